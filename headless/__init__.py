@@ -1,0 +1,1 @@
+"""Thin command lines over `synthroads_addon`; each module is one sub-command."""

@@ -1,0 +1,141 @@
+"""The console command `synthroads`: parses, runs, and turns errors into exit codes.
+
+Exit codes: 0 done; 1 a defect of ours; 2 bad input; 3 violations found; 130 interrupted.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from importlib import import_module
+from typing import Any
+
+from synthroads_addon import version
+from synthroads_addon.core.errors import InputError
+from synthroads_addon.core.progress import Progress, silent
+from synthroads_addon.core.schema import canonical_json
+
+COMMANDS = {
+    "generate": "make a road, scan it and write cloud, parameters and pictures",
+    "tradeoff": "measure error against time for each knob",
+}
+
+
+class _Parser(argparse.ArgumentParser):
+    """A parser whose complaints are one line, like every other bad input."""
+
+    def error(self, message: str) -> Any:
+        self.exit(2, f"{self.prog}: {message}\n")
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run one sub-command; return its exit code."""
+    parser = _Parser(prog="synthroads", description="Synthetic motorways, scanned and labelled.")
+    parser.add_argument("--version", action="version", version=f"SynthRoads {version()}")
+    commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
+    for name, summary in COMMANDS.items():
+        module = import_module(f"headless.{name}")
+        module.add_arguments(commands.add_parser(name, help=summary, description=module.__doc__))
+    arguments = parser.parse_args(argv)
+    return run(import_module(f"headless.{arguments.command}").run, arguments)
+
+
+def command(name: str, argv: Sequence[str] | None = None) -> int:
+    """Run the sub-command `name` by itself, as ``python -m headless.NAME`` does."""
+    module = import_module(f"headless.{name}")
+    parser = _Parser(prog=f"synthroads {name}", description=module.__doc__)
+    module.add_arguments(parser)
+    return run(module.run, parser.parse_args(argv))
+
+
+def add_common_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the flags that every sub-command understands."""
+    parser.add_argument("--quiet", action="store_true", help="print nothing but errors")
+    parser.add_argument("--json", action="store_true", help="print the result as JSON on standard output")
+
+
+def run(action: Callable[[argparse.Namespace], tuple[int, dict[str, Any], str]], arguments: argparse.Namespace) -> int:
+    """Run an action that returns (exit code, result as JSON data, result as text); print what was asked for."""
+    try:
+        with _only_our_words_on_stdout():
+            code, result, text = action(arguments)
+    except InputError as error:
+        print(f"error: {error}", file=sys.stderr)
+        return 2
+    except KeyboardInterrupt:
+        print("interrupted; nothing was left half-written", file=sys.stderr)
+        return 130
+    if arguments.json:
+        print(canonical_json(result), end="")
+    elif not arguments.quiet:
+        print(text)
+    return code
+
+
+def entry(name: str) -> None:
+    """Run a sub-command as a script, under plain Python or ``blender -b -P``; ends the process.
+
+    In Blender the arguments follow ``--``. The process is left at once: Blender's own teardown can crash after the work.
+    """
+    blender = "bpy" in sys.modules and "--" in sys.argv or os.path.basename(sys.argv[0]).startswith("blender")
+    argv = sys.argv[sys.argv.index("--") + 1 :] if "--" in sys.argv else [] if blender else sys.argv[1:]
+    leave(lambda: command(name, argv))
+
+
+def console() -> None:
+    """Run the console command `synthroads`; ends the process."""
+    leave(main)
+
+
+def leave(action: Callable[[], int]) -> None:
+    """Run an action and end the process with its exit code, without Blender's teardown."""
+    try:
+        code = action()
+    except SystemExit as error:
+        code = error.code if isinstance(error.code, int) else 0 if error.code is None else 1
+    except BaseException:
+        import traceback
+
+        traceback.print_exc()
+        code = 1
+    sys.stdout.flush()
+    sys.stderr.flush()
+    os._exit(code)
+
+
+def progress_bar(arguments: argparse.Namespace) -> Progress:
+    """Return the progress that suits the flags: a bar on standard error, or nothing."""
+    if arguments.quiet or arguments.json or not sys.stderr.isatty():
+        return silent
+    from tqdm import tqdm
+
+    bar = tqdm(total=100, bar_format="{desc:<12} {bar:40} {n:3.0f} %  {elapsed}", file=sys.stderr, leave=False)
+
+    def show(stage: str, share: float) -> None:
+        if bar.desc != f"{stage}: ":
+            bar.reset()
+            bar.set_description(stage)
+        bar.update(100 * share - bar.n)
+
+    return show
+
+
+@contextmanager
+def _only_our_words_on_stdout() -> Iterator[None]:
+    """Send what Blender prints to standard output (file names it saved, say) to standard error meanwhile."""
+    sys.stdout.flush()
+    try:
+        saved = os.dup(1)
+    except OSError:  # no standard output at all
+        yield
+        return
+    os.dup2(2, 1)
+    try:
+        yield
+    finally:
+        sys.stdout.flush()
+        os.dup2(saved, 1)
+        os.close(saved)

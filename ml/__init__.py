@@ -1,0 +1,1 @@
+"""Learning on the scenes (PyTorch; no Blender)."""

@@ -1,0 +1,30 @@
+"""Ray casters behind one interface (`core.scanning.caster.Caster`)."""
+
+from __future__ import annotations
+
+from ...core.errors import InputError
+from ...core.scanning.caster import Caster
+from ...core.scene_mesh import SceneMesh
+
+NAMES = ("embree", "bvhtree")
+
+
+def make_caster(name: str, mesh: SceneMesh) -> Caster:
+    """Return the caster ``embree``, ``bvhtree`` or, as ``auto``, the fastest that is there.
+
+    Raises:
+        InputError: there is no such caster, or its package isn't installed.
+    """
+    if name in ("auto", "embree"):
+        try:
+            from .embree import EmbreeCaster
+
+            return EmbreeCaster(mesh)
+        except ImportError:
+            if name == "embree":
+                raise InputError("scan.caster", name, "needs the package embreex; bvhtree is always there") from None
+    if name in ("auto", "bvhtree"):
+        from .bvhtree import BVHTreeCaster
+
+        return BVHTreeCaster(mesh)
+    raise InputError("scan.caster", name, f"must be auto or one of {', '.join(NAMES)}")

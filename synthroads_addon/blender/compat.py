@@ -1,0 +1,34 @@
+"""What differs between Blender 4.5 LTS and 5.2 LTS, and nothing else."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import bpy
+
+_INPUTS_ARE_PROPERTIES = bpy.app.version >= (5, 2, 0)
+
+
+def _identifier(modifier: bpy.types.NodesModifier, name: str) -> str:
+    for item in modifier.node_group.interface.items_tree:
+        if item.item_type == "SOCKET" and item.in_out == "INPUT" and item.name == name:
+            return item.identifier
+    raise KeyError(f"{modifier.node_group.name} has no input '{name}'")
+
+
+def set_modifier_input(modifier: bpy.types.NodesModifier, name: str, value: Any) -> None:
+    """Set the input `name` of a Geometry Nodes modifier; KeyError if its group has none of that name."""
+    identifier = _identifier(modifier, name)
+    if _INPUTS_ARE_PROPERTIES:
+        getattr(modifier.properties.inputs, identifier).value = value
+    else:
+        modifier[identifier] = value
+    modifier.id_data.update_tag()
+
+
+def modifier_input(modifier: bpy.types.NodesModifier, name: str) -> Any:
+    """Return the value of the input `name` of a Geometry Nodes modifier."""
+    identifier = _identifier(modifier, name)
+    if _INPUTS_ARE_PROPERTIES:
+        return getattr(modifier.properties.inputs, identifier).value
+    return modifier[identifier]

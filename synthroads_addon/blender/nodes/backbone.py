@@ -1,0 +1,77 @@
+"""The backbone: a polyline along the axis whose points carry what a row of the road needs to know.
+
+Attributes of its points: ``station`` (m), ``left`` (unit vector, horizontal), ``curvature`` (1/m, positive to the left),
+``crossfall_left`` and ``crossfall_right`` (m/m, positive where the surface falls to the right).
+"""
+
+from __future__ import annotations
+
+from . import operations as op
+from .builder import Operand, Value
+
+FOLD_SHARE = 0.98
+"""Share of the radius at which an offset curve is cut, as in `core.parameters.alignment.clip_offset`."""
+
+NUMBERS = ("station", "curvature", "crossfall_left", "crossfall_right")
+"""The backbone's attributes that are numbers."""
+
+
+def row(backbone: Value, number: Value) -> tuple[Value, Value, Value]:
+    """Return axis point, left vector and curvature of the backbone's row `number`."""
+    tree = backbone.tree
+    axis = op.sample_index(backbone, op.position(tree), number)
+    left = op.sample_index(backbone, op.named(tree, "left", "FLOAT_VECTOR"), number)
+    return axis, left, op.sample_index(backbone, op.named(tree, "curvature"), number)
+
+
+def cut(offset: Value, curvature: Value) -> Value:
+    """Return the offset, cut where its curve would fold."""
+    return op.switch(offset * curvature > FOLD_SHARE, offset, FOLD_SHARE / curvature)
+
+
+def station_ribbon(backbone: Value) -> Value:
+    """Return a flat ribbon along x = station that carries the backbone's attributes, to look them up by station."""
+    tree = backbone.tree
+    with tree.frame("Ribbon to look up stations"):
+        mesh, column, number = op.grid(tree, 2, op.point_count(backbone))
+        axis, left, _ = row(backbone, number)
+        values = {name: op.sample_index(backbone, op.named(tree, name), number) for name in NUMBERS}
+        for name, value in {"axis": axis, "left": left, **values}.items():
+            mesh = op.store(mesh, name, value)
+        place = op.vector(tree, op.named(tree, "station"), 0.5 - column)
+        return op.set_position(mesh, place)
+
+
+def look_up(ribbon: Value, name: str, station: Value) -> Value:
+    """Return an attribute of the backbone (``axis`` is its position) at any station, linear between its rows."""
+    tree = ribbon.tree
+    kind = "FLOAT_VECTOR" if name in ("axis", "left") else "FLOAT"
+    return op.sample_surface(ribbon, op.named(tree, name, kind), op.vector(tree, station))
+
+
+def height_on(road: Value, terrain: Value, place: Value) -> Value:
+    """Return the z of the surface above or below `place`: the road's, beside it the terrain's.
+
+    On the very border of the road a vertical ray may pass by: there the nearest point of the road counts.
+    """
+    tree = road.tree
+    above = place + (0.0, 0.0, 500.0)
+
+    def cast(target: Value) -> tuple[Value, Value]:
+        ray = tree.node("GeometryNodeRaycast", target_geometry=target, source_position=above, ray_length=1000.0)
+        return ray["Is Hit"], op.component(ray["Hit Position"], "Z")
+
+    on_road, road_z = cast(road)
+    on_terrain, terrain_z = cast(terrain)
+    nearest_z = op.component(op.sample_surface(road, op.position(tree), place), "Z")
+    return op.switch(on_road, op.switch(on_terrain, nearest_z, terrain_z), road_z)
+
+
+def last_station(backbone: Value) -> Value:
+    """Return the station of the backbone's last point."""
+    return op.sample_index(backbone, op.named(backbone.tree, "station"), op.point_count(backbone) - 1)
+
+
+def raised(place: Value, height: Operand) -> Value:
+    """Return `place` moved up by `height`."""
+    return place + op.vector(place.tree, 0.0, 0.0, height)

@@ -1,0 +1,320 @@
+"""A small builder of Geometry Nodes: a node group is a function that reads top to bottom.
+
+    def build(tree: Tree) -> None:
+        width = tree.number("Width", 3.5, (2.0, 6.0), unit="m", description="Width of the lane")
+        with tree.frame("Pavement"):
+            grid = tree.node("GeometryNodeMeshGrid", size_x=width, size_y=2.0 * width + 1.0)
+        tree.output("Mesh", grid.value)
+
+    group = node_group("SR Lane", build)
+
+Sockets are `Value`s: they can be added, multiplied, compared and handed to other nodes. Positions of nodes are worked out
+from the frames and the links. A group that is already in the file in the same version is used again.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import bpy
+
+from .layout import arrange
+
+KEY = "synthroads_key"
+"""Custom property of a group: hash of what it was built from."""
+
+
+class Value:
+    """An output socket that can be calculated with. Numbers mix freely with it; vectors take numbers component-wise."""
+
+    def __init__(self, tree: Tree, socket: bpy.types.NodeSocket | None, kind: str) -> None:
+        self.tree = tree
+        self.socket = socket
+        self.kind = kind  # VALUE, INT, BOOLEAN, VECTOR, ROTATION, GEOMETRY, OBJECT, MATERIAL, STRING
+
+    def source(self) -> bpy.types.NodeSocket:
+        """Return the socket to link from."""
+        assert self.socket is not None
+        return self.socket
+
+    def _math(self, operation: str, *operands: Operand) -> Value:
+        kinds = {_kind(operand) for operand in operands}
+        if "VECTOR" in kinds:
+            if operation == "MULTIPLY" and "VECTOR" not in {_kind(operands[1])}:
+                return self.tree.node("ShaderNodeVectorMath", operands[0], scale=operands[1], operation="SCALE").value
+            return self.tree.node("ShaderNodeVectorMath", *operands, operation=operation).value
+        if kinds == {"INT"} and operation != "DIVIDE":
+            return self.tree.node("FunctionNodeIntegerMath", *operands, operation=operation).value
+        return self.tree.node("ShaderNodeMath", *operands, operation=operation).value
+
+    def _compare(self, operation: str, other: Operand) -> Value:
+        kind = "INT" if {_kind(self), _kind(other)} == {"INT"} else "FLOAT"
+        return self.tree.node("FunctionNodeCompare", self, other, operation=operation, data_type=kind).value
+
+    def __add__(self, other: Operand) -> Value:
+        return self._math("ADD", self, other)
+
+    def __radd__(self, other: Operand) -> Value:
+        return self._math("ADD", other, self)
+
+    def __sub__(self, other: Operand) -> Value:
+        return self._math("SUBTRACT", self, other)
+
+    def __rsub__(self, other: Operand) -> Value:
+        return self._math("SUBTRACT", other, self)
+
+    def __mul__(self, other: Operand) -> Value:
+        if _kind(other) == "VECTOR" and self.kind != "VECTOR":
+            return self._math("MULTIPLY", other, self)
+        return self._math("MULTIPLY", self, other)
+
+    def __rmul__(self, other: Operand) -> Value:
+        return self * other
+
+    def __truediv__(self, other: Operand) -> Value:
+        return self._math("DIVIDE", self, other)
+
+    def __rtruediv__(self, other: Operand) -> Value:
+        return self._math("DIVIDE", other, self)
+
+    def __floordiv__(self, other: Operand) -> Value:
+        return self._math("DIVIDE_FLOOR", self, other)
+
+    def __mod__(self, other: Operand) -> Value:
+        return self._math("FLOORED_MODULO", self, other)
+
+    def __neg__(self) -> Value:
+        return self._math("MULTIPLY", self, -1 if self.kind == "INT" else -1.0)
+
+    def __lt__(self, other: Operand) -> Value:
+        return self._compare("LESS_THAN", other)
+
+    def __le__(self, other: Operand) -> Value:
+        return self._compare("LESS_EQUAL", other)
+
+    def __gt__(self, other: Operand) -> Value:
+        return self._compare("GREATER_THAN", other)
+
+    def __ge__(self, other: Operand) -> Value:
+        return self._compare("GREATER_EQUAL", other)
+
+    def __and__(self, other: Operand) -> Value:
+        return self.tree.node("FunctionNodeBooleanMath", self, other, operation="AND").value
+
+    def __or__(self, other: Operand) -> Value:
+        return self.tree.node("FunctionNodeBooleanMath", self, other, operation="OR").value
+
+    def __invert__(self) -> Value:
+        return self.tree.node("FunctionNodeBooleanMath", self, operation="NOT").value
+
+    def equals(self, other: Operand) -> Value:
+        """Return whether two whole numbers are the same."""
+        return self._compare("EQUAL", other)
+
+
+Operand = Value | float | int | bool | tuple[float, float, float]
+
+
+class GroupInput(Value):
+    """An input of the group. Each frame gets a Group Input node of its own, so that links stay short."""
+
+    def __init__(self, tree: Tree, name: str, kind: str) -> None:
+        super().__init__(tree, None, kind)
+        self.name = name
+
+    def source(self) -> bpy.types.NodeSocket:
+        """Return the socket of the current frame's Group Input node."""
+        return self.tree.group_input_node().outputs[self.name]
+
+
+class Node:
+    """A node that has been added; its outputs by name, and the first of them as `value`."""
+
+    def __init__(self, tree: Tree, raw: bpy.types.Node) -> None:
+        self.tree = tree
+        self.raw = raw
+
+    def __getitem__(self, name: str) -> Value:
+        socket = next(s for s in self.raw.outputs if s.enabled and s.name == name)
+        return Value(self.tree, socket, socket.type)
+
+    @property
+    def value(self) -> Value:
+        """Return the first output."""
+        socket = next(s for s in self.raw.outputs if s.enabled)
+        return Value(self.tree, socket, socket.type)
+
+
+class Tree:
+    """A node group under construction."""
+
+    def __init__(self, group: bpy.types.NodeTree) -> None:
+        self.group = group
+        self._frame: bpy.types.Node | None = None
+        self._panel: Any = None
+        self._inputs: dict[str, bpy.types.Node] = {}
+        self._output: bpy.types.Node | None = None
+
+    # Interface
+
+    def number(
+        self, name: str, default: float, limits: tuple[float, float], *, unit: str = "", description: str
+    ) -> Value:
+        """Declare a number; `unit` "m" and "rad" let Blender show the scene's units."""
+        socket = self._socket(name, "NodeSocketFloat", description + (f" ({unit})" if unit else ""))
+        socket.subtype = {"m": "DISTANCE", "rad": "ANGLE", "share": "FACTOR"}.get(unit, "NONE")
+        socket.default_value, (socket.min_value, socket.max_value) = default, limits
+        return GroupInput(self, name, "VALUE")
+
+    def integer(self, name: str, default: int, limits: tuple[int, int], *, description: str) -> Value:
+        """Declare a whole number."""
+        socket = self._socket(name, "NodeSocketInt", description)
+        socket.default_value, (socket.min_value, socket.max_value) = default, limits
+        return GroupInput(self, name, "INT")
+
+    def boolean(self, name: str, default: bool, *, description: str) -> Value:
+        """Declare a choice of yes or no."""
+        self._socket(name, "NodeSocketBool", description).default_value = default
+        return GroupInput(self, name, "BOOLEAN")
+
+    def input(self, name: str, kind: str, *, description: str) -> Value:
+        """Declare an input of another kind: ``Geometry``, ``Object``, ``Material``, ``Vector``, ``Rotation``."""
+        self._socket(name, f"NodeSocket{kind}", description)
+        return GroupInput(self, name, kind.upper())
+
+    def output(self, name: str, value: Value, *, description: str = "") -> None:
+        """Declare an output and link it."""
+        kind = {"VALUE": "Float", "INT": "Int", "BOOLEAN": "Bool"}.get(value.kind, value.kind.title())
+        socket = self.group.interface.new_socket(name, in_out="OUTPUT", socket_type=f"NodeSocket{kind}")
+        socket.description = description
+        if self._output is None:
+            self._output = self.group.nodes.new("NodeGroupOutput")
+        self.group.links.new(value.source(), self._output.inputs[name])
+
+    @contextmanager
+    def panel(self, name: str) -> Iterator[None]:
+        """Put the inputs declared inside under one heading of the modifier."""
+        self._panel = self.group.interface.new_panel(name, default_closed=True)
+        yield
+        self._panel = None
+
+    def _socket(self, name: str, kind: str, description: str) -> Any:
+        socket = self.group.interface.new_socket(name, in_out="INPUT", socket_type=kind, parent=self._panel)
+        socket.description = description
+        return socket
+
+    def group_input_node(self) -> bpy.types.Node:
+        """Return the Group Input node of the current frame."""
+        key = self._frame.name if self._frame else ""
+        if key not in self._inputs:
+            self._inputs[key] = self._new("NodeGroupInput")
+        return self._inputs[key]
+
+    # Nodes
+
+    @contextmanager
+    def frame(self, label: str) -> Iterator[None]:
+        """Put the nodes made inside into one labelled frame."""
+        outer, self._frame = self._frame, self.group.nodes.new("NodeFrame")
+        self._frame.label = label
+        yield
+        self._frame = outer
+
+    def node(self, kind: str, *operands: Operand, **settings: Any) -> Node:
+        """Add a node.
+
+        Args:
+            kind: Blender's name of the node's class.
+            operands: values of its inputs in order.
+            settings: properties of the node (``operation="ADD"``) and inputs by name in snake case (``ray_length=5.0``).
+        """
+        raw = self._new(kind)
+        inputs = {}
+        for name, value in settings.items():
+            if name in raw.bl_rna.properties and name not in bpy.types.Node.bl_rna.properties:
+                setattr(raw, name, value)
+            else:
+                inputs[name.rstrip("_")] = value
+        sockets = [socket for socket in raw.inputs if socket.enabled]
+        for socket, operand in zip(sockets, operands, strict=False):
+            self._feed(socket, operand)
+        named = {socket.name.lower().replace(" ", "_"): socket for socket in sockets}
+        for name, operand in inputs.items():
+            self._feed(named[name], operand)
+        return Node(self, raw)
+
+    def call(self, group: bpy.types.NodeTree, **inputs: Operand) -> Node:
+        """Add another group as a node; its inputs by name in snake case."""
+        raw = self._new("GeometryNodeGroup")
+        raw.node_tree = group
+        named = {socket.name.lower().replace(" ", "_"): socket for socket in raw.inputs}
+        for name, operand in inputs.items():
+            self._feed(named[name], operand)
+        return Node(self, raw)
+
+    def link_all(self, socket: bpy.types.NodeSocket, values: list[Value]) -> None:
+        """Link several values to a socket that takes more than one, in order."""
+        # Blender puts the newest link of such a socket on top, that is first.
+        for value in reversed(values):
+            self.group.links.new(value.source(), socket)
+
+    def _new(self, kind: str) -> bpy.types.Node:
+        raw = self.group.nodes.new(kind)
+        raw.parent = self._frame
+        return raw
+
+    def _feed(self, socket: bpy.types.NodeSocket, operand: Operand) -> None:
+        if isinstance(operand, Value):
+            self.group.links.new(operand.source(), socket)
+        elif socket.type == "VECTOR" and isinstance(operand, int | float):
+            socket.default_value = (operand, operand, operand)
+        else:
+            socket.default_value = operand
+
+
+def _kind(operand: Operand) -> str:
+    if isinstance(operand, Value):
+        return operand.kind
+    if isinstance(operand, tuple):
+        return "VECTOR"
+    return "INT" if isinstance(operand, int) else "VALUE"
+
+
+@cache
+def _sources() -> bytes:
+    """Return a digest of this package's sources: a change to any of them makes new groups."""
+    digest = hashlib.sha256()
+    for path in sorted(Path(__file__).parent.glob("*.py")):
+        digest.update(path.read_bytes())
+    return digest.digest()
+
+
+def node_group(
+    name: str, build: Callable[[Tree], None], *arguments: object, description: str = ""
+) -> bpy.types.NodeTree:
+    """Return the node group `name`, from this file if it holds the same version, else built anew.
+
+    Args:
+        name: as shown in Blender; an older version of that name is renamed.
+        build: declares inputs, adds nodes, declares outputs.
+        arguments: what `build` depends on apart from its source (a number of lanes, say).
+        description: shown as a tooltip.
+    """
+    key = hashlib.sha256(_sources() + repr((name, arguments)).encode()).hexdigest()[:16]
+    for group in bpy.data.node_groups:
+        if group.get(KEY) == key:
+            return group
+    if old := bpy.data.node_groups.get(name):
+        old.name = f"{name} (older)"
+    group = bpy.data.node_groups.new(name, "GeometryNodeTree")
+    group[KEY] = key
+    group.is_modifier = True
+    group.description = description or (build.__doc__ or "").strip().partition("\n")[0]
+    build(Tree(group))
+    arrange(group)
+    return group

@@ -1,0 +1,50 @@
+"""Where the nodes of a group are put: frames one below the other, in each the nodes from left to right by depth."""
+
+from __future__ import annotations
+
+import bpy
+
+COLUMN = 220.0
+ROW_GAP = 30.0
+FRAME_GAP = 90.0
+
+
+def arrange(group: bpy.types.NodeTree) -> None:
+    """Give every node its place, and hide unused sockets of the Group Input nodes."""
+    incoming: dict[str, list[bpy.types.Node]] = {node.name: [] for node in group.nodes}
+    for link in group.links:
+        incoming[link.to_node.name].append(link.from_node)
+    depths: dict[str, int] = {}
+    for node in group.nodes:
+        _depth(node, incoming, depths)
+    top = 0.0
+    blocks: dict[str, list[bpy.types.Node]] = {}
+    for node in group.nodes:
+        if node.type != "FRAME":
+            blocks.setdefault(node.parent.name if node.parent else "", []).append(node)
+    for block in blocks.values():
+        top -= _arrange_block(block, depths, top) + FRAME_GAP
+    for node in group.nodes:
+        if node.type == "GROUP_INPUT":
+            for socket in node.outputs:
+                socket.hide = not socket.is_linked
+
+
+def _depth(node: bpy.types.Node, incoming: dict[str, list[bpy.types.Node]], depths: dict[str, int]) -> int:
+    """Return the node's depth: the longest way to it, counted within its own frame."""
+    if node.name not in depths:
+        same = [before for before in incoming[node.name] if before.parent == node.parent]
+        depths[node.name] = 1 + max((_depth(before, incoming, depths) for before in same), default=-1)
+    return depths[node.name]
+
+
+def _arrange_block(block: list[bpy.types.Node], depths: dict[str, int], top: float) -> float:
+    """Place the nodes of one frame from `top` downwards and return the block's height."""
+    heights: dict[int, float] = {}
+    for node in block:
+        depth = depths[node.name]
+        sockets = sum(1 for socket in (*node.inputs, *node.outputs) if socket.enabled and not socket.hide)
+        height = 60.0 + 22.0 * sockets + ROW_GAP
+        node.location = (COLUMN * depth, top - heights.get(depth, 0.0))
+        heights[depth] = heights.get(depth, 0.0) + height
+    return max(heights.values(), default=0.0)

@@ -1,0 +1,79 @@
+"""SR Line Marking: a solid or dashed line on the pavement."""
+
+from __future__ import annotations
+
+import bpy
+
+from . import operations as op
+from .backbone import NUMBERS, last_station, look_up, station_ribbon
+from .builder import Tree, Value, node_group
+from .strip import FAR, strip_group
+
+SNAP = 1e-3
+"""End of a dash this near (m) to a row of the backbone: it is that row."""
+
+
+def marking_group() -> bpy.types.NodeTree:
+    """Return the group SR Line Marking."""
+    return node_group("SR Line Marking", _build)
+
+
+def _build(tree: Tree) -> None:
+    """A line between two offsets, dashed or solid, raised above the pavement by its film."""
+    backbone = tree.input("Backbone", "Geometry", description="Polyline along the axis with its attributes")
+    left = tree.number("Left Offset", 0.1, FAR, unit="m", description="Offset of the left edge, positive to the left")
+    right = tree.number("Right Offset", -0.1, FAR, unit="m", description="Offset of the right edge")
+    left_height = tree.number("Left Height", 0.0, FAR, unit="m", description="Pavement at the left edge above the axis")
+    right_height = tree.number("Right Height", 0.0, FAR, unit="m", description="Pavement at the right edge")
+    first = tree.number("Start Station", 0.0, (0.0, 1e6), unit="m", description="Beginning of the first dash")
+    last = tree.number("End Station", 1e6, (0.0, 1e6), unit="m", description="End of the line")
+    dash = tree.number("Dash", 6.0, (0.0, 100.0), unit="m", description="Length of a dash; 0 for a solid line")
+    gap = tree.number("Gap", 12.0, (0.0, 100.0), unit="m", description="Length of a gap")
+    film = tree.number("Film Thickness", 0.003, (0.0, 0.01), unit="m", description="Height above the pavement")
+    class_id = tree.integer("Class", 2, (0, 255), description="Semantic class of the faces")
+    instance = tree.integer("Instance", 0, (-(2**31), 2**31 - 1), description="Instance number of the faces")
+    material = tree.input("Material", "Material", description="Material of the faces")
+
+    with tree.frame("Dashes: a solid line is one dash"):
+        end = op.minimum(last, last_station(backbone))
+        dashed = dash > 0.0
+        length = op.switch(dashed, end - first, dash)
+        period = op.switch(dashed, (end - first) * 2.0, dash + gap)
+        count = op.rounded_up(op.maximum((end - first) / period - 1e-6, 0.0))
+    rows = _with_ends(tree, backbone, (first, end, length, period, count))
+    with tree.frame("Ribbon over all rows; the faces of the gaps are deleted"):
+        ribbon = tree.call(
+            strip_group(),
+            backbone=rows,
+            left_offset=left,
+            right_offset=right,
+            left_height=left_height + film,
+            right_height=right_height + film,
+            class_=class_id,
+            instance=instance,
+            material=material,
+        ).value
+        station = op.named(tree, "station")
+        painted = (station > first) & (station < end) & ((station - first) % period < length)
+        tree.output("Mesh", op.delete_faces(ribbon, ~painted), description="Dashes whose faces look up")
+
+
+def _with_ends(tree: Tree, backbone: Value, dashes: tuple[Value, Value, Value, Value, Value]) -> Value:
+    """Return the backbone with a row more at both ends of every dash."""
+    first, end, length, period, count = dashes
+    ribbon = station_ribbon(backbone)
+    with tree.frame("Ends of the dashes as rows of their own"):
+        points = tree.node("GeometryNodeMeshLine", count=count * 2).value
+        number = op.index(tree)
+        wanted = op.minimum(first + (number // 2) * period + (number % 2) * length, end)
+        near = tree.node("GeometryNodeSampleNearest", ribbon, op.vector(tree, wanted), domain="POINT").value
+        snapped = op.sample_index(ribbon, op.named(tree, "station"), near)
+        distance = op.unary("ABSOLUTE", wanted - snapped)
+        points = op.store(points, "station", op.switch(distance < SNAP, wanted, snapped))
+        station = op.named(tree, "station")
+        for name in NUMBERS[1:]:
+            points = op.store(points, name, look_up(ribbon, name, station))
+        points = op.store(points, "left", look_up(ribbon, "left", station))
+        points = op.set_position(points, look_up(ribbon, "axis", station))
+        both = op.join(backbone, points)
+        return tree.node("GeometryNodeSortElements", both, domain="POINT", sort_weight=op.named(tree, "station")).value

@@ -1,0 +1,195 @@
+"""The nodes that the groups use most, as functions of values: what goes in, what comes out."""
+
+from __future__ import annotations
+
+from .builder import Operand, Tree, Value
+
+SMALLEST_AREA = 1e-6
+"""Faces smaller than this (m2) come from strips of no width or offset curves that are cut, and are removed."""
+
+_DATA_TYPES = {"VALUE": "FLOAT", "INT": "INT", "BOOLEAN": "BOOLEAN", "VECTOR": "FLOAT_VECTOR"}
+_SWITCH_TYPES = {"VALUE": "FLOAT", "INT": "INT", "BOOLEAN": "BOOLEAN", "VECTOR": "VECTOR"}
+
+
+def index(tree: Tree) -> Value:
+    """Return the element's index."""
+    return tree.node("GeometryNodeInputIndex").value
+
+
+def position(tree: Tree) -> Value:
+    """Return the point's position."""
+    return tree.node("GeometryNodeInputPosition").value
+
+
+def named(tree: Tree, name: str, data_type: str = "FLOAT") -> Value:
+    """Return the attribute `name` of the geometry that the field is evaluated on."""
+    return tree.node("GeometryNodeInputNamedAttribute", name, data_type=data_type).value
+
+
+def minimum(a: Value, b: Operand) -> Value:
+    """Return the smaller of two numbers."""
+    return a.tree.node("ShaderNodeMath", a, b, operation="MINIMUM").value
+
+
+def maximum(a: Value, b: Operand) -> Value:
+    """Return the larger of two numbers."""
+    return a.tree.node("ShaderNodeMath", a, b, operation="MAXIMUM").value
+
+
+def unary(operation: str, a: Value) -> Value:
+    """Return a function of one number: ``ABSOLUTE``, ``CEIL``, ``FLOOR``, ``SQRT``, ``SINE``, ..."""
+    return a.tree.node("ShaderNodeMath", a, operation=operation).value
+
+
+def power(a: Value, exponent: Operand) -> Value:
+    """Return `a` to the power of `exponent`."""
+    return a.tree.node("ShaderNodeMath", a, exponent, operation="POWER").value
+
+
+def rounded_up(a: Value) -> Value:
+    """Return the least whole number that is not less than `a`."""
+    return a.tree.node("FunctionNodeFloatToInt", a, rounding_mode="CEILING").value
+
+
+def dot(a: Value, b: Operand) -> Value:
+    """Return the dot product of two vectors."""
+    return a.tree.node("ShaderNodeVectorMath", a, b, operation="DOT_PRODUCT").value
+
+
+def vector(tree: Tree, x: Operand = 0.0, y: Operand = 0.0, z: Operand = 0.0) -> Value:
+    """Return a vector from its components."""
+    return tree.node("ShaderNodeCombineXYZ", x, y, z).value
+
+
+def component(a: Value, axis: str) -> Value:
+    """Return the component "X", "Y" or "Z" of a vector."""
+    return a.tree.node("ShaderNodeSeparateXYZ", a)[axis]
+
+
+def switch(condition: Value, false: Operand, true: Operand) -> Value:
+    """Return `true` where the condition holds, else `false`."""
+    kinds = [value.kind for value in (false, true) if isinstance(value, Value)]
+    kind = _SWITCH_TYPES.get(kinds[0] if kinds else "VALUE", kinds[0] if kinds else "FLOAT")
+    return condition.tree.node("GeometryNodeSwitch", condition, false, true, input_type=kind).value
+
+
+def only_if(condition: Value, geometry: Value) -> Value:
+    """Return the geometry if the (single) condition holds, else nothing."""
+    return condition.tree.node("GeometryNodeSwitch", input_type="GEOMETRY", switch=condition, true=geometry).value
+
+
+def choose(index: Value, items: list[tuple[float, float, float]]) -> Value:
+    """Return the vector of the table `items` that stands at `index`."""
+    node = index.tree.node("GeometryNodeIndexSwitch", data_type="VECTOR")
+    for _ in items[2:]:
+        node.raw.index_switch_items.new()
+    sockets = [socket for socket in node.raw.inputs if socket.enabled and socket.type == "VECTOR"]
+    for socket, item in zip(sockets, items, strict=True):
+        socket.default_value = item
+    index.tree.group.links.new(index.source(), node.raw.inputs[0])
+    return node.value
+
+
+def random(tree: Tree, low: Operand, high: Operand, seed: Operand, identifier: Value | None = None) -> Value:
+    """Return a uniform random number (or vector, if `low` is one) per element."""
+    kind = "FLOAT_VECTOR" if isinstance(low, tuple) else "FLOAT"
+    settings: dict[str, Operand] = {"min": low, "max": high, "seed": seed}
+    if identifier is not None:
+        settings["id"] = identifier
+    return tree.node("FunctionNodeRandomValue", data_type=kind, **settings).value
+
+
+def point_count(geometry: Value) -> Value:
+    """Return the number of points of a mesh."""
+    return geometry.tree.node("GeometryNodeAttributeDomainSize", geometry, component="MESH")["Point Count"]
+
+
+def sample_index(geometry: Value, value: Value, index: Value) -> Value:
+    """Return `value`, evaluated on the points of another geometry, at `index`."""
+    kind = _DATA_TYPES[value.kind]
+    return geometry.tree.node("GeometryNodeSampleIndex", geometry, value, index, data_type=kind, clamp=True).value
+
+
+def sample_surface(mesh: Value, value: Value, place: Value) -> Value:
+    """Return `value`, interpolated on the point of the mesh's surface nearest to `place`."""
+    kind = _DATA_TYPES[value.kind]
+    return mesh.tree.node(
+        "GeometryNodeSampleNearestSurface", data_type=kind, mesh=mesh, value=value, sample_position=place
+    ).value
+
+
+def object_geometry(item: Value) -> Value:
+    """Return an object's evaluated geometry in the space of the modified object."""
+    return item.tree.node("GeometryNodeObjectInfo", item, transform_space="RELATIVE")["Geometry"]
+
+
+def grid(tree: Tree, columns: Operand, rows: Operand) -> tuple[Value, Value, Value]:
+    """Return a mesh of columns x rows vertices and the fields of their column and row.
+
+    Column 0 is the left one for an observer who looks from row 0 along the rows; then its faces look up.
+    """
+    mesh = tree.node("GeometryNodeMeshGrid", vertices_x=columns, vertices_y=rows).value
+    number = index(tree)
+    if isinstance(rows, int):
+        rows = tree.node("FunctionNodeInputInt", integer=rows).value
+    assert isinstance(rows, Value)
+    return mesh, number // rows, number % rows
+
+
+def set_position(geometry: Value, place: Value) -> Value:
+    """Move all points to `place`."""
+    return geometry.tree.node("GeometryNodeSetPosition", geometry, position=place).value
+
+
+def store(geometry: Value, name: str, value: Operand, domain: str = "POINT") -> Value:
+    """Store a named attribute."""
+    kind = _DATA_TYPES[value.kind] if isinstance(value, Value) else ("INT" if isinstance(value, int) else "FLOAT")
+    return geometry.tree.node(
+        "GeometryNodeStoreNamedAttribute", geometry, data_type=kind, domain=domain, name=name, value=value
+    ).value
+
+
+def delete_faces(geometry: Value, selection: Value) -> Value:
+    """Delete faces, and the points that only they used."""
+    return geometry.tree.node("GeometryNodeDeleteGeometry", geometry, selection, domain="FACE", mode="ALL").value
+
+
+def delete_points(geometry: Value, selection: Value) -> Value:
+    """Delete points."""
+    return geometry.tree.node("GeometryNodeDeleteGeometry", geometry, selection, domain="POINT", mode="ALL").value
+
+
+def separate(geometry: Value, selection: Value, domain: str = "POINT") -> Value:
+    """Return the selected part of the geometry."""
+    return geometry.tree.node("GeometryNodeSeparateGeometry", geometry, selection, domain=domain)["Selection"]
+
+
+def without_degenerate(geometry: Value) -> Value:
+    """Delete faces without area."""
+    area = geometry.tree.node("GeometryNodeInputMeshFaceArea").value
+    return delete_faces(geometry, area < SMALLEST_AREA)
+
+
+def join(*geometries: Value) -> Value:
+    """Join geometries; the first comes first."""
+    tree = geometries[0].tree
+    node = tree.node("GeometryNodeJoinGeometry")
+    tree.link_all(node.raw.inputs[0], list(geometries))
+    return node.value
+
+
+def label(geometry: Value, class_id: Operand, instance: Operand, material: Value) -> Value:
+    """Give every face its class, its instance and its material."""
+    labelled = store(geometry, "class_id", class_id, "FACE")
+    labelled = store(labelled, "instance_id", instance, "FACE")
+    return geometry.tree.node("GeometryNodeSetMaterial", labelled, material=material).value
+
+
+def realize(geometry: Value) -> Value:
+    """Turn instances into real geometry; their attributes go to it."""
+    return geometry.tree.node("GeometryNodeRealizeInstances", geometry).value
+
+
+def turn(tree: Tree, x: Operand = 0.0, y: Operand = 0.0, z: Operand = 0.0) -> Value:
+    """Return the rotation about x, then y, then z (rad)."""
+    return tree.node("FunctionNodeEulerToRotation", vector(tree, x, y, z)).value

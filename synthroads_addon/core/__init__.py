@@ -1,0 +1,1 @@
+"""Functions and data that need no Blender: plain Python and NumPy."""

@@ -1,0 +1,54 @@
+"""The project's one tree of errors.
+
+`SynthRoadsError` is what a caller catches. `InputError` (and its children) say that the user's input is wrong: the
+command line turns them into one line and exit code 2, the panel into a message. Anything else is a defect of ours.
+"""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable
+
+
+class SynthRoadsError(Exception):
+    """Base of every error raised on purpose."""
+
+
+class InputError(SynthRoadsError):
+    """An input is wrong; the message is one line that names the field, its value and what is allowed.
+
+    Args:
+        field: where the value stands, as a dotted path or a file name, e.g. ``scan.platform.height``.
+        value: the offending value; None if there is none to show (a missing key, say).
+        allowed: what would be right, in words with its unit.
+    """
+
+    def __init__(self, field: str, value: object, allowed: str) -> None:
+        self.field = field
+        self.value = value
+        self.allowed = allowed
+        shown = "" if value is None else f" is {_short(value)}"
+        super().__init__(f"{field}{shown}: {allowed}")
+
+
+class MissingFileError(InputError):
+    """An input file or folder does not exist or cannot be read."""
+
+
+class OutputError(InputError):
+    """The output cannot be written: no permission, already there, disk full."""
+
+
+class Cancelled(SynthRoadsError):
+    """The user stopped the work (Esc or Ctrl-C); nothing is left half-written."""
+
+
+def nearest_name(name: str, known: Iterable[str]) -> str:
+    """Return `` (did you mean 'x'?)`` for the known name most like `name`, or an empty string."""
+    close = difflib.get_close_matches(name, list(known), n=1, cutoff=0.6)
+    return f" (did you mean '{close[0]}'?)" if close else ""
+
+
+def _short(value: object, limit: int = 80) -> str:
+    text = " ".join(repr(value).split())
+    return text if len(text) <= limit else text[: limit - 3] + "..."

@@ -1,0 +1,68 @@
+"""A measured centreline as the alignment of a parameter set."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..scenario import RoadScenario
+from ..schema import rounded
+from .axis_fit import fit_axis, read_axis
+from .model import AlignmentObject, HorizontalElement, VerticalPoint
+
+
+def fitted_axis(path: Path, scenario: RoadScenario) -> tuple[AlignmentObject, RoadScenario, dict[str, Any]]:
+    """Fit an alignment to the points of a CSV or GeoJSON file.
+
+    Returns:
+        the alignment in local coordinates, the scenario with the length and map origin that follow from it, and how well
+        it fits (m): root mean square, 95th percentile and worst distance, horizontally and in height.
+
+    Raises:
+        InputError: the file is missing or not an axis.
+    """
+    points = read_axis(path)
+    origin = np.round(points.mean(axis=0))
+    fit = fit_axis(points - origin)
+    start, heading, _ = fit.alignment.frame(0.0)
+    horizontal = tuple(
+        HorizontalElement(
+            kind=e.kind, length=e.length, curvature_start=e.curvature_start, curvature_end=e.curvature_end
+        )
+        for e in fit.alignment.elements
+    )
+    vertical = tuple(
+        VerticalPoint(station=rounded(p.station), elevation=rounded(p.elevation), radius=p.radius)
+        for p in fit.profile.points
+    )
+    alignment = AlignmentObject(
+        instance=1,
+        start_x=rounded(start[0]),
+        start_y=rounded(start[1]),
+        start_heading_deg=rounded(np.rad2deg(heading), 12),
+        horizontal=horizontal,
+        vertical=vertical,
+    )
+    road = scenario.model_copy(
+        update={"length": alignment.length, "map_origin": tuple(float(value) for value in origin)}
+    )
+    report = {
+        "file": path.name,
+        "points": fit.points,
+        "elements": len(horizontal),
+        "horizontal": {
+            "rms": round(fit.rms, 4),
+            "p95": round(fit.p95, 4),
+            "worst": round(fit.worst, 4),
+            "worst_station": round(fit.worst_station, 2),
+        },
+        "height": {
+            "rms": round(fit.height_rms, 4),
+            "p95": round(fit.height_p95, 4),
+            "worst": round(fit.height_worst, 4),
+            "worst_station": round(fit.height_worst_station, 2),
+        },
+    }
+    return alignment, road, report

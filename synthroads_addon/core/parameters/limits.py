@@ -1,0 +1,86 @@
+"""Limits of the RAA 2008 by design class, and the standard cross-sections: the one table of both.
+
+Values and how sure each is: the RAA's limits as printed in secondary sources; the stopping sight distances of EKA 1B and
+2 and the crossfall over radius are derived (the RAA shows the latter as a diagram).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class DesignLimits:
+    """Limits of one design class.
+
+    Attributes:
+        speed: speed used for driving dynamics on a wet road, km/h.
+        radius: smallest radius, m.
+        clothoid: smallest clothoid parameter A, m.
+        grade_percent: steepest longitudinal grade.
+        crest, sag: smallest vertical radii, m.
+        run_off_percent: largest slope of the pavement's edge against its rotation axis (4 m or more apart).
+        radius_least_crossfall: radius from which the least crossfall suffices, m.
+    """
+
+    speed: float
+    radius: float
+    clothoid: float
+    grade_percent: float
+    crest: float
+    sag: float
+    run_off_percent: float
+    radius_least_crossfall: float
+
+
+LIMITS = {
+    "EKA1A": DesignLimits(130, 900, 300, 4.0, 13000, 8800, 0.9, 3100),
+    "EKA1B": DesignLimits(120, 720, 240, 4.5, 10000, 5700, 0.9, 2550),
+    "EKA2": DesignLimits(100, 470, 160, 4.5, 5000, 4000, 0.9, 1700),
+    "EKA3": DesignLimits(80, 280, 90, 6.0, 3000, 2600, 0.9, 1030),
+}
+LEAST_CROSSFALL_PERCENT = 2.5
+LARGEST_CROSSFALL_PERCENT = 6.0
+LONGEST_STRAIGHT = 2000.0
+
+
+@dataclass(frozen=True)
+class StandardCrossSection:
+    """One direction of an RQ, m; lanes from outside to inside."""
+
+    lanes: tuple[float, ...]
+    hard_shoulder: float
+    outer_edge_strip: float
+    inner_edge_strip: float
+    median: float
+    verge: float = 1.5
+
+
+STANDARD_CROSS_SECTIONS = {
+    "RQ43.5": StandardCrossSection((3.75, 3.75, 3.5, 3.5), 2.5, 0.5, 0.75, 4.0),
+    "RQ38.5": StandardCrossSection((3.5, 3.5, 3.25, 3.25), 2.0, 0.5, 0.5, 2.5),
+    "RQ36": StandardCrossSection((3.75, 3.5, 3.5), 2.5, 0.5, 0.75, 4.0),
+    "RQ31.5": StandardCrossSection((3.5, 3.25, 3.25), 2.0, 0.5, 0.5, 2.5),
+    "RQ31": StandardCrossSection((3.75, 3.75), 3.0, 0.75, 0.75, 4.0),
+    "RQ28": StandardCrossSection((3.5, 3.5), 2.5, 0.5, 0.5, 4.0),
+    "RQ25": StandardCrossSection((3.5, 3.25), 2.0, 0.5, 0.5, 2.5),
+}
+
+
+def curve_crossfall_percent(design_class: str, curvature: float) -> float:
+    """Return the crossfall (%) towards the inside of a curve: 6 at the smallest radius, 2.5 from the largest.
+
+    In between linear in log radius against log crossfall, rounded up to half a percent.
+    """
+    limits = LIMITS[design_class]
+    radius = 1.0 / max(abs(curvature), 1e-9)
+    ends = np.log([limits.radius, limits.radius_least_crossfall])
+    values = np.log([LARGEST_CROSSFALL_PERCENT, LEAST_CROSSFALL_PERCENT])
+    exact = float(np.exp(np.interp(np.log(radius), ends, values)))
+    return float(np.ceil(2.0 * exact - 1e-9) / 2.0)
+
+
+DELINEATOR_SPACING = ((20.0, 3.0), (50.0, 5.0), (100.0, 10.0), (300.0, 20.0), (600.0, 50.0))
+"""Radius (m) and the spacing of delineators (m) outside the curve; 50 m from 600 m on."""

@@ -1,0 +1,57 @@
+"""How long work reports where it is, and how it is stopped; and how each stage is measured."""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from typing import Protocol
+
+
+class Progress(Protocol):
+    """Called now and then with the stage's name and the share of it that is done; may raise `Cancelled`."""
+
+    def __call__(self, stage: str, share: float) -> None: ...
+
+
+def silent(stage: str, share: float) -> None:
+    """Report nothing."""
+
+
+@dataclass
+class StageTimer:
+    """Measures each stage's seconds and the process's peak memory at its end.
+
+    Attributes:
+        stages: name -> {"seconds": ..., "peak_memory_mb": ...} in order.
+    """
+
+    progress: Progress = silent
+    stages: dict[str, dict[str, float | None]] = field(default_factory=dict)
+
+    @contextmanager
+    def stage(self, name: str) -> Iterator[None]:
+        """Measure what happens inside."""
+        self.progress(name, 0.0)
+        start = time.perf_counter()
+        yield
+        seconds = time.perf_counter() - start
+        self.stages[name] = {"seconds": round(seconds, 3), "peak_memory_mb": peak_memory_mb()}
+        self.progress(name, 1.0)
+
+    @property
+    def seconds(self) -> float:
+        """Return the sum of all stages, s."""
+        return sum(row["seconds"] or 0.0 for row in self.stages.values())
+
+
+def peak_memory_mb() -> float | None:
+    """Return the largest resident memory of this process so far, MB (1e6 bytes); None where it can't be told."""
+    try:
+        import resource
+    except ImportError:  # Windows
+        return None
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    return round(peak * (1 if sys.platform == "darwin" else 1024) / 1e6, 1)

@@ -1,0 +1,219 @@
+"""`Scenario`: the one description of a job, from the road's limits to the files wanted, and what it requires."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import Field, model_validator
+
+from .errors import InputError, nearest_name
+from .parameters.limits import STANDARD_CROSS_SECTIONS
+from .schema import Model, quantity, read_json
+
+SCENARIOS = Path(__file__).parents[1] / "presets" / "scenarios"
+
+_Finite = Annotated[float, Field(strict=True, ge=-1e8, le=1e8)]
+
+
+class ScenarioModel(Model):
+    """Base of the scenario's parts; a scenario has no vendor keys."""
+
+    vendor_keys_allowed = False
+
+
+class Interval(ScenarioModel):
+    """Limits that a sampled value lies within."""
+
+    minimum: _Finite = Field(description="Smallest value.")
+    maximum: _Finite = Field(description="Largest value.")
+
+    @model_validator(mode="after")
+    def _in_order(self) -> Interval:
+        if self.maximum < self.minimum:
+            raise ValueError(f"maximum {self.maximum} must not be less than minimum {self.minimum}")
+        return self
+
+
+def _interval(low: float, high: float, unit: str, description: str) -> Any:
+    return Field(
+        Interval(minimum=low, maximum=high), description=description, json_schema_extra={"unit": unit}
+    )
+
+
+class RoadScenario(ScenarioModel):
+    """Limits that the road is sampled within."""
+
+    design_class: Literal["EKA1A", "EKA1B", "EKA2", "EKA3"] = Field("EKA1A", description="Design class (RAA).")
+    cross_section: str = Field("RQ31", description="Standard cross-section.")
+    length: float = quantity(600.0, ge=1, le=200_000, unit="m", description="Length of the centreline.")
+    radius: Interval = _interval(900, 1500, "m", "Radius of the curve.")
+    grade_percent: Interval = _interval(-2.5, 2.5, "%", "Longitudinal grades.")
+    embankment_height: Interval = _interval(1.5, 4.0, "m", "Mean height of the road above the ground.")
+    undulation: float = quantity(0.25, ge=0, le=20, unit="m", description="Standard deviation of the ground.")
+    batter_slope: float = quantity(1.5, ge=0.5, le=10, unit="m/m", description="Run of the batter per height.")
+    half_width: float = quantity(78.0, ge=5, le=1000, unit="m", description="Reach built to either side.")
+    epsg: int = quantity(25832, ge=1024, le=99_999_999, unit="1", description="Map coordinate system.")
+    map_origin: tuple[_Finite, _Finite, _Finite] = Field(
+        (294_000.0, 5_628_000.0, 180.0),
+        description="Map coordinates (east, north, elevation) of the local origin, m.",
+    )
+    roadside_guardrails: bool = Field(True, description="Guardrails on the embankment's edges.")
+    median_guardrail: bool = Field(True, description="Guardrail in the median.")
+    delineators: bool = Field(True, description="Delineator posts.")
+    grass_density: float = quantity(0.8, ge=0, le=50, unit="1/m2", description="Tufts of grass per area.")
+    trees_per_hectare: float = quantity(40.0, ge=0, le=2000, unit="1/ha", description="Trees per hectare.")
+
+    @model_validator(mode="after")
+    def _known(self) -> RoadScenario:
+        if self.cross_section not in STANDARD_CROSS_SECTIONS:
+            names = ", ".join(STANDARD_CROSS_SECTIONS)
+            raise ValueError(f"cross_section is '{self.cross_section}': must be one of {names}")
+        return self
+
+
+class Platform(ScenarioModel):
+    """What carries the scanner, and its strips."""
+
+    kind: Literal["uav"] = Field("uav", description="Platform.")
+    height: float = quantity(60.0, ge=2, le=2000, unit="m", description="Height above the road.")
+    speed: float = quantity(8.0, ge=0.1, le=100, unit="m/s", description="Speed over ground.")
+    lateral_offsets: tuple[_Finite, ...] = Field(
+        (10.0, -10.0),
+        min_length=1,
+        max_length=64,
+        description="Offset of each strip from the centreline, m; every second strip is flown back.",
+    )
+
+
+class Noise(ScenarioModel):
+    """Random errors of the measurement."""
+
+    range_sigma: float | None = quantity(
+        None, ge=0, le=1, unit="m", description="Standard deviation of the range; the device's if not given."
+    )
+
+
+class ScanScenario(ScenarioModel):
+    """How the road is scanned. What isn't given is the device's own value."""
+
+    device: str = Field("riegl-minivux-3uav", description="Device preset or file.")
+    pulse_rate_khz: float | None = quantity(None, gt=0, le=5000, unit="kHz", description="Pulse repetition rate.")
+    field_of_view_deg: float | None = quantity(None, gt=0, le=360, unit="deg", description="Field of view.")
+    lines_per_second: float | None = quantity(None, gt=0, le=1000, unit="1/s", description="Scan lines per second.")
+    platform: Platform = Field(Platform(), description="Platform and path.")
+    noise: Noise = Field(Noise(), description="Measurement noise.")
+    attenuation: float = quantity(
+        0.0, ge=0, le=1, unit="1/m", description="Attenuation per metre of range (there and back)."
+    )
+    rays_per_pulse: Literal[1, 7, 19, 37, 61] | None = Field(
+        None, description="Rays that sample a pulse's footprint; the fidelity's if not given."
+    )
+    caster: Literal["auto", "embree", "bvhtree"] = Field("auto", description="How rays are cast.")
+    threads: int = quantity(0, ge=0, le=1024, unit="1", description="Threads; 0 uses every core.")
+
+
+OUTPUTS = ("parameters", "cloud", "centerline", "scene", "previews")
+
+
+class Scenario(ScenarioModel):
+    """One job: a road, a scan, the files wanted, and how faithful they are to be."""
+
+    type: Literal["Scenario"] = "Scenario"
+    version: Literal["1.0"] = "1.0"
+    title: str = ""
+    seed: int = quantity(1, ge=0, le=2**63 - 1, unit="1", description="Seed of everything random.")
+    fidelity: Literal["draft", "standard", "high"] = Field("standard", description="Point on the trade-off.")
+    geometric_tolerance: float | None = quantity(
+        None, ge=1e-4, le=1, unit="m", description="Chord error of the model; the fidelity's if not given."
+    )
+    vegetation_detail: float | None = quantity(
+        None, ge=0, le=1, unit="1", description="Share of the vegetation built; the fidelity's if not given."
+    )
+    road: RoadScenario = Field(RoadScenario(), description="The road's limits.")
+    scan: ScanScenario = Field(ScanScenario(), description="The scan.")
+    outputs: tuple[Literal["parameters", "cloud", "centerline", "scene", "previews"], ...] = Field(
+        OUTPUTS, description="Files wanted; nothing is computed that none of them needs."
+    )
+
+    def settings(self) -> Settings:
+        """Return the numbers that the fidelity stands for, after the scenario's own."""
+        preset = FIDELITIES[self.fidelity]
+
+        def pick(own: Any, otherwise: Any) -> Any:
+            return otherwise if own is None else own
+
+        return Settings(
+            tolerance=pick(self.geometric_tolerance, preset.tolerance),
+            vegetation_detail=pick(self.vegetation_detail, preset.vegetation_detail),
+            rays_per_pulse=pick(self.scan.rays_per_pulse, preset.rays_per_pulse),
+        )
+
+
+@dataclass(frozen=True)
+class Settings:
+    """What trades speed for accuracy.
+
+    Attributes:
+        tolerance: largest chord error of the model's road surface, m.
+        vegetation_detail: share of the plants that are built, 0 to 1.
+        rays_per_pulse: rays that sample a pulse's footprint.
+    """
+
+    tolerance: float
+    vegetation_detail: float
+    rays_per_pulse: int
+
+
+FIDELITIES = {
+    "draft": Settings(tolerance=0.020, vegetation_detail=0.3, rays_per_pulse=1),
+    "standard": Settings(tolerance=0.005, vegetation_detail=1.0, rays_per_pulse=7),
+    "high": Settings(tolerance=0.001, vegetation_detail=1.0, rays_per_pulse=19),
+}
+
+
+def scenario_names() -> list[str]:
+    """Return the names of the built-in scenarios."""
+    return sorted(path.stem for path in SCENARIOS.glob("*.json"))
+
+
+def load_scenario(name_or_file: str, changes: list[str] | None = None) -> Scenario:
+    """Load a built-in scenario or a file and apply ``path=value`` changes.
+
+    Raises:
+        InputError: there is no such scenario, or a field is unknown or out of its limits.
+    """
+    path = Path(name_or_file)
+    if name_or_file in scenario_names():
+        path = SCENARIOS / f"{name_or_file}.json"
+    elif path.suffix != ".json":
+        hint = nearest_name(name_or_file, scenario_names())
+        raise InputError(
+            "--scenario", name_or_file, f"must be a .json file or one of {', '.join(scenario_names())}{hint}"
+        )
+    scenario = Scenario.from_dict(read_json(path), source=str(name_or_file))
+    if not changes:
+        return scenario
+    data = scenario.to_dict()
+    for change in changes:
+        data = apply_change(data, change)
+    return Scenario.from_dict(data)
+
+
+def apply_change(data: Any, change: str) -> Any:
+    """Return the scenario's JSON data with one ``path=value`` applied; the value is JSON, or else plain text."""
+    path, equals, text = change.partition("=")
+    if not equals or not path:
+        raise InputError("--set", change, "must be path=value, e.g. road.length=800")
+    try:
+        value = json.loads(text)
+    except ValueError:
+        value = text
+    if not isinstance(data, dict):
+        raise InputError("scenario", data, "must be a JSON object")
+    result = dict(data)
+    head, dot, rest = path.partition(".")
+    result[head] = apply_change(result.get(head, {}), f"{rest}={text}") if dot else value
+    return result

@@ -1,0 +1,81 @@
+"""What all tests share: a Blender that is nobody's own, an empty scene for each test, and a way out without a crash."""
+
+from __future__ import annotations
+
+import importlib.util
+import os
+import shutil
+import sys
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+TESTS = Path(__file__).resolve().parent
+HAS_BPY = importlib.util.find_spec("bpy") is not None
+
+# Before anything imports bpy: it must not read the user's settings and extensions, whose wheels would shadow ours.
+BLENDER_FOLDER = Path(tempfile.mkdtemp(prefix="synthroads-blender-"))
+os.environ["BLENDER_USER_RESOURCES"] = str(BLENDER_FOLDER)
+
+collect_ignore = [] if HAS_BPY else ["blender"]
+
+
+def pytest_report_header() -> str:
+    """Say which Blender the tests run on, without importing it."""
+    if not HAS_BPY:
+        return "bpy is not installed: tests/blender is left out"
+    spec = importlib.util.find_spec("bpy")
+    folders = Path(spec.origin).parent.glob("[0-9].[0-9]*") if spec and spec.origin else []
+    return f"bpy {', '.join(folder.name for folder in folders)}"
+
+
+def _needs_blender(request: pytest.FixtureRequest) -> bool:
+    return TESTS / "blender" in request.path.parents
+
+
+def _empty_scene() -> None:
+    import bpy
+
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _empty_scene_for_module(request: pytest.FixtureRequest) -> Iterator[None]:
+    """Start each module of tests/blender with an empty scene, and leave none of its data behind."""
+    if not _needs_blender(request):
+        yield
+        return
+    _empty_scene()
+    yield
+    _empty_scene()
+
+
+@pytest.fixture(autouse=True)
+def _empty_scene_for_test(request: pytest.FixtureRequest) -> None:
+    """Start each test of tests/blender with an empty scene, unless it is marked `keep_scene`."""
+    if _needs_blender(request) and request.node.get_closest_marker("keep_scene") is None:
+        _empty_scene()
+
+
+_session: list[pytest.Session] = []
+
+
+def pytest_sessionstart(session: pytest.Session) -> None:
+    """Remember the session: its exit code is final only at the very end."""
+    _session.append(session)
+
+
+@pytest.hookimpl(trylast=True)
+def pytest_unconfigure(config: pytest.Config) -> None:
+    """Leave the process hard where bpy is loaded: its own teardown can crash after all tests have passed.
+
+    Reports and summary are written by now. Under pytest-xdist the worker has still to talk to its controller.
+    """
+    shutil.rmtree(BLENDER_FOLDER, ignore_errors=True)
+    if "bpy" not in sys.modules or not _session or hasattr(config, "workerinput"):
+        return
+    sys.stdout.flush()
+    sys.stderr.flush()
+    os._exit(int(_session[0].exitstatus))

@@ -1,0 +1,47 @@
+"""Output folders: nothing half-written, nothing of the user's touched."""
+
+import errno
+from pathlib import Path
+
+import pytest
+
+from synthroads_addon.core.errors import OutputError
+from synthroads_addon.core.files import output_folder
+
+
+def test_files_appear_at_the_end(tmp_path: Path) -> None:
+    target = tmp_path / "out"
+    with output_folder(target, ["a.txt"], overwrite=False) as folder:
+        (folder / "a.txt").write_text("new")
+        assert not (target / "a.txt").exists()
+    assert sorted(p.name for p in target.iterdir()) == ["a.txt"]
+
+
+def test_stopped_work_leaves_nothing(tmp_path: Path) -> None:
+    with pytest.raises(KeyboardInterrupt), output_folder(tmp_path / "out", ["a.txt"], False) as folder:
+        (folder / "a.txt").write_text("half")
+        raise KeyboardInterrupt
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_present_files_need_overwrite_and_others_stay(tmp_path: Path) -> None:
+    (tmp_path / "a.txt").write_text("old")
+    (tmp_path / "mine.txt").write_text("mine")
+    with pytest.raises(OutputError, match="--overwrite"), output_folder(tmp_path, ["a.txt"], False):
+        pass
+    with output_folder(tmp_path, ["a.txt"], True) as folder:
+        (folder / "a.txt").write_text("new")
+    assert (tmp_path / "a.txt").read_text() == "new"
+    assert (tmp_path / "mine.txt").read_text() == "mine"
+
+
+def test_a_file_in_the_way_is_named(tmp_path: Path) -> None:
+    (tmp_path / "out").write_text("a file")
+    with pytest.raises(OutputError, match="--output"), output_folder(tmp_path / "out" / "x", [], False):
+        pass
+
+
+def test_full_disk_is_one_clear_line(tmp_path: Path) -> None:
+    with pytest.raises(OutputError, match="No space left"), output_folder(tmp_path / "out", [], False):
+        raise OSError(errno.ENOSPC, "No space left on device")
+    assert list(tmp_path.iterdir()) == []

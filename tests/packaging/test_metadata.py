@@ -1,0 +1,74 @@
+"""The manifest, pyproject.toml and the list of bundled wheels agree."""
+
+from __future__ import annotations
+
+import importlib.metadata
+import re
+import tomllib
+from pathlib import Path
+
+import pytest
+from packaging.requirements import Requirement
+from packaging.utils import canonicalize_name
+
+ROOT = Path(__file__).resolve().parents[2]
+MANIFEST = tomllib.loads((ROOT / "blender_manifest.toml").read_text(encoding="utf-8"))
+PYPROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+PINS = {
+    canonicalize_name(requirement.name): str(next(iter(requirement.specifier)).version)
+    for requirement in map(
+        Requirement,
+        re.findall(r"^[^#\s].*", (ROOT / "tools/extension_wheels.txt").read_text(encoding="utf-8"), re.MULTILINE),
+    )
+}
+BASE = [Requirement(text) for text in PYPROJECT["project"]["dependencies"]]
+
+
+def test_version_stands_in_the_manifest_alone() -> None:
+    hatch = PYPROJECT["tool"]["hatch"]["version"]
+    text = (ROOT / hatch["path"]).read_text(encoding="utf-8")
+    match = re.search(hatch["pattern"], text, re.MULTILINE)
+    assert match is not None
+    assert match["version"] == MANIFEST["version"]
+    assert "version" not in PYPROJECT["project"]
+
+
+def test_installed_version_is_the_manifests() -> None:
+    try:
+        installed = importlib.metadata.version("synthroads")
+    except importlib.metadata.PackageNotFoundError:
+        pytest.skip("synthroads is not installed here")
+    assert installed == MANIFEST["version"]
+
+
+def test_name_and_licence_agree() -> None:
+    project = PYPROJECT["project"]
+    assert project["name"] == MANIFEST["id"]
+    assert MANIFEST["license"] == [f"SPDX:{project['license']}"]
+    assert MANIFEST["maintainer"] == project["authors"][0]["name"]
+    assert "GNU GENERAL PUBLIC LICENSE" in (ROOT / "LICENSE").read_text(encoding="utf-8")[:200]
+
+
+def test_manifest_as_committed_has_no_wheels() -> None:
+    assert "wheels" not in MANIFEST
+    assert "platforms" not in MANIFEST
+
+
+@pytest.mark.parametrize("requirement", BASE, ids=lambda requirement: requirement.name)
+def test_bundled_versions_fit_the_dependencies(requirement: Requirement) -> None:
+    name = canonicalize_name(requirement.name)
+    if name == "numpy":
+        assert name not in PINS, "Blender has NumPy: a second one would break it"
+        return
+    assert PINS[name] in requirement.specifier
+
+
+def test_one_blender_for_each_python() -> None:
+    lines = [Requirement(text) for text in PYPROJECT["project"]["optional-dependencies"]["blender"]]
+    for python in ("3.11", "3.13"):
+        fitting = [line for line in lines if line.marker and line.marker.evaluate({"python_version": python})]
+        assert [line.name for line in fitting].count("bpy") == 1, python
+
+
+def test_no_init_file_in_the_root() -> None:
+    assert not (ROOT / "__init__.py").exists(), "it breaks pytest, which would take the root for a package"

@@ -1,0 +1,267 @@
+"""Build the Blender extension: the add-on, its manifest and the wheels it needs, in one zip per platform.
+
+    python tools/build_extension.py [--platform linux-x64|windows-x64|macos-arm64|all] [--output-dir dist]
+
+The add-on is copied beside a completed manifest in a folder of its own (no committed file is touched), then built and
+validated by Blender's own tool, which comes with the `bpy` package. Each platform's zip holds wheels for every Python
+that a supported Blender has. The same source and the same list of wheels give the same bytes.
+"""
+
+from __future__ import annotations
+
+import argparse
+import email.parser
+import hashlib
+import importlib.util
+import json
+import os
+import platform
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+import tomllib
+import zipfile
+from email.message import Message
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parent.parent
+PACKAGE = ROOT / "synthroads_addon"
+MANIFEST = ROOT / "blender_manifest.toml"
+WHEEL_LIST = ROOT / "tools" / "extension_wheels.txt"
+
+# Blender 4.5 and 5.0 have Python 3.11, the official 5.1 and 5.2 have 3.13, Debian's 5.2 has 3.14.
+PYTHON_VERSIONS = ("3.11", "3.13", "3.14")
+
+# Blender's name of a platform -> the wheel tags that run on every machine that its Blender runs on.
+PLATFORM_TAGS = {
+    "linux-x64": ("manylinux_2_28_x86_64", "manylinux_2_27_x86_64", "manylinux_2_17_x86_64", "manylinux2014_x86_64"),
+    "windows-x64": ("win_amd64",),
+    "macos-arm64": ("macosx_13_0_arm64",),  # embreex has none for older systems
+}
+
+# Dependencies of the wheels that are left out: Blender has NumPy, and tqdm does without colorama.
+NOT_BUNDLED = frozenset({"numpy", "colorama"})
+
+# Where a wheel's fields say too little.
+LICENCES = {
+    "embreex": "BSD-2-Clause; holds Intel Embree and oneTBB: Apache-2.0, https://www.apache.org/licenses/LICENSE-2.0",
+}
+
+LEFT_OUT = shutil.ignore_patterns("__pycache__", "*.py[co]", ".*", "*.blend[1-9]")
+ZIP_DATE = (1980, 1, 1, 0, 0, 0)
+
+
+class BuildError(Exception):
+    """The extension cannot be built; the message says why."""
+
+
+def current_platform() -> str:
+    """Return Blender's name of the platform we run on."""
+    system = {"Linux": "linux", "Windows": "windows", "Darwin": "macos"}.get(platform.system(), platform.system())
+    machine = {"x86_64": "x64", "amd64": "x64", "aarch64": "arm64"}.get(
+        platform.machine().lower(), platform.machine().lower()
+    )
+    return f"{system}-{machine}"
+
+
+def blender_tool() -> Path:
+    """Return Blender's command-line tool for extensions, which lies inside the installed `bpy` package."""
+    spec = importlib.util.find_spec("bpy")
+    if spec is None or spec.origin is None:
+        raise BuildError("the bpy package is needed for its extension tool: pip install 'synthroads[blender]'")
+    found = sorted(Path(spec.origin).parent.glob("*/scripts/addons_core/bl_pkg/cli/blender_ext.py"))
+    if not found:
+        raise BuildError(f"no extension tool in {Path(spec.origin).parent}")
+    return found[-1]
+
+
+# --- wheels ----------------------------------------------------------------------------------------------------------
+
+
+def normal_name(name: str) -> str:
+    """Return a distribution's name as the packaging rules compare it."""
+    return re.sub(r"[-_.]+", "-", name).lower()
+
+
+def read_wheel_list() -> list[str]:
+    """Return the lines `name==version` of the list of wheels."""
+    lines = (line.split("#")[0].strip() for line in WHEEL_LIST.read_text(encoding="utf-8").splitlines())
+    return [line for line in lines if line]
+
+
+def fetch_wheels(target: str, cache: Path) -> list[Path]:
+    """Return the wheels of all Pythons for one platform, sorted by name; download what the cache lacks."""
+    pins = read_wheel_list()
+    wheels: dict[str, Path] = {}
+    for version in PYTHON_VERSIONS:
+        folder = cache / target / f"cp{version.replace('.', '')}"
+        stamp = folder / "complete.json"
+        if not stamp.exists() or json.loads(stamp.read_text(encoding="utf-8")) != pins:
+            part = folder.with_name(f"{folder.name}.part-{os.getpid()}")
+            download(pins, version, target, part)
+            (part / stamp.name).write_text(json.dumps(pins), encoding="utf-8")
+            shutil.rmtree(folder, ignore_errors=True)
+            part.rename(folder)
+        wheels.update({path.name: path for path in folder.glob("*.whl")})
+    return [wheels[name] for name in sorted(wheels)]
+
+
+def download(pins: list[str], version: str, target: str, folder: Path) -> None:
+    """Download the wheels of one Python and platform, whatever Python and platform this is."""
+    folder.mkdir(parents=True, exist_ok=True)
+    print(f"downloading wheels for Python {version}, {target}", flush=True)
+    command = [
+        *(sys.executable, "-m", "pip", "download", "--quiet", "--disable-pip-version-check", "--no-deps"),
+        *("--only-binary=:all:", "--implementation", "cp", "--python-version", version, "--dest", str(folder)),
+        *(word for tag in PLATFORM_TAGS[target] for word in ("--platform", tag)),
+    ]
+    if subprocess.run([*command, *pins], check=False).returncode != 0:
+        shutil.rmtree(folder)
+        raise BuildError(f"pip did not get the wheels for Python {version} on {target}, see above")
+
+
+def wheel_metadata(wheel: Path) -> Message:
+    """Return the fields of a wheel's METADATA file."""
+    with zipfile.ZipFile(wheel) as archive:
+        name = next(name for name in archive.namelist() if re.fullmatch(r"[^/]+\.dist-info/METADATA", name))
+        return email.parser.Parser().parsestr(archive.read(name).decode("utf-8"))
+
+
+def check_complete(wheels: list[Path]) -> None:
+    """Raise BuildError if a wheel needs a package that is neither bundled nor in Blender."""
+    metadata = [wheel_metadata(wheel) for wheel in wheels]
+    present = {normal_name(fields["Name"]) for fields in metadata} | NOT_BUNDLED
+    for fields in metadata:
+        for requirement in fields.get_all("Requires-Dist", []):
+            if "extra ==" in requirement:
+                continue
+            needed = normal_name(re.split(r"[^A-Za-z0-9._-]", requirement, maxsplit=1)[0])
+            if needed not in present:
+                raise BuildError(f"{fields['Name']} needs {requirement}: add it to tools/{WHEEL_LIST.name}")
+
+
+def licence(fields: Message) -> str:
+    """Return the name of a package's licence from its metadata: an expression, a classifier or a line of text."""
+    if fields["Name"] in LICENCES:
+        return LICENCES[fields["Name"]]
+    classifiers = [line.split(" :: ")[-1] for line in fields.get_all("Classifier", []) if line.startswith("License")]
+    text = (fields["License"] or "").strip().splitlines()[:1]
+    return fields["License-Expression"] or "; ".join(classifiers or text) or "see the wheel"
+
+
+def third_party_notice(wheels: list[Path]) -> str:
+    """Return the text that lists the bundled packages with their licences."""
+    rows = {f"{fields['Name']} {fields['Version']}": licence(fields) for fields in map(wheel_metadata, wheels)}
+    lines = [f"{name}: {rows[name]}" for name in sorted(rows, key=str.lower)]
+    head = (
+        "SynthRoads is licensed under the GPL, version 3 or later (LICENSE). It brings these packages as wheels,\n"
+        "unchanged; the full text of each licence lies in the wheel's own dist-info folder where its authors put one.\n"
+    )
+    return head + "\n" + "\n".join(lines) + "\n"
+
+
+# --- staging ---------------------------------------------------------------------------------------------------------
+
+
+def stage(target: str, wheels: list[Path], folder: Path) -> None:
+    """Fill an empty folder with all that the extension holds."""
+    shutil.copytree(PACKAGE, folder, ignore=LEFT_OUT, dirs_exist_ok=True)
+    shutil.copy(ROOT / "LICENSE", folder)
+    (folder / "THIRD_PARTY.txt").write_text(third_party_notice(wheels), encoding="utf-8", newline="\n")
+    (folder / "wheels").mkdir()
+    for wheel in wheels:
+        shutil.copy(wheel, folder / "wheels")
+    manifest = complete_manifest(target, [f"./wheels/{wheel.name}" for wheel in wheels])
+    (folder / MANIFEST.name).write_text(manifest, encoding="utf-8", newline="\n")
+
+
+def complete_manifest(target: str, wheels: list[str]) -> str:
+    """Return the text of the manifest with the platform and the wheels added, before the first table as TOML wants."""
+    committed = MANIFEST.read_text(encoding="utf-8")
+    tables = re.search(r"^\[", committed, flags=re.MULTILINE)
+    split = tables.start() if tables else len(committed)
+    added = f"platforms = {toml_list([target])}\nwheels = {toml_list(wheels)}\n\n"
+    return committed[:split] + added + committed[split:]
+
+
+def toml_list(items: list[str]) -> str:
+    """Return a TOML array of strings, one to a line."""
+    return "[\n" + "".join(f"  {json.dumps(item)},\n" for item in items) + "]"
+
+
+# --- building --------------------------------------------------------------------------------------------------------
+
+
+def build(target: str, output_dir: Path, cache: Path) -> Path:
+    """Build and validate the extension for one platform; return the zip."""
+    wheels = fetch_wheels(target, cache)
+    check_complete(wheels)
+    version = tomllib.loads(MANIFEST.read_text(encoding="utf-8"))["version"]
+    output_dir.mkdir(parents=True, exist_ok=True)
+    archive = output_dir / f"synthroads-{version}-{target.replace('-', '_')}.zip"
+    with tempfile.TemporaryDirectory(prefix="synthroads-") as folder:
+        stage(target, wheels, Path(folder))
+        run_tool("build", "--source-dir", folder, "--output-filepath", str(archive))
+    make_reproducible(archive)
+    run_tool("validate", str(archive))
+    return archive
+
+
+def make_reproducible(archive: Path) -> None:
+    """Write a zip anew with its files in the order of their names, and without their dates and modes."""
+    renewed = archive.with_suffix(".part")
+    with zipfile.ZipFile(archive) as source, zipfile.ZipFile(renewed, "w") as target:
+        for name in sorted(set(source.namelist())):
+            entry = zipfile.ZipInfo(name, ZIP_DATE)
+            entry.external_attr = 0o644 << 16
+            entry.compress_type = zipfile.ZIP_STORED if name.endswith(".whl") else zipfile.ZIP_DEFLATED
+            target.writestr(entry, source.read(name))
+    renewed.replace(archive)
+
+
+def run_tool(*arguments: str) -> None:
+    """Run Blender's tool; its output is shown only if it fails."""
+    answer = subprocess.run(
+        [sys.executable, "-B", str(blender_tool()), *arguments],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    if answer.returncode != 0:
+        raise BuildError(f"Blender's tool failed to {arguments[0]}:\n{answer.stdout}{answer.stderr}")
+
+
+def parse_arguments(argv: list[str] | None) -> argparse.Namespace:
+    """Return the options of the command line."""
+    parser = argparse.ArgumentParser(description="Build the Blender extension, one zip per platform.")
+    parser.add_argument(
+        "--platform", choices=[*PLATFORM_TAGS, "all"], default=current_platform(), help="default: the current one"
+    )
+    parser.add_argument("--output-dir", type=Path, default=ROOT / "dist", metavar="DIR", help="default: dist")
+    parser.add_argument(
+        "--wheel-cache", type=Path, default=ROOT / "build" / "wheels", metavar="DIR", help="default: build/wheels"
+    )
+    return parser.parse_args(argv)
+
+
+def main(argv: list[str] | None = None) -> int:
+    """Build for the platforms asked for; return 0, or 1 with one message if that failed."""
+    options = parse_arguments(argv)
+    if options.platform not in (*PLATFORM_TAGS, "all"):
+        print(f"no wheels are known for {options.platform}: choose --platform {'|'.join(PLATFORM_TAGS)}|all")
+        return 2
+    try:
+        for target in PLATFORM_TAGS if options.platform == "all" else [options.platform]:
+            archive = build(target, options.output_dir, options.wheel_cache)
+            checksum = hashlib.sha256(archive.read_bytes()).hexdigest()
+            print(f"{archive}  {archive.stat().st_size / 1e6:.1f} MB  sha256 {checksum[:16]}")
+    except BuildError as error:
+        print(f"error: {error}", file=sys.stderr)
+        return 1
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

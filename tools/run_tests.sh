@@ -1,0 +1,69 @@
+#!/bin/sh
+# The source checks once and the tests on both Blender LTS releases, as far as their Pythons are here.
+# usage: run_tests.sh EXTRAS_OF_3.11 EXTRAS_OF_3.13 MARKERS [PYTEST_ARGUMENT...]
+# PYTHON=COMMAND in the environment: that interpreter alone.
+set -eu
+
+extras_311=${1:?}
+extras_313=${2:?}
+markers=${3:?}
+shift 3
+cd "$(dirname "$0")/.."
+
+versions="3.11 3.13"
+if [ -n "${PYTHON:-}" ]; then
+    versions=$("$PYTHON" -c 'import sys; print("%d.%d" % sys.version_info[:2])')
+fi
+
+passed=0
+failed=0
+linted=""
+summary=""
+note() { summary="$summary
+  $1"; }
+
+for version in $versions; do
+    case $version in
+        3.11) extras=$extras_311 blender="Blender 4.5 LTS" ;;
+        3.13) extras=$extras_313 blender="Blender 5.2 LTS" ;;
+        *)
+            note "Python $version: not run, Blender as a package needs 3.11 or 3.13"
+            continue
+            ;;
+    esac
+    if ! sh tools/find_python.sh "$version" "${PYTHON:-}" >/dev/null; then
+        note "Python $version ($blender): NOT RUN, no such Python found (see tools/find_python.sh)"
+        continue
+    fi
+    echo "== Python $version, $blender"
+    if ! python=$(sh tools/setup_env.sh "$version" "$extras" "${PYTHON:-}"); then
+        note "Python $version ($blender): FAILED, the environment could not be made"
+        failed=$((failed + 1))
+        continue
+    fi
+    if [ -z "$linted" ]; then
+        linted=yes
+        if "$python" tools/lint.py; then note "lint: passed"; else
+            note "lint: FAILED"
+            failed=$((failed + 1))
+        fi
+    fi
+    start=$(date +%s)
+    status=0
+    "$python" -m pytest -q -m "$markers" "$@" || status=$?
+    seconds=$(($(date +%s) - start))
+    if [ "$status" -eq 0 ]; then
+        note "Python $version ($blender): tests passed, $seconds s"
+        passed=$((passed + 1))
+    else
+        note "Python $version ($blender): tests FAILED (pytest's code $status), $seconds s"
+        failed=$((failed + 1))
+    fi
+done
+
+echo "== Summary$summary"
+if [ "$failed" -gt 0 ]; then exit 1; fi
+if [ "$passed" -eq 0 ]; then
+    echo "Nothing was tested: install Python 3.11 (Debian 12: apt install python3 python3-venv) or 3.13." >&2
+    exit 1
+fi
