@@ -12,6 +12,7 @@ export PYTHON
 ENVIRONMENT = sh tools/any_env.sh
 
 .DEFAULT_GOAL := help
+.NOTPARALLEL:
 .PHONY: help demo test test-slow lint extension clean distclean
 
 help: ## say what there is

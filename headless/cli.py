@@ -11,6 +11,7 @@ import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from importlib import import_module
+from pathlib import Path
 from typing import Any
 
 from synthroads_addon import version
@@ -78,10 +79,11 @@ def run(action: Callable[[argparse.Namespace], tuple[int, dict[str, Any], str]],
 def entry(name: str) -> None:
     """Run a sub-command as a script, under plain Python or ``blender -b -P``; ends the process.
 
-    In Blender the arguments follow ``--``. The process is left at once: Blender's own teardown can crash after the work.
+    In Blender the arguments follow ``--``. The process is left at once, since Blender's teardown can crash.
     """
-    blender = "bpy" in sys.modules and "--" in sys.argv or os.path.basename(sys.argv[0]).startswith("blender")
-    argv = sys.argv[sys.argv.index("--") + 1 :] if "--" in sys.argv else [] if blender else sys.argv[1:]
+    in_blender = Path(sys.argv[0]).name.lower().startswith("blender")
+    begin = sys.argv.index("--") + 1 if "--" in sys.argv else len(sys.argv) if in_blender else 1
+    argv = sys.argv[begin:]
     leave(lambda: command(name, argv))
 
 

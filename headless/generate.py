@@ -64,9 +64,7 @@ def summary(report: dict[str, Any], output: Path) -> str:
             f"{fit['p95'] * 100:.1f} cm, worst {fit['worst'] * 100:.1f} cm at station {fit['worst_station']:.0f} m"
         )
     if "points" in counts:
-        lines.append(
-            f"{counts['points']:,} points from {counts['pulses']:,} pulses, {counts['triangles']:,} triangles"
-        )
+        lines.append(f"{counts['points']:,} points from {counts['pulses']:,} pulses, {counts['triangles']:,} triangles")
     for name, stage in report["stages"].items():
         lines.append(f"  {name:<12} {stage['seconds']:8.2f} s   peak {stage['peak_memory_mb'] or 0:7.0f} MB")
     lines.append(f"  {'in all':<12} {report['seconds']:8.2f} s")

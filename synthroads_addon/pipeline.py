@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import platform as machine
-from collections.abc import Iterator
+from collections.abc import Generator, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, field
@@ -21,17 +21,14 @@ from .core.cloud.previews import TopView
 from .core.crs import wkt
 from .core.errors import InputError
 from .core.files import output_folder
-from .core.materials import surfaces
-from .core.parameters.axis_object import fitted_axis
 from .core.parameters.geometry import RoadGeometry
 from .core.parameters.model import RoadParameters, read_parameters
 from .core.parameters.sampler import sample_road
 from .core.parameters.tessellation import sample_stations
 from .core.progress import Progress, StageTimer, silent
-from .core.scanning.caster import Caster
 from .core.scanning.devices import scanner_setting
 from .core.scanning.path import FlightPath
-from .core.scanning.scan import BlockResult, Scan, scan_block
+from .core.scanning.scan import BlockResult, Scan, scan_block, surfaces_of
 from .core.scenario import Scenario
 from .core.scene_mesh import SceneMesh
 from .core.schema import canonical_json
@@ -125,22 +122,24 @@ def road_parameters(job: Job) -> tuple[RoadParameters, dict[str, Any]]:
     if job.parameters:
         return read_parameters(job.parameters), {}
     if job.axis:
+        from .core.parameters.axis_object import fitted_axis
+
         axis, road, fit = fitted_axis(job.axis, scenario.road)
         return sample_road(road, scenario.seed, scenario.title, axis), {"axis": fit}
     return sample_road(scenario.road, scenario.seed, scenario.title), {}
 
 
-def make_scan(
-    scenario: Scenario, geometry: RoadGeometry, mesh: SceneMesh, caster: Caster, rays_per_pulse: int | None = None
-) -> Scan:
-    """Return the scan that a scenario asks for, ready to be cut into blocks."""
+def make_scan(scenario: Scenario, geometry: RoadGeometry, mesh: SceneMesh) -> Scan:
+    """Return the scan that a scenario asks for, ready to be cut into blocks; builds the caster."""
+    from .blender.casters import make_caster
+
     return Scan(
         mesh=mesh,
-        surfaces=surfaces(mesh.materials),
-        caster=caster,
+        surfaces=surfaces_of(mesh.materials),
+        caster=make_caster(scenario.scan.caster, mesh),
         setting=scanner_setting(scenario.scan),
         path=FlightPath(geometry, scenario.scan.platform),
-        rays_per_pulse=rays_per_pulse or scenario.settings().rays_per_pulse,
+        rays_per_pulse=scenario.settings().rays_per_pulse,
         seed=scenario.seed,
         attenuation=scenario.scan.attenuation,
     )
@@ -191,9 +190,9 @@ def _scene_outputs(
     job: Job, folder: Path, parameters: RoadParameters, geometry: RoadGeometry, timer: StageTimer
 ) -> dict[str, Any]:
     """Build the model and write what needs it."""
-    from .blender.casters import make_caster
+    from .blender.files import save_scene
     from .blender.model import build_road
-    from .blender.scene import save_scene, scene_mesh
+    from .blender.scene import scene_mesh
 
     settings, wanted = job.scenario.settings(), job.scenario.outputs
     counts: dict[str, Any] = {}
@@ -201,54 +200,73 @@ def _scene_outputs(
         model = build_road(parameters, settings.tolerance, settings.vegetation_detail)
     if set(wanted) & {"cloud", "previews"}:
         with timer.stage("scene mesh"):
-            mesh = scene_mesh(origin=model.origin)
-        counts |= {"triangles": len(mesh.triangles), "vertices": len(mesh.vertices)}
+            mesh = scene_mesh()
         with timer.stage("caster"):
-            caster = make_caster(job.scenario.scan.caster, mesh)
+            scan = make_scan(job.scenario, geometry, mesh)
         with timer.stage("scan"):
-            scan = make_scan(job.scenario, geometry, mesh, caster)
-            counts |= _scan_to_files(job, folder, scan, geometry, timer)
-        counts["caster"] = caster.name
+            for share in (task := ScanToFiles(job.scenario, scan, geometry, folder)).run():
+                timer.progress("scan", share)
+        counts = task.summary()
     if "scene" in wanted:
         with timer.stage("scene file"):
             save_scene(folder / "scene.blend")
     return counts
 
 
-def _scan_to_files(
-    job: Job, folder: Path, scan: Scan, geometry: RoadGeometry, timer: StageTimer
-) -> dict[str, Any]:
-    """Scan block by block into the cloud and the previews."""
-    wanted, epsg = job.scenario.outputs, geometry.parameters.metadata.epsg
-    counts, view = ScanCounts(), _top_view(geometry) if "previews" in wanted else None
-    total = len(scan.blocks())
-    with _cloud_writer(folder, wanted, epsg, scan) as writer:
-        for number, result in enumerate(scan_blocks(scan, job.scenario.scan.threads), start=1):
-            counts.add(result)
-            if writer:
-                writer.write(result.points)
-            if view:
-                view.add(result.points)
-            timer.progress("scan", number / total)
-        counts.intensity_clipped = writer.clipped if writer else 0
-    if view:
-        view.save(folder, epsg)
-    summary = {k: v for k, v in asdict(counts).items() if k != "by_class"}
-    names = {row.id: row.name for row in classes()} | {255: "unlabelled"}
-    by_class = {names.get(i, str(i)): int(n) for i, n in enumerate(counts.by_class) if n}
-    summary |= {"intensity_scale": writer.intensity_scale if writer else None}
-    return summary | {"points_by_class": by_class}
+class ScanToFiles:
+    """A scan into the cloud and the previews, a block at a time, so that its caller can show progress or stop it.
+
+    Attributes:
+        counts: what was counted so far.
+    """
+
+    def __init__(self, scenario: Scenario, scan: Scan, geometry: RoadGeometry, folder: Path) -> None:
+        self.scenario, self.scan, self.geometry, self.folder = scenario, scan, geometry, folder
+        self.counts = ScanCounts()
+        # 16 bits are full for a white target at a right angle at half the flight height: nothing but a retro-reflector
+        # is brighter, and the weakest echoes still have hundreds of steps.
+        self.intensity_scale = 65535.0 * max(1.0, scan.path.platform.height / 2.0) ** 2
+
+    def run(self) -> Generator[float, None, None]:
+        """Scan; yield the share that is done after each block. The files are complete when the iteration ends."""
+        epsg = self.geometry.parameters.metadata.epsg
+        view = _top_view(self.geometry) if "previews" in self.scenario.outputs else None
+        total = len(self.scan.blocks())
+        with _cloud_writer(self.folder, self.scenario, epsg, self.scan, self.intensity_scale) as writer:
+            for number, result in enumerate(scan_blocks(self.scan, self.scenario.scan.threads), start=1):
+                self.counts.add(result)
+                if writer:
+                    writer.write(result.points)
+                if view:
+                    view.add(result.points)
+                yield number / total
+        self.counts.intensity_clipped = writer.clipped if writer else 0
+        if view:
+            view.save(self.folder, epsg)
+
+    def summary(self) -> dict[str, Any]:
+        """Return the counts as JSON data."""
+        names = {row.id: row.name for row in classes()} | {255: "unlabelled"}
+        by_class = {names.get(i, str(i)): int(n) for i, n in enumerate(self.counts.by_class) if n}
+        mesh = self.scan.mesh
+        return {
+            "triangles": len(mesh.triangles),
+            "vertices": len(mesh.vertices),
+            "caster": self.scan.caster.name,
+            **{name: value for name, value in asdict(self.counts).items() if name != "by_class"},
+            "intensity_scale": self.intensity_scale,
+            "points_by_class": by_class,
+        }
 
 
 @contextmanager
-def _cloud_writer(folder: Path, wanted: tuple[str, ...], epsg: int, scan: Scan) -> Iterator[LasWriter | None]:
-    if "cloud" not in wanted:
+def _cloud_writer(
+    folder: Path, scenario: Scenario, epsg: int, scan: Scan, intensity_scale: float
+) -> Iterator[LasWriter | None]:
+    if "cloud" not in scenario.outputs:
         yield None
         return
-    # 16 bits are full for a white target at a right angle at half the flight height: nothing but a retro-reflector is
-    # brighter, and the weakest echoes still have hundreds of steps.
-    full_scale_range = max(1.0, scan.path.platform.height / 2.0)
-    with LasWriter(folder / "cloud.laz", epsg, scan.mesh.origin, 65535.0 * full_scale_range**2) as writer:
+    with LasWriter(folder / "cloud.laz", epsg, scan.mesh.origin, intensity_scale) as writer:
         yield writer
 
 

@@ -10,6 +10,7 @@ import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
+import hypothesis
 import pytest
 
 TESTS = Path(__file__).resolve().parent
@@ -20,6 +21,10 @@ BLENDER_FOLDER = Path(tempfile.mkdtemp(prefix="synthroads-blender-"))
 os.environ["BLENDER_USER_RESOURCES"] = str(BLENDER_FOLDER)
 
 collect_ignore = [] if HAS_BPY else ["blender"]
+
+# The same examples in every run, and no time limit for one: the machine may be busy with something else.
+hypothesis.settings.register_profile("synthroads", deadline=None, derandomize=True)
+hypothesis.settings.load_profile("synthroads")
 
 
 def pytest_report_header() -> str:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import errno
-import os
 import shutil
 import tempfile
 from collections.abc import Iterable, Iterator
@@ -39,7 +38,7 @@ def output_folder(target: Path, names: Iterable[str], overwrite: bool) -> Iterat
     try:
         yield temporary
         for path in sorted(temporary.iterdir()):
-            os.replace(path, target / path.name)
+            path.replace(target / path.name)
     except OSError as error:
         if error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EACCES, errno.EROFS):
             raise OutputError("--output", str(target), f"cannot be written ({error.strerror})") from None

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, get_args
 
 from pydantic import Field, model_validator
 
@@ -38,9 +38,7 @@ class Interval(ScenarioModel):
 
 
 def _interval(low: float, high: float, unit: str, description: str) -> Any:
-    return Field(
-        Interval(minimum=low, maximum=high), description=description, json_schema_extra={"unit": unit}
-    )
+    return Field(Interval(minimum=low, maximum=high), description=description, json_schema_extra={"unit": unit})
 
 
 class RoadScenario(ScenarioModel):
@@ -115,7 +113,8 @@ class ScanScenario(ScenarioModel):
     threads: int = quantity(0, ge=0, le=1024, unit="1", description="Threads; 0 uses every core.")
 
 
-OUTPUTS = ("parameters", "cloud", "centerline", "scene", "previews")
+Output = Literal["parameters", "cloud", "centerline", "scene", "previews"]
+OUTPUTS: tuple[Output, ...] = get_args(Output)
 
 
 class Scenario(ScenarioModel):
@@ -134,7 +133,7 @@ class Scenario(ScenarioModel):
     )
     road: RoadScenario = Field(RoadScenario(), description="The road's limits.")
     scan: ScanScenario = Field(ScanScenario(), description="The scan.")
-    outputs: tuple[Literal["parameters", "cloud", "centerline", "scene", "previews"], ...] = Field(
+    outputs: tuple[Output, ...] = Field(
         OUTPUTS, description="Files wanted; nothing is computed that none of them needs."
     )
 

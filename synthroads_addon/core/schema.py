@@ -43,6 +43,11 @@ def quantity(
     )
 
 
+def _only_vendor_keys(schema: dict[str, Any]) -> None:
+    schema["additionalProperties"] = False
+    schema["patternProperties"] = {f"^\\{VENDOR_PREFIX}": {}}
+
+
 class Model(BaseModel):
     """Base of all parameter classes: immutable, no unknown keys but a vendor's, no NaN; numbers are strict."""
 
@@ -50,7 +55,7 @@ class Model(BaseModel):
         extra="allow",
         frozen=True,
         allow_inf_nan=False,
-        json_schema_extra=lambda schema: _only_vendor_keys(schema),
+        json_schema_extra=_only_vendor_keys,
     )
     vendor_keys_allowed: ClassVar[bool] = True
 
@@ -126,11 +131,6 @@ def unit_of(field: FieldInfo) -> str:
 
 def _refuse_constant(name: str) -> float:
     raise ValueError(f"{name} is not a number")
-
-
-def _only_vendor_keys(schema: dict[str, Any]) -> None:
-    schema["additionalProperties"] = False
-    schema["patternProperties"] = {f"^\\{VENDOR_PREFIX}": {}}
 
 
 def _input_error(error: ValidationError, data: object, source: str) -> InputError:

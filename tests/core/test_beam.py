@@ -1,6 +1,5 @@
 """The rays of a pulse have the moments of the Gaussian beam that they stand for."""
 
-import numpy as np
 import pytest
 
 from synthroads_addon.core.scanning.beam import RINGS, beam_pattern

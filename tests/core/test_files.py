@@ -18,9 +18,13 @@ def test_files_appear_at_the_end(tmp_path: Path) -> None:
 
 
 def test_stopped_work_leaves_nothing(tmp_path: Path) -> None:
-    with pytest.raises(KeyboardInterrupt), output_folder(tmp_path / "out", ["a.txt"], False) as folder:
-        (folder / "a.txt").write_text("half")
-        raise KeyboardInterrupt
+    def stopped() -> None:
+        with output_folder(tmp_path / "out", ["a.txt"], False) as folder:
+            (folder / "a.txt").write_text("half")
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        stopped()
     assert list(tmp_path.iterdir()) == []
 
 

@@ -75,9 +75,13 @@ def test_overflow_is_refused_and_nothing_is_left(tmp_path: Path, points) -> None
 
 
 def test_interrupted_writing_leaves_nothing(tmp_path: Path, points) -> None:
-    with pytest.raises(KeyboardInterrupt), LasWriter(tmp_path / "cloud.laz", None, ORIGIN, SCALE) as writer:
-        writer.write(points)
-        raise KeyboardInterrupt
+    def stopped() -> None:
+        with LasWriter(tmp_path / "cloud.laz", None, ORIGIN, SCALE) as writer:
+            writer.write(points)
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        stopped()
     assert list(tmp_path.iterdir()) == []
 
 

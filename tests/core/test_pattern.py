@@ -59,7 +59,7 @@ def test_impossible_settings_are_refused(change: str, field: str) -> None:
 
 
 def test_too_fine_an_angle_is_refused() -> None:
-    with pytest.raises(InputError, match="angle step of 0.012"):
+    with pytest.raises(InputError, match=r"angle step of 0\.012"):
         setting("scan.pulse_rate_khz=300", "scan.field_of_view_deg=120", "scan.lines_per_second=10")
 
 
@@ -106,7 +106,7 @@ def test_path_keeps_height_offset_speed_and_sides() -> None:
 def test_positive_scan_angle_looks_to_the_right() -> None:
     s, p = setting(), path("road.radius.maximum=900")
     pulses = rotating_mirror(s, p, p.strips[0], 0, 1000)
-    station, offset = p.geometry.alignment.project((pulses.origin + pulses.direction)[:, :2])
+    _station, offset = p.geometry.alignment.project((pulses.origin + pulses.direction)[:, :2])
     right = pulses.scan_angle > 0.01
     assert np.all(offset[right] < p.strips[0].lateral_offset)
 

@@ -26,7 +26,9 @@ def test_extremes_are_finite() -> None:
     distance = np.array([0.0, 1e-300, 1e-9, 1.0, 1e6, np.inf])
     with np.errstate(all="raise", under="ignore", over="ignore"):
         got = lambert_intensity(1.0, 1.0, distance, attenuation=0.2)
-    assert got[0] == 0.0 and got[-1] == 0.0 and got[-2] == 0.0
+    assert got[0] == 0.0
+    assert got[-1] == 0.0
+    assert got[-2] == 0.0
     assert not np.isnan(got).any()
     assert lambert_intensity(1.0, -0.5, 10.0) == 0.0
     assert lambert_intensity(1.0, 0.0, 10.0) == 0.0
@@ -36,5 +38,6 @@ def test_colour_is_srgb_of_the_linear_base() -> None:
     from synthroads_addon.core.scanning.radiometry import SUN
 
     color = lit_color(np.array([[0.0, 0.5, 1.0]]), SUN[None, :])
-    assert color[0, 0] == 0 and color[0, 2] == 65535
+    assert color[0, 0] == 0
+    assert color[0, 2] == 65535
     assert color[0, 1] / 65535 == pytest.approx(0.7354, abs=1e-3)

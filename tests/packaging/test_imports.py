@@ -76,7 +76,8 @@ def test_library_is_imported_without_blender() -> None:
 import importlib, sys
 for name in {sorted(BLENDER)!r}:
     sys.modules[name] = None # importing it raises ImportError
-for name in {modules!r}:
+modules = {modules!r}
+for name in modules:
     importlib.import_module(name)
 """
     answer = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=False)
@@ -90,10 +91,16 @@ def test_addon_is_imported_under_another_name(tmp_path: Path) -> None:
     (parent / "synthroads").symlink_to(ADDON, target_is_directory=True)
     names = _modules(ADDON / "core")
     modules = [name.replace("synthroads_addon", "bl_ext.user_default.synthroads", 1) for name in names]
-    code = f"import importlib, sys\nfor name in {modules!r}: importlib.import_module(name)\n"
-    code += "assert 'synthroads_addon' not in sys.modules"
+    code = f"""
+import importlib, sys
+sys.path.insert(0, {str(tmp_path)!r})
+modules = {modules!r}
+for name in modules:
+    importlib.import_module(name)
+assert "synthroads_addon" not in sys.modules
+"""
     answer = subprocess.run(
-        [sys.executable, "-P", "-c", f"import sys; sys.path.insert(0, {str(tmp_path)!r})\n{code}"],
+        [sys.executable, "-P", "-c", code],
         cwd=tmp_path,
         capture_output=True,
         text=True,

@@ -254,7 +254,7 @@ class Tree:
         raw.node_tree = group
         named = {socket.name.lower().replace(" ", "_"): socket for socket in raw.inputs}
         for name, operand in inputs.items():
-            self._feed(named[name], operand)
+            self._feed(named[name.rstrip("_")], operand)
         return Node(self, raw)
 
     def link_all(self, socket: bpy.types.NodeSocket, values: list[Value]) -> None:

@@ -18,12 +18,15 @@ def arrange(group: bpy.types.NodeTree) -> None:
     for node in group.nodes:
         _depth(node, incoming, depths)
     top = 0.0
+    places: dict[str, tuple[float, float]] = {}
     blocks: dict[str, list[bpy.types.Node]] = {}
     for node in group.nodes:
         if node.type != "FRAME":
             blocks.setdefault(node.parent.name if node.parent else "", []).append(node)
     for block in blocks.values():
-        top -= _arrange_block(block, depths, top) + FRAME_GAP
+        top -= _arrange_block(block, depths, top, places) + FRAME_GAP
+    # One call for all: setting a node's place by itself updates the whole tree each time.
+    group.nodes.foreach_set("location", [value for node in group.nodes for value in places.get(node.name, (0.0, 0.0))])
     for node in group.nodes:
         if node.type == "GROUP_INPUT":
             for socket in node.outputs:
@@ -38,13 +41,15 @@ def _depth(node: bpy.types.Node, incoming: dict[str, list[bpy.types.Node]], dept
     return depths[node.name]
 
 
-def _arrange_block(block: list[bpy.types.Node], depths: dict[str, int], top: float) -> float:
+def _arrange_block(
+    block: list[bpy.types.Node], depths: dict[str, int], top: float, places: dict[str, tuple[float, float]]
+) -> float:
     """Place the nodes of one frame from `top` downwards and return the block's height."""
     heights: dict[int, float] = {}
     for node in block:
         depth = depths[node.name]
         sockets = sum(1 for socket in (*node.inputs, *node.outputs) if socket.enabled and not socket.hide)
         height = 60.0 + 22.0 * sockets + ROW_GAP
-        node.location = (COLUMN * depth, top - heights.get(depth, 0.0))
+        places[node.name] = (COLUMN * depth, top - heights.get(depth, 0.0))
         heights[depth] = heights.get(depth, 0.0) + height
     return max(heights.values(), default=0.0)

@@ -7,7 +7,6 @@ intensity stands as JSON in the VLR ``SynthRoads`` 1.
 
 from __future__ import annotations
 
-import os
 from datetime import date
 from pathlib import Path
 from types import TracebackType
@@ -83,7 +82,7 @@ class LasWriter:
         finally:
             self._file.close()
             if kind is None:
-                os.replace(self._temporary, self.path)
+                self._temporary.replace(self.path)
             else:
                 self._temporary.unlink(missing_ok=True)
 

@@ -56,7 +56,7 @@ class TopView:
         window, size = slice(first, last), last - first
 
         def total(weights: NDArray[np.float64] | None = None) -> NDArray[np.float64]:
-            return np.bincount(cell - first, weights, size)
+            return np.bincount(cell - first, weights, size).astype(np.float64)
 
         self.count[window] += total()
         self.intensity[window] += total((block.intensity * block.range**2)[inside])
@@ -95,7 +95,10 @@ class TopView:
     def _gray(self, values: NDArray[np.float64], filled: NDArray[np.bool_]) -> tuple[NDArray[np.float64], list]:
         low, high = np.quantile(values[filled], [0.005, 0.995]) if filled.any() else (0.0, 1.0)
         gray = np.clip((values - low) / max(high - low, 1e-12), 0, 1) * 255
-        legend = [(f"{low:.2f}", (0, 0, 0)), (f"{high:.2f}  intensity x range\u00b2 (white target = 1)", (255, 255, 255))]
+        legend = [
+            (f"{low:.2f}", (0, 0, 0)),
+            (f"{high:.2f}  intensity x range\u00b2 (white target = 1)", (255, 255, 255)),
+        ]
         return np.repeat(gray[:, None], 3, axis=1), legend
 
     def _draw(self, pixels: NDArray[np.uint8], name: str, legend: list, epsg: int) -> Image.Image:

@@ -63,11 +63,13 @@ class Element:
     curvature_end: float
 
     def __post_init__(self) -> None:
-        if not (np.isfinite(self.length) and self.length > 0):
-            raise InputError("element.length", self.length, "a finite length above 0 m is needed")
+        finite_array("element.length", self.length)
+        if self.length <= 0:
+            raise InputError("element.length", self.length, "a length above 0 m is needed")
         for name in ("curvature_start", "curvature_end"):
             value = getattr(self, name)
-            if not abs(value) <= CURVATURE_LIMIT:  # false for NaN, too
+            finite_array(f"element.{name}", value)
+            if abs(value) > CURVATURE_LIMIT:
                 raise InputError(f"element.{name}", value, f"from -{CURVATURE_LIMIT:g} to {CURVATURE_LIMIT:g} 1/m")
 
     @property
@@ -108,8 +110,7 @@ class Alignment:
     def __init__(self, elements: Sequence[Element], x: float = 0.0, y: float = 0.0, heading: float = 0.0) -> None:
         """Raise InputError without elements, or where x, y or heading is not a finite number."""
         for name, value in (("x", x), ("y", y), ("heading", heading)):
-            if not np.isfinite(value):
-                raise InputError(f"alignment.{name}", value, "a finite number is needed")
+            finite_array(f"alignment.{name}", value)
         if not elements:
             raise InputError("alignment.elements", None, "at least one element is needed")
         self.elements = tuple(elements)
@@ -220,6 +221,19 @@ class Alignment:
         for chosen, x, y, nodes in self._leaves(wanted[:, 0] - self.x, wanted[:, 1] - self.y):
             station[chosen], offset[chosen] = self._project_leaf(x, y, nodes)
         return station, offset
+
+    def project_near(self, points: ArrayLike, station: ArrayLike, reach: float) -> tuple[FloatArray, FloatArray]:
+        """Return station (N,) and offset (N,) of points (N, 2) whose stations are known to within `reach` metres.
+
+        Faster than `project`, it cannot stray to another branch of a road that crosses itself, and it takes the
+        tangents beyond the ends like the road. A foot farther away is replaced by the end of the reach.
+        """
+        guess, wanted = finite_array("station", station), finite_array("points", points)
+        if wanted.shape != (*guess.shape, 2) or guess.ndim != 1:
+            raise InputError("points", wanted.shape, f"the shape ({guess.size}, 2) is needed, one point per station")
+        x, y = wanted[:, 0] - self.x, wanted[:, 1] - self.y
+        found, _, offset = self._find_feet(x, y, guess, guess - reach, guess + reach)
+        return found, offset
 
     def _leaves(self, x: FloatArray, y: FloatArray) -> Iterator[tuple[IntArray, FloatArray, FloatArray, IntArray]]:
         """Halve the points along their longer extent until few are left, near few nodes; yield both.

@@ -17,8 +17,8 @@ def fitted_axis(path: Path, scenario: RoadScenario) -> tuple[AlignmentObject, Ro
     """Fit an alignment to the points of a CSV or GeoJSON file.
 
     Returns:
-        the alignment in local coordinates, the scenario with the length and map origin that follow from it, and how well
-        it fits (m): root mean square, 95th percentile and worst distance, horizontally and in height.
+        the alignment in local coordinates, the scenario with the length and map origin that follow from it, and how
+        well it fits (m): root mean square, 95th percentile and worst distance, horizontally and in height.
 
     Raises:
         InputError: the file is missing or not an axis.

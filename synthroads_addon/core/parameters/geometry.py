@@ -83,7 +83,12 @@ class RoadGeometry:
         """Return the crossfall (m/m, positive where the surface falls to the right) at the stations, same shape."""
         points = carriageway.crossfall
         return (
-            np.interp(station, [p.station for p in points], [p.crossfall_percent for p in points]) / 100.0
+            np.interp(
+                np.asarray(station, dtype=np.float64),
+                [p.station for p in points],
+                [p.crossfall_percent for p in points],
+            )
+            / 100.0
         )
 
     def boundary_elevations(self, station: ArrayLike) -> Float:

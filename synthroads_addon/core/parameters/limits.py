@@ -1,7 +1,7 @@
 """Limits of the RAA 2008 by design class, and the standard cross-sections: the one table of both.
 
-Values and how sure each is: the RAA's limits as printed in secondary sources; the stopping sight distances of EKA 1B and
-2 and the crossfall over radius are derived (the RAA shows the latter as a diagram).
+The limits are those that secondary sources print of the RAA; the crossfall over the radius, which the RAA shows as a
+diagram, is derived from the shares of friction at its ends.
 """
 
 from __future__ import annotations

@@ -23,7 +23,7 @@ def line_markings(
             LineMarking(
                 instance=first_instance + boundary,
                 carriageway=name,
-                kind=kind,  # type: ignore[arg-type]
+                kind=kind,
                 boundary=boundary,
                 width=BROAD if kind == "outer_edge" else NARROW,
                 dash_length=LANE_DASH if lane_line else 0.0,

@@ -7,6 +7,7 @@ positive to the left), slopes in percent, angles in degrees in JSON (`_deg`). Co
 
 from __future__ import annotations
 
+import builtins
 import re
 from pathlib import Path
 from typing import Annotated, Any, Literal, TypeVar
@@ -16,7 +17,7 @@ from pydantic import Field, model_validator
 from ..errors import InputError
 from ..schema import Model, canonical_json, quantity, read_json
 
-SCHEMA_VERSION = "1.0"
+SCHEMA_VERSION: Literal["1.0"] = "1.0"
 EPSG_URI = "https://www.opengis.net/def/crs/EPSG/0/{}"
 StrictFinite = Annotated[float, Field(strict=True, ge=-1e8, le=1e8)]
 DESIGN_CLASSES = ("EKA1A", "EKA1B", "EKA2", "EKA3")
@@ -55,6 +56,9 @@ class RoadObject(Model):
     instance: int = quantity(
         ge=1, le=2**32 - 1, unit="1", description="Number that the object's faces and points carry."
     )
+
+
+ObjectT = TypeVar("ObjectT", bound=RoadObject)
 
 
 class HorizontalElement(Model):
@@ -244,7 +248,6 @@ class Vegetation(RoadObject):
         return self
 
 
-ObjectT = TypeVar("ObjectT", bound=RoadObject)
 AnyObject = Annotated[
     AlignmentObject | Carriageway | Median | LineMarking | Guardrail | Delineator | Terrain | Vegetation,
     Field(discriminator="type"),
@@ -283,7 +286,7 @@ class RoadParameters(Model):
                 raise ValueError(f"objects.{name}: carriageway and boundary must name a lane boundary that exists")
         return self
 
-    def of_type(self, kind: type[ObjectT]) -> dict[str, ObjectT]:
+    def of_type(self, kind: builtins.type[ObjectT]) -> dict[str, ObjectT]:
         """Return the objects of one class by id, in the order of the file."""
         return {name: item for name, item in self.objects.items() if isinstance(item, kind)}
 

@@ -140,9 +140,7 @@ def _horizontal(scenario: RoadScenario, rng: np.random.Generator) -> tuple[Horiz
     before = rounded((scenario.length - 2.0 * transition - arc) * rng.uniform(0.3, 0.7))
     after = rounded(scenario.length - 2.0 * transition - arc - before)
     if max(before, after) > LONGEST_STRAIGHT:
-        raise InputError(
-            "road.length", scenario.length, f"one curve leaves a straight over {LONGEST_STRAIGHT:.0f} m"
-        )
+        raise InputError("road.length", scenario.length, f"one curve leaves a straight over {LONGEST_STRAIGHT:.0f} m")
     curvature = rounded(sign / radius, 12)
     return (
         _element(before, 0.0, 0.0),
@@ -156,16 +154,14 @@ def _horizontal(scenario: RoadScenario, rng: np.random.Generator) -> tuple[Horiz
 def _run_off_clothoid(scenario: RoadScenario, radius: float) -> float:
     """Return the smallest A (m) whose length suffices for the crossfall's run-off."""
     section = STANDARD_CROSS_SECTIONS[scenario.cross_section]
-    half = (
-        sum(section.lanes) + section.hard_shoulder + section.outer_edge_strip + section.inner_edge_strip
-    ) / 2.0
+    half = (sum(section.lanes) + section.hard_shoulder + section.outer_edge_strip + section.inner_edge_strip) / 2.0
     change = LEAST_CROSSFALL_PERCENT + curve_crossfall_percent(scenario.design_class, 1.0 / radius)
     return math.sqrt(radius * half * change / LIMITS[scenario.design_class].run_off_percent)
 
 
 def _element(length: float, start: float, end: float) -> HorizontalElement:
     kind = "line" if start == end == 0.0 else "arc" if start == end else "clothoid"
-    return HorizontalElement(kind=kind, length=length, curvature_start=start, curvature_end=end)  # type: ignore[arg-type]
+    return HorizontalElement(kind=kind, length=length, curvature_start=start, curvature_end=end)
 
 
 def _vertical(scenario: RoadScenario, rng: np.random.Generator) -> tuple[VerticalPoint, ...]:
@@ -173,9 +169,7 @@ def _vertical(scenario: RoadScenario, rng: np.random.Generator) -> tuple[Vertica
     limits = LIMITS[scenario.design_class]
     steepest = max(abs(scenario.grade_percent.minimum), abs(scenario.grade_percent.maximum))
     if steepest > limits.grade_percent:
-        raise InputError(
-            "road.grade_percent", steepest, f"{scenario.design_class} allows {limits.grade_percent} %"
-        )
+        raise InputError("road.grade_percent", steepest, f"{scenario.design_class} allows {limits.grade_percent} %")
     first = _draw(rng, scenario.grade_percent)
     length = scenario.length
     middle = rounded(length * rng.uniform(0.4, 0.6))
@@ -202,7 +196,7 @@ def _carriageway(
     section = STANDARD_CROSS_SECTIONS[scenario.cross_section]
     return Carriageway(
         instance=instance,
-        side=side,  # type: ignore[arg-type]
+        side=side,
         inner_offset=section.median / 2.0,
         hard_shoulder_width=section.hard_shoulder,
         outer_edge_strip_width=section.outer_edge_strip,
@@ -213,9 +207,7 @@ def _carriageway(
     )
 
 
-def _crossfall(
-    design_class: str, side: str, elements: list[tuple[float, float, float]]
-) -> list[CrossfallPoint]:
+def _crossfall(design_class: str, side: str, elements: list[tuple[float, float, float]]) -> list[CrossfallPoint]:
     """Return the crossfall at the elements' borders: outwards on straights, to the inside in curves.
 
     Where the curvature changes the crossfall runs off linearly along the clothoid.

@@ -40,7 +40,7 @@ def _kinks(geometry: RoadGeometry) -> NDArray[np.float64]:
     parameters, length = geometry.parameters, geometry.length
     stations = [geometry.alignment.element_starts, np.asarray(geometry.profile.breakpoints), [0.0, length]]
     for side in ("left", "right"):
-        if carriageway := parameters.carriageway(side):  # type: ignore[arg-type]
+        if carriageway := parameters.carriageway(side):
             stations.append([point.station for point in carriageway.crossfall])
     stations += [geometry.dashes(line).ravel() for line in parameters.of_type(LineMarking).values()]
     inside = np.clip(np.concatenate([np.asarray(s, dtype=np.float64) for s in stations]), 0.0, length)
@@ -51,9 +51,7 @@ def _kinks(geometry: RoadGeometry) -> NDArray[np.float64]:
     return kinks[keep] if len(kinks) > 2 else kinks
 
 
-def _chord_spacing(
-    geometry: RoadGeometry, kinks: NDArray[np.float64], tolerance: float
-) -> NDArray[np.float64]:
+def _chord_spacing(geometry: RoadGeometry, kinks: NDArray[np.float64], tolerance: float) -> NDArray[np.float64]:
     """Return the largest spacing (K,) whose horizontal and vertical sagitta keep their share of the tolerance."""
     samples = np.linspace(kinks[:-1] + 1e-6, kinks[1:] - 1e-6, 5)
     reach = np.abs(geometry.offsets).max()
@@ -63,9 +61,7 @@ def _chord_spacing(
     return np.sqrt(8.0 * _SHARE * tolerance / np.maximum(np.maximum(horizontal, vertical), 1e-12))
 
 
-def _twist_spacing(
-    geometry: RoadGeometry, kinks: NDArray[np.float64], tolerance: float
-) -> NDArray[np.float64]:
+def _twist_spacing(geometry: RoadGeometry, kinks: NDArray[np.float64], tolerance: float) -> NDArray[np.float64]:
     """Return the largest spacing (K,) at which two triangles stay close to a strip whose crossfall changes.
 
     The middle of a twisted quad of width w and length ds lies w ds (dq/ds) / 4 off its diagonal.

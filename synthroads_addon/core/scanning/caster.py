@@ -17,7 +17,9 @@ class Caster(Protocol):
 
     name: str
 
-    def cast(self, origins: NDArray[np.float32], directions: NDArray[np.float32], maximum_range: float) -> NDArray[np.int32]:
+    def cast(
+        self, origins: NDArray[np.float32], directions: NDArray[np.float32], maximum_range: float
+    ) -> NDArray[np.int32]:
         """Return the (N,) indices of the faces hit; -1 where nothing is hit within ``maximum_range`` (m).
 
         Args:

@@ -39,13 +39,11 @@ def pulse_count(setting: ScannerSetting, strip: Strip) -> int:
     return max(1, int(strip.duration * setting.lines_per_second + 1e-9)) * setting.pulses_per_line
 
 
-def rotating_mirror(
-    setting: ScannerSetting, path: FlightPath, strip: Strip, first: int, count: int
-) -> Pulses:
+def rotating_mirror(setting: ScannerSetting, path: FlightPath, strip: Strip, first: int, count: int) -> Pulses:
     """Return pulses ``first`` to ``first + count`` of a strip scanned by a rotating mirror.
 
-    Line k begins at k / lines_per_second; its pulses follow at the pulse rate, an angle step apart, centred on the nadir.
-    The scan plane is perpendicular to the heading; the platform moves on during a line.
+    Line k begins at k / lines_per_second; its pulses follow at the pulse rate, an angle step apart, centred on the
+    nadir. The scan plane is perpendicular to the heading; the platform moves on during a line.
     """
     line, within = np.divmod(np.arange(first, first + count, dtype=np.int64), setting.pulses_per_line)
     time = strip.start_time + line / setting.lines_per_second + within / setting.pulse_rate

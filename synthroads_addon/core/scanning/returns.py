@@ -38,7 +38,7 @@ def group_returns(ranges: Float, weights: Float, intensities: Float, resolution:
         intensities: (P, K) intensity that each ray adds.
         resolution: m.
     """
-    pulses, rays = ranges.shape
+    _pulses, _rays = ranges.shape
     nearest, farthest = ranges.min(axis=1), ranges.max(axis=1)
     with np.errstate(invalid="ignore"):
         single = farthest - nearest <= resolution  # NaN (nothing hit at all) is not single
@@ -88,7 +88,9 @@ def _split_pulses(
     return Echoes(owner[starts], flat[strongest], mean, np.add.reduceat(energy, starts))
 
 
-def number_returns(pulse: NDArray[np.intp], maximum: int) -> tuple[NDArray[np.bool_], NDArray[np.uint8], NDArray[np.uint8]]:
+def number_returns(
+    pulse: NDArray[np.intp], maximum: int
+) -> tuple[NDArray[np.bool_], NDArray[np.uint8], NDArray[np.uint8]]:
     """Return which echoes are recorded, and for these the return number and the number of returns.
 
     Args:

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..cloud.points import PointBlock
+from ..materials import UNKNOWN, materials
 from ..random_streams import stream
 from ..scene_mesh import SceneMesh
 from .beam import beam_pattern
@@ -37,6 +38,17 @@ class Surfaces:
     def reflectivity(self) -> Float:
         """Return R of each material, (M,)."""
         return reflectivity(self.base_color, self.metallic, self.specular)
+
+
+def surfaces_of(names: tuple[str, ...]) -> Surfaces:
+    """Return the constants of the named materials; a name that isn't in the table gets those of `UNKNOWN`."""
+    table = materials()
+    rows = [table.get(name, table[UNKNOWN]) for name in names]
+    return Surfaces(
+        np.array([row.base_color for row in rows], dtype=np.float64).reshape(-1, 3),
+        np.array([row.metallic for row in rows], dtype=np.float64),
+        np.array([row.specular for row in rows], dtype=np.float64),
+    )
 
 
 @dataclass(frozen=True)
@@ -92,9 +104,13 @@ class BlockResult:
 
 def scan_block(scan: Scan, strip: Strip, block: int) -> BlockResult:
     """Scan one block; blocks can be computed in any order and by any worker."""
-    size = scan.pulses_per_block
-    first = block * size
-    count = min(size, pulse_count(scan.setting, strip) - first)
+    first = block * scan.pulses_per_block
+    count = min(scan.pulses_per_block, pulse_count(scan.setting, strip) - first)
+    return scan_pulses(scan, strip, first, count, stream(scan.seed, "range noise", strip.index, block))
+
+
+def scan_pulses(scan: Scan, strip: Strip, first: int, count: int, noise: np.random.Generator) -> BlockResult:
+    """Scan pulses ``first`` to ``first + count`` of a strip; memory grows with their number."""
     pulses = rotating_mirror(scan.setting, scan.path, strip, first, count)
     facing = _reaching_scene(scan, pulses)
     pulses = Pulses(*(getattr(pulses, name)[facing] for name in Pulses.__dataclass_fields__))
@@ -102,7 +118,7 @@ def scan_block(scan: Scan, strip: Strip, block: int) -> BlockResult:
     faces = _cast(scan, pulses, directions)
     echoes, rays = _echoes(scan, pulses, directions, faces)
     strong = echoes.intensity >= scan.setting.threshold
-    points = _points(scan, strip, block, pulses, echoes, rays, np.flatnonzero(strong))
+    points = _points(scan, strip, pulses, echoes, rays, np.flatnonzero(strong), noise)
     return BlockResult(points, count, faces.size, int(np.count_nonzero(~strong)))
 
 
@@ -156,9 +172,7 @@ class _Rays:
     slot: NDArray[np.intp]
 
 
-def _echoes(
-    scan: Scan, pulses: Pulses, directions: Float, faces: NDArray[np.int32]
-) -> tuple[Echoes, _Rays]:
+def _echoes(scan: Scan, pulses: Pulses, directions: Float, faces: NDArray[np.int32]) -> tuple[Echoes, _Rays]:
     """Return the returns of a block, before the threshold, and the rays that they stem from."""
     hit = np.flatnonzero(faces.ravel() >= 0)
     face = faces.ravel()[hit]
@@ -182,15 +196,20 @@ def _echoes(
 
 
 def _points(
-    scan: Scan, strip: Strip, block: int, pulses: Pulses, echoes: Echoes, rays: _Rays, strong: NDArray[np.intp]
+    scan: Scan,
+    strip: Strip,
+    pulses: Pulses,
+    echoes: Echoes,
+    rays: _Rays,
+    strong: NDArray[np.intp],
+    noise: np.random.Generator,
 ) -> PointBlock:
     """Return the points of the echoes above the threshold, with range noise."""
     keep, number, returns = number_returns(echoes.pulse[strong], scan.setting.device.maximum_returns)
     chosen = strong[keep]
     pulse, row = echoes.pulse[chosen], rays.slot[echoes.ray[chosen]]
     face = rays.face[row]
-    noise = stream(scan.seed, "range noise", strip.index, block).normal(size=len(chosen))
-    distance = echoes.range[chosen] + scan.setting.range_sigma * noise
+    distance = echoes.range[chosen] + scan.setting.range_sigma * noise.normal(size=len(chosen))
     local = pulses.origin[pulse] + distance[:, None] * pulses.direction[pulse]
     return PointBlock(
         xyz=local + scan.mesh.origin,

@@ -1,0 +1,103 @@
+"""Measure error against time for each knob that trades one for the other."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+if __name__ == "__main__":
+    sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
+from headless.cli import add_common_arguments, entry, progress_bar
+from synthroads_addon.core.errors import InputError
+from synthroads_addon.core.scenario import load_scenario
+from synthroads_addon.core.schema import canonical_json
+from synthroads_addon.core.tradeoff import KNOBS, ROW_TITLES, markdown, rows
+
+_ROW = "--row"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments of `synthroads tradeoff`."""
+    parser.add_argument("--scenario", default="rq31-600m", metavar="NAME_OR_FILE", help="scene to measure on")
+    parser.add_argument("--output", required=True, type=Path, metavar="DIR", help="folder for table, JSON and plot")
+    parser.add_argument("--knobs", nargs="+", default=list(KNOBS), metavar="KNOB", help=f"any of {', '.join(KNOBS)}")
+    parser.add_argument("--overwrite", action="store_true", help="replace files that are already there")
+    parser.add_argument(_ROW, metavar="JSON", help=argparse.SUPPRESS)
+    add_common_arguments(parser)
+
+
+def run(arguments: argparse.Namespace) -> tuple[int, dict[str, Any], str]:
+    """Run `synthroads tradeoff`; each row is measured in a process of its own, so that its memory is its own."""
+    load_scenario(arguments.scenario)
+    if arguments.row:
+        from synthroads_addon.measuring import measure_row
+
+        row = json.loads(arguments.row)
+        result = measure_row(arguments.scenario, row["knob"], row["value"])
+        return 0, result, json.dumps(result)
+    for knob in arguments.knobs:
+        if knob not in KNOBS:
+            raise InputError("--knobs", knob, f"must be any of {', '.join(KNOBS)}")
+    from synthroads_addon.core.files import output_folder
+
+    names = ["tradeoff.json", "tradeoff.md", "tradeoff.png"]
+    with output_folder(arguments.output, names, arguments.overwrite) as folder:
+        results = _measure_all(arguments)
+        table = markdown(results, arguments.scenario)
+        (folder / "tradeoff.json").write_text(canonical_json({"rows": results}), encoding="utf-8")
+        (folder / "tradeoff.md").write_text(table, encoding="utf-8")
+        _plot(results, folder / "tradeoff.png")
+    return 0, {"rows": results}, table + f"\nwritten to {arguments.output}"
+
+
+def _measure_all(arguments: argparse.Namespace) -> list[dict[str, Any]]:
+    progress = progress_bar(arguments)
+    wanted = list(rows(arguments.knobs))
+    results = []
+    for number, (knob, value) in enumerate(wanted):
+        progress(f"{knob} {value}", number / len(wanted))
+        request = json.dumps({"knob": knob, "value": value})
+        line = [sys.executable, str(Path(__file__).resolve()), "--scenario", arguments.scenario, "--output", "."]
+        done = subprocess.run([*line, _ROW, request, "--json"], capture_output=True, text=True, check=False)
+        if done.returncode:
+            raise RuntimeError(f"{knob} = {value} failed: {done.stderr.strip()}")
+        results.append(json.loads(done.stdout))
+    return results
+
+
+def _plot(results: list[dict[str, Any]], path: Path) -> None:
+    """Draw error against time, one panel per kind of error; the rows of one knob are joined."""
+    try:
+        import matplotlib as mpl
+    except ImportError:
+        raise InputError("tradeoff", None, "needs matplotlib for its plot: pip install matplotlib") from None
+    mpl.use("Agg")
+    from matplotlib import pyplot
+
+    panels = [name for name in ROW_TITLES if any(name in row["errors"] for row in results)]
+    figure, axes = pyplot.subplots(1, len(panels), figsize=(4.6 * len(panels), 4.2), squeeze=False)
+    for axis, name in zip(axes[0], panels, strict=True):
+        for knob in dict.fromkeys(row["knob"] for row in results):
+            chosen = [row for row in results if row["knob"] == knob and row["errors"].get(name) is not None]
+            if not chosen:
+                continue
+            style = "*" if knob == "fidelity" else "o-"
+            x, y = [row["seconds"] for row in chosen], [row["errors"][name] for row in chosen]
+            axis.plot(x, y, style, label=knob.replace("_", " "), markersize=11 if knob == "fidelity" else 6)
+            for row, a, b in zip(chosen, x, y, strict=True):
+                axis.annotate(str(row["value"]), (a, b), textcoords="offset points", xytext=(5, 4), fontsize=8)
+        axis.set(xlabel="time (s)", ylabel=ROW_TITLES[name], xscale="log")
+        axis.set_yscale("symlog", linthresh=1e-3)
+        axis.grid(alpha=0.3)
+        axis.legend(fontsize=8)
+    figure.tight_layout()
+    figure.savefig(path, dpi=110, metadata={"Software": None})
+
+
+if __name__ == "__main__":
+    entry("tradeoff")

@@ -1,0 +1,72 @@
+"""Blender materials from the material table: one module per family, each with means equal to the table's."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+
+import bpy
+
+from ...core.errors import nearest_name
+from ...core.materials import UNKNOWN, Material, materials
+from . import furniture, ground, paving, plants
+from .shading import Shade, shade
+
+PROPERTY = "synthroads_material"
+"""Custom property of a Blender material: its name in the table."""
+
+_BUILDERS: dict[str, Callable[[Shade], None]] = {
+    **paving.BUILDERS,
+    **ground.BUILDERS,
+    **plants.BUILDERS,
+    **furniture.BUILDERS,
+}
+
+
+def material(name: str) -> bpy.types.Material:
+    """Return the Blender material of a table entry, made if the file has none yet; KeyError if it isn't in the table."""
+    if name not in materials():
+        raise KeyError(f"no material '{name}'{nearest_name(name, materials())}")
+    for existing in bpy.data.materials:
+        if existing.get(PROPERTY) == name:
+            return existing
+    made = bpy.data.materials.new(f"SR {name}")
+    made[PROPERTY] = name
+    shade(made, materials()[name], _BUILDERS.get(name))
+    return made
+
+
+def table_name(item: bpy.types.Material | None) -> str:
+    """Return the name that a face's material is known by: the table's, else Blender's own."""
+    if item is None:
+        return UNKNOWN
+    return str(item.get(PROPERTY, item.name))
+
+
+def constants(names: Iterable[str]) -> dict[str, Material]:
+    """Return the properties of materials by name: the table's, else those of the Blender material's Principled BSDF."""
+    table = materials()
+    return {name: table[name] if name in table else _principled(name) for name in names}
+
+
+def _principled(name: str) -> Material:
+    item = bpy.data.materials.get(name)
+    if item is None:
+        return materials()[UNKNOWN]
+    nodes = item.node_tree.nodes if item.node_tree else ()
+    node = next((node for node in nodes if node.type == "BSDF_PRINCIPLED"), None)
+    if node is None:
+        colour, rough, metal = item.diffuse_color, item.roughness, item.metallic
+    else:
+        colour, rough, metal = (node.inputs[key].default_value for key in ("Base Color", "Roughness", "Metallic"))
+    # A renderer's default specular of 0.5 would drown the contrast of the base colours.
+    specular = min(0.2, node.inputs["Specular IOR Level"].default_value) if node else 0.2
+
+    def share(value: float) -> float:
+        return min(1.0, max(0.0, float(value)))
+
+    return Material(
+        base_color=(share(colour[0]), share(colour[1]), share(colour[2])),
+        roughness=share(rough),
+        metallic=share(metal),
+        specular=share(specular),
+    )

@@ -1,0 +1,97 @@
+"""SR Delineator: delineator posts (Leitpfosten) on given points."""
+
+from __future__ import annotations
+
+import bpy
+
+from ...core.cloud.labels import class_id
+from . import operations as op
+from .backbone import height_on
+from .builder import Tree, Value, node_group
+
+# Cross-section seen from above, x away from the road, y along the driver's way: a hollow triangle 0.12 m wide.
+SECTION = [(-0.06, -0.050), (-0.045, -0.055), (0.05, -0.014), (0.06, 0.0), (0.05, 0.014), (-0.045, 0.055), (-0.06, 0.05)]
+_SLANT = 0.6
+"""Rise of the top and of the black band away from the road, m/m."""
+# Rows of the body from below: z on the axis; the slant applies above the surface only.
+_LEVELS = (-0.3, 0.0, 0.64, 0.89, 0.964)
+_BAND = 2
+REFLECTOR = (0.04, 0.18)
+"""Width and height of the upright reflector, m."""
+
+
+def delineator_group() -> bpy.types.NodeTree:
+    """Return the group SR Delineator."""
+    return node_group("SR Delineator", _build)
+
+
+def _build(tree: Tree) -> None:
+    """A delineator post on each point; ``heading`` (rad), ``height`` (m) and ``instance`` are the points' attributes."""
+    points = tree.input("Points", "Geometry", description="One point per post, at any height")
+    road = tree.input("Road", "Object", description="Surface that the posts stand on")
+    terrain = tree.input("Terrain", "Object", description="Surface beside the road")
+    names = ("White Material", "Black Material", "Reflector Material")
+    white, black, glass = (tree.input(name, "Material", description="Material of this part") for name in names)
+
+    with tree.frame("Body: white, with a slanted black band"):
+        body = _body(tree, white, black)
+    with tree.frame("Reflectors: an upright one in front, two round ones behind"):
+        body = op.join(body, _front(tree, glass), _behind(tree, glass, 0.07), _behind(tree, glass, -0.07))
+    with tree.frame("On the surface"):
+        place = op.position(tree)
+        height = height_on(op.object_geometry(road), op.object_geometry(terrain), place)
+        flat = tree.node("ShaderNodeVectorMath", place, (1.0, 1.0, 0.0), operation="MULTIPLY").value
+        points = op.set_position(points, flat + op.vector(tree, 0.0, 0.0, height))
+        tall = op.vector(tree, 1.0, 1.0, op.named(tree, "height"))
+        posts = tree.node(
+            "GeometryNodeInstanceOnPoints",
+            points,
+            instance=body,
+            rotation=op.turn(tree, z=op.named(tree, "heading")),
+            scale=tall,
+        ).value
+    with tree.frame("Labels"):
+        posts = op.realize(op.store(posts, "post_instance", op.named(tree, "instance", "INT"), "INSTANCE"))
+        posts = op.store(posts, "class_id", class_id("warning_post"), "FACE")
+        posts = op.store(posts, "instance_id", op.named(tree, "post_instance", "INT"), "FACE")
+    tree.output("Mesh", posts, description="Posts; each face has its own post's instance number")
+
+
+def _set_material(mesh: Value, material: Value, selection: Value | bool = True) -> Value:
+    return mesh.tree.node("GeometryNodeSetMaterial", mesh, selection, material=material).value
+
+
+def _body(tree: Tree, white: Value, black: Value) -> Value:
+    rows = len(_LEVELS)
+    mesh, column, row = op.grid(tree, len(SECTION) + 1, rows)
+    section = op.choose(column, [(x, y, 0.0) for x, y in (*SECTION, SECTION[0])])
+    level = op.component(op.choose(row, [(0.0, 0.0, z) for z in _LEVELS]), "Z")
+    slant = op.switch(row > 1, 0.0, op.component(section, "X") * _SLANT)
+    mesh = op.set_position(mesh, section + op.vector(tree, 0.0, 0.0, level + slant))
+    # Faces of a grid run column by column, rows - 1 of them each.
+    banded = (op.index(tree) % (rows - 1)).equals(_BAND)
+    mesh = _set_material(_set_material(mesh, white), black, banded)
+    lid = tree.node("GeometryNodeMeshCircle", vertices=len(SECTION), fill_type="NGON").value
+    outline = op.choose(op.index(tree), [(x, y, _LEVELS[-1] + _SLANT * x) for x, y in SECTION])
+    return op.join(mesh, _set_material(op.set_position(lid, outline), white))
+
+
+def _front(tree: Tree, material: Value) -> Value:
+    """Return the reflector on the face that approaching drivers see (-y)."""
+    mesh, column, row = op.grid(tree, 2, 2)
+    x = column * REFLECTOR[0] - REFLECTOR[0] / 2
+    # 2 mm before the front face, which runs from (-0.045, -0.055) to (0.05, -0.014).
+    y = (x + 0.045) * (0.041 / 0.095) - 0.0575
+    place = op.vector(tree, x, y, row * REFLECTOR[1] - REFLECTOR[1] / 2 + 0.765)
+    return _set_material(op.set_position(mesh, place), material)
+
+
+def _behind(tree: Tree, material: Value, above: float) -> Value:
+    """Return one of the round reflectors on the other face."""
+    disc = tree.node("GeometryNodeMeshCircle", vertices=8, radius=0.03, fill_type="NGON").value
+    place = op.position(tree)
+    x = op.component(place, "X")
+    y = 0.0575 - (x + 0.045) * (0.041 / 0.095)
+    return _set_material(
+        op.set_position(disc, op.vector(tree, x, y, op.component(place, "Y") + 0.765 + above)), material
+    )

@@ -1,0 +1,101 @@
+"""Rows of the trade-off: one setting, its time, its errors against the analytic road and the converged footprint."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from .blender.model import build_road
+from .blender.scene import scene_mesh
+from .core.cloud.points import PointBlock, concatenate
+from .core.measure import mesh_height_errors
+from .core.parameters.geometry import RoadGeometry
+from .core.parameters.sampler import sample_road
+from .core.progress import peak_memory_mb
+from .core.random_streams import stream
+from .core.scanning.beam import RINGS
+from .core.scanning.pattern import pulse_count
+from .core.scanning.scan import Scan, scan_pulses
+from .core.scenario import Scenario, load_scenario
+from .pipeline import make_scan
+
+CONVERGED = max(RINGS)
+"""Rays per pulse of the footprint that counts as truth."""
+_WINDOWS, _WINDOW = 20, 4000
+"""Windows of each strip that are scanned, spread evenly over it, and the pulses of each."""
+
+
+def measure_row(scenario_name: str, knob: str, value: Any) -> dict[str, Any]:
+    """Measure one row of the trade-off.
+
+    The time is that of building the model and scanning a fixed sample of pulses, on one thread. Errors:
+
+    - height: largest vertical distance of 100,000 random points of the road's mesh from the analytic surface;
+    - position and intensity: first returns against those of the same pulses with 61 rays, 95th percentile;
+    - labels: share of the first returns whose class is another.
+    """
+    path = {"rays_per_pulse": "scan.rays_per_pulse", "caster": "scan.caster"}.get(knob, knob)
+    scenario = load_scenario(scenario_name, ["scan.noise.range_sigma=0", f"{path}={value}"])
+    parameters = sample_road(scenario.road, scenario.seed)
+    geometry = RoadGeometry(parameters)
+    start = time.perf_counter()
+    settings = scenario.settings()
+    model = build_road(parameters, settings.tolerance, settings.vegetation_detail)
+    mesh = scene_mesh()
+    built = time.perf_counter()
+    scan = make_scan(scenario, geometry, mesh)
+    ready = time.perf_counter()
+    points, rays = _sample(scan)
+    seconds = time.perf_counter() - ready
+    errors: dict[str, float] = {"height_mm": 1e3 * float(np.abs(mesh_height_errors(mesh, geometry)).max())}
+    peak = peak_memory_mb()
+    errors |= _beam_errors(scenario, scan, points)
+    return {
+        "knob": knob,
+        "value": value,
+        "seconds": round(built - start + seconds, 3),
+        "model_seconds": round(built - start, 3),
+        "caster_seconds": round(ready - built, 3),
+        "scan_seconds": round(seconds, 3),
+        "rays_per_second": round(rays / seconds),
+        "peak_memory_mb": peak,
+        "triangles": len(mesh.triangles),
+        "errors": {name: round(error, 6) for name, error in errors.items()},
+    }
+
+
+def _sample(scan: Scan) -> tuple[PointBlock, int]:
+    """Scan the same pulses whatever the setting; return their first returns and the number of rays cast."""
+    parts, rays = [], 0
+    for strip in scan.path.strips:
+        firsts = np.linspace(0, pulse_count(scan.setting, strip) - _WINDOW, _WINDOWS).astype(int)
+        for first in firsts:
+            result = scan_pulses(scan, strip, int(first), _WINDOW, stream(0, "no noise"))
+            parts.append(result.points)
+            rays += result.rays
+    points = concatenate(parts)
+    return points.select(points.return_number == 1), rays
+
+
+def _beam_errors(scenario: Scenario, scan: Scan, points: PointBlock) -> dict[str, float]:
+    """Compare first returns with those of the converged footprint, pulse by pulse (told by their time)."""
+    if scan.rays_per_pulse == CONVERGED:
+        return {"position_mm": 0.0, "intensity_percent": 0.0, "labels_percent": 0.0}
+    truth, _ = _sample(replace(scan, rays_per_pulse=CONVERGED, caster=_fast(scan, scenario)))
+    _times, mine, true = np.intersect1d(points.gps_time, truth.gps_time, return_indices=True)
+    a, b = points.select(mine), truth.select(true)
+    return {
+        "position_mm": 1e3 * float(np.quantile(np.linalg.norm(a.xyz - b.xyz, axis=1), 0.95)),
+        "intensity_percent": 100.0 * float(np.quantile(np.abs(a.intensity / b.intensity - 1.0), 0.95)),
+        "labels_percent": 100.0 * float(np.mean(a.class_id != b.class_id)),
+    }
+
+
+def _fast(scan: Scan, scenario: Scenario) -> Any:
+    """Return a fast caster for the truth."""
+    from .blender.casters import make_caster
+
+    return scan.caster if scan.caster.name == "embree" else make_caster("auto", scan.mesh)
