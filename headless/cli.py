@@ -61,7 +61,7 @@ def add_common_arguments(parser: argparse.ArgumentParser) -> None:
 def run(action: Callable[[argparse.Namespace], tuple[int, dict[str, Any], str]], arguments: argparse.Namespace) -> int:
     """Run an action that returns (exit code, result as JSON data, result as text); print what was asked for."""
     try:
-        with _only_our_words_on_stdout():
+        with _without_blenders_chatter():
             code, result, text = action(arguments)
     except InputError as error:
         print(f"error: {error}", file=sys.stderr)
@@ -126,15 +126,17 @@ def progress_bar(arguments: argparse.Namespace) -> Progress:
 
 
 @contextmanager
-def _only_our_words_on_stdout() -> Iterator[None]:
-    """Send what Blender prints to standard output (file names it saved, say) to standard error meanwhile."""
+def _without_blenders_chatter() -> Iterator[None]:
+    """Drop what Blender prints to standard output meanwhile (where it saved, which colours it uses); errors still show."""
     sys.stdout.flush()
     try:
         saved = os.dup(1)
     except OSError:  # no standard output at all
         yield
         return
-    os.dup2(2, 1)
+    silence = os.open(os.devnull, os.O_WRONLY)
+    os.dup2(silence, 1)
+    os.close(silence)
     try:
         yield
     finally:

@@ -43,12 +43,9 @@ def run(arguments: argparse.Namespace) -> tuple[int, dict[str, Any], str]:
     if arguments.fidelity:
         changes.append(f"fidelity={arguments.fidelity}")
     scenario = load_scenario(arguments.scenario, changes)
-    import bpy
-
     from synthroads_addon.pipeline import Job, generate
 
-    bpy.ops.wm.read_factory_settings(use_empty=True)
-    job = Job(scenario, arguments.output, arguments.parameters, arguments.axis, arguments.overwrite)
+    job = Job(scenario, arguments.output, arguments.parameters, arguments.axis, arguments.overwrite, new_file=True)
     report = generate(job, progress_bar(arguments))
     return 0, report, summary(report, arguments.output)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import platform as machine
+import sys
 from collections.abc import Generator, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import contextmanager
@@ -11,6 +12,7 @@ from itertools import islice
 from pathlib import Path
 from typing import Any
 
+import laspy
 import numpy as np
 
 from . import version
@@ -53,6 +55,7 @@ class Job:
         parameters: take this road instead of sampling one.
         axis: sample a road along this centreline (CSV or GeoJSON).
         overwrite: replace files that are already there.
+        new_file: build in a new, empty Blender file instead of the open one, which is lost.
     """
 
     scenario: Scenario
@@ -60,6 +63,7 @@ class Job:
     parameters: Path | None = None
     axis: Path | None = None
     overwrite: bool = False
+    new_file: bool = False
 
 
 @dataclass
@@ -190,12 +194,14 @@ def _scene_outputs(
     job: Job, folder: Path, parameters: RoadParameters, geometry: RoadGeometry, timer: StageTimer
 ) -> dict[str, Any]:
     """Build the model and write what needs it."""
-    from .blender.files import save_scene
+    from .blender.files import empty_file, save_scene
     from .blender.model import build_road
     from .blender.scene import scene_mesh
 
     settings, wanted = job.scenario.settings(), job.scenario.outputs
     counts: dict[str, Any] = {}
+    if job.new_file:
+        empty_file()
     with timer.stage("model"):
         model = build_road(parameters, settings.tolerance, settings.vegetation_detail)
     if set(wanted) & {"cloud", "previews"}:
@@ -287,9 +293,7 @@ def _top_view(geometry: RoadGeometry) -> TopView:
 
 def _closing(job: Job, timer: StageTimer) -> dict[str, Any]:
     """Return the part of the report that is the same for every job."""
-    import bpy
-    import laspy
-
+    bpy = sys.modules.get("bpy")  # not there if nothing needed Blender
     return {
         "seed": job.scenario.seed,
         "settings": asdict(job.scenario.settings()),
@@ -298,7 +302,7 @@ def _closing(job: Job, timer: StageTimer) -> dict[str, Any]:
         "stages": timer.stages,
         "versions": {
             "synthroads": version(),
-            "blender": bpy.app.version_string,
+            "blender": bpy.app.version_string if bpy else None,
             "python": machine.python_version(),
             "numpy": np.__version__,
             "laspy": laspy.__version__,

@@ -1,10 +1,15 @@
-"""Saving Blender files."""
+"""Opening and saving Blender files."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
 import bpy
+
+
+def empty_file() -> None:
+    """Begin a new file with nothing in it; what was open is lost."""
+    bpy.ops.wm.read_factory_settings(use_empty=True)
 
 
 def save_scene(path: Path) -> None:

@@ -16,8 +16,9 @@ from synthroads_addon.core.errors import InputError
 from synthroads_addon.core.measure import misplaced_points
 from synthroads_addon.core.parameters.geometry import RoadGeometry
 from synthroads_addon.core.parameters.model import read_parameters
+from synthroads_addon.core.scanning.scan import scan_block
 from synthroads_addon.core.scenario import load_scenario
-from synthroads_addon.pipeline import FILES, Job, generate, make_scan, scan_blocks
+from synthroads_addon.pipeline import FILES, Job, generate, make_scan
 
 ROOT = Path(__file__).parents[2]
 REAL_AXIS = ROOT.parent / "shared" / "real" / "als_rural2lane_t211-278_axis.csv"
@@ -102,8 +103,7 @@ def test_labels_of_the_pavement_agree_with_the_parameters(demo, sigma: float, ra
     scenario, geometry, mesh = demo
     changed = scenario.scan.model_copy(update={"noise": scenario.scan.noise.model_copy(update={"range_sigma": sigma})})
     scan = make_scan(scenario.model_copy(update={"scan": changed}), geometry, mesh)
-    blocks = [result.points for number, result in enumerate(scan_blocks(scan)) if number % 5 == 0]
-    points = concatenate(blocks)
+    points = concatenate([scan_block(scan, *task).points for task in scan.blocks()[::5]])
     wrong = misplaced_points(points, geometry, 0.02 + 3 * sigma)
     assert len(wrong) > 100_000
     assert wrong.mean() < 0.001
@@ -115,7 +115,7 @@ def test_labels_of_the_pavement_agree_with_the_parameters(demo, sigma: float, ra
 def test_points_of_the_road_lie_on_the_analytic_surface(demo) -> None:
     scenario, geometry, mesh = demo
     scan = make_scan(scenario, geometry, mesh)
-    points = concatenate([r.points for number, r in enumerate(scan_blocks(scan)) if number % 7 == 0])
+    points = concatenate([scan_block(scan, *task).points for task in scan.blocks()[::7]])
     road = points.select(points.class_id == 1)
     local = road.xyz - mesh.origin
     station, offset = geometry.alignment.project(local[:, :2])

@@ -6,7 +6,7 @@ import bpy
 
 from ...core.cloud.labels import class_id
 from . import operations as op
-from .builder import Tree, Value, node_group
+from .builder import Tree, node_group
 from .plants import declare_stand, planted, points_in_band
 
 _VARIANTS = 4
@@ -44,10 +44,8 @@ def _build(tree: Tree) -> None:
             seed=stand.seed + 7,
         )["Points"]
         points = op.join(points, op.store(mown, "share", short))
-    variants = []
-    for number in range(_VARIANTS):
-        with tree.frame(f"Tuft {number + 1}"):
-            variants.append(_tuft(tree, number, width))
+    with tree.frame("Kinds of tufts"):
+        variants = [tree.call(tuft_group(), seed=100 * n, blade_width=width).value for n in range(_VARIANTS)]
     with tree.frame("Tufts"):
         height = op.random(tree, 0.0, 1.0, stand.seed + 3)
         height = stand.lowest + (stand.tallest - stand.lowest) * height * height
@@ -60,22 +58,30 @@ def _build(tree: Tree) -> None:
     tree.output("Mesh", mesh, description="Grass; only faces that scanner and camera can see")
 
 
-def _tuft(tree: Tree, number: int, width: Value) -> Value:
-    """Return one tuft of height 1 for a typical height of 0.3 m."""
-    blade = tree.node("GeometryNodeMeshGrid", vertices_x=2, vertices_y=2).value
-    shape = op.choose(op.index(tree), [_BLADE[0], _BLADE[1], _BLADE[2], _BLADE[3]])
-    across = op.component(shape, "Y") * width / 0.3
-    blade = op.set_position(blade, op.vector(tree, op.component(shape, "X"), across, op.component(shape, "Z")))
-    points = tree.node("GeometryNodeMeshLine", count=_BLADES, offset=(0.0, 0.0, 0.0)).value
-    seed = 100 * number
-    around = op.index(tree) * (6.2832 / _BLADES) + op.random(tree, 0.0, 1.0, seed)
-    out = op.random(tree, 0.05, 0.45, seed + 1)
-    place = op.vector(tree, op.unary("COSINE", around) * out, op.unary("SINE", around) * out)
-    blades = tree.node(
-        "GeometryNodeInstanceOnPoints",
-        op.set_position(points, place),
-        instance=blade,
-        rotation=op.turn(tree, z=around + op.random(tree, -0.6, 0.6, seed + 2)),
-        scale=op.vector(tree, 1.0, 1.0, 1.0) * op.random(tree, 0.55, 1.0, seed + 3),
-    ).value
-    return op.realize(blades)
+def tuft_group() -> bpy.types.NodeTree:
+    """Return the group SR Grass Tuft."""
+    return node_group("SR Grass Tuft", _build_tuft)
+
+
+def _build_tuft(tree: Tree) -> None:
+    """One tuft of height 1, for a typical height of 0.3 m."""
+    seed = tree.integer("Seed", 0, (0, 2**30), description="Seed of the blades")
+    width = tree.number("Blade Width", 0.035, (0.002, 0.2), unit="m", description="Widest place of a blade")
+    with tree.frame("A bent blade"):
+        blade = tree.node("GeometryNodeMeshGrid", vertices_x=2, vertices_y=2).value
+        shape = op.choose(op.index(tree), _BLADE)
+        across = op.component(shape, "Y") * (width / 0.3)
+        blade = op.set_position(blade, op.vector(tree, op.component(shape, "X"), across, op.component(shape, "Z")))
+    with tree.frame("Blades around the middle"):
+        points = tree.node("GeometryNodeMeshLine", count=_BLADES, offset=(0.0, 0.0, 0.0)).value
+        around = op.index(tree) * (6.2832 / _BLADES) + op.random(tree, 0.0, 1.0, seed)
+        out = op.random(tree, 0.05, 0.45, seed + 1)
+        place = op.vector(tree, op.unary("COSINE", around) * out, op.unary("SINE", around) * out)
+        blades = tree.node(
+            "GeometryNodeInstanceOnPoints",
+            op.set_position(points, place),
+            instance=blade,
+            rotation=op.turn(tree, z=around + op.random(tree, -0.6, 0.6, seed + 2)),
+            scale=op.random(tree, 0.55, 1.0, seed + 3),
+        ).value
+    tree.output("Mesh", op.realize(blades), description="The tuft's blades")

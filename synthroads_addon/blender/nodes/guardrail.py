@@ -8,6 +8,7 @@ from ...core.cloud.labels import class_id
 from . import operations as op
 from .backbone import height_on, look_up, station_ribbon
 from .builder import Operand, Tree, Value, node_group
+from .strip import INSTANCES
 
 # The A profile of 0.31 m as a polyline (m): depth towards traffic, 0, height under the top edge.
 _SHEET = [
@@ -18,8 +19,8 @@ _THICKNESS = 0.003
 BEAM_PROFILE = [(x, 0.0, z) for x, z in _SHEET] + [(x - _THICKNESS, 0.0, z) for x, z in reversed(_SHEET)]
 BEAM_PROFILE.append(BEAM_PROFILE[0])
 
-# A post of 100 x 55 mm, open towards the stations: across the road, along it.
-_POST = [(0.05, 0.018), (0.05, 0.055), (-0.05, 0.055), (-0.05, 0.0), (0.05, 0.0)]
+# A post of 100 x 55 mm: across the road, along it.
+_POST = [(0.05, -0.010), (0.05, 0.0275), (-0.05, 0.0275), (-0.05, -0.0275), (0.05, -0.0275)]
 POST_DEPTH = 0.05
 """From a post's axis to the back of a beam that is bolted to it, m."""
 BURIED = 0.35
@@ -52,7 +53,7 @@ def _build(tree: Tree) -> None:
     spacing = tree.number("Post Spacing", 4.0, (0.5, 10.0), unit="m", description="Distance between posts")
     terminal = tree.number("Terminal Length", 12.0, (0.0, 50.0), unit="m", description="Length of the ramp at each end")
     step = tree.number("Beam Step", 2.0, (0.1, 8.0), unit="m", description="Largest length of a straight piece of beam")
-    instance = tree.integer("Instance", 0, (-(2**31), 2**31 - 1), description="Instance number of the faces")
+    instance = tree.integer("Instance", 0, INSTANCES, description="Instance number of the faces")
     material = tree.input("Material", "Material", description="Material of beams and posts")
 
     with tree.frame("Geometry"):
@@ -131,24 +132,23 @@ def _instances(tree: Tree, posts: Value, spacer: Value, beams: dict[float, Value
         "FunctionNodeAxesToRotation", (0.0, 0.0, 1.0), left, primary_axis="Z", secondary_axis="X"
     ).value
 
-    def on_posts(body: Value, scale: Operand) -> Value:
-        return tree.node("GeometryNodeInstanceOnPoints", posts, instance=body, rotation=upright, scale=scale).value
+    def on_posts(body: Value, height: Operand, scale: Operand) -> Value:
+        points = tree.node("GeometryNodeSetPosition", posts, offset=op.vector(tree, 0.0, 0.0, height)).value
+        return tree.node("GeometryNodeInstanceOnPoints", points, instance=body, rotation=upright, scale=scale).value
 
-    parts = [on_posts(_post(tree), op.vector(tree, 1.0, 1.0, tall - _POST_TOP))]
+    parts = [on_posts(_post(tree), -BURIED, op.vector(tree, 1.0, 1.0, tall + (BURIED - _POST_TOP)))]
     for side, wanted in beams.items():
         box = tree.node("GeometryNodeMeshCube", size=(1.0, 0.1, 0.22)).value
-        middle = op.vector(tree, (spacer * 0.5 + POST_DEPTH) * side, 0.0275, -0.155)
+        middle = op.vector(tree, (spacer * 0.5 + POST_DEPTH) * side, 0.0, -0.155)
         body = tree.node(
             "GeometryNodeTransform", box, translation=middle, scale=op.vector(tree, spacer, 1.0, 1.0)
         ).value
-        raised = tree.node("GeometryNodeSetPosition", posts, offset=op.vector(tree, 0.0, 0.0, tall)).value
-        spacers = tree.node("GeometryNodeInstanceOnPoints", raised, instance=body, rotation=upright).value
-        parts.append(op.only_if(wanted & (spacer > 1e-3), spacers))
+        parts.append(op.only_if(wanted & (spacer > 1e-3), on_posts(body, tall, 1.0)))
     return parts
 
 
 def _post(tree: Tree) -> Value:
-    """Return a post of height 1 that reaches below the ground; x is across the road, y along it."""
+    """Return a post of height 1; x is across the road, y along it."""
     mesh, column, number = op.grid(tree, len(_POST), 2)
     section = op.choose(column, [(x, y, 0.0) for x, y in _POST])
-    return op.set_position(mesh, section + op.vector(tree, 0.0, 0.0, number * (1.0 + BURIED) - BURIED))
+    return op.set_position(mesh, section + op.vector(tree, 0.0, 0.0, number))

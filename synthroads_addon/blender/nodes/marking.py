@@ -7,7 +7,7 @@ import bpy
 from . import operations as op
 from .backbone import NUMBERS, last_station, look_up, station_ribbon
 from .builder import Tree, Value, node_group
-from .strip import FAR, strip_group
+from .strip import FAR, INSTANCES, strip_group
 
 SNAP = 1e-3
 """End of a dash this near (m) to a row of the backbone: it is that row."""
@@ -25,14 +25,9 @@ def _build(tree: Tree) -> None:
     right = tree.number("Right Offset", -0.1, FAR, unit="m", description="Offset of the right edge")
     left_height = tree.number("Left Height", 0.0, FAR, unit="m", description="Pavement at the left edge above the axis")
     right_height = tree.number("Right Height", 0.0, FAR, unit="m", description="Pavement at the right edge")
-    first = tree.number("Start Station", 0.0, (0.0, 1e6), unit="m", description="Beginning of the first dash")
-    last = tree.number("End Station", 1e6, (0.0, 1e6), unit="m", description="End of the line")
-    dash = tree.number("Dash", 6.0, (0.0, 100.0), unit="m", description="Length of a dash; 0 for a solid line")
-    gap = tree.number("Gap", 12.0, (0.0, 100.0), unit="m", description="Length of a gap")
-    film = tree.number("Film Thickness", 0.003, (0.0, 0.01), unit="m", description="Height above the pavement")
-    class_id = tree.integer("Class", 2, (0, 255), description="Semantic class of the faces")
-    instance = tree.integer("Instance", 0, (-(2**31), 2**31 - 1), description="Instance number of the faces")
-    material = tree.input("Material", "Material", description="Material of the faces")
+    given = declare_marking(tree)
+    first, last = given["start_station"], given["end_station"]
+    dash, gap, film = given["dash"], given["gap"], given["film_thickness"]
 
     with tree.frame("Dashes: a solid line is one dash"):
         end = op.minimum(last, last_station(backbone))
@@ -49,13 +44,32 @@ def _build(tree: Tree) -> None:
             right_offset=right,
             left_height=left_height + film,
             right_height=right_height + film,
-            class_=class_id,
-            instance=instance,
-            material=material,
+            class_=given["class_"],
+            instance=given["instance"],
+            material=given["material"],
         ).value
         station = op.named(tree, "station")
         painted = (station > first) & (station < end) & ((station - first) % period < length)
         tree.output("Mesh", op.delete_faces(ribbon, ~painted), description="Dashes whose faces look up")
+
+
+def declare_marking(tree: Tree) -> dict[str, Value]:
+    """Declare the inputs of a line that don't say where it lies across the road."""
+    stations, lengths = (0.0, 1e6), (0.0, 100.0)
+    return {
+        "start_station": tree.number(
+            "Start Station", 0.0, stations, unit="m", description="Beginning of the first dash"
+        ),
+        "end_station": tree.number("End Station", 1e6, stations, unit="m", description="End of the line"),
+        "dash": tree.number("Dash", 6.0, lengths, unit="m", description="Length of a dash; 0 for a solid line"),
+        "gap": tree.number("Gap", 12.0, lengths, unit="m", description="Length of a gap"),
+        "film_thickness": tree.number(
+            "Film Thickness", 0.003, (0.0, 0.01), unit="m", description="Height above the pavement"
+        ),
+        "class_": tree.integer("Class", 2, (0, 255), description="Semantic class of the faces"),
+        "instance": tree.integer("Instance", 0, INSTANCES, description="Instance number of the faces"),
+        "material": tree.input("Material", "Material", description="Material of the faces"),
+    }
 
 
 def _with_ends(tree: Tree, backbone: Value, dashes: tuple[Value, Value, Value, Value, Value]) -> Value:

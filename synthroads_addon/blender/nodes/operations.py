@@ -193,3 +193,8 @@ def realize(geometry: Value) -> Value:
 def turn(tree: Tree, x: Operand = 0.0, y: Operand = 0.0, z: Operand = 0.0) -> Value:
     """Return the rotation about x, then y, then z (rad)."""
     return tree.node("FunctionNodeEulerToRotation", vector(tree, x, y, z)).value
+
+
+def random_turn(tree: Tree, low: tuple[float, float, float], high: tuple[float, float, float], seed: Operand) -> Value:
+    """Return a random rotation whose Euler angles (rad) lie between `low` and `high`."""
+    return tree.node("FunctionNodeEulerToRotation", random(tree, low, high, seed)).value

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from . import operations as op
 from .builder import Operand, Tree, Value
+from .strip import INSTANCES
 
 _MARGIN = 6.0
 """Faces of the terrain this far (m) outside the band are still looked at: their mean distance lies off its border."""
@@ -41,7 +42,7 @@ def declare_stand(tree: Tree, density: float, heights: tuple[float, float], band
         tallest=tree.number("Largest Height", heights[1], (0.01, 60.0), unit="m", description="Height of the tallest"),
         seed=tree.integer("Seed", 0, (0, 2**31 - 1), description="Seed of places, sizes and turns"),
         detail=tree.number("Detail", 1.0, (0.0, 1.0), unit="share", description="Share of the triangles"),
-        instance=tree.integer("Instance", 0, (-(2**31), 2**31 - 1), description="Instance number of the faces"),
+        instance=tree.integer("Instance", 0, INSTANCES, description="Instance number of the faces"),
     )
 
 
@@ -58,7 +59,6 @@ def points_in_band(tree: Tree, stand: Stand, surface: Value, density: Operand) -
 def planted(tree: Tree, stand: Stand, points: Value, variants: list[Value], height: Value, lean: float) -> Value:
     """Put one of the variants (of height 1) on each point, turned and leant at random, and make it real."""
     bodies = op.join(*(tree.node("GeometryNodeGeometryToInstance", variant).value for variant in variants))
-    turn = op.random(tree, (-lean, -lean, 0.0), (lean, lean, 6.2832), stand.seed + 1)
     pick = tree.node(
         "FunctionNodeRandomValue", data_type="INT", min=0, max=len(variants) - 1, seed=stand.seed + 2
     ).value
@@ -68,7 +68,7 @@ def planted(tree: Tree, stand: Stand, points: Value, variants: list[Value], heig
         instance=bodies,
         pick_instance=True,
         instance_index=pick,
-        rotation=tree.node("FunctionNodeEulerToRotation", turn).value,
+        rotation=op.random_turn(tree, (-lean, -lean, 0.0), (lean, lean, 6.2832), stand.seed + 1),
         scale=height,
     ).value
     return op.realize(plants)

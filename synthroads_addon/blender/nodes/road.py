@@ -11,9 +11,9 @@ from ...core.cloud.labels import class_id
 from ...core.parameters.model import Carriageway, LineMarking, Median, RoadParameters
 from . import operations as op
 from .backbone import row
-from .builder import Tree, Value, node_group
-from .marking import marking_group
-from .strip import strip_group
+from .builder import Operand, Tree, Value, node_group
+from .carriageway import carriageway_marking_group, height_group
+from .strip import INSTANCES, strip_group
 
 MATERIALS = {"Pavement": "asphalt", "Marking": "paint_white", "Verge": "verge", "Median": "median"}
 """Material inputs of the group (their name goes on with "Material"), and what the model builder puts there."""
@@ -37,7 +37,7 @@ class SideLayout:
 
 @dataclass
 class Side:
-    """Inputs and boundaries of one carriageway: distances from the axis, innermost first, and heights above it."""
+    """Inputs and boundaries of one carriageway: distance from the axis, offset and height above it, innermost first."""
 
     layout: SideLayout
     numbers: dict[str, Value] = field(default_factory=dict)
@@ -46,7 +46,9 @@ class Side:
     markings: dict[str, dict[str, Value]] = field(default_factory=dict)
     strips: list[str] = field(default_factory=list)
     distances: list[Value] = field(default_factory=list)
+    offsets: list[Value] = field(default_factory=list)
     heights: list[Value] = field(default_factory=list)
+    section: dict[str, Operand] = field(default_factory=dict)
 
 
 def road_layout(parameters: RoadParameters) -> tuple[SideLayout, ...]:
@@ -134,8 +136,7 @@ def _build(tree: Tree, layout: tuple[SideLayout, ...]) -> None:
 
 
 def _instance(tree: Tree, name: str) -> Value:
-    limits = (-(2**31), 2**31 - 1)
-    return tree.integer(f"{name} Instance", 0, limits, description="Instance number of the faces")
+    return tree.integer(f"{name} Instance", 0, INSTANCES, description="Instance number of the faces")
 
 
 def _declare_side(tree: Tree, layout: SideLayout) -> Side:
@@ -175,47 +176,39 @@ def _declare_marking(tree: Tree, name: str) -> dict[str, Value]:
 
 
 def _boundaries(tree: Tree, side: Side) -> None:
-    """Work out the boundaries' distances from the axis (innermost first) and their heights above it."""
+    """Work out the boundaries, innermost first: distance from the axis, offset, and height above the axis."""
+    assert side.at_inner_edge is not None
     distance = side.numbers["Inner Offset"]
     side.distances = [distance]
     for name in side.strips:
         distance = distance + side.numbers[f"{name} Width"]
         side.distances.append(distance)
-    side.heights = [_height(tree, side, distance) for distance in side.distances]
-
-
-def _height(tree: Tree, side: Side, distance: Value) -> Value:
-    """Return the height above the axis of the line at a distance from it, as a field of the backbone."""
-    assert side.at_inner_edge is not None
     inner, paved = side.distances[0], side.distances[-2]
-    pivot = op.switch(side.at_inner_edge, (inner + paved) * 0.5, inner)
-    # A surface that falls to the right rises with the offset, and the offset is sign * distance.
-    rise = op.named(tree, f"crossfall_{side.layout.side.lower()}") * side.layout.sign
-    beyond = op.maximum(distance - paved, 0.0)
-    return rise * (op.minimum(distance, paved) - pivot) - beyond * side.numbers["slope"]
-
-
-def _ordered(side: Side, inner: tuple[Value, Value], outer: tuple[Value, Value]) -> dict[str, Value]:
-    """Return the inputs of a strip between two (distance, height) pairs."""
-    left, right = (outer, inner) if side.layout.side == "Left" else (inner, outer)
-    sign = side.layout.sign
-    return {
-        "left_offset": left[0] * sign,
-        "left_height": left[1],
-        "right_offset": right[0] * sign,
-        "right_height": right[1],
+    side.section = {
+        "side": side.layout.sign,
+        "paved_edge": paved,
+        "pivot": op.switch(side.at_inner_edge, (inner + paved) * 0.5, inner),
+        "crossfall": op.named(tree, f"crossfall_{side.layout.side.lower()}"),
+        "verge_slope": side.numbers["slope"],
     }
+    for distance in side.distances:
+        boundary = tree.call(height_group(), distance=distance, **side.section)
+        side.offsets.append(boundary["Offset"])
+        side.heights.append(boundary["Height"])
 
 
 def _surfaces(tree: Tree, backbone: Value, side: Side, materials: dict[str, Value]) -> Iterator[Value]:
     assert side.instance is not None
     for number, name in enumerate(side.strips):
         verge = name == "Verge"
-        inner, outer = ((side.distances[i], side.heights[i]) for i in (number, number + 1))
+        left, right = (number + 1, number) if side.layout.sign > 0 else (number, number + 1)
         mesh = tree.call(
             strip_group(),
             backbone=backbone,
-            **_ordered(side, inner, outer),
+            left_offset=side.offsets[left],
+            right_offset=side.offsets[right],
+            left_height=side.heights[left],
+            right_height=side.heights[right],
             class_=class_id("roadside" if verge else "road"),
             instance=side.instance,
             material=materials["Verge" if verge else "Pavement"],
@@ -231,9 +224,9 @@ def _median(tree: Tree, backbone: Value, sides: list[Side], instance: Value, mat
     return tree.call(
         strip_group(),
         backbone=backbone,
-        left_offset=left.distances[0],
+        left_offset=left.offsets[0],
         left_height=left.heights[0],
-        right_offset=-right.distances[0],
+        right_offset=right.offsets[0],
         right_height=right.heights[0],
         class_=class_id("roadside"),
         instance=instance,
@@ -244,18 +237,18 @@ def _median(tree: Tree, backbone: Value, sides: list[Side], instance: Value, mat
 def _markings(tree: Tree, backbone: Value, side: Side, material: Value) -> Iterator[Value]:
     lanes = side.layout.lanes
     for name, kind, boundary in side.layout.markings:
-        inputs = dict(side.markings[name])
-        width = inputs.pop("width")
         # Boundaries count from the outer edge of lane 1 inwards; distances from the inner paved edge outwards.
-        middle = side.distances[1 + lanes - boundary] + width * _SHIFT[kind]
-        inner, outer = middle - width * 0.5, middle + width * 0.5
+        middle = side.distances[1 + lanes - boundary]
+        if _SHIFT[kind]:
+            middle = middle + side.markings[name]["width"] * _SHIFT[kind]
         yield tree.call(
-            marking_group(),
+            carriageway_marking_group(),
             backbone=backbone,
-            **_ordered(side, (inner, _height(tree, side, inner)), (outer, _height(tree, side, outer))),
+            distance=middle,
+            **side.section,
+            **side.markings[name],
             class_=class_id("road_marking"),
             material=material,
-            **inputs,
         ).value
 
 
@@ -268,7 +261,7 @@ def _edges(tree: Tree, backbone: Value, sides: list[Side]) -> Iterator[Value]:
         number = op.index(tree)
         axis, left, _ = row(backbone, number)
         height = op.sample_index(backbone, side.heights[at], number)
-        place = axis + left * (side.distances[at] * side.layout.sign) + op.vector(tree, 0.0, 0.0, height)
+        place = axis + left * side.offsets[at] + op.vector(tree, 0.0, 0.0, height)
         points = op.store(op.set_position(points, place), "edge", sign)
         # A mesh line has edges; only its points are wanted.
         yield tree.node("GeometryNodeDeleteGeometry", points, domain="EDGE", mode="EDGE_FACE").value

@@ -9,6 +9,8 @@ from .backbone import cut, row
 from .builder import Tree, node_group
 
 FAR = (-1000.0, 1000.0)
+INSTANCES = (-(2**31), 2**31 - 1)
+"""Limits of instance numbers: 32 bits, with a sign in the nodes and without one elsewhere."""
 
 
 def strip_group() -> bpy.types.NodeTree:
@@ -24,7 +26,7 @@ def _build(tree: Tree) -> None:
     left_height = tree.number("Left Height", 0.0, FAR, unit="m", description="Left edge above the axis, per row")
     right_height = tree.number("Right Height", 0.0, FAR, unit="m", description="Right edge above the axis, per row")
     class_id = tree.integer("Class", 0, (0, 255), description="Semantic class of the faces")
-    instance = tree.integer("Instance", 0, (-(2**31), 2**31 - 1), description="Instance number of the faces")
+    instance = tree.integer("Instance", 0, INSTANCES, description="Instance number of the faces")
     material = tree.input("Material", "Material", description="Material of the faces")
 
     with tree.frame("Two columns, one row per point of the backbone"):

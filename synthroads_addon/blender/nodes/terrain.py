@@ -8,6 +8,7 @@ from ...core.cloud.labels import class_id
 from . import operations as op
 from .backbone import cut, row
 from .builder import Tree, Value, node_group
+from .strip import INSTANCES
 
 _FINE = 0.12
 """Share of even spacing among the columns; the rest grows away from the road."""
@@ -26,7 +27,7 @@ def _build(tree: Tree) -> None:
     reach = tree.number("Half Width", 60.0, (5.0, 1000.0), unit="m", description="Reach to either side of the axis")
     batter = tree.number("Batter Slope", 1.5, (0.5, 10.0), description="Run of the batter per metre of height (m/m)")
     columns = tree.integer("Columns", 40, (3, 500), description="Points across each side, closer near the road")
-    instance = tree.integer("Instance", 0, (-(2**31), 2**31 - 1), description="Instance number of the faces")
+    instance = tree.integer("Instance", 0, INSTANCES, description="Instance number of the faces")
     material = tree.input("Material", "Material", description="Material of the ground")
 
     with tree.frame("Geometry"):

@@ -1,1 +1,1 @@
-"""."""
+"""Points and their files: container, classes, LAS, previews."""

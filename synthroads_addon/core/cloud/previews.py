@@ -12,8 +12,8 @@ from .labels import class_colors, class_id, classes
 from .points import PointBlock
 
 WIDTH = 1800
-_MARGIN, _FOOTER = 12, 64
-_PAPER, _INK = (250, 250, 248), (40, 40, 44)
+_MARGIN, _FOOTER = 12, 72
+_PAPER, _INK = (226, 231, 238), (40, 40, 44)
 
 
 class TopView:
@@ -97,7 +97,7 @@ class TopView:
         gray = np.clip((values - low) / max(high - low, 1e-12), 0, 1) * 255
         legend = [
             (f"{low:.2f}", (0, 0, 0)),
-            (f"{high:.2f}  intensity x range\u00b2 (white target = 1)", (255, 255, 255)),
+            (f"{high:.2f}  intensity x squared range (white target = 1)", (255, 255, 255)),
         ]
         return np.repeat(gray[:, None], 3, axis=1), legend
 
@@ -114,7 +114,7 @@ class TopView:
         self._north(draw, (_MARGIN + step / self.pixel + 45, line + 26))
         x = _MARGIN + step / self.pixel + 90
         title = f"{name}   {int(self.count.sum()):,} points   EPSG:{epsg}   pixel {self.pixel:.2f} m"
-        draw.text((x, line), title.replace(",", "\u2009"), fill=_INK, font=font)
+        draw.text((x, line), title, fill=_INK, font=font)
         for text, color in legend:
             draw.rectangle([x, line + 30, x + 16, line + 46], fill=color, outline=_INK)
             draw.text((x + 22, line + 28), text, fill=_INK, font=font)
@@ -129,4 +129,5 @@ class TopView:
         draw.line([(x - 20 * right, y + 20 * up), tip], fill=_INK, width=2)
         for side in (-1, 1):
             draw.line([tip, (x + 10 * right + side * 6 * up, y - 10 * up + side * 6 * right)], fill=_INK, width=2)
-        draw.text((x + 12, y + 6), "N", fill=_INK, font=ImageFont.load_default(size=14))
+        beside = (x + 30 * right, y - 30 * up)
+        draw.text(beside, "N", fill=_INK, font=ImageFont.load_default(size=14), anchor="mm")

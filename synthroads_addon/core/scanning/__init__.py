@@ -1,1 +1,1 @@
-"""."""
+"""What a scanner does: devices, patterns, path, beam, returns, radiometry."""

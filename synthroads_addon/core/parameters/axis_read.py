@@ -1,0 +1,155 @@
+"""Reading a measured axis from CSV or GeoJSON; every fault is one line that names the file, the line and the value."""
+
+from __future__ import annotations
+
+import csv
+import json
+import math
+import os
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+
+from ..errors import InputError, MissingFileError
+from .alignment import FloatArray
+
+_TWO = "at least two distinct points are needed"
+
+
+def read_axis(path: str | os.PathLike[str]) -> FloatArray:
+    """Return the points (N, 3) of an axis, m, in the file's order.
+
+    CSV (comma, semicolon, tab or spaces): with a header that names at least x and y (z optional, other columns
+    ignored, any order, any case), or without one as x, y and, optionally, z. Empty lines and lines that begin with #
+    are skipped. GeoJSON: a LineString, alone, as a Feature, or as the only feature of a collection. Without z the
+    elevation is 0. Coordinates are metres of a projected system; longitudes and latitudes are refused.
+
+    Raises:
+        MissingFileError: the file doesn't exist or cannot be read.
+        InputError: anything in it is not as above, or there are fewer than two distinct points.
+    """
+    name = os.fspath(path)
+    try:
+        text = Path(name).read_text(encoding="utf-8-sig")
+    except OSError as error:
+        raise MissingFileError(name, None, f"an axis file is needed here ({error.strerror})") from None
+    except UnicodeDecodeError:
+        raise InputError(name, None, "this is no text: CSV with columns x, y, z or GeoJSON is needed") from None
+    rows = _read_json(name, text) if text.lstrip().startswith(("{", "[")) else _read_csv(name, text)
+    points = np.array(rows, dtype=np.float64).reshape(-1, 3)
+    if len(np.unique(points[:, :2], axis=0)) < 2:
+        raise InputError(name, None, f"{_TWO}, the file has {len(points)} points in all")
+    return points
+
+
+def _read_csv(name: str, text: str) -> list[tuple[float, float, float]]:
+    lines = [(number, line) for number, line in enumerate(text.splitlines(), 1) if line.strip()]
+    lines = [(number, line) for number, line in lines if not line.lstrip().startswith("#")]
+    if not lines:
+        raise InputError(name, None, f"the file is empty: {_TWO}")
+    separator = next((mark for mark in (";", ",", "\t") if mark in lines[0][1]), " ")
+    head = _fields(lines[0][1], separator)
+    columns, body = [0, 1, 2], lines
+    if not all(_is_number(entry) for entry in head):
+        columns, body = _columns(f"{name}:{lines[0][0]}", head), lines[1:]
+    elif len(head) < 2:
+        raise InputError(f"{name}:{lines[0][0]}", lines[0][1], "x, y and, optionally, z are needed")
+    elif len(head) == 2:
+        columns = [0, 1]
+    return [_row(f"{name}:{number}", _fields(line, separator), columns) for number, line in body]
+
+
+def _fields(line: str, separator: str) -> list[str]:
+    if separator == " ":
+        return line.split()
+    return [entry.strip() for entry in next(csv.reader([line], delimiter=separator))]
+
+
+def _is_number(entry: str) -> bool:
+    try:
+        float(entry)
+    except ValueError:
+        return False
+    return True
+
+
+def _columns(place: str, head: list[str]) -> list[int]:
+    """Return the places of x, y and, where there is one, z."""
+    names = [entry.lower() for entry in head]
+    for wanted in ("x", "y"):
+        if wanted not in names:
+            raise InputError(place, ", ".join(head), f"a header with columns x, y (z optional): {wanted} is missing")
+    for wanted in ("x", "y", "z"):
+        if names.count(wanted) > 1:
+            raise InputError(place, ", ".join(head), f"each column once: {wanted} is there {names.count(wanted)} times")
+    return [names.index(wanted) for wanted in ("x", "y", "z") if wanted in names]
+
+
+def _row(place: str, entries: list[str], columns: list[int]) -> tuple[float, float, float]:
+    if len(entries) <= max(columns):
+        allowed = f"at least {max(columns) + 1} columns are needed, this line has {len(entries)}"
+        raise InputError(place, " ".join(entries), allowed)
+    return _point(place, [entries[column] for column in columns])
+
+
+def _point(place: str, entries: list[object]) -> tuple[float, float, float]:
+    values = []
+    for axis, entry in zip("xyz", entries, strict=False):
+        try:
+            value = math.nan if isinstance(entry, bool) else float(entry)  # type: ignore[arg-type]
+        except (TypeError, ValueError):
+            value = math.nan
+        if not math.isfinite(value):
+            raise InputError(f"{place} {axis}", entry, "a finite number is needed")
+        values.append(value)
+    return values[0], values[1], values[2] if len(values) > 2 else 0.0
+
+
+def _read_json(name: str, text: str) -> list[tuple[float, float, float]]:
+    try:
+        document = json.loads(text)
+    except json.JSONDecodeError as error:
+        raise InputError(f"{name}:{error.lineno}", None, f"valid JSON is needed ({error.msg})") from None
+    lines = list(_line_strings(name, document))
+    if len(lines) != 1:
+        raise InputError(name, len(lines), "exactly one LineString is needed")
+    coordinates = lines[0].get("coordinates")
+    if not isinstance(coordinates, list):
+        raise InputError(f"{name} coordinates", coordinates, "a list of positions is needed")
+    rows = []
+    for number, position in enumerate(coordinates):
+        place = f"{name} coordinates[{number}]"
+        if not isinstance(position, list) or len(position) < 2:
+            raise InputError(place, position, "a list of two or three numbers is needed")
+        rows.append(_point(place, position))
+    _refuse_degrees(name, document, rows)
+    return rows
+
+
+def _line_strings(name: str, node: object) -> Iterator[dict]:
+    """Yield every LineString in a GeoJSON document; refuse what is no GeoJSON and lines of several parts."""
+    kind = node.get("type") if isinstance(node, dict) else None
+    if kind == "FeatureCollection" and isinstance(node.get("features"), list):
+        for feature in node["features"]:
+            yield from _line_strings(name, feature)
+    elif kind == "Feature":
+        if node.get("geometry") is not None:
+            yield from _line_strings(name, node["geometry"])
+    elif kind == "LineString":
+        yield node
+    elif kind == "MultiLineString":
+        raise InputError(f"{name} type", kind, "one LineString is needed, in one part")
+    elif kind not in ("Point", "MultiPoint", "Polygon", "MultiPolygon"):
+        raise InputError(f"{name} type", kind, "GeoJSON with a LineString is needed")
+
+
+def _refuse_degrees(name: str, document: dict, rows: list[tuple[float, float, float]]) -> None:
+    """Refuse geographic coordinates: by the file's own word, or where it says nothing, by their size and extent."""
+    system = json.dumps(document.get("crs")) if document.get("crs") else ""
+    said = any(word in system for word in ("CRS84", "4326", "4258"))
+    plan = np.array(rows).reshape(-1, 3)[:, :2]
+    seems = len(plan) > 0 and bool((np.abs(plan) <= (180.0, 90.0)).all()) and np.ptp(plan, axis=0).max() < 2.0
+    if said or (not system and seems):
+        first = list(rows[0][:2]) if rows else None
+        raise InputError(f"{name} coordinates", first, "metres of a projected system are needed, not degrees")
