@@ -127,7 +127,7 @@ def progress_bar(arguments: argparse.Namespace) -> Progress:
 
 @contextmanager
 def _without_blenders_chatter() -> Iterator[None]:
-    """Drop what Blender prints to standard output meanwhile (where it saved, which colours it uses); errors still show."""
+    """Drop what Blender prints to standard output meanwhile (where it saved, say); its errors still show."""
     sys.stdout.flush()
     try:
         saved = os.dup(1)

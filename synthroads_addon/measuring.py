@@ -43,7 +43,7 @@ def measure_row(scenario_name: str, knob: str, value: Any) -> dict[str, Any]:
     geometry = RoadGeometry(parameters)
     start = time.perf_counter()
     settings = scenario.settings()
-    model = build_road(parameters, settings.tolerance, settings.vegetation_detail)
+    build_road(parameters, settings.tolerance, settings.vegetation_detail)
     mesh = scene_mesh()
     built = time.perf_counter()
     scan = make_scan(scenario, geometry, mesh)

@@ -203,7 +203,7 @@ def _scene_outputs(
     if job.new_file:
         empty_file()
     with timer.stage("model"):
-        model = build_road(parameters, settings.tolerance, settings.vegetation_detail)
+        build_road(parameters, settings.tolerance, settings.vegetation_detail)
     if set(wanted) & {"cloud", "previews"}:
         with timer.stage("scene mesh"):
             mesh = scene_mesh()

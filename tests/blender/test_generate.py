@@ -92,7 +92,7 @@ def demo():
 
     scenario = load_scenario("rq31-600m", ["scan.noise.range_sigma=0", "scan.rays_per_pulse=1"])
     parameters = sample_road(scenario.road, scenario.seed)
-    model = build_road(parameters, scenario.settings().tolerance)
+    build_road(parameters, scenario.settings().tolerance)
     return scenario, RoadGeometry(parameters), scene_mesh()
 
 
