@@ -28,9 +28,7 @@ def fitted_axis(path: Path, scenario: RoadScenario) -> tuple[AlignmentObject, Ro
     fit = fit_axis(points - origin)
     start, heading, _ = fit.alignment.frame(0.0)
     horizontal = tuple(
-        HorizontalElement(
-            kind=e.kind, length=e.length, curvature_start=e.curvature_start, curvature_end=e.curvature_end
-        )
+        HorizontalElement.between(rounded(e.length), e.curvature_start, e.curvature_end)
         for e in fit.alignment.elements
     )
     vertical = tuple(
@@ -41,7 +39,7 @@ def fitted_axis(path: Path, scenario: RoadScenario) -> tuple[AlignmentObject, Ro
         instance=1,
         start_x=rounded(start[0]),
         start_y=rounded(start[1]),
-        start_heading_deg=rounded(np.rad2deg(heading), 12),
+        start_heading_deg=rounded(float(np.rad2deg(heading)), 12),
         horizontal=horizontal,
         vertical=vertical,
     )

@@ -23,6 +23,7 @@ class DesignLimits:
         crest, sag: smallest vertical radii, m.
         run_off_percent: largest slope of the pavement's edge against its rotation axis (4 m or more apart).
         radius_least_crossfall: radius from which the least crossfall suffices, m.
+        radius_outwards: radius from which the crossfall may fall to the outside, m.
     """
 
     speed: float
@@ -33,13 +34,14 @@ class DesignLimits:
     sag: float
     run_off_percent: float
     radius_least_crossfall: float
+    radius_outwards: float
 
 
 LIMITS = {
-    "EKA1A": DesignLimits(130, 900, 300, 4.0, 13000, 8800, 0.9, 3100),
-    "EKA1B": DesignLimits(120, 720, 240, 4.5, 10000, 5700, 0.9, 2550),
-    "EKA2": DesignLimits(100, 470, 160, 4.5, 5000, 4000, 0.9, 1700),
-    "EKA3": DesignLimits(80, 280, 90, 6.0, 3000, 2600, 0.9, 1030),
+    "EKA1A": DesignLimits(130, 900, 300, 4.0, 13000, 8800, 0.9, 3100, 4000),
+    "EKA1B": DesignLimits(120, 720, 240, 4.5, 10000, 5700, 0.9, 2550, 4000),
+    "EKA2": DesignLimits(100, 470, 160, 4.5, 5000, 4000, 0.9, 1700, 4000),
+    "EKA3": DesignLimits(80, 280, 90, 6.0, 3000, 2600, 0.9, 1030, 1050),
 }
 LEAST_CROSSFALL_PERCENT = 2.5
 LARGEST_CROSSFALL_PERCENT = 6.0

@@ -77,6 +77,13 @@ class HorizontalElement(Model):
             raise ValueError(f"kind '{self.kind}' contradicts its curvatures")
         return self
 
+    @classmethod
+    def between(cls, length: float, curvature_start: float, curvature_end: float) -> HorizontalElement:
+        """Return the element of these curvatures (1/m), whatever kind that makes it."""
+        same = curvature_start == curvature_end
+        kind: Literal["line", "arc", "clothoid"] = "clothoid" if not same else "arc" if curvature_start else "line"
+        return cls(kind=kind, length=length, curvature_start=curvature_start, curvature_end=curvature_end)
+
 
 class VerticalPoint(Model):
     """A point of vertical intersection with its parabolic rounding."""

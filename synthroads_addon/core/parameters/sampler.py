@@ -133,7 +133,7 @@ def _horizontal(scenario: RoadScenario, rng: np.random.Generator) -> tuple[Horiz
     if room < least:
         # Too short for a whole curve with its transitions: part of one, at full curvature.
         curvature = rounded(sign / radius, 12)
-        return (_element(scenario.length, curvature, curvature),)
+        return (HorizontalElement.between(scenario.length, curvature, curvature),)
     transition = rounded(rng.uniform(least, max(least, min(radius, 0.6 * room + 0.4 * least))))
     lines = scenario.length - shortest_arc - 2.0 * transition
     arc = rounded(shortest_arc + lines * rng.uniform(0.2, 0.6))
@@ -143,11 +143,11 @@ def _horizontal(scenario: RoadScenario, rng: np.random.Generator) -> tuple[Horiz
         raise InputError("road.length", scenario.length, f"one curve leaves a straight over {LONGEST_STRAIGHT:.0f} m")
     curvature = rounded(sign / radius, 12)
     return (
-        _element(before, 0.0, 0.0),
-        _element(transition, 0.0, curvature),
-        _element(arc, curvature, curvature),
-        _element(transition, curvature, 0.0),
-        _element(after, 0.0, 0.0),
+        HorizontalElement.between(before, 0.0, 0.0),
+        HorizontalElement.between(transition, 0.0, curvature),
+        HorizontalElement.between(arc, curvature, curvature),
+        HorizontalElement.between(transition, curvature, 0.0),
+        HorizontalElement.between(after, 0.0, 0.0),
     )
 
 
@@ -157,11 +157,6 @@ def _run_off_clothoid(scenario: RoadScenario, radius: float) -> float:
     half = (sum(section.lanes) + section.hard_shoulder + section.outer_edge_strip + section.inner_edge_strip) / 2.0
     change = LEAST_CROSSFALL_PERCENT + curve_crossfall_percent(scenario.design_class, 1.0 / radius)
     return math.sqrt(radius * half * change / LIMITS[scenario.design_class].run_off_percent)
-
-
-def _element(length: float, start: float, end: float) -> HorizontalElement:
-    kind = "line" if start == end == 0.0 else "arc" if start == end else "clothoid"
-    return HorizontalElement(kind=kind, length=length, curvature_start=start, curvature_end=end)
 
 
 def _vertical(scenario: RoadScenario, rng: np.random.Generator) -> tuple[VerticalPoint, ...]:
@@ -208,14 +203,14 @@ def _carriageway(
 
 
 def _crossfall(design_class: str, side: str, elements: list[tuple[float, float, float]]) -> list[CrossfallPoint]:
-    """Return the crossfall at the elements' borders: outwards on straights, to the inside in curves.
+    """Return the crossfall at the elements' borders: outwards on straights and in wide curves, else to the inside.
 
     Where the curvature changes the crossfall runs off linearly along the clothoid.
     """
     outwards = LEAST_CROSSFALL_PERCENT if side == "right" else -LEAST_CROSSFALL_PERCENT
 
     def wanted(curvature: float) -> float:
-        if curvature == 0.0:
+        if abs(curvature) * LIMITS[design_class].radius_outwards < 1.0:
             return outwards
         return rounded(-math.copysign(curve_crossfall_percent(design_class, curvature), curvature))
 
