@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from synthroads_addon.core.cloud.labels import PRESETS
 from synthroads_addon.core.errors import InputError, MissingFileError
 from synthroads_addon.core.parameters.geometry import RoadGeometry
 from synthroads_addon.core.parameters.limits import (
@@ -28,6 +29,7 @@ from synthroads_addon.core.parameters.model import (
 from synthroads_addon.core.parameters.sampler import sample_road
 from synthroads_addon.core.parameters.tessellation import sample_stations
 from synthroads_addon.core.scenario import load_scenario
+from synthroads_addon.core.schema import read_json
 
 CLASS_OF = {"RQ43.5": "EKA1A", "RQ36": "EKA1A", "RQ31": "EKA1A", "RQ28": "EKA2", "RQ38.5": "EKA3", "RQ31.5": "EKA3"}
 
@@ -57,6 +59,11 @@ def test_write_read_write_gives_the_same_bytes_and_fits_the_schema(seed: int) ->
     text = road(seed).to_json()
     assert RoadParameters.from_dict(json.loads(text)).to_json() == text
     jsonschema.validate(json.loads(text), parameters_schema())
+
+
+def test_the_published_schema_is_that_of_the_code() -> None:
+    """`python tools/make_schema.py` writes it."""
+    assert read_json(PRESETS / "parameters.schema.json") == parameters_schema()
 
 
 def test_vendor_keys_are_kept(data: dict) -> None:
