@@ -1,4 +1,4 @@
-"""From road parameters to a scene: Python writes the backbone and the node groups' inputs, the nodes do the rest."""
+"""Road parameters -> scene: Python writes the backbone and the node groups' inputs, the nodes do the rest."""
 
 from __future__ import annotations
 
@@ -48,8 +48,8 @@ class RoadModel:
 
     Attributes:
         collection: holds all of the model's objects.
-        objects: by role: ``Backbone``, ``Road``, ``Ground``, ``Terrain``, ``Delineators``, and the parameter set's ids of
-            guardrails and vegetation. Hidden helpers are among them.
+        objects: by role: ``Backbone``, ``Road``, ``Ground``, ``Terrain``, ``Delineators``, and the parameter
+            set's ids of guardrails and vegetation. Hidden helpers are among them.
         origin: (3,) map coordinates of the local origin.
     """
 
@@ -69,7 +69,7 @@ def build_road(
     Args:
         parameters: the road.
         tolerance: largest chord error of the road's surface, m.
-        vegetation_detail: share of the vegetation's triangles, 0 to 1.
+        vegetation_detail: share of the vegetation's triangles, 0 to 1; 0 builds none.
         parts: which of `PARTS` are wanted; all if None. What they need from others is built hidden.
 
     Raises:
@@ -93,7 +93,7 @@ def build_road(
         builder.guardrails()
     if "delineators" in wanted:
         builder.delineators()
-    if "vegetation" in wanted:
+    if "vegetation" in wanted and vegetation_detail > 0.0:
         builder.vegetation()
     bpy.context.view_layer.update()
     return RoadModel(collection, builder.objects, origin)
@@ -199,7 +199,10 @@ class _Builder:
                 "Instance": plants.instance,
             }
             if plants.kind == "grass":
-                inputs |= {"Roadside Density": plants.density * _ROADSIDE_SHARE, "Material": material("grass")}
+                inputs |= {
+                    "Roadside Density": plants.density * _ROADSIDE_SHARE,
+                    "Material": material("grass"),
+                }
                 self._add(name, bpy.data.meshes.new("SR Grass"), grass_group(), inputs)
             else:
                 inputs |= {"Bark Material": material("bark"), "Leaves Material": material("leaves")}
@@ -241,8 +244,10 @@ def backbone_mesh(geometry: RoadGeometry, station: Float) -> bpy.types.Mesh:
     elevation = geometry.profile.elevation(station)
     values = {"station": station, "curvature": curvature}
     for side in ("left", "right"):
-        carriageway = geometry.parameters.carriageway(side)  # type: ignore[arg-type]
-        values[f"crossfall_{side}"] = geometry.crossfall(carriageway, station) if carriageway else 0.0 * station
+        carriageway = geometry.parameters.carriageway(side)
+        values[f"crossfall_{side}"] = (
+            geometry.crossfall(carriageway, station) if carriageway else 0.0 * station
+        )
     mesh = bpy.data.meshes.new("SR Backbone")
     first = np.arange(len(station) - 1)
     _fill(mesh, np.column_stack([position, elevation]), edges=np.column_stack([first, first + 1]))
@@ -254,7 +259,7 @@ def backbone_mesh(geometry: RoadGeometry, station: Float) -> bpy.types.Mesh:
 
 
 def ground_mesh(geometry: RoadGeometry, terrain: Terrain, tolerance: float) -> bpy.types.Mesh:
-    """Return the ground before the road was built as a grid of stations and offsets, wider than the terrain."""
+    """Return the ground before the road was built: a grid of stations and offsets, wider than the terrain."""
     bend = terrain.undulation * (2.0 * np.pi / terrain.wavelength) ** 2
     spacing = float(np.clip(np.sqrt(8.0 * tolerance / max(bend, 1e-9)), 1.5, 4.0))
 
@@ -279,7 +284,7 @@ def ground_mesh(geometry: RoadGeometry, terrain: Terrain, tolerance: float) -> b
 
 
 def delineator_mesh(geometry: RoadGeometry, posts: list[Delineator]) -> bpy.types.Mesh:
-    """Return one vertex per post at its exact place in plan, with heading, height and instance as attributes."""
+    """Return one vertex per post, exact in plan, with heading, height and instance as attributes."""
     station = np.array([post.station for post in posts])
     offset = np.array([post.offset for post in posts])
     position, heading, _ = geometry.alignment.frame(station)
@@ -290,7 +295,9 @@ def delineator_mesh(geometry: RoadGeometry, posts: list[Delineator]) -> bpy.type
     turn = heading - np.pi / 2.0 + np.deg2rad([post.rotation_deg for post in posts])
     _attribute(mesh, "heading", np.arctan2(np.sin(turn), np.cos(turn)))
     _attribute(mesh, "height", np.array([post.height for post in posts]))
-    _attribute(mesh, "instance", np.array([post.instance for post in posts], np.uint32).astype(np.int32), "INT")
+    _attribute(
+        mesh, "instance", np.array([post.instance for post in posts], np.uint32).astype(np.int32), "INT"
+    )
     return mesh
 
 

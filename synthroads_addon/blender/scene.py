@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator
+from collections.abc import Collection
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -21,7 +21,6 @@ CLASS_PROPERTY = "synthroads_class"
 INSTANCE_PROPERTY = "synthroads_instance"
 """Custom property of any object: its instance number."""
 
-_MESH_LIKE = {"MESH", "CURVE", "SURFACE", "META", "FONT"}
 _SMALLEST_AREA = 1e-12
 
 
@@ -46,13 +45,15 @@ class _Part:
 
 
 def scene_mesh(
-    source: bpy.types.Depsgraph | bpy.types.Scene | None = None, objects: Collection[bpy.types.Object] | None = None
+    source: bpy.types.Depsgraph | bpy.types.Scene | None = None,
+    objects: Collection[bpy.types.Object] | None = None,
 ) -> SceneMesh:
     """Return the triangles of the evaluated scene: everything that is visible in it and has faces.
 
-    A face's class is its attribute ``class_id``, else its object's custom property ``synthroads_class``, else the class
-    that a collection of the object is named after, else unlabelled; its instance likewise is the attribute
-    ``instance_id`` or the property ``synthroads_instance``, else 0. Triangles without area are left out.
+    A face's class is its attribute ``class_id``, else its object's custom property ``synthroads_class``, else
+    the class that a collection of the object is named after, else unlabelled; its instance likewise is the
+    attribute ``instance_id`` or the property ``synthroads_instance``, else 0. Triangles without area are left
+    out.
 
     Args:
         source: a depsgraph, or a scene (its first view layer); the current scene if None.
@@ -65,21 +66,24 @@ def scene_mesh(
     scene = depsgraph.scene
     by_collection = _classes_by_collection(scene)
     chosen = None if objects is None else {item.original for item in objects}
-    parts: dict[tuple[int, str], _Part] = {}
+    parts: dict[tuple[object, ...], _Part] = {}
     materials: dict[str, int] = {}
     for use in depsgraph.object_instances:
+        # Curves, texts, surfaces and metaballs come a second time as the mesh that they make.
         item, owner = use.object, (use.parent if use.is_instance else use.object)
-        if item.type not in _MESH_LIKE or SUPPORT in owner.original:
+        if item.type != "MESH" or not len(item.data.polygons) or SUPPORT in owner.original:
             continue
         if chosen is not None and owner.original not in chosen:
             continue
-        for key, part in _parts(item, parts, materials):
-            parts.setdefault(key, part)
-            label = _object_class(item, owner, by_collection)
-            number = item.original.get(INSTANCE_PROPERTY, owner.original.get(INSTANCE_PROPERTY, 0))
-            parts[key].places.append((np.array(use.matrix_world), label, int(number)))
-    origin = _origin(scene)
-    return _assemble(list(parts.values()), tuple(materials), origin)
+        slots = _slot_names(item)
+        # Materials may be linked to the object, so that the same mesh can look different.
+        key = (item.data.as_pointer(), *slots)
+        if key not in parts:
+            parts[key] = _read(item.name, item.data, slots, materials)
+        label = _object_class(item, owner, by_collection)
+        number = item.original.get(INSTANCE_PROPERTY, owner.original.get(INSTANCE_PROPERTY, 0))
+        parts[key].places.append((np.array(use.matrix_world), label, int(number)))
+    return _assemble(list(parts.values()), tuple(materials), _origin(scene))
 
 
 def _depsgraph(source: bpy.types.Depsgraph | bpy.types.Scene | None) -> bpy.types.Depsgraph:
@@ -100,7 +104,7 @@ def _origin(scene: bpy.types.Scene) -> NDArray[np.float64]:
 
 
 def _classes_by_collection(scene: bpy.types.Scene) -> dict[str, int]:
-    """Return the class of each object (by name) in a collection that is named after a class, the innermost last."""
+    """Return the class of each object (by name) that is in a collection named after a class."""
     ids = {row.name: row.id for row in classes()}
     result: dict[str, int] = {}
     for collection in scene.collection.children_recursive:
@@ -121,25 +125,8 @@ def _object_class(item: bpy.types.Object, owner: bpy.types.Object, by_collection
     return by_collection.get(item.original.name, by_collection.get(owner.original.name, UNLABELLED))
 
 
-def _parts(
-    item: bpy.types.Object, known: dict[tuple[int, str], _Part], materials: dict[str, int]
-) -> Iterator[tuple[tuple[int, str], _Part]]:
-    """Yield the part that the object's mesh is, read only the first time; nothing if it has no faces."""
-    own = item.type == "MESH"
-    mesh = item.data if own else item.to_mesh()
-    # Materials may be linked to the object, so the same mesh can look different.
-    slots = _slot_names(item, mesh) if mesh is not None else []
-    key = (mesh.as_pointer() if own and mesh is not None else item.as_pointer(), "|".join(slots))
-    if key in known:
-        yield key, known[key]
-    elif mesh is not None and len(mesh.polygons):
-        yield key, _read(item.name, mesh, slots, materials)
-    if not own:
-        item.to_mesh_clear()
-
-
-def _slot_names(item: bpy.types.Object, mesh: bpy.types.Mesh) -> list[str]:
-    names = [table_name(material) for material in mesh.materials]
+def _slot_names(item: bpy.types.Object) -> list[str]:
+    names = [table_name(material) for material in item.data.materials]
     for index, slot in enumerate(item.material_slots[: len(names)]):
         if slot.link == "OBJECT":
             names[index] = table_name(slot.material)
@@ -158,7 +145,11 @@ def _read(name: str, mesh: bpy.types.Mesh, slots: list[str], materials: dict[str
     mesh.loop_triangle_polygons.foreach_get("value", face)
     slot = _face_values(mesh, "material_index")
     index = np.array([materials.setdefault(entry, len(materials)) for entry in slots], np.uint16)
-    material = np.zeros(count, np.uint16) + index[0] if slot is None else index[np.clip(slot, 0, len(index) - 1)][face]
+    material = (
+        np.zeros(count, np.uint16) + index[0]
+        if slot is None
+        else index[np.clip(slot, 0, len(index) - 1)][face]
+    )
     label, number = _face_values(mesh, "class_id"), _face_values(mesh, "instance_id")
     if label is not None:
         label = np.where((label >= 0) & (label <= UNLABELLED), label, UNLABELLED).astype(np.uint8)[face]
@@ -170,7 +161,11 @@ def _read(name: str, mesh: bpy.types.Mesh, slots: list[str], materials: dict[str
 def _face_values(mesh: bpy.types.Mesh, name: str) -> NDArray[Any] | None:
     """Return the (F,) int32 values of a face attribute, or None."""
     attribute = mesh.attributes.get(name)
-    if attribute is None or attribute.domain != "FACE" or attribute.data_type not in ("INT", "INT8", "BOOLEAN"):
+    if (
+        attribute is None
+        or attribute.domain != "FACE"
+        or attribute.data_type not in ("INT", "INT8", "BOOLEAN")
+    ):
         return None
     values = np.empty(len(mesh.polygons), np.int32)
     attribute.data.foreach_get("value", values)
@@ -213,14 +208,14 @@ def _moved(vertices: NDArray[np.float32], matrix: NDArray[np.float64]) -> NDArra
     return vertices @ matrix[:3, :3].T + matrix[:3, 3]
 
 
-def _with_area(vertices: NDArray[np.float32], triangles: NDArray[np.int32], block: int = 1 << 18) -> NDArray[np.bool_]:
+def _with_area(
+    vertices: NDArray[np.float32], triangles: NDArray[np.int32], block: int = 1 << 18
+) -> NDArray[np.bool_]:
     """Return which triangles have an area (T,)."""
     keep = np.empty(len(triangles), bool)
     for start in range(0, len(triangles), block):
         corner = vertices[triangles[start : start + block]]
         a, b = corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]
-        cross = np.stack(
-            [a[:, i] * b[:, j] - a[:, j] * b[:, i] for i, j in ((1, 2), (2, 0), (0, 1))]
-        )
+        cross = np.stack([a[:, i] * b[:, j] - a[:, j] * b[:, i] for i, j in ((1, 2), (2, 0), (0, 1))])
         keep[start : start + block] = (cross * cross).sum(axis=0) > (2.0 * _SMALLEST_AREA) ** 2
     return keep

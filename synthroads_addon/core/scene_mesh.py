@@ -1,4 +1,4 @@
-"""`SceneMesh`: a scene as triangles with class, instance and material. What casters, radiometry and tests read."""
+"""`SceneMesh`: a scene as triangles with class, instance and material; what casters and radiometry read."""
 
 from __future__ import annotations
 
@@ -49,7 +49,9 @@ class SceneMesh:
     def __post_init__(self) -> None:
         for name, (dtype, shape) in _SHAPES.items():
             array = np.asarray(getattr(self, name))
-            fits = array.ndim == len(shape) and all(n in (None, m) for n, m in zip(shape, array.shape, strict=True))
+            fits = array.ndim == len(shape) and all(
+                n in (None, m) for n, m in zip(shape, array.shape, strict=True)
+            )
             if not fits or array.dtype != dtype:
                 wanted = f"must be {np.dtype(dtype)} of shape {shape} with None for any length"
                 raise InputError(f"scene mesh: {name}", f"{array.dtype} {array.shape}", wanted)

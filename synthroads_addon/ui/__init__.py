@@ -17,7 +17,8 @@ def register() -> None:
 
 
 def unregister() -> None:
-    """Undo `register`."""
+    """Undo `register`; a scan that is at work is stopped."""
+    operators.stop_scan()
     del bpy.types.Scene.synthroads
     for cls in reversed(CLASSES):
         bpy.utils.unregister_class(cls)

@@ -2,143 +2,212 @@
 
 from __future__ import annotations
 
-import json
-from contextlib import ExitStack
-from pathlib import Path
-from typing import Any
+import traceback
 
 import bpy
 
-from ..core.errors import InputError
-from ..core.files import output_folder
-from ..core.parameters.geometry import RoadGeometry
-from ..core.parameters.model import RoadParameters
+from ..core.errors import Cancelled, InputError
 from ..core.parameters.sampler import sample_road
-from ..core.schema import canonical_json
-from ..pipeline import FILES, ScanToFiles, make_scan
+from . import scan_job
+from .road import find_road, recall, remember
+from .scan_job import ScanJob, scanning
+from .view import look_along
 
-STORED = "synthroads_parameters"
-"""Custom property of the scene that holds the parameter set of the model in it, as JSON."""
-
-
-def stored_parameters(scene: bpy.types.Scene) -> RoadParameters | None:
-    """Return the parameter set of the model in a scene, if there is one."""
-    text = scene.get(STORED)
-    return RoadParameters.from_dict(json.loads(text), source="stored parameters") if text else None
+_TICK = 0.1
+"""Seconds between two looks at a running scan."""
 
 
 class SYNTHROADS_OT_build(bpy.types.Operator):
-    """Make a road from the seed and build its model"""
+    """Make a road from these settings. It takes the place of the road built before; other objects stay as they are"""
 
     bl_idname = "synthroads.build"
     bl_label = "Build Road"
     bl_options = {"REGISTER", "UNDO"}  # noqa: RUF012 (Blender reads a plain set)
 
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """Object mode, and no scan at work."""
+        return _is_free(cls, context)
+
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        """Build, and show the first road that is built."""
+        first = find_road(context.scene) is None
+        context.window.cursor_set("WAIT")
+        result = self.execute(context)
+        context.window.cursor_set("DEFAULT")
+        road = find_road(context.scene)
+        if first and road and isinstance(context.space_data, bpy.types.SpaceView3D):
+            look_along(context.space_data, recall(road)[0])
+        return result
+
     def execute(self, context: bpy.types.Context) -> set[str]:
         """Sample the parameters and build the model."""
         from ..blender.model import build_road
 
+        settings = context.scene.synthroads
         try:
-            scenario = context.scene.synthroads.scenario()
+            scenario = settings.scenario()
             parameters = sample_road(scenario.road, scenario.seed, scenario.title)
-            settings = scenario.settings()
-            build_road(parameters, settings.tolerance, settings.vegetation_detail)
+            fidelity = scenario.settings()
+            model = build_road(parameters, fidelity.tolerance, fidelity.vegetation_detail)
         except InputError as error:
-            self.report({"ERROR"}, str(error))
-            return {"CANCELLED"}
-        context.scene[STORED] = parameters.to_json()
-        self.report({"INFO"}, f"Built {parameters.metadata.identifier}: {len(parameters.objects)} objects")
+            return _refuse(self, error)
+        remember(model.collection, parameters, scenario, settings.road_values())
+        self.report({"INFO"}, f"Built {parameters.alignment.length:,.0f} m of road")
         return {"FINISHED"}
 
 
 class SYNTHROADS_OT_scan(bpy.types.Operator):
-    """Scan the model that was built and write the labelled cloud. Esc cancels"""
+    """Scan everything that is visible, and write the labelled point cloud with pictures and the road's parameters"""
 
     bl_idname = "synthroads.scan"
     bl_label = "Scan"
+    bl_options = {"REGISTER"}  # noqa: RUF012
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         """A road must have been built."""
-        return bool(context.scene.get(STORED))
+        if not _is_free(cls, context):
+            return False
+        if find_road(context.scene) is None:
+            cls.poll_message_set("Build a road first")
+            return False
+        return True
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
-        """Begin; the blocks are computed between the window's own events."""
-        if not self._begin(context):
-            return {"CANCELLED"}
-        manager = context.window_manager
-        manager.progress_begin(0, 100)
-        self._timer = manager.event_timer_add(0.05, window=context.window)
-        manager.modal_handler_add(self)
+        """Begin; the scan runs beside the window, which looks at it now and then."""
+        try:
+            job = scan_job.latest = _scan_of(context)
+        except InputError as error:
+            return _refuse(self, error)
+        job.start()
+        self._timer = context.window_manager.event_timer_add(_TICK, window=context.window)
+        context.window_manager.modal_handler_add(self)
         return {"RUNNING_MODAL"}
 
     def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
-        """Take the next block, or stop."""
-        if event.type == "ESC":
-            return self._end(context, cancelled=True)
+        """Show how far the scan is, or that it has ended."""
+        job = scan_job.latest
+        assert job
+        if event.type == "ESC" and event.value == "PRESS" and job.running:
+            job.stop()
+            return {"RUNNING_MODAL"}
         if event.type != "TIMER":
             return {"PASS_THROUGH"}
-        try:
-            share = next(self._steps, None)
-        except InputError as error:
-            self.report({"ERROR"}, str(error))
-            return self._end(context, cancelled=True)
-        if share is None:
-            return self._end(context, cancelled=False)
-        context.window_manager.progress_update(100 * share)
-        context.workspace.status_text_set(f"SynthRoads scans: {100 * share:.0f} %   Esc cancels")
-        return {"RUNNING_MODAL"}
+        if job.running:
+            context.workspace.status_text_set(_draw_status)
+            _redraw_sidebars(context)
+            return {"PASS_THROUGH"}
+        return self._end(context, job)
+
+    def cancel(self, context: bpy.types.Context) -> None:
+        """Stop: another file is opened, or the window closed."""
+        stop_scan()
+        self._leave(context)
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        """Scan without a window."""
-        if not self._begin(context):
-            return {"CANCELLED"}
+        """Scan without a window, to the end."""
         try:
-            for _ in self._steps:
-                pass
+            job = _scan_of(context)
+            job.run()
         except InputError as error:
-            self.report({"ERROR"}, str(error))
-            return self._end(context, cancelled=True)
-        return self._end(context, cancelled=False)
+            return _refuse(self, error)
+        return self._succeed(job)
 
-    def _begin(self, context: bpy.types.Context) -> bool:
-        from ..blender.scene import scene_mesh
-
-        self._stack, self._timer = ExitStack(), None
-        try:
-            scenario = context.scene.synthroads.scenario()
-            parameters = stored_parameters(context.scene)
-            assert parameters  # poll() has seen it
-            target = Path(bpy.path.abspath(context.scene.synthroads.output))
-            names = [name for output in scenario.outputs for name in FILES[output]]
-            self._folder = self._stack.enter_context(output_folder(target, names, overwrite=True))
-            geometry = RoadGeometry(parameters)
-            mesh = scene_mesh()
-            self._task = ScanToFiles(scenario, make_scan(scenario, geometry, mesh), geometry, self._folder)
-            (self._folder / "parameters.json").write_text(parameters.to_json(), encoding="utf-8")
-        except InputError as error:
-            self._stack.__exit__(type(error), error, None)
-            self.report({"ERROR"}, str(error))
-            return False
-        self._steps = self._task.run()
-        return True
-
-    def _end(self, context: bpy.types.Context, *, cancelled: bool) -> set[str]:
-        self._steps.close()
-        if self._timer:
-            context.window_manager.event_timer_remove(self._timer)
-            context.window_manager.progress_end()
-            context.workspace.status_text_set(None)
-        if cancelled:
-            stop = KeyboardInterrupt()
-            self._stack.__exit__(type(stop), stop, None)
+    def _end(self, context: bpy.types.Context, job: ScanJob) -> set[str]:
+        self._leave(context)
+        if job.error is None:
+            return self._succeed(job)
+        if isinstance(job.error, Cancelled):
             self.report({"WARNING"}, "Scan cancelled; nothing was written")
             return {"CANCELLED"}
-        summary: dict[str, Any] = self._task.summary()
-        (self._folder / "report.json").write_text(canonical_json({"counts": summary}), encoding="utf-8")
-        self._stack.close()
-        self.report({"INFO"}, f"{summary['points']:,} points written to {context.scene.synthroads.output}")
+        if isinstance(job.error, InputError):
+            return _refuse(self, job.error)
+        traceback.print_exception(job.error)
+        self.report({"ERROR"}, f"Scan failed, nothing was written: {job.error!r} (the console says more)")
+        return {"CANCELLED"}
+
+    def _leave(self, context: bpy.types.Context) -> None:
+        context.window_manager.event_timer_remove(self._timer)
+        if context.workspace:
+            context.workspace.status_text_set(None)
+        _redraw_sidebars(context)
+
+    def _succeed(self, job: ScanJob) -> set[str]:
+        scan_job.latest = job
+        self.report({"INFO"}, f"{job.points:,} points written to {job.target}")
         return {"FINISHED"}
 
 
-CLASSES = (SYNTHROADS_OT_build, SYNTHROADS_OT_scan)
+class SYNTHROADS_OT_cancel_scan(bpy.types.Operator):
+    """Stop the scan; nothing is written"""
+
+    bl_idname = "synthroads.cancel_scan"
+    bl_label = "Cancel Scan"
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        """Have it stop; the scan's own operator notices when it has."""
+        if scan_job.latest:
+            scan_job.latest.stop()
+        return {"FINISHED"}
+
+
+def stop_scan() -> None:
+    """Stop a scan that is at work, and wait until it has."""
+    if scan_job.latest:
+        scan_job.latest.stop(wait=True)
+
+
+def _is_free(operator: type[bpy.types.Operator], context: bpy.types.Context) -> bool:
+    if scanning():
+        operator.poll_message_set("A scan is running")
+        return False
+    if context.mode != "OBJECT":
+        operator.poll_message_set("Go back to object mode first")
+        return False
+    return True
+
+
+def _scan_of(context: bpy.types.Context) -> ScanJob:
+    """Return the scan that the panel asks for: the road as it was built, the scanner as it is set now."""
+    from ..blender.scene import scene_mesh
+
+    settings, road = context.scene.synthroads, find_road(context.scene)
+    assert road  # poll() has seen it
+    parameters, built = recall(road)
+    scenario = built.model_copy(update={"scan": settings.scenario().scan})
+    target = settings.folder()
+    mesh = scene_mesh()
+    if len(mesh.triangles) == 0:
+        raise InputError("Scene", None, "nothing that could be scanned is visible")
+    return ScanJob(scenario, parameters, mesh, target, settings.overwrite)
+
+
+def _refuse(operator: bpy.types.Operator, error: InputError) -> set[str]:
+    """Show what is wrong in the panel's words."""
+    message = str(error).replace("--overwrite replaces it", "tick Replace Files, or choose another folder")
+    operator.report({"ERROR"}, message.replace("--output", "Output"))
+    return {"CANCELLED"}
+
+
+def _draw_status(header: bpy.types.Header, context: bpy.types.Context) -> None:
+    """Draw the status bar during a scan."""
+    job, layout = scan_job.latest, header.layout
+    if job is None:
+        return
+    layout.label(text="Stopping the scan" if job.stopping else "Cancel Scan", icon="EVENT_ESC")
+    layout.separator_spacer()
+    layout.label(text="SynthRoads scans")
+    layout.progress(factor=job.share, text=f"{job.share:.0%}")
+    layout.separator_spacer()
+
+
+def _redraw_sidebars(context: bpy.types.Context) -> None:
+    for window in context.window_manager.windows:
+        for area in window.screen.areas:
+            for region in area.regions:
+                if area.type == "VIEW_3D" and region.type == "UI":
+                    region.tag_redraw()
+
+
+CLASSES = (SYNTHROADS_OT_build, SYNTHROADS_OT_scan, SYNTHROADS_OT_cancel_scan)

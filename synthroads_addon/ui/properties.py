@@ -3,91 +3,177 @@
 Annotations are not postponed here: Blender reads the properties from them.
 """
 
+import json
+from collections.abc import Iterator
+from operator import attrgetter
+from pathlib import Path
 from typing import Any
 
 import annotated_types
 import bpy
+import numpy as np
 from pydantic import BaseModel
 
+from ..core.errors import InputError
 from ..core.parameters.limits import STANDARD_CROSS_SECTIONS
-from ..core.scanning.devices import device_names
-from ..core.scenario import Platform, RoadScenario, Scenario, load_scenario, scenario_names
+from ..core.scanning.devices import device_names, load_device
+from ..core.scenario import (
+    FIDELITIES,
+    Platform,
+    RoadScenario,
+    ScanScenario,
+    Scenario,
+    load_scenario,
+    scenario_names,
+)
 from ..core.schema import unit_of
 
-_SUBTYPES = {"m": "LENGTH", "m/s": "VELOCITY"}
+ROAD_FIELDS = {
+    "seed": "seed",
+    "fidelity": "fidelity",
+    "cross_section": "road.cross_section",
+    "length": "road.length",
+}
+SCAN_FIELDS = {
+    "device": "scan.device",
+    "height": "scan.platform.height",
+    "speed": "scan.platform.speed",
+}
+"""Settings and the fields of the scenario that they set: what the road is built from, and what it is scanned with."""
+
+OUTPUTS = ("parameters", "cloud", "centerline", "previews")
+"""What a scan from the panel writes; the scene itself is open already."""
+
+_UNITS = {"m": "LENGTH", "m/s": "VELOCITY"}
+_LARGEST_INTEGER = 2**31 - 1  # Blender's integers have 32 bits
+_KEPT = ("seed", "fidelity")  # choosing a scenario leaves these as they are: they say which and how fine, not what
 
 
-def number(model: type[BaseModel], name: str, default: float | None = None) -> Any:
-    """Return a float or int property with the limits, unit and description of a field of the schema.
+def number(model: type[BaseModel], name: str) -> Any:
+    """Return a float or int property with the limits, default, unit and description of a field of the schema.
 
-    Args:
-        model: the class that declares the field.
-        name: the field.
-        default: the property's default where it isn't the field's own.
+    Blender's limits are inclusive: a limit that the schema excludes is refused when the scenario is made.
     """
     field = model.model_fields[name]
-    value = field.default if default is None else default
-    arguments: dict[str, Any] = {"name": name.replace("_", " ").capitalize(), "default": value}
-    arguments["description"] = f"{field.description} ({unit_of(field)})"
+    arguments = {"name": name.replace("_", " ").title(), "default": field.default, "description": tooltip(model, name)}
     for limit in field.metadata:
-        if isinstance(limit, annotated_types.Ge):
-            arguments["min"] = limit.ge
-        if isinstance(limit, annotated_types.Le):
-            arguments["max"] = limit.le
+        if isinstance(limit, annotated_types.Ge | annotated_types.Gt):
+            arguments["min"] = getattr(limit, "ge", getattr(limit, "gt", None))
+        if isinstance(limit, annotated_types.Le | annotated_types.Lt):
+            arguments["max"] = getattr(limit, "le", getattr(limit, "lt", None))
     if field.annotation is int:
-        # Blender's integers have 32 bits.
-        arguments["max"] = min(arguments.get("max", 2**31 - 1), 2**31 - 1)
+        arguments["max"] = min(arguments.get("max", _LARGEST_INTEGER), _LARGEST_INTEGER)
         return bpy.props.IntProperty(**arguments)
-    return bpy.props.FloatProperty(**arguments, unit=_SUBTYPES.get(unit_of(field), "NONE"))
+    return bpy.props.FloatProperty(**arguments, step=100, unit=_UNITS.get(unit_of(field), "NONE"))
 
 
-def _names(values: Any) -> list[tuple[str, str, str]]:
-    return [(value, value, "") for value in values]
+def tooltip(model: type[BaseModel], name: str) -> str:
+    """Return a field's description without its final stop: Blender adds one."""
+    return (model.model_fields[name].description or "").removesuffix(".")
 
 
-_DEMO = load_scenario("rq31-600m")
+def _scenarios() -> Iterator[tuple[str, str, str]]:
+    for name in scenario_names():
+        yield name, name, load_scenario(name).title
+
+
+def _fidelities() -> Iterator[tuple[str, str, str]]:
+    for name, settings in FIDELITIES.items():
+        rays = "1 ray" if settings.rays_per_pulse == 1 else f"{settings.rays_per_pulse} rays"
+        model = f"{1000 * settings.tolerance:g} mm chord error, {settings.vegetation_detail:.0%} of the plants"
+        yield name, name.title(), f"{model}, {rays} per pulse"
+
+
+def _cross_sections() -> Iterator[tuple[str, str, str]]:
+    for name, section in STANDARD_CROSS_SECTIONS.items():
+        lanes = len(section.lanes)
+        shoulder = f"hard shoulders of {section.hard_shoulder:g} m, median of {section.median:g} m"
+        yield name, f"{name.replace('RQ', 'RQ ')}, 2 × {lanes} lanes", f"{lanes} lanes each way, {shoulder}"
+
+
+def _devices() -> Iterator[tuple[str, str, str]]:
+    for name in device_names():
+        device = load_device(name)
+        rates = ", ".join(f"{mode.pulse_rate_khz:g}" for mode in device.modes)
+        yield name, device.title, f"{device.wavelength_nm:g} nm, {rates} kHz, {device.maximum_returns} returns at most"
+
+
+def _take_over(settings: "SYNTHROADS_PG_settings", context: bpy.types.Context) -> None:
+    """Show the chosen scenario's own values."""
+    scenario = load_scenario(settings.preset)
+    for name, path in (ROAD_FIELDS | SCAN_FIELDS).items():
+        if name not in _KEPT:
+            setattr(settings, name, attrgetter(path)(scenario))
 
 
 class SYNTHROADS_PG_settings(bpy.types.PropertyGroup):
     """What the panel shows; `scenario` turns it into the same description of a job that the command line takes."""
 
     preset: bpy.props.EnumProperty(
-        name="Scenario", items=_names(scenario_names()), description="Ready-made scenario that the rest starts from"
+        name="Scenario",
+        items=list(_scenarios()),
+        default="rq31-600m",
+        description="Ready-made scenario that everything else starts from",
+        update=_take_over,
     )
-    seed: number(Scenario, "seed")
     fidelity: bpy.props.EnumProperty(
         name="Fidelity",
-        items=_names(["draft", "standard", "high"]),
-        default="draft",
-        description=Scenario.model_fields["fidelity"].description or "",
+        items=list(_fidelities()),
+        default="draft",  # the first road and scan are to come fast
+        description=tooltip(Scenario, "fidelity"),
     )
+    seed: number(Scenario, "seed")
     cross_section: bpy.props.EnumProperty(
-        name="Cross-section",
-        items=_names(STANDARD_CROSS_SECTIONS),
-        default=_DEMO.road.cross_section,
-        description=RoadScenario.model_fields["cross_section"].description or "",
+        name="Cross-Section",
+        items=list(_cross_sections()),
+        default=RoadScenario.model_fields["cross_section"].default,
+        description=tooltip(RoadScenario, "cross_section"),
     )
     length: number(RoadScenario, "length")
-    device: bpy.props.EnumProperty(name="Device", items=_names(device_names()), description="Laser scanner")
+    device: bpy.props.EnumProperty(
+        name="Device",
+        items=list(_devices()),
+        default=ScanScenario.model_fields["device"].default,
+        description="Laser scanner",
+    )
     height: number(Platform, "height")
     speed: number(Platform, "speed")
     output: bpy.props.StringProperty(
-        name="Output", subtype="DIR_PATH", default="//synthroads", description="Folder for the files"
+        name="Output",
+        subtype="DIR_PATH",
+        default="//synthroads",
+        description="Folder for the files; // is the folder of the .blend file",
+        options={"PATH_SUPPORTS_BLEND_RELATIVE"},
+    )
+    overwrite: bpy.props.BoolProperty(
+        name="Replace Files", default=False, description="Replace the files of an earlier scan in this folder"
     )
 
     def scenario(self) -> Scenario:
         """Return the job that the panel describes; raise `InputError` where a value is refused."""
-        changes = {
-            "seed": self.seed,
-            "fidelity": f'"{self.fidelity}"',
-            "road.cross_section": f'"{self.cross_section}"',
-            "road.length": round(self.length, 6),
-            "scan.device": f'"{self.device}"',
-            "scan.platform.height": round(self.height, 6),
-            "scan.platform.speed": round(self.speed, 6),
-            "outputs": '["parameters", "cloud", "centerline", "previews"]',
-        }
-        return load_scenario(self.preset, [f"{path}={value}" for path, value in changes.items()])
+        changes = [f"{path}={_plain(getattr(self, name))}" for name, path in (ROAD_FIELDS | SCAN_FIELDS).items()]
+        return load_scenario(self.preset, [*changes, f"outputs={json.dumps(OUTPUTS)}"])
+
+    def road_values(self) -> str:
+        """Return what a road is built from, to tell whether it has changed."""
+        return json.dumps([self.preset, *(_plain(getattr(self, name)) for name in ROAD_FIELDS)])
+
+    def needs_saved_file(self) -> bool:
+        """Return whether the output folder is given relative to a file that has no place yet."""
+        return self.output.startswith("//") and not bpy.data.filepath
+
+    def folder(self) -> Path:
+        """Return the output folder; raise `InputError` if there is none."""
+        if not self.output.strip():
+            raise InputError("Output", None, "choose a folder for the files")
+        if self.needs_saved_file():
+            raise InputError("Output", self.output, "save the file first, or choose a folder")
+        return Path(bpy.path.abspath(self.output)).expanduser().absolute()
+
+
+def _plain(value: float | str) -> str:
+    """Return a value as JSON; a number of Blender's 32 bits as the shortest decimal that it stands for (0.1)."""
+    return json.dumps(float(str(np.float32(value))) if isinstance(value, float) else value)
 
 
 CLASSES = (SYNTHROADS_PG_settings,)

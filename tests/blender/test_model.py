@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -68,7 +67,9 @@ class Built:
         low, high = self.geometry.offsets[-1], self.geometry.offsets[0]
         assert offset.max() < high + 0.01
         assert offset.min() > low - 0.01
-        return self.geometry.elevation(np.clip(station, 0.0, self.geometry.length), np.clip(offset, low, high))
+        return self.geometry.elevation(
+            np.clip(station, 0.0, self.geometry.length), np.clip(offset, low, high)
+        )
 
 
 def demo_parameters(**changes: Any) -> RoadParameters:
@@ -85,9 +86,9 @@ def with_object(parameters: RoadParameters, name: str, **changes: Any) -> RoadPa
     return parameters.model_copy(update={"objects": objects})
 
 
-@pytest.fixture(scope="module")
-def demo() -> Iterator[Built]:
-    yield built(demo_parameters())
+@pytest.fixture(scope="class")
+def demo() -> Built:
+    return built(demo_parameters())
 
 
 def of_class(mesh: SceneMesh, *names: str) -> NDArray[np.int32]:
@@ -111,6 +112,17 @@ def pieces(mesh: SceneMesh) -> list[NDArray[np.intp]]:
     labels = connected_components(graph, directed=False)[1]
     order = np.argsort(labels, kind="stable")
     return np.split(order, np.flatnonzero(np.diff(labels[order])) + 1)
+
+
+def timed_edit(road: Built, role: str, name: str, value: float) -> float:
+    """Set an input of an object's modifier and return how long the update takes, s."""
+    bpy.context.view_layer.update()
+    start = time.perf_counter()
+    set_modifier_input(road.modifier(role), name, value)
+    bpy.context.view_layer.update()
+    seconds = time.perf_counter() - start
+    print(f"{role}, {name}: {seconds * 1000:.0f} ms")
+    return seconds
 
 
 @pytest.mark.keep_scene
@@ -141,7 +153,7 @@ class TestSurface:
     def test_strips_have_their_classes_and_instances(self, demo: Built) -> None:
         mesh = demo.mesh("Road")
         chosen = mesh.class_id != class_id("road_marking")
-        station, offset = demo.located(mesh.vertices[mesh.triangles[chosen]].mean(axis=1))
+        _, offset = demo.located(mesh.vertices[mesh.triangles[chosen]].mean(axis=1))
         strips = demo.geometry.strip_index(offset)
         wanted = np.array([class_id(strip.class_name) for strip in demo.geometry.strips])
         numbers = np.array([strip.instance for strip in demo.geometry.strips])
@@ -175,16 +187,7 @@ class TestSurface:
         assert mesh.areas().min() > 1e-7
         assert mesh.normals()[:, 2].min() > 0.3
 
-    @pytest.mark.parametrize("tolerance", [0.02, 0.001])
-    def test_other_tolerances_hold_too(self, tolerance: float) -> None:
-        road = built(demo_parameters(length=400.0), tolerance, {"road"})
-        mesh = road.mesh("Road")
-        points = random_points(mesh, of_class(mesh, "road", "roadside"))
-        error = points[:, 2] - road.surface(*road.located(points))
-        assert np.abs(error).max() < tolerance
 
-
-@pytest.mark.keep_scene
 class TestMarkings:
     def test_films_lie_just_above_the_pavement(self) -> None:
         road = built(demo_parameters(), TOLERANCE, {"road"})
@@ -196,7 +199,7 @@ class TestMarkings:
             hit = tree.ray_cast((*point[:2], point[2] + 1.0), (0.0, 0.0, -1.0))
             height.append(point[2] - hit[0][2])
         print(f"films: {min(height) * 1000:.2f} to {max(height) * 1000:.2f} mm above the pavement")
-        assert 0.0 < min(height)
+        assert min(height) > 0.0
         assert max(height) < 0.006
 
     def test_dashes_are_where_the_parameters_say(self) -> None:
@@ -210,9 +213,12 @@ class TestMarkings:
             assert np.isclose(offset.min(), right, atol=ROUNDING)
             dashes = road.geometry.dashes(line)
             corners = mesh.vertices[chosen].astype(np.float64)
-            area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1) / 2
-            shrink = 1.0 - road.geometry.alignment.curvature(dashes.mean(axis=1)) * (left + right) / 2
-            wanted = (np.diff(dashes, axis=1)[:, 0] * shrink).sum() * line.width
+            area = (
+                np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+                / 2
+            )
+            turn = np.diff(road.geometry.alignment.heading(dashes), axis=1)
+            wanted = (np.diff(dashes, axis=1) - turn * (left + right) / 2).sum() * line.width
             assert np.isclose(area.sum(), wanted, rtol=2e-3)
             inside = (station[:, None] > dashes[:, 0] - 1e-3) & (station[:, None] < dashes[:, 1] + 1e-3)
             assert inside.any(axis=1).all()
@@ -246,19 +252,6 @@ class TestTerrain:
         assert np.abs(error).max() < 0.015
         assert (reach > 1.0).any()
         assert np.abs(z - ground)[np.abs(offset) > 40.0].max() < 0.015
-
-    def test_offsets_that_fold_are_cut(self) -> None:
-        parameters = demo_parameters(length=150.0)
-        bend = [{"kind": "arc", "length": 150.0, "curvature_start": 0.02, "curvature_end": 0.02}]
-        data = parameters.to_dict()
-        data["objects"]["alignment"]["horizontal"] = bend
-        road = built(RoadParameters.from_dict(data), TOLERANCE, {"road", "terrain"})
-        mesh = road.mesh("Road", "Terrain")
-        station, offset = road.located(mesh.vertices[np.unique(mesh.triangles)])
-        assert offset.max() < 0.98 * 50.0 + 1e-3
-        assert offset.max() > 40.0
-        assert offset.min() < -70.0
-        assert mesh.normals()[:, 2].min() > 0.0
 
 
 @pytest.mark.keep_scene
@@ -329,7 +322,6 @@ class TestFurniture:
             assert (along < -0.8).all()
 
 
-@pytest.mark.keep_scene
 class TestLabels:
     def test_every_face_is_labelled_and_every_object_has_faces(self) -> None:
         parameters = demo_parameters(length=300.0)
@@ -359,9 +351,11 @@ class TestLabels:
             assert beyond.max() < plants.band_end + room
             if plants.kind == "tree":
                 assert beyond.min() > plants.band_start - room
-            paved = road.geometry.strip_index(offset)
-            blades = [road.geometry.strips[index].class_name for index in paved[paved >= 0]]
-            assert blades.count("road") < 0.2 * len(foot)
+            for side in ("left", "right"):
+                carriageway = road.parameters.carriageway(side)
+                outwards = carriageway.sign * offset - carriageway.inner_offset
+                into_road = np.minimum(outwards, carriageway.paved_width - outwards)
+                assert into_road.max() < plants.height_max
 
     def test_large_instance_numbers_survive(self) -> None:
         parameters = with_object(demo_parameters(length=100.0), "median", instance=2**32 - 5)
@@ -373,36 +367,6 @@ class TestLabels:
 
 @pytest.mark.keep_scene
 class TestLiveEdits:
-    def timed(self, road: Built, role: str, name: str, value: float) -> float:
-        bpy.context.view_layer.update()
-        start = time.perf_counter()
-        set_modifier_input(road.modifier(role), name, value)
-        bpy.context.view_layer.update()
-        seconds = time.perf_counter() - start
-        print(f"{role}, {name}: {seconds * 1000:.0f} ms")
-        return seconds
-
-    def test_a_lane_moves_all_that_lies_outside_of_it(self) -> None:
-        parameters = demo_parameters()
-        road = built(parameters)
-        assert self.timed(road, "Road", "Right Lane 1 Width", 4.0) < 1.0
-        carriageway = parameters.objects["carriageway-right"]
-        assert isinstance(carriageway, Carriageway)
-        lanes = (carriageway.lanes[0].model_copy(update={"width": 4.0}), *carriageway.lanes[1:])
-        wider = with_object(parameters, "carriageway-right", lanes=lanes)
-        live = road.mesh("Road", "Terrain")
-        again = built(wider, parts={"road", "terrain"}).mesh("Road", "Terrain")
-        # Station by station the analytic road of the changed parameters, to which the rebuilt mesh is held as well.
-        truth = Built(wider, RoadGeometry(wider), road.model)
-        for mesh in (live, again):
-            vertices = mesh.vertices[np.unique(of_class(mesh, "road", "roadside"))]
-            station, offset = truth.located(vertices)
-            assert np.abs(offset[:, None] - truth.geometry.offsets).min(axis=1).max() < ROUNDING
-            assert np.abs(vertices[:, 2] - truth.surface(station, offset)).max() < ROUNDING
-            for line in wider.of_type(LineMarking).values():
-                _, offset = truth.located(mesh.vertices[np.unique(mesh.triangles[mesh.instance_id == line.instance])])
-                assert np.isclose(offset.max(), truth.geometry.marking_offsets(line)[0], atol=ROUNDING)
-
     @pytest.mark.parametrize(
         ("role", "name", "value"),
         [
@@ -416,12 +380,37 @@ class TestLiveEdits:
     def test_an_input_changes_the_mesh_at_once(self, demo: Built, role: str, name: str, value: float) -> None:
         before = demo.mesh(role).vertices
         old = modifier_input(demo.modifier(role), name)
-        seconds = self.timed(demo, role, name, value)
+        seconds = timed_edit(demo, role, name, value)
         after = demo.mesh(role).vertices
         set_modifier_input(demo.modifier(role), name, old)
         assert seconds < 1.0
         assert before.shape != after.shape or not np.array_equal(before, after)
         assert np.array_equal(before, demo.mesh(role).vertices)
+
+
+class TestLiveEditsOfTheRoad:
+    def test_a_lane_moves_all_that_lies_outside_of_it(self) -> None:
+        parameters = demo_parameters()
+        road = built(parameters)
+        assert timed_edit(road, "Road", "Right Lane 1 Width", 4.0) < 1.0
+        carriageway = parameters.objects["carriageway-right"]
+        assert isinstance(carriageway, Carriageway)
+        lanes = (carriageway.lanes[0].model_copy(update={"width": 4.0}), *carriageway.lanes[1:])
+        wider = with_object(parameters, "carriageway-right", lanes=lanes)
+        live = road.mesh("Road", "Terrain")
+        again = built(wider, parts={"road", "terrain"}).mesh("Road", "Terrain")
+        # The rebuilt mesh is held to the same truth as the one that was edited.
+        truth = Built(wider, RoadGeometry(wider), road.model)
+        for mesh in (live, again):
+            vertices = mesh.vertices[np.unique(of_class(mesh, "road", "roadside"))]
+            station, offset = truth.located(vertices)
+            assert np.abs(offset[:, None] - truth.geometry.offsets).min(axis=1).max() < ROUNDING
+            assert np.abs(vertices[:, 2] - truth.surface(station, offset)).max() < ROUNDING
+            for line in wider.of_type(LineMarking).values():
+                _, offset = truth.located(
+                    mesh.vertices[np.unique(mesh.triangles[mesh.instance_id == line.instance])]
+                )
+                assert np.isclose(offset.max(), truth.geometry.marking_offsets(line)[0], atol=ROUNDING)
 
     def test_guardrails_and_terrain_follow_the_road(self) -> None:
         road = built(demo_parameters())
@@ -432,6 +421,27 @@ class TestLiveEdits:
 
 
 class TestBuilding:
+    @pytest.mark.parametrize("tolerance", [0.02, 0.001])
+    def test_other_tolerances_hold_too(self, tolerance: float) -> None:
+        road = built(demo_parameters(length=400.0), tolerance, {"road"})
+        mesh = road.mesh("Road")
+        points = random_points(mesh, of_class(mesh, "road", "roadside"))
+        error = points[:, 2] - road.surface(*road.located(points))
+        assert np.abs(error).max() < tolerance
+
+    def test_offsets_that_fold_are_cut(self) -> None:
+        parameters = demo_parameters(length=150.0)
+        bend = [{"kind": "arc", "length": 150.0, "curvature_start": 0.02, "curvature_end": 0.02}]
+        data = parameters.to_dict()
+        data["objects"]["alignment"]["horizontal"] = bend
+        road = built(RoadParameters.from_dict(data), TOLERANCE, {"road", "terrain"})
+        mesh = road.mesh("Road", "Terrain")
+        _, offset = road.located(mesh.vertices[np.unique(mesh.triangles)])
+        assert offset.max() < 0.98 * 50.0 + 1e-3
+        assert offset.max() > 40.0
+        assert offset.min() < -70.0
+        assert mesh.normals()[:, 2].min() > 0.0
+
     def test_a_second_build_replaces_the_first_and_leaves_the_rest(self) -> None:
         cube = bpy.data.objects.new("Mine", bpy.data.meshes.new("Mine"))
         bpy.context.scene.collection.objects.link(cube)
@@ -494,13 +504,19 @@ class TestBuilding:
 
     def test_one_carriageway_without_verge_is_built(self) -> None:
         data = demo_parameters(length=100.0).to_dict()
-        left = {"carriageway-left"} | {k for k, v in data["objects"].items() if v.get("carriageway") == "carriageway-left"}
-        data["objects"] = {k: v for k, v in data["objects"].items() if k not in left and "left" not in k and k != "median"}
+        left = {"carriageway-left"} | {
+            k for k, v in data["objects"].items() if v.get("carriageway") == "carriageway-left"
+        }
+        data["objects"] = {
+            k: v for k, v in data["objects"].items() if k not in left and "left" not in k and k != "median"
+        }
         data["objects"]["carriageway-right"]["verge_width"] = 0.0
         data["objects"]["carriageway-right"]["rotation_axis"] = "inner_edge"
         road = built(RoadParameters.from_dict(data), parts={"road", "terrain"})
         mesh = road.mesh("Road", "Terrain")
-        assert set(np.unique(mesh.class_id)) == {class_id(name) for name in ("road", "road_marking", "ground")}
+        assert set(np.unique(mesh.class_id)) == {
+            class_id(name) for name in ("road", "road_marking", "ground")
+        }
         vertices = mesh.vertices[np.unique(of_class(mesh, "road"))]
         station, offset = road.located(vertices)
         assert np.abs(vertices[:, 2] - road.surface(station, offset)).max() < ROUNDING

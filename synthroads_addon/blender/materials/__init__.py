@@ -23,7 +23,7 @@ _BUILDERS: dict[str, Callable[[Shade], None]] = {
 
 
 def material(name: str) -> bpy.types.Material:
-    """Return the Blender material of a table entry, made if the file has none yet; KeyError if it isn't in the table."""
+    """Return the Blender material of a table entry, made if the file has none; KeyError for other names."""
     if name not in materials():
         raise KeyError(f"no material '{name}'{nearest_name(name, materials())}")
     for existing in bpy.data.materials:
@@ -43,7 +43,7 @@ def table_name(item: bpy.types.Material | None) -> str:
 
 
 def constants(names: Iterable[str]) -> dict[str, Material]:
-    """Return the properties of materials by name: the table's, else those of the Blender material's Principled BSDF."""
+    """Return materials' properties by name: the table's, else those of the material's Principled BSDF."""
     table = materials()
     return {name: table[name] if name in table else _principled(name) for name in names}
 
@@ -57,7 +57,9 @@ def _principled(name: str) -> Material:
     if node is None:
         colour, rough, metal = item.diffuse_color, item.roughness, item.metallic
     else:
-        colour, rough, metal = (node.inputs[key].default_value for key in ("Base Color", "Roughness", "Metallic"))
+        colour, rough, metal = (
+            node.inputs[key].default_value for key in ("Base Color", "Roughness", "Metallic")
+        )
     # A renderer's default specular of 0.5 would drown the contrast of the base colours.
     specular = min(0.2, node.inputs["Specular IOR Level"].default_value) if node else 0.2
 

@@ -30,7 +30,9 @@ class Shade:
     factor: Value | None = None
     roughness: Value | None = None
 
-    def noise(self, wavelength: float, detail: float = 2.0, stretch: tuple[float, float, float] = (1, 1, 1)) -> Value:
+    def noise(
+        self, wavelength: float, detail: float = 2.0, stretch: tuple[float, float, float] = (1, 1, 1)
+    ) -> Value:
         """Return a noise from -1 to 1 of mean 0 whose features are about `wavelength` (m) large."""
         place = self.tree.node("ShaderNodeVectorMath", self.place, stretch, operation="MULTIPLY").value
         node = self.tree.node("ShaderNodeTexNoise", place, scale=1.0 / wavelength, detail=detail)
@@ -44,7 +46,8 @@ class Shade:
 
 def shade(item: bpy.types.Material, mean: Material, build: Callable[[Shade], None] | None) -> None:
     """Give a new Blender material its nodes: a Principled BSDF with the table's values, varied by `build`."""
-    item.use_nodes = True
+    if item.node_tree is None:
+        item.use_nodes = True
     item.node_tree.nodes.clear()
     tree = Tree(item.node_tree)
     with tree.frame("Variation around the mean"):
@@ -61,7 +64,9 @@ def shade(item: bpy.types.Material, mean: Material, build: Callable[[Shade], Non
             specular_ior_level=mean.specular,
         )
         if varied.factor is not None:
-            scaled = tree.node("ShaderNodeVectorMath", mean.base_color, scale=varied.factor, operation="SCALE").value
+            scaled = tree.node(
+                "ShaderNodeVectorMath", mean.base_color, scale=varied.factor, operation="SCALE"
+            ).value
             tree.group.links.new(scaled.source(), surface.raw.inputs["Base Color"])
         tree.node("ShaderNodeOutputMaterial", surface.value)
     item.diffuse_color = (*mean.base_color, 1.0)

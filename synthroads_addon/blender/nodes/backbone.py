@@ -1,7 +1,7 @@
 """The backbone: a polyline along the axis whose points carry what a row of the road needs to know.
 
-Attributes of its points: ``station`` (m), ``left`` (unit vector, horizontal), ``curvature`` (1/m, positive to the left),
-``crossfall_left`` and ``crossfall_right`` (m/m, positive where the surface falls to the right).
+Attributes of its points: ``station`` (m), ``left`` (unit vector, horizontal), ``curvature`` (1/m, positive to
+the left), ``crossfall_left`` and ``crossfall_right`` (m/m, positive where the surface falls to the right).
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ def cut(offset: Value, curvature: Value) -> Value:
 
 
 def station_ribbon(backbone: Value) -> Value:
-    """Return a flat ribbon along x = station that carries the backbone's attributes, to look them up by station."""
+    """Return a flat ribbon along x = station that carries the backbone's attributes, for `look_up`."""
     tree = backbone.tree
     with tree.frame("Ribbon to look up stations"):
         mesh, column, number = op.grid(tree, 2, op.point_count(backbone))
@@ -43,7 +43,7 @@ def station_ribbon(backbone: Value) -> Value:
 
 
 def look_up(ribbon: Value, name: str, station: Value) -> Value:
-    """Return an attribute of the backbone (``axis`` is its position) at any station, linear between its rows."""
+    """Return the backbone's attribute (``axis`` is its position) at any station, linear between its rows."""
     tree = ribbon.tree
     kind = "FLOAT_VECTOR" if name in ("axis", "left") else "FLOAT"
     return op.sample_surface(ribbon, op.named(tree, name, kind), op.vector(tree, station))
@@ -58,7 +58,9 @@ def height_on(road: Value, terrain: Value, place: Value) -> Value:
     above = place + (0.0, 0.0, 500.0)
 
     def cast(target: Value) -> tuple[Value, Value]:
-        ray = tree.node("GeometryNodeRaycast", target_geometry=target, source_position=above, ray_length=1000.0)
+        ray = tree.node(
+            "GeometryNodeRaycast", target_geometry=target, source_position=above, ray_length=1000.0
+        )
         return ray["Is Hit"], op.component(ray["Hit Position"], "Z")
 
     on_road, road_z = cast(road)

@@ -8,8 +8,8 @@
 
     group = node_group("SR Lane", build)
 
-Sockets are `Value`s: they can be added, multiplied, compared and handed to other nodes. Positions of nodes are worked out
-from the frames and the links. A group that is already in the file in the same version is used again.
+Sockets are `Value`s: they can be added, multiplied, compared and handed to other nodes. Places of nodes are
+worked out from the frames and the links. A group that is already in the file in the same version is used again.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ KEY = "synthroads_key"
 
 
 class Value:
-    """An output socket that can be calculated with. Numbers mix freely with it; vectors take numbers component-wise."""
+    """An output socket that can be calculated with; vectors take numbers component-wise."""
 
     def __init__(self, tree: Tree, socket: bpy.types.NodeSocket | None, kind: str) -> None:
         self.tree = tree
@@ -46,7 +46,9 @@ class Value:
         kinds = {_kind(operand) for operand in operands}
         if "VECTOR" in kinds:
             if operation == "MULTIPLY" and "VECTOR" not in {_kind(operands[1])}:
-                return self.tree.node("ShaderNodeVectorMath", operands[0], scale=operands[1], operation="SCALE").value
+                return self.tree.node(
+                    "ShaderNodeVectorMath", operands[0], scale=operands[1], operation="SCALE"
+                ).value
             return self.tree.node("ShaderNodeVectorMath", *operands, operation=operation).value
         if kinds == {"INT"} and operation != "DIVIDE":
             return self.tree.node("FunctionNodeIntegerMath", *operands, operation=operation).value
@@ -117,7 +119,7 @@ class Value:
         return self._compare("EQUAL", other)
 
 
-Operand = Value | float | int | bool | tuple[float, float, float]
+Operand = Value | float | int | bool | str | tuple[float, ...]
 
 
 class GroupInput(Value):
@@ -183,7 +185,7 @@ class Tree:
         return GroupInput(self, name, "BOOLEAN")
 
     def input(self, name: str, kind: str, *, description: str) -> Value:
-        """Declare an input of another kind: ``Geometry``, ``Object``, ``Material``, ``Vector``, ``Rotation``."""
+        """Declare an input of another kind: ``Geometry``, ``Object``, ``Material``, ``Vector``, ..."""
         self._socket(name, f"NodeSocket{kind}", description)
         return GroupInput(self, name, kind.upper())
 
@@ -222,6 +224,8 @@ class Tree:
         """Put the nodes made inside into one labelled frame."""
         outer, self._frame = self._frame, self.group.nodes.new("NodeFrame")
         self._frame.label = label
+        # Blender cuts labels after 63 bytes without a word.
+        assert self._frame.label == label, label
         yield
         self._frame = outer
 
@@ -231,7 +235,8 @@ class Tree:
         Args:
             kind: Blender's name of the node's class.
             operands: values of its inputs in order.
-            settings: properties of the node (``operation="ADD"``) and inputs by name in snake case (``ray_length=5.0``).
+            settings: properties of the node (``operation="ADD"``), and inputs by name in snake case
+                (``ray_length=5.0``).
         """
         raw = self._new(kind)
         inputs = {}

@@ -1,4 +1,4 @@
-"""SR Carriageway Height and SR Carriageway Marking: what lies at a distance from the axis on one carriageway."""
+"""SR Carriageway Height, SR Carriageway Marking: what lies at a distance from the axis on a carriageway."""
 
 from __future__ import annotations
 
@@ -22,14 +22,21 @@ def carriageway_marking_group() -> bpy.types.NodeTree:
 def _declare_section(tree: Tree) -> dict[str, Value]:
     widths = (0.0, 1000.0)
     return {
-        "side": tree.number("Side", 1.0, (-1.0, 1.0), description="+1 for the left, -1 for the right carriageway"),
+        "side": tree.number(
+            "Side", 1.0, (-1.0, 1.0), description="+1 for the left, -1 for the right carriageway"
+        ),
         "distance": tree.number("Distance", 5.0, widths, unit="m", description="Distance from the axis"),
         "paved_edge": tree.number("Paved Edge", 14.0, widths, unit="m", description="Where the verge begins"),
         "pivot": tree.number("Pivot", 8.0, widths, unit="m", description="Line that keeps the axis's height"),
         "crossfall": tree.number(
-            "Crossfall", 0.025, (-0.12, 0.12), description="Positive where the surface falls to the right (m/m), per row"
+            "Crossfall",
+            0.025,
+            (-0.12, 0.12),
+            description="Positive where the surface falls to the right (m/m), per row",
         ),
-        "verge_slope": tree.number("Verge Slope", 0.08, (0.0, 0.15), description="Fall of the verge outwards (m/m)"),
+        "verge_slope": tree.number(
+            "Verge Slope", 0.08, (0.0, 0.15), description="Fall of the verge outwards (m/m)"
+        ),
     }
 
 
@@ -37,7 +44,7 @@ def _build_height(tree: Tree) -> None:
     """Offset and height above the axis of a line at a distance from it."""
     section = _declare_section(tree)
     side, distance, paved = section["side"], section["distance"], section["paved_edge"]
-    with tree.frame("The pavement turns about the pivot, the verge falls away from it"):
+    with tree.frame("The pavement turns about the pivot, the verge falls away"):
         # A surface that falls to the right rises with the offset, and the offset is side * distance.
         rise = section["crossfall"] * side
         beyond = op.maximum(distance - paved, 0.0)

@@ -9,8 +9,16 @@ from . import operations as op
 from .backbone import height_on
 from .builder import Tree, Value, node_group
 
-# Cross-section seen from above, x away from the road, y along the driver's way: a hollow triangle 0.12 m wide.
-SECTION = [(-0.06, -0.050), (-0.045, -0.055), (0.05, -0.014), (0.06, 0.0), (0.05, 0.014), (-0.045, 0.055), (-0.06, 0.05)]
+# Cross-section from above, x away from the road, y along the driver's way: a triangle 0.12 m wide.
+SECTION = [
+    (-0.06, -0.050),
+    (-0.045, -0.055),
+    (0.05, -0.014),
+    (0.06, 0.0),
+    (0.05, 0.014),
+    (-0.045, 0.055),
+    (-0.06, 0.05),
+]
 _SLANT = 0.6
 """Rise of the top and of the black band away from the road, m/m."""
 # Rows of the body from below: z on the axis; the slant applies above the surface only.
@@ -26,12 +34,14 @@ def delineator_group() -> bpy.types.NodeTree:
 
 
 def _build(tree: Tree) -> None:
-    """A delineator post on each point; ``heading`` (rad), ``height`` (m) and ``instance`` are the points' attributes."""
+    """A delineator post on each point; points carry ``heading`` (rad), ``height`` (m) and ``instance``."""
     points = tree.input("Points", "Geometry", description="One point per post, at any height")
     road = tree.input("Road", "Object", description="Surface that the posts stand on")
     terrain = tree.input("Terrain", "Object", description="Surface beside the road")
     names = ("White Material", "Black Material", "Reflector Material")
-    white, black, glass = (tree.input(name, "Material", description="Material of this part") for name in names)
+    white, black, glass = (
+        tree.input(name, "Material", description="Material of this part") for name in names
+    )
 
     with tree.frame("Body: white, with a slanted black band"):
         body = _body(tree, white, black)

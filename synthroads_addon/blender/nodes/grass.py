@@ -23,9 +23,15 @@ def grass_group() -> bpy.types.NodeTree:
 def _build(tree: Tree) -> None:
     """Tufts of grass in a band beside the road, and shorter ones on its verges and median."""
     stand = declare_stand(tree, 1.0, (0.1, 0.45), (0.0, 60.0))
-    beside = tree.number("Roadside Density", 1.0, (0.0, 50.0), description="Tufts per area of verge and median (1/m2)")
+    beside = tree.number(
+        "Roadside Density", 1.0, (0.0, 50.0), description="Tufts per area of verge and median (1/m2)"
+    )
     short = tree.number(
-        "Roadside Height", 0.5, (0.0, 1.0), unit="share", description="Height there, as a share of the height elsewhere"
+        "Roadside Height",
+        0.5,
+        (0.0, 1.0),
+        unit="share",
+        description="Height there, as a share of the height elsewhere",
     )
     width = tree.number("Blade Width", 0.035, (0.002, 0.2), unit="m", description="Widest place of a blade")
     material = tree.input("Material", "Material", description="Material of the blades")
@@ -71,7 +77,9 @@ def _build_tuft(tree: Tree) -> None:
         blade = tree.node("GeometryNodeMeshGrid", vertices_x=2, vertices_y=2).value
         shape = op.choose(op.index(tree), _BLADE)
         across = op.component(shape, "Y") * (width / 0.3)
-        blade = op.set_position(blade, op.vector(tree, op.component(shape, "X"), across, op.component(shape, "Z")))
+        blade = op.set_position(
+            blade, op.vector(tree, op.component(shape, "X"), across, op.component(shape, "Z"))
+        )
     with tree.frame("Blades around the middle"):
         points = tree.node("GeometryNodeMeshLine", count=_BLADES, offset=(0.0, 0.0, 0.0)).value
         around = op.index(tree) * (6.2832 / _BLADES) + op.random(tree, 0.0, 1.0, seed)

@@ -1,19 +1,22 @@
-"""SR Guardrail: a steel W-beam on posts, on one side of them or on both, ramped into the ground at its ends."""
+"""SR Guardrail: a steel W-beam on posts, on one side or on both, ramped into the ground at its ends."""
 
 from __future__ import annotations
+
+from dataclasses import dataclass
 
 import bpy
 
 from ...core.cloud.labels import class_id
 from . import operations as op
-from .backbone import height_on, look_up, station_ribbon
+from .backbone import height_on, look_up, raised, station_ribbon
 from .builder import Operand, Tree, Value, node_group
 from .strip import INSTANCES
 
 # The A profile of 0.31 m as a polyline (m): depth towards traffic, 0, height under the top edge.
 _SHEET = [
-    (0.010, 0.000), (0.040, -0.006), (0.074, -0.030), (0.081, -0.052), (0.074, -0.080), (0.012, -0.124), (0.003, -0.140),
-    (0.003, -0.170), (0.012, -0.186), (0.074, -0.230), (0.081, -0.258), (0.074, -0.280), (0.040, -0.304), (0.010, -0.310),
+    (0.010, 0.000), (0.040, -0.006), (0.074, -0.030), (0.081, -0.052), (0.074, -0.080), (0.012, -0.124),
+    (0.003, -0.140), (0.003, -0.170), (0.012, -0.186), (0.074, -0.230), (0.081, -0.258), (0.074, -0.280),
+    (0.040, -0.304), (0.010, -0.310),
 ]  # fmt: skip
 _THICKNESS = 0.003
 BEAM_PROFILE = [(x, 0.0, z) for x, z in _SHEET] + [(x - _THICKNESS, 0.0, z) for x, z in reversed(_SHEET)]
@@ -36,23 +39,66 @@ def guardrail_group() -> bpy.types.NodeTree:
     return node_group("SR Guardrail", _build)
 
 
+@dataclass(frozen=True)
+class Rail:
+    """The group's inputs, and where the rail's foot and top are at any station."""
+
+    tree: Tree
+    first: Value
+    last: Value
+    offset: Value
+    beams: dict[float, Value]
+    spacer: Value
+    height: Value
+    spacing: Value
+    terminal: Value
+    step: Value
+
+    def ramp(self) -> Value:
+        """Return the length of the ramp at either end."""
+        return op.minimum(self.terminal, (self.last - self.first) * 0.5)
+
+    def top_at(self, station: Value, ramp: Value) -> Value:
+        """Return the height of the beam's top edge above the surface."""
+        inside = op.minimum(station - self.first, self.last - station) / op.maximum(ramp, 1e-3)
+        share = op.switch(ramp > 1e-3, 1.0, op.minimum(inside, 1.0))
+        return self.height * share + TIP * (1.0 - share)
+
+    def foot_at(self, station: Value, ribbon: Value, surfaces: tuple[Value, Value]) -> tuple[Value, Value]:
+        """Return the point on the surface under the posts' axis, and the vector to the left."""
+        left = look_up(ribbon, "left", station)
+        place = look_up(ribbon, "axis", station) + left * self.offset
+        rise = height_on(*surfaces, place) - op.component(place, "Z")
+        return raised(place, rise), left
+
+
+def _declare(tree: Tree) -> Rail:
+    def metres(name: str, default: float, limits: tuple[float, float], description: str) -> Value:
+        return tree.number(name, default, limits, unit="m", description=description)
+
+    return Rail(
+        tree,
+        first=metres("Start Station", 0.0, (0.0, 1e6), "Beginning, terminal included"),
+        last=metres("End Station", 100.0, (0.0, 1e6), "End, terminal included"),
+        offset=metres("Offset", 0.0, (-100.0, 100.0), "Offset of the posts' axis"),
+        beams={
+            1.0: tree.boolean("Left Beam", True, description="A beam on the left of the posts"),
+            -1.0: tree.boolean("Right Beam", True, description="A beam on the right of the posts"),
+        },
+        spacer=metres("Spacer", 0.0, (0.0, 0.5), "Distance between posts and beam"),
+        height=metres("Height", 0.75, (0.3, 1.5), "Top of the beam above the surface"),
+        spacing=metres("Post Spacing", 4.0, (0.5, 10.0), "Distance between posts"),
+        terminal=metres("Terminal Length", 12.0, (0.0, 50.0), "Length of the ramp at each end"),
+        step=metres("Beam Step", 2.0, (0.1, 8.0), "Largest length of a straight piece of beam"),
+    )
+
+
 def _build(tree: Tree) -> None:
     """A steel guardrail along the road: W-beams, posts and spacers, with ramped terminals."""
     backbone = tree.input("Backbone", "Object", description="Polyline along the axis with its attributes")
     road = tree.input("Road", "Object", description="Surface that the guardrail stands on")
     terrain = tree.input("Terrain", "Object", description="Surface beside the road")
-    first = tree.number("Start Station", 0.0, (0.0, 1e6), unit="m", description="Beginning, terminal included")
-    last = tree.number("End Station", 100.0, (0.0, 1e6), unit="m", description="End, terminal included")
-    offset = tree.number("Offset", 0.0, (-100.0, 100.0), unit="m", description="Offset of the posts' axis")
-    beams = {
-        1.0: tree.boolean("Left Beam", True, description="A beam on the left of the posts"),
-        -1.0: tree.boolean("Right Beam", True, description="A beam on the right of the posts"),
-    }
-    spacer = tree.number("Spacer", 0.0, (0.0, 0.5), unit="m", description="Distance between posts and beam")
-    height = tree.number("Height", 0.75, (0.3, 1.5), unit="m", description="Top of the beam above the surface")
-    spacing = tree.number("Post Spacing", 4.0, (0.5, 10.0), unit="m", description="Distance between posts")
-    terminal = tree.number("Terminal Length", 12.0, (0.0, 50.0), unit="m", description="Length of the ramp at each end")
-    step = tree.number("Beam Step", 2.0, (0.1, 8.0), unit="m", description="Largest length of a straight piece of beam")
+    rail = _declare(tree)
     instance = tree.integer("Instance", 0, INSTANCES, description="Instance number of the faces")
     material = tree.input("Material", "Material", description="Material of beams and posts")
 
@@ -60,45 +106,39 @@ def _build(tree: Tree) -> None:
         axis = op.object_geometry(backbone)
         surfaces = op.object_geometry(road), op.object_geometry(terrain)
     ribbon = station_ribbon(axis)
-    ramp = op.minimum(terminal, (last - first) * 0.5)
-
-    def top_at(station: Value) -> Value:
-        inside = op.minimum(station - first, last - station) / op.maximum(ramp, 1e-3)
-        share = op.switch(ramp > 1e-3, 1.0, op.minimum(inside, 1.0))
-        return height * share + TIP * (1.0 - share)
-
-    def foot_at(station: Value) -> tuple[Value, Value]:
-        left = look_up(ribbon, "left", station)
-        place = look_up(ribbon, "axis", station) + left * offset
-        rise = height_on(*surfaces, place) - op.component(place, "Z")
-        return place + op.vector(tree, 0.0, 0.0, rise), left
-
     with tree.frame("Rows of the beams: terminal, middle, terminal"):
-        line = _rows(tree, first, last, ramp, step)
+        ramp = rail.ramp()
+        line = _rows(tree, rail, ramp)
     with tree.frame("Line of the beams' top edge"):
         station = op.named(tree, "station")
-        foot, left = foot_at(station)
-        line = op.store(op.store(line, "left", left), "top", foot + op.vector(tree, 0.0, 0.0, top_at(station)))
+        foot, left = rail.foot_at(station, ribbon, surfaces)
+        line = op.store(op.store(line, "left", left), "top", raised(foot, rail.top_at(station, ramp)))
     parts = []
-    for side, wanted in beams.items():
+    for side, wanted in rail.beams.items():
         with tree.frame(f"{'Left' if side > 0 else 'Right'} beam"):
-            parts.append(op.only_if(wanted, _beam(tree, line, side, spacer)))
-    with tree.frame("Posts every Post Spacing from the start, where the beam is high enough"):
-        count = tree.node("FunctionNodeFloatToInt", (last - first) / spacing + 1e-4, rounding_mode="FLOOR").value + 1
-        posts = tree.node("GeometryNodeMeshLine", count=count).value
-        posts = op.store(posts, "station", first + op.index(tree) * spacing)
-        station = op.named(tree, "station")
-        foot, left = foot_at(station)
-        posts = op.store(op.store(posts, "left", left), "tall", top_at(station))
-        posts = op.delete_points(op.set_position(posts, foot), op.named(tree, "tall") < _LOWEST_POST)
-        parts += _instances(tree, posts, spacer, beams)
+            parts.append(op.only_if(wanted, _beam(tree, line, side, rail.spacer)))
+    with tree.frame("Posts from the start on, where the beam is high enough"):
+        posts = op.store(_post_rows(tree, rail), "tall", rail.top_at(station, ramp))
+        foot, left = rail.foot_at(station, ribbon, surfaces)
+        posts = op.set_position(op.store(posts, "left", left), foot)
+        posts = op.delete_points(posts, op.named(tree, "tall") < _LOWEST_POST)
+        parts += _instances(tree, posts, rail.spacer, rail.beams)
     with tree.frame("Labels"):
         mesh = op.label(op.realize(op.join(*parts)), class_id("guardrail"), instance, material)
     tree.output("Mesh", mesh, description="Beams, posts and spacers")
 
 
-def _rows(tree: Tree, first: Value, last: Value, ramp: Value, step: Value) -> Value:
-    """Return points with their station, so many that no piece is longer than `step`, the ramps' ends among them."""
+def _post_rows(tree: Tree, rail: Rail) -> Value:
+    """Return one point per post with its station."""
+    number = (rail.last - rail.first) / rail.spacing + 1e-4
+    count = tree.node("FunctionNodeFloatToInt", number, rounding_mode="FLOOR").value + 1
+    posts = tree.node("GeometryNodeMeshLine", count=count).value
+    return op.store(posts, "station", rail.first + op.index(tree) * rail.spacing)
+
+
+def _rows(tree: Tree, rail: Rail, ramp: Value) -> Value:
+    """Return points with their station: no piece is longer than the step, and the ramps end at a point."""
+    first, last, step = rail.first, rail.last, rail.step
     outer = op.rounded_up(ramp / step - 1e-4)
     middle = op.maximum(op.rounded_up((last - first - ramp * 2.0) / step - 1e-4), 0)
     middle = tree.node("FunctionNodeFloatToInt", middle, rounding_mode="ROUND").value
@@ -134,11 +174,14 @@ def _instances(tree: Tree, posts: Value, spacer: Value, beams: dict[float, Value
 
     def on_posts(body: Value, height: Operand, scale: Operand) -> Value:
         points = tree.node("GeometryNodeSetPosition", posts, offset=op.vector(tree, 0.0, 0.0, height)).value
-        return tree.node("GeometryNodeInstanceOnPoints", points, instance=body, rotation=upright, scale=scale).value
+        return tree.node(
+            "GeometryNodeInstanceOnPoints", points, instance=body, rotation=upright, scale=scale
+        ).value
 
     parts = [on_posts(_post(tree), -BURIED, op.vector(tree, 1.0, 1.0, tall + (BURIED - _POST_TOP)))]
     for side, wanted in beams.items():
-        box = tree.node("GeometryNodeMeshCube", size=(1.0, 0.1, 0.22)).value
+        # A little shorter than the gap: faces that coincide with the post's or the beam's have no first hit.
+        box = tree.node("GeometryNodeMeshCube", size=(0.96, 0.1, 0.22)).value
         middle = op.vector(tree, (spacer * 0.5 + POST_DEPTH) * side, 0.0, -0.155)
         body = tree.node(
             "GeometryNodeTransform", box, translation=middle, scale=op.vector(tree, spacer, 1.0, 1.0)

@@ -1,4 +1,4 @@
-"""Where the nodes of a group are put: frames one below the other, in each the nodes from left to right by depth."""
+"""Where a group's nodes are put: frames one below the other, in each the nodes from left to right."""
 
 from __future__ import annotations
 
@@ -26,7 +26,9 @@ def arrange(group: bpy.types.NodeTree) -> None:
     for block in blocks.values():
         top -= _arrange_block(block, depths, top, places) + FRAME_GAP
     # One call for all: setting a node's place by itself updates the whole tree each time.
-    group.nodes.foreach_set("location", [value for node in group.nodes for value in places.get(node.name, (0.0, 0.0))])
+    group.nodes.foreach_set(
+        "location", [value for node in group.nodes for value in places.get(node.name, (0.0, 0.0))]
+    )
     for node in group.nodes:
         if node.type == "GROUP_INPUT":
             for socket in node.outputs:
@@ -48,8 +50,17 @@ def _arrange_block(
     heights: dict[int, float] = {}
     for node in block:
         depth = depths[node.name]
-        sockets = sum(1 for socket in (*node.inputs, *node.outputs) if socket.enabled and not socket.hide)
-        height = 60.0 + 22.0 * sockets + ROW_GAP
+        height = _height(node) + ROW_GAP
         places[node.name] = (COLUMN * depth, top - heights.get(depth, 0.0))
         heights[depth] = heights.get(depth, 0.0) + height
     return max(heights.values(), default=0.0)
+
+
+def _height(node: bpy.types.Node) -> float:
+    """Return about how high a node is drawn: a vector that isn't linked shows its three components."""
+    lines = sum(1 for socket in node.outputs if socket.enabled and not socket.hide)
+    for socket in node.inputs:
+        if socket.enabled and not socket.hide:
+            lines += 4 if socket.type == "VECTOR" and not socket.is_linked else 1
+    settings = len(set(node.bl_rna.properties.keys()) - set(bpy.types.Node.bl_rna.properties.keys()))
+    return 40.0 + 22.0 * (lines + min(settings, 3))

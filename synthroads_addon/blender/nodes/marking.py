@@ -21,9 +21,13 @@ def marking_group() -> bpy.types.NodeTree:
 def _build(tree: Tree) -> None:
     """A line between two offsets, dashed or solid, raised above the pavement by its film."""
     backbone = tree.input("Backbone", "Geometry", description="Polyline along the axis with its attributes")
-    left = tree.number("Left Offset", 0.1, FAR, unit="m", description="Offset of the left edge, positive to the left")
+    left = tree.number(
+        "Left Offset", 0.1, FAR, unit="m", description="Offset of the left edge, positive to the left"
+    )
     right = tree.number("Right Offset", -0.1, FAR, unit="m", description="Offset of the right edge")
-    left_height = tree.number("Left Height", 0.0, FAR, unit="m", description="Pavement at the left edge above the axis")
+    left_height = tree.number(
+        "Left Height", 0.0, FAR, unit="m", description="Pavement at the left edge above the axis"
+    )
     right_height = tree.number("Right Height", 0.0, FAR, unit="m", description="Pavement at the right edge")
     given = declare_marking(tree)
     first, last = given["start_station"], given["end_station"]
@@ -61,7 +65,9 @@ def declare_marking(tree: Tree) -> dict[str, Value]:
             "Start Station", 0.0, stations, unit="m", description="Beginning of the first dash"
         ),
         "end_station": tree.number("End Station", 1e6, stations, unit="m", description="End of the line"),
-        "dash": tree.number("Dash", 6.0, lengths, unit="m", description="Length of a dash; 0 for a solid line"),
+        "dash": tree.number(
+            "Dash", 6.0, lengths, unit="m", description="Length of a dash; 0 for a solid line"
+        ),
         "gap": tree.number("Gap", 12.0, lengths, unit="m", description="Length of a gap"),
         "film_thickness": tree.number(
             "Film Thickness", 0.003, (0.0, 0.01), unit="m", description="Height above the pavement"
@@ -90,4 +96,6 @@ def _with_ends(tree: Tree, backbone: Value, dashes: tuple[Value, Value, Value, V
         points = op.store(points, "left", look_up(ribbon, "left", station))
         points = op.set_position(points, look_up(ribbon, "axis", station))
         both = op.join(backbone, points)
-        return tree.node("GeometryNodeSortElements", both, domain="POINT", sort_weight=op.named(tree, "station")).value
+        return tree.node(
+            "GeometryNodeSortElements", both, domain="POINT", sort_weight=op.named(tree, "station")
+        ).value

@@ -16,7 +16,7 @@ from .carriageway import carriageway_marking_group, height_group
 from .strip import INSTANCES, strip_group
 
 MATERIALS = {"Pavement": "asphalt", "Marking": "paint_white", "Verge": "verge", "Median": "median"}
-"""Material inputs of the group (their name goes on with "Material"), and what the model builder puts there."""
+"""Material inputs of the group (their names go on with "Material"), and what the model puts there."""
 
 _SHIFT = {"outer_edge": 0.5, "lane": 0.0, "inner_edge": -0.5}
 
@@ -37,7 +37,7 @@ class SideLayout:
 
 @dataclass
 class Side:
-    """Inputs and boundaries of one carriageway: distance from the axis, offset and height above it, innermost first."""
+    """Inputs and boundaries (innermost first) of one carriageway."""
 
     layout: SideLayout
     numbers: dict[str, Value] = field(default_factory=dict)
@@ -93,7 +93,10 @@ def road_inputs(parameters: RoadParameters) -> dict[str, float | int | bool]:
 def road_group(layout: tuple[SideLayout, ...]) -> bpy.types.NodeTree:
     """Return the group SR Road for these lanes and markings."""
     return node_group(
-        "SR Road", lambda tree: _build(tree, layout), layout, description="The road's surface, live from its widths"
+        "SR Road",
+        lambda tree: _build(tree, layout),
+        layout,
+        description="The road's surface, live from its widths",
     )
 
 
@@ -119,7 +122,7 @@ def _build(tree: Tree, layout: tuple[SideLayout, ...]) -> None:
     with tree.frame("Backbone"):
         backbone = op.object_geometry(item)
     for side in sides:
-        with tree.frame(f"{side.layout.side} boundaries: distance from the axis and height above it"):
+        with tree.frame(f"{side.layout.side} boundaries: distance, offset and height"):
             _boundaries(tree, side)
     parts: list[Value] = []
     if median_instance is not None:
@@ -130,7 +133,7 @@ def _build(tree: Tree, layout: tuple[SideLayout, ...]) -> None:
             parts += _surfaces(tree, backbone, side, materials)
         with tree.frame(f"{side.layout.side} markings"):
             parts += _markings(tree, backbone, side, materials["Marking"])
-    with tree.frame("Outermost edges, where the terrain begins: points without faces"):
+    with tree.frame("Outermost edges, where the terrain begins"):
         parts += _edges(tree, backbone, sides)
     tree.output("Mesh", op.join(*parts), description="The road; every face has class_id and instance_id")
 
@@ -155,7 +158,9 @@ def _declare_side(tree: Tree, layout: SideLayout) -> Side:
         width(f"{name} Width", defaults.get(name, 3.5), 6.0, f"Width of the {name.lower()}{counted}")
     slope = "Fall of the verge away from the pavement (m/m)"
     side.numbers["slope"] = tree.number(f"{layout.side} Verge Slope", 0.08, (0.0, 0.15), description=slope)
-    about = "The inner edge keeps the axis's height while the crossfall changes, else the middle of the pavement"
+    about = (
+        "The inner edge keeps the axis's height while the crossfall changes, else the middle of the pavement"
+    )
     side.at_inner_edge = tree.boolean(f"{layout.side} Turns About Inner Edge", False, description=about)
     side.instance = _instance(tree, layout.side)
     return side
@@ -164,12 +169,22 @@ def _declare_side(tree: Tree, layout: SideLayout) -> Side:
 def _declare_marking(tree: Tree, name: str) -> dict[str, Value]:
     return {
         "width": tree.number(f"{name} Width", 0.15, (0.05, 1.0), unit="m", description="Width of the line"),
-        "dash": tree.number(f"{name} Dash", 0.0, (0.0, 100.0), unit="m", description="Length of a dash; 0 if solid"),
+        "dash": tree.number(
+            f"{name} Dash", 0.0, (0.0, 100.0), unit="m", description="Length of a dash; 0 if solid"
+        ),
         "gap": tree.number(f"{name} Gap", 0.0, (0.0, 100.0), unit="m", description="Length of a gap"),
-        "start_station": tree.number(f"{name} Start Station", 0.0, (0.0, 1e6), unit="m", description="Beginning"),
-        "end_station": tree.number(f"{name} End Station", 1e6, (0.0, 1e6), unit="m", description="End of the line"),
+        "start_station": tree.number(
+            f"{name} Start Station", 0.0, (0.0, 1e6), unit="m", description="Beginning"
+        ),
+        "end_station": tree.number(
+            f"{name} End Station", 1e6, (0.0, 1e6), unit="m", description="End of the line"
+        ),
         "film_thickness": tree.number(
-            f"{name} Film Thickness", 0.003, (0.0005, 0.006), unit="m", description="Height above the pavement"
+            f"{name} Film Thickness",
+            0.003,
+            (0.0005, 0.006),
+            unit="m",
+            description="Height above the pavement",
         ),
         "instance": _instance(tree, name),
     }
@@ -237,7 +252,7 @@ def _median(tree: Tree, backbone: Value, sides: list[Side], instance: Value, mat
 def _markings(tree: Tree, backbone: Value, side: Side, material: Value) -> Iterator[Value]:
     lanes = side.layout.lanes
     for name, kind, boundary in side.layout.markings:
-        # Boundaries count from the outer edge of lane 1 inwards; distances from the inner paved edge outwards.
+        # Boundaries count from lane 1's outer edge inwards, distances from the inner paved edge outwards.
         middle = side.distances[1 + lanes - boundary]
         if _SHIFT[kind]:
             middle = middle + side.markings[name]["width"] * _SHIFT[kind]

@@ -21,10 +21,16 @@ def strip_group() -> bpy.types.NodeTree:
 def _build(tree: Tree) -> None:
     """A ribbon along a backbone between two offsets, each at its own height above the axis."""
     backbone = tree.input("Backbone", "Geometry", description="Polyline along the axis with its attributes")
-    left = tree.number("Left Offset", 1.0, FAR, unit="m", description="Offset of the left edge, positive to the left")
+    left = tree.number(
+        "Left Offset", 1.0, FAR, unit="m", description="Offset of the left edge, positive to the left"
+    )
     right = tree.number("Right Offset", -1.0, FAR, unit="m", description="Offset of the right edge")
-    left_height = tree.number("Left Height", 0.0, FAR, unit="m", description="Left edge above the axis, per row")
-    right_height = tree.number("Right Height", 0.0, FAR, unit="m", description="Right edge above the axis, per row")
+    left_height = tree.number(
+        "Left Height", 0.0, FAR, unit="m", description="Left edge above the axis, per row"
+    )
+    right_height = tree.number(
+        "Right Height", 0.0, FAR, unit="m", description="Right edge above the axis, per row"
+    )
     class_id = tree.integer("Class", 0, (0, 255), description="Semantic class of the faces")
     instance = tree.integer("Instance", 0, INSTANCES, description="Instance number of the faces")
     material = tree.input("Material", "Material", description="Material of the faces")
@@ -34,7 +40,7 @@ def _build(tree: Tree) -> None:
     with tree.frame("Rows of the backbone"):
         axis, leftwards, curvature = row(backbone, number)
         heights = [op.sample_index(backbone, height, number) for height in (left_height, right_height)]
-    with tree.frame("Offset, cut where it would fold, and height on the line between the edges"):
+    with tree.frame("Offset, cut where it would fold, and the height there"):
         offset = cut(op.switch(column.equals(0), right, left), curvature)
         share = (offset - right) / (left - right)
         height = heights[0] * share + heights[1] * (1.0 - share)

@@ -40,7 +40,9 @@ def _build(tree: Tree) -> None:
         points = points_in_band(tree, stand, op.object_geometry(stand.terrain), stand.density)
     with tree.frame("Kinds of trees"):
         shapes = [
-            tree.call(shape_group(), **shape, detail=stand.detail, bark_material=bark, leaves_material=foliage).value
+            tree.call(
+                shape_group(), **shape, detail=stand.detail, bark_material=bark, leaves_material=foliage
+            ).value
             for shape in _SHAPES
         ]
     with tree.frame("Trees"):
@@ -60,11 +62,17 @@ def shape_group() -> bpy.types.NodeTree:
 
 def _build_shape(tree: Tree) -> None:
     """One tree of height 1: trunk, branches and leaves."""
-    bottom = tree.number("Crown Bottom", 0.2, (0.0, 0.9), unit="m", description="Height at which the crown begins")
+    bottom = tree.number(
+        "Crown Bottom", 0.2, (0.0, 0.9), unit="m", description="Height at which the crown begins"
+    )
     radius = tree.number("Crown Radius", 0.3, (0.05, 1.0), unit="m", description="Radius of the crown")
-    trunk = tree.number("Trunk Radius", 0.02, (0.001, 0.2), unit="m", description="Radius of the trunk at its foot")
+    trunk = tree.number(
+        "Trunk Radius", 0.02, (0.001, 0.2), unit="m", description="Radius of the trunk at its foot"
+    )
     seed = tree.integer("Seed", 0, (0, 2**30), description="Seed of branches and leaves")
-    detail = tree.number("Detail", 1.0, (0.0, 1.0), unit="share", description="Share of the leaves' triangles")
+    detail = tree.number(
+        "Detail", 1.0, (0.0, 1.0), unit="share", description="Share of the leaves' triangles"
+    )
     bark = tree.input("Bark Material", "Material", description="Material of trunk and branches")
     foliage = tree.input("Leaves Material", "Material", description="Material of the leaves")
     with tree.frame("Trunk"):
@@ -73,7 +81,7 @@ def _build_shape(tree: Tree) -> None:
         wood = op.join(wood, _branches(tree, bottom, radius, trunk, seed))
     with tree.frame("Crooked"):
         wood = tree.node("GeometryNodeSetMaterial", _crooked(tree, wood, seed), material=bark).value
-    with tree.frame("Leaves: twigs as kites, gathered in clusters that fill a spheroid"):
+    with tree.frame("Leaves: twigs as kites in clusters that fill a spheroid"):
         leaves = tree.node(
             "GeometryNodeSetMaterial", _leaves(tree, bottom, radius, seed, detail), material=foliage
         ).value

@@ -11,6 +11,7 @@ knots' stations; the kinds of the elements tie values together (`Chain.groups`).
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Protocol
 
 import numpy as np
@@ -53,6 +54,7 @@ class Chain:
         """(M,) change of value per metre."""
         return np.diff(self.values) / np.diff(self.knots)
 
+    @cached_property
     def groups(self) -> tuple[FloatArray, FloatArray]:
         """Return (M + 1, G) and (M + 1,): values = first @ free values + second."""
         label = np.arange(self.size + 1)
@@ -71,14 +73,14 @@ class Chain:
 
     def tied(self) -> Chain:
         """Return the chain with values that obey the kinds: the mean of each group."""
-        choice, given = self.groups()
+        choice, given = self.groups
         mean = choice.T @ self.values / np.maximum(choice.sum(axis=0), 1.0)
         return replace(self, values=choice @ mean + given)
 
     def freedom(self) -> int:
         """Number of free parameters; the pose's shift along the road is none."""
         start = 0 if self.pinned else len(self.pose) - (len(self.pose) == 3)
-        return start + self.groups()[0].shape[1] + self.size - 1
+        return start + self.groups[0].shape[1] + self.size - 1
 
     def basis(self, free_knots: bool) -> FloatArray:
         """Return (F, P): the change of all F parameters for each of the P free ones.
@@ -88,11 +90,12 @@ class Chain:
         turns = 2 if len(self.pose) == 3 else 1
         rows = turns + self.size + 1
         columns = np.eye(rows + self.size - 1)
-        choice = np.zeros((len(columns), self.groups()[0].shape[1]))
-        choice[turns:rows] = self.groups()[0]
+        choice = np.zeros((len(columns), self.groups[0].shape[1]))
+        choice[turns:rows] = self.groups[0]
         pose = columns[:, : 0 if self.pinned else turns]
         return np.hstack((pose, choice, columns[:, rows:] if free_knots else columns[:, :0]))
 
+    @cached_property
     def alignment(self) -> Alignment:
         """Return the chain of curvatures as an alignment."""
         rows = zip(np.diff(self.knots), self.values[:-1], self.values[1:], strict=True)
@@ -161,22 +164,24 @@ def assemble(pose: FloatArray, rise: FloatArray, fall: FloatArray, slopes: Float
 
 @dataclass(frozen=True)
 class Plan:
-    """Map points (N, 2) of an axis, in order; the residual is the offset."""
+    """Map points (N, 2) of an axis, in order, with weights (N,); the residual is the weighted offset."""
 
     points: FloatArray
+    weights: FloatArray
     least: float
     limit: float = 0.2
     snaps: tuple[int, ...] = (EQUAL, ZERO)
 
     def measure(self, chain: Chain, stations: FloatArray) -> tuple[FloatArray, FloatArray]:
-        return chain.alignment().project_near(self.points, stations, _REACH)
+        found, offset = chain.alignment.project_near(self.points, stations, _REACH)
+        return found, self.weights * offset
 
     def jacobian(self, chain: Chain, stations: FloatArray) -> FloatArray:
         """A change of curvature at s' turns the rest of the road about the point there.
 
         The offset at s thus falls by t(s) . (z(s) - z(s')) for each radian; the foot's own shift has no effect.
         """
-        alignment = chain.alignment()
+        alignment = chain.alignment
         grid = quadrature_grid(chain, stations)
         origin = np.array([alignment.x, alignment.y])
         position, heading, _ = alignment.frame(stations)
@@ -188,7 +193,7 @@ class Plan:
         lever = (tangent * z).real
         rise, fall = ((tangent[:, None] * b).real - lever[:, None] * a for a, b in zip(plain, turned, strict=True))
         across = -(tangent * np.exp(1j * alignment.start_heading)).real
-        return assemble(np.column_stack((across, -lever)), rise, fall, chain.slopes)
+        return self.weights[:, None] * assemble(np.column_stack((across, -lever)), rise, fall, chain.slopes)
 
     def moved(self, pose: FloatArray, step: FloatArray) -> FloatArray:
         return pose + np.array([-np.sin(pose[2]) * step[0], np.cos(pose[2]) * step[0], step[1]])
@@ -196,20 +201,21 @@ class Plan:
 
 @dataclass(frozen=True)
 class Heights:
-    """Elevations (N,) at stations; the residual is the point's height above the chain."""
+    """Elevations (N,) at stations, with weights (N,); the residual is the weighted height above the chain."""
 
     heights: FloatArray
+    weights: FloatArray
     least: float
     limit: float = 10.0
     snaps: tuple[int, ...] = (EQUAL,)
 
     def measure(self, chain: Chain, stations: FloatArray) -> tuple[FloatArray, FloatArray]:
-        return stations, self.heights - elevations(chain, stations)
+        return stations, self.weights * (self.heights - elevations(chain, stations))
 
     def jacobian(self, chain: Chain, stations: FloatArray) -> FloatArray:
         grid = quadrature_grid(chain, stations)
         rise, fall = ramp_integrals(chain, stations, grid, np.ones(len(grid) - 1))
-        return assemble(-np.ones((len(stations), 1)), -rise, -fall, chain.slopes)
+        return -self.weights[:, None] * assemble(np.ones((len(stations), 1)), rise, fall, chain.slopes)
 
     def moved(self, pose: FloatArray, step: FloatArray) -> FloatArray:
         return pose + step

@@ -18,7 +18,7 @@ from ..errors import InputError
 from .alignment import Alignment, Element, FloatArray, IntArray, finite_array
 from .axis_chain import FREE, Chain, Data, Fit, Heights, Plan, elevations, refine
 from .axis_read import read_axis
-from .axis_search import Goal, descent, improved, independent
+from .axis_search import Goal, descent, improved, independent, simplified
 from .axis_start import Start, start_heights, start_plan
 from .profile import IntersectionPoint, Profile
 
@@ -28,8 +28,16 @@ _WINDOW = 1200.0  # m
 _TAIL = 300.0  # m at a window's end that only steady what lies before
 _MOST_POINTS = 3000  # in a window; denser data are thinned for the search, not for the figures reported
 _HEIGHT_SHARE = 0.6  # of the tolerance that the heights' rms may use
-_EXACT = 6e-4  # m: rms up to which data are taken to lie on a chain of elements (coordinates rounded to 1 mm do)
+_EXACT = 1e-5  # m: rms up to which data lie on a chain of elements,
+_ROUNDED = 3.5e-4  # m: or on one whose coordinates were rounded to 1 mm, where residuals are random
+_RANDOM = 0.5  # correlation of neighbouring residuals that still passes for random
+_GAP = 100.0  # m between points from which the chord between them is given some weight
+_CHORD_WEIGHT = 1e-3
+_NEAR = 40.0  # m
+_SPACING = 20.0  # m between knots at first
+_LEAP = 1.5
 _MARGIN = 0.98  # of the tolerance that the search aims at: it may see thinned points only
+_NEGLIGIBLE = 0.3  # of the tolerance: residuals below it are worth no element
 _RELAXED = 1.5  # times what dense knots reach is aimed at where the tolerance cannot be had: less would fit noise
 
 
@@ -75,15 +83,15 @@ def fit_axis(points: ArrayLike, tolerance: float = 0.05) -> AxisFit:
     if not (np.isfinite(tolerance) and tolerance > 0):
         raise InputError("tolerance", tolerance, "a finite length above 0 m is needed")
     origin = np.append(np.round(given[:, :2].mean(axis=0)), 0.0)
-    local = given - origin
-    alignment = _fit_plan(local[:, :2], _MARGIN * tolerance)
-    station, offset = alignment.project(local[:, :2])
-    profile = _fit_heights(station, local[:, 2], alignment.length, _HEIGHT_SHARE * tolerance)
+    local, weights = _bridged(given - origin)
+    alignment, near = _fit_plan(local[:, :2], weights, _MARGIN * tolerance)
+    station, offset = alignment.project_near(local[:, :2], near, _NEAR)
+    profile = _fit_heights(station, local[:, 2], weights, alignment.length, _HEIGHT_SHARE * tolerance)
     heading = alignment.start_heading
     placed = Alignment(alignment.elements, alignment.x + origin[0], alignment.y + origin[1], heading)
-    across = _figures(station, offset)
-    above = _figures(station, local[:, 2] - profile.elevation(station))
-    return AxisFit(placed, profile, *across, *above, points=len(given))
+    real = weights == 1.0
+    station, above = station[real], local[real, 2] - profile.elevation(station[real])
+    return AxisFit(placed, profile, *_figures(station, offset[real]), *_figures(station, above), points=len(given))
 
 
 def _checked(points: ArrayLike) -> FloatArray:
@@ -99,6 +107,22 @@ def _checked(points: ArrayLike) -> FloatArray:
     if len(array) < 2:
         raise InputError("points", len(array), "at least two distinct points are needed")
     return array
+
+
+def _bridged(points: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return points (M, 3) with some added on the chord of every long gap, and weights (M,).
+
+    A polyline with dense points on its curves only would leave the fit without a hold on the straights between. The
+    added points weigh next to nothing, so a curve across a gap is still bridged as a curve.
+    """
+    step = np.hypot(*np.diff(points[:, :2], axis=0).T)
+    usual = float(np.median(step))
+    added = np.where(step > max(_GAP, 5.0 * usual), np.ceil(step / max(_SPACING, 2.0 * usual)) - 1.0, 0.0)
+    owner = np.repeat(np.arange(len(step)), added.astype(np.int64) + 1)
+    nth = np.arange(len(owner)) - np.searchsorted(owner, owner)
+    share = (nth / (added[owner] + 1.0))[:, None]
+    dense = points[owner] + share * (points[owner + 1] - points[owner])
+    return np.vstack((dense, points[-1:])), np.append(np.where(nth == 0, 1.0, _CHORD_WEIGHT), 1.0)
 
 
 def _figures(station: FloatArray, distance: FloatArray) -> tuple[float, float, float, float]:
@@ -132,15 +156,16 @@ class _Part(Protocol):
 @dataclass(frozen=True)
 class _PlanPart:
     points: FloatArray
-    spacing: ClassVar[_Spacing] = _Spacing(7.0, 20.0, 5.0)
+    weights: FloatArray
+    spacing: ClassVar[_Spacing] = _Spacing(7.0, _SPACING, 5.0)
 
     def begin(self, chosen: IntArray, spacing: float, start: Start | None, origin: float) -> tuple[Data, Fit]:
-        data = Plan(self.points[chosen], 0.4 * spacing)
+        data = Plan(self.points[chosen], self.weights[chosen], 0.4 * spacing)
         chain, station = start_plan(data.points, spacing, start)
         return data, refine(data, chain, station, False, 8)
 
     def leave(self, chain: Chain, cut: float) -> Start:
-        position, heading, value = chain.alignment().frame(cut)
+        position, heading, value = chain.alignment.frame(cut)
         return np.append(position, heading), float(value)
 
 
@@ -148,10 +173,11 @@ class _PlanPart:
 class _HeightPart:
     station: FloatArray
     heights: FloatArray
+    weights: FloatArray
     spacing: ClassVar[_Spacing] = _Spacing(20.0, 40.0, 40.0)
 
     def begin(self, chosen: IntArray, spacing: float, start: Start | None, origin: float) -> tuple[Data, Fit]:
-        data = Heights(self.heights[chosen], 0.8 * spacing)
+        data = Heights(self.heights[chosen], self.weights[chosen], 0.8 * spacing)
         station = self.station[chosen] - origin
         return data, refine(data, start_heights(station, data.heights, spacing, start), station, False, 8)
 
@@ -159,39 +185,42 @@ class _HeightPart:
         return elevations(chain, np.array([cut])), float(np.interp(cut, chain.knots, chain.values))
 
 
-def _fit_plan(points: FloatArray, tolerance: float) -> Alignment:
+def _fit_plan(points: FloatArray, weights: FloatArray, tolerance: float) -> tuple[Alignment, FloatArray]:
+    """Return the alignment from the first point's foot to the last one's, and all points' stations, roughly."""
     run = np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))))
-    chain, first, last = _walk(_PlanPart(points), run, tolerance)
-    return _trimmed(chain, first, last)
+    chain, station = _walk(_PlanPart(points, weights), run, tolerance)
+    return _trimmed(chain, float(station[0]), float(station[-1])), station - station[0]
 
 
-def _fit_heights(station: FloatArray, heights: FloatArray, length: float, tolerance: float) -> Profile:
+def _fit_heights(
+    station: FloatArray, heights: FloatArray, weights: FloatArray, length: float, tolerance: float
+) -> Profile:
     order = np.argsort(station, kind="stable")
     station = np.clip(station[order], 0.0, length)
-    return _profile(_walk(_HeightPart(station, heights[order]), station, tolerance)[0])
+    return _profile(_walk(_HeightPart(station, heights[order], weights[order]), station, tolerance)[0])
 
 
-def _walk(part: _Part, run: FloatArray, tolerance: float) -> tuple[Chain, float, float]:
-    """Fit window after window; return the whole chain and the stations of the first and last point on it.
+def _walk(part: _Part, run: FloatArray, tolerance: float) -> tuple[Chain, FloatArray]:
+    """Fit window after window; return the whole chain and the stations (N,) of all points on it, roughly.
 
-    `run` (N) tells how far along the points are, roughly.
+    `run` (N) tells how far along the points are, roughly as well.
     """
     step = float(np.median(np.diff(run)))
     window, tail = max(_WINDOW, 60.0 * step), max(_TAIL, 15.0 * step)
     pieces: list[Chain] = []
     start: Start | None = None
-    first, origin, begins = 0, 0.0, 0.0
+    first, origin = 0, 0.0
+    station = np.empty(len(run))
     while True:
         whole = run[-1] - run[first] <= window + tail
         end = len(run) if whole else int(np.searchsorted(run, run[first] + window))
         end = max(end, min(first + 8, len(run)))
-        chosen = np.arange(first, end)[:: -(-(end - first) // _MOST_POINTS)]
+        every = -(-(end - first) // _MOST_POINTS)
+        chosen = np.unique(np.append(np.arange(first, end, every), end - 1))
         fit = _solve(part, chosen, start, origin, float(run[end - 1] - run[first]), tolerance)
-        if not pieces:
-            begins = float(fit.stations[0])
+        station[first:end] = origin + np.interp(np.arange(first, end), chosen, fit.stations)
         if end == len(run):
-            pieces.append(fit.chain)
-            return _joined(pieces), begins, origin + float(fit.stations[-1])
+            return _joined([*pieces, fit.chain]), station
         cut = _cut(fit.chain, tail)
         start = part.leave(fit.chain, cut)
         pieces.append(_head(fit.chain, cut))
@@ -206,11 +235,11 @@ def _solve(
     count = independent(length, len(chosen))
     exact = Goal(tolerance, 2.0 * tolerance, 1e-5, count, int(length / 15.0) + 5)
     data, rich = part.begin(chosen, max(part.spacing.exact, scale), start, origin)
-    if rich.rms < 2.0 * _EXACT:
-        best = improved(data, min(descent(data, rich, exact), key=exact.rank), exact)
-        if best.rms < _EXACT and exact.met(best) and best.chain.size <= exact.most:
+    if rich.rms < 3.0 * _ROUNDED:
+        best = improved(data, min(descent(data, rich, exact), key=exact.rank), exact, 10)
+        if _exactly(best) and exact.rank(best)[:2] == (False, False) and _sharp(data, best, exact):
             return best
-    goal = Goal(tolerance, 2.0 * tolerance, 0.5 * tolerance, count, int(max(5.0, length / 30.0 - 0.01)))
+    goal = Goal(tolerance, 2.0 * tolerance, _NEGLIGIBLE * tolerance, count, int(max(5.0, length / 30.0 - 0.01)))
     spacing = max(part.spacing.first, scale)
     data, rich = part.begin(chosen, spacing, start, origin)
     while not goal.met(rich) and 0.5 * spacing >= max(part.spacing.finest, scale):
@@ -219,6 +248,21 @@ def _solve(
     if not goal.met(rich):
         goal = replace(goal, rms=max(goal.rms, _RELAXED * rich.rms), p95=max(goal.p95, _RELAXED * rich.p95))
     return improved(data, min(descent(data, rich, goal), key=goal.rank), goal)
+
+
+def _exactly(fit: Fit) -> bool:
+    """Tell whether nothing but rounding is left of the residuals."""
+    r = fit.residuals
+    return fit.rms < _EXACT or (fit.rms < _ROUNDED and float(r[1:] @ r[:-1]) < _RANDOM * fit.square)
+
+
+def _sharp(data: Data, fit: Fit, goal: Goal) -> bool:
+    """Tell whether the elements are the data's own: with one less the residuals leap.
+
+    Any smooth curve can be approximated closely by many elements, but then one less makes little difference.
+    """
+    simpler = simplified(data, fit, True, goal)
+    return simpler is None or simpler.rms > _LEAP * fit.rms
 
 
 def _cut(chain: Chain, tail: float) -> float:

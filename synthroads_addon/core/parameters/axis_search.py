@@ -40,6 +40,7 @@ _EXACT_FLOOR = 1e-5  # m
 _TRIALS = 3  # refinements per decision
 _PARTS = 4  # an element is split at one of the inner borders of so many parts
 _WORTH = 0.05  # least gain of score
+_HOPELESS = 10.0  # times the bound at which a descent ends
 
 
 @dataclass(frozen=True)
@@ -94,16 +95,25 @@ def independent(length: float, points: int) -> float:
 
 
 def edited(chain: Chain, edits: Sequence[Edit]) -> tuple[Chain, list[int]]:
-    """Return the chain's structure after edits, with its values as they are, and the knots that stay."""
+    """Return the chain's structure after edits, with its values as they are, and the knots that stay.
+
+    Constant elements that come to lie side by side are one.
+    """
     gone = {edit.index for edit in edits if edit.kind == "merge"}
-    keep = [i for i in range(chain.size + 1) if i not in gone]
-    kinds = []
-    for first, last in zip(keep[:-1], keep[1:], strict=True):
-        found = set(chain.kinds[first:last].tolist())
-        kinds.append(found.pop() if len(found) == 1 else FREE)
-    for edit in edits:
-        if edit.kind != "merge":
-            kinds[int(np.searchsorted(keep, edit.index, side="right")) - 1] = edit.kind
+    snapped = {edit.index: edit.kind for edit in edits if edit.kind != "merge"}
+    keep, kinds, found = [0], [], set()
+    for e, kind in enumerate(chain.kinds.tolist()):
+        found.add(snapped.get(e, kind))
+        if e + 1 in gone:
+            continue
+        new = found.pop() if len(found) == 1 else FREE
+        found = set()
+        if new != FREE and kinds and kinds[-1] != FREE:
+            kinds[-1] = max(new, kinds[-1])  # a line beside an arc is one with it
+            keep[-1] = e + 1
+        else:
+            kinds.append(new)
+            keep.append(e + 1)
     return replace(chain, knots=chain.knots[keep], values=chain.values[keep], kinds=np.array(kinds)), keep
 
 
@@ -252,22 +262,29 @@ def simplified(data: Data, fit: Fit, free_knots: bool, goal: Goal) -> Fit | None
         if goal.score(trial) - present <= 0.5 * sum(change for change, _ in batch):
             return trial
         batch = batch[: len(batch) // 2]
-    trials = _trials(data, fit, [edit for _, edit in ways[: 3 * _TRIALS]], free_knots, goal)
+    trials = []
+    for trial in _trials(data, fit, [edit for _, edit in ways[: 3 * _TRIALS]], free_knots, goal):
+        if goal.score(trial) < present:
+            return trial
+        trials.append(trial)
     return min(trials, key=goal.score, default=None)
 
 
-def _trials(data: Data, fit: Fit, edits: list[Edit], free_knots: bool, goal: Goal) -> list[Fit]:
-    """Foresee every edit and refine the most promising ones."""
+def _trials(data: Data, fit: Fit, edits: list[Edit], free_knots: bool, goal: Goal) -> Iterator[Fit]:
+    """Foresee every edit and refine the most promising ones, best first."""
     foreseen = [foresee(data, fit, [edit], free_knots, goal) for edit in edits]
     scores = [goal.expected(square, chain, len(fit.residuals)) for chain, square in foreseen]
-    order = np.argsort(scores, kind="stable")[:_TRIALS]
-    return [_refined(data, fit, foreseen[i][0], free_knots) for i in order]
+    for i in np.argsort(scores, kind="stable")[:_TRIALS]:
+        yield _refined(data, fit, foreseen[i][0], free_knots)
 
 
 def descent(data: Data, fit: Fit, goal: Goal) -> list[Fit]:
-    """Return all fits from a rich chain down to a single element: first with fixed knots, then with free ones."""
+    """Return all fits from a rich chain down to few elements: first with fixed knots, then with free ones.
+
+    It goes on past the bounds, since a poor removal may be made good by the next, but not hopelessly far.
+    """
     path, free_knots = [fit], False
-    while True:
+    while fit.rms < _HOPELESS * max(goal.rms, path[0].rms):
         trial = simplified(data, fit, free_knots, goal)
         if not free_knots and (trial is None or goal.score(trial) > goal.score(fit)):
             free_knots = True
@@ -276,6 +293,7 @@ def descent(data: Data, fit: Fit, goal: Goal) -> list[Fit]:
             return path
         fit = trial
         path.append(fit)
+    return path
 
 
 def splits(data: Data, fit: Fit) -> list[Chain]:

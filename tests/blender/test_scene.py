@@ -1,0 +1,264 @@
+"""Evaluated scenes as triangles: scenes that are not ours."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import bpy
+import numpy as np
+import pytest
+from mathutils import Matrix
+
+from synthroads_addon.blender.materials import PROPERTY, constants, material
+from synthroads_addon.blender.model import SUPPORT
+from synthroads_addon.blender.scene import scene_mesh
+from synthroads_addon.core.cloud.labels import UNLABELLED, class_id
+from synthroads_addon.core.errors import InputError
+from synthroads_addon.core.materials import materials
+from synthroads_addon.core.scene_mesh import SceneMesh, empty_scene_mesh
+
+CUBE = [(x, y, z) for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (-1.0, 1.0)]
+FACES = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
+
+
+def add_cube(name: str = "Cube", collection: bpy.types.Collection | None = None) -> bpy.types.Object:
+    """Add a cube of 2 m edges whose faces look outwards."""
+    mesh = bpy.data.meshes.new(name)
+    mesh.from_pydata(CUBE, [], FACES)
+    item = bpy.data.objects.new(name, mesh)
+    (collection or bpy.context.scene.collection).objects.link(item)
+    return item
+
+
+def volume(mesh: SceneMesh) -> float:
+    """Return the volume inside a closed mesh; negative if its faces look inwards."""
+    corners = mesh.vertices[mesh.triangles].astype(np.float64)
+    return float(np.einsum("ni,ni->n", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])).sum() / 6.0)
+
+
+class TestForeignScene:
+    def test_an_empty_scene_has_no_triangles(self) -> None:
+        mesh = scene_mesh()
+        assert len(mesh) == 0
+        assert mesh.origin.tolist() == [0.0, 0.0, 0.0]
+
+    def test_a_cube_with_a_custom_property(self) -> None:
+        cube = add_cube()
+        cube.matrix_world = Matrix.Translation((10.0, 20.0, 30.0)) @ Matrix.Diagonal((1.0, 2.0, 3.0, 1.0))
+        cube["synthroads_class"] = "vehicle"
+        cube["synthroads_instance"] = 2**31 - 1
+        mesh = scene_mesh()
+        assert len(mesh) == 12
+        assert set(mesh.class_id) == {class_id("vehicle")}
+        assert set(mesh.instance_id) == {2**31 - 1}
+        assert mesh.vertices.min(axis=0).tolist() == [9.0, 18.0, 27.0]
+        assert volume(mesh) == pytest.approx(48.0)
+        assert mesh.areas().sum() == pytest.approx(2 * (8 + 12 + 24))
+        assert mesh.materials == ("unknown",)
+
+    def test_a_collection_named_after_a_class(self) -> None:
+        outer = bpy.data.collections.new("pole")
+        inner = bpy.data.collections.new("Inner")
+        bpy.context.scene.collection.children.link(outer)
+        outer.children.link(inner)
+        add_cube("A", inner)
+        add_cube("B", inner)["synthroads_class"] = "utility"
+        add_cube("C")
+        mesh = scene_mesh()
+        found = {int(label) for label in mesh.class_id}
+        assert found == {class_id("pole"), class_id("utility"), UNLABELLED}
+
+    def test_an_unknown_class_is_refused_by_name(self) -> None:
+        add_cube("Wrong")["synthroads_class"] = "lorry"
+        with pytest.raises(InputError, match=r"Wrong: synthroads_class is 'lorry'"):
+            scene_mesh()
+
+    def test_face_attributes_come_before_the_objects_class(self) -> None:
+        cube = add_cube()
+        cube["synthroads_class"] = "vehicle"
+        for name, values in {"class_id": [1, 2, 3, 4, 300, -1], "instance_id": [5, 6, 7, 8, 9, -1]}.items():
+            cube.data.attributes.new(name, "INT", "FACE").data.foreach_set("value", values)
+        mesh = scene_mesh()
+        assert mesh.class_id.tolist() == [1, 1, 2, 2, 3, 3, 4, 4, 255, 255, 255, 255]
+        assert mesh.instance_id[::2].tolist() == [5, 6, 7, 8, 9, 2**32 - 1]
+
+    def test_an_instanced_collection(self) -> None:
+        source = bpy.data.collections.new("Source")
+        add_cube("Part", source)["synthroads_class"] = "bridge"
+        for x in (0.0, 5.0, 10.0):
+            empty = bpy.data.objects.new("Empty", None)
+            empty.instance_type, empty.instance_collection = "COLLECTION", source
+            empty.location.x = x
+            bpy.context.scene.collection.objects.link(empty)
+        bpy.context.scene.collection.objects[-1].scale.x = -1.0
+        mesh = scene_mesh()
+        assert len(mesh) == 36
+        assert set(mesh.class_id) == {class_id("bridge")}
+        assert sorted(set(mesh.vertices[:, 0])) == [-1.0, 1.0, 4.0, 6.0, 9.0, 11.0]
+        assert volume(mesh) == pytest.approx(24.0)
+
+    def test_instances_of_geometry_nodes(self) -> None:
+        from synthroads_addon.blender.nodes.builder import Tree, node_group
+
+        def build(tree: Tree) -> None:
+            """Cubes on points."""
+            points = tree.node("GeometryNodeMeshLine", count=5, offset=(3.0, 0.0, 0.0)).value
+            cube = tree.node("GeometryNodeMeshCube").value
+            tree.output("Mesh", tree.node("GeometryNodeInstanceOnPoints", points, instance=cube).value)
+
+        item = bpy.data.objects.new("Row", bpy.data.meshes.new("Row"))
+        item["synthroads_class"] = "barrier"
+        bpy.context.scene.collection.objects.link(item)
+        item.modifiers.new("Nodes", "NODES").node_group = node_group("Cubes", build)
+        mesh = scene_mesh()
+        assert len(mesh) == 60
+        assert set(mesh.class_id) == {class_id("barrier")}
+        assert mesh.vertices[:, 0].max() == pytest.approx(12.5)
+
+    def test_curves_and_modifiers_are_evaluated(self) -> None:
+        curve = bpy.data.curves.new("Pipe", "CURVE")
+        curve.dimensions, curve.bevel_depth = "3D", 0.5
+        spline = curve.splines.new("POLY")
+        spline.points.add(1)
+        spline.points[1].co = (10.0, 0.0, 0.0, 1.0)
+        pipe = bpy.data.objects.new("Pipe", curve)
+        bpy.context.scene.collection.objects.link(pipe)
+        cube = add_cube()
+        cube.modifiers.new("Array", "ARRAY").count = 3
+        assert len(scene_mesh(objects=[cube])) == 36
+        tube = scene_mesh(objects=[pipe])
+        assert tube.vertices[:, 0].max() == pytest.approx(10.0)
+        assert tube.areas().sum() == pytest.approx(np.pi * 10.0, rel=0.1)
+
+    def test_hidden_and_support_objects_are_left_out(self) -> None:
+        add_cube("Hidden").hide_viewport = True
+        add_cube("Support")[SUPPORT] = True
+        bpy.data.objects.new("Nowhere", bpy.data.meshes.new("Nowhere"))
+        add_cube("Seen").location.x = 100.0
+        assert scene_mesh().vertices[:, 0].min() == pytest.approx(99.0)
+
+    def test_degenerate_triangles_are_dropped(self) -> None:
+        mesh = bpy.data.meshes.new("Flat")
+        places = [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (2, 0, 0), (1, 0, 0)]
+        mesh.from_pydata(places, [], [(0, 1, 2, 3), (0, 1, 4), (1, 5, 2)])
+        item = bpy.data.objects.new("Flat", mesh)
+        item["synthroads_class"] = "road"
+        bpy.context.scene.collection.objects.link(item)
+        assert len(scene_mesh()) == 2
+
+    def test_vertices_that_are_not_finite_are_refused_by_name(self) -> None:
+        add_cube("Broken").data.vertices[3].co.y = float("nan")
+        with pytest.raises(InputError, match="Broken: vertices"):
+            scene_mesh()
+
+    def test_the_scene_is_left_as_it_was(self) -> None:
+        cube = add_cube()
+        cube.modifiers.new("Array", "ARRAY")
+        before = (len(bpy.data.meshes), len(bpy.data.objects), len(cube.data.vertices))
+        scene_mesh()
+        assert (len(bpy.data.meshes), len(bpy.data.objects), len(cube.data.vertices)) == before
+
+    def test_another_scene_than_the_current_one(self) -> None:
+        other = bpy.data.scenes.new("Other")
+        mesh = bpy.data.meshes.new("There")
+        mesh.from_pydata(CUBE, [], FACES)
+        other.collection.objects.link(bpy.data.objects.new("There", mesh))
+        add_cube("Here").modifiers.new("Array", "ARRAY").count = 2
+        assert len(scene_mesh(other)) == 12
+        assert len(scene_mesh(bpy.context.scene)) == 24
+        assert len(scene_mesh(bpy.context.evaluated_depsgraph_get())) == 24
+
+
+class TestMaterials:
+    def test_slots_keep_their_faces(self) -> None:
+        cube = add_cube()
+        own = bpy.data.materials.new("Own paint")
+        for item in (material("asphalt"), own, None):
+            cube.data.materials.append(item)
+        cube.data.polygons.foreach_set("material_index", [0, 0, 1, 1, 2, 2])
+        mesh = scene_mesh()
+        names = [mesh.materials[index] for index in mesh.material]
+        assert names == ["asphalt"] * 4 + ["Own paint"] * 4 + ["unknown"] * 4
+
+    def test_a_material_of_the_object_wins(self) -> None:
+        cube = add_cube()
+        cube.data.materials.append(material("asphalt"))
+        twin = bpy.data.objects.new("Twin", cube.data)
+        bpy.context.scene.collection.objects.link(twin)
+        twin.material_slots[0].link = "OBJECT"
+        twin.material_slots[0].material = material("leaves")
+        mesh = scene_mesh()
+        assert {mesh.materials[index] for index in mesh.material} == {"asphalt", "leaves"}
+
+    def test_blender_materials_have_the_tables_values(self) -> None:
+        for name, row in materials().items():
+            item = material(name)
+            assert material(name) == item
+            assert item[PROPERTY] == name
+            node = next(node for node in item.node_tree.nodes if node.type == "BSDF_PRINCIPLED")
+            assert node.inputs["Roughness"].default_value == pytest.approx(row.roughness)
+            assert node.inputs["Metallic"].default_value == pytest.approx(row.metallic)
+            assert node.inputs["Specular IOR Level"].default_value == pytest.approx(row.specular)
+            assert tuple(item.diffuse_color)[:3] == pytest.approx(row.base_color)
+
+    def test_reflectivities_are_plausible_at_905_nm(self) -> None:
+        wanted = {"asphalt": 0.18, "paint_white": 0.65, "grass": 0.5, "leaves": 0.5, "soil": 0.3}
+        wanted |= {"galvanised_steel": 0.5, "plastic_white": 0.7, "concrete": 0.37, "plastic_black": 0.06}
+        for name, reflectivity in wanted.items():
+            assert materials()[name].reflectivity == pytest.approx(reflectivity, abs=0.03), name
+        assert max(row.reflectivity for row in materials().values()) < 1.0
+
+    def test_constants_of_foreign_materials_are_read_from_their_shader(self) -> None:
+        item = bpy.data.materials.new("Car")
+        if item.node_tree is None:
+            item.use_nodes = True
+        node = next(node for node in item.node_tree.nodes if node.type == "BSDF_PRINCIPLED")
+        node.inputs["Base Color"].default_value = (0.5, 0.25, 0.125, 1.0)
+        node.inputs["Metallic"].default_value = 1.0
+        found = constants(["Car", "asphalt", "nobody's"])
+        assert found["Car"].base_color == pytest.approx((0.5, 0.25, 0.125))
+        assert found["Car"].metallic == 1.0
+        assert found["asphalt"] == materials()["asphalt"]
+        assert found["nobody's"] == materials()["unknown"]
+
+    def test_an_unknown_name_is_refused_with_the_nearest(self) -> None:
+        with pytest.raises(KeyError, match="asphalt"):
+            material("ashpalt")
+
+
+class TestSceneMesh:
+    def arrays(self) -> dict[str, Any]:
+        return {
+            "vertices": np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [2, 0, 0]], np.float32),
+            "triangles": np.array([[0, 1, 2], [0, 1, 3]], np.int32),
+            "class_id": np.zeros(2, np.uint8),
+            "instance_id": np.zeros(2, np.uint32),
+            "material": np.zeros(2, np.uint16),
+            "materials": ("asphalt",),
+            "origin": np.zeros(3),
+        }
+
+    def test_normals_and_areas(self) -> None:
+        mesh = SceneMesh(**self.arrays())
+        assert mesh.normals().tolist() == [[0.0, 0.0, 1.0], [0.0, 0.0, 0.0]]
+        assert mesh.areas().tolist() == [0.5, 0.0]
+        assert mesh.normals().dtype == np.float64
+        assert len(empty_scene_mesh(np.zeros(3)).normals()) == 0
+
+    @pytest.mark.parametrize(
+        ("field", "value"),
+        [
+            ("vertices", np.zeros((4, 3))),
+            ("vertices", np.full((4, 3), np.nan, np.float32)),
+            ("triangles", np.array([[0, 1, 2], [0, 1, 4]], np.int32)),
+            ("triangles", np.array([[0, 1, 2], [0, -1, 3]], np.int32)),
+            ("triangles", np.zeros((2, 4), np.int32)),
+            ("class_id", np.zeros(3, np.uint8)),
+            ("instance_id", np.zeros(2, np.int32)),
+            ("material", np.ones(2, np.uint16)),
+            ("origin", np.array([0.0, np.inf, 0.0])),
+        ],
+    )
+    def test_wrong_arrays_are_refused_by_name(self, field: str, value: object) -> None:
+        with pytest.raises(InputError, match=f"scene mesh: {field}"):
+            SceneMesh(**self.arrays() | {field: value})
