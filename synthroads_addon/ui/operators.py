@@ -195,10 +195,11 @@ def _draw_status(header: bpy.types.Header, context: bpy.types.Context) -> None:
     job, layout = scan_job.latest, header.layout
     if job is None:
         return
-    layout.label(text="Stopping the scan" if job.stopping else "Cancel Scan", icon="EVENT_ESC")
+    layout.label(text="", icon="EVENT_ESC")
+    layout.label(text="Cancel Scan")
     layout.separator_spacer()
-    layout.label(text="SynthRoads scans")
-    layout.progress(factor=job.share, text=f"{job.share:.0%}")
+    layout.label(text="SynthRoads")
+    layout.progress(factor=job.share, text=job.state)
     layout.separator_spacer()
 
 

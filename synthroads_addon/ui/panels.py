@@ -67,9 +67,10 @@ class SYNTHROADS_PT_scanner(_Sidebar, bpy.types.Panel):
             return
         if find_road(context.scene) is None:
             layout.label(text="Build a road first", icon="INFO")
-        elif settings.needs_saved_file():
-            _ask_to_save(layout)
-        _others(layout, context)
+        else:
+            _others(layout, context)
+            if settings.needs_saved_file():
+                _ask_to_save(layout)
         _button(layout).operator(SYNTHROADS_OT_scan.bl_idname, icon="LIGHT_AREA")
         if job and job.points is not None:
             _result(layout, settings, job)
@@ -91,7 +92,7 @@ def _button(layout: bpy.types.UILayout) -> bpy.types.UILayout:
 def _progress(layout: bpy.types.UILayout, job: ScanJob) -> None:
     row = layout.row(align=True)
     row.scale_y = 1.4
-    row.progress(factor=job.share, text="Stopping" if job.stopping else f"Scanning {job.share:.0%}")
+    row.progress(factor=job.share, text=job.state)
     row.operator(SYNTHROADS_OT_cancel_scan.bl_idname, text="", icon="X")
 
 

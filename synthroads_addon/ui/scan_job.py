@@ -74,9 +74,11 @@ class ScanJob:
         return self._thread is not None and self._thread.is_alive()
 
     @property
-    def stopping(self) -> bool:
-        """Return whether it was told to stop and has not yet done so."""
-        return self.running and self._stopping.is_set()
+    def state(self) -> str:
+        """Return what it is doing, in words for the window."""
+        if self._stopping.is_set():
+            return "Stopping"
+        return f"Scanning {self.share:.0%}" if self.share else "Preparing"
 
     def stop(self, wait: bool = False) -> None:
         """Have the thread stop after the block at hand; `wait` until it has."""

@@ -28,5 +28,5 @@ def look_along(space: bpy.types.SpaceView3D, parameters: RoadParameters) -> None
     region.view_rotation = (target - eye).to_track_quat("-Z", "Y")
     region.view_distance = (target - eye).length
     # Blender's own clip start of 1 cm leaves too little depth to tell paint from asphalt some hundred metres away.
-    space.clip_start = max(space.clip_start, 0.1)
+    space.clip_start = max(space.clip_start, 0.5)
     space.clip_end = max(space.clip_end, 5.0 * reach)

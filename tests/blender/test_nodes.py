@@ -203,7 +203,9 @@ class TestGroups:
         snapshot = SNAPSHOTS / f"{group.name}.txt"
         if WRITE in os.environ:
             snapshot.write_text(describe(group), encoding="utf-8")
-        assert describe(group) == snapshot.read_text(encoding="utf-8"), f"if this is meant, run with {WRITE}=1"
+        assert describe(group) == snapshot.read_text(encoding="utf-8"), (
+            f"if this is meant, run with {WRITE}=1"
+        )
 
     def test_the_road_has_an_input_for_each_lane_and_marking(self) -> None:
         names = {item.name for item in road_group(LAYOUT).interface.items_tree}

@@ -9,7 +9,8 @@
     group = node_group("SR Lane", build)
 
 Sockets are `Value`s: they can be added, multiplied, compared and handed to other nodes. Places of nodes are
-worked out from the frames and the links. A group that is already in the file in the same version is used again.
+worked out from the frames and the links. A group that is in the file already, in the same version, is used
+again.
 """
 
 from __future__ import annotations

@@ -21,7 +21,6 @@ from .alignment import Alignment, Element, FloatArray, IntArray
 
 FREE, EQUAL, ZERO = 0, 1, 2
 
-_REACH = 40.0  # m that a foot may move between two steps of a refinement
 _QUADRATURE = 2.0  # m, step of the integrals in the Jacobian; the residuals themselves are exact
 _SHARE = 0.45  # of its room that a knot may use up in one step, so that neighbours never meet
 
@@ -169,11 +168,12 @@ class Plan:
     points: FloatArray
     weights: FloatArray
     least: float
+    reach: float  # m that a foot may move between two steps
     limit: float = 0.2
     snaps: tuple[int, ...] = (EQUAL, ZERO)
 
     def measure(self, chain: Chain, stations: FloatArray) -> tuple[FloatArray, FloatArray]:
-        found, offset = chain.alignment.project_near(self.points, stations, _REACH)
+        found, offset = chain.alignment.project_near(self.points, stations, self.reach)
         return found, self.weights * offset
 
     def jacobian(self, chain: Chain, stations: FloatArray) -> FloatArray:

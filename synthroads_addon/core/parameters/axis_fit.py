@@ -33,11 +33,12 @@ _ROUNDED = 3.5e-4  # m: or on one whose coordinates were rounded to 1 mm, where 
 _RANDOM = 0.5  # correlation of neighbouring residuals that still passes for random
 _GAP = 100.0  # m between points from which the chord between them is given some weight
 _CHORD_WEIGHT = 1e-3
-_NEAR = 40.0  # m
+_NEAR = 40.0  # m that feet are looked for around where they should be
 _SPACING = 20.0  # m between knots at first
 _LEAP = 1.5
 _MARGIN = 0.98  # of the tolerance that the search aims at: it may see thinned points only
 _NEGLIGIBLE = 0.3  # of the tolerance: residuals below it are worth no element
+_FINER_HELPS = 0.8  # of the rms at most must be left by knots half as far apart: else the rest is noise
 _RELAXED = 1.5  # times what dense knots reach is aimed at where the tolerance cannot be had: less would fit noise
 
 
@@ -85,13 +86,15 @@ def fit_axis(points: ArrayLike, tolerance: float = 0.05) -> AxisFit:
     origin = np.append(np.round(given[:, :2].mean(axis=0)), 0.0)
     local, weights = _bridged(given - origin)
     alignment, near = _fit_plan(local[:, :2], weights, _MARGIN * tolerance)
-    station, offset = alignment.project_near(local[:, :2], near, _NEAR)
+    reach = max(_NEAR, 5.0 * float(np.median(np.diff(near))))
+    station, _ = alignment.project_near(local[:, :2], near, reach)
+    across = np.hypot(*(local[:, :2] - alignment.position(station)).T)
     profile = _fit_heights(station, local[:, 2], weights, alignment.length, _HEIGHT_SHARE * tolerance)
     heading = alignment.start_heading
     placed = Alignment(alignment.elements, alignment.x + origin[0], alignment.y + origin[1], heading)
     real = weights == 1.0
     station, above = station[real], local[real, 2] - profile.elevation(station[real])
-    return AxisFit(placed, profile, *_figures(station, offset[real]), *_figures(station, above), points=len(given))
+    return AxisFit(placed, profile, *_figures(station, across[real]), *_figures(station, above), points=len(given))
 
 
 def _checked(points: ArrayLike) -> FloatArray:
@@ -160,7 +163,7 @@ class _PlanPart:
     spacing: ClassVar[_Spacing] = _Spacing(7.0, _SPACING, 5.0)
 
     def begin(self, chosen: IntArray, spacing: float, start: Start | None, origin: float) -> tuple[Data, Fit]:
-        data = Plan(self.points[chosen], self.weights[chosen], 0.4 * spacing)
+        data = Plan(self.points[chosen], self.weights[chosen], 0.4 * spacing, max(_NEAR, 2.0 * spacing))
         chain, station = start_plan(data.points, spacing, start)
         return data, refine(data, chain, station, False, 8)
 
@@ -236,7 +239,7 @@ def _solve(
     exact = Goal(tolerance, 2.0 * tolerance, 1e-5, count, int(length / 15.0) + 5)
     data, rich = part.begin(chosen, max(part.spacing.exact, scale), start, origin)
     if rich.rms < 3.0 * _ROUNDED:
-        best = improved(data, min(descent(data, rich, exact), key=exact.rank), exact, 10)
+        best = min(descent(data, rich, exact), key=exact.rank)
         if _exactly(best) and exact.rank(best)[:2] == (False, False) and _sharp(data, best, exact):
             return best
     goal = Goal(tolerance, 2.0 * tolerance, _NEGLIGIBLE * tolerance, count, int(max(5.0, length / 30.0 - 0.01)))
@@ -244,7 +247,10 @@ def _solve(
     data, rich = part.begin(chosen, spacing, start, origin)
     while not goal.met(rich) and 0.5 * spacing >= max(part.spacing.finest, scale):
         spacing *= 0.5
-        data, rich = part.begin(chosen, spacing, start, origin)
+        finer_data, finer = part.begin(chosen, spacing, start, origin)
+        if finer.rms > _FINER_HELPS * rich.rms:
+            break
+        data, rich = finer_data, finer
     if not goal.met(rich):
         goal = replace(goal, rms=max(goal.rms, _RELAXED * rich.rms), p95=max(goal.p95, _RELAXED * rich.p95))
     return improved(data, min(descent(data, rich, goal), key=goal.rank), goal)
