@@ -136,10 +136,11 @@ def road_parameters(job: Job) -> tuple[RoadParameters, dict[str, Any]]:
 def make_scan(scenario: Scenario, geometry: RoadGeometry, mesh: SceneMesh) -> Scan:
     """Return the scan that a scenario asks for, ready to be cut into blocks; builds the caster."""
     from .blender.casters import make_caster
+    from .blender.materials import constants
 
     return Scan(
         mesh=mesh,
-        surfaces=surfaces_of(mesh.materials),
+        surfaces=surfaces_of(constants(mesh.materials).values()),
         caster=make_caster(scenario.scan.caster, mesh),
         setting=scanner_setting(scenario.scan),
         path=FlightPath(geometry, scenario.scan.platform),

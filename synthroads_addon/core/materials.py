@@ -12,6 +12,7 @@ from typing import Annotated
 from pydantic import Field
 
 from .cloud.labels import PRESETS
+from .scanning.radiometry import reflectivity
 from .schema import Model, quantity, read_json
 
 UNKNOWN = "unknown"
@@ -29,16 +30,9 @@ class Material(Model):
     specular: float = quantity(ge=0, le=1, unit="1", description="Specular share of the reflectivity.")
 
     @property
-    def luminance(self) -> float:
-        """Return L = 0.3 r + 0.59 g + 0.11 b of the linear base colour."""
-        red, green, blue = self.base_color
-        return 0.3 * red + 0.59 * green + 0.11 * blue
-
-    @property
     def reflectivity(self) -> float:
-        """Return R = (1 - m)(s + 0.5 L) + m L."""
-        metal = self.metallic
-        return (1.0 - metal) * (self.specular + 0.5 * self.luminance) + metal * self.luminance
+        """Return R, see `radiometry.reflectivity`."""
+        return float(reflectivity(self.base_color, self.metallic, self.specular))
 
 
 class MaterialTable(Model):

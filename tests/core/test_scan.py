@@ -8,6 +8,7 @@ import pytest
 from scipy.integrate import dblquad
 
 from synthroads_addon.core.errors import InputError
+from synthroads_addon.core.materials import materials
 from synthroads_addon.core.parameters.geometry import RoadGeometry
 from synthroads_addon.core.parameters.sampler import sample_road
 from synthroads_addon.core.random_streams import stream
@@ -80,7 +81,7 @@ def plane(size: float = 5000.0, tilt_deg: float = 0.0) -> SceneMesh:
 def scan_of(mesh: SceneMesh, rays: int = 1, path: FlightPath | None = None, **changes) -> Scan:
     setting = replace(scanner_setting(load_scenario("rq31-600m").scan), range_sigma=0.0, threshold=0.0)
     setting = replace(setting, **changes)
-    return Scan(mesh, surfaces_of(mesh.materials), BruteForce(mesh), setting, path or Standing(), rays, seed=3)
+    return Scan(mesh, surfaces_of(materials()[name] for name in mesh.materials), BruteForce(mesh), setting, path or Standing(), rays, seed=3)
 
 
 def middle_pulses(scan: Scan, count: int = 100):

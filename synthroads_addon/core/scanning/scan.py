@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -9,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..cloud.points import PointBlock
-from ..materials import UNKNOWN, materials
+from ..materials import Material
 from ..random_streams import stream
 from ..scene_mesh import SceneMesh
 from .beam import beam_pattern
@@ -40,10 +41,9 @@ class Surfaces:
         return reflectivity(self.base_color, self.metallic, self.specular)
 
 
-def surfaces_of(names: tuple[str, ...]) -> Surfaces:
-    """Return the constants of the named materials; a name that isn't in the table gets those of `UNKNOWN`."""
-    table = materials()
-    rows = [table.get(name, table[UNKNOWN]) for name in names]
+def surfaces_of(rows: Iterable[Material]) -> Surfaces:
+    """Return the constants of materials in the order of the scene mesh's."""
+    rows = list(rows)
     return Surfaces(
         np.array([row.base_color for row in rows], dtype=np.float64).reshape(-1, 3),
         np.array([row.metallic for row in rows], dtype=np.float64),
