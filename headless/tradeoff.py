@@ -79,24 +79,36 @@ def _plot(results: list[dict[str, Any]], path: Path) -> None:
     mpl.use("Agg")
     from matplotlib import pyplot
 
-    panels = [name for name in ROW_TITLES if any(name in row["errors"] for row in results)]
-    figure, axes = pyplot.subplots(1, len(panels), figsize=(4.6 * len(panels), 4.2), squeeze=False)
-    for axis, name in zip(axes[0], panels, strict=True):
-        for knob in dict.fromkeys(row["knob"] for row in results):
-            chosen = [row for row in results if row["knob"] == knob and row["errors"].get(name) is not None]
-            if not chosen:
-                continue
-            style = "*" if knob == "fidelity" else "o-"
-            x, y = [row["seconds"] for row in chosen], [row["errors"][name] for row in chosen]
-            axis.plot(x, y, style, label=knob.replace("_", " "), markersize=11 if knob == "fidelity" else 6)
-            for row, a, b in zip(chosen, x, y, strict=True):
-                axis.annotate(str(row["value"]), (a, b), textcoords="offset points", xytext=(5, 4), fontsize=8)
-        axis.set(xlabel="time (s)", ylabel=ROW_TITLES[name], xscale="log")
-        axis.set_yscale("symlog", linthresh=1e-3)
+    panels = [name for name in ROW_TITLES if any(_varies(results, knob, name) for knob in _knobs(results))]
+    figure, axes = pyplot.subplots(1, max(1, len(panels)), figsize=(5.2 * max(1, len(panels)), 4.4), squeeze=False)
+    for axis, name in zip(axes[0], panels, strict=False):
+        for knob in _knobs(results):
+            if _varies(results, knob, name):
+                _draw_knob(axis, [row for row in results if row["knob"] == knob], knob, name)
+        axis.set(xlabel="processor time of the whole job (s)", ylabel=ROW_TITLES[name])
+        axis.set_ylim(0, 1.15 * axis.get_ylim()[1])
         axis.grid(alpha=0.3)
-        axis.legend(fontsize=8)
+        axis.legend(fontsize=9)
     figure.tight_layout()
     figure.savefig(path, dpi=110, metadata={"Software": None})
+
+
+def _knobs(results: list[dict[str, Any]]) -> list[str]:
+    return list(dict.fromkeys(row["knob"] for row in results))
+
+
+def _varies(results: list[dict[str, Any]], knob: str, name: str) -> bool:
+    """Return whether a knob changes a kind of error at all: a flat line says nothing."""
+    errors = [row["errors"][name] for row in results if row["knob"] == knob]
+    return knob == "fidelity" or max(errors) - min(errors) > 0.5 * max(errors)
+
+
+def _draw_knob(axis: Any, rows_of_knob: list[dict[str, Any]], knob: str, name: str) -> None:
+    preset = knob == "fidelity"
+    x, y = [row["seconds"] for row in rows_of_knob], [row["errors"][name] for row in rows_of_knob]
+    axis.plot(x, y, "*" if preset else "o-", label=knob.replace("_", " "), markersize=14 if preset else 6)
+    for row, a, b in zip(rows_of_knob, x, y, strict=True):
+        axis.annotate(str(row["value"]), (a, b), textcoords="offset points", xytext=(8, -14 if preset else 5), fontsize=9)
 
 
 if __name__ == "__main__":

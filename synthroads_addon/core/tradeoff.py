@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator
 from typing import Any
 
 KNOBS: dict[str, tuple[Any, ...]] = {
-    "geometric_tolerance": (0.05, 0.02, 0.01, 0.005, 0.002, 0.001),
+    "geometric_tolerance": (0.02, 0.01, 0.005, 0.002, 0.001),
     "caster": ("bvhtree", "embree"),
     "rays_per_pulse": (1, 7, 19, 37, 61),
     "fidelity": ("draft", "standard", "high"),
@@ -31,20 +31,13 @@ def rows(knobs: Iterable[str]) -> Iterator[tuple[str, Any]]:
 
 def markdown(results: list[dict[str, Any]], scenario: str) -> str:
     """Return the table; columns are time, memory, triangles, rays per second and the errors."""
-    titles = ["knob", "value", "time (s)", "memory (MB)", "triangles", "rays/s", *ROW_TITLES.values()]
+    titles = ["knob", "value", "processor time (s)", "of it model (s)", "memory (MB)", "triangles", "rays/s"]
+    titles += ROW_TITLES.values()
     lines = [f"Scene `{scenario}`: `synthroads tradeoff --scenario {scenario} --output DIR`", ""]
     lines += ["| " + " | ".join(titles) + " |", "|" + "---|" * len(titles)]
     for row in results:
-        errors = [_cell(row["errors"].get(name)) for name in ROW_TITLES]
-        cells = [row["knob"], str(row["value"]), f"{row['seconds']:.2f}", f"{row['peak_memory_mb'] or 0:.0f}"]
-        cells += [
-            f"{row['triangles']:,}",
-            f"{row['rays_per_second']:,.0f}" if row.get("rays_per_second") else "",
-            *errors,
-        ]
+        cells = [row["knob"], str(row["value"]), f"{row['seconds']:.1f}", f"{row['model_seconds']:.1f}"]
+        cells += [f"{row['peak_memory_mb'] or 0:.0f}", f"{row['triangles']:,}", f"{row['rays_per_second']:,.0f}"]
+        cells += [f"{row['errors'][name]:.3g}" for name in ROW_TITLES]
         lines.append("| " + " | ".join(cells) + " |")
     return "\n".join(lines) + "\n"
-
-
-def _cell(value: float | None) -> str:
-    return "" if value is None else f"{value:.3g}"

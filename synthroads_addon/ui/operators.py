@@ -196,6 +196,7 @@ def _draw_status(header: bpy.types.Header, context: bpy.types.Context) -> None:
     if job is None:
         return
     layout.label(text="", icon="EVENT_ESC")
+    layout.separator(factor=2.0)
     layout.label(text="Cancel Scan")
     layout.separator_spacer()
     layout.label(text="SynthRoads")

@@ -81,7 +81,8 @@ def plane(size: float = 5000.0, tilt_deg: float = 0.0) -> SceneMesh:
 def scan_of(mesh: SceneMesh, rays: int = 1, path: FlightPath | None = None, **changes) -> Scan:
     setting = replace(scanner_setting(load_scenario("rq31-600m").scan), range_sigma=0.0, threshold=0.0)
     setting = replace(setting, **changes)
-    return Scan(mesh, surfaces_of(materials()[name] for name in mesh.materials), BruteForce(mesh), setting, path or Standing(), rays, seed=3)
+    surfaces = surfaces_of(materials()[name] for name in mesh.materials)
+    return Scan(mesh, surfaces, BruteForce(mesh), setting, path or Standing(), rays, seed=3)
 
 
 def middle_pulses(scan: Scan, count: int = 100):

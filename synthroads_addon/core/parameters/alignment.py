@@ -9,7 +9,7 @@ length: with K = k h and C = k' h^2 the direction w = exp(i (K v + C v^2 / 2)) o
     w[n+1] = i (K w[n] + C w[n-1]) / (n + 1),        z[n+1] = h w[n] / (n + 1).
 
 Twelve terms leave less than 1e-14 of the piece's length. Nothing is divided by a radius or by a difference of
-curvatures, so infinity and nearly equal radii need no branch (`road_facts`, numerical extremes: clothoids).
+curvatures, so infinity and nearly equal radii need no branch.
 
 Beyond its ends an alignment goes on straight along its end tangents.
 """

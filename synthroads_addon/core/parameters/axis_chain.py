@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -49,6 +49,16 @@ class Chain:
         return len(self.kinds)
 
     @property
+    def turns(self) -> int:
+        """Number of the pose's parameters: across and heading, or elevation."""
+        return 2 if len(self.pose) == 3 else 1
+
+    @property
+    def value_columns(self) -> slice:
+        """Where the values stand among all parameters (`basis`)."""
+        return slice(self.turns, self.turns + self.size + 1)
+
+    @property
     def slopes(self) -> FloatArray:
         """(M,) change of value per metre."""
         return np.diff(self.values) / np.diff(self.knots)
@@ -77,8 +87,8 @@ class Chain:
         return replace(self, values=choice @ mean + given)
 
     def freedom(self) -> int:
-        """Number of free parameters; the pose's shift along the road is none."""
-        start = 0 if self.pinned else len(self.pose) - (len(self.pose) == 3)
+        """Number of free parameters."""
+        start = 0 if self.pinned else self.turns
         return start + self.groups[0].shape[1] + self.size - 1
 
     def basis(self, free_knots: bool) -> FloatArray:
@@ -86,13 +96,12 @@ class Chain:
 
         All are: pose (across, heading; or elevation), M + 1 values, M - 1 inner knots.
         """
-        turns = 2 if len(self.pose) == 3 else 1
-        rows = turns + self.size + 1
-        columns = np.eye(rows + self.size - 1)
-        choice = np.zeros((len(columns), self.groups[0].shape[1]))
-        choice[turns:rows] = self.groups[0]
-        pose = columns[:, : 0 if self.pinned else turns]
-        return np.hstack((pose, choice, columns[:, rows:] if free_knots else columns[:, :0]))
+        everything = np.eye(self.turns + 2 * self.size)
+        values = np.zeros((len(everything), self.groups[0].shape[1]))
+        values[self.value_columns] = self.groups[0]
+        pose = everything[:, : 0 if self.pinned else self.turns]
+        knots = everything[:, self.value_columns.stop :]
+        return np.hstack((pose, values, knots if free_knots else knots[:, :0]))
 
     @cached_property
     def alignment(self) -> Alignment:
@@ -105,9 +114,17 @@ class Chain:
 class Data(Protocol):
     """Points to be fitted: what `refine` and the search need of them."""
 
-    least: float  # m, shortest element
-    limit: float  # largest absolute value
-    snaps: tuple[int, ...]  # kinds that an element may be snapped to
+    @property
+    def least(self) -> float:
+        """Length of the shortest element, m."""
+
+    @property
+    def limit(self) -> float:
+        """Largest absolute value."""
+
+    @property
+    def snaps(self) -> tuple[int, ...]:
+        """Kinds that an element may be snapped to."""
 
     def measure(self, chain: Chain, stations: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return stations (N,) of the points on the chain, from the former ones, and residuals (N,), m."""
@@ -119,7 +136,9 @@ class Data(Protocol):
         """Return the pose after a step of its parameters."""
 
 
-def ramp_integrals(chain: Chain, stations: FloatArray, grid: FloatArray, weight: NDArray) -> tuple[NDArray, NDArray]:
+def ramp_integrals(
+    chain: Chain, stations: FloatArray, grid: FloatArray, weight: NDArray[Any]
+) -> tuple[NDArray[Any], NDArray[Any]]:
     """Return two (N, M): from the start to each station, weight times each element's rising and falling ramp.
 
     `grid` (Q + 1) holds all knots and stations; `weight` (Q) is given at the middles of its steps.
@@ -239,7 +258,7 @@ class Fit:
     chain: Chain
     stations: FloatArray
     residuals: FloatArray
-    _linear: tuple[FloatArray, FloatArray, FloatArray] | None = field(default=None, repr=False)
+    _linear: tuple[FloatArray, FloatArray] | None = field(default=None, repr=False)
 
     @property
     def square(self) -> float:
@@ -271,12 +290,11 @@ def room(chain: Chain, least: float) -> FloatArray:
 
 def stepped(data: Data, chain: Chain, step: FloatArray) -> Chain:
     """Return the chain after a step (F,) of all parameters, its knots kept apart."""
-    turns = 2 if len(chain.pose) == 3 else 1
-    values = np.clip(chain.values + step[turns : turns + chain.size + 1], -data.limit, data.limit)
+    values = np.clip(chain.values + step[chain.value_columns], -data.limit, data.limit)
     spare = _SHARE * np.maximum(np.diff(chain.knots) - data.least, 0.0)
     knots = chain.knots.copy()
-    knots[1:-1] += np.clip(step[turns + chain.size + 1 :], -spare[:-1], spare[1:])
-    return replace(chain, pose=data.moved(chain.pose, step[:turns]), values=values, knots=knots).tied()
+    knots[1:-1] += np.clip(step[chain.value_columns.stop :], -spare[:-1], spare[1:])
+    return replace(chain, pose=data.moved(chain.pose, step[: chain.turns]), values=values, knots=knots).tied()
 
 
 def least_squares(matrix: FloatArray, wanted: FloatArray) -> FloatArray:

@@ -230,9 +230,7 @@ def _walk(part: _Part, run: FloatArray, tolerance: float) -> tuple[Chain, FloatA
         first, origin = int(chosen[np.argmax(fit.stations >= cut)]), origin + cut
 
 
-def _solve(
-    part: _Part, chosen: IntArray, start: Start | None, origin: float, length: float, tolerance: float
-) -> Fit:
+def _solve(part: _Part, chosen: IntArray, start: Start | None, origin: float, length: float, tolerance: float) -> Fit:
     """Fit one window: as exact data if they are, else with knots as dense as the tolerance needs."""
     scale = 2.5 * length / len(chosen)  # knots need data between them
     count = independent(length, len(chosen))
@@ -288,7 +286,8 @@ def _head(chain: Chain, cut: float) -> Chain:
 
 def _joined(pieces: list[Chain]) -> Chain:
     """Return the pieces as one chain; lines, arcs and constant grades that a cut went through become one again."""
-    knots, values, kinds = [0.0], [float(pieces[0].values[0])], []
+    knots, values = [0.0], [float(pieces[0].values[0])]
+    kinds: list[int] = []
     offset = 0.0
     for piece in pieces:
         for e, kind in enumerate(piece.kinds):

@@ -8,6 +8,7 @@ import math
 import os
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -127,24 +128,25 @@ def _read_json(name: str, text: str) -> list[tuple[float, float, float]]:
     return rows
 
 
-def _line_strings(name: str, node: object) -> Iterator[dict]:
+def _line_strings(name: str, node: object) -> Iterator[dict[str, Any]]:
     """Yield every LineString in a GeoJSON document; refuse what is no GeoJSON and lines of several parts."""
-    kind = node.get("type") if isinstance(node, dict) else None
-    if kind == "FeatureCollection" and isinstance(node.get("features"), list):
-        for feature in node["features"]:
+    member = node if isinstance(node, dict) else {}
+    kind = member.get("type")
+    if kind == "FeatureCollection" and isinstance(member.get("features"), list):
+        for feature in member["features"]:
             yield from _line_strings(name, feature)
     elif kind == "Feature":
-        if node.get("geometry") is not None:
-            yield from _line_strings(name, node["geometry"])
+        if member.get("geometry") is not None:
+            yield from _line_strings(name, member["geometry"])
     elif kind == "LineString":
-        yield node
+        yield member
     elif kind == "MultiLineString":
         raise InputError(f"{name} type", kind, "one LineString is needed, in one part")
     elif kind not in ("Point", "MultiPoint", "Polygon", "MultiPolygon"):
         raise InputError(f"{name} type", kind, "GeoJSON with a LineString is needed")
 
 
-def _refuse_degrees(name: str, document: dict, rows: list[tuple[float, float, float]]) -> None:
+def _refuse_degrees(name: str, document: dict[str, Any], rows: list[tuple[float, float, float]]) -> None:
     """Refuse geographic coordinates: by the file's own word, or where it says nothing, by their size and extent."""
     system = json.dumps(document.get("crs")) if document.get("crs") else ""
     said = any(word in system for word in ("CRS84", "4326", "4258"))

@@ -18,7 +18,7 @@ from typing import Literal
 
 import numpy as np
 
-from .alignment import FloatArray
+from .alignment import FloatArray, IntArray
 from .axis_chain import (
     EQUAL,
     FREE,
@@ -29,8 +29,6 @@ from .axis_chain import (
     column_scale,
     knot_penalty,
     least_squares,
-    ramp_integrals,
-    quadrature_grid,
     refine,
     stepped,
 )
@@ -54,6 +52,10 @@ class Edit:
     def span(self) -> tuple[int, int]:
         """First and last element concerned."""
         return (self.index - 1, self.index) if self.kind == "merge" else (self.index, self.index)
+
+
+#: An edit, the linear conditions (C, P) that it imposes on the free parameters, and how far they are from true (C,).
+Condition = tuple[Edit, FloatArray, FloatArray]
 
 
 @dataclass(frozen=True)
@@ -101,7 +103,8 @@ def edited(chain: Chain, edits: Sequence[Edit]) -> tuple[Chain, list[int]]:
     """
     gone = {edit.index for edit in edits if edit.kind == "merge"}
     snapped = {edit.index: edit.kind for edit in edits if edit.kind != "merge"}
-    keep, kinds, found = [0], [], set()
+    keep, found = [0], set()
+    kinds: list[int] = []
     for e, kind in enumerate(chain.kinds.tolist()):
         found.add(snapped.get(e, kind))
         if e + 1 in gone:
@@ -132,30 +135,30 @@ def _interpolation(chain: Chain, keep: list[int]) -> tuple[FloatArray, FloatArra
     return weights, shifts
 
 
-def foresee(data: Data, fit: Fit, edits: Sequence[Edit], free_knots: bool, goal: Goal) -> tuple[Chain, float]:
-    """Return the edited chain at the optimum of the linearised problem, and the sum of squares expected there."""
-    chain = fit.chain
-    new, keep = edited(chain, edits)
-    new = new.tied()
-    basis = new.basis(free_knots)
-    turns = 2 if len(chain.pose) == 3 else 1
+def _lift(chain: Chain, new: Chain, keep: list[int]) -> FloatArray:
+    """Return all parameters of the chain as a linear function of those of the edited one."""
     weights, shifts = _interpolation(chain, keep)
     inner = [i for i in keep if 0 < i < chain.size]
-    old_row, new_row = turns + chain.size + 1, turns + new.size + 1
-    # All parameters of the old chain from those of the new one.
-    lift = np.zeros((old_row + chain.size - 1, new_row + new.size - 1))
-    lift[:turns, :turns] = np.eye(turns)
-    lift[turns:old_row, turns:new_row] = weights
-    lift[turns:old_row, new_row:] = shifts[:, inner]
-    lift[[old_row + i - 1 for i in inner], range(new_row, new_row + len(inner))] = 1.0
-    start = np.zeros(len(lift))
-    start[turns:old_row] = weights @ new.values - chain.values
+    old_knots, new_knots = chain.value_columns.stop, new.value_columns.stop
+    lift = np.zeros((old_knots + chain.size - 1, new_knots + new.size - 1))
+    lift[: chain.turns, : chain.turns] = np.eye(chain.turns)
+    lift[chain.value_columns, new.value_columns] = weights
+    lift[chain.value_columns, new_knots:] = shifts[:, inner]
+    lift[[old_knots + i - 1 for i in inner], range(new_knots, new_knots + len(inner))] = 1.0
+    return lift
+
+
+def foresee(data: Data, fit: Fit, edits: Sequence[Edit], free_knots: bool, goal: Goal) -> tuple[Chain, float]:
+    """Return the edited chain at the optimum of the linearised problem, and the sum of squares expected there."""
+    new, keep = edited(fit.chain, edits)
+    new = new.tied()
+    basis, lift = new.basis(free_knots), _lift(fit.chain, new, keep)
+    start = np.zeros(len(lift))  # the jump to the new chain's values
+    values = fit.chain.value_columns
+    start[values] = lift[values, new.value_columns] @ new.values - fit.chain.values
     r, projected = fit.linear(data)
     matrix, wanted = r @ (lift @ basis), -(projected + r @ start)
-    held = np.zeros((0, basis.shape[1]))
-    if free_knots:
-        allowance = np.sqrt(fit.square + len(fit.residuals) * goal.floor**2)
-        held = allowance * knot_penalty(data, new, basis.shape[1])
+    held = _allowance(fit, goal) * knot_penalty(data, new, basis.shape[1]) if free_knots else matrix[:0]
     scale = column_scale(matrix)
     rows = np.vstack((matrix / scale, held / scale, 1e-6 * np.eye(len(scale))))
     scaled = least_squares(rows, np.concatenate((wanted, np.zeros(len(rows) - len(wanted)))))
@@ -165,13 +168,17 @@ def foresee(data: Data, fit: Fit, edits: Sequence[Edit], free_knots: bool, goal:
     return stepped(data, new, basis @ (scaled / scale)), square
 
 
+def _allowance(fit: Fit, goal: Goal) -> float:
+    """Return what a knot's step over its whole room costs, m: as much as all residuals."""
+    return float(np.sqrt(fit.square + len(fit.residuals) * goal.floor**2))
+
+
 def _covariance_root(data: Data, fit: Fit, free_knots: bool, goal: Goal) -> FloatArray:
     """Return W with W.T @ W the free parameters' covariance for unit noise."""
     basis = fit.chain.basis(free_knots)
     rows = fit.linear(data)[0] @ basis
     if free_knots:
-        allowance = np.sqrt(fit.square + len(fit.residuals) * goal.floor**2)
-        rows = np.vstack((rows, allowance * knot_penalty(data, fit.chain, basis.shape[1])))
+        rows = np.vstack((rows, _allowance(fit, goal) * knot_penalty(data, fit.chain, basis.shape[1])))
     scale = column_scale(rows)
     root = np.linalg.qr(np.vstack((rows / scale, 1e-6 * np.eye(len(scale)))), mode="r")
     return np.linalg.solve(root, np.eye(len(scale))).T / scale
@@ -179,64 +186,64 @@ def _covariance_root(data: Data, fit: Fit, free_knots: bool, goal: Goal) -> Floa
 
 def options(data: Data, fit: Fit, free_knots: bool, goal: Goal) -> list[tuple[float, Edit]]:
     """Return (expected change of score, edit), cheapest first, by each edit's own Wald statistic."""
-    chain = fit.chain
+    chain, present = fit.chain, goal.score(fit)
     root = _covariance_root(data, fit, free_knots, goal)
     basis = chain.basis(free_knots)
-    turns = 2 if len(chain.pose) == 3 else 1
-    rows = basis[turns : turns + chain.size + 1]
+    conditions = list(_merges(chain, basis, free_knots))
+    if free_knots:
+        conditions += _snaps(data, chain, basis)
     result = []
-    for edit, conditions, violation in _conditions(data, chain, rows, basis, free_knots):
-        spread = root @ conditions.T
+    for edit, rows, violation in conditions:
+        spread = root @ rows.T
         if edit.kind == "merge" and free_knots:  # the knot itself stays where it is until it is gone
             own = root[:, basis.shape[1] - chain.size + edit.index]
             spread = spread - own[:, None] * (own @ spread) / (own @ own)
         square = spread.T @ spread
         square[np.diag_indices(len(square))] *= 1.0 + 1e-9
-        if not (np.diag(square) > 0).all():
-            continue
-        cost = float(violation @ np.linalg.solve(square, violation))
-        new = edited(chain, [edit])[0]
-        result.append((goal.expected(fit.square + cost, new, len(fit.residuals)), edit))
-    present = goal.score(fit)
-    return sorted(((score - present, edit) for score, edit in result), key=lambda pair: pair[0])
+        if (np.diag(square) > 0).all():
+            cost = float(violation @ np.linalg.solve(square, violation))
+            score = goal.expected(fit.square + cost, edited(chain, [edit])[0], len(fit.residuals))
+            result.append((score - present, edit))
+    return sorted(result, key=lambda pair: pair[0])
 
 
-def _conditions(
-    data: Data, chain: Chain, rows: FloatArray, basis: FloatArray, free_knots: bool
-) -> Iterator[tuple[Edit, FloatArray, FloatArray]]:
-    """Yield each possible edit with the linear conditions (C, P) it imposes and how far they are from true (C)."""
-    knots, values = chain.knots, chain.values
+def _merges(chain: Chain, basis: FloatArray, free_knots: bool) -> Iterator[Condition]:
+    """Yield for each inner knot that its value is that of the straight between its neighbours."""
+    rows, knots, values = basis[chain.value_columns], chain.knots, chain.values
+    first = basis.shape[1] - chain.size  # + i: the column of inner knot i
     for i in range(1, chain.size):
         length, change = knots[i + 1] - knots[i - 1], values[i + 1] - values[i - 1]
         share = (knots[i] - knots[i - 1]) / length
         condition = rows[i] - (1.0 - share) * rows[i - 1] - share * rows[i + 1]
-        if free_knots:
-            condition = condition.copy()
-            first = basis.shape[1] - chain.size  # + i: the column of inner knot i
-            if i > 1:
-                condition[first + i - 1] += change * (1.0 - share) / length
-            if i < chain.size - 1:
-                condition[first + i + 1] += change * share / length
+        if free_knots and i > 1:
+            condition[first + i - 1] += change * (1.0 - share) / length
+        if free_knots and i < chain.size - 1:
+            condition[first + i + 1] += change * share / length
         if condition.any():
             yield Edit("merge", i), condition[None], np.array([values[i] - values[i - 1] - share * change])
-    if not free_knots:
-        return
+
+
+def _snaps(data: Data, chain: Chain, basis: FloatArray) -> Iterator[Condition]:
+    """Yield for each element that its ends' values are equal, and that they are zero."""
+    rows = basis[chain.value_columns]
     for e, kind in enumerate(chain.kinds):
-        pair, ends = rows[[e, e + 1]], values[[e, e + 1]]
-        if kind == FREE and EQUAL in data.snaps and (pair[0] != pair[1]).any():
+        pair, ends = rows[[e, e + 1]], chain.values[[e, e + 1]]
+        tied = kind != FREE or bool((pair[0] == pair[1]).all())
+        if EQUAL in data.snaps and not tied:
             yield Edit(EQUAL, e), pair[1:] - pair[:1], ends[1:] - ends[:1]
-        if kind != ZERO and ZERO in data.snaps:
-            tied = kind == EQUAL or (pair[0] == pair[1]).all()
-            wanted = pair[:1] if tied else pair[pair.any(axis=1)]
-            given = ends[~pair.any(axis=1)]  # pinned or already zero
-            if wanted.any(axis=1).all() and len(wanted) and not np.abs(given).max(initial=0.0) > 0.0:
-                yield Edit(ZERO, e), wanted, ends[:1] if tied else ends[pair.any(axis=1)]
+        if ZERO in data.snaps and kind != ZERO:
+            free = pair.any(axis=1)
+            if tied:
+                free[1] = False  # one condition says it all
+            given = ends[~pair.any(axis=1)]  # zero already, or pinned
+            if free.any() and not given.any():
+                yield Edit(ZERO, e), pair[free], ends[free]
 
 
 def _several(options_: list[tuple[float, Edit]], most: int, gain: float) -> list[tuple[float, Edit]]:
     """Return edits that pay and don't touch each other, cheapest first."""
     taken: set[int] = set()
-    chosen = []
+    chosen: list[tuple[float, Edit]] = []
     for change, edit in options_:
         low, high = edit.span
         if len(chosen) >= most or change > -gain:
@@ -301,33 +308,31 @@ def splits(data: Data, fit: Fit) -> list[Chain]:
     chain = fit.chain
     cuts = np.linspace(0.0, 1.0, _PARTS + 1)[:-1]
     fine = np.append((chain.knots[:-1, None] + np.diff(chain.knots)[:, None] * cuts).ravel(), chain.knots[-1])
-    dense = replace(chain, knots=fine, values=np.interp(fine, chain.knots, chain.values), kinds=np.zeros(len(fine) - 1, int))
-    turns = 2 if len(chain.pose) == 3 else 1
-    hats = data.jacobian(dense, fit.stations)[:, turns : turns + len(fine)]
+    dense = replace(chain, knots=fine, values=np.interp(fine, chain.knots, chain.values))
+    dense = replace(dense, kinds=np.full(len(fine) - 1, FREE))
+    hats = data.jacobian(dense, fit.stations)[:, dense.value_columns]
     full = data.jacobian(chain, fit.stations)
     matrix = full @ chain.basis(True)
     q, _ = np.linalg.qr(matrix / column_scale(matrix))
     rest = fit.residuals - q @ (q.T @ fit.residuals)
     ways = []
     for e, kind in enumerate(chain.kinds):
-        ends = [full[:, turns + e], full[:, turns + e + 1]] if kind != FREE else []
+        freed = chain.kinds.copy()
+        freed[e] = FREE
+        ends = [] if kind == FREE else list(full[:, chain.value_columns][:, e : e + 2].T)
         if ends:
-            freed = chain.kinds.copy()
-            freed[e] = FREE
             ways.append((_gain(ends, q, rest), replace(chain, kinds=freed)))
-        for part in range(1, _PARTS):
-            knot = fine[e * _PARTS + part]
-            if min(knot - chain.knots[e], chain.knots[e + 1] - knot) < data.least:
-                continue
-            hat = hats @ np.interp(fine, [chain.knots[e], knot, chain.knots[e + 1]], [0.0, 1.0, 0.0])
-            kinds = np.insert(chain.kinds, e, FREE)
-            kinds[e + 1] = FREE
-            value = np.interp(knot, chain.knots, chain.values)
-            new = replace(
-                chain, kinds=kinds, knots=np.insert(chain.knots, e + 1, knot), values=np.insert(chain.values, e + 1, value)
-            )
-            ways.append((_gain([hat, *ends], q, rest), new))
+        for knot in fine[e * _PARTS + 1 : (e + 1) * _PARTS]:
+            if min(knot - chain.knots[e], chain.knots[e + 1] - knot) >= data.least:
+                hat = hats @ np.interp(fine, [chain.knots[e], knot, chain.knots[e + 1]], [0.0, 1.0, 0.0])
+                ways.append((_gain([hat, *ends], q, rest), _split(chain, freed, e, knot)))
     return [new for _, new in sorted(ways, key=lambda way: -way[0])]
+
+
+def _split(chain: Chain, freed: IntArray, e: int, knot: float) -> Chain:
+    """Return the chain with a knot in element e, both parts of which are free."""
+    values = np.insert(chain.values, e + 1, np.interp(knot, chain.knots, chain.values))
+    return replace(chain, knots=np.insert(chain.knots, e + 1, knot), values=values, kinds=np.insert(freed, e, FREE))
 
 
 def _gain(columns: list[FloatArray], q: FloatArray, rest: FloatArray) -> float:
@@ -355,8 +360,8 @@ def improved(data: Data, fit: Fit, goal: Goal, steps: int = 60) -> Fit:
         if goal.met(fit) and not _better(best, fit, goal):
             # A split may pay only together with the removal that it makes possible.
             ways = [edit for _, edit in options(data, best, True, goal)[: 3 * _TRIALS]]
-            best = min(_trials(data, best, ways, True, goal), key=goal.rank, default=best)
-            if not _better(best, fit, goal):
+            best = min(_trials(data, best, ways, True, goal), key=goal.rank, default=None)
+            if best is None or not _better(best, fit, goal):
                 return fit
         fit = best
     return fit

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .alignment import FloatArray
+from .alignment import FloatArray, IntArray
 from .axis_chain import FREE, Chain
 
 _STIFFNESS = 0.05  # of the spline, relative to the density of the data; it spans gaps and leaves the rest alone
@@ -57,7 +57,7 @@ def even_knots(length: float, spacing: float) -> FloatArray:
     return np.linspace(0.0, length, max(1, round(length / spacing)) + 1)
 
 
-def _free(knots: FloatArray) -> FloatArray:
+def _free(knots: FloatArray) -> IntArray:
     return np.full(len(knots) - 1, FREE)
 
 
