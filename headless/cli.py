@@ -17,7 +17,24 @@ from typing import Any
 from synthroads_addon import version
 from synthroads_addon.core.errors import InputError
 from synthroads_addon.core.progress import Progress, silent
-from synthroads_addon.core.schema import canonical_json
+
+
+def _missing(error: ModuleNotFoundError) -> str:
+    """Return what to say of a package that isn't there; a missing part of our own is a defect and raised again."""
+    name = (error.name or "").partition(".")[0]
+    if name in ("", "headless", "ml", "synthroads_addon"):
+        raise error
+    return (
+        f"error: the package {name} is missing: in Blender install and enable the SynthRoads extension, "
+        "elsewhere run pip install 'synthroads[blender]'"
+    )
+
+
+try:
+    from synthroads_addon.core.schema import canonical_json
+except ModuleNotFoundError as error:  # Blender itself has none of the packages that the extension brings
+    print(_missing(error), file=sys.stderr)
+    raise SystemExit(2) from None
 
 COMMANDS = {
     "generate": "make a road, scan it and write cloud, parameters and pictures",
@@ -65,6 +82,9 @@ def run(action: Callable[[argparse.Namespace], tuple[int, dict[str, Any], str]],
             code, result, text = action(arguments)
     except InputError as error:
         print(f"error: {error}", file=sys.stderr)
+        return 2
+    except ModuleNotFoundError as error:
+        print(_missing(error), file=sys.stderr)
         return 2
     except KeyboardInterrupt:
         print("interrupted; nothing was left half-written", file=sys.stderr)

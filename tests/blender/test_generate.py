@@ -105,6 +105,7 @@ def test_labels_of_the_pavement_agree_with_the_parameters(demo, sigma: float, ra
     scan = make_scan(scenario.model_copy(update={"scan": changed}), geometry, mesh)
     points = concatenate([scan_block(scan, *task).points for task in scan.blocks()[::5]])
     wrong = misplaced_points(points, geometry, 0.02 + 3 * sigma)
+    print(f"{wrong.mean():.4%} of {len(wrong)} points of the pavement lie outside the strips of their class")
     assert len(wrong) > 100_000
     assert wrong.mean() < 0.001
     swapped = replace(points, class_id=np.where(points.class_id == 1, 2, points.class_id).astype(np.uint8))
@@ -121,6 +122,7 @@ def test_points_of_the_road_lie_on_the_analytic_surface(demo) -> None:
     station, offset = geometry.alignment.project(local[:, :2])
     error = local[:, 2] - geometry.elevation(station, offset)
     error = error[np.isfinite(error)]
+    print(f"largest height error {1e3 * np.abs(error).max():.2f} mm over {len(error)} points")
     assert len(error) > 100_000
     assert np.abs(error).max() <= scenario.settings().tolerance
 

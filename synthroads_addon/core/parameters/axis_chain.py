@@ -19,6 +19,8 @@ from numpy.typing import NDArray
 
 from .alignment import Alignment, Element, FloatArray, IntArray
 
+AnyArray = NDArray[Any]  # real or complex
+
 FREE, EQUAL, ZERO = 0, 1, 2
 
 _QUADRATURE = 2.0  # m, step of the integrals in the Jacobian; the residuals themselves are exact
@@ -320,31 +322,35 @@ def refine(data: Data, chain: Chain, stations: FloatArray, free_knots: bool, ste
     The damping holds knots by their room, scaled by the present sum of squares: exact data end quadratically.
     """
     fit = Fit(chain, *data.measure(chain, stations))
-    damping, basis = 1.0, chain.basis(free_knots)
-    system: tuple[FloatArray, FloatArray, FloatArray] | None = None
-    for _ in range(steps):
-        if system is None:
-            matrix = data.jacobian(fit.chain, fit.stations) @ basis
-            scale = column_scale(matrix)
-            q, r = np.linalg.qr(matrix / scale)
-            held = knot_penalty(data, fit.chain, basis.shape[1]) / scale if free_knots else np.zeros((0, len(scale)))
-            system = r, -(q.T @ fit.residuals), held
-        r, wanted, held = system
+    basis = chain.basis(free_knots)
+    damping, system = 1.0, _system(data, fit, basis, free_knots)
+    for _ in range(steps if basis.shape[1] else 0):
+        r, wanted, held, scale = system
         weight = np.sqrt(damping * (fit.square + 1e-12 * len(fit.residuals)))
         rows = np.vstack((r, weight * held, np.sqrt(1e-7 * damping) * np.eye(r.shape[1])))
-        step = least_squares(rows, np.concatenate((wanted, np.zeros(len(rows) - len(wanted)))))
-        trial_chain = stepped(data, fit.chain, basis @ (step / scale))
+        step = least_squares(rows, np.concatenate((wanted, np.zeros(len(rows) - len(wanted))))) / scale
+        trial_chain = stepped(data, fit.chain, basis @ step)
         trial = Fit(trial_chain, *data.measure(trial_chain, fit.stations))
         if trial.square < fit.square:
             gain = 1.0 - trial.square / fit.square
-            fit, system, damping = trial, None, max(0.2 * damping, 1e-6)
+            fit, damping = trial, max(0.2 * damping, 1e-6)
             if gain < 1e-4 or fit.square < 1e-16 * len(fit.residuals):
                 break
+            system = _system(data, fit, basis, free_knots)
         else:
             damping *= 6.0
             if damping > 1e5:
                 break
     return fit
+
+
+def _system(data: Data, fit: Fit, basis: FloatArray, free_knots: bool) -> tuple[FloatArray, ...]:
+    """Return R (P, P), the right side (P,), the knots' penalty (M - 1, P) and the scale (P,) of the linear problem."""
+    matrix = data.jacobian(fit.chain, fit.stations) @ basis
+    scale = column_scale(matrix)
+    q, r = np.linalg.qr(matrix / scale)
+    held = knot_penalty(data, fit.chain, len(scale)) / scale if free_knots else np.zeros((0, len(scale)))
+    return r, -(q.T @ fit.residuals), held, scale
 
 
 def column_scale(matrix: FloatArray) -> FloatArray:

@@ -271,7 +271,7 @@ def _sharp(data: Data, fit: Fit, goal: Goal) -> bool:
 
 def _cut(chain: Chain, tail: float) -> float:
     """Return where to leave a window: at its last knot before the tail, or within a long element."""
-    latest = chain.knots[-1] - tail
+    latest = max(chain.knots[-1] - tail, 0.5 * chain.knots[-1])  # points that turn back make a short chain
     good = chain.knots[(chain.knots <= latest) & (chain.knots >= 0.4 * latest)]
     return float(good[-1]) if len(good) else float(latest)
 
