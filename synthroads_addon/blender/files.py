@@ -8,8 +8,11 @@ import bpy
 
 
 def empty_file() -> None:
-    """Begin a new file with nothing in it; what was open is lost."""
-    bpy.ops.wm.read_factory_settings(use_empty=True)
+    """Begin a new file with nothing in it; what was open is lost.
+
+    Not `read_factory_settings`: that would also disable the extension that this code may belong to.
+    """
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
 
 
 def save_scene(path: Path) -> None:

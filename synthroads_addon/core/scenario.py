@@ -47,8 +47,14 @@ class RoadScenario(ScenarioModel):
     design_class: Literal["EKA1A", "EKA1B", "EKA2", "EKA3"] = Field("EKA1A", description="Design class (RAA).")
     cross_section: str = Field("RQ31", description="Standard cross-section.")
     length: float = quantity(600.0, ge=1, le=200_000, unit="m", description="Length of the centreline.")
-    radius: Interval = _interval(900, 1500, "m", "Radius of the curve.")
-    grade_percent: Interval = _interval(-2.5, 2.5, "%", "Longitudinal grades.")
+    radius: Interval | None = Field(
+        None,
+        description="Radii of curves; from the class's smallest to 5000 m if not given.",
+        json_schema_extra={"unit": "m"},
+    )
+    grade_percent: Interval | None = Field(
+        None, description="Longitudinal grades; the class's if not given.", json_schema_extra={"unit": "%"}
+    )
     embankment_height: Interval = _interval(1.5, 4.0, "m", "Mean height of the road above the ground.")
     undulation: float = quantity(0.25, ge=0, le=20, unit="m", description="Standard deviation of the ground.")
     batter_slope: float = quantity(1.5, ge=0.5, le=10, unit="m/m", description="Run of the batter per height.")

@@ -129,8 +129,7 @@ class SYNTHROADS_OT_scan(bpy.types.Operator):
 
     def _leave(self, context: bpy.types.Context) -> None:
         context.window_manager.event_timer_remove(self._timer)
-        if context.workspace:
-            context.workspace.status_text_set(None)
+        _reset_status()
         _redraw_sidebars(context)
 
     def _succeed(self, job: ScanJob) -> set[str]:
@@ -154,8 +153,9 @@ class SYNTHROADS_OT_cancel_scan(bpy.types.Operator):
 
 def stop_scan() -> None:
     """Stop a scan that is at work, and wait until it has."""
-    if scan_job.latest:
+    if scanning() and scan_job.latest:
         scan_job.latest.stop(wait=True)
+        _reset_status()
 
 
 def _is_free(operator: type[bpy.types.Operator], context: bpy.types.Context) -> bool:
@@ -202,6 +202,11 @@ def _draw_status(header: bpy.types.Header, context: bpy.types.Context) -> None:
     layout.label(text="SynthRoads")
     layout.progress(factor=job.share, text=job.state)
     layout.separator_spacer()
+
+
+def _reset_status() -> None:
+    """Give the status bar back to Blender; what draws it is the same in every workspace."""
+    bpy.data.workspaces[0].status_text_set(None)
 
 
 def _redraw_sidebars(context: bpy.types.Context) -> None:

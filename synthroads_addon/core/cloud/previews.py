@@ -31,8 +31,9 @@ class TopView:
         self.start = np.asarray(start, dtype=np.float64)
         border = 0.02 * length + 1.0
         self.left, self.low = -border, low
-        self.pixel = (length + 2 * border) / WIDTH
-        self.width, self.height = WIDTH, max(1, int(np.ceil((high - low) / self.pixel)))
+        self.pixel = max(length + 2 * border, high - low) / WIDTH
+        self.width = max(1, int(np.ceil((length + 2 * border) / self.pixel)))
+        self.height = max(1, int(np.ceil((high - low) / self.pixel)))
         cells = self.width * self.height
         self.count = np.zeros(cells)
         self.intensity = np.zeros(cells)
@@ -103,7 +104,7 @@ class TopView:
 
     def _draw(self, pixels: NDArray[np.uint8], name: str, legend: list, epsg: int) -> Image.Image:
         font = ImageFont.load_default(size=17)
-        size = (self.width + 2 * _MARGIN, self.height + 2 * _MARGIN + _FOOTER)
+        size = (max(self.width, WIDTH // 2) + 2 * _MARGIN, self.height + 2 * _MARGIN + _FOOTER)
         picture = Image.new("RGB", size, _PAPER)
         picture.paste(Image.fromarray(pixels), (_MARGIN, _MARGIN))
         draw = ImageDraw.Draw(picture)

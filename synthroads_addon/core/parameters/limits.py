@@ -59,6 +59,11 @@ class StandardCrossSection:
     median: float
     verge: float = 1.5
 
+    @property
+    def paved_width(self) -> float:
+        """Return the width from the inner edge strip to the hard shoulder, m."""
+        return sum(self.lanes) + self.hard_shoulder + self.outer_edge_strip + self.inner_edge_strip
+
 
 STANDARD_CROSS_SECTIONS = {
     "RQ43.5": StandardCrossSection((3.75, 3.75, 3.5, 3.5), 2.5, 0.5, 0.75, 4.0),

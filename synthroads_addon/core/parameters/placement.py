@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from .alignment import Alignment
 from .limits import DELINEATOR_SPACING
-from .model import Carriageway, Delineator, Guardrail
+from .model import Carriageway, Delineator, Guardrail, Terrain
 
 GUARDRAIL_DISTANCE = 0.70
 """From the paved edge to the posts' axis: the beam's face then stands 0.5 m from the pavement (m)."""
@@ -25,16 +25,24 @@ def paved_edge(carriageway: Carriageway) -> float:
     return carriageway.inner_offset + carriageway.paved_width
 
 
-def roadside_guardrail(carriageway: Carriageway, start: float, end: float, instance: int) -> Guardrail:
-    """Return the guardrail beside one carriageway, its beam towards the traffic."""
+def roadside_guardrail(carriageway: Carriageway, start: float, end: float, through: bool, instance: int) -> Guardrail:
+    """Return the guardrail beside one carriageway, its beam towards the traffic.
+
+    One that stands all along the road goes on beyond both ends, so it has no terminals.
+    """
     return Guardrail(
         instance=instance,
         start_station=start,
         end_station=end,
         offset=carriageway.sign * (paved_edge(carriageway) + GUARDRAIL_DISTANCE),
         faces="right" if carriageway.side == "left" else "left",
-        terminal_length=min(12.0, (end - start) / 4),
+        terminal_length=0.0 if through else min(12.0, (end - start) / 4),
     )
+
+
+def needs_guardrail(terrain: Terrain) -> bool:
+    """Return whether the embankment is so high and steep that a guardrail must stand all along it (RPS)."""
+    return terrain.embankment_height > 3.0 and terrain.batter_slope < 3.0
 
 
 def median_guardrail(length: float, instance: int) -> Guardrail:
@@ -74,9 +82,13 @@ def delineator_stations(alignment: Alignment) -> NDArray[np.float64]:
     come closer before a curve begins.
     """
     radii, spacings = np.array(DELINEATOR_SPACING).T
-    result, station = [], min(25.0, alignment.length / 2)
+
+    def spacing(station: float) -> float:
+        ahead = np.abs(alignment.curvature(station + np.linspace(0.0, 50.0, 11))).max()
+        return float(np.interp(1.0 / max(ahead, 1e-9), radii, spacings))
+
+    result, station = [], min(spacing(0.0), alignment.length) / 2.0
     while station <= alignment.length:
         result.append(station)
-        ahead = np.abs(alignment.curvature(station + np.linspace(0.0, 50.0, 11))).max()
-        station += float(np.interp(1.0 / max(ahead, 1e-9), radii, spacings))
+        station += spacing(station)
     return np.array(result)

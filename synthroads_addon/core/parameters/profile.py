@@ -18,6 +18,8 @@ from .alignment import FloatArray, finite_array
 
 #: Roundings may overlap by this much (m) and are then taken as touching: stations in files are rounded.
 TOUCH = 1e-6
+#: A rounding with a tangent up to this (m) is none; its curvature could exceed all numbers.
+NO_ROUNDING = 1e-9
 
 
 @dataclass(frozen=True)
@@ -73,7 +75,8 @@ class Profile:
         self.grades = _grades(gap, np.diff(elevation))
         change = np.diff(self.grades)
         radius = np.array([point.radius for point in self.points], dtype=np.float64)
-        self.tangent_lengths = 0.5 * radius * np.abs(change)
+        tangent = 0.5 * radius * np.abs(change)
+        self.tangent_lengths = np.where(tangent > NO_ROUNDING, tangent, 0.0)
         self._refuse_overlap(gap)
         rounded = self.tangent_lengths > 0
         self._build_pieces(station, elevation, np.where(rounded, np.sign(change) / np.where(rounded, radius, 1.0), 0.0))

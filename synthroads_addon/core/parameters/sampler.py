@@ -3,21 +3,18 @@
 from __future__ import annotations
 
 import math
+from typing import Literal
 
 import numpy as np
 
 from ... import version
-from ..errors import InputError
 from ..random_streams import stream
 from ..scenario import Interval, RoadScenario
 from ..schema import rounded
 from .alignment import Alignment, Element
+from .crossfall import crossfall_points
 from .limits import (
-    LEAST_CROSSFALL_PERCENT,
-    LIMITS,
-    LONGEST_STRAIGHT,
     STANDARD_CROSS_SECTIONS,
-    curve_crossfall_percent,
 )
 from .markings import line_markings
 from .model import (
@@ -25,8 +22,6 @@ from .model import (
     AlignmentObject,
     AnyObject,
     Carriageway,
-    CrossfallPoint,
-    HorizontalElement,
     Lane,
     Median,
     Metadata,
@@ -34,9 +29,11 @@ from .model import (
     Terrain,
     Transform,
     Vegetation,
-    VerticalPoint,
 )
-from .placement import SHORTEST_GUARDRAIL, delineators, median_guardrail, roadside_guardrail
+from .placement import SHORTEST_GUARDRAIL, delineators, median_guardrail, needs_guardrail, roadside_guardrail
+from .sampler_alignment import HorizontalSampler, sample_profile
+
+_SIDES: tuple[Literal["left", "right"], ...] = ("right", "left")
 
 
 def sample_road(
@@ -55,30 +52,31 @@ def sample_road(
     """
     axis = axis or sample_alignment(scenario, seed)
     length = rounded(axis.length)
-    elements = [(e.length, e.curvature_start, e.curvature_end) for e in axis.horizontal]
-    alignment = Alignment([Element(*e) for e in elements], 0.0, 0.0, 0.0)
+    elements = [Element(e.length, e.curvature_start, e.curvature_end) for e in axis.horizontal]
+    alignment = Alignment(elements, 0.0, 0.0, 0.0)
     objects: dict[str, AnyObject] = {"alignment": axis}
 
     def following() -> int:
         return max(item.instance for item in objects.values()) + 1
 
     objects["median"] = Median(instance=following())
-    sides = {}
-    for side in ("right", "left"):
-        sides[side] = objects[f"carriageway-{side}"] = _carriageway(scenario, side, elements, following())
+    sides: dict[Literal["left", "right"], Carriageway] = {}
+    for side in _SIDES:
+        sides[side] = objects[f"carriageway-{side}"] = _carriageway(scenario, side, axis, following())
     for side, carriageway in sides.items():
         objects |= dict(line_markings(f"carriageway-{side}", carriageway, length, following()))
+    terrain = _terrain(scenario, seed)
     rails = []
     if scenario.median_guardrail:
         objects["guardrail-median"] = median_guardrail(length, following())
     for side, carriageway in sides.items():
-        span = _guardrail_span(length, stream(seed, "guardrail", side))
+        span = _guardrail_span(terrain, length, stream(seed, "guardrail", side))
         if scenario.roadside_guardrails and span:
-            rails.append(roadside_guardrail(carriageway, *span, following()))
+            rails.append(roadside_guardrail(carriageway, *span, needs_guardrail(terrain), following()))
             objects[f"guardrail-{side}"] = rails[-1]
     for carriageway in sides.values() if scenario.delineators else ():
         objects |= dict(delineators(carriageway, alignment, rails, following()))
-    objects["terrain"] = _terrain(scenario, seed, following())
+    objects["terrain"] = terrain.model_copy(update={"instance": following()})
     for name, plants in _vegetation(scenario, seed).items():
         objects[name] = plants.model_copy(update={"instance": following()})
     return RoadParameters(
@@ -96,11 +94,10 @@ def sample_road(
 
 
 def sample_alignment(scenario: RoadScenario, seed: int) -> AlignmentObject:
-    """Return an alignment of line, clothoid, arc, clothoid and line (what the length leaves room for)."""
-    rng = stream(seed, "alignment")
-    horizontal = _horizontal(scenario, rng)
+    """Return an alignment within the limits of its class, its middle at the local origin."""
+    horizontal = HorizontalSampler(scenario, stream(seed, "alignment")).draw()
     elements = [Element(e.length, e.curvature_start, e.curvature_end) for e in horizontal]
-    heading = rng.uniform(-180.0, 180.0)
+    heading = stream(seed, "heading").uniform(-180.0, 180.0)
     middle = Alignment(elements, 0.0, 0.0, math.radians(heading)).position(scenario.length / 2)
     return AlignmentObject(
         instance=1,
@@ -108,7 +105,7 @@ def sample_alignment(scenario: RoadScenario, seed: int) -> AlignmentObject:
         start_y=rounded(-middle[1]),
         start_heading_deg=rounded(heading),
         horizontal=horizontal,
-        vertical=_vertical(scenario, rng),
+        vertical=sample_profile(scenario, stream(seed, "profile")),
     )
 
 
@@ -116,79 +113,11 @@ def _draw(rng: np.random.Generator, limits: Interval) -> float:
     return rounded(rng.uniform(limits.minimum, limits.maximum))
 
 
-def _horizontal(scenario: RoadScenario, rng: np.random.Generator) -> tuple[HorizontalElement, ...]:
-    """Draw the curve so that both clothoids, two seconds of arc and the lines fit into the length."""
-    limits = LIMITS[scenario.design_class]
-    if scenario.radius.minimum < limits.radius:
-        raise InputError(
-            "road.radius.minimum",
-            scenario.radius.minimum,
-            f"{scenario.design_class} allows {limits.radius} m and more",
-        )
-    radius = _draw(rng, scenario.radius)
-    sign = 1.0 if rng.random() < 0.5 else -1.0
-    shortest_arc = limits.speed / 3.6 * 2.0
-    least = max(limits.clothoid, radius / 3.0, _run_off_clothoid(scenario, radius)) ** 2 / radius
-    room = (scenario.length - shortest_arc) / 2.0
-    if room < least:
-        # Too short for a whole curve with its transitions: part of one, at full curvature.
-        curvature = rounded(sign / radius, 12)
-        return (HorizontalElement.between(scenario.length, curvature, curvature),)
-    transition = rounded(rng.uniform(least, max(least, min(radius, 0.6 * room + 0.4 * least))))
-    lines = scenario.length - shortest_arc - 2.0 * transition
-    arc = rounded(shortest_arc + lines * rng.uniform(0.2, 0.6))
-    before = rounded((scenario.length - 2.0 * transition - arc) * rng.uniform(0.3, 0.7))
-    after = rounded(scenario.length - 2.0 * transition - arc - before)
-    if max(before, after) > LONGEST_STRAIGHT:
-        raise InputError("road.length", scenario.length, f"one curve leaves a straight over {LONGEST_STRAIGHT:.0f} m")
-    curvature = rounded(sign / radius, 12)
-    return (
-        HorizontalElement.between(before, 0.0, 0.0),
-        HorizontalElement.between(transition, 0.0, curvature),
-        HorizontalElement.between(arc, curvature, curvature),
-        HorizontalElement.between(transition, curvature, 0.0),
-        HorizontalElement.between(after, 0.0, 0.0),
-    )
-
-
-def _run_off_clothoid(scenario: RoadScenario, radius: float) -> float:
-    """Return the smallest A (m) whose length suffices for the crossfall's run-off."""
-    section = STANDARD_CROSS_SECTIONS[scenario.cross_section]
-    half = (sum(section.lanes) + section.hard_shoulder + section.outer_edge_strip + section.inner_edge_strip) / 2.0
-    change = LEAST_CROSSFALL_PERCENT + curve_crossfall_percent(scenario.design_class, 1.0 / radius)
-    return math.sqrt(radius * half * change / LIMITS[scenario.design_class].run_off_percent)
-
-
-def _vertical(scenario: RoadScenario, rng: np.random.Generator) -> tuple[VerticalPoint, ...]:
-    """Draw two grades with one crest or sag in the middle third; its radius fills most of the room it has."""
-    limits = LIMITS[scenario.design_class]
-    steepest = max(abs(scenario.grade_percent.minimum), abs(scenario.grade_percent.maximum))
-    if steepest > limits.grade_percent:
-        raise InputError("road.grade_percent", steepest, f"{scenario.design_class} allows {limits.grade_percent} %")
-    first = _draw(rng, scenario.grade_percent)
-    length = scenario.length
-    middle = rounded(length * rng.uniform(0.4, 0.6))
-    room = min(middle, length - middle)
-    # The tangent T = H |g2 - g1| / 2 must fit: the second grade is drawn as near to the first as that asks.
-    change = 2.0 * room / max(limits.crest, limits.sag)
-    low = max(scenario.grade_percent.minimum, first - 100.0 * change)
-    high = min(scenario.grade_percent.maximum, first + 100.0 * change)
-    second = rounded(rng.uniform(low, high))
-    least = limits.crest if second < first else limits.sag
-    difference = abs(second - first) / 100.0
-    largest = max(least, min(2.0 * room / max(difference, 1e-9), 5.0 * least))
-    radius = rounded(rng.uniform(least, largest)) if difference > 0 else 0.0
-    return (
-        VerticalPoint(station=0.0, elevation=rounded(-first / 100.0 * middle)),
-        VerticalPoint(station=middle, elevation=0.0, radius=radius),
-        VerticalPoint(station=length, elevation=rounded(second / 100.0 * (length - middle))),
-    )
-
-
 def _carriageway(
-    scenario: RoadScenario, side: str, elements: list[tuple[float, float, float]], instance: int
+    scenario: RoadScenario, side: Literal["left", "right"], axis: AlignmentObject, instance: int
 ) -> Carriageway:
     section = STANDARD_CROSS_SECTIONS[scenario.cross_section]
+    half_width = section.paved_width / 2.0
     return Carriageway(
         instance=instance,
         side=side,
@@ -198,44 +127,27 @@ def _carriageway(
         lanes=tuple(Lane(width=width) for width in section.lanes),
         inner_edge_strip_width=section.inner_edge_strip,
         verge_width=section.verge,
-        crossfall=tuple(_crossfall(scenario.design_class, side, elements)),
+        crossfall=crossfall_points(scenario.design_class, side, half_width, axis.horizontal),
     )
 
 
-def _crossfall(design_class: str, side: str, elements: list[tuple[float, float, float]]) -> list[CrossfallPoint]:
-    """Return the crossfall at the elements' borders: outwards on straights and in wide curves, else to the inside.
+def _guardrail_span(terrain: Terrain, length: float, rng: np.random.Generator) -> tuple[float, float] | None:
+    """Return stations between which a roadside guardrail stands, or None where the road is too short for one.
 
-    Where the curvature changes the crossfall runs off linearly along the clothoid.
+    A high and steep embankment needs it all along (RPS); elsewhere it stands along a part.
     """
-    outwards = LEAST_CROSSFALL_PERCENT if side == "right" else -LEAST_CROSSFALL_PERCENT
-
-    def wanted(curvature: float) -> float:
-        if abs(curvature) * LIMITS[design_class].radius_outwards < 1.0:
-            return outwards
-        return rounded(-math.copysign(curve_crossfall_percent(design_class, curvature), curvature))
-
-    points: list[CrossfallPoint] = []
-    station = 0.0
-    for length, start, end in elements:
-        for at, curvature in ((station, start), (station + length, end)):
-            if not points or at > points[-1].station:
-                points.append(CrossfallPoint(station=rounded(at), crossfall_percent=wanted(curvature)))
-        station += length
-    return points
-
-
-def _guardrail_span(length: float, rng: np.random.Generator) -> tuple[float, float] | None:
-    """Return stations between which a roadside guardrail stands, or None where the road is too short for one."""
+    if needs_guardrail(terrain):
+        return 0.0, length
     if length < 1.5 * SHORTEST_GUARDRAIL:
         return None
     start = rounded(length * rng.uniform(0.05, 0.2))
     return start, rounded(max(start + SHORTEST_GUARDRAIL, length * rng.uniform(0.75, 0.95)))
 
 
-def _terrain(scenario: RoadScenario, seed: int, instance: int) -> Terrain:
+def _terrain(scenario: RoadScenario, seed: int) -> Terrain:
     rng = stream(seed, "terrain")
     return Terrain(
-        instance=instance,
+        instance=1,
         half_width=scenario.half_width,
         embankment_height=_draw(rng, scenario.embankment_height),
         undulation=scenario.undulation,

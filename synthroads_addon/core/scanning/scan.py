@@ -112,13 +112,15 @@ def scan_block(scan: Scan, strip: Strip, block: int) -> BlockResult:
 def scan_pulses(scan: Scan, strip: Strip, first: int, count: int, noise: np.random.Generator) -> BlockResult:
     """Scan pulses ``first`` to ``first + count`` of a strip; memory grows with their number."""
     pulses = rotating_mirror(scan.setting, scan.path, strip, first, count)
+    # Drawn for every pulse and return there could be, so that one more return leaves the others' noise alone.
+    errors = noise.normal(size=(count, scan.setting.device.maximum_returns))
     facing = _reaching_scene(scan, pulses)
     pulses = Pulses(*(getattr(pulses, name)[facing] for name in Pulses.__dataclass_fields__))
     directions = beam_directions(scan, pulses)
     faces = _cast(scan, pulses, directions)
     echoes, rays = _echoes(scan, pulses, directions, faces)
     strong = echoes.intensity >= scan.setting.threshold
-    points = _points(scan, strip, pulses, echoes, rays, np.flatnonzero(strong), noise)
+    points = _points(scan, strip, pulses, echoes, rays, np.flatnonzero(strong), errors[facing])
     return BlockResult(points, count, faces.size, int(np.count_nonzero(~strong)))
 
 
@@ -202,14 +204,14 @@ def _points(
     echoes: Echoes,
     rays: _Rays,
     strong: NDArray[np.intp],
-    noise: np.random.Generator,
+    errors: Float,
 ) -> PointBlock:
     """Return the points of the echoes above the threshold, with range noise."""
     keep, number, returns = number_returns(echoes.pulse[strong], scan.setting.device.maximum_returns)
     chosen = strong[keep]
     pulse, row = echoes.pulse[chosen], rays.slot[echoes.ray[chosen]]
     face = rays.face[row]
-    distance = echoes.range[chosen] + scan.setting.range_sigma * noise.normal(size=len(chosen))
+    distance = echoes.range[chosen] + scan.setting.range_sigma * errors[pulse, number - 1]
     local = pulses.origin[pulse] + distance[:, None] * pulses.direction[pulse]
     return PointBlock(
         xyz=local + scan.mesh.origin,
