@@ -36,8 +36,13 @@ except ModuleNotFoundError as error:  # Blender itself has none of the packages 
     print(_missing(error), file=sys.stderr)
     raise SystemExit(2) from None
 
+Outcome = tuple[int, dict[str, Any], str | Iterator[str]]
+"""What a sub-command returns: exit code, result as JSON data, result as text or lines of it."""
+
 COMMANDS = {
     "generate": "make a road, scan it and write cloud, parameters and pictures",
+    "parameters": "sample road parameters and write them to standard output",
+    "check": "list the rules of the guidelines that a road breaks",
     "tradeoff": "measure error against time for each knob",
 }
 
@@ -75,25 +80,31 @@ def add_common_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--json", action="store_true", help="print the result as JSON on standard output")
 
 
-def run(action: Callable[[argparse.Namespace], tuple[int, dict[str, Any], str]], arguments: argparse.Namespace) -> int:
-    """Run an action that returns (exit code, result as JSON data, result as text); print what was asked for."""
+def run(action: Callable[[argparse.Namespace], Outcome], arguments: argparse.Namespace) -> int:
+    """Run an action and print of its outcome what was asked for; turn errors into one line and an exit code."""
     try:
         with _without_blenders_chatter():
             code, result, text = action(arguments)
+        if arguments.json:
+            print(canonical_json(result), end="")
+        elif not arguments.quiet:
+            for line in [text] if isinstance(text, str) else text:
+                print(line)
+        sys.stdout.flush()
+        return code
     except InputError as error:
         print(f"error: {error}", file=sys.stderr)
         return 2
     except ModuleNotFoundError as error:
         print(_missing(error), file=sys.stderr)
         return 2
+    except BrokenPipeError:
+        # Whoever read our output has left (`| head`): nothing more to say, not even when the process ends.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
+        return 130
     except KeyboardInterrupt:
         print("interrupted; nothing was left half-written", file=sys.stderr)
         return 130
-    if arguments.json:
-        print(canonical_json(result), end="")
-    elif not arguments.quiet:
-        print(text)
-    return code
 
 
 def entry(name: str) -> None:

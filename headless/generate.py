@@ -10,7 +10,7 @@ from typing import Any
 if __name__ == "__main__":
     sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from headless.cli import add_common_arguments, entry, progress_bar
+from headless.cli import Outcome, add_common_arguments, entry, progress_bar
 from synthroads_addon.core.scenario import load_scenario, scenario_names
 
 
@@ -35,7 +35,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_common_arguments(parser)
 
 
-def run(arguments: argparse.Namespace) -> tuple[int, dict[str, Any], str]:
+def run(arguments: argparse.Namespace) -> Outcome:
     """Run `synthroads generate`."""
     changes = list(arguments.changes)
     if arguments.seed is not None:

@@ -12,7 +12,7 @@ from typing import Any
 if __name__ == "__main__":
     sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from headless.cli import add_common_arguments, entry, progress_bar
+from headless.cli import Outcome, add_common_arguments, entry, progress_bar
 from synthroads_addon.core.errors import InputError
 from synthroads_addon.core.scenario import load_scenario
 from synthroads_addon.core.schema import canonical_json
@@ -31,7 +31,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_common_arguments(parser)
 
 
-def run(arguments: argparse.Namespace) -> tuple[int, dict[str, Any], str]:
+def run(arguments: argparse.Namespace) -> Outcome:
     """Run `synthroads tradeoff`; each row is measured in a process of its own, so that its memory is its own."""
     load_scenario(arguments.scenario)
     if arguments.row:
@@ -108,7 +108,9 @@ def _draw_knob(axis: Any, rows_of_knob: list[dict[str, Any]], knob: str, name: s
     x, y = [row["seconds"] for row in rows_of_knob], [row["errors"][name] for row in rows_of_knob]
     axis.plot(x, y, "*" if preset else "o-", label=knob.replace("_", " "), markersize=14 if preset else 6)
     for row, a, b in zip(rows_of_knob, x, y, strict=True):
-        axis.annotate(str(row["value"]), (a, b), textcoords="offset points", xytext=(8, -14 if preset else 5), fontsize=9)
+        axis.annotate(
+            str(row["value"]), (a, b), textcoords="offset points", xytext=(8, -14 if preset else 5), fontsize=9
+        )
 
 
 if __name__ == "__main__":

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 import time
 import tracemalloc
@@ -63,7 +64,7 @@ def quadrature(elements: list[Element], x: float, y: float, heading: float, stat
     points, s = [], 0.0
     for station in stations:
         ends = [s, *borders[(borders > s) & (borders < station)], station]
-        for a, b in zip(ends[:-1], ends[1:], strict=True):
+        for a, b in itertools.pairwise(ends):
             if b > a:
                 x += quad(lambda t: math.cos(exact_heading(elements, heading, t)), a, b, epsabs=1e-12, epsrel=1e-13)[0]
                 y += quad(lambda t: math.sin(exact_heading(elements, heading, t)), a, b, epsabs=1e-12, epsrel=1e-13)[0]
@@ -212,7 +213,7 @@ def test_moving_and_turning_the_start_moves_and_turns_the_road(
     share=st.floats(-1.0, 1.0),
     where=st.floats(-0.2, 1.2),
 )
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=6000, deadline=None)
 def test_project_is_the_inverse_where_the_foot_is_unique(
     rows: list[tuple[float, float, float]], share: float, where: float
 ) -> None:
@@ -221,17 +222,18 @@ def test_project_is_the_inverse_where_the_foot_is_unique(
     sharpest = max(abs(k) for row in rows for k in row[1:])
     offset = share * min(300.0, 0.9 / max(sharpest, 1e-9))
     point = left_of(alignment, np.array([station]), np.array([offset]))
-    dense = alignment.position(np.linspace(0.0, alignment.length, 4000))
-    nearest = np.hypot(*(dense - point).T).min()
+    distance = np.hypot(*(alignment.position(np.linspace(0.0, alignment.length, 4000)) - point).T)
+    nearest = distance.min()
     found, lateral = (float(value[0]) for value in alignment.project(point))
-    if nearest < abs(offset) - 1e-6:  # another part of the road is nearer: the foot must be there
+    same = found == pytest.approx(station, abs=1e-6) and lateral == pytest.approx(offset, abs=1e-6)
+    if 0.0 <= station <= alignment.length:
+        # Another part of the road may be nearer, or (to within the samples' spacing) as near.
+        assert same or (nearest < abs(offset) + 1e-3 and abs(lateral) <= nearest + 1e-6)
+    elif 0 < distance.argmin() < 3999:
+        assert 0.0 <= found <= alignment.length  # the road comes first
         assert abs(lateral) <= nearest + 1e-6
-        return
-    if nearest < abs(offset) + 1e-3 and found != pytest.approx(station, abs=1e-6):
-        assert abs(lateral) == pytest.approx(abs(offset), abs=1e-3)  # a tie, but for the sampling
-        return
-    assert found == pytest.approx(station, abs=1e-6)
-    assert lateral == pytest.approx(offset, abs=1e-6)
+    else:
+        assert same or abs(lateral) < abs(offset) + 1e-6  # the tangents may cross
 
 
 def test_round_trip_at_large_offsets_on_every_element() -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import itertools
 import json
 import time
 from pathlib import Path
@@ -391,7 +392,7 @@ class TestRealAxes:
 
     def test_curvature_is_continuous(self, path: Path) -> None:
         elements = real_fit(path).alignment.elements
-        steps = [abs(a.curvature_end - b.curvature_start) for a, b in zip(elements[:-1], elements[1:], strict=True)]
+        steps = [abs(a.curvature_end - b.curvature_start) for a, b in itertools.pairwise(elements)]
         assert max(steps, default=0.0) < 1e-12
 
     def test_a_second_pass_finds_the_elements_again(self, path: Path) -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -104,7 +106,7 @@ def profiles(draw: st.DrawFn) -> Profile:
 def test_curvature_integrates_to_grade_and_grade_to_elevation(profile: Profile) -> None:
     """Between breakpoints, where all three are smooth, by Simpson's rule."""
     ends = [profile.points[0].station - 50.0, *profile.breakpoints, profile.points[-1].station + 50.0]
-    for a, b in zip(ends[:-1], ends[1:], strict=True):
+    for a, b in itertools.pairwise(ends):
         if b - a < 1e-6:
             continue
         s = np.linspace(a + 1e-9 * (b - a), b - 1e-9 * (b - a), 41)

@@ -211,7 +211,8 @@ class Alignment:
         """Return station (N,) and offset (N,) of map points (N, 2); the offset is positive to the left.
 
         The foot is the road's nearest point. The tangents beyond the ends serve the points whose nearest point of the
-        road is that end, so a road that bends round and crosses its own prolongation is measured on the road.
+        road is an end (the nearer tangent, if both would do), so a road that bends round and crosses its own
+        prolongation is measured on the road.
         Memory beyond the result is bounded. InputError for a wrong shape or points that aren't finite.
         """
         wanted = finite_array("points", points)
@@ -279,9 +280,22 @@ class Alignment:
             order = np.lexsort((np.hypot(along, offset), owner))
             best = order[np.searchsorted(owner, np.arange(len(x)))]  # owner is sorted, so its first is the best
             station, along, offset = station[best], along[best], offset[best]
-        # A foot held at an end while the point lies farther along the tangent belongs to the tangent.
         beyond = ((station <= 0.0) & (along < 0.0)) | ((station >= self.length) & (along > 0.0))
-        return np.where(beyond, station + along, station), offset
+        if beyond.any():
+            station[beyond], offset[beyond] = self._on_tangents(x[beyond], y[beyond])
+        return station, offset
+
+    def _on_tangents(self, x: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return station and offset on the nearer of both tangents, of points that lie beyond an end."""
+        feet = []
+        for end, side in ((0.0, -1.0), (self.length, 1.0)):
+            px, py, heading, _ = (float(value[0]) for value in self._evaluate(np.array([end])))
+            along = (x - px) * np.cos(heading) + (y - py) * np.sin(heading)
+            offset = (y - py) * np.cos(heading) - (x - px) * np.sin(heading)
+            feet.append((end + along, offset, np.where(along * side > 0.0, np.abs(offset), np.inf)))
+        (station_0, offset_0, distance_0), (station_1, offset_1, distance_1) = feet
+        later = distance_1 < distance_0
+        return np.where(later, station_1, station_0), np.where(later, offset_1, offset_0)
 
     def _find_feet(
         self, x: FloatArray, y: FloatArray, station: FloatArray, low: FloatArray, high: FloatArray

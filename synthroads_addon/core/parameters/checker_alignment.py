@@ -7,7 +7,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from .checker_base import STRAIGHT, Finding, Road, Rule, Run, above, below, class_name, same_curvature
+from .checker_base import STRAIGHT, Finding, Road, Rule, Run, above, below, same_curvature
 from .limits import LONGEST_STRAIGHT
 
 #: Shortest straight between two curves of the same direction, m (RAA, after a textbook).
@@ -33,7 +33,7 @@ def _radius(road: Road) -> Iterator[Finding]:
     sharp += [(station, 1.0 / curvature) for station, curvature in _clothoids_own_ends(road)]
     for station, radius in sorted(sharp):
         if below(radius, least):
-            text = f"The radius of {radius:.1f} m is below {least:.0f} m (RAA, {class_name(road.design_class)})."
+            text = f"The radius of {radius:.1f} m is below {least:.0f} m ({road.guideline})."
             yield Finding(road.axis, station, radius, least, text)
 
 
@@ -43,7 +43,8 @@ def _clothoids_own_ends(road: Road) -> Iterator[tuple[float, float]]:
     last = len(k0) - 1
     for i in np.flatnonzero(~road.constant).tolist():
         if k1[i] >= k0[i]:
-            beside = k0[i + 1] * (1.0 + 1e-6) if i < last and road.constant[i + 1] else 0.0
+            stands = i < last and (road.constant[i + 1] or k1[i + 1] > k0[i + 1])
+            beside = k0[i + 1] * (1.0 + 1e-6) if stands else 0.0
             at, curvature = road.starts[i + 1], k1[i]
         else:
             beside = k1[i - 1] * (1.0 + 1e-6) if i > 0 else 0.0
@@ -75,7 +76,7 @@ def _clothoid_minimum(road: Road) -> Iterator[Finding]:
     least = road.limits.clothoid
     for i, parameter, _, _ in _clothoids(road):
         if below(parameter, least):
-            text = f"The clothoid's A = {parameter:.1f} m is below {least:.0f} m (RAA, {class_name(road.design_class)})."
+            text = f"The clothoid's A = {parameter:.1f} m is below {least:.0f} m ({road.guideline})."
             yield Finding(road.axis, float(road.starts[i]), parameter, least, text)
 
 
@@ -115,10 +116,9 @@ def _straight_between(road: Road) -> Iterator[Finding]:
         length = run.end - run.start
         if not run.straight or road.cut(run) or not below(length, least):
             continue
-        before, after = run.first - 1, run.last + 1
-        turn_before = road.k0[before] + road.k1[before]
-        turn_after = road.k0[after] + road.k1[after]
-        if turn_before * turn_after > 0.0:
+        before = _direction(road.k1[run.first - 1], road.k0[run.first - 1])
+        after = _direction(road.k0[run.last + 1], road.k1[run.last + 1])
+        if before * after > 0.0:
             text = (
                 f"The straight between two curves of the same direction is {length:.1f} m long; it must be absent or "
                 f"{least:.0f} m and more (RAA)."
@@ -126,8 +126,13 @@ def _straight_between(road: Road) -> Iterator[Finding]:
             yield Finding(road.axis, run.start, length, least, text)
 
 
+def _direction(near: float, far: float) -> float:
+    """Return the sign of an element beside a straight: of its curvature there, or else at its other end."""
+    return float(np.sign(near if abs(near) > STRAIGHT else far))
+
+
 def _arcs(road: Road) -> list[Run]:
-    """Return the arcs in order, and as arcs without length the points where two clothoids meet at their sharper ends."""
+    """Return the arcs in order; where two clothoids meet at their sharper ends is an arc without length."""
     arcs = [run for run in road.runs if not run.straight]
     k0, k1 = road.k0, road.k1
     for i, (a, b) in enumerate(pairwise(~road.constant)):
@@ -191,9 +196,7 @@ def _grade(road: Road) -> Iterator[Finding]:
     for station, grade in found:
         if above(100.0 * abs(grade), steepest) and (station, grade) not in reported:
             reported.add((station, grade))
-            text = (
-                f"The grade of {100.0 * grade:.2f} % is steeper than {steepest} % (RAA, {class_name(road.design_class)})."
-            )
+            text = f"The grade of {100.0 * grade:.2f} % is steeper than {steepest} % ({road.guideline})."
             yield Finding(road.axis, station, 100.0 * abs(grade), steepest, text)
 
 
@@ -208,7 +211,7 @@ def _rounding(road: Road, crest: bool) -> Iterator[Finding]:
         if below(radius, least):
             kind = "crest" if crest else "sag"
             has = f"radius of {radius:.0f} m" if radius else "missing rounding"
-            text = f"The {kind}'s {has} is below {least:.0f} m (RAA, {class_name(road.design_class)})."
+            text = f"The {kind}'s {has} is below {least:.0f} m ({road.guideline})."
             yield Finding(road.axis, float(profile.station[i]), radius, least, text)
 
 

@@ -73,7 +73,7 @@ class Rule:
         unit: unit of value and limit.
         source: guideline, or what else it follows from.
         sure: ``confirmed`` (secondary sources print it), ``derived`` (computed from what they print),
-            ``unconfirmed`` (common knowledge, not found in print), ``definition`` (a set that breaks it makes no sense).
+            ``unconfirmed`` (common knowledge, not found in print), ``definition`` (a set that breaks it is faulty).
         find: function that yields the findings.
     """
 
@@ -118,6 +118,7 @@ class Road:
     Attributes:
         axis: id of the alignment.
         limits: limits of the design class.
+        guideline: the RAA with the design class, for people.
         two_seconds: m travelled in two seconds at the class's speed.
         lengths, k0, k1: (E,) lengths (m) and curvatures (1/m) at both ends of the horizontal elements.
         starts: (E + 1,) stations of their borders; `length` is the last.
@@ -131,6 +132,7 @@ class Road:
         self.parameters = parameters
         self.design_class = parameters.design_class
         self.limits = LIMITS[self.design_class]
+        self.guideline = f"RAA, {self.design_class.replace('EKA', 'EKA ')}"
         self.two_seconds = self.limits.speed / 3.6 * 2.0
         alignment = parameters.alignment
         self.axis = next(name for name, item in parameters.objects.items() if item is alignment)
@@ -222,8 +224,3 @@ def gaps(ranges: Iterable[tuple[float, float]], length: float) -> Iterator[tuple
         if start > reached + SAME_STATION and reached < length - SAME_STATION:
             yield reached, min(start, length)
         reached = max(reached, end)
-
-
-def class_name(design_class: str) -> str:
-    """Return the design class as people write it: ``EKA 1A``."""
-    return design_class.replace("EKA", "EKA ")

@@ -7,9 +7,8 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from .alignment import Alignment
 from .limits import DELINEATOR_SPACING
-from .model import Carriageway, Delineator, Guardrail, Terrain
+from .model import Carriageway, Delineator, Guardrail, HorizontalElement, Terrain
 
 GUARDRAIL_DISTANCE = 0.70
 """From the paved edge to the posts' axis: the beam's face then stands 0.5 m from the pavement (m)."""
@@ -53,10 +52,9 @@ def median_guardrail(length: float, instance: int) -> Guardrail:
 
 
 def delineators(
-    carriageway: Carriageway, alignment: Alignment, guardrails: list[Guardrail], first_instance: int
+    carriageway: Carriageway, stations: NDArray[np.float64], guardrails: list[Guardrail], first_instance: int
 ) -> Iterator[tuple[str, Delineator]]:
-    """Yield (id, post) along the outer edge of one carriageway: every 50 m, closer in tight curves."""
-    stations = delineator_stations(alignment)
+    """Yield (id, post) at stations (P,) along the outer edge of one carriageway, behind the guardrail where one is."""
     for index, station in enumerate(stations):
         offset = carriageway.sign * (paved_edge(carriageway) + DELINEATOR_DISTANCE)
         covered = any(
@@ -75,20 +73,26 @@ def delineators(
         )
 
 
-def delineator_stations(alignment: Alignment) -> NDArray[np.float64]:
+def delineator_stations(elements: tuple[HorizontalElement, ...]) -> NDArray[np.float64]:
     """Return stations of delineators, from half a spacing after the beginning to the end.
 
     Between two posts lies the spacing of the table at the tightest curvature within the next 50 m, so that the posts
     come closer before a curve begins.
     """
     radii, spacings = np.array(DELINEATOR_SPACING).T
+    borders = np.cumsum([0.0, *(element.length for element in elements)])
+    # Curvature is linear in between, so that its largest values stand at borders and at the ends of the stretch ahead.
+    at_border = np.abs([*(element.curvature_start for element in elements), elements[-1].curvature_end])
+    at_border = np.maximum(at_border, np.abs([elements[0].curvature_start, *(e.curvature_end for e in elements)]))
 
     def spacing(station: float) -> float:
-        ahead = np.abs(alignment.curvature(station + np.linspace(0.0, 50.0, 11))).max()
+        ends = np.interp([station, station + 50.0], borders, at_border)
+        ahead = max(*ends, at_border[(borders >= station) & (borders <= station + 50.0)].max(initial=0.0))
         return float(np.interp(1.0 / max(ahead, 1e-9), radii, spacings))
 
-    result, station = [], min(spacing(0.0), alignment.length) / 2.0
-    while station <= alignment.length:
+    length = float(borders[-1])
+    result, station = [], min(spacing(0.0), length) / 2.0
+    while station <= length:
         result.append(station)
         station += spacing(station)
     return np.array(result)

@@ -30,7 +30,14 @@ from .model import (
     Transform,
     Vegetation,
 )
-from .placement import SHORTEST_GUARDRAIL, delineators, median_guardrail, needs_guardrail, roadside_guardrail
+from .placement import (
+    SHORTEST_GUARDRAIL,
+    delineator_stations,
+    delineators,
+    median_guardrail,
+    needs_guardrail,
+    roadside_guardrail,
+)
 from .sampler_alignment import HorizontalSampler, sample_profile
 
 _SIDES: tuple[Literal["left", "right"], ...] = ("right", "left")
@@ -52,8 +59,6 @@ def sample_road(
     """
     axis = axis or sample_alignment(scenario, seed)
     length = rounded(axis.length)
-    elements = [Element(e.length, e.curvature_start, e.curvature_end) for e in axis.horizontal]
-    alignment = Alignment(elements, 0.0, 0.0, 0.0)
     objects: dict[str, AnyObject] = {"alignment": axis}
 
     def following() -> int:
@@ -74,8 +79,9 @@ def sample_road(
         if scenario.roadside_guardrails and span:
             rails.append(roadside_guardrail(carriageway, *span, needs_guardrail(terrain), following()))
             objects[f"guardrail-{side}"] = rails[-1]
+    posts = delineator_stations(axis.horizontal)
     for carriageway in sides.values() if scenario.delineators else ():
-        objects |= dict(delineators(carriageway, alignment, rails, following()))
+        objects |= dict(delineators(carriageway, posts, rails, following()))
     objects["terrain"] = terrain.model_copy(update={"instance": following()})
     for name, plants in _vegetation(scenario, seed).items():
         objects[name] = plants.model_copy(update={"instance": following()})

@@ -1,0 +1,59 @@
+"""List every rule of the guidelines that a road breaks. Exit code 0: none; 3: some."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+if __name__ == "__main__":
+    sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
+from headless.cli import add_common_arguments, entry
+
+if TYPE_CHECKING:
+    from synthroads_addon.core.parameters.checker import Violation
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments of `synthroads check`."""
+    parser.add_argument("file", type=Path, metavar="FILE", help="parameter set (parameters.json)")
+    add_common_arguments(parser)
+
+
+def run(arguments: argparse.Namespace) -> tuple[int, dict[str, Any], str]:
+    """Run `synthroads check`."""
+    from synthroads_addon.core.parameters.checker import check
+    from synthroads_addon.core.parameters.model import read_parameters
+
+    violations = check(read_parameters(arguments.file))
+    return 3 if violations else 0, {"violations": [asdict(item) for item in violations]}, table(violations)
+
+
+def table(violations: list[Violation]) -> str:
+    """Return the violations as a table for people, each with its sentence."""
+    if not violations:
+        return "no violations"
+    head = ("rule", "object", "station", "value", "limit", "")
+    rows = [
+        (v.rule, v.object, f"{v.station:.1f} m", _number(v.value, v.unit), _number(v.limit, v.unit), v.text)
+        for v in violations
+    ]
+    widths = [max(len(row[column]) for row in (head, *rows)) for column in range(5)]
+    lines = []
+    for row in (head, *rows):
+        left = [row[column].ljust(widths[column]) for column in (0, 1)]
+        right = [row[column].rjust(widths[column]) for column in (2, 3, 4)]
+        lines.append("  ".join([*left, *right, row[5]]).rstrip())
+    count = len(violations)
+    return "\n".join([*lines, f"{count} violation{'s' if count > 1 else ''}"])
+
+
+def _number(value: float, unit: str) -> str:
+    return f"{value:.6g}" + (f" {unit}" if unit != "1" else "")
+
+
+if __name__ == "__main__":
+    entry("check")

@@ -1,0 +1,35 @@
+"""Which rules of the guidelines (RAA, RMS, RPS) a road breaks. It works on any parameter set, hand-made or sampled."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from . import checker_alignment, checker_furniture, checker_section
+from .checker_base import Road, Rule, Violation
+from .model import RoadParameters
+
+__all__ = ["RULES", "Rule", "Violation", "check"]
+
+RULES: dict[str, Rule] = {
+    rule.id: rule for rule in (*checker_alignment.RULES, *checker_section.RULES, *checker_furniture.RULES)
+}
+"""All rules by id, in the order of their findings."""
+
+
+def check(parameters: RoadParameters) -> list[Violation]:
+    """Return every broken rule in the order of `RULES`, then along the road; none if the road keeps them all."""
+    violations: list[Violation] = []
+    with np.errstate(all="ignore"):
+        road = Road(parameters)
+        for rule in RULES.values():
+            found = [
+                Violation(rule.id, name, _finite(station), _finite(value), _finite(limit), rule.unit, text)
+                for name, station, value, limit, text in rule.find(road)
+            ]
+            violations += sorted(found, key=lambda violation: violation.station)
+    return violations
+
+
+def _finite(value: float) -> float:
+    """Return a number that JSON can hold: values that overflowed count as the largest one."""
+    return float(np.nan_to_num(value))
