@@ -213,7 +213,7 @@ def test_moving_and_turning_the_start_moves_and_turns_the_road(
     share=st.floats(-1.0, 1.0),
     where=st.floats(-0.2, 1.2),
 )
-@settings(max_examples=6000, deadline=None)
+@settings(max_examples=150, deadline=None)
 def test_project_is_the_inverse_where_the_foot_is_unique(
     rows: list[tuple[float, float, float]], share: float, where: float
 ) -> None:

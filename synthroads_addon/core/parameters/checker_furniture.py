@@ -131,7 +131,7 @@ def _delineator_missing(road: Road) -> Iterator[Finding]:
         limit = float(_spacing(road, np.array([0.0, max(first, 0.0)]))[0]) / 2.0
         if first > limit + SPACING_ROOM:
             what = f"The first delineator stands at {first:.1f} m" if len(posts) else "There is no delineator"
-            text = f"{what} on the outer side; one is needed within {limit:.1f} m of the beginning (StVO, sign 620)."
+            text = f"{what} on the outer side; one is needed within {limit:.1f} m of the beginning (HLB)."
             yield Finding(name, 0.0, first, limit, text)
 
 
@@ -143,7 +143,7 @@ def _delineator_spacing(road: Road) -> Iterator[Finding]:
         borders = np.append(posts, max(road.length, posts[-1]))
         gap, limit = np.diff(borders), _spacing(road, borders)
         for i in np.flatnonzero(gap > limit + SPACING_ROOM).tolist():
-            text = f"No delineator follows for {gap[i]:.1f} m; {limit[i]:.1f} m are allowed (StVO, sign 620)."
+            text = f"No delineator follows for {gap[i]:.1f} m; {limit[i]:.1f} m are allowed (HLB)."
             yield Finding(name, float(posts[i]), float(gap[i]), float(limit[i]), text)
 
 
@@ -151,7 +151,9 @@ def _delineator_distance(road: Road) -> Iterator[Finding]:
     for name, post in road.delineators.items():
         distance = _clearance(road, post.offset, post.offset)
         if distance >= 0.0 and below(distance, DELINEATOR_DISTANCE):
-            text = f"The delineator stands {distance:.2f} m from the paved edge; {DELINEATOR_DISTANCE} m are needed (StVO, sign 620)."
+            text = (
+                f"The delineator stands {distance:.2f} m from the paved edge; {DELINEATOR_DISTANCE} m are needed (HLB)."
+            )
             yield Finding(name, post.station, distance, DELINEATOR_DISTANCE, text)
 
 
@@ -201,9 +203,9 @@ RULES = (
     Rule("embankment-guardrail", "Embankments have guardrails", "m", "RPS", "unconfirmed", _embankment_guardrail),
     Rule("guardrail-distance", "Guardrails keep clear of the pavement", "m", "RPS", "unconfirmed", _guardrail_distance),
     Rule("guardrail-length", "Shortest guardrail", "m", "RPS", "unconfirmed", _guardrail_length),
-    Rule("delineator-missing", "Delineators begin at the beginning", "m", "StVO", "derived", _delineator_missing),
-    Rule("delineator-spacing", "Spacing of delineators", "m", "StVO", "confirmed", _delineator_spacing),
-    Rule("delineator-distance", "Delineators keep off the pavement", "m", "StVO", "confirmed", _delineator_distance),
+    Rule("delineator-missing", "Delineators begin at the beginning", "m", "HLB", "derived", _delineator_missing),
+    Rule("delineator-spacing", "Spacing of delineators", "m", "HLB", "confirmed", _delineator_spacing),
+    Rule("delineator-distance", "Delineators keep off the pavement", "m", "HLB", "confirmed", _delineator_distance),
     Rule("object-range", "Objects lie on the road's length", "m", "", "definition", _object_range),
     Rule("object-on-pavement", "Nothing stands on the pavement", "m", "", "definition", _object_on_pavement),
     Rule("tree-distance", "Trees keep clear of the pavement", "m", "RPS", "unconfirmed", _tree_distance),

@@ -15,7 +15,6 @@ from .checker_base import (
     Rule,
     above,
     below,
-    class_name,
     gaps,
     increasing,
     stretches,
@@ -48,6 +47,8 @@ LEAST_MEDIAN = 2.5
 #: Widths of the lines, m, and the lane line's dash and gap, m (RMS).
 LINE_WIDTHS = {"outer_edge": 0.30, "lane": 0.15, "inner_edge": 0.15}
 LANE_DASH, LANE_GAP = 6.0, 12.0
+
+_Boundary = tuple[str, int, list[tuple[str, LineMarking]]]
 
 
 class _Crossfall(NamedTuple):
@@ -126,8 +127,8 @@ def _crossfall_inside(road: Road) -> Iterator[Finding]:
             needed = curve_crossfall_percent(road.design_class, run.curvature)
             if below(float(inwards[worst]), needed):
                 text = (
-                    f"The crossfall towards the inside of the curve (R = {run.radius:.0f} m) is {inwards[worst]:.2f} %; "
-                    f"{needed} % are needed (RAA, {class_name(road.design_class)})."
+                    f"The crossfall towards the inside of the {run.radius:.0f} m curve is {inwards[worst]:.2f} %; "
+                    f"{needed} % are needed ({road.guideline})."
                 )
                 station = run.start if worst == 0 else float(at[worst])
                 yield Finding(name, station, float(inwards[worst]), needed, text)
@@ -157,9 +158,7 @@ def _run_off_steepest(road: Road) -> Iterator[Finding]:
         slope = np.abs(fall.slope) * lever
         for first, last in stretches(fall.runs_off & (slope > limit * (1.0 + TOLERANCE))):
             worst = first + int(np.argmax(slope[first : last + 1] / limit[first : last + 1]))
-            text = (
-                f"The edge runs off at {slope[worst]:.3f} %; {limit[worst]:.3f} % are allowed (RAA, a = {lever:.2f} m)."
-            )
+            text = f"The edge runs off at {slope[worst]:.3f} %; {limit[worst]:.3f} % are allowed (RAA)."
             yield Finding(name, float(fall.station[worst]), float(slope[worst]), float(limit[worst]), text)
 
 
@@ -173,7 +172,7 @@ def _run_off_least(road: Road) -> Iterator[Finding]:
             worst = first + int(np.argmin(slope[first : last + 1]))
             text = (
                 f"The edge runs off at {slope[worst]:.3f} % where the crossfall is below {LEAST_CROSSFALL_PERCENT} %; "
-                f"{least:.3f} % are needed to drain it (RAA, a = {lever:.2f} m)."
+                f"{least:.3f} % are needed to drain it (RAA)."
             )
             yield Finding(name, float(fall.station[worst]), float(slope[worst]), least, text)
 
@@ -188,9 +187,7 @@ def _run_off_place(road: Road) -> Iterator[Finding]:
         for first, last in stretches(fall.runs_off[piece] & road.constant[element]):
             length = float(cuts[last + 1] - cuts[first])
             if above(length, RUN_OFF_BEYOND):
-                text = (
-                    f"The crossfall changes over {length:.1f} m where the curvature is constant (RAA: along clothoids)."
-                )
+                text = f"The crossfall changes over {length:.1f} m where the curvature doesn't (RAA)."
                 yield Finding(name, float(cuts[first]), length, RUN_OFF_BEYOND, text)
 
 
@@ -218,9 +215,7 @@ def _median_width(road: Road) -> Iterator[Finding]:
         )
 
 
-def _lines_at(
-    road: Road, name: str, carriageway: Carriageway
-) -> Iterator[tuple[str, int, list[tuple[str, LineMarking]]]]:
+def _lines_at(road: Road, name: str, carriageway: Carriageway) -> Iterator[_Boundary]:
     """Yield (kind, boundary, its lines by id) of every lane boundary of a carriageway."""
     last = len(carriageway.lanes)
     for boundary in range(last + 1):
@@ -263,9 +258,7 @@ def _marking_pattern(road: Road) -> Iterator[Finding]:
         wanted = (LANE_DASH, LANE_GAP) if line.kind == "lane" else (0.0, 0.0)
         for part, value, limit in zip(("dash", "gap"), (line.dash_length, line.gap_length), wanted, strict=True):
             if below(value, limit) or above(value, limit):
-                text = (
-                    f"The {part} of the {line.kind.replace('_', ' ')} line is {value:g} m instead of {limit:g} m (RMS)."
-                )
+                text = f"The line's {part} is {value:g} m instead of {limit:g} m ({line.kind.replace('_', ' ')}, RMS)."
                 yield Finding(name, line.start_station, value, limit, text)
                 break
 

@@ -24,6 +24,7 @@ WIDEST_RADIUS = 5000.0
 """Largest radius that is drawn where the scenario doesn't say otherwise, m."""
 BALANCED_BELOW, BALANCE = 1500.0, 1.5
 """Consecutive radii differ by at most this ratio where the smaller is below this radius (m)."""
+_BALANCED_FROM = BALANCED_BELOW * (1.0 + 1e-6)  # rounding the curvature must not take a radius below it
 STRAIGHT_SAME_DIRECTION = 400.0
 """Least length of a straight between two curves of the same direction, m."""
 _SHORTEST_STRAIGHT = 60.0
@@ -112,7 +113,7 @@ class HorizontalSampler:
             # Beyond this no pair of clothoids has R/3 <= A <= R on both sides and parameters within 1.5 of each other.
             low, high = max(low, before / _WIDEST_RATIO), min(high, before * _WIDEST_RATIO)
         if before is not None and self.scenario.design_class != "EKA3":
-            low = max(low, before / BALANCE if before < BALANCED_BELOW else min(BALANCED_BELOW, before / BALANCE))
+            low = max(low, before / BALANCE if before < BALANCED_BELOW else min(_BALANCED_FROM, before / BALANCE))
             high = min(high, before * BALANCE) if before < BALANCED_BELOW else high
         # Wide curves need long clothoids (R/9 and more): on what is left of the road only narrower ones have room.
         room = self.scenario.length - self._length(self.parts)
