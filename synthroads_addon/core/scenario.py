@@ -10,7 +10,7 @@ from typing import Annotated, Any, Literal, get_args
 from pydantic import Field, model_validator
 
 from .errors import InputError, nearest_name
-from .parameters.limits import STANDARD_CROSS_SECTIONS
+from .parameters.limits import SECTIONS_OF_CLASS, STANDARD_CROSS_SECTIONS
 from .schema import Model, quantity, read_json
 
 SCENARIOS = Path(__file__).parents[1] / "presets" / "scenarios"
@@ -75,6 +75,10 @@ class RoadScenario(ScenarioModel):
         if self.cross_section not in STANDARD_CROSS_SECTIONS:
             names = ", ".join(STANDARD_CROSS_SECTIONS)
             raise ValueError(f"cross_section is '{self.cross_section}': must be one of {names}")
+        allowed = SECTIONS_OF_CLASS[self.design_class]
+        if self.cross_section not in allowed:
+            names = ", ".join(allowed)
+            raise ValueError(f"cross_section is '{self.cross_section}': {self.design_class} allows {names}")
         return self
 
 

@@ -15,7 +15,7 @@ import numpy as np
 from pydantic import BaseModel
 
 from ..core.errors import InputError
-from ..core.parameters.limits import STANDARD_CROSS_SECTIONS
+from ..core.parameters.limits import STANDARD_CROSS_SECTIONS, design_class_of
 from ..core.scanning.devices import device_names, load_device
 from ..core.scenario import (
     FIDELITIES,
@@ -152,7 +152,10 @@ class SYNTHROADS_PG_settings(bpy.types.PropertyGroup):
     def scenario(self) -> Scenario:
         """Return the job that the panel describes; raise `InputError` where a value is refused."""
         changes = [f"{path}={_plain(getattr(self, name))}" for name, path in (ROAD_FIELDS | SCAN_FIELDS).items()]
-        return load_scenario(self.preset, [*changes, f"outputs={json.dumps(OUTPUTS)}"])
+        # The panel asks for the cross-section only: the design class follows where the scenario's doesn't have it.
+        design_class = design_class_of(self.cross_section, load_scenario(self.preset).road.design_class)
+        changes += [f'road.design_class="{design_class}"', f"outputs={json.dumps(OUTPUTS)}"]
+        return load_scenario(self.preset, changes)
 
     def road_values(self) -> str:
         """Return what a road is built from, to tell whether it has changed."""

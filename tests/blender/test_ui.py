@@ -13,6 +13,7 @@ from pydantic import BaseModel
 import synthroads_addon
 from synthroads_addon.blender.model import ROLE
 from synthroads_addon.core.errors import Cancelled, InputError
+from synthroads_addon.core.parameters.limits import STANDARD_CROSS_SECTIONS
 from synthroads_addon.core.scanning.devices import device_names
 from synthroads_addon.core.scenario import FIDELITIES, Platform, RoadScenario, Scenario, load_scenario, scenario_names
 from synthroads_addon.pipeline import FILES, Job, generate
@@ -144,7 +145,10 @@ def test_choices_are_the_schemas(settings: Any) -> None:
     assert choices["preset"] == scenario_names()
     assert choices["fidelity"] == list(FIDELITIES)
     assert choices["device"] == device_names()
-    assert all(RoadScenario(cross_section=name).cross_section == name for name in choices["cross_section"])
+    for name in choices["cross_section"]:
+        choose(settings, cross_section=name)
+        assert settings.scenario().road.cross_section == name
+    assert len(choices["cross_section"]) == len(STANDARD_CROSS_SECTIONS)
     assert shown["cross_section"].default == RoadScenario().cross_section
     assert shown["device"].default == Scenario().scan.device
     assert shown["fidelity"].default == "draft"

@@ -14,8 +14,10 @@ from synthroads_addon.core.errors import InputError, MissingFileError
 from synthroads_addon.core.parameters.geometry import RoadGeometry
 from synthroads_addon.core.parameters.limits import (
     LIMITS,
+    SECTIONS_OF_CLASS,
     STANDARD_CROSS_SECTIONS,
     curve_crossfall_percent,
+    design_class_of,
 )
 from synthroads_addon.core.parameters.model import (
     AlignmentObject,
@@ -311,3 +313,11 @@ def test_every_kink_is_a_station(geometry: RoadGeometry) -> None:
     for kink in [*geometry.alignment.element_starts, *geometry.profile.breakpoints, *geometry.dashes(line).ravel()]:
         if 0 <= kink <= 600:
             assert np.abs(stations - kink).min() < 2e-4
+
+
+def test_a_cross_section_must_suit_its_design_class() -> None:
+    with pytest.raises(InputError, match=r"'RQ25': EKA1A allows RQ43\.5, RQ36, RQ31"):
+        road(1, "road.cross_section=RQ25")
+    for section in STANDARD_CROSS_SECTIONS:
+        design_class = design_class_of(section, "EKA1A")
+        assert section in SECTIONS_OF_CLASS[design_class]

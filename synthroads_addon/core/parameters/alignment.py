@@ -257,16 +257,12 @@ class Alignment:
     def _nodes_near(self, low: FloatArray, high: FloatArray) -> IntArray:
         """Return indices of every node that may be next to the nearest point of something in the box.
 
-        The nearest node of a point is at most half a spacing farther than its foot, hence the margin. One node more
-        on either side makes a local minimum at the rim recognisable.
+        The nearest node of a point is at most half a spacing farther than its foot, hence the margin.
         """
         nodes = self._nodes[:, 1:]
         nearest = np.hypot(*np.maximum(np.maximum(low - nodes, nodes - high), 0.0).T)
         farthest = np.hypot(*np.maximum(nodes - low, high - nodes).T)
-        near = nearest <= farthest.min() + _NODE_SPACING
-        near[1:] |= near[:-1].copy()
-        near[:-1] |= near[1:].copy()
-        return np.flatnonzero(near)
+        return np.flatnonzero(nearest <= farthest.min() + _NODE_SPACING)
 
     def _project_leaf(self, x: FloatArray, y: FloatArray, nodes: IntArray) -> tuple[FloatArray, FloatArray]:
         """Start from every node that is a local minimum of the distance and near the least; keep the best foot."""

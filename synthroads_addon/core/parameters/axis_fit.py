@@ -28,7 +28,7 @@ _WINDOW = 1200.0  # m
 _TAIL = 300.0  # m at a window's end that only steady what lies before
 _MOST_POINTS = 3000  # in a window; denser data are thinned for the search, not for the figures reported
 _HEIGHT_SHARE = 0.6  # of the tolerance that the heights' rms may use
-_EXACT = 1e-5  # m: rms up to which data lie on a chain of elements,
+_EXACT = 1e-6  # m: rms up to which data lie on a chain of elements,
 _ROUNDED = 3.5e-4  # m: or on one whose coordinates were rounded to 1 mm, where residuals are random
 _RANDOM = 0.5  # correlation of neighbouring residuals that still passes for random
 _GAP = 100.0  # m between points from which the chord between them is given some weight
@@ -234,7 +234,7 @@ def _solve(part: _Part, chosen: IntArray, start: Start | None, origin: float, le
     """Fit one window: as exact data if they are, else with knots as dense as the tolerance needs."""
     scale = 2.5 * length / len(chosen)  # knots need data between them
     count = independent(length, len(chosen))
-    exact = Goal(tolerance, 2.0 * tolerance, 1e-5, count, int(length / 15.0) + 5)
+    exact = Goal(tolerance, 2.0 * tolerance, _EXACT, count, int(length / 15.0) + 5)
     data, rich = part.begin(chosen, max(part.spacing.exact, scale), start, origin)
     if rich.rms < 3.0 * _ROUNDED:
         best = min(descent(data, rich, exact), key=exact.rank)

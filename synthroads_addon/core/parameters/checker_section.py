@@ -22,6 +22,7 @@ from .checker_base import (
 from .limits import (
     LARGEST_CROSSFALL_PERCENT,
     LEAST_CROSSFALL_PERCENT,
+    SECTIONS_OF_CLASS,
     STANDARD_CROSS_SECTIONS,
     curve_crossfall_percent,
 )
@@ -35,13 +36,6 @@ RUN_OFF_BEYOND = 1.0
 LEAST_RUN_OFF_PER_METRE = 0.1
 NARROW_RUN_OFF_PER_METRE = 0.225
 NARROW_RUN_OFF = 4.0
-#: Standard cross-sections by design class (RAA); the narrowest lane among them is the least.
-SECTIONS_OF_CLASS = {
-    "EKA1A": ("RQ43.5", "RQ36", "RQ31"),
-    "EKA1B": ("RQ43.5", "RQ36", "RQ31", "RQ28"),
-    "EKA2": ("RQ36", "RQ31", "RQ28"),
-    "EKA3": ("RQ38.5", "RQ31.5", "RQ25"),
-}
 #: Narrowest median of the standard cross-sections, m.
 LEAST_MEDIAN = 2.5
 #: Widths of the lines, m, and the lane line's dash and gap, m (RMS).

@@ -76,6 +76,22 @@ STANDARD_CROSS_SECTIONS = {
 }
 
 
+SECTIONS_OF_CLASS = {
+    "EKA1A": ("RQ43.5", "RQ36", "RQ31"),
+    "EKA1B": ("RQ43.5", "RQ36", "RQ31", "RQ28"),
+    "EKA2": ("RQ36", "RQ31", "RQ28"),
+    "EKA3": ("RQ38.5", "RQ31.5", "RQ25"),
+}
+"""Design class -> standard cross-sections that it may have."""
+
+
+def design_class_of(cross_section: str, preferred: str) -> str:
+    """Return the preferred design class if it may have a cross-section, else the first one that may."""
+    if cross_section in SECTIONS_OF_CLASS[preferred]:
+        return preferred
+    return next(name for name, sections in SECTIONS_OF_CLASS.items() if cross_section in sections)
+
+
 def curve_crossfall_percent(design_class: str, curvature: float) -> float:
     """Return the crossfall (%) towards the inside of a curve: 6 at the smallest radius, 2.5 from the largest.
 
