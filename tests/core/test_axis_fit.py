@@ -375,7 +375,8 @@ def real_fit(path: Path) -> AxisFit:
         f" worst {fit.worst:.3f} m at {fit.worst_station:.0f} m; heights rms {fit.height_rms:.4f}"
         f" p95 {fit.height_p95:.4f} worst {fit.height_worst:.3f} m; {seconds:.1f} s"
     )
-    assert seconds < 10.0 * max(1.0, length / 1000.0)
+    # 4 to 8 s per kilometre of a quiet core; half a minute where it is shared.
+    assert seconds < 30.0 * max(1.0, length / 1000.0)
     return fit
 
 
