@@ -13,8 +13,8 @@ import pytest
 
 from synthroads_addon.core.errors import InputError, MissingFileError
 from synthroads_addon.core.parameters.alignment import Alignment, Element
-from synthroads_addon.core.parameters.axis_chain import FREE, Chain, Heights, Plan
-from synthroads_addon.core.parameters.axis_fit import AxisFit, fit_axis, read_axis
+from synthroads_addon.core.parameters.axis_chain import FREE, ZERO, Chain, Fit, Heights, Plan
+from synthroads_addon.core.parameters.axis_fit import AxisFit, _exactly, _trimmed, fit_axis, read_axis
 from synthroads_addon.core.parameters.profile import IntersectionPoint, Profile
 
 REAL = sorted((Path(__file__).resolve().parents[2].parent / "shared" / "real").glob("*_axis.csv"))
@@ -218,12 +218,48 @@ def test_a_wider_tolerance_needs_no_more_elements() -> None:
     assert counts[0] > counts[2] > counts[3] == 1
 
 
-def test_a_smooth_curve_is_not_taken_for_a_chain_of_many_elements() -> None:
+@pytest.mark.parametrize(("height", "width"), [(30.0, 100.0), (0.3, 60.0)])
+def test_a_smooth_curve_is_not_taken_for_a_chain_of_many_elements(height: float, width: float) -> None:
     """Points on a sinusoid have no noise, but no elements of their own either."""
     s = np.arange(0.0, 320.0)
-    fit = fit_axis(np.column_stack((s, 30.0 * np.sin(s / 100.0))))
+    fit = fit_axis(np.column_stack((s, height * np.sin(s / width))))
     assert len(fit.alignment.elements) <= 4
     assert fit.rms <= 0.05
+
+
+def test_what_counts_as_exact() -> None:
+    """Nothing, a smooth micrometre, or random residuals of coordinates rounded to a millimetre; not a smooth tenth."""
+    chain = Chain(np.zeros(3), np.array([0.0, 1.0]), np.zeros(2), np.array([ZERO]))
+    smooth, random = np.sin(np.linspace(0.0, 20.0, 900)), np.random.default_rng(1).uniform(-0.5e-3, 0.5e-3, 900)
+    for residuals, exact in ((1e-7 * smooth, True), (random, True), (2e-4 * smooth, False), (10 * random, False)):
+        assert _exactly(Fit(chain, np.zeros(900), residuals)) is exact
+
+
+def test_a_corner_is_rounded_and_its_straights_stay_straight() -> None:
+    """No chain of elements follows a right angle; finer and finer knots must not be tried in vain."""
+    s = np.arange(100.0)[:, None]
+    fit = fit_axis(np.vstack((s * [1.0, 0.0], [100.0, 0.0] + s * [0.0, 1.0])))
+    assert len(fit.alignment.elements) <= 6
+    assert kinds(fit.alignment)[0] == kinds(fit.alignment)[-1] == "line"
+    assert fit.p95 < 0.5
+    assert fit.worst_station == pytest.approx(99.0, abs=3.0)
+
+
+def test_ends_are_cut_and_prolonged_along_their_clothoids() -> None:
+    """From 0.5 m before the chain to 0.7 m beyond it, and the other way round, on the same curve."""
+    whole = road([(120.0, 0.002, 0.01), (90.0, 0.01, -0.004)], 3.0, 4.0, 0.5)
+    for first, last in ((-0.5, 200.7), (0.5, 199.3)):
+        chain = Chain(
+            np.append(whole.position(5.0), whole.heading(5.0)),
+            np.array([0.0, 115.0, 200.0]),
+            whole.curvature(np.array([5.0, 120.0, 205.0])),
+            np.full(2, FREE),
+        )
+        cut = _trimmed(chain, first, last)
+        s = np.linspace(0.0, cut.length, 50)
+        assert cut.length == pytest.approx(last - first)
+        np.testing.assert_allclose(cut.position(s), whole.position(s + 5.0 + first), atol=1e-6)
+        np.testing.assert_allclose(cut.curvature(s), whole.curvature(s + 5.0 + first), atol=1e-12)
 
 
 def test_dense_curves_between_sparse_straights() -> None:

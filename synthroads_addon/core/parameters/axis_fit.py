@@ -18,7 +18,7 @@ from ..errors import InputError
 from .alignment import Alignment, Element, FloatArray, IntArray, finite_array
 from .axis_chain import FREE, Chain, Data, Fit, Heights, Plan, elevations, refine
 from .axis_read import read_axis
-from .axis_search import Goal, descent, improved, independent, simplified
+from .axis_search import Goal, descent, improved, independent
 from .axis_start import Start, start_heights, start_plan
 from .profile import IntersectionPoint, Profile
 
@@ -28,14 +28,13 @@ _WINDOW = 1200.0  # m
 _TAIL = 300.0  # m at a window's end that only steady what lies before
 _MOST_POINTS = 3000  # in a window; denser data are thinned for the search, not for the figures reported
 _HEIGHT_SHARE = 0.6  # of the tolerance that the heights' rms may use
-_EXACT = 1e-6  # m: rms up to which data lie on a chain of elements,
+_EXACT = 1e-6  # m: rms up to which data lie on a chain of elements (no smooth curve comes so near with few of them),
 _ROUNDED = 3.5e-4  # m: or on one whose coordinates were rounded to 1 mm, where residuals are random
 _RANDOM = 0.5  # correlation of neighbouring residuals that still passes for random
 _GAP = 100.0  # m between points from which the chord between them is given some weight
 _CHORD_WEIGHT = 1e-3
 _NEAR = 40.0  # m that feet are looked for around where they should be
 _SPACING = 20.0  # m between knots at first
-_LEAP = 1.5
 _MARGIN = 0.98  # of the tolerance that the search aims at: it may see thinned points only
 _NEGLIGIBLE = 0.3  # of the tolerance: residuals below it are worth no element
 _FINER_HELPS = 0.8  # of the rms at most must be left by knots half as far apart: else the rest is noise
@@ -238,7 +237,7 @@ def _solve(part: _Part, chosen: IntArray, start: Start | None, origin: float, le
     data, rich = part.begin(chosen, max(part.spacing.exact, scale), start, origin)
     if rich.rms < 3.0 * _ROUNDED:
         best = min(descent(data, rich, exact), key=exact.rank)
-        if _exactly(best) and exact.rank(best)[:2] == (False, False) and _sharp(data, best, exact):
+        if _exactly(best) and exact.rank(best)[:2] == (False, False):
             return best
     goal = Goal(tolerance, 2.0 * tolerance, _NEGLIGIBLE * tolerance, count, int(max(5.0, length / 30.0 - 0.01)))
     spacing = max(part.spacing.first, scale)
@@ -258,15 +257,6 @@ def _exactly(fit: Fit) -> bool:
     """Tell whether nothing but rounding is left of the residuals."""
     r = fit.residuals
     return fit.rms < _EXACT or (fit.rms < _ROUNDED and float(r[1:] @ r[:-1]) < _RANDOM * fit.square)
-
-
-def _sharp(data: Data, fit: Fit, goal: Goal) -> bool:
-    """Tell whether the elements are the data's own: with one less the residuals leap.
-
-    Any smooth curve can be approximated closely by many elements, but then one less makes little difference.
-    """
-    simpler = simplified(data, fit, True, goal)
-    return simpler is None or simpler.rms > _LEAP * fit.rms
 
 
 def _cut(chain: Chain, tail: float) -> float:

@@ -28,8 +28,7 @@ def fitted_axis(path: Path, scenario: RoadScenario) -> tuple[AlignmentObject, Ro
     fit = fit_axis(points - origin)
     start, heading, _ = fit.alignment.frame(0.0)
     horizontal = tuple(
-        HorizontalElement.between(rounded(e.length), e.curvature_start, e.curvature_end)
-        for e in fit.alignment.elements
+        HorizontalElement.between(rounded(e.length), e.curvature_start, e.curvature_end) for e in fit.alignment.elements
     )
     vertical = tuple(
         VerticalPoint(station=rounded(p.station), elevation=rounded(p.elevation), radius=p.radius)

@@ -34,7 +34,6 @@ from .axis_chain import (
 )
 
 _CORRELATED = 20.0  # m
-_EXACT_FLOOR = 1e-5  # m
 _TRIALS = 3  # refinements per decision
 _PARTS = 4  # an element is split at one of the inner borders of so many parts
 _WORTH = 0.05  # least gain of score
