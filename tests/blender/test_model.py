@@ -115,7 +115,7 @@ def pieces(mesh: SceneMesh) -> list[NDArray[np.intp]]:
 
 
 def timed_edit(road: Built, role: str, name: str, value: float) -> float:
-    """Set an input of an object's modifier and return the processor seconds of the update: a busy machine doesn't count."""
+    """Set an input of an object's modifier; return the update's processor seconds (a busy machine doesn't count)."""
     bpy.context.view_layer.update()
     start = time.process_time()
     set_modifier_input(road.modifier(role), name, value)
