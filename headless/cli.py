@@ -74,6 +74,12 @@ def command(name: str, argv: Sequence[str] | None = None) -> int:
     return run(module.run, parser.parse_args(argv))
 
 
+def add_changes_argument(parser: argparse.ArgumentParser) -> None:
+    """Add ``--set PATH=VALUE``, gathered in ``changes``."""
+    text = "change one field of the scenario, e.g. road.length=800 (can be repeated)"
+    parser.add_argument("--set", action="append", default=[], metavar="PATH=VALUE", dest="changes", help=text)
+
+
 def add_common_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the flags that every sub-command understands."""
     parser.add_argument("--quiet", action="store_true", help="print nothing but errors")

@@ -10,7 +10,7 @@ from typing import Any
 if __name__ == "__main__":
     sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from headless.cli import Outcome, add_common_arguments, entry, progress_bar
+from headless.cli import Outcome, add_changes_argument, add_common_arguments, entry, progress_bar
 from synthroads_addon.core.scenario import load_scenario, scenario_names
 
 
@@ -23,14 +23,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--fidelity", choices=("draft", "standard", "high"), help="point on the trade-off")
     parser.add_argument("--parameters", type=Path, metavar="FILE", help="take this road instead of sampling one")
     parser.add_argument("--axis", type=Path, metavar="FILE", help="centreline, CSV (x, y, z in order) or GeoJSON")
-    parser.add_argument(
-        "--set",
-        action="append",
-        default=[],
-        metavar="PATH=VALUE",
-        dest="changes",
-        help="change one field of the scenario, e.g. road.length=800 (can be repeated)",
-    )
+    add_changes_argument(parser)
     parser.add_argument("--overwrite", action="store_true", help="replace files that are already there")
     add_common_arguments(parser)
 

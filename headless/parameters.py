@@ -11,7 +11,7 @@ from typing import Any
 if __name__ == "__main__":
     sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from headless.cli import Outcome, add_common_arguments, entry
+from headless.cli import Outcome, add_changes_argument, add_common_arguments, entry
 from synthroads_addon.core.parameters.limits import STANDARD_CROSS_SECTIONS
 from synthroads_addon.core.parameters.model import DESIGN_CLASSES, RoadParameters
 from synthroads_addon.core.parameters.sampler import sample_road
@@ -26,14 +26,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     sections = ", ".join(STANDARD_CROSS_SECTIONS)
     parser.add_argument("--cross-section", default="RQ31", metavar="RQ", help=f"one of {sections}")
     parser.add_argument("--length", type=float, default=600.0, metavar="M", help="length of the road, m (600)")
-    parser.add_argument(
-        "--set",
-        action="append",
-        default=[],
-        metavar="PATH=VALUE",
-        dest="changes",
-        help="change a field",
-    )
+    add_changes_argument(parser)
     add_common_arguments(parser)
 
 
