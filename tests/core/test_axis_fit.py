@@ -411,8 +411,9 @@ def real_fit(path: Path) -> AxisFit:
         f" worst {fit.worst:.3f} m at {fit.worst_station:.0f} m; heights rms {fit.height_rms:.4f}"
         f" p95 {fit.height_p95:.4f} worst {fit.height_worst:.3f} m; {seconds:.1f} s"
     )
-    # 4 to 8 s per kilometre of a quiet core; half a minute where it is shared.
-    assert seconds < 30.0 * max(1.0, length / 1000.0)
+    # 3 to 8 s per kilometre of a quiet core; many times that where BLAS's threads wait for a shared one: this only
+    # tells a search that doesn't end.
+    assert seconds < 150.0 * max(1.0, length / 1000.0)
     return fit
 
 
