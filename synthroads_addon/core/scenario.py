@@ -5,82 +5,15 @@ from __future__ import annotations
 import json
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, Literal, get_args
+from typing import Any, Literal, get_args
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from .errors import InputError, nearest_name
-from .parameters.limits import SECTIONS_OF_CLASS, STANDARD_CROSS_SECTIONS
-from .schema import Model, quantity, read_json
+from .road_scenario import Finite, RoadScenario, ScenarioModel
+from .schema import quantity, read_json
 
 SCENARIOS = Path(__file__).parents[1] / "presets" / "scenarios"
-
-_Finite = Annotated[float, Field(strict=True, ge=-1e8, le=1e8)]
-
-
-class ScenarioModel(Model):
-    """Base of the scenario's parts; a scenario has no vendor keys."""
-
-    vendor_keys_allowed = False
-
-
-class Interval(ScenarioModel):
-    """Limits that a sampled value lies within."""
-
-    minimum: _Finite = Field(description="Smallest value.")
-    maximum: _Finite = Field(description="Largest value.")
-
-    @model_validator(mode="after")
-    def _in_order(self) -> Interval:
-        if self.maximum < self.minimum:
-            raise ValueError(f"maximum {self.maximum} must not be less than minimum {self.minimum}")
-        return self
-
-
-def _interval(low: float, high: float, unit: str, description: str) -> Any:
-    return Field(Interval(minimum=low, maximum=high), description=description, json_schema_extra={"unit": unit})
-
-
-class RoadScenario(ScenarioModel):
-    """Limits that the road is sampled within."""
-
-    design_class: Literal["EKA1A", "EKA1B", "EKA2", "EKA3"] = Field("EKA1A", description="Design class (RAA).")
-    cross_section: str = Field("RQ31", description="Standard cross-section.")
-    length: float = quantity(600.0, ge=1, le=200_000, unit="m", description="Length of the centreline.")
-    radius: Interval | None = Field(
-        None,
-        description="Radii of curves; from the class's smallest to 5000 m if not given.",
-        json_schema_extra={"unit": "m"},
-    )
-    grade_percent: Interval | None = Field(
-        None, description="Longitudinal grades; the class's if not given.", json_schema_extra={"unit": "%"}
-    )
-    embankment_height: Interval = _interval(1.5, 4.0, "m", "Mean height of the road above the ground.")
-    undulation: float = quantity(0.25, ge=0, le=20, unit="m", description="Standard deviation of the ground.")
-    batter_slope: float = quantity(1.5, ge=0.5, le=10, unit="m/m", description="Run of the batter per height.")
-    half_width: float = quantity(78.0, ge=5, le=1000, unit="m", description="Reach built to either side.")
-    epsg: int = quantity(25832, ge=1024, le=99_999_999, unit="1", description="Map coordinate system.")
-    map_origin: tuple[_Finite, _Finite, _Finite] = Field(
-        (294_000.0, 5_628_000.0, 180.0),
-        description="Map coordinates (east, north, elevation) of the local origin, m.",
-    )
-    roadside_guardrails: bool = Field(True, description="Guardrails on the embankment's edges.")
-    median_guardrail: bool = Field(True, description="Guardrail in the median.")
-    delineators: bool = Field(True, description="Delineator posts.")
-    grass_density: float = quantity(0.8, ge=0, le=50, unit="1/m2", description="Tufts of grass per area.")
-    trees_per_hectare: float = quantity(40.0, ge=0, le=2000, unit="1/ha", description="Trees per hectare.")
-
-    @model_validator(mode="after")
-    def _known(self) -> RoadScenario:
-        if self.cross_section not in STANDARD_CROSS_SECTIONS:
-            names = ", ".join(STANDARD_CROSS_SECTIONS)
-            raise ValueError(f"cross_section is '{self.cross_section}': must be one of {names}")
-        allowed = SECTIONS_OF_CLASS[self.design_class]
-        if self.cross_section not in allowed:
-            names = ", ".join(allowed)
-            raise ValueError(f"cross_section is '{self.cross_section}': {self.design_class} allows {names}")
-        return self
-
 
 class Platform(ScenarioModel):
     """What carries the scanner, and its strips."""
@@ -88,7 +21,7 @@ class Platform(ScenarioModel):
     kind: Literal["uav"] = Field("uav", description="Platform.")
     height: float = quantity(60.0, ge=2, le=2000, unit="m", description="Height above the road.")
     speed: float = quantity(8.0, ge=0.1, le=100, unit="m/s", description="Speed over ground.")
-    lateral_offsets: tuple[_Finite, ...] = Field(
+    lateral_offsets: tuple[Finite, ...] = Field(
         (10.0, -10.0),
         min_length=1,
         max_length=64,

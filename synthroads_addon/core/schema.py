@@ -8,8 +8,11 @@ from __future__ import annotations
 
 import json
 import os
+import re
+from collections.abc import Sequence
+from functools import cache
 from pathlib import Path
-from typing import Any, ClassVar, TypeVar
+from typing import Any, ClassVar, TypeVar, get_args
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 from pydantic.fields import FieldInfo
@@ -18,6 +21,8 @@ from .errors import InputError, MissingFileError, nearest_name
 
 VENDOR_PREFIX = "+"
 """Keys that begin with this are a vendor's own: read, kept, written back, never interpreted (CityJSON's habit)."""
+LARGEST = 1e15
+"""Limit, to either side, of a quantity that declares none: what is larger overflows somewhere later."""
 
 
 def quantity(
@@ -34,41 +39,76 @@ def quantity(
     return Field(
         default,
         description=description,
-        ge=ge,
+        ge=-LARGEST if ge is None and gt is None else ge,
         gt=gt,
-        le=le,
+        le=LARGEST if le is None and lt is None else le,
         lt=lt,
         strict=True,
         json_schema_extra={"unit": unit},
     )
 
 
-def _only_vendor_keys(schema: dict[str, Any]) -> None:
+def when(test: dict[str, Any], then: dict[str, Any], otherwise: dict[str, Any] | None = None) -> dict[str, Any]:
+    """Return a condition of `Model.conditions`: where the fields of ``test`` are there and fit, those of ``then`` must.
+
+    Each argument maps fields to what JSON Schema says of them. A field that must be null or a constant may be left out.
+    """
+    result = {"if": {"properties": test, "required": list(test)}, "then": _fields_fit(then)}
+    return result | ({"else": _fields_fit(otherwise)} if otherwise else {})
+
+
+def _fields_fit(fields: dict[str, Any]) -> dict[str, Any]:
+    needed = [name for name, rule in fields.items() if rule.get("type") != "null" and "const" not in rule]
+    return {"properties": fields, "required": needed}
+
+
+def _complete_schema(schema: dict[str, Any], model: type[Any]) -> None:
+    """Say in a class's JSON Schema what pydantic doesn't: unknown keys and conditions between fields."""
     schema["additionalProperties"] = False
-    schema["patternProperties"] = {f"^\\{VENDOR_PREFIX}": {}}
+    if model.vendor_keys_allowed:
+        schema["patternProperties"] = {f"^\\{VENDOR_PREFIX}": {}}
+    conditions = [rule for base in reversed(model.__mro__) for rule in base.__dict__.get("conditions", ())]
+    if conditions:
+        schema["allOf"] = conditions
+
+
+@cache
+def _keys(model: type[Model]) -> tuple[frozenset[str], frozenset[str]]:
+    """Return the keys of a class, and those of whole numbers."""
+    fields = {field.alias or name: field.annotation for name, field in model.model_fields.items()}
+    whole = [name for name, kind in fields.items() if kind is int or int in get_args(kind)]
+    return frozenset(fields), frozenset(whole)
 
 
 class Model(BaseModel):
-    """Base of all parameter classes: immutable, no unknown keys but a vendor's, no NaN; numbers are strict."""
+    """Base of all parameter classes: immutable, no unknown keys but a vendor's, no NaN; numbers are strict.
+
+    Attributes:
+        conditions: what the class's validators require of several fields together, in the words of JSON Schema.
+    """
 
     model_config = ConfigDict(
         extra="allow",
         frozen=True,
         allow_inf_nan=False,
-        json_schema_extra=_only_vendor_keys,
+        json_schema_extra=_complete_schema,
     )
     vendor_keys_allowed: ClassVar[bool] = True
+    conditions: ClassVar[Sequence[dict[str, Any]]] = ()
 
     @model_validator(mode="before")
     @classmethod
-    def _refuse_unknown_keys(cls, data: Any) -> Any:
-        if isinstance(data, dict):
-            known = [field.alias or name for name, field in cls.model_fields.items()]
-            for key in data:
-                if key in known or (cls.vendor_keys_allowed and str(key).startswith(VENDOR_PREFIX)):
-                    continue
-                raise ValueError(f"unknown key '{key}'{nearest_name(str(key), known)}")
-        return data
+    def _prepare(cls, data: Any) -> Any:
+        """Refuse unknown keys; take 2.0 for 2 where a whole number is wanted, as JSON doesn't tell them apart."""
+        if not isinstance(data, dict):
+            return data
+        known, whole = _keys(cls)
+        for key in data:
+            if key in known or (cls.vendor_keys_allowed and str(key).startswith(VENDOR_PREFIX)):
+                continue
+            raise ValueError(f"unknown key {str(key)!r}{nearest_name(str(key), cls.model_fields)}")
+        changed = {key: int(data[key]) for key in whole if isinstance(data.get(key), float) and data[key].is_integer()}
+        return data | changed if changed else data
 
     @classmethod
     def from_dict(cls: type[T], data: object, source: str = "") -> T:
@@ -82,7 +122,8 @@ class Model(BaseModel):
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain JSON data in the order of the declaration, without fields that are None."""
-        return self.model_dump(mode="json", exclude_none=True, by_alias=True)
+        data: dict[str, Any] = _without_absent_fields(self.model_dump(mode="json", by_alias=True))
+        return data
 
     def to_json(self) -> str:
         """Return the canonical text: the same set gives the same bytes."""
@@ -90,6 +131,17 @@ class Model(BaseModel):
 
 
 T = TypeVar("T", bound=Model)
+
+
+def _without_absent_fields(data: Any) -> Any:
+    """Leave out fields that are None; what a vendor wrote is kept as it is."""
+    if isinstance(data, dict):
+        return {
+            key: value if key.startswith(VENDOR_PREFIX) else _without_absent_fields(value)
+            for key, value in data.items()
+            if value is not None or key.startswith(VENDOR_PREFIX)
+        }
+    return [_without_absent_fields(value) for value in data] if isinstance(data, list) else data
 
 
 def canonical_json(data: object) -> str:
@@ -118,7 +170,10 @@ def read_json(path: Path | str) -> Any:
     except OSError as error:
         raise MissingFileError(str(path), None, f"cannot be read ({os.strerror(error.errno or 0)})") from None
     try:
-        return json.loads(text, parse_constant=_refuse_constant)
+        data = json.loads(text, parse_constant=_refuse_constant, parse_float=_finite)
+        if "\\u" in text:
+            json.dumps(data, ensure_ascii=False).encode()  # refuses half a surrogate pair, which no file could hold
+        return data
     except (ValueError, RecursionError) as error:
         raise InputError(str(path), None, f"must be valid JSON ({error})") from None
 
@@ -133,25 +188,62 @@ def _refuse_constant(name: str) -> float:
     raise ValueError(f"{name} is not a number")
 
 
+def _finite(text: str) -> float:
+    value = float(text)
+    if value in (float("inf"), float("-inf")):
+        raise ValueError(f"{text} is too large a number")
+    return value
+
+
+_WORDING = {
+    "missing": "is required",
+    "model_type": "must be a JSON object",
+    "model_attributes_type": "must be a JSON object",
+    "dict_type": "must be a JSON object",
+    "tuple_type": "must be a list",
+    "union_tag_not_found": "must be a JSON object that names its type",
+    "string_unicode": "must be Unicode text",
+}
+"""Type of complaint -> our words, where pydantic's speak of Python."""
+
+
 def _input_error(error: ValidationError, data: object, source: str) -> InputError:
     """Turn pydantic's first complaint into the project's one line."""
     first = error.errors(include_url=False)[0]
-    path = _field_path(first["loc"], data) or "the file"
-    message = str(first["msg"]).removeprefix("Value error, ")
-    value = None if first["type"] in ("missing", "value_error") else first.get("input")
-    field = f"{source}: {path}" if source else path
-    return InputError(field, value, message[0].lower() + message[1:])
+    kind, value, context = first["type"], first.get("input"), first.get("ctx", {})
+    path = _real_path(first["loc"], data, missing=kind == "missing")
+    message = _WORDING.get(kind) or _in_our_words(str(first["msg"]))
+    if kind == "union_tag_invalid":
+        path, value = [*path, str(context["discriminator"]).strip("'")], context["tag"]
+        known = re.findall(r"\w+", context["expected_tags"])
+        message = f"must be one of {', '.join(known)}{nearest_name(str(value), known)}"
+    elif kind in ("missing", "value_error"):
+        value = None
+    field = ".".join(part if part.isprintable() else repr(part) for part in path) or "the file"
+    return InputError(f"{source}: {field}" if source else field, value, " ".join(message.split()))
 
 
-def _field_path(location: tuple[int | str, ...], data: object) -> str:
-    """Return the dotted path of a field; pydantic also names the chosen type of a union, which is left out."""
-    parts = []
-    for part in location:
-        if isinstance(data, dict) and part not in data and data.get("type") == part:
-            continue
-        parts.append(str(part))
+def _in_our_words(message: str) -> str:
+    message = re.sub(r"^(Input|Tuple|List|String|Dictionary) should ", "must ", message.removeprefix("Value error, "))
+    for theirs, ours in (("a valid integer", "a whole number"), ("a valid ", "a "), (" after validation", "")):
+        message = message.replace(theirs, ours)
+    return message[0].lower() + message[1:]
+
+
+def _real_path(location: tuple[int | str, ...], data: Any, missing: bool) -> list[str]:
+    """Return the keys and indices that lead to a field; pydantic also names the chosen types of unions between them.
+
+    Args:
+        location: pydantic's.
+        data: what was read.
+        missing: the last key isn't there, and that is the fault.
+    """
+    path = []
+    for depth, part in enumerate(location, start=1):
         try:
-            data = data[part]  # type: ignore[index]
+            data = data[part]
         except (KeyError, IndexError, TypeError):
-            data = None
-    return ".".join(parts)
+            if not (missing and depth == len(location)):
+                continue
+        path.append(str(part))
+    return path

@@ -6,9 +6,8 @@ diagram, is derived from the shares of friction at its ends.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
-
-import numpy as np
 
 
 @dataclass(frozen=True)
@@ -99,11 +98,67 @@ def curve_crossfall_percent(design_class: str, curvature: float) -> float:
     """
     limits = LIMITS[design_class]
     radius = 1.0 / max(abs(curvature), 1e-9)
-    ends = np.log([limits.radius, limits.radius_least_crossfall])
-    values = np.log([LARGEST_CROSSFALL_PERCENT, LEAST_CROSSFALL_PERCENT])
-    exact = float(np.exp(np.interp(np.log(radius), ends, values)))
-    return float(np.ceil(2.0 * exact - 1e-9) / 2.0)
+    share = math.log(radius / limits.radius) / math.log(limits.radius_least_crossfall / limits.radius)
+    change = math.log(LEAST_CROSSFALL_PERCENT / LARGEST_CROSSFALL_PERCENT)
+    exact = LARGEST_CROSSFALL_PERCENT * math.exp(change * min(1.0, max(0.0, share)))
+    return math.ceil(2.0 * exact - 1e-9) / 2.0
 
 
 DELINEATOR_SPACING = ((20.0, 3.0), (50.0, 5.0), (100.0, 10.0), (300.0, 20.0), (600.0, 50.0))
 """Radius (m) and the spacing of delineators (m) outside the curve; 50 m from 600 m on."""
+
+# --- turnouts (RAA; all unconfirmed but the interchange spacing) ---------------------------------------------------
+
+TURNOUT_LANE_LENGTH = {"EKA1A": 250.0, "EKA1B": 250.0, "EKA2": 200.0, "EKA3": 150.0}
+"""Shortest deceleration or acceleration lane, m."""
+TURNOUT_LANE_WIDTH = 3.5
+"""Narrowest deceleration or acceleration lane, m."""
+EMERGENCY_BAY_WIDTH = 3.0
+EMERGENCY_BAY_LENGTH = 40.0
+"""Narrowest and shortest emergency bay at full width, m."""
+TURNOUT_GAP = 20.0
+"""Least distance between two turnouts of one carriageway, m."""
+INTERCHANGE_SPACING = {"EKA1A": 8000.0, "EKA1B": 5000.0, "EKA2": 5000.0, "EKA3": 0.0}
+"""Least distance between two exits, or two entries, of one carriageway, m."""
+LANE_TAPER_LENGTH = {"EKA1A": 120.0, "EKA1B": 120.0, "EKA2": 100.0, "EKA3": 80.0}
+"""Shortest stretch over which a lane begins or ends, m."""
+
+# --- barriers (RPS) -----------------------------------------------------------------------------------------------
+
+EMBANKMENT_HEIGHT, EMBANKMENT_RUN = 3.0, 3.0
+"""An embankment higher (m) and steeper (run per height) than this needs barriers."""
+TIGHT_CURVE = 1.25
+"""Arcs of a radius below this times the design class's smallest have a barrier on their outer side (unconfirmed)."""
+OBSTACLE_DISTANCE = {"EKA1A": 12.0, "EKA1B": 12.0, "EKA2": 12.0, "EKA3": 7.5}
+"""From the paved edge: nearer than this (m), an obstacle (pier, gantry post, pole, noise barrier, tree, board on thick
+posts) needs a barrier in front of it."""
+OBSTACLE_POST = 0.1
+"""Posts of signs thicker than this (m) are obstacles; thinner ones give way."""
+OBSTACLE_LEAD, OBSTACLE_TAIL = 60.0, 10.0
+"""A barrier begins so far before an obstacle, and ends so far behind it, in the direction of traffic, m."""
+BARRIER_DISTANCE = 0.5
+"""From the paved edge to a barrier's nearest part, m."""
+SHORTEST_BARRIER = 60.0
+BARRIER_GAP = 0.1
+"""Barriers no farther apart along the road than this (m) leave no gap."""
+
+# --- signs and equipment --------------------------------------------------------------------------------------------
+
+SIGN_DISTANCE = 0.5
+"""From the paved edge to a sign's nearest part, m."""
+SIGN_LOWER_EDGE = 1.5
+"""Lowest lower edge of a sign's face, m (beacons before exits and kilometre boards may be lower)."""
+EXIT_SEQUENCE = {1000.0: "448", 500.0: "449", 300.0: "450-52", 200.0: "450-51", 100.0: "450-50"}
+"""Distance before the beginning of an exit (m) -> code of the sign there; those before the road's begin fall away."""
+EXIT_SIGN_ROOM = 5.0
+"""A sign of the sequence may stand this far (m) from its place."""
+GORE_SIGN = "333"
+"""The exit board, which stands in the gore."""
+CLEARANCE = 4.70
+"""Least clearance over the pavement, m."""
+KILOMETRE_BOARD_SPACING = 500.0
+EMERGENCY_PHONE_SPACING = 2000.0
+BEACON_SPACING, BEACON_SPACING_TAPER = 18.0, 9.0
+"""Largest spacing of a construction zone's beacons along it and in its tapers, m."""
+CONSTRUCTION_LANE_WIDTH = 2.5
+"""Narrowest lane left open beside a construction zone, m."""

@@ -10,16 +10,100 @@ from __future__ import annotations
 import builtins
 import re
 from pathlib import Path
-from typing import Annotated, Any, Literal, TypeVar
+from typing import Annotated, Any, Literal
 
 from pydantic import Field, model_validator
 
 from ..errors import InputError
-from ..schema import Model, canonical_json, quantity, read_json
+from ..schema import Model, canonical_json, quantity, read_json, when
+from .model_base import LineObject, ObjectT, PointObject, RoadObject, StrictFinite, WidthPoint
+from .model_furniture import (
+    Asset,
+    Cabinet,
+    ConcreteBarrier,
+    ConstructionBeacon,
+    Delineator,
+    Gantry,
+    GantrySign,
+    Guardrail,
+    KilometreBoard,
+    NoiseBarrier,
+    Overpass,
+    Pole,
+    TemporaryBarrier,
+    TrafficLight,
+    TrafficSign,
+)
+from .model_section import (
+    Arrow,
+    Carriageway,
+    CrossfallPoint,
+    Hatching,
+    Lane,
+    LineMarking,
+    Median,
+    Pavement,
+    Pothole,
+    Ramp,
+    Rut,
+    Turnout,
+)
+from .model_surroundings import Environment, MaterialVariation, Terrain, Vegetation, Vehicle
+
+__all__ = [
+    "DESIGN_CLASSES",
+    "EPSG_URI",
+    "SCHEMA_VERSION",
+    "AlignmentObject",
+    "AnyObject",
+    "Arrow",
+    "Asset",
+    "Cabinet",
+    "Carriageway",
+    "ConcreteBarrier",
+    "ConstructionBeacon",
+    "CrossfallPoint",
+    "Delineator",
+    "Environment",
+    "Gantry",
+    "GantrySign",
+    "Guardrail",
+    "Hatching",
+    "HorizontalElement",
+    "KilometreBoard",
+    "Lane",
+    "LineMarking",
+    "LineObject",
+    "MaterialVariation",
+    "Median",
+    "Metadata",
+    "NoiseBarrier",
+    "Overpass",
+    "Pavement",
+    "PointObject",
+    "Pole",
+    "Pothole",
+    "Ramp",
+    "RoadObject",
+    "RoadParameters",
+    "Rut",
+    "TemporaryBarrier",
+    "Terrain",
+    "TrafficLight",
+    "TrafficSign",
+    "Transform",
+    "Turnout",
+    "Vegetation",
+    "Vehicle",
+    "VerticalPoint",
+    "WidthPoint",
+    "parameters_schema",
+    "read_parameters",
+    "write_schema",
+]
 
 SCHEMA_VERSION: Literal["1.0"] = "1.0"
 EPSG_URI = "https://www.opengis.net/def/crs/EPSG/0/{}"
-StrictFinite = Annotated[float, Field(strict=True, ge=-1e8, le=1e8)]
 DESIGN_CLASSES = ("EKA1A", "EKA1B", "EKA2", "EKA3")
 
 
@@ -28,10 +112,10 @@ class Metadata(Model):
 
     identifier: str = Field(description="Unique name of the set, used in file names.")
     title: str = Field("", description="Title for people.")
-    seed: int = quantity(0, ge=0, unit="1", description="Seed that the set was sampled from.")
+    seed: int = quantity(0, ge=0, le=2**63 - 1, unit="1", description="Seed that the set was sampled from.")
     generator: str = Field(description="Program and version that wrote the set.")
     referenceSystem: str = Field(  # noqa: N815 (CityJSON's spelling)
-        pattern=r"^https://www\.opengis\.net/def/crs/EPSG/0/\d{4,6}$",
+        pattern=r"^https://www\.opengis\.net/def/crs/EPSG/0/[0-9]{4,8}$",
         description="URI of the map coordinate system.",
     )
 
@@ -50,20 +134,10 @@ class Transform(Model):
     )
 
 
-class RoadObject(Model):
-    """Base of everything in ``objects``: each has a type and a number that its points carry."""
-
-    instance: int = quantity(
-        ge=1, le=2**32 - 1, unit="1", description="Number that the object's faces and points carry."
-    )
-
-
-ObjectT = TypeVar("ObjectT", bound=RoadObject)
-
-
 class HorizontalElement(Model):
     """A line, arc or clothoid; the curvature changes linearly with the station."""
 
+    conditions = (when({"kind": {"const": "line"}}, {"curvature_start": {"const": 0}, "curvature_end": {"const": 0}}),)
     kind: Literal["line", "arc", "clothoid"] = Field(description="What the two curvatures make it.")
     length: float = quantity(gt=0, unit="m", description="Length along the centreline.")
     curvature_start: float = quantity(ge=-0.1, le=0.1, unit="1/m", description="Positive to the left.")
@@ -111,154 +185,41 @@ class AlignmentObject(RoadObject):
         return sum(element.length for element in self.horizontal)
 
 
-class Lane(Model):
-    """One lane."""
-
-    width: float = quantity(ge=2.0, le=6.0, unit="m", description="Width between the lane's boundaries.")
-    kind: Literal["through"] = Field("through", description="Use of the lane.")
-
-
-class CrossfallPoint(Model):
-    """Crossfall at a station; linear in between, constant before the first and after the last."""
-
-    station: float = quantity(unit="m", description="Where the value holds.")
-    crossfall_percent: float = quantity(
-        ge=-12, le=12, unit="%", description="Positive where the surface falls to the right."
-    )
-
-
-class Carriageway(RoadObject):
-    """One direction's paved surface with its verge."""
-
-    type: Literal["Carriageway"] = "Carriageway"
-    side: Literal["left", "right"] = Field(description="Side of the centreline.")
-    inner_offset: float = quantity(
-        ge=0, le=50, unit="m", description="Distance of the inner paved edge from the centreline."
-    )
-    hard_shoulder_width: float = quantity(ge=0, le=6, unit="m", description="0 where there is none.")
-    outer_edge_strip_width: float = quantity(ge=0, le=2, unit="m", description="Outside the outermost lane.")
-    lanes: tuple[Lane, ...] = Field(min_length=1, max_length=8, description="Lanes from outside to inside.")
-    inner_edge_strip_width: float = quantity(ge=0, le=2, unit="m", description="Inside the innermost lane.")
-    verge_width: float = quantity(ge=0, le=5, unit="m", description="Unpaved strip outside the pavement.")
-    verge_slope_percent: float = quantity(
-        8.0, ge=0, le=15, unit="%", description="Fall of the verge away from the pavement."
-    )
-    crossfall: tuple[CrossfallPoint, ...] = Field(min_length=1, description="Crossfall by station.")
-    rotation_axis: Literal["carriageway_axis", "inner_edge"] = Field(
-        "carriageway_axis", description="Line that keeps the profile's elevation while the crossfall changes."
-    )
-
-    @property
-    def sign(self) -> int:
-        """Return +1 for the left, -1 for the right carriageway: the sign of its offsets."""
-        return 1 if self.side == "left" else -1
-
-    @property
-    def paved_width(self) -> float:
-        """Return the width from the inner edge strip to the hard shoulder, m."""
-        lanes = sum(lane.width for lane in self.lanes)
-        return self.inner_edge_strip_width + lanes + self.outer_edge_strip_width + self.hard_shoulder_width
-
-
-class Median(RoadObject):
-    """The strip between the carriageways' inner edges, straight from one to the other."""
-
-    type: Literal["Median"] = "Median"
-
-
-class LineMarking(RoadObject):
-    """A marking that follows a lane boundary. It lies on the pavement with the thickness of its film."""
-
-    type: Literal["LineMarking"] = "LineMarking"
-    carriageway: str = Field(description="Id of the carriageway that it lies on.")
-    kind: Literal["outer_edge", "lane", "inner_edge"] = Field(description="What the line separates.")
-    boundary: int = quantity(
-        ge=0, le=8, unit="1", description="Lane boundary, counted from the outer edge of the outermost lane."
-    )
-    width: float = quantity(ge=0.05, le=1.0, unit="m", description="Width of the line.")
-    dash_length: float = quantity(ge=0, le=100, unit="m", description="Length of a dash; 0 for a solid line.")
-    gap_length: float = quantity(ge=0, le=100, unit="m", description="Length of a gap; 0 for a solid line.")
-    start_station: float = quantity(ge=0, unit="m", description="Beginning of the first dash.")
-    end_station: float = quantity(ge=0, unit="m", description="End of the line.")
-    film_thickness: float = quantity(
-        0.003, ge=0.0005, le=0.006, unit="m", description="Height of the film above the pavement."
-    )
-
-    @model_validator(mode="after")
-    def _dashes_fit(self) -> LineMarking:
-        if (self.dash_length == 0) != (self.gap_length == 0):
-            raise ValueError("dash_length and gap_length must both be 0 (solid) or both be positive")
-        return self
-
-
-class Guardrail(RoadObject):
-    """A steel guardrail: W-beam on posts, ramped down at its terminals."""
-
-    type: Literal["Guardrail"] = "Guardrail"
-    start_station: float = quantity(ge=0, unit="m", description="Beginning, terminal included.")
-    end_station: float = quantity(ge=0, unit="m", description="End, terminal included.")
-    offset: float = quantity(ge=-100, le=100, unit="m", description="Offset of the posts' axis.")
-    faces: Literal["left", "right", "both"] = Field(description="Side that the beam is mounted on.")
-    height: float = quantity(0.75, ge=0.3, le=1.5, unit="m", description="Top of the beam above the surface.")
-    post_spacing: float = quantity(4.0, ge=0.5, le=10, unit="m", description="Distance between posts.")
-    terminal_length: float = quantity(
-        12.0, ge=0, le=50, unit="m", description="Length over which either end is ramped into the ground."
-    )
-
-
-class Delineator(RoadObject):
-    """A delineator post (Leitpfosten) beside the road."""
-
-    type: Literal["Delineator"] = "Delineator"
-    station: float = quantity(ge=0, unit="m", description="Station of its axis.")
-    offset: float = quantity(ge=-100, le=100, unit="m", description="Offset of its axis.")
-    rotation_deg: float = quantity(
-        0.0, ge=-360, le=360, unit="deg", description="About the vertical; 0 faces traffic with the stations."
-    )
-    height: float = quantity(1.0, ge=0.3, le=1.5, unit="m", description="Top above the surface.")
-
-
-class Terrain(RoadObject):
-    """The ground beside the road: generated undulation that the batter meets."""
-
-    type: Literal["Terrain"] = "Terrain"
-    half_width: float = quantity(ge=5, le=1000, unit="m", description="Reach to either side of the centreline.")
-    embankment_height: float = quantity(
-        ge=-20, le=20, unit="m", description="Mean height of the centreline above the ground; negative in a cutting."
-    )
-    undulation: float = quantity(ge=0, le=20, unit="m", description="Standard deviation of the ground's height.")
-    wavelength: float = quantity(
-        ge=10, le=2000, unit="m", description="Shortest wavelength of the ground's undulation."
-    )
-    batter_slope: float = quantity(
-        1.5, ge=0.5, le=10, unit="m/m", description="Horizontal run of the batter per metre of height."
-    )
-    seed: int = quantity(ge=0, unit="1", description="Seed of the undulation.")
-
-
-class Vegetation(RoadObject):
-    """Plants of one kind in a band on both sides of the road, measured from the outer edge of the verge."""
-
-    type: Literal["Vegetation"] = "Vegetation"
-    kind: Literal["grass", "tree"] = Field(description="What grows.")
-    density: float = quantity(ge=0, le=50, unit="1/m2", description="Plants (tufts of grass, trees) per area.")
-    band_start: float = quantity(ge=-5, le=1000, unit="m", description="Beginning of the band.")
-    band_end: float = quantity(ge=-5, le=1000, unit="m", description="End of the band.")
-    height_min: float = quantity(gt=0, le=60, unit="m", description="Height of the smallest plant.")
-    height_max: float = quantity(gt=0, le=60, unit="m", description="Height of the tallest plant.")
-    seed: int = quantity(ge=0, unit="1", description="Seed of places, sizes and turns.")
-
-    @model_validator(mode="after")
-    def _in_order(self) -> Vegetation:
-        if self.band_end < self.band_start or self.height_max < self.height_min:
-            raise ValueError("band_end and height_max must not be less than band_start and height_min")
-        return self
-
-
 AnyObject = Annotated[
-    AlignmentObject | Carriageway | Median | LineMarking | Guardrail | Delineator | Terrain | Vegetation,
+    AlignmentObject
+    | Carriageway
+    | Median
+    | Turnout
+    | LineMarking
+    | Hatching
+    | Arrow
+    | Guardrail
+    | ConcreteBarrier
+    | NoiseBarrier
+    | TemporaryBarrier
+    | Delineator
+    | TrafficSign
+    | Gantry
+    | Pole
+    | TrafficLight
+    | KilometreBoard
+    | Cabinet
+    | ConstructionBeacon
+    | Overpass
+    | Asset
+    | Terrain
+    | Vegetation
+    | Vehicle,
     Field(discriminator="type"),
 ]
+
+
+OBJECT_ID = r"[A-Za-z0-9_.-]{1,64}"
+
+
+def _at_least_one(kind: str) -> dict[str, Any]:
+    """Return what JSON Schema says of a dictionary with an object of a type: not all are of another."""
+    return {"not": {"additionalProperties": {"properties": {"type": {"not": {"const": kind}}}}}}
 
 
 class RoadParameters(Model):
@@ -269,12 +230,20 @@ class RoadParameters(Model):
     metadata: Metadata
     transform: Transform
     design_class: Literal["EKA1A", "EKA1B", "EKA2", "EKA3"] = Field(description="Design class of the RAA.")
-    objects: dict[str, AnyObject]
+    environment: Environment = Field(Environment(), description="Light and weather.")
+    materials: MaterialVariation = Field(MaterialVariation(), description="How the materials differ from the mean.")
+    objects: dict[str, AnyObject] = Field(
+        description="Objects by id.",
+        json_schema_extra={
+            "propertyNames": {"pattern": f"^{OBJECT_ID}$"},
+            "allOf": [_at_least_one("Alignment"), _at_least_one("Carriageway")],
+        },
+    )
 
     @model_validator(mode="after")
     def _consistent(self) -> RoadParameters:
         for name in self.objects:
-            if not re.fullmatch(r"[A-Za-z0-9_.-]{1,64}", name):
+            if not re.fullmatch(OBJECT_ID, name):
                 raise ValueError(f"object id {name!r}: letters, digits, '_', '-' and '.' are allowed, at most 64")
         numbers = [item.instance for item in self.objects.values()]
         if len(set(numbers)) != len(numbers):
@@ -287,11 +256,26 @@ class RoadParameters(Model):
         sides = [item.side for item in self.of_type(Carriageway).values()]
         if len(set(sides)) != len(sides) or not sides:
             raise ValueError("objects must contain one Carriageway per side at most, and at least one")
-        for name, line in self.of_type(LineMarking).items():
-            carriageway = self.objects.get(line.carriageway)
-            if not isinstance(carriageway, Carriageway) or line.boundary > len(carriageway.lanes):
-                raise ValueError(f"objects.{name}: carriageway and boundary must name a lane boundary that exists")
+        for name, item in self.objects.items():
+            if fault := self._dangling(item):
+                raise ValueError(f"objects.{name}: {fault}")
         return self
+
+    def _dangling(self, item: RoadObject) -> str:
+        """Return what an object names that isn't there, or an empty string."""
+        if isinstance(item, LineMarking | Arrow | Vehicle | Turnout):
+            carriageway = self.objects.get(item.carriageway)
+            if not isinstance(carriageway, Carriageway):
+                return f"carriageway '{item.carriageway}' must name a Carriageway"
+            if isinstance(item, LineMarking) and item.boundary > len(carriageway.lanes):
+                return "carriageway and boundary must name a lane boundary that exists"
+            if isinstance(item, Vehicle) and item.lane >= len(carriageway.lanes):
+                return f"lane {item.lane} must be less than the number of lanes, {len(carriageway.lanes)}"
+        if isinstance(item, LineMarking | Hatching) and item.turnout is not None:
+            turnout = self.objects.get(item.turnout)
+            if not isinstance(turnout, Turnout) or turnout.ramp is None:
+                return f"turnout '{item.turnout}' must name an exit or entry"
+        return ""
 
     def of_type(self, kind: builtins.type[ObjectT]) -> dict[str, ObjectT]:
         """Return the objects of one class by id, in the order of the file."""
