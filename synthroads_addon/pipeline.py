@@ -282,7 +282,7 @@ def _top_view(geometry: RoadGeometry) -> TopView:
     origin = np.array(geometry.parameters.transform.translate)[:2]
     stations = np.linspace(0.0, geometry.length, 50)
     terrain = geometry.parameters.terrain
-    reach = terrain.half_width if terrain else float(np.abs(geometry.offsets).max())
+    reach = terrain.half_width if terrain else float(np.abs(geometry.offsets(stations)).max())
     plan, heading, _ = geometry.alignment.frame(stations)
     left = np.stack([-np.sin(heading), np.cos(heading)], axis=1)
     chord = plan[-1] - plan[0]

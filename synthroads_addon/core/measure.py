@@ -58,18 +58,20 @@ def misplaced_points(points: PointBlock, geometry: RoadGeometry, margin: Float |
     station, offset = geometry.alignment.project(points.xyz[paved, :2] - origin[:2])
     margin = np.broadcast_to(margin, len(points))[paved]
     on_line = _distance_to_markings(geometry, station, offset)
-    on_road = _distance_to_strips(geometry, offset, "road")
+    on_road = _distance_to_strips(geometry, station, offset, "road")
     is_line = points.class_id[paved] == class_id("road_marking")
     # A point of the pavement must not lie on paint: its distance into the nearest marking must not exceed the margin.
     return np.where(is_line, on_line > margin, (on_road > margin) | (on_line < -margin))
 
 
-def _distance_to_strips(geometry: RoadGeometry, offset: Float, name: str) -> Float:
+def _distance_to_strips(geometry: RoadGeometry, station: Float, offset: Float, name: str) -> Float:
     """Return the distance (N,) to the nearest strip of a class; 0 inside."""
     distance = np.full(len(offset), np.inf)
-    for strip, left, right in zip(geometry.strips, geometry.offsets[:-1], geometry.offsets[1:], strict=True):
+    boundaries = geometry.offsets(station)
+    for strip, left, right in zip(geometry.strips, boundaries.T[:-1], boundaries.T[1:], strict=True):
         if strip.class_name == name:
-            distance = np.minimum(distance, np.maximum(np.maximum(offset - left, right - offset), 0.0))
+            beside = np.maximum(np.maximum(offset - left, right - offset), 0.0)
+            distance = np.where(left > right, np.minimum(distance, beside), distance)
     return distance
 
 
@@ -77,7 +79,7 @@ def _distance_to_markings(geometry: RoadGeometry, station: Float, offset: Float)
     """Return the signed distance (N,) to the nearest dash: negative inside, by how far it is to the dash's edge."""
     distance = np.full(len(offset), np.inf)
     for line in geometry.parameters.of_type(LineMarking).values():
-        left, right = geometry.marking_offsets(line)
+        left, right = geometry.marking_edges(line, station)
         across = np.maximum(offset - left, right - offset)
         dashes = geometry.dashes(line)
         if not len(dashes):

@@ -12,8 +12,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .alignment import Alignment, Element
-from .model import Carriageway, LineMarking, Median, RoadParameters
+from .damage import damage_depth
+from .model import Carriageway, LineMarking, Median, RoadParameters, Turnout
+from .model_base import width_at
+from .model_furniture import Side
 from .profile import IntersectionPoint, Profile
+from .section import CarriagewaySection
+from .turnout_shape import TURNOUT_STRIPS
 
 Float = NDArray[np.float64]
 
@@ -23,20 +28,23 @@ class Strip:
     """A lengthwise strip of the road between two neighbouring boundaries.
 
     Attributes:
-        kind: ``verge``, ``hard_shoulder``, ``outer_edge_strip``, ``lane``, ``inner_edge_strip`` or ``median``.
+        kind: ``median``, or one of `CarriagewaySection.kinds`.
         class_name: semantic class of its surface.
         material: name in the material table.
-        instance: instance number of the object that it belongs to.
+        instance: instance number of the object that it belongs to; a strip of turnouts has theirs beside them
+            (`RoadGeometry.instances`).
+        side: carriageway that it belongs to; None for the median.
     """
 
     kind: str
     class_name: str
     material: str
     instance: int
+    side: Side | None
 
 
-_SURFACES = {"verge": ("roadside", "verge"), "median": ("roadside", "median")}
-_PAVED = ("road", "asphalt")
+_SURFACES = {"verge": ("roadside", "verge"), "island": ("roadside", "verge"), "median": ("roadside", "median")}
+_SIDES: tuple[Side, ...] = ("left", "right")
 
 
 class RoadGeometry:
@@ -45,8 +53,8 @@ class RoadGeometry:
     Attributes:
         alignment: the horizontal alignment in the local frame.
         profile: the vertical profile in local elevation.
+        sections: the carriageways' cross-sections by side.
         strips: the M strips from left to right.
-        offsets: (M + 1,) offsets of their boundaries from left (largest) to right.
     """
 
     def __init__(self, parameters: RoadParameters) -> None:
@@ -59,20 +67,17 @@ class RoadGeometry:
             np.deg2rad(axis.start_heading_deg),
         )
         self.profile = Profile([IntersectionPoint(p.station, p.elevation, p.radius) for p in axis.vertical])
-        left, right = parameters.carriageway("left"), parameters.carriageway("right")
+        self.sections = sections_of(parameters)
+        left, right = self.sections.get("left"), self.sections.get("right")
         strips: list[Strip] = []
-        offsets: list[float] = []
         if left:
-            strips, offsets = _half(left)
+            strips += _strips(left)[::-1]
         if left and right:
-            median = next(iter(parameters.of_type(Median).values()), None)
-            strips.append(Strip("median", *_SURFACES["median"], median.instance if median else left.instance))
+            median = next(iter(parameters.of_type(Median).values()), left.carriageway)
+            strips.append(Strip("median", *_SURFACES["median"], median.instance, None))
         if right:
-            half_strips, half_offsets = _half(right)
-            strips += half_strips[::-1]
-            offsets += half_offsets[::-1]
+            strips += _strips(right)
         self.strips: tuple[Strip, ...] = tuple(strips)
-        self.offsets: Float = np.array(offsets)
 
     @property
     def length(self) -> float:
@@ -91,61 +96,82 @@ class RoadGeometry:
             / 100.0
         )
 
+    def offsets(self, station: ArrayLike) -> Float:
+        """Return the (N, M + 1) offsets of the strips' boundaries at N stations, from left (largest) to right, m."""
+        return self._across({side: section.distances(station) for side, section in self.sections.items()}, True)
+
     def boundary_elevations(self, station: ArrayLike) -> Float:
-        """Return the (N, M + 1) local elevations of the strips' boundaries at N stations."""
+        """Return the (N, M + 1) local elevations of the strips' boundaries at N stations, without damage."""
         station = np.atleast_1d(np.asarray(station, dtype=np.float64))
-        axis = self.profile.elevation(station)[:, None]
-        left, right = self.parameters.carriageway("left"), self.parameters.carriageway("right")
-        parts = []
-        if left:
-            parts.append(axis + self._relative(left, station))
-        if right:
-            parts.append(axis + self._relative(right, station)[:, ::-1])
-        return np.hstack(parts)
+        relative = {
+            side: section.elevations(station, self.crossfall(section.carriageway, station))
+            for side, section in self.sections.items()
+        }
+        return self.profile.elevation(station)[:, None] + self._across(relative, False)
 
     def elevation(self, station: ArrayLike, offset: ArrayLike) -> Float:
-        """Return the surface's local elevation (N,); NaN outside the outermost boundaries."""
-        station, offset = np.broadcast_arrays(
-            np.asarray(station, dtype=np.float64).ravel(), np.asarray(offset, dtype=np.float64).ravel()
-        )
-        strip = self.strip_index(offset)
-        inside = strip >= 0
+        """Return the surface's local elevation (N,), damage included; NaN outside the outermost boundaries."""
+        station, offset = _pairs(station, offset)
+        strip = self.strip_index(station, offset)
+        inside = np.flatnonzero(strip >= 0)
         result = np.full(offset.shape, np.nan)
-        heights = self.boundary_elevations(station[inside])
-        index, row = strip[inside], np.arange(np.count_nonzero(inside))
-        left, right = self.offsets[index], self.offsets[index + 1]
-        share = (left - offset[inside]) / (left - right)
+        heights, offsets = self.boundary_elevations(station[inside]), self.offsets(station[inside])
+        index, row = strip[inside], np.arange(len(inside))
+        left, right = offsets[row, index], offsets[row, index + 1]
+        share = (left - offset[inside]) / np.maximum(left - right, 1e-300)
         result[inside] = heights[row, index] * (1.0 - share) + heights[row, index + 1] * share
+        for section in self.sections.values():
+            if section.carriageway.pavement.ruts or section.carriageway.pavement.potholes:
+                result -= damage_depth(section, station, offset)
         return result
 
-    def strip_index(self, offset: ArrayLike) -> NDArray[np.intp]:
-        """Return the index into `strips` of each offset (N,); -1 outside."""
-        offset = np.asarray(offset, dtype=np.float64)
-        index = np.searchsorted(-self.offsets, -offset, side="right") - 1
+    def strip_index(self, station: ArrayLike, offset: ArrayLike) -> NDArray[np.intp]:
+        """Return the index into `strips` of stations and offsets (N,); -1 outside."""
+        station, offset = _pairs(station, offset)
+        boundaries = self.offsets(station)
+        index = np.count_nonzero(boundaries >= offset[:, None], axis=1) - 1
         last = len(self.strips) - 1
-        index = np.where(offset == self.offsets[-1], last, index)
+        # The right-most boundary belongs to the right-most strip that has a width.
+        at_end = offset == boundaries[:, -1]
+        widest_last = last - np.argmax(np.diff(boundaries, axis=1)[:, ::-1] < 0.0, axis=1)
+        index = np.where(at_end, widest_last, index)
         return np.where((index < 0) | (index > last), -1, index)
+
+    def instances(self, strip: Strip, station: ArrayLike) -> NDArray[np.int64]:
+        """Return the instance numbers (N,) that a strip's surface has at stations (N,)."""
+        station = np.atleast_1d(np.asarray(station, dtype=np.float64))
+        result = np.full(station.shape, strip.instance, dtype=np.int64)
+        if strip.side and strip.kind in TURNOUT_STRIPS:
+            for shape in self.sections[strip.side].turnouts:
+                low, high = shape.range()
+                result[(station >= low) & (station <= high)] = shape.turnout.instance
+        return result
 
     def point(self, station: ArrayLike, offset: ArrayLike) -> Float:
         """Return local points (N, 3) of the surface; z is NaN outside the road."""
-        station, offset = np.broadcast_arrays(
-            np.asarray(station, dtype=np.float64).ravel(), np.asarray(offset, dtype=np.float64).ravel()
-        )
+        station, offset = _pairs(station, offset)
         position, heading, _ = self.alignment.frame(station)
         left = np.stack([-np.sin(heading), np.cos(heading)], axis=1)
         return np.column_stack([position + offset[:, None] * left, self.elevation(station, offset)])
 
-    def marking_offsets(self, line: LineMarking) -> tuple[float, float]:
-        """Return the left and right edge offsets of a line marking.
+    def marking_edges(self, line: LineMarking, station: ArrayLike) -> tuple[Float, Float]:
+        """Return the left and right edge offsets (N,) of a line marking at stations (N,).
 
         A line between lanes is centred on the boundary; an edge line lies on the edge strip, so that the lane keeps
-        its full width (`RMS`).
+        its full width (RMS).
         """
         carriageway = self.parameters.objects[line.carriageway]
         assert isinstance(carriageway, Carriageway)
-        boundary = lane_boundaries(carriageway)[line.boundary]
-        shift = {"outer_edge": 0.5, "lane": 0.0, "inner_edge": -0.5}[line.kind] * line.width
-        centre = carriageway.sign * (boundary + shift)
+        section = self.sections[carriageway.side]
+        outwards = {"outer_edge": 0.5, "block": 0.5, "turnout_edge": 0.5, "inner_edge": -0.5, "gore_edge": -0.5}
+        if line.kind == "free":
+            beside = width_at(line.offset, np.atleast_1d(station))
+        elif line.kind in ("turnout_edge", "gore_edge"):
+            inner, outer = section.boundaries_of("turnout_lane", station)
+            beside = outer if line.kind == "turnout_edge" else inner
+        else:
+            beside = section.lane_boundaries(station)[:, line.boundary]
+        centre = carriageway.sign * (beside + outwards.get(line.kind, 0.0) * line.width)
         return centre + line.width / 2, centre - line.width / 2
 
     def dashes(self, line: LineMarking) -> Float:
@@ -157,34 +183,34 @@ class RoadGeometry:
         first = start + period * np.arange(max(0, int(np.ceil((end - start) / period))))
         return np.column_stack([first, np.minimum(first + line.dash_length, end)])
 
-    def _relative(self, carriageway: Carriageway, station: Float) -> Float:
-        """Return (N, B) elevations of one carriageway's boundaries, outermost first, above the axis."""
-        outward = np.array(_half(carriageway)[1]) * carriageway.sign
-        paved = np.minimum(outward, carriageway.inner_offset + carriageway.paved_width)
-        pivot = carriageway.inner_offset
-        if carriageway.rotation_axis == "carriageway_axis":
-            pivot += carriageway.paved_width / 2
-        # A surface that falls to the right rises with the offset, and the offset is sign * distance outwards.
-        rise = carriageway.sign * self.crossfall(carriageway, station)
-        verge_fall = (outward - paved) * carriageway.verge_slope_percent / 100.0
-        return rise[:, None] * (paved - pivot) - verge_fall
+    def _across(self, by_side: dict[Side, Float], signed: bool) -> Float:
+        """Return (N, B) values of both sides, innermost first, as one row from left to right."""
+        parts = []
+        for side in _SIDES:
+            if side in by_side:
+                values = by_side[side] * (self.sections[side].carriageway.sign if signed else 1.0)
+                parts.append(values[:, ::-1] if side == "left" else values)
+        return np.hstack(parts)
 
 
-def lane_boundaries(carriageway: Carriageway) -> Float:
-    """Return the distances of the lane boundaries from the centreline, outermost first, m (lanes + 1,)."""
-    widths = np.array([lane.width for lane in carriageway.lanes])
-    innermost = carriageway.inner_offset + carriageway.inner_edge_strip_width
-    return innermost + np.concatenate([np.cumsum(widths[::-1])[::-1], [0.0]])
+def sections_of(parameters: RoadParameters) -> dict[Side, CarriagewaySection]:
+    """Return the cross-section of every carriageway, its turnouts included."""
+    turnouts = parameters.of_type(Turnout).values()
+    return {
+        item.side: CarriagewaySection(item, [turnout for turnout in turnouts if turnout.carriageway == name])
+        for name, item in parameters.of_type(Carriageway).items()
+    }
 
 
-def _half(carriageway: Carriageway) -> tuple[list[Strip], list[float]]:
-    """Return one carriageway's strips and the signed offsets of their boundaries, outermost first."""
-    widths = [("verge", carriageway.verge_width), ("hard_shoulder", carriageway.hard_shoulder_width)]
-    widths.append(("outer_edge_strip", carriageway.outer_edge_strip_width))
-    widths += [("lane", lane.width) for lane in carriageway.lanes]
-    widths.append(("inner_edge_strip", carriageway.inner_edge_strip_width))
-    present = [(kind, width) for kind, width in widths if width > 0]
-    strips = [Strip(kind, *_SURFACES.get(kind, _PAVED), carriageway.instance) for kind, _ in present]
-    inwards = np.cumsum([width for _, width in present[::-1]])[::-1]
-    distances = [*(carriageway.inner_offset + inwards), carriageway.inner_offset]
-    return strips, [carriageway.sign * float(distance) for distance in distances]
+def _strips(section: CarriagewaySection) -> list[Strip]:
+    """Return one carriageway's strips, innermost first."""
+    paved = ("road", section.carriageway.pavement.kind)
+    instance, side = section.carriageway.instance, section.carriageway.side
+    return [Strip(kind, *_SURFACES.get(kind, paved), instance, side) for kind in section.kinds]
+
+
+def _pairs(station: ArrayLike, offset: ArrayLike) -> tuple[Float, Float]:
+    pair = np.broadcast_arrays(
+        np.asarray(station, dtype=np.float64).ravel(), np.asarray(offset, dtype=np.float64).ravel()
+    )
+    return pair[0], pair[1]

@@ -5,8 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from .damage import damage_rows
 from .geometry import RoadGeometry
 from .model import LineMarking
+from .turnout_shape import STEP
 
 MAXIMUM_SPACING = 8.0
 """No two stations lie farther apart than this (m), so that the terrain's undulation is followed on straights."""
@@ -16,8 +18,10 @@ _SHARE = 0.57
 root sum of squares stays below the whole."""
 
 
-def sample_stations(geometry: RoadGeometry, tolerance: float) -> NDArray[np.float64]:
-    """Return the (N,) increasing stations at which the road is sampled, from 0 to its length.
+def sample_stations(
+    geometry: RoadGeometry, tolerance: float, start: float = 0.0, end: float = np.inf
+) -> NDArray[np.float64]:
+    """Return the (N,) increasing stations at which the road is sampled, from start to end within its length.
 
     Every kink (element, rounding, crossfall point, end of a dash) is a station of its own. Between two kinks the
     spacing is even and keeps the chord's sagitta ds^2 k / 8 and the twist of the widest strip within the tolerance.
@@ -25,10 +29,12 @@ def sample_stations(geometry: RoadGeometry, tolerance: float) -> NDArray[np.floa
     Args:
         geometry: the analytic road.
         tolerance: largest distance (m) between the mesh and the analytic surface, > 0.
+        start, end: stations (m) of the stretch that is wanted.
     """
-    kinks = _kinks(geometry)
+    kinks = _kinks(geometry, tolerance, start, min(end, geometry.length))
     spacing = np.minimum(_chord_spacing(geometry, kinks, tolerance), _twist_spacing(geometry, kinks, tolerance))
-    spacing = np.minimum(spacing, MAXIMUM_SPACING)
+    # Between the two ends of a step there is nothing to follow.
+    spacing = np.where(np.diff(kinks) <= 2.0 * STEP, np.inf, np.minimum(spacing, MAXIMUM_SPACING))
     counts = np.maximum(1, np.ceil(np.diff(kinks) / spacing - 1e-9)).astype(int)
     first = np.repeat(kinks[:-1], counts)
     step = np.repeat(np.diff(kinks) / counts, counts)
@@ -36,14 +42,14 @@ def sample_stations(geometry: RoadGeometry, tolerance: float) -> NDArray[np.floa
     return np.append(first + within * step, kinks[-1])
 
 
-def _kinks(geometry: RoadGeometry) -> NDArray[np.float64]:
-    parameters, length = geometry.parameters, geometry.length
-    stations = [geometry.alignment.element_starts, np.asarray(geometry.profile.breakpoints), [0.0, length]]
-    for side in ("left", "right"):
-        if carriageway := parameters.carriageway(side):
-            stations.append([point.station for point in carriageway.crossfall])
+def _kinks(geometry: RoadGeometry, tolerance: float, start: float, end: float) -> NDArray[np.float64]:
+    parameters = geometry.parameters
+    stations = [geometry.alignment.element_starts, np.asarray(geometry.profile.breakpoints), [start, end]]
+    for section in geometry.sections.values():
+        stations.append([point.station for point in section.carriageway.crossfall])
+        stations += [section.kinks(), damage_rows(section, tolerance)]
     stations += [geometry.dashes(line).ravel() for line in parameters.of_type(LineMarking).values()]
-    inside = np.clip(np.concatenate([np.asarray(s, dtype=np.float64) for s in stations]), 0.0, length)
+    inside = np.clip(np.concatenate([np.asarray(s, dtype=np.float64) for s in stations]), start, end)
     kinks = np.unique(inside)
     # Kinks closer than a tenth of a millimetre are one: they would only make faces without area.
     keep = np.append(np.diff(kinks) > 1e-4, True)
@@ -54,8 +60,10 @@ def _kinks(geometry: RoadGeometry) -> NDArray[np.float64]:
 def _chord_spacing(geometry: RoadGeometry, kinks: NDArray[np.float64], tolerance: float) -> NDArray[np.float64]:
     """Return the largest spacing (K,) whose horizontal and vertical sagitta keep their share of the tolerance."""
     samples = np.linspace(kinks[:-1] + 1e-6, kinks[1:] - 1e-6, 5)
-    reach = np.abs(geometry.offsets).max()
+    reach = np.abs(geometry.offsets(kinks)).max()
     bend = np.abs(geometry.alignment.curvature(samples)).max(axis=0)
+    for section in geometry.sections.values():
+        bend = bend + section.bend(samples.ravel()).reshape(samples.shape).max(axis=0)
     horizontal = bend * (1.0 + bend * reach)
     vertical = np.abs(geometry.profile.curvature(samples)).max(axis=0)
     return np.sqrt(8.0 * _SHARE * tolerance / np.maximum(np.maximum(horizontal, vertical), 1e-12))
@@ -66,8 +74,11 @@ def _twist_spacing(geometry: RoadGeometry, kinks: NDArray[np.float64], tolerance
 
     The middle of a twisted quad of width w and length ds lies w ds (dq/ds) / 4 off its diagonal.
     """
-    widest = np.abs(np.diff(geometry.offsets)).max()
-    heights = geometry.boundary_elevations(kinks)
-    slopes = np.diff(heights, axis=1) / -np.diff(geometry.offsets)
-    twist = np.abs(np.diff(slopes, axis=0)).max(axis=1) / np.diff(kinks)
-    return 4.0 * _SHARE * tolerance / np.maximum(twist * widest, 1e-12)
+    widths = -np.diff(geometry.offsets(kinks), axis=1)
+    heights = np.diff(geometry.boundary_elevations(kinks), axis=1)
+    # A strip without width lies in no plane; one that opens from 0 has the slope that it opens to.
+    slopes = np.where(widths > 1e-6, heights / np.maximum(widths, 1e-6), np.nan)
+    change = np.nan_to_num(np.abs(np.diff(slopes, axis=0)))
+    widest = np.maximum(widths[:-1], widths[1:])
+    twist = (change * widest).max(axis=1) / np.diff(kinks)
+    return 4.0 * _SHARE * tolerance / np.maximum(twist, 1e-12)
