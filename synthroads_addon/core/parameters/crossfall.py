@@ -10,20 +10,27 @@ from .model import CrossfallPoint, HorizontalElement
 
 LEAST_RUN_OFF = 0.1
 """Least slope (%) of the pavement's edge per metre of its distance from the rotation axis, while water could stand."""
+NARROW, NARROW_RUN_OFF = 4.0, 0.225
+"""Where the edge is nearer than this (m) to the rotation axis, its largest slope (%) per metre of that distance."""
 
 
 def run_off_length(design_class: str, half_width: float, start: float, end: float) -> float:
     """Return the least length (m) in which both carriageways' crossfall can change between two curvatures (1/m)."""
     lengths = []
+    slowest = steepest_percent(design_class, half_width)
     for side in ("left", "right"):
         a, b = wanted_percent(design_class, side, start), wanted_percent(design_class, side, end)
-        slowest = LIMITS[design_class].run_off_percent
         if a * b >= 0.0:
             lengths.append(half_width * abs(b - a) / slowest)
         else:
             outside = abs(a) + abs(b) - 2.0 * LEAST_CROSSFALL_PERCENT
             lengths.append(crossing_length(design_class, half_width) + half_width * outside / slowest)
     return max(lengths)
+
+
+def steepest_percent(design_class: str, half_width: float) -> float:
+    """Return the largest slope (%) of the pavement's edge, ``half_width`` (m) from its rotation axis, in a run-off."""
+    return LIMITS[design_class].run_off_percent if half_width >= NARROW else NARROW_RUN_OFF * half_width
 
 
 def crossing_length(design_class: str, half_width: float) -> float:
@@ -34,7 +41,7 @@ def crossing_length(design_class: str, half_width: float) -> float:
     """
     change = 2.0 * LEAST_CROSSFALL_PERCENT
     longest = change / LEAST_RUN_OFF
-    return 0.5 * (longest + min(longest, half_width * change / LIMITS[design_class].run_off_percent))
+    return 0.5 * (longest + min(longest, half_width * change / steepest_percent(design_class, half_width)))
 
 
 def wanted_percent(design_class: str, side: str, curvature: float) -> float:

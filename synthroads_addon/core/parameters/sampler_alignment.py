@@ -13,12 +13,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..errors import InputError
-from ..scenario import Interval, RoadScenario
+from ..road_scenario import RoadScenario
 from ..schema import rounded
 from .crossfall import run_off_length
-from .limits import LIMITS, LONGEST_STRAIGHT, STANDARD_CROSS_SECTIONS, DesignLimits
+from .limits import LIMITS, LONGEST_STRAIGHT, DesignLimits
 from .model import HorizontalElement, VerticalPoint
+from .sampler_section import cross_section_of
+
+_Pair = tuple[float, float]
+Lengths = tuple[list[float], list[float]]
+"""Least and drawn lengths of the clothoids of a joint, m."""
 
 WIDEST_RADIUS = 5000.0
 """Largest radius that is drawn where the scenario doesn't say otherwise, m."""
@@ -33,6 +37,14 @@ _EGG_RATIO = 1.2
 _WIDEST_RATIO = 3.0
 _LONGEST_TURN = 0.9
 """Angle of an arc beyond which no length is given to it while others can take it, rad."""
+
+HIGHEST_CLIMB = 120.0
+"""Height above or below the road's begin from which it no longer climbs or falls, m."""
+
+
+def _widest(room: float) -> float:
+    """Return the largest radius whose least clothoid, A = R/3, is no longer than a room, both m."""
+    return 9.0 * room
 
 
 @dataclass
@@ -52,112 +64,157 @@ class HorizontalSampler:
     """Draws one chain of elements."""
 
     def __init__(self, scenario: RoadScenario, rng: np.random.Generator) -> None:
-        self.scenario, self.rng = scenario, rng
+        self.design_class, self.length, self.rng = scenario.design_class, scenario.length, rng
         self.limits: DesignLimits = LIMITS[scenario.design_class]
         self.radii = radius_limits(scenario)
+        self.half_width = cross_section_of(scenario).paved_width / 2.0
         self.shortest_arc = 2.0 * self.limits.speed / 3.6
         self.parts: list[_Part] = []
+        self.room = 0.0
         self.turned = 0.0
 
     def draw(self) -> tuple[HorizontalElement, ...]:
         """Return elements whose lengths add up to the scenario's length."""
-        first = 0.0 if self.rng.random() < 0.35 else self._sign() / self._radius(None)
-        self.parts = [_Part(min(_SHORTEST_END, self.scenario.length), first, first)]
-        while (joint := self._joint()) and self._length(joint) + self._length(self.parts) <= self.scenario.length:
-            # What was the end has a neighbour now: it gets its full least length.
+        first = 0.0 if self._may_begin_straight() and self.rng.random() < 0.35 else self._sign() / self._radius(None)
+        self.parts = [_Part(min(_SHORTEST_END, self.length), first, first)]
+        self.room = self.length - self.parts[0].length
+        while joint := self._joint():
             self.parts += joint
+            self.room -= sum(part.length for part in joint)
             self.turned += sum(part.length * (part.start + part.end) / 2 for part in joint)
         self._share_out()
         return self._elements()
 
+    def _may_begin_straight(self) -> bool:
+        """Return whether a straight can be all of the road, or else a curve can follow it."""
+        return self.length <= LONGEST_STRAIGHT or _widest(self.length - 3.0 * _SHORTEST_END) > self.radii[0]
+
     def _joint(self) -> list[_Part]:
-        """Return what could follow: clothoids and the next straight or arc, the last at an end's least length."""
+        """Return what follows: clothoids and the next straight or arc, the last at an end's least length.
+
+        What was the end has a neighbour then: it gets what it lacks to its full least length. Nothing follows where the
+        road has no room for it.
+        """
         last = self.parts[-1]
         if last.start == 0.0:
             return self._arc_after_straight(last)
-        kind = self.rng.choice(["straight", "s", "egg"], p=[0.25, 0.5, 0.25])
-        if kind == "straight":
-            return [self._grown(last), self._clothoid(last.start, 0.0), _Part(_SHORTEST_END, 0.0, 0.0)]
-        radius = self._radius(1.0 / abs(last.start))
-        small, large = sorted((radius, 1.0 / abs(last.start)))
-        if kind == "egg" and large / small >= _EGG_RATIO:
-            curvature = math.copysign(1.0 / radius, last.start)
-            return [self._grown(last), self._egg(last.start, curvature), _Part(_SHORTEST_END, curvature, curvature)]
-        curvature = -math.copysign(1.0 / radius, last.start)
-        a, b = self._s_curve(last.start, curvature)
-        return [self._grown(last), a, b, _Part(_SHORTEST_END, curvature, curvature)]
-
-    def _grown(self, last: _Part) -> _Part:
-        """Return what an arc lacks to its least length now that it isn't the road's end any more."""
         lacking = max(0.0, self.shortest_arc - last.length) if len(self.parts) > 1 else 0.0
-        return _Part(lacking, last.start, last.end)
+        grown = _Part(lacking, last.start, last.start)
+        room = self.room - lacking - _SHORTEST_END
+        chance = self.rng.random()
+        drawn = "straight" if chance < 0.25 else "egg" if chance < 0.5 else "s"
+        for kind in dict.fromkeys((drawn, "s", "egg", "straight")):
+            if kind == "straight":
+                joint = self._clothoids([(last.start, 0.0)], self._transition(last.start, 0.0), room)
+            else:
+                joint = self._arc_after_arc(kind, last.start, room)
+            if joint:
+                end = joint[-1].end
+                return [grown, *joint, _Part(_SHORTEST_END, end, end)]
+        return []
 
     def _arc_after_straight(self, last: _Part) -> list[_Part]:
         before = next((part.start for part in reversed(self.parts[:-1]) if part.start), 0.0)
-        radius = self._radius(1.0 / abs(before) if before else None)
-        curvature = self._sign() / radius
-        same = before * curvature > 0
-        least = (STRAIGHT_SAME_DIRECTION if same else _SHORTEST_STRAIGHT) if before else 0.0
-        lacking = _Part(max(0.0, least - last.length), 0.0, 0.0)
-        return [lacking, self._clothoid(0.0, curvature), _Part(_SHORTEST_END, curvature, curvature)]
+        sign = self._sign()
+        least = (STRAIGHT_SAME_DIRECTION if before * sign > 0.0 else _SHORTEST_STRAIGHT) if before else 0.0
+        lacking = max(0.0, least - last.length)
+        room = self.room - lacking - _SHORTEST_END
+        if not (radius := self._radius(1.0 / abs(before) if before else None, room)):
+            return []
+        curvature = sign / radius
+        joint = self._clothoids([(0.0, curvature)], self._transition(0.0, curvature), room)
+        return [_Part(lacking, 0.0, 0.0), *joint, _Part(_SHORTEST_END, curvature, curvature)] if joint else []
+
+    def _arc_after_arc(self, kind: str, start: float, room: float) -> list[_Part]:
+        """Return the clothoids of an S-curve ("s") or an egg curve ("egg")."""
+        least = self._least(start, 0.0) if kind == "s" else 0.0
+        if not (radius := self._radius(1.0 / abs(start), room - least)):
+            return []
+        if kind == "s":
+            end = -math.copysign(1.0 / radius, start)
+            return self._clothoids([(start, 0.0), (0.0, end)], self._s_curve(start, end), room)
+        end = math.copysign(1.0 / radius, start)
+        alike = max(start / end, end / start) < _EGG_RATIO
+        return [] if alike else self._clothoids([(start, end)], self._egg(start, end), room)
+
+    def _clothoids(self, curvatures: list[_Pair], lengths: Lengths, room: float) -> list[_Part]:
+        """Return clothoids with lengths between the least and the drawn ones, so long as there is room; else none.
+
+        Every rule for lengths is linear in them, so that what lies between two sets that keep it keeps it as well.
+        """
+        least, drawn = lengths
+        spare, asked = room - sum(least), sum(drawn) - sum(least)
+        if spare < 0.0:
+            return []
+        share = min(1.0, spare / asked) if asked > 0.0 else 0.0
+        fitting = [a + (b - a) * share for a, b in zip(least, drawn, strict=True)]
+        return [_Part(length, *pair) for length, pair in zip(fitting, curvatures, strict=True)]
 
     def _sign(self) -> float:
         """Return a direction to turn to; the farther the road has turned, the likelier back again."""
-        left = 0.5 - np.clip(0.4 * self.turned, -0.45, 0.45)
+        left = 0.5 - min(0.45, max(-0.45, 0.4 * self.turned))
         return 1.0 if self.rng.random() < left else -1.0
 
-    def _radius(self, before: float | None) -> float:
-        """Draw a radius that is balanced with the one before; even in the logarithm, as small ones matter more."""
-        low, high = self.radii.minimum, self.radii.maximum
+    def _radius(self, before: float | None, room: float = math.inf) -> float:
+        """Draw a radius that is balanced with the one before and whose clothoid has room; 0 where there is none.
+
+        It is even in the logarithm, as small radii matter more.
+        """
+        low, high = self.radii
         if before is not None:
             # Beyond this no pair of clothoids has R/3 <= A <= R on both sides and parameters within 1.5 of each other.
             low, high = max(low, before / _WIDEST_RATIO), min(high, before * _WIDEST_RATIO)
-        if before is not None and self.scenario.design_class != "EKA3":
+        if before is not None and self.design_class != "EKA3":
             low = max(low, before / BALANCE if before < BALANCED_BELOW else min(_BALANCED_FROM, before / BALANCE))
             high = min(high, before * BALANCE) if before < BALANCED_BELOW else high
-        # Wide curves need long clothoids (R/9 and more): on what is left of the road only narrower ones have room.
-        room = self.scenario.length - self._length(self.parts)
-        high = min(high, 2.0 * room)
-        return rounded(math.exp(self.rng.uniform(math.log(low), math.log(max(low, high)))), 6)
+        if room < math.inf:
+            low, high = max(low, self.limits.clothoid**2 / max(room, 1.0)), min(high, _widest(room))
+        if low > high:
+            return 0.0
+        return rounded(math.exp(self.rng.uniform(math.log(low), math.log(high))), 6)
 
-    def _clothoid(self, start: float, end: float) -> _Part:
-        """Return the transition between a straight and an arc."""
-        return _Part(self._transition(max(abs(start), abs(end)), start, end), start, end)
+    def _least(self, start: float, end: float) -> float:
+        """Return the least length A^2 / R of a clothoid between a straight and an arc: A >= R/3, and the run-off's."""
+        radius = 1.0 / max(abs(start), abs(end))
+        return max(max(self.limits.clothoid, radius / 3.0) ** 2 / radius, self._run_off(start, end))
 
-    def _transition(self, curvature: float, start: float, end: float) -> float:
-        """Draw the length A^2 / R of a clothoid with R/3 <= A <= R that leaves room for the crossfall's run-off."""
-        radius = 1.0 / curvature
-        least = max(max(self.limits.clothoid, radius / 3.0) ** 2 / radius, self._run_off(start, end))
-        return self.rng.uniform(least, max(least, min(radius, 2.0 * least)))
+    def _transition(self, start: float, end: float, crossing: float = 0.0) -> Lengths:
+        """Return the least length and a drawn one of a clothoid between a straight and an arc; A <= R."""
+        radius = 1.0 / max(abs(start), abs(end))
+        least = max(crossing, self._least(start, end))
+        return [least], [self.rng.uniform(least, max(least, min(radius, 2.0 * least)))]
 
-    def _s_curve(self, start: float, end: float) -> tuple[_Part, _Part]:
-        """Return two clothoids back to back, whose parameters differ by at most 1.5."""
-        lengths = [self._transition(abs(k), *pair) for k, pair in ((start, (start, 0.0)), (end, (0.0, end)))]
-        lengths = [max(length, self._run_off(start, end) / 2.0) for length in lengths]
-        a = [math.sqrt(length / abs(k)) for length, k in zip(lengths, (start, end), strict=True)]
-        short = int(a[0] > a[1])
-        a[short] = max(a[short], max(a) / 1.5)
-        return _Part(a[0] ** 2 * abs(start), start, 0.0), _Part(a[1] ** 2 * abs(end), 0.0, end)
+    def _s_curve(self, start: float, end: float) -> Lengths:
+        """Return least and drawn lengths of two clothoids back to back, whose parameters differ by at most 1.5."""
+        crossing = self._run_off(start, end) / 2.0
+        first, second = self._transition(start, 0.0, crossing), self._transition(0.0, end, crossing)
+        least, drawn = (self._alike(a + b, start, end) for a, b in zip(first, second, strict=True))
+        return least, drawn
 
-    def _egg(self, start: float, end: float) -> _Part:
-        """Return the clothoid of an egg curve: A between a third of the wider and the whole of the tighter radius."""
+    @staticmethod
+    def _alike(lengths: list[float], start: float, end: float) -> list[float]:
+        """Return the lengths of an S-curve's clothoids, the one of the smaller parameter A no less than allowed."""
+        a = [length / abs(k) for length, k in zip(lengths, (start, end), strict=True)]
+        least = max(a) / 1.5**2
+        return [max(square, least) * abs(k) for square, k in zip(a, (start, end), strict=True)]
+
+    def _egg(self, start: float, end: float) -> Lengths:
+        """Return least and drawn length of an egg's clothoid: A from a third of the wider to all of the tighter radius.
+
+        Short ones are left out: they would hardly turn.
+        """
         change = abs(end - start)
         small, large = 1.0 / max(abs(start), abs(end)), 1.0 / min(abs(start), abs(end))
         least = max(self.limits.clothoid, large / 3.0, math.sqrt(self._run_off(start, end) / change), 0.6 * small)
-        return _Part(self.rng.uniform(least, max(least, small)) ** 2 * change, start, end)
+        return [least**2 * change], [self.rng.uniform(least, max(least, small)) ** 2 * change]
 
     def _run_off(self, start: float, end: float) -> float:
-        section = STANDARD_CROSS_SECTIONS[self.scenario.cross_section]
-        return run_off_length(self.scenario.design_class, section.paved_width / 2.0, start, end)
-
-    @staticmethod
-    def _length(parts: list[_Part]) -> float:
-        return sum(part.length for part in parts)
+        return run_off_length(self.design_class, self.half_width, start, end)
 
     def _share_out(self) -> None:
         """Give the length that is left to straights and arcs, within the longest straight and turn."""
         self.parts = _merged(self.parts)
-        spare = self.scenario.length - self._length(self.parts)
+        spare = self.length - sum(part.length for part in self.parts)
         growing = [part for part in self.parts if part.grows]
         room = np.array([self._room(part) for part in growing])
         weights = self.rng.uniform(0.2, 1.0, len(growing)) * np.minimum(room, spare + 1e-9)
@@ -168,11 +225,8 @@ class HorizontalSampler:
                 break
             open_ = np.flatnonzero(room - given > 1e-9)
             if not len(open_):
-                open_ = np.array([i for i, part in enumerate(growing) if part.start], dtype=int)
-                if not len(open_):
-                    allowed = f"{LONGEST_STRAIGHT:.0f} m is the longest straight, and radii leave no room for a curve"
-                    raise InputError("road.length", self.scenario.length, allowed)
-                given[open_] += left / len(open_)
+                arcs = np.array([i for i, part in enumerate(growing) if part.start], dtype=int)
+                given[arcs] += left / len(arcs)
                 break
             given[open_] += np.minimum(room[open_] - given[open_], left / len(open_))
         for part, extra in zip(growing, given, strict=True):
@@ -186,21 +240,16 @@ class HorizontalSampler:
         """Round lengths and curvatures; the last length takes what rounding leaves."""
         parts = [part for part in self.parts if part.length > 1e-6]
         lengths = [rounded(part.length) for part in parts[:-1]]
-        lengths.append(rounded(self.scenario.length - sum(lengths)))
+        lengths.append(rounded(self.length - sum(lengths)))
         curvatures = [(rounded(part.start, 12), rounded(part.end, 12)) for part in parts]
         return tuple(HorizontalElement.between(n, *k) for n, k in zip(lengths, curvatures, strict=True))
 
 
-def radius_limits(scenario: RoadScenario) -> Interval:
-    """Return the radii that may be drawn; raise `InputError` where the scenario asks for less than its class allows."""
-    least = LIMITS[scenario.design_class].radius
+def radius_limits(scenario: RoadScenario) -> tuple[float, float]:
+    """Return the smallest and the largest radius (m) that may be drawn."""
     if scenario.radius is None:
-        return Interval(minimum=least, maximum=max(WIDEST_RADIUS, least))
-    if scenario.radius.minimum < least:
-        raise InputError(
-            "road.radius.minimum", scenario.radius.minimum, f"{scenario.design_class} allows {least} m and more"
-        )
-    return scenario.radius
+        return LIMITS[scenario.design_class].radius, WIDEST_RADIUS
+    return scenario.radius.minimum, scenario.radius.maximum
 
 
 def _merged(parts: list[_Part]) -> list[_Part]:
@@ -218,13 +267,14 @@ def sample_profile(scenario: RoadScenario, rng: np.random.Generator) -> tuple[Ve
     """Draw grades and roundings: a point of intersection every 300 to 900 m, elevation 0 at the road's middle.
 
     Each rounding has half of the shorter of its two tangents; a grade changes by no more than the least radius allows
-    within it.
+    within it. Long roads turn back to the height they came from.
     """
     limits = LIMITS[scenario.design_class]
-    grades_allowed = grade_limits(scenario)
+    lowest, highest = grade_limits(scenario)
     stations = _intersections(scenario.length, rng)
-    grades = [rounded(rng.uniform(grades_allowed.minimum, grades_allowed.maximum))]
-    radii = []
+    grades = [rounded(rng.uniform(lowest, highest))]
+    radii: list[float] = []
+    climbed = 0.0
     for before, here, after in zip(stations[:-2], stations[1:-1], stations[2:], strict=True):
         # The first and last span have no rounding at the road's end: they can give their whole length.
         spans = [
@@ -232,8 +282,13 @@ def sample_profile(scenario: RoadScenario, rng: np.random.Generator) -> tuple[Ve
             (after - here) / (1 if after == stations[-1] else 2),
         ]
         tangent = min(spans)
-        low = max(grades_allowed.minimum, grades[-1] - 200.0 * tangent / limits.crest)
-        high = min(grades_allowed.maximum, grades[-1] + 200.0 * tangent / limits.sag)
+        climbed += grades[-1] / 100.0 * (here - before)
+        low = max(lowest, grades[-1] - 200.0 * tangent / limits.crest)
+        high = min(highest, grades[-1] + 200.0 * tangent / limits.sag)
+        if climbed > HIGHEST_CLIMB:
+            high = max(low, min(high, 0.0))
+        elif climbed < -HIGHEST_CLIMB:
+            low = min(high, max(low, 0.0))
         grades.append(rounded(rng.uniform(low, high)))
         change = abs(grades[-1] - grades[-2]) / 100.0
         least = limits.crest if grades[-1] < grades[-2] else limits.sag
@@ -248,15 +303,12 @@ def sample_profile(scenario: RoadScenario, rng: np.random.Generator) -> tuple[Ve
     )
 
 
-def grade_limits(scenario: RoadScenario) -> Interval:
-    """Return the grades (%) that may be drawn; raise `InputError` where the scenario exceeds those of its class."""
-    steepest = LIMITS[scenario.design_class].grade_percent
+def grade_limits(scenario: RoadScenario) -> tuple[float, float]:
+    """Return the least and the largest grade (%) that may be drawn."""
     if scenario.grade_percent is None:
-        return Interval(minimum=-steepest, maximum=steepest)
-    asked = max(abs(scenario.grade_percent.minimum), abs(scenario.grade_percent.maximum))
-    if asked > steepest:
-        raise InputError("road.grade_percent", asked, f"{scenario.design_class} allows {steepest} %")
-    return scenario.grade_percent
+        steepest = LIMITS[scenario.design_class].grade_percent
+        return -steepest, steepest
+    return scenario.grade_percent.minimum, scenario.grade_percent.maximum
 
 
 def _intersections(length: float, rng: np.random.Generator) -> list[float]:
