@@ -1,98 +1,125 @@
-"""Where road furniture stands: guardrails and delineators by the safety rules."""
+"""Everything that stands on and beside a road that is being sampled: by the safety rules, or at random.
+
+What needs much room, or has its station by a rule, is planned first: it reserves stretches of the road, and asks for
+barriers. Then the barriers are built, and then what stands behind them, which so finds its distance from the road.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
-from .limits import DELINEATOR_SPACING
-from .model import Carriageway, Delineator, Guardrail, HorizontalElement, Terrain
+from .model_base import RoadObject
+from .placement_barriers import median_barriers, plan_noise_barrier, roadside_barriers
+from .placement_construction import closed_lanes, construction_zones
+from .placement_delineators import delineator_stations, delineators
+from .placement_equipment import (
+    plan_cabinets,
+    plan_lighting,
+    plan_periodic,
+    plan_surveillance,
+    plan_traffic_lights,
+)
+from .placement_gantries import GantryPlan, gantries, plan_gantries
+from .placement_layout import Layout
+from .placement_overpass import OverpassPlan, overpass, plan_overpass
+from .placement_random import plan_random_equipment, plan_random_signs, random_front, random_median_barrier
+from .placement_signs import median_signs, plan_exit_signs, plan_gore_signs, plan_other_signs
+from .site import Site
 
-GUARDRAIL_DISTANCE = 0.70
-"""From the paved edge to the posts' axis: the beam's face then stands 0.5 m from the pavement (m)."""
-DELINEATOR_DISTANCE = 0.50
-"""From the paved edge to the delineator's axis where there is no guardrail (m)."""
-DELINEATOR_BEHIND_GUARDRAIL = 1.15
-"""From the paved edge to the delineator's axis where a guardrail stands in front of it (m)."""
-SHORTEST_GUARDRAIL = 60.0
-
-
-def paved_edge(carriageway: Carriageway) -> float:
-    """Return the distance of the outer paved edge from the centreline, m."""
-    return carriageway.inner_offset + carriageway.paved_width
-
-
-def roadside_guardrail(carriageway: Carriageway, start: float, end: float, through: bool, instance: int) -> Guardrail:
-    """Return the guardrail beside one carriageway, its beam towards the traffic.
-
-    One that stands all along the road goes on beyond both ends, so it has no terminals.
-    """
-    return Guardrail(
-        instance=instance,
-        start_station=start,
-        end_station=end,
-        offset=carriageway.sign * (paved_edge(carriageway) + GUARDRAIL_DISTANCE),
-        faces="right" if carriageway.side == "left" else "left",
-        terminal_length=0.0 if through else min(12.0, (end - start) / 4),
-    )
+__all__ = ["closed_lanes", "place_furniture"]
 
 
-def needs_guardrail(terrain: Terrain) -> bool:
-    """Return whether the embankment is so high and steep that a guardrail must stand all along it (RPS)."""
-    return terrain.embankment_height > 3.0 and terrain.batter_slope < 3.0
+def place_furniture(site: Site) -> Iterator[tuple[str, RoadObject]]:
+    """Yield (id, object) of all furniture; every object has the instance number 1."""
+    layout, streams = Layout(site), _Streams(site)
+    by_rules = site.scenario.placement == "rules"
+    if by_rules:
+        _plan_fixed(layout, streams)
+    bridge = plan_overpass(layout, streams.structures)
+    planned = plan_gantries(layout, streams.structures)
+    zones, in_zones = construction_zones(layout, streams.structures)
+    yield from in_zones.items()
+    for side, roadside in layout.sides.items():
+        noise_barrier = plan_noise_barrier(layout, roadside, streams.barriers)
+        if noise_barrier:
+            yield f"noise-barrier-{side}", noise_barrier
+    if by_rules and site.scenario.furniture.signs:
+        plan_other_signs(layout, streams.signs, zones)
+    elif site.scenario.furniture.signs:
+        plan_random_signs(layout, streams.signs)
+    if by_rules:
+        plan_traffic_lights(layout, streams.equipment)
+    else:
+        plan_random_equipment(layout, streams.equipment)
+    plan_surveillance(layout, streams.equipment)
+    plan_lighting(layout, streams.equipment)
+    plan_cabinets(layout, streams.equipment)
+    yield from _fronts_by_rules(layout, streams) if by_rules else _fronts_at_random(layout, streams)
+    yield from _behind(layout, streams, planned, bridge)
 
 
-def median_guardrail(length: float, instance: int) -> Guardrail:
-    """Return the double-sided guardrail on the centreline; it goes on beyond both ends, so it has no terminals."""
-    return Guardrail(
-        instance=instance, start_station=0.0, end_station=length, offset=0.0, faces="both", terminal_length=0.0
-    )
+@dataclass(frozen=True)
+class _Streams:
+    """The random numbers of each family of furniture."""
+
+    site: Site
+
+    @cached_property
+    def signs(self) -> np.random.Generator:
+        return self.site.stream("furniture", "signs")
+
+    @cached_property
+    def equipment(self) -> np.random.Generator:
+        return self.site.stream("furniture", "equipment")
+
+    @cached_property
+    def structures(self) -> np.random.Generator:
+        return self.site.stream("furniture", "structures")
+
+    @cached_property
+    def barriers(self) -> np.random.Generator:
+        return self.site.stream("furniture", "barriers")
 
 
-def delineators(
-    carriageway: Carriageway, stations: NDArray[np.float64], guardrails: list[Guardrail], first_instance: int
-) -> Iterator[tuple[str, Delineator]]:
-    """Yield (id, post) at stations (P,) along the outer edge of one carriageway, behind the guardrail where one is."""
-    for index, station in enumerate(stations):
-        offset = carriageway.sign * (paved_edge(carriageway) + DELINEATOR_DISTANCE)
-        covered = any(
-            rail.start_station <= station <= rail.end_station and rail.offset * offset > 0 for rail in guardrails
-        )
-        if covered:
-            offset = carriageway.sign * (paved_edge(carriageway) + DELINEATOR_BEHIND_GUARDRAIL)
-        yield (
-            f"delineator-{carriageway.side}-{index + 1:04d}",
-            Delineator(
-                instance=first_instance + index,
-                station=float(station),
-                offset=offset,
-                rotation_deg=180.0 if carriageway.side == "left" else 0.0,
-            ),
-        )
+def _plan_fixed(layout: Layout, streams: _Streams) -> None:
+    """Plan what has its station by a rule."""
+    signs = layout.site.scenario.furniture.signs
+    if signs:
+        plan_gore_signs(layout)
+    plan_periodic(layout, streams.equipment)
+    if signs:
+        plan_exit_signs(layout, streams.signs)
 
 
-def delineator_stations(elements: tuple[HorizontalElement, ...]) -> NDArray[np.float64]:
-    """Return stations of delineators, from half a spacing after the beginning to the end.
+def _fronts_by_rules(layout: Layout, streams: _Streams) -> Iterator[tuple[str, RoadObject]]:
+    """Yield barriers and delineators."""
+    yield from median_barriers(layout, streams.barriers)
+    for roadside in layout.sides.values():
+        yield from roadside_barriers(layout, roadside, streams.barriers)
+    if layout.site.scenario.furniture.delineators:
+        stations = delineator_stations(layout.site.alignment.horizontal)
+        for roadside in layout.sides.values():
+            yield from delineators(roadside, stations)
 
-    Between two posts lies the spacing of the table at the tightest curvature within the next 50 m, so that the posts
-    come closer before a curve begins.
-    """
-    radii, spacings = np.array(DELINEATOR_SPACING).T
-    borders = np.cumsum([0.0, *(element.length for element in elements)])
-    # Curvature is linear in between, so that its largest values stand at borders and at the ends of the stretch ahead.
-    at_border = np.abs([*(element.curvature_start for element in elements), elements[-1].curvature_end])
-    at_border = np.maximum(at_border, np.abs([elements[0].curvature_start, *(e.curvature_end for e in elements)]))
 
-    def spacing(station: float) -> float:
-        ends = np.interp([station, station + 50.0], borders, at_border)
-        ahead = max(*ends, at_border[(borders >= station) & (borders <= station + 50.0)].max(initial=0.0))
-        return float(np.interp(1.0 / max(ahead, 1e-9), radii, spacings))
+def _fronts_at_random(layout: Layout, streams: _Streams) -> Iterator[tuple[str, RoadObject]]:
+    """Yield barriers and delineators."""
+    yield from random_median_barrier(layout, streams.barriers)
+    for roadside in layout.sides.values():
+        yield from random_front(layout, roadside, streams.barriers)
 
-    length = float(borders[-1])
-    result, station = [], min(spacing(0.0), length) / 2.0
-    while station <= length:
-        result.append(station)
-        station += spacing(station)
-    return np.array(result)
+
+def _behind(
+    layout: Layout, streams: _Streams, planned: list[GantryPlan], bridge: OverpassPlan | None
+) -> Iterator[tuple[str, RoadObject]]:
+    """Yield what stands behind the barriers."""
+    for roadside in layout.sides.values():
+        yield from roadside.stand()
+    yield from median_signs(layout)
+    yield from gantries(layout, planned, streams.structures)
+    if bridge:
+        yield "overpass", overpass(layout, bridge, streams.structures)
