@@ -38,7 +38,9 @@ PYTHON_VERSIONS = ("3.11", "3.13", "3.14")
 PLATFORM_TAGS = {
     "linux-x64": ("manylinux_2_28_x86_64", "manylinux_2_27_x86_64", "manylinux_2_17_x86_64", "manylinux2014_x86_64"),
     "windows-x64": ("win_amd64",),
-    "macos-arm64": ("macosx_13_0_arm64",),  # embreex has none for older systems
+    # embreex has none for older systems than 13, rasterio for older ones than 14. On 13 Blender installs rasterio all
+    # the same; it doesn't load there, and only elevation models can't be read.
+    "macos-arm64": ("macosx_13_0_arm64", "macosx_14_0_arm64"),
 }
 
 # Dependencies of the wheels that are left out: Blender has NumPy, and tqdm does without colorama.
@@ -47,6 +49,7 @@ NOT_BUNDLED = frozenset({"numpy", "colorama"})
 # Where a wheel's fields say too little.
 LICENCES = {
     "embreex": "BSD-2-Clause; holds Intel Embree and oneTBB: Apache-2.0, https://www.apache.org/licenses/LICENSE-2.0",
+    "rasterio": "BSD-3-Clause; holds GDAL and PROJ: MIT, GEOS: LGPL-2.1-or-later, and free libraries that these use",
 }
 
 LEFT_OUT = shutil.ignore_patterns("__pycache__", "*.py[co]", ".*", "*.blend[1-9]")

@@ -76,7 +76,7 @@ def test_holds_no_tests_caches_or_tools(names: list[str]) -> None:
 def test_holds_wheels_for_every_python(names: list[str], manifest: dict[str, list[str]]) -> None:
     wheels = [name for name in names if name.endswith(".whl")]
     assert sorted(manifest["wheels"]) == sorted(f"./{name}" for name in wheels)
-    for package in ("embreex", "lazrs", "pillow", "pydantic_core"):
+    for package in ("embreex", "lazrs", "pillow", "pydantic_core", "rasterio"):
         tags = {Path(wheel).name.split("-")[2] for wheel in wheels if Path(wheel).name.startswith(f"{package}-")}
         assert tags == PYTHON_TAGS, package
     assert not [wheel for wheel in wheels if Path(wheel).name.startswith("numpy-")], "Blender has NumPy"
@@ -110,9 +110,9 @@ import bpy
 MODULE = "bl_ext.user_default.synthroads"
 bpy.ops.extensions.package_install_files(filepath=sys.argv[1], repo="user_default", enable_on_install=True)
 enabled = MODULE in bpy.context.preferences.addons
-import embreex.rtcore_scene, importlib, laspy, lazrs, numpy, PIL.Image, pydantic, tqdm
+import embreex.rtcore_scene, importlib, laspy, lazrs, numpy, PIL.Image, pydantic, rasterio, tqdm
 importlib.import_module(MODULE + ".core.scenario")
-bundled = (embreex, laspy, lazrs, PIL, pydantic, tqdm)
+bundled = (embreex, laspy, lazrs, PIL, pydantic, rasterio, tqdm)
 bpy.ops.preferences.addon_disable(module=MODULE)
 disabled = MODULE not in bpy.context.preferences.addons
 bpy.ops.preferences.addon_enable(module=MODULE)
