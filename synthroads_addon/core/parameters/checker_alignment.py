@@ -7,7 +7,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from .checker_base import STRAIGHT, Finding, Road, Rule, Run, above, below, same_curvature
+from .checker_base import STRAIGHT, Finding, Road, Rule, Run, above, below, out_of_order, same_curvature
 from .limits import LONGEST_STRAIGHT
 
 #: Shortest straight between two curves of the same direction, m (RAA, after a textbook).
@@ -15,6 +15,8 @@ SHORTEST_STRAIGHT_SAME_DIRECTION = 400.0
 #: The larger of two neighbouring radii over the smaller, at most, where the smaller is below the radius beside (RAA).
 RADIUS_RATIO = 1.5
 RADIUS_RATIO_BELOW = 1500.0
+#: The larger parameter of an S-curve's two clothoids over the smaller, at most (RAA).
+CLOTHOID_RATIO = 1.5
 #: Grades that differ by less than this (m/m) need no rounding: 0.1 mm on 100 m.
 SAME_GRADE = 1e-6
 
@@ -94,6 +96,22 @@ def _clothoid_long(road: Road) -> Iterator[Finding]:
             yield Finding(road.axis, float(road.starts[i]), parameter, radius, text)
 
 
+def _clothoid_ratio(road: Road) -> Iterator[Finding]:
+    parameters = {i: parameter for i, parameter, _, _ in _clothoids(road)}
+    for i, before in parameters.items():
+        after = parameters.get(i + 1)
+        if after is None or max(abs(road.k1[i]), abs(road.k0[i + 1])) > STRAIGHT or road.k0[i] * road.k1[i + 1] >= 0.0:
+            continue
+        small, large = sorted((np.float64(before), np.float64(after)))
+        ratio = float(large / small)
+        if above(ratio, CLOTHOID_RATIO):
+            text = (
+                f"The S-curve's clothoids, A = {before:.1f} m and {after:.1f} m, are as 1 : {ratio:.2f}; "
+                f"1 : {CLOTHOID_RATIO} is allowed (RAA)."
+            )
+            yield Finding(road.axis, float(road.starts[i + 1]), ratio, CLOTHOID_RATIO, text)
+
+
 def _curvature_jump(road: Road) -> Iterator[Finding]:
     same = same_curvature(road.k1[:-1], road.k0[1:])
     for i in np.flatnonzero(~same).tolist():
@@ -171,7 +189,7 @@ def _arc_length(road: Road) -> Iterator[Finding]:
 
 def _vertical_order(road: Road) -> Iterator[Finding]:
     stations = np.array([p.station for p in road.parameters.alignment.vertical])
-    for i in np.setdiff1d(np.arange(len(stations)), road.vertical.points).tolist():
+    for i in out_of_order(stations):
         past = float(stations[:i].max())
         at = float(stations[i])
         text = f"Point of vertical intersection {i + 1} at {at:.3f} m does not follow the one at {past:.3f} m."
@@ -239,6 +257,7 @@ RULES = (
     Rule("clothoid-minimum", "Smallest clothoid parameter A", "m", "RAA", "confirmed", _clothoid_minimum),
     Rule("clothoid-short", "A is at least R/3", "m", "RAA", "unconfirmed", _clothoid_short),
     Rule("clothoid-long", "A is at most R", "m", "RAA", "unconfirmed", _clothoid_long),
+    Rule("clothoid-ratio", "Parameters of an S-curve's clothoids", "1", "RAA", "unconfirmed", _clothoid_ratio),
     Rule("curvature-jump", "Curvature doesn't jump between elements", "1/m", "RAA", "unconfirmed", _curvature_jump),
     Rule("straight-longest", "Longest straight", "m", "RAA", "confirmed", _straight_longest),
     Rule("straight-between", "Straight between curves of one direction", "m", "RAA", "confirmed", _straight_between),

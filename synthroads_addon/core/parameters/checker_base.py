@@ -7,18 +7,23 @@ out of order, overlapping roundings and elements without length are findings.
 
 from __future__ import annotations
 
+import builtins
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
-from typing import Literal, NamedTuple
+from functools import cached_property
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from .checker_bodies import Around, Barriers, Beside, Bodies, Bool, Signs
+from .checker_edges import Edges, Float, TurnoutEdges
 from .limits import LIMITS
-from .model import Carriageway, Delineator, Guardrail, LineMarking, RoadParameters
+from .model import AlignmentObject, RoadParameters
+from .model_base import ObjectT
+from .model_section import Carriageway, Turnout
+from .model_surroundings import Terrain
 
-Float = NDArray[np.float64]
-Bool = NDArray[np.bool_]
 Sure = Literal["confirmed", "derived", "unconfirmed", "definition"]
 
 #: Values may miss a limit by this share of it: what is written exactly at a limit passes.
@@ -29,6 +34,8 @@ SAME_CURVATURE = 1e-9
 STRAIGHT = 1e-7
 #: Stations nearer than this (m) are the same.
 SAME_STATION = 1e-3
+#: Crossfalls that differ by less than this (%) don't run off.
+SAME_CROSSFALL = 1e-6
 
 
 class Finding(NamedTuple):
@@ -117,6 +124,7 @@ class Road:
 
     Attributes:
         axis: id of the alignment.
+        terrain: the terrain, if there is one.
         limits: limits of the design class.
         guideline: the RAA with the design class, for people.
         two_seconds: m travelled in two seconds at the class's speed.
@@ -125,7 +133,8 @@ class Road:
         constant: (E,) whether an element is a line or an arc.
         runs: stretches of constant curvature in order.
         vertical: the profile.
-        carriageways, markings, guardrails, delineators: objects by id.
+        sides: the carriageways' edges, by the carriageway's id.
+        marks: (M,) increasing stations at which an edge of the pavement bends or steps.
     """
 
     def __init__(self, parameters: RoadParameters) -> None:
@@ -134,8 +143,11 @@ class Road:
         self.limits = LIMITS[self.design_class]
         self.guideline = f"RAA, {self.design_class.replace('EKA', 'EKA ')}"
         self.two_seconds = self.limits.speed / 3.6 * 2.0
-        alignment = parameters.alignment
-        self.axis = next(name for name, item in parameters.objects.items() if item is alignment)
+        self._by_type: dict[builtins.type, dict[str, Any]] = {}
+        for name, item in parameters.objects.items():
+            self._by_type.setdefault(type(item), {})[name] = item
+        self.axis, alignment = next(iter(self.of(AlignmentObject).items()))
+        self.terrain = next(iter(self.of(Terrain).values()), None)
         elements = alignment.horizontal
         self.lengths = np.array([e.length for e in elements], dtype=np.float64)
         self.k0 = np.array([e.curvature_start for e in elements], dtype=np.float64)
@@ -144,11 +156,58 @@ class Road:
         self.length = float(self.starts[-1])
         self.constant: Bool = same_curvature(self.k0, self.k1)
         self.runs = self._runs()
-        self.vertical = Vertical(parameters)
-        self.carriageways = parameters.of_type(Carriageway)
-        self.markings = parameters.of_type(LineMarking)
-        self.guardrails = parameters.of_type(Guardrail)
-        self.delineators = parameters.of_type(Delineator)
+        self.vertical = Vertical(alignment)
+        turnouts = self.of(Turnout)
+        self.sides: dict[str, Edges] = {}
+        for name, carriageway in self.of(Carriageway).items():
+            own = {key: turnout for key, turnout in turnouts.items() if turnout.carriageway == name}
+            self.sides[name] = Edges(name, carriageway, own, self.length)
+        self.marks = np.unique(np.concatenate([edges.marks for edges in self.sides.values()]))
+
+    def of(self, kind: builtins.type[ObjectT]) -> dict[str, ObjectT]:
+        """Return the objects of one class by id, in the order of the file."""
+        return self._by_type.get(kind, {})
+
+    def each(self, *kinds: builtins.type) -> Iterator[tuple[str, Any]]:
+        """Yield the objects, with their ids, whose class is one of some classes or derives from one."""
+        for kind, items in self._by_type.items():
+            if issubclass(kind, kinds):
+                yield from items.items()
+
+    @property
+    def turnouts(self) -> Iterator[tuple[Edges, TurnoutEdges]]:
+        """The turnouts with their carriageways."""
+        return ((edges, turnout) for edges in self.sides.values() for turnout in edges.turnouts)
+
+    @cached_property
+    def crossfalls(self) -> dict[str, Crossfall]:
+        """The carriageways' crossfall, by the carriageway's id."""
+        return {name: Crossfall(edges.carriageway, self.length) for name, edges in self.sides.items()}
+
+    @cached_property
+    def bodies(self) -> Bodies:
+        """What stands on the road as boxes."""
+        return Bodies(self.parameters)
+
+    @cached_property
+    def around(self) -> Around:
+        """Where the bodies are in relation to the carriageways."""
+        return Around(self.bodies, self.sides, self.marks)
+
+    @cached_property
+    def barriers(self) -> Barriers:
+        """The guardrails and concrete barriers."""
+        return Barriers(self.parameters, self.bodies, self.around)
+
+    @cached_property
+    def signs(self) -> Signs:
+        """The traffic signs, kilometre boards and traffic lights."""
+        return Signs(self.parameters, self.bodies, self.around)
+
+    @cached_property
+    def beside(self) -> dict[str, Beside]:
+        """Which of the barriers protect the traffic of each carriageway, by the carriageway's id."""
+        return {name: Beside(self.barriers, name, edges) for name, edges in self.sides.items()}
 
     def _runs(self) -> list[Run]:
         runs: list[Run] = []
@@ -176,8 +235,8 @@ class Vertical:
         tangents: (P,) tangent lengths of the roundings, m.
     """
 
-    def __init__(self, parameters: RoadParameters) -> None:
-        points = parameters.alignment.vertical
+    def __init__(self, alignment: AlignmentObject) -> None:
+        points = alignment.vertical
         station = np.array([p.station for p in points], dtype=np.float64)
         elevation = np.array([p.elevation for p in points], dtype=np.float64)
         self.points = increasing(station)
@@ -186,6 +245,27 @@ class Vertical:
         between = np.diff(elevation[self.points]) / np.diff(self.station)
         self.grades = np.concatenate((between[:1], between, between[-1:])) if len(between) else np.zeros(2)
         self.tangents = 0.5 * self.radius * np.abs(np.diff(self.grades))
+
+
+class Crossfall:
+    """A carriageway's crossfall on the road as arrays; points whose station isn't past all before are left out.
+
+    Attributes:
+        station: (N,) m: the road's begin, the points on it, its end.
+        percent: (N,) crossfall there.
+        runs_off: (N - 1,) whether it changes from one to the next.
+        slope: (N - 1,) % per m.
+    """
+
+    def __init__(self, carriageway: Carriageway, length: float) -> None:
+        points = np.array([(p.station, p.crossfall_percent) for p in carriageway.crossfall])
+        station, percent = points[increasing(points[:, 0])].T
+        inside = (station > 0.0) & (station < length)
+        self.station = np.concatenate(([0.0], station[inside], [length]))
+        self.percent = np.interp(self.station, station, percent)
+        change = np.diff(self.percent)
+        self.runs_off: Bool = np.abs(change) > SAME_CROSSFALL
+        self.slope = change / np.diff(self.station)
 
 
 def same_curvature(a: Float | float, b: Float | float) -> Bool:
@@ -200,6 +280,11 @@ def increasing(station: Float) -> NDArray[np.intp]:
     return np.flatnonzero(station > before)
 
 
+def out_of_order(station: Float) -> list[int]:
+    """Return the indices of the stations that don't lie past all stations before them."""
+    return sorted(set(range(len(station))) - set(increasing(station).tolist()))
+
+
 def below(value: float, limit: float) -> bool:
     """Return whether a value falls short of a limit by more than the tolerance."""
     return bool(value < limit - TOLERANCE * max(abs(limit), TOLERANCE))
@@ -212,15 +297,19 @@ def above(value: float, limit: float) -> bool:
 
 def stretches(mask: Bool) -> Iterator[tuple[int, int]]:
     """Yield (first, last) index of every run of neighbouring True values."""
+    if not mask.any():
+        return
     edges = np.flatnonzero(np.diff(np.concatenate(([0], mask.astype(np.int8), [0]))))
     for first, end in edges.reshape(-1, 2).tolist():
         yield first, end - 1
 
 
-def gaps(ranges: Iterable[tuple[float, float]], length: float) -> Iterator[tuple[float, float]]:
-    """Yield the parts of 0..length (m) that no range covers."""
-    reached = 0.0
-    for start, end in [*sorted(ranges), (length, length)]:
-        if start > reached + SAME_STATION and reached < length - SAME_STATION:
-            yield reached, min(start, length)
-        reached = max(reached, end)
+def gaps(
+    ranges: Iterable[tuple[float, float]], start: float, end: float, least: float = SAME_STATION
+) -> Iterator[tuple[float, float]]:
+    """Yield the parts of start..end (m) that no range covers and that are longer than `least`."""
+    reached = start
+    for low, high in [*sorted(ranges), (end, end)]:
+        if low > reached + least and reached < end - least:
+            yield reached, min(low, end)
+        reached = max(reached, high)

@@ -1,112 +1,35 @@
-"""Rules for what stands beside the road: guardrails (RPS), delineators, plants, and objects off the road."""
+"""Rules for what stands beside the road: delineators, boards, phones; and that bodies stand where they can."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Literal
+from itertools import pairwise
 
 import numpy as np
 
-from .checker_base import TOLERANCE, Finding, Float, Road, Rule, above, below, gaps
-from .limits import DELINEATOR_SPACING
-from .model import Carriageway, Guardrail, Vegetation
+from .checker_base import TOLERANCE, Finding, Road, Rule, below
+from .checker_bodies import DELINEATOR_REACH, Bodies, Bool
+from .checker_edges import Edges, Float
+from .limits import DELINEATOR_SPACING, EMERGENCY_PHONE_SPACING, KILOMETRE_BOARD_SPACING
+from .model_base import LineObject, PointObject
+from .model_furniture import Cabinet, ConstructionBeacon, Delineator, KilometreBoard
+from .model_section import LineMarking
+from .model_surroundings import Vegetation, Vehicle
 
-#: An embankment higher (m) and steeper (run per height) than this needs guardrails (RPS).
-EMBANKMENT_HEIGHT, EMBANKMENT_RUN = 3.0, 3.0
-#: From the paved edge to a guardrail's nearest part, and to a delineator's axis, m (RPS).
-FACE_DISTANCE = 0.5
+#: From the paved edge to a delineator's axis, m (HLB).
 DELINEATOR_DISTANCE = 0.5
-#: From the posts' axis to the face of a beam, and to the posts' rear, m.
-BEAM_REACH, POST_REACH = 0.2, 0.05
-#: Shortest guardrail, m (RPS).
-SHORTEST_GUARDRAIL = 60.0
-#: From the paved edge to the nearest unprotected tree, m (RPS: obstacles on level ground).
-TREE_DISTANCE = {"EKA1A": 12.0, "EKA1B": 12.0, "EKA2": 12.0, "EKA3": 7.5}
-#: Delineators may stand this much (m) farther apart: stations are rounded.
+#: Posts, boards and phones may stand this much (m) farther apart: stations are rounded.
 SPACING_ROOM = 1e-3
-
-_FACES: dict[int, Literal["left", "right"]] = {1: "left", -1: "right"}
-
-
-def _outer_edge(carriageway: Carriageway) -> float:
-    """Return the distance of the outer paved edge from the centreline, m."""
-    return carriageway.inner_offset + carriageway.paved_width
+#: The kilometre that a board tells may be this far (m) from where it stands: boards have one decimal or more.
+KILOMETRE_ROOM = 5.0
+#: Bodies may reach this far (m) into each other: offsets are rounded.
+OVERLAP_ROOM = 1e-3
 
 
-def _clearance(road: Road, low: float, high: float) -> float:
-    """Return the distance (m) of what lies between two offsets from the nearest pavement; negative over it."""
-    distances = []
-    for carriageway in road.carriageways.values():
-        edges = sorted((carriageway.sign * carriageway.inner_offset, carriageway.sign * _outer_edge(carriageway)))
-        distances.append(max(edges[0] - high, low - edges[1]))
-    return min(distances)
-
-
-def _rail_clearance(road: Road, rail: Guardrail) -> float:
-    left = BEAM_REACH if rail.faces in ("left", "both") else POST_REACH
-    right = BEAM_REACH if rail.faces in ("right", "both") else POST_REACH
-    return _clearance(road, rail.offset - right, rail.offset + left)
-
-
-def _outer_rails(road: Road, carriageway: Carriageway, reach: float = np.inf) -> list[tuple[float, float]]:
-    """Return the stretches (m) of guardrails outside a carriageway that face it, within `reach` of its edge."""
-    sign, edge = carriageway.sign, _outer_edge(carriageway)
-    return [
-        (rail.start_station, rail.end_station)
-        for rail in road.guardrails.values()
-        if 0.0 < sign * rail.offset - edge < reach and rail.faces in ("both", _FACES[-sign])
-    ]
-
-
-def _median_guardrail(road: Road) -> Iterator[Finding]:
-    if len(road.carriageways) < 2:
-        return
-    inner = {carriageway.sign: carriageway.inner_offset for carriageway in road.carriageways.values()}
-    in_median = [rail for rail in road.guardrails.values() if -inner[-1] <= rail.offset <= inner[1]]
-    for name, carriageway in road.carriageways.items():
-        faces = ("both", _FACES[carriageway.sign])
-        spans = [(rail.start_station, rail.end_station) for rail in in_median if rail.faces in faces]
-        for start, end in gaps(spans, road.length):
-            text = f"The median has no guardrail towards this carriageway for {end - start:.1f} m (RPS)."
-            yield Finding(name, start, end - start, 0.0, text)
-
-
-def _embankment_guardrail(road: Road) -> Iterator[Finding]:
-    terrain = road.parameters.terrain
-    if terrain is None or not above(terrain.embankment_height, EMBANKMENT_HEIGHT):
-        return
-    if not below(terrain.batter_slope, EMBANKMENT_RUN):
-        return
-    for name, carriageway in road.carriageways.items():
-        for start, end in gaps(_outer_rails(road, carriageway), road.length):
-            text = (
-                f"The embankment is {terrain.embankment_height:.1f} m high and 1 : {terrain.batter_slope:g} steep, and "
-                f"{end - start:.1f} m beside it are without guardrail (RPS)."
-            )
-            yield Finding(name, start, end - start, 0.0, text)
-
-
-def _guardrail_distance(road: Road) -> Iterator[Finding]:
-    for name, rail in road.guardrails.items():
-        distance = _rail_clearance(road, rail)
-        if distance >= 0.0 and below(distance, FACE_DISTANCE):
-            text = f"The guardrail stands {distance:.2f} m from the paved edge; {FACE_DISTANCE} m are needed (RPS)."
-            yield Finding(name, rail.start_station, distance, FACE_DISTANCE, text)
-
-
-def _guardrail_length(road: Road) -> Iterator[Finding]:
-    for name, rail in road.guardrails.items():
-        length = rail.end_station - rail.start_station
-        through = not list(gaps([(rail.start_station, rail.end_station)], road.length))
-        if below(length, SHORTEST_GUARDRAIL) and not through:
-            text = f"The guardrail is {length:.1f} m long; {SHORTEST_GUARDRAIL:.0f} m are needed (RPS)."
-            yield Finding(name, rail.start_station, length, SHORTEST_GUARDRAIL, text)
-
-
-def _posts(road: Road, carriageway: Carriageway) -> Float:
+def _posts(road: Road, edges: Edges) -> Float:
     """Return the sorted stations of the delineators on a carriageway's outer side, m."""
-    middle = carriageway.inner_offset + carriageway.paved_width / 2.0
-    return np.sort([p.station for p in road.delineators.values() if carriageway.sign * p.offset > middle])
+    index = np.array(road.bodies.of(Delineator, part="foot"), dtype=np.intp)
+    return np.sort(road.bodies.station[index[road.around.outer[edges.name][index]]])
 
 
 def _spacing(road: Road, borders: Float) -> Float:
@@ -125,8 +48,8 @@ def _spacing(road: Road, borders: Float) -> Float:
 
 
 def _delineator_missing(road: Road) -> Iterator[Finding]:
-    for name, carriageway in road.carriageways.items():
-        posts = _posts(road, carriageway)
+    for name, edges in road.sides.items():
+        posts = _posts(road, edges)
         first = float(posts[0]) if len(posts) else road.length
         limit = float(_spacing(road, np.array([0.0, max(first, 0.0)]))[0]) / 2.0
         if first > limit + SPACING_ROOM:
@@ -136,8 +59,8 @@ def _delineator_missing(road: Road) -> Iterator[Finding]:
 
 
 def _delineator_spacing(road: Road) -> Iterator[Finding]:
-    for name, carriageway in road.carriageways.items():
-        posts = _posts(road, carriageway)
+    for name, edges in road.sides.items():
+        posts = _posts(road, edges)
         if not len(posts):
             continue
         borders = np.append(posts, max(road.length, posts[-1]))
@@ -148,65 +71,145 @@ def _delineator_spacing(road: Road) -> Iterator[Finding]:
 
 
 def _delineator_distance(road: Road) -> Iterator[Finding]:
-    for name, post in road.delineators.items():
-        distance = _clearance(road, post.offset, post.offset)
-        if distance >= 0.0 and below(distance, DELINEATOR_DISTANCE):
+    posts, clearance = road.of(Delineator), road.around.nearest
+    for i in np.flatnonzero((clearance >= 0.0) & (clearance < DELINEATOR_DISTANCE)).tolist():
+        body, distance = road.bodies.items[i], float(clearance[i]) + DELINEATOR_REACH
+        if body.name in posts and below(distance, DELINEATOR_DISTANCE):
             text = (
                 f"The delineator stands {distance:.2f} m from the paved edge; {DELINEATOR_DISTANCE} m are needed (HLB)."
             )
-            yield Finding(name, post.station, distance, DELINEATOR_DISTANCE, text)
+            yield Finding(body.name, posts[body.name].station, distance, DELINEATOR_DISTANCE, text)
+
+
+def _by_side(road: Road, items: dict[str, KilometreBoard] | dict[str, Cabinet]) -> Iterator[list[tuple[str, float]]]:
+    """Yield the ids and stations of objects on either side of the centreline, in order."""
+    for sign in (1.0, -1.0):
+        own = [(name, item.station) for name, item in items.items() if sign * item.offset > 0.0]
+        yield sorted(own, key=lambda pair: pair[1])
+
+
+def _apart(road: Road, items: dict[str, KilometreBoard] | dict[str, Cabinet], limit: float) -> Iterator[Finding]:
+    for places in _by_side(road, items):
+        for (name, here), (_, there) in pairwise(places):
+            if there - here > limit + SPACING_ROOM:
+                text = f"The next one on this side stands {there - here:.1f} m on; {limit:.0f} m are allowed."
+                yield Finding(name, here, there - here, limit, text)
+
+
+def _kilometre_spacing(road: Road) -> Iterator[Finding]:
+    yield from _apart(road, road.of(KilometreBoard), KILOMETRE_BOARD_SPACING)
+
+
+def _phone_spacing(road: Road) -> Iterator[Finding]:
+    phones = {name: item for name, item in road.of(Cabinet).items() if item.kind == "emergency_phone"}
+    yield from _apart(road, phones, EMERGENCY_PHONE_SPACING)
+
+
+def _kilometre_text(road: Road) -> Iterator[Finding]:
+    """Compare each board with the others: kilometres rise or fall with the stations, from an unknown beginning."""
+    boards = road.of(KilometreBoard)
+    if not boards:
+        return
+    names, station = list(boards), np.array([board.station for board in boards.values()])
+    told = np.array([_metres(board.text) for board in boards.values()])
+    known = np.isfinite(told)
+    begins = [told - station, told + station] if known.any() else [told]
+    off = min((_off(begin, known) for begin in begins), key=lambda far: int(np.sum(far > KILOMETRE_ROOM)))
+    for i in np.flatnonzero(~(off <= KILOMETRE_ROOM)).tolist():
+        board = boards[names[i]]
+        value = float(np.nan_to_num(off[i], nan=road.length))
+        text = f"The board's '{board.text}' is {value:.0f} m from the kilometre that the other boards give its place."
+        yield Finding(names[i], board.station, value, KILOMETRE_ROOM, text)
+
+
+def _off(begin: Float, known: Bool) -> Float:
+    """Return how far (N,) the beginnings of the road that boards tell are from the middle one of those known, m."""
+    middle = np.sort(begin[known])[np.sum(known) // 2] if known.any() else np.nan
+    return np.abs(begin - middle)
+
+
+def _metres(text: str) -> float:
+    """Return the m that a board tells, or NaN where it is no number."""
+    whole, _, part = text.strip().replace(",", ".").partition(".")
+    digits = whole + part
+    return float(f"{whole}.{part}0") * 1000.0 if whole.isascii() and digits.isascii() and digits.isdigit() else np.nan
 
 
 def _object_range(road: Road) -> Iterator[Finding]:
-    spans = [(name, line.start_station, line.end_station) for name, line in road.markings.items()]
-    spans += [(name, rail.start_station, rail.end_station) for name, rail in road.guardrails.items()]
-    spans += [(name, post.station, post.station) for name, post in road.delineators.items()]
-    for name, start, end in spans:
+    for name, start, end in _ranges(road):
         if end < start:
             yield Finding(name, end, end, start, f"The object ends at {end:.3f} m before it begins at {start:.3f} m.")
-        elif max(start, end) > road.length * (1.0 + TOLERANCE):
+        elif end > road.length * (1.0 + TOLERANCE):
             text = f"The object reaches {end:.3f} m; the road ends at {road.length:.3f} m."
             yield Finding(name, end, end, road.length, text)
 
 
+def _ranges(road: Road) -> Iterator[tuple[str, float, float]]:
+    """Yield (id, start, end) of all that lies along the road, damage of the pavement included."""
+    for name, item in road.each(PointObject, Vehicle):
+        yield name, item.station, item.station
+    for name, item in road.each(LineObject, LineMarking):
+        yield name, item.start_station, item.end_station
+    for name, edges in road.sides.items():
+        for rut in edges.carriageway.pavement.ruts:
+            yield name, rut.start_station, rut.end_station
+        for pothole in edges.carriageway.pavement.potholes:
+            yield name, pothole.station, pothole.station
+
+
 def _object_on_pavement(road: Road) -> Iterator[Finding]:
-    found = [(n, rail.start_station, _rail_clearance(road, rail)) for n, rail in road.guardrails.items()]
-    found += [(n, p.station, _clearance(road, p.offset, p.offset)) for n, p in road.delineators.items()]
-    for name, plants in road.parameters.of_type(Vegetation).items():
-        verge = min(carriageway.verge_width for carriageway in road.carriageways.values())
-        if plants.density > 0.0:
+    allowed = road.of(ConstructionBeacon)
+    clearance, where = road.around.nearest, road.around.where
+    worst: dict[str, tuple[float, float]] = {}
+    for i in np.flatnonzero(clearance < -TOLERANCE).tolist():
+        body = road.bodies.items[i]
+        if body.part in ("foot", "barrier", "wall") and body.name not in allowed:
+            worst[body.name] = min(worst.get(body.name, (0.0, 0.0)), (float(clearance[i]), float(where[i])))
+    found = [(name, station, distance) for name, (distance, station) in worst.items()]
+    for name, plants in road.of(Vegetation).items():
+        verge = min(edges.verge for edges in road.sides.values())
+        if plants.density > 0.0 and verge + plants.band_start < -TOLERANCE:
             found.append((name, 0.0, verge + plants.band_start))
     for name, station, distance in found:
-        if distance < -TOLERANCE:
-            yield Finding(name, station, distance, 0.0, f"The object reaches {-distance:.2f} m over the pavement.")
+        yield Finding(name, station, distance, 0.0, f"The object reaches {-distance:.2f} m over the pavement.")
 
 
-def _tree_distance(road: Road) -> Iterator[Finding]:
-    least = TREE_DISTANCE[road.design_class]
-    for name, plants in road.parameters.of_type(Vegetation).items():
-        if plants.kind != "tree" or plants.density == 0.0:
+def _object_overlap(road: Road) -> Iterator[Finding]:
+    bodies = road.bodies
+    first, second = _near_pairs(bodies)
+    depth = np.full(len(first), np.inf)
+    for low, high in ((bodies.start, bodies.end), (bodies.low, bodies.high), (bodies.bottom, bodies.top)):
+        depth = np.minimum(depth, np.minimum(high[first], high[second]) - np.maximum(low[first], low[second]))
+    told = set()
+    for i in np.flatnonzero(depth > OVERLAP_ROOM).tolist():
+        a, b = bodies.items[first[i]], bodies.items[second[i]]
+        pair = (a.name, b.name)
+        if a.name == b.name or pair in told:
             continue
-        for carriageway in road.carriageways.values():
-            distance = carriageway.verge_width + plants.band_start
-            if distance < 0.0 or not below(distance, least):
-                continue
-            for start, _ in list(gaps(_outer_rails(road, carriageway, reach=distance), road.length))[:1]:
-                text = (
-                    f"Trees stand {distance:.2f} m from the {carriageway.side} paved edge with no guardrail in front; "
-                    f"{least} m are needed (RPS)."
-                )
-                yield Finding(name, start, distance, least, text)
+        told.add(pair)
+        text = f"The object and {a.name} reach {depth[i]:.2f} m into each other."
+        yield Finding(b.name, max(a.start, b.start), float(depth[i]), 0.0, text)
+
+
+def _near_pairs(bodies: Bodies) -> tuple[np.ndarray, np.ndarray]:
+    """Return the indices (P,), (P,) of all pairs of bodies whose stations overlap, in the order of the file."""
+    order = np.argsort(bodies.start, kind="stable")
+    until = np.searchsorted(bodies.start[order], bodies.end[order], side="left")
+    count = np.maximum(until - np.arange(len(order)) - 1, 0)
+    one = np.repeat(np.arange(len(order)), count)
+    other = one + 1 + np.arange(len(one)) - np.repeat(np.cumsum(count) - count, count)
+    one, other = order[one], order[other]
+    return np.minimum(one, other), np.maximum(one, other)
 
 
 RULES = (
-    Rule("median-guardrail", "The median has a guardrail throughout", "m", "RPS", "confirmed", _median_guardrail),
-    Rule("embankment-guardrail", "Embankments have guardrails", "m", "RPS", "unconfirmed", _embankment_guardrail),
-    Rule("guardrail-distance", "Guardrails keep clear of the pavement", "m", "RPS", "unconfirmed", _guardrail_distance),
-    Rule("guardrail-length", "Shortest guardrail", "m", "RPS", "unconfirmed", _guardrail_length),
     Rule("delineator-missing", "Delineators begin at the beginning", "m", "HLB", "derived", _delineator_missing),
     Rule("delineator-spacing", "Spacing of delineators", "m", "HLB", "confirmed", _delineator_spacing),
     Rule("delineator-distance", "Delineators keep off the pavement", "m", "HLB", "confirmed", _delineator_distance),
+    Rule("kilometre-spacing", "Spacing of kilometre boards", "m", "", "confirmed", _kilometre_spacing),
+    Rule("kilometre-text", "Kilometre boards tell their place", "m", "", "definition", _kilometre_text),
+    Rule("phone-spacing", "Spacing of emergency phones", "m", "", "confirmed", _phone_spacing),
     Rule("object-range", "Objects lie on the road's length", "m", "", "definition", _object_range),
     Rule("object-on-pavement", "Nothing stands on the pavement", "m", "", "definition", _object_on_pavement),
-    Rule("tree-distance", "Trees keep clear of the pavement", "m", "RPS", "unconfirmed", _tree_distance),
+    Rule("object-overlap", "No two objects stand at one place", "m", "", "definition", _object_overlap),
 )
