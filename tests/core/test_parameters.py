@@ -21,7 +21,6 @@ from synthroads_addon.core.parameters.limits import (
 )
 from synthroads_addon.core.parameters.model import (
     AlignmentObject,
-    Carriageway,
     Delineator,
     Guardrail,
     HorizontalElement,
@@ -113,7 +112,8 @@ def test_vendor_keys_are_kept(data: dict) -> None:
         ("objects/carriageway-left/instance", 1, "same instance number"),
         ("objects/carriageway-left/instance", True, "instance is True"),
         ("objects/guardrail-median/type", "Gardrail", "'Gardrail'"),
-        ("objects/carriageway-left-line-0/carriageway", "nowhere", "must name a lane boundary"),
+        ("objects/carriageway-left-line-0/carriageway", "nowhere", "must name a Carriageway"),
+        ("objects/carriageway-left-line-0/boundary", 3, "must name a lane boundary that exists"),
         ("metadata/referenceSystem", "EPSG:25832", "metadata.referenceSystem"),
         ("transform/translate", [1.0, 2.0], "transform.translate"),
         ("objects", [], "objects is []"),
@@ -244,14 +244,14 @@ def test_strips_follow_the_cross_section(geometry: RoadGeometry) -> None:
     half = ["verge", "hard_shoulder", "outer_edge_strip", "lane", "lane", "inner_edge_strip"]
     assert kinds == [*half, "median", *half[::-1]]
     expected = np.cumsum([1.5, 3.0, 0.75, 3.75, 3.75, 0.75, 4.0, 0.75, 3.75, 3.75, 0.75, 3.0, 1.5])
-    np.testing.assert_allclose(geometry.offsets, 15.5 - np.concatenate([[0], expected]))
-    assert [geometry.strips[i].kind for i in geometry.strip_index([15.5, 0.0, -13.9, -15.5])] == [
+    np.testing.assert_allclose(geometry.offsets(0.0)[0], 15.5 - np.concatenate([[0], expected]))
+    assert [geometry.strips[i].kind for i in geometry.strip_index(0.0, [15.5, 0.0, -13.9, -15.5])] == [
         "verge",
         "median",
         "hard_shoulder",
         "verge",
     ]
-    assert geometry.strip_index([15.6, -15.6]).tolist() == [-1, -1]
+    assert geometry.strip_index(0.0, [15.6, -15.6]).tolist() == [-1, -1]
 
 
 def test_heights_on_the_straight_fall_outwards(geometry: RoadGeometry) -> None:
@@ -273,7 +273,7 @@ def test_the_curve_falls_to_its_inside(geometry: RoadGeometry) -> None:
 
 def test_markings_and_dashes(geometry: RoadGeometry) -> None:
     lines = geometry.parameters.of_type(LineMarking)
-    edges = sorted(geometry.marking_offsets(line) for line in lines.values())
+    edges = sorted(tuple(edge[0] for edge in geometry.marking_edges(line, 0.0)) for line in lines.values())
     assert edges[-1] == pytest.approx((10.55, 10.25))  # broad, on the edge strip: the lane keeps its width
     assert edges[-2] == pytest.approx((6.575, 6.425))
     assert edges[-3] == pytest.approx((2.75, 2.60))
@@ -285,7 +285,7 @@ def test_markings_and_dashes(geometry: RoadGeometry) -> None:
 
 def test_furniture_stands_clear_of_the_pavement(geometry: RoadGeometry) -> None:
     parameters = geometry.parameters
-    paved = next(iter(parameters.of_type(Carriageway).values())).paved_width + 2.0
+    paved = geometry.sections["right"].paved_edge(0.0)[0]
     for name, rail in parameters.of_type(Guardrail).items():
         assert rail.offset == 0.0 if "median" in name else abs(rail.offset) > paved + 0.3
     posts = list(parameters.of_type(Delineator).values())
@@ -300,7 +300,7 @@ def test_chords_stay_within_the_tolerance(geometry: RoadGeometry, tolerance: flo
     stations = sample_stations(geometry, tolerance)
     for share in (0.25, 0.5, 0.75):
         between = stations[:-1] + share * np.diff(stations)
-        for offset in geometry.offsets:
+        for offset in geometry.offsets(0.0)[0]:
             ends = geometry.point(stations, np.full(len(stations), offset))
             chord = ends[:-1] + share * np.diff(ends, axis=0)
             truth = geometry.point(between, np.full(len(between), offset))

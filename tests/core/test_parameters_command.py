@@ -1,6 +1,7 @@
 """`synthroads parameters`: one set, many sets, wrong input."""
 
 import json
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -8,9 +9,10 @@ from pathlib import Path
 ROOT = Path(__file__).parents[2]
 
 
-def command(*arguments: str) -> subprocess.CompletedProcess:
+def command(*arguments: str, hash_seed: str = "random") -> subprocess.CompletedProcess:
     line = [sys.executable, "-m", "headless.parameters", *arguments]
-    return subprocess.run(line, cwd=ROOT, capture_output=True, text=True, timeout=120, check=False)
+    environment = {**os.environ, "PYTHONHASHSEED": hash_seed}
+    return subprocess.run(line, cwd=ROOT, capture_output=True, text=True, timeout=120, check=False, env=environment)
 
 
 def test_one_set_is_what_the_library_makes() -> None:
@@ -25,7 +27,16 @@ def test_one_set_is_what_the_library_makes() -> None:
 
 def test_many_sets_are_lines_of_consecutive_seeds() -> None:
     done = command("--seed", "5", "--count", "3")
-    assert [json.loads(line)["metadata"]["seed"] for line in done.stdout.splitlines()] == [5, 6, 7]
+    sets = [json.loads(line) for line in done.stdout.splitlines()]
+    assert [each["metadata"]["seed"] for each in sets] == [5, 6, 7]
+    assert sets[2] == json.loads(command("--seed", "7").stdout)
+
+
+def test_two_processes_write_the_same_bytes() -> None:
+    arguments = ["--count", "20", "--length", "3000", "--cross-section", "RQ43.5"]
+    first, second = (command(*arguments, hash_seed=seed).stdout for seed in ("1", "2"))
+    assert len(first.splitlines()) == 20
+    assert first == second
 
 
 def test_wrong_input_is_one_line() -> None:
@@ -33,3 +44,12 @@ def test_wrong_input_is_one_line() -> None:
         done = command(*arguments)
         assert done.returncode == 2
         assert len(done.stderr.strip().splitlines()) == 1
+
+
+def test_limits_that_conflict_are_all_named_in_one_line() -> None:
+    changes = ["lanes=5", "lane_width=4.0", "median_width=2.0", "furniture.gantry_spacing=10"]
+    arguments = ["--design-class", "EKA3", "--cross-section", "RQ25", "--length", "5"]
+    done = command(*arguments, *(part for change in changes for part in ("--set", f"road.{change}")))
+    assert done.returncode == 2
+    (line,) = done.stderr.strip().splitlines()
+    assert all(name in line for name in ("lanes is 5", "51 m wide", "median_width is 2 m", "gantry_spacing is 10 m"))

@@ -1,0 +1,67 @@
+"""One road's materials: the table's means, changed by age, wear, dryness and rain.
+
+The table holds the means of a road with the default `MaterialVariation`. Base colour and specular change together, so
+that what the camera sees and what the laser measures change alike.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .materials import Material, materials
+from .parameters.model_surroundings import Environment, MaterialVariation
+
+ASPHALT_OF_AGE = (0.6, 1.6)
+"""Factor on new and on old asphalt: binder is black, bare aggregate bright."""
+DRY_GRASS = (0.27, 0.22, 0.11)
+WET_BASE, WET_SPECULAR, WET_ROUGHNESS = 0.45, 0.5, 0.6
+"""Share that water takes of a porous surface's base colour, of what it reflects at 905 nm, and of its roughness."""
+
+_PAINTS = ("paint_white", "paint_yellow")
+_GRASSES = ("verge", "median", "grass_ground", "grass", "meadow", "ryegrass", "reed")
+_POROUS = ("asphalt", "concrete", "soil", "verge", *_PAINTS)
+_DEFAULT = MaterialVariation()
+
+
+def varied(name: str, variation: MaterialVariation, environment: Environment) -> Material:
+    """Return a material of the table as a road with this variation and weather has it; KeyError for other names."""
+    result = _aged(name, materials()[name], variation)
+    if environment.wetness > 0.0 and name in _POROUS:
+        wet = environment.wetness
+        result = _scaled(result, 1.0 - WET_BASE * wet, 1.0 - WET_SPECULAR * wet)
+        result = result.model_copy(update={"roughness": result.roughness * (1.0 - WET_ROUGHNESS * wet)})
+    return result
+
+
+def _aged(name: str, mean: Material, variation: MaterialVariation) -> Material:
+    if name == "asphalt":
+        return _scaled(mean, variation.asphalt_brightness * _of_age(variation) / _of_age(_DEFAULT))
+    if name == "concrete":
+        return _scaled(mean, variation.concrete_brightness)
+    if name == "soil":
+        return _scaled(mean, variation.soil_brightness)
+    if name in _PAINTS:
+        worn = (variation.paint_wear - _DEFAULT.paint_wear) / (1.0 - _DEFAULT.paint_wear)
+        return _mixed(mean, materials()["asphalt"], worn)
+    if name in _GRASSES:
+        dry = (variation.grass_dryness - _DEFAULT.grass_dryness) / (1.0 - _DEFAULT.grass_dryness)
+        return _mixed(mean, mean.model_copy(update={"base_color": DRY_GRASS}), dry)
+    return mean
+
+
+def _of_age(variation: MaterialVariation) -> float:
+    new, old = ASPHALT_OF_AGE
+    return new + (old - new) * variation.asphalt_age
+
+
+def _scaled(mean: Material, factor: float, specular: float | None = None) -> Material:
+    color = np.clip(np.array(mean.base_color) * factor, 0.0, 1.0)
+    reflected = float(np.clip(mean.specular * (factor if specular is None else specular), 0.0, 1.0))
+    return mean.model_copy(update={"base_color": tuple(color.tolist()), "specular": reflected})
+
+
+def _mixed(mean: Material, other: Material, share: float) -> Material:
+    """Return a material between two; a negative share goes beyond the first, away from the other."""
+    color = np.clip(np.array(mean.base_color) * (1.0 - share) + np.array(other.base_color) * share, 0.0, 1.0)
+    specular = float(np.clip(mean.specular * (1.0 - share) + other.specular * share, 0.0, 1.0))
+    return mean.model_copy(update={"base_color": tuple(color.tolist()), "specular": specular})
