@@ -32,3 +32,13 @@ def modifier_input(modifier: bpy.types.NodesModifier, name: str) -> Any:
     if _INPUTS_ARE_PROPERTIES:
         return getattr(modifier.properties.inputs, identifier).value
     return modifier[identifier]
+
+
+def sky_texture(nodes: bpy.types.Nodes, elevation: float, azimuth: float) -> bpy.types.ShaderNodeTexSky:
+    """Add a physical sky without sun disc; elevation and azimuth (clockwise from north) of the sun in rad."""
+    node = nodes.new("ShaderNodeTexSky")
+    names = [item.identifier for item in node.bl_rna.properties["sky_type"].enum_items]
+    node.sky_type = "NISHITA" if "NISHITA" in names else "SINGLE_SCATTERING"
+    node.sun_disc = False
+    node.sun_elevation, node.sun_rotation = elevation, azimuth
+    return node

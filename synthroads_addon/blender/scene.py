@@ -14,12 +14,9 @@ from ..core.cloud.labels import UNLABELLED, classes
 from ..core.errors import InputError
 from ..core.scene_mesh import SceneMesh, empty_scene_mesh
 from .materials import table_name
-from .model import ORIGIN, SUPPORT
-
-CLASS_PROPERTY = "synthroads_class"
-"""Custom property of any object: the name of its class."""
-INSTANCE_PROPERTY = "synthroads_instance"
-"""Custom property of any object: its instance number."""
+from .model import ORIGIN
+from .model_builder import SUPPORT
+from .scene_labels import CLASS_PROPERTY, INSTANCE_PROPERTY
 
 _SMALLEST_AREA = 1e-12
 

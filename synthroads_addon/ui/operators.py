@@ -9,7 +9,7 @@ import bpy
 from ..core.errors import Cancelled, InputError
 from ..core.parameters.sampler import sample_road
 from . import scan_job
-from .road import find_road, recall, remember
+from .road import find_road, objects_of, recall, remember
 from .scan_job import ScanJob, scanning
 from .view import look_along
 
@@ -169,12 +169,14 @@ def _is_free(operator: type[bpy.types.Operator], context: bpy.types.Context) -> 
 
 
 def _scan_of(context: bpy.types.Context) -> ScanJob:
-    """Return the scan that the panel asks for: the road as it was built, the scanner as it is set now."""
+    """Return the scan that the panel asks for: the road as it is edited now, the scanner as it is set now."""
+    from ..blender.read_back import edited_parameters
     from ..blender.scene import scene_mesh
 
     settings, road = context.scene.synthroads, find_road(context.scene)
     assert road  # poll() has seen it
     parameters, built = recall(road)
+    parameters = edited_parameters(parameters, objects_of(road))
     scenario = built.model_copy(update={"scan": settings.scenario().scan})
     target = settings.folder()
     mesh = scene_mesh()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import bpy
 
-from ..blender.model import ROLE
+from ..blender.model_builder import ROLE
 from . import scan_job
 from .operators import SYNTHROADS_OT_build, SYNTHROADS_OT_cancel_scan, SYNTHROADS_OT_scan
 from .properties import SYNTHROADS_PG_settings

@@ -16,11 +16,11 @@ from pydantic import BaseModel
 
 from ..core.errors import InputError
 from ..core.parameters.limits import STANDARD_CROSS_SECTIONS, design_class_of
+from ..core.road_scenario import RoadScenario
 from ..core.scanning.devices import device_names, load_device
 from ..core.scenario import (
     FIDELITIES,
     Platform,
-    RoadScenario,
     ScanScenario,
     Scenario,
     load_scenario,

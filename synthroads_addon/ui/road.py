@@ -6,7 +6,8 @@ import json
 
 import bpy
 
-from ..blender.model import COLLECTION, ROLE
+from ..blender.model import COLLECTION
+from ..blender.model_builder import ROLE
 from ..core.errors import InputError
 from ..core.parameters.model import RoadParameters
 from ..core.scenario import Scenario
@@ -29,6 +30,11 @@ def remember(collection: bpy.types.Collection, parameters: RoadParameters, scena
     collection[PARAMETERS] = parameters.to_json()
     collection[SCENARIO] = scenario.to_json()
     collection[BUILT_FROM] = built_from
+
+
+def objects_of(collection: bpy.types.Collection) -> dict[str, bpy.types.Object]:
+    """Return the road's objects by role."""
+    return {str(item[ROLE]): item for item in collection.all_objects if ROLE in item}
 
 
 def recall(collection: bpy.types.Collection) -> tuple[RoadParameters, Scenario]:

@@ -64,7 +64,8 @@ class Built:
 
     def surface(self, station: Float, offset: Float) -> Float:
         """Return the analytic elevation; points beyond the ends or the edges by rounding count as on them."""
-        low, high = self.geometry.offsets[-1], self.geometry.offsets[0]
+        across = self.geometry.offsets(0.0)[0]
+        low, high = across[-1], across[0]
         assert offset.max() < high + 0.01
         assert offset.min() > low - 0.01
         return self.geometry.elevation(
@@ -131,7 +132,7 @@ class TestSurface:
         mesh = demo.mesh("Road")
         vertices = mesh.vertices[np.unique(of_class(mesh, "road", "roadside"))]
         station, offset = demo.located(vertices)
-        boundaries = demo.geometry.offsets
+        boundaries = demo.geometry.offsets(0.0)[0]
         expected = sample_stations(demo.geometry, TOLERANCE)
         assert np.abs(offset[:, None] - boundaries).min(axis=1).max() < ROUNDING
         assert np.abs(station[:, None] - expected).min(axis=1).max() < ROUNDING
@@ -154,7 +155,7 @@ class TestSurface:
         mesh = demo.mesh("Road")
         chosen = mesh.class_id != class_id("road_marking")
         _, offset = demo.located(mesh.vertices[mesh.triangles[chosen]].mean(axis=1))
-        strips = demo.geometry.strip_index(offset)
+        strips = demo.geometry.strip_index(np.zeros(len(offset)), offset)
         wanted = np.array([class_id(strip.class_name) for strip in demo.geometry.strips])
         numbers = np.array([strip.instance for strip in demo.geometry.strips])
         names = np.array([strip.material for strip in demo.geometry.strips])
@@ -208,7 +209,7 @@ class TestMarkings:
         for line in road.parameters.of_type(LineMarking).values():
             chosen = mesh.triangles[mesh.instance_id == line.instance]
             station, offset = road.located(mesh.vertices[np.unique(chosen)])
-            left, right = road.geometry.marking_offsets(line)
+            left, right = (edges[0] for edges in road.geometry.marking_edges(line, 0.0))
             assert np.isclose(offset.max(), left, atol=ROUNDING)
             assert np.isclose(offset.min(), right, atol=ROUNDING)
             dashes = road.geometry.dashes(line)
@@ -243,7 +244,7 @@ class TestTerrain:
         station, offset = demo.located(mesh.vertices)
         inside = (station > 0.0) & (station < demo.geometry.length)
         station, offset, z = station[inside], offset[inside], mesh.vertices[inside, 2]
-        edge_offset = np.clip(offset, demo.geometry.offsets[-1], demo.geometry.offsets[0])
+        edge_offset = np.clip(offset, *demo.geometry.offsets(0.0)[0, [-1, 0]])
         edge = demo.surface(station, edge_offset)
         ground = ground_elevation(demo.geometry, terrain, station, offset)
         reach = np.abs(offset - edge_offset) / terrain.batter_slope
@@ -260,7 +261,7 @@ class TestFurniture:
         mesh = road.mesh(name)
         return road.parameters.objects[name], mesh, pieces(mesh)  # type: ignore[return-value]
 
-    @pytest.mark.parametrize("name", ["guardrail-median", "guardrail-left", "guardrail-right"])
+    @pytest.mark.parametrize("name", ["guardrail-median", "guardrail-right-1"])
     def test_beams_are_as_high_as_the_parameters_say(self, demo: Built, name: str) -> None:
         rail, mesh, parts = self.rail(demo, name)
         beams = [mesh.vertices[part] for part in parts if len(part) > 100]
@@ -271,7 +272,7 @@ class TestFurniture:
             assert np.isclose(station.max(), min(rail.end_station, demo.geometry.length), atol=2e-3)
             side = np.sign(offset.mean() - rail.offset)
             assert rail.faces in ("both", "left" if side > 0 else "right")
-            full = np.minimum(station - rail.start_station, rail.end_station - station) > rail.terminal_length
+            full = np.minimum(station - rail.start_station, rail.end_station - station) > rail.terminal_length + 0.01
             rows = np.round(station[full], 2)
             top = np.array([beam[full][rows == row, 2].max() for row in np.unique(rows)])
             surface = demo.surface(np.unique(rows), np.full(top.size, rail.offset))
@@ -283,9 +284,9 @@ class TestFurniture:
 
     @pytest.mark.parametrize("spacing", [4.0, 1.33])
     def test_posts_are_evenly_spaced_from_the_start(self, demo: Built, spacing: float) -> None:
-        set_modifier_input(demo.modifier("guardrail-right"), "Post Spacing", spacing)
-        rail, mesh, parts = self.rail(demo, "guardrail-right")
-        set_modifier_input(demo.modifier("guardrail-right"), "Post Spacing", rail.post_spacing)
+        set_modifier_input(demo.modifier("guardrail-right-1"), "Post Spacing", spacing)
+        rail, mesh, parts = self.rail(demo, "guardrail-right-1")
+        set_modifier_input(demo.modifier("guardrail-right-1"), "Post Spacing", rail.post_spacing)
         stations = []
         for part in parts:
             station, offset = demo.located(mesh.vertices[part])
@@ -343,22 +344,24 @@ class TestLabels:
     def plants_grow_in_their_band(road: Built) -> None:
         for name, plants in road.parameters.of_type(Vegetation).items():
             mesh = road.mesh(name)
-            # A tree's longest piece is its trunk; every blade of grass is a piece of its own.
-            least = 0.8 * plants.height_min if plants.kind == "tree" else 0.0
+            # A tree's longest piece is its trunk, a shrub's its stems; every blade of grass is a piece of its own.
+            least = {"tree": 0.8, "shrub": 0.5, "grass": 0.0}[plants.kind] * plants.height_min
             parts = [mesh.vertices[part] for part in pieces(mesh)]
             feet = np.array([part[part[:, 2].argmin()] for part in parts if np.ptp(part[:, 2]) >= least])
             assert len(feet) > 10
             _, offset = road.located(feet)
-            beyond = np.maximum(offset - road.geometry.offsets[0], road.geometry.offsets[-1] - offset)
+            across = road.geometry.offsets(0.0)[0]
+            beyond = np.maximum(offset - across[0], across[-1] - offset)
             # Blades stand up to half their length from the middle of their tuft.
             room = plants.height_max if plants.kind == "grass" else 0.4
             assert beyond.max() < plants.band_end + room
             if plants.kind == "tree":
                 assert beyond.min() > plants.band_start - room
             for side in ("left", "right"):
-                carriageway = road.parameters.carriageway(side)
-                outwards = carriageway.sign * offset - carriageway.inner_offset
-                assert np.minimum(outwards, carriageway.paved_width - outwards).max() < room
+                section = road.geometry.sections[side]
+                width = section.paved_edge(0.0)[0] - section.distances(0.0)[0, 0]
+                outwards = section.carriageway.sign * offset - section.distances(0.0)[0, 0]
+                assert np.minimum(outwards, width - outwards).max() < room
 
     def test_large_instance_numbers_survive(self) -> None:
         parameters = with_object(demo_parameters(length=100.0), "median", instance=2**32 - 5)
@@ -377,7 +380,7 @@ class TestLiveEdits:
             ("Road", "Left Verge Slope", 0.05),
             ("Terrain", "Batter Slope", 3.0),
             ("guardrail-median", "Post Spacing", 2.0),
-            ("guardrail-left", "Height", 0.9),
+            ("guardrail-right-1", "Height", 0.9),
         ],
     )
     def test_an_input_changes_the_mesh_at_once(self, demo: Built, role: str, name: str, value: float) -> None:
@@ -407,18 +410,18 @@ class TestLiveEditsOfTheRoad:
         for mesh in (live, again):
             vertices = mesh.vertices[np.unique(of_class(mesh, "road", "roadside"))]
             station, offset = truth.located(vertices)
-            assert np.abs(offset[:, None] - truth.geometry.offsets).min(axis=1).max() < ROUNDING
+            assert np.abs(offset[:, None] - truth.geometry.offsets(0.0)).min(axis=1).max() < ROUNDING
             assert np.abs(vertices[:, 2] - truth.surface(station, offset)).max() < ROUNDING
             for line in wider.of_type(LineMarking).values():
                 _, offset = truth.located(
                     mesh.vertices[np.unique(mesh.triangles[mesh.instance_id == line.instance])]
                 )
-                assert np.isclose(offset.max(), truth.geometry.marking_offsets(line)[0], atol=ROUNDING)
+                assert np.isclose(offset.max(), truth.geometry.marking_edges(line, 0.0)[0][0], atol=ROUNDING)
 
     def test_guardrails_and_terrain_follow_the_road(self) -> None:
         road = built(demo_parameters())
         set_modifier_input(road.modifier("Road"), "Right Verge Width", 2.5)
-        edge = road.geometry.offsets[-1] - 1.0
+        edge = road.geometry.offsets(0.0)[0, -1] - 1.0
         _, offset = road.located(road.mesh("Terrain").vertices)
         assert np.isclose(offset[offset < 0].max(), edge, atol=ROUNDING)
 
@@ -525,7 +528,7 @@ class TestBuilding:
         station, offset = road.located(vertices)
         assert np.abs(vertices[:, 2] - road.surface(station, offset)).max() < ROUNDING
         _, offset = road.located(mesh.vertices[np.unique(of_class(mesh, "ground"))])
-        assert np.isclose(offset[offset > -10].min(), road.geometry.offsets[0], atol=ROUNDING)
+        assert np.isclose(offset[offset > -10].min(), road.geometry.offsets(0.0)[0, 0], atol=ROUNDING)
 
 
 def mirrored(data: dict[str, Any]) -> dict[str, Any]:

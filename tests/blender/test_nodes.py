@@ -4,29 +4,39 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable
+from importlib import import_module
+from inspect import signature
 from pathlib import Path
+from pkgutil import iter_modules
 
 import bpy
 import numpy as np
 import pytest
 
+from synthroads_addon.blender import nodes
 from synthroads_addon.blender.compat import modifier_input, set_modifier_input
 from synthroads_addon.blender.nodes import builder
 from synthroads_addon.blender.nodes import operations as op
 from synthroads_addon.blender.nodes.builder import Tree, Value, node_group
 from synthroads_addon.blender.nodes.carriageway import carriageway_marking_group, height_group
-from synthroads_addon.blender.nodes.delineator import delineator_group
 from synthroads_addon.blender.nodes.describe import describe
-from synthroads_addon.blender.nodes.grass import grass_group
 from synthroads_addon.blender.nodes.guardrail import guardrail_group
-from synthroads_addon.blender.nodes.road import SideLayout, road_group
+from synthroads_addon.blender.nodes.road import road_group
+from synthroads_addon.blender.nodes.road_layout import MarkingLayout, SideLayout
 from synthroads_addon.blender.nodes.strip import strip_group
-from synthroads_addon.blender.nodes.terrain import terrain_group
-from synthroads_addon.blender.nodes.tree import tree_group
+from synthroads_addon.blender.nodes.vehicle import vehicle_group
+from synthroads_addon.blender.nodes.vehicle_models import CHASSIS
 
 LAYOUT = (
-    SideLayout("Left", 3, (("outer", "outer_edge", 0), ("dashes", "lane", 1))),
-    SideLayout("Right", 2, (("inner", "inner_edge", 2),)),
+    SideLayout("Left", 3, (MarkingLayout("outer", "outer_edge", 0), MarkingLayout("dashes", "lane", 1))),
+    SideLayout(
+        "Right",
+        2,
+        (MarkingLayout("inner", "inner_edge", 2), MarkingLayout("gore", "gore_edge"), MarkingLayout("free", "free")),
+        varying=("Hard Shoulder", "Lane 1"),
+        turnouts=("exit",),
+        detailed=("Lane 2",),
+    ),
 )
 
 SNAPSHOTS = Path(__file__).parent / "snapshots"
@@ -34,10 +44,16 @@ WRITE = "SYNTHROADS_WRITE_SNAPSHOTS"
 
 
 def all_groups() -> list[bpy.types.NodeTree]:
-    """Return every group of the road model, sub-groups included."""
+    """Return every group of the road model, sub-groups included: each module's `..._group` function makes one."""
     road_group(LAYOUT)
-    for make in (terrain_group, guardrail_group, delineator_group, grass_group, tree_group):
-        make()
+    for module in iter_modules(nodes.__path__):
+        loaded = import_module(f"{nodes.__name__}.{module.name}")
+        for name, make in vars(loaded).items():
+            own = getattr(make, "__module__", "") == loaded.__name__
+            if name.endswith("_group") and own and not signature(make).parameters:
+                make()
+    for model in CHASSIS:
+        vehicle_group(model)
     return [group for group in bpy.data.node_groups if group.name.startswith("SR ")]
 
 

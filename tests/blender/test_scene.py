@@ -10,7 +10,7 @@ import pytest
 from mathutils import Matrix
 
 from synthroads_addon.blender.materials import PROPERTY, constants, material
-from synthroads_addon.blender.model import SUPPORT
+from synthroads_addon.blender.model_builder import SUPPORT
 from synthroads_addon.blender.scene import scene_mesh
 from synthroads_addon.core.cloud.labels import UNLABELLED, class_id
 from synthroads_addon.core.errors import InputError

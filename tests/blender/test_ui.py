@@ -11,11 +11,14 @@ import pytest
 from pydantic import BaseModel
 
 import synthroads_addon
-from synthroads_addon.blender.model import ROLE
+from synthroads_addon.blender.compat import set_modifier_input
+from synthroads_addon.blender.model_builder import ROLE
 from synthroads_addon.core.errors import Cancelled, InputError
 from synthroads_addon.core.parameters.limits import STANDARD_CROSS_SECTIONS
+from synthroads_addon.core.parameters.model import read_parameters
+from synthroads_addon.core.road_scenario import RoadScenario
 from synthroads_addon.core.scanning.devices import device_names
-from synthroads_addon.core.scenario import FIDELITIES, Platform, RoadScenario, Scenario, load_scenario, scenario_names
+from synthroads_addon.core.scenario import FIDELITIES, Platform, Scenario, load_scenario, scenario_names
 from synthroads_addon.pipeline import FILES, Job, generate
 from synthroads_addon.ui import operators, properties, scan_job
 
@@ -195,6 +198,15 @@ def test_scan_is_of_the_road_that_was_built(road: Any, tmp_path: Path) -> None:
     scenario = json.loads((tmp_path / "out" / "report.json").read_text())["scenario"]
     assert (scenario["road"]["length"], scenario["seed"], scenario["scan"]["platform"]["speed"]) == (120.0, 3, 50.0)
     assert json.loads((tmp_path / "out" / "parameters.json").read_text())["metadata"]["seed"] == 3
+
+
+def test_a_scan_writes_the_parameters_of_the_edited_road(road: Any, tmp_path: Path) -> None:
+    set_modifier_input(bpy.data.objects["Road"].modifiers[0], "Right Lane 1 Width", 4.5)
+    road.output = str(tmp_path / "edited")
+    assert bpy.ops.synthroads.scan() == {"FINISHED"}
+    written = read_parameters(tmp_path / "edited" / "parameters.json")
+    assert written.carriageway("right").lanes[0].width == 4.5
+    assert written.carriageway("left").lanes[0].width != 4.5
 
 
 def test_building_and_scanning_leave_the_users_objects_alone(

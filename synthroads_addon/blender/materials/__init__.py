@@ -2,23 +2,31 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Iterable
 
 import bpy
 
 from ...core.errors import nearest_name
+from ...core.material_variation import varied
 from ...core.materials import UNKNOWN, Material, materials
-from . import furniture, ground, paving, plants
+from ...core.parameters.model import Environment, MaterialVariation
+from . import furniture, ground, paving, plants, signs, structures, vehicles
 from .shading import Shade, shade
 
 PROPERTY = "synthroads_material"
 """Custom property of a Blender material: its name in the table."""
+MEAN = "synthroads_mean"
+"""Custom property of a Blender material: its mean properties on this road, as JSON."""
 
 _BUILDERS: dict[str, Callable[[Shade], None]] = {
     **paving.BUILDERS,
     **ground.BUILDERS,
     **plants.BUILDERS,
     **furniture.BUILDERS,
+    **structures.BUILDERS,
+    **signs.BUILDERS,
+    **vehicles.BUILDERS,
 }
 
 
@@ -31,8 +39,22 @@ def material(name: str) -> bpy.types.Material:
             return existing
     made = bpy.data.materials.new(f"SR {name}")
     made[PROPERTY] = name
-    shade(made, materials()[name], _BUILDERS.get(name))
+    _shade(made, materials()[name])
     return made
+
+
+def vary(variation: MaterialVariation, environment: Environment) -> None:
+    """Give the materials that the file has their means on a road with this variation and weather."""
+    for item in bpy.data.materials:
+        if PROPERTY in item and item[PROPERTY] in materials():
+            mean = varied(item[PROPERTY], variation, environment)
+            if mean.to_json() != item.get(MEAN):
+                _shade(item, mean)
+
+
+def _shade(item: bpy.types.Material, mean: Material) -> None:
+    shade(item, mean, _BUILDERS.get(item[PROPERTY]))
+    item[MEAN] = mean.to_json()
 
 
 def table_name(item: bpy.types.Material | None) -> str:
@@ -43,9 +65,14 @@ def table_name(item: bpy.types.Material | None) -> str:
 
 
 def constants(names: Iterable[str]) -> dict[str, Material]:
-    """Return materials' properties by name: the table's, else those of the material's Principled BSDF."""
+    """Return materials' properties by name: this road's, else those of the material's Principled BSDF."""
     table = materials()
-    return {name: table[name] if name in table else _principled(name) for name in names}
+    here = {item[PROPERTY]: item[MEAN] for item in bpy.data.materials if PROPERTY in item and MEAN in item}
+
+    def mean(name: str) -> Material:
+        return Material.from_dict(json.loads(here[name])) if name in here else table[name]
+
+    return {name: mean(name) if name in table else _principled(name) for name in names}
 
 
 def _principled(name: str) -> Material:

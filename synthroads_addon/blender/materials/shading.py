@@ -8,8 +8,11 @@ from dataclasses import dataclass
 import bpy
 
 from ...core.materials import Material
-from ..nodes.builder import Tree, Value
+from ..nodes.builder import Operand, Tree, Value
 from ..nodes.layout import arrange
+
+LAYERS = {"base_color": "COLOR", "roughness": "VALUE", "metallic": "VALUE", "specular": "VALUE"}
+"""Render layers (AOVs) that every material has, and their kinds."""
 
 
 @dataclass
@@ -22,6 +25,7 @@ class Shade:
         place: position in the world, m.
         factor: what the base colour is multiplied with; its mean is 1.
         tint: second base colour to mix towards and its share (a field of mean 0.5), or None.
+        transparency: share of the light that passes straight through.
     """
 
     tree: Tree
@@ -29,6 +33,7 @@ class Shade:
     place: Value
     factor: Value | None = None
     roughness: Value | None = None
+    transparency: float = 0.0
 
     def noise(
         self, wavelength: float, detail: float = 2.0, stretch: tuple[float, float, float] = (1, 1, 1)
@@ -38,9 +43,13 @@ class Shade:
         node = self.tree.node("ShaderNodeTexNoise", place, scale=1.0 / wavelength, detail=detail)
         return node.value * 2.0 - 1.0
 
-    def vary(self, amount: float, noise: Value) -> None:
-        """Let the base colour vary by +- `amount` (a share) with the noise."""
-        change = 1.0 + noise * amount
+    def vary(self, amount: float | tuple[float, float, float], noise: Value) -> None:
+        """Let the base colour vary by +- `amount` (a share, or one for each of red, green and blue) with the noise."""
+        change = noise * amount
+        self.scale((1.0, 1.0, 1.0) + change if isinstance(amount, tuple) else 1.0 + change)
+
+    def scale(self, change: Value) -> None:
+        """Multiply the base colour with a field of mean 1."""
         self.factor = change if self.factor is None else self.factor * change
 
 
@@ -63,12 +72,32 @@ def shade(item: bpy.types.Material, mean: Material, build: Callable[[Shade], Non
             metallic=mean.metallic,
             specular_ior_level=mean.specular,
         )
+        color: Operand = mean.base_color
         if varied.factor is not None:
-            scaled = tree.node(
-                "ShaderNodeVectorMath", mean.base_color, scale=varied.factor, operation="SCALE"
+            color = tree.node(
+                "ShaderNodeVectorMath", mean.base_color, varied.factor, operation="MULTIPLY"
             ).value
-            tree.group.links.new(scaled.source(), surface.raw.inputs["Base Color"])
-        tree.node("ShaderNodeOutputMaterial", surface.value)
+            tree.group.links.new(color.source(), surface.raw.inputs["Base Color"])
+        if varied.roughness is not None:
+            tree.group.links.new(varied.roughness.source(), surface.raw.inputs["Roughness"])
+        seen = surface.value
+        if varied.transparency:
+            clear = tree.node("ShaderNodeBsdfTransparent").value
+            seen = tree.node("ShaderNodeMixShader", varied.transparency, seen, clear).value
+        tree.node("ShaderNodeOutputMaterial", seen)
+    with tree.frame("Layers"):
+        _layer(tree, "base_color", color=color)
+        rough = mean.roughness if varied.roughness is None else varied.roughness
+        for name, value in {"roughness": rough, "metallic": mean.metallic, "specular": mean.specular}.items():
+            _layer(tree, name, value=value)
     item.diffuse_color = (*mean.base_color, 1.0)
     item.roughness, item.metallic = mean.roughness, mean.metallic
     arrange(item.node_tree)
+
+
+def _layer(tree: Tree, name: str, **value: Operand) -> None:
+    """Add an output for a render layer of this name."""
+    if isinstance(value.get("color"), tuple):
+        value["color"] = (*value["color"], 1.0)  # type: ignore[misc]
+    output = tree.node("ShaderNodeOutputAOV", **value)
+    output.raw.aov_name = name

@@ -1,7 +1,8 @@
 """The backbone: a polyline along the axis whose points carry what a row of the road needs to know.
 
 Attributes of its points: ``station`` (m), ``left`` (unit vector, horizontal), ``curvature`` (1/m, positive to
-the left), ``crossfall_left`` and ``crossfall_right`` (m/m, positive where the surface falls to the right).
+the left), ``crossfall_left`` and ``crossfall_right`` (m/m, positive where the surface falls to the right), and
+those of `nodes.road_layout.varying_widths`.
 """
 
 from __future__ import annotations
@@ -11,10 +12,6 @@ from .builder import Operand, Value
 
 FOLD_SHARE = 0.98
 """Share of the radius at which an offset curve is cut, as in `core.parameters.alignment.clip_offset`."""
-
-NUMBERS = ("station", "curvature", "crossfall_left", "crossfall_right")
-"""The backbone's attributes that are numbers."""
-
 
 def row(backbone: Value, number: Value) -> tuple[Value, Value, Value]:
     """Return axis point, left vector and curvature of the backbone's row `number`."""
@@ -29,13 +26,17 @@ def cut(offset: Value, curvature: Value) -> Value:
     return op.switch(offset * curvature > FOLD_SHARE, offset, FOLD_SHARE / curvature)
 
 
-def station_ribbon(backbone: Value) -> Value:
-    """Return a flat ribbon along x = station that carries the backbone's attributes, for `look_up`."""
+def station_ribbon(backbone: Value, numbers: tuple[str, ...] = ()) -> Value:
+    """Return a flat ribbon along x = station for `look_up`.
+
+    It carries the backbone's position (``axis``), ``left``, ``station`` and ``curvature``, and the attributes named.
+    """
     tree = backbone.tree
     with tree.frame("Ribbon to look up stations"):
         mesh, column, number = op.grid(tree, 2, op.point_count(backbone))
         axis, left, _ = row(backbone, number)
-        values = {name: op.sample_index(backbone, op.named(tree, name), number) for name in NUMBERS}
+        names = ("station", "curvature", *numbers)
+        values = {name: op.sample_index(backbone, op.named(tree, name), number) for name in names}
         for name, value in {"axis": axis, "left": left, **values}.items():
             mesh = op.store(mesh, name, value)
         place = op.vector(tree, op.named(tree, "station"), 0.5 - column)
@@ -67,6 +68,11 @@ def height_on(road: Value, terrain: Value, place: Value) -> Value:
     on_terrain, terrain_z = cast(terrain)
     nearest_z = op.component(op.sample_surface(road, op.position(tree), place), "Z")
     return op.switch(on_road, op.switch(on_terrain, nearest_z, terrain_z), road_z)
+
+
+def first_station(backbone: Value) -> Value:
+    """Return the station of the backbone's first point."""
+    return op.sample_index(backbone, op.named(backbone.tree, "station"), 0)
 
 
 def last_station(backbone: Value) -> Value:

@@ -300,6 +300,13 @@ def _sources() -> bytes:
     return digest.digest()
 
 
+def remove_unused_groups() -> None:
+    """Remove the groups made here that nothing uses any more, and those that only they used."""
+    while unused := [group for group in bpy.data.node_groups if KEY in group and not group.users]:
+        for group in unused:
+            bpy.data.node_groups.remove(group)
+
+
 def node_group(
     name: str, build: Callable[[Tree], None], *arguments: object, description: str = ""
 ) -> bpy.types.NodeTree:

@@ -6,8 +6,8 @@ import bpy
 
 from ...core.cloud.labels import class_id
 from . import operations as op
-from .backbone import height_on
 from .builder import Tree, Value, node_group
+from .standing import on_surface, put_on
 
 # Cross-section from above, x away from the road, y along the driver's way: a triangle 0.12 m wide.
 SECTION = [
@@ -26,6 +26,10 @@ _LEVELS = (-0.3, 0.0, 0.64, 0.89, 0.964)
 _BAND = 2
 REFLECTOR = (0.04, 0.18)
 """Width and height of the upright reflector, m."""
+_MIDDLE = 0.765
+"""Height of the reflectors' middle on a post of 1 m, m."""
+_UNDER, _PROUD = 0.001, 0.004
+"""How far reflectors reach into the post, and out of it, m."""
 
 
 def delineator_group() -> bpy.types.NodeTree:
@@ -34,7 +38,7 @@ def delineator_group() -> bpy.types.NodeTree:
 
 
 def _build(tree: Tree) -> None:
-    """A delineator post on each point; points carry ``heading`` (rad), ``height`` (m) and ``instance``."""
+    """A delineator post on each point; points carry ``heading``, ``elevation``, ``height`` and ``instance``."""
     points = tree.input("Points", "Geometry", description="One point per post, at any height")
     road = tree.input("Road", "Object", description="Surface that the posts stand on")
     terrain = tree.input("Terrain", "Object", description="Surface beside the road")
@@ -48,22 +52,12 @@ def _build(tree: Tree) -> None:
     with tree.frame("Reflectors: an upright one in front, two round ones behind"):
         body = op.join(body, _front(tree, glass), _behind(tree, glass, 0.07), _behind(tree, glass, -0.07))
     with tree.frame("On the surface"):
-        place = op.position(tree)
-        height = height_on(op.object_geometry(road), op.object_geometry(terrain), place)
-        flat = tree.node("ShaderNodeVectorMath", place, (1.0, 1.0, 0.0), operation="MULTIPLY").value
-        points = op.set_position(points, flat + op.vector(tree, 0.0, 0.0, height))
+        places = on_surface(points, road, terrain)
         tall = op.vector(tree, 1.0, 1.0, op.named(tree, "height"))
-        posts = tree.node(
-            "GeometryNodeInstanceOnPoints",
-            points,
-            instance=body,
-            rotation=op.turn(tree, z=op.named(tree, "heading")),
-            scale=tall,
-        ).value
+        posts = put_on(places, body, tall)
     with tree.frame("Labels"):
-        posts = op.realize(op.store(posts, "post_instance", op.named(tree, "instance", "INT"), "INSTANCE"))
         posts = op.store(posts, "class_id", class_id("warning_post"), "FACE")
-        posts = op.store(posts, "instance_id", op.named(tree, "post_instance", "INT"), "FACE")
+        posts = op.store(posts, "instance_id", op.named(tree, "instance", "INT"), "FACE")
     tree.output("Mesh", posts, description="Posts; each face has its own post's instance number")
 
 
@@ -90,18 +84,25 @@ def _front(tree: Tree, material: Value) -> Value:
     """Return the reflector on the face that approaching drivers see (-y)."""
     mesh, column, row = op.grid(tree, 2, 2)
     x = column * REFLECTOR[0] - REFLECTOR[0] / 2
-    # 2 mm before the front face, which runs from (-0.045, -0.055) to (0.05, -0.014).
-    y = (x + 0.045) * (0.041 / 0.095) - 0.0575
-    place = op.vector(tree, x, y, row * REFLECTOR[1] - REFLECTOR[1] / 2 + 0.765)
-    return _set_material(op.set_position(mesh, place), material)
+    place = op.vector(tree, x, -_flank(x), row * REFLECTOR[1] - REFLECTOR[1] / 2 + _MIDDLE)
+    return _raised(op.set_position(mesh, place), material)
 
 
 def _behind(tree: Tree, material: Value, above: float) -> Value:
     """Return one of the round reflectors on the other face."""
-    disc = tree.node("GeometryNodeMeshCircle", vertices=8, radius=0.03, fill_type="NGON").value
+    disc = tree.node("GeometryNodeMeshCircle", vertices=16, radius=0.03, fill_type="NGON").value
     place = op.position(tree)
     x = op.component(place, "X")
-    y = 0.0575 - (x + 0.045) * (0.041 / 0.095)
-    return _set_material(
-        op.set_position(disc, op.vector(tree, x, y, op.component(place, "Y") + 0.765 + above)), material
-    )
+    place = op.vector(tree, -x, _flank(-x), op.component(place, "Y") + _MIDDLE + above)
+    return _raised(op.set_position(disc, place), material)
+
+
+def _flank(x: Value) -> Value:
+    """Return the y of the flank behind, which runs from (-0.045, 0.055) to (0.05, 0.014), just under its surface."""
+    return (x + 0.045) * (-0.041 / 0.095) + (0.055 - _UNDER)
+
+
+def _raised(face: Value, material: Value) -> Value:
+    """Return a reflector as thick as it stands out of the post."""
+    solid = face.tree.node("GeometryNodeExtrudeMesh", face, offset_scale=_UNDER + _PROUD, individual=False).value
+    return _set_material(solid, material)

@@ -8,7 +8,7 @@ import bpy
 
 from ...core.cloud.labels import class_id
 from . import operations as op
-from .backbone import height_on, look_up, raised, station_ribbon
+from .backbone import first_station, height_on, last_station, look_up, raised, station_ribbon
 from .builder import Operand, Tree, Value, node_group
 from .strip import INSTANCES
 
@@ -108,7 +108,11 @@ def _build(tree: Tree) -> None:
     ribbon = station_ribbon(axis)
     with tree.frame("Rows of the beams: terminal, middle, terminal"):
         ramp = rail.ramp()
+        begin, end = first_station(axis), last_station(axis)
         line = _rows(tree, rail, ramp)
+        # What lies beyond the backbone's ends collapses there.
+        within = op.minimum(op.maximum(op.named(tree, "station"), begin), end)
+        line = op.store(line, "station", within)
     with tree.frame("Line of the beams' top edge"):
         station = op.named(tree, "station")
         foot, left = rail.foot_at(station, ribbon, surfaces)
@@ -119,6 +123,9 @@ def _build(tree: Tree) -> None:
             parts.append(op.only_if(wanted, _beam(tree, line, side, rail.spacer)))
     with tree.frame("Posts from the start on, where the beam is high enough"):
         posts = op.store(_post_rows(tree, rail), "tall", rail.top_at(station, ramp))
+        # A post on the end of a backbone beyond which the rail goes on is the next stretch's.
+        beyond = (station > end) | ((station > end - 1e-3) & (rail.last > end + 1e-3))
+        posts = op.delete_points(posts, beyond | (station < begin))
         foot, left = rail.foot_at(station, ribbon, surfaces)
         posts = op.set_position(op.store(posts, "left", left), foot)
         posts = op.delete_points(posts, op.named(tree, "tall") < _LOWEST_POST)
@@ -160,7 +167,7 @@ def _beam(tree: Tree, line: Value, side: float, spacer: Value) -> Value:
     left = op.sample_index(line, op.named(tree, "left", "FLOAT_VECTOR"), number)
     depth = (op.component(profile, "X") + spacer + POST_DEPTH) * side
     place = top + left * depth + op.vector(tree, 0.0, 0.0, op.component(profile, "Z"))
-    mesh = op.set_position(mesh, place)
+    mesh = op.without_degenerate(op.set_position(mesh, place))
     # Seen along the rows the profile runs round clockwise on the right side: there its faces look outwards.
     return tree.node("GeometryNodeFlipFaces", mesh).value if side > 0 else mesh
 

@@ -5,10 +5,11 @@ from __future__ import annotations
 import bpy
 
 from . import operations as op
-from .backbone import NUMBERS, last_station, look_up, station_ribbon
+from .backbone import last_station, look_up, station_ribbon
 from .builder import Tree, Value, node_group
 from .strip import FAR, INSTANCES, strip_group
 
+_EDGES = ("edge_left", "edge_right", "edge_left_height", "edge_right_height")
 SNAP = 1e-3
 """End of a dash this near (m) to a row of the backbone: it is that row."""
 
@@ -19,7 +20,10 @@ def marking_group() -> bpy.types.NodeTree:
 
 
 def _build(tree: Tree) -> None:
-    """A line between two offsets, dashed or solid, raised above the pavement by its film."""
+    """A line between two offsets, dashed or solid, raised above the pavement by its film.
+
+    Offsets and heights may be fields on the backbone's points.
+    """
     backbone = tree.input("Backbone", "Geometry", description="Polyline along the axis with its attributes")
     left = tree.number(
         "Left Offset", 0.1, FAR, unit="m", description="Offset of the left edge, positive to the left"
@@ -39,15 +43,19 @@ def _build(tree: Tree) -> None:
         length = op.switch(dashed, end - first, dash)
         period = op.switch(dashed, (end - first) * 2.0, dash + gap)
         count = op.rounded_up(op.maximum((end - first) / period - 1e-6, 0.0))
+    with tree.frame("Edges as attributes of the rows"):
+        edges = dict(zip(_EDGES, (left, right, left_height, right_height), strict=True))
+        for name, value in edges.items():
+            backbone = op.store(backbone, name, value)
     rows = _with_ends(tree, backbone, (first, end, length, period, count))
     with tree.frame("Ribbon over all rows; the faces of the gaps are deleted"):
         ribbon = tree.call(
             strip_group(),
             backbone=rows,
-            left_offset=left,
-            right_offset=right,
-            left_height=left_height + film,
-            right_height=right_height + film,
+            left_offset=op.named(tree, "edge_left"),
+            right_offset=op.named(tree, "edge_right"),
+            left_height=op.named(tree, "edge_left_height") + film,
+            right_height=op.named(tree, "edge_right_height") + film,
             class_=given["class_"],
             instance=given["instance"],
             material=given["material"],
@@ -81,7 +89,7 @@ def declare_marking(tree: Tree) -> dict[str, Value]:
 def _with_ends(tree: Tree, backbone: Value, dashes: tuple[Value, Value, Value, Value, Value]) -> Value:
     """Return the backbone with a row more at both ends of every dash."""
     first, end, length, period, count = dashes
-    ribbon = station_ribbon(backbone)
+    ribbon = station_ribbon(backbone, _EDGES)
     with tree.frame("Ends of the dashes as rows of their own"):
         points = tree.node("GeometryNodeMeshLine", count=count * 2).value
         number = op.index(tree)
@@ -89,9 +97,9 @@ def _with_ends(tree: Tree, backbone: Value, dashes: tuple[Value, Value, Value, V
         near = tree.node("GeometryNodeSampleNearest", ribbon, op.vector(tree, wanted), domain="POINT").value
         snapped = op.sample_index(ribbon, op.named(tree, "station"), near)
         distance = op.unary("ABSOLUTE", wanted - snapped)
-        points = op.store(points, "station", op.switch(distance < SNAP, wanted, snapped))
+        points = op.delete_points(op.store(points, "station", wanted), distance < SNAP)
         station = op.named(tree, "station")
-        for name in NUMBERS[1:]:
+        for name in ("curvature", *_EDGES):
             points = op.store(points, name, look_up(ribbon, name, station))
         points = op.store(points, "left", look_up(ribbon, "left", station))
         points = op.set_position(points, look_up(ribbon, "axis", station))

@@ -106,7 +106,7 @@ def point_count(geometry: Value) -> Value:
     return geometry.tree.node("GeometryNodeAttributeDomainSize", geometry, component="MESH")["Point Count"]
 
 
-def sample_index(geometry: Value, value: Value, index: Value) -> Value:
+def sample_index(geometry: Value, value: Value, index: Operand) -> Value:
     """Return `value`, evaluated on the points of another geometry, at `index`."""
     kind = _DATA_TYPES[value.kind]
     return geometry.tree.node(

@@ -31,9 +31,7 @@ class Stand:
     instance: Value
 
 
-def declare_stand(
-    tree: Tree, density: float, heights: tuple[float, float], band: tuple[float, float]
-) -> Stand:
+def declare_stand(tree: Tree, density: float, heights: tuple[float, float], band: tuple[float, float]) -> Stand:
     """Declare the inputs common to all kinds of plants."""
     return Stand(
         terrain=tree.input("Terrain", "Object", description="Terrain whose points carry their distance"),
@@ -42,15 +40,9 @@ def declare_stand(
         start=tree.number(
             "Band Start", band[0], (-5.0, 1000.0), unit="m", description="From the outer edge of the verge"
         ),
-        end=tree.number(
-            "Band End", band[1], (-5.0, 1000.0), unit="m", description="From the outer edge of the verge"
-        ),
-        lowest=tree.number(
-            "Smallest Height", heights[0], (0.01, 60.0), unit="m", description="Height of the smallest"
-        ),
-        tallest=tree.number(
-            "Largest Height", heights[1], (0.01, 60.0), unit="m", description="Height of the tallest"
-        ),
+        end=tree.number("Band End", band[1], (-5.0, 1000.0), unit="m", description="From the outer edge of the verge"),
+        lowest=tree.number("Smallest Height", heights[0], (0.01, 60.0), unit="m", description="Height of the smallest"),
+        tallest=tree.number("Largest Height", heights[1], (0.01, 60.0), unit="m", description="Height of the tallest"),
         seed=tree.integer("Seed", 0, (0, 2**31 - 1), description="Seed of places, sizes and turns"),
         detail=tree.number("Detail", 1.0, (0.0, 1.0), unit="share", description="Share of the triangles"),
         instance=tree.integer("Instance", 0, INSTANCES, description="Instance number of the faces"),
@@ -71,9 +63,7 @@ def points_in_band(tree: Tree, stand: Stand, surface: Value, density: Operand) -
     return op.delete_points(points, (distance < stand.start) | (distance > stand.end))
 
 
-def planted(
-    tree: Tree, stand: Stand, points: Value, variants: list[Value], height: Value, lean: float
-) -> Value:
+def planted(tree: Tree, stand: Stand, points: Value, variants: list[Value], height: Value, lean: float) -> Value:
     """Put one of the variants (of height 1) on each point, turned and leant at random, and make it real."""
     bodies = op.join(*(tree.node("GeometryNodeGeometryToInstance", variant).value for variant in variants))
     # A whole random number would be another one in Blender 5.
@@ -91,3 +81,12 @@ def planted(
     for name in _NEEDED_NO_MORE:
         plants = tree.node("GeometryNodeRemoveAttribute", plants, name=name).value
     return op.realize(plants)
+
+
+def one_high(plant: Value) -> Value:
+    """Return a plant scaled along z so that its top is at 1."""
+    tree = plant.tree
+    top = op.component(tree.node("GeometryNodeBoundBox", plant)["Max"], "Z")
+    size = op.vector(tree, 1.0, 1.0, 1.0 / top)
+    place = tree.node("ShaderNodeVectorMath", op.position(tree), size, operation="MULTIPLY").value
+    return op.set_position(plant, place)

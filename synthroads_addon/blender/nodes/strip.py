@@ -8,6 +8,14 @@ from . import operations as op
 from .backbone import cut, row
 from .builder import Tree, node_group
 
+_DETAIL = (
+    "Finer columns: a point per column and row (row by row within a column, from the left), with the attributes share "
+    "(1 at the left edge, 0 at the right one) and depth (m below the plane); two columns if empty"
+)
+NARROW = 0.01
+"""Strips narrower than this (m) have two columns whatever their detail."""
+CLOSED = 1e-4
+"""Where a strip is narrower than this (m) it has no faces."""
 FAR = (-1000.0, 1000.0)
 INSTANCES = (-(2**31), 2**31 - 1)
 """Limits of instance numbers: 32 bits, with a sign in the nodes and without one elsewhere."""
@@ -19,7 +27,10 @@ def strip_group() -> bpy.types.NodeTree:
 
 
 def _build(tree: Tree) -> None:
-    """A ribbon along a backbone between two offsets, each at its own height above the axis."""
+    """A ribbon along a backbone between two offsets, each at its own height above the axis.
+
+    Offsets and heights may be fields on the backbone's points.
+    """
     backbone = tree.input("Backbone", "Geometry", description="Polyline along the axis with its attributes")
     left = tree.number(
         "Left Offset", 1.0, FAR, unit="m", description="Offset of the left edge, positive to the left"
@@ -34,20 +45,32 @@ def _build(tree: Tree) -> None:
     class_id = tree.integer("Class", 0, (0, 255), description="Semantic class of the faces")
     instance = tree.integer("Instance", 0, INSTANCES, description="Instance number of the faces")
     material = tree.input("Material", "Material", description="Material of the faces")
+    detail = tree.input("Detail", "Geometry", description=_DETAIL)
 
-    with tree.frame("Two columns, one row per point of the backbone"):
-        mesh, column, number = op.grid(tree, 2, op.point_count(backbone))
+    with tree.frame("Columns, one row per point of the backbone"):
+        rows, detailed = op.point_count(backbone), op.point_count(detail)
+        mesh, column, number = op.grid(tree, op.switch(detailed > 0, 2, detailed // rows), rows)
+        point = column * rows + number
     with tree.frame("Rows of the backbone"):
         axis, leftwards, curvature = row(backbone, number)
-        heights = [op.sample_index(backbone, height, number) for height in (left_height, right_height)]
+        left, right, left_height, right_height = (
+            op.sample_index(backbone, value, number) for value in (left, right, left_height, right_height)
+        )
+    with tree.frame("Share of the left edge and depth of every column"):
+        share = op.switch(detailed > 0, 1.0 - column, op.sample_index(detail, op.named(tree, "share"), point))
+        depth = op.switch(detailed > 0, 0.0, op.sample_index(detail, op.named(tree, "depth"), point))
+        # Where a strip closes, rounding would fold its fine columns: they all lie on the right edge.
+        share = op.switch(left - right > NARROW, op.switch(share > 0.999, 0.0, 1.0), share)
     with tree.frame("Offset, cut where it would fold, and the height there"):
-        offset = cut(op.switch(column.equals(0), right, left), curvature)
-        share = (offset - right) / (left - right)
-        height = heights[0] * share + heights[1] * (1.0 - share)
+        offset = cut(left * share + right * (1.0 - share), curvature)
+        inside = (offset - right) / op.maximum(left - right, 1e-9)
+        height = left_height * inside + right_height * (1.0 - inside) - depth
     with tree.frame("Place and label"):
         place = axis + leftwards * offset + op.vector(tree, 0.0, 0.0, height)
-        mesh = op.store(mesh, "offset", offset)
+        mesh = op.store(op.store(mesh, "offset", offset), "row", number)
+        mesh = op.store(mesh, "strip_width", left - right)
         mesh = op.store(mesh, "station", op.sample_index(backbone, op.named(tree, "station"), number))
-        mesh = op.without_degenerate(op.set_position(mesh, place))
-        mesh = op.only_if(left - right > 1e-6, op.label(mesh, class_id, instance, material))
+        mesh = op.label(op.set_position(mesh, place), class_id, instance, material)
+        # Of faces that narrow, rounding would decide which way they look.
+        mesh = op.delete_faces(op.without_degenerate(mesh), op.named(tree, "strip_width") < CLOSED)
     tree.output("Mesh", mesh, description="Ribbon whose faces look up")

@@ -1,0 +1,109 @@
+"""What the parts of a model are built with."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from functools import cached_property
+from typing import Any
+
+import bpy
+import numpy as np
+from numpy.typing import NDArray
+
+from ..core.parameters.geometry import RoadGeometry
+from ..core.parameters.model import PointObject, RoadParameters
+from ..core.parameters.stretch import cut
+from .compat import set_modifier_input
+from .meshes import points_mesh, signed
+
+ROLE = "synthroads_role"
+"""Custom property of the objects that `build_road` makes: what they are in the model."""
+SUPPORT = "synthroads_support"
+"""Custom property of objects that only other objects need: they are hidden and never scanned."""
+
+
+class ModelBuilder:
+    """Makes a model's objects one by one.
+
+    Attributes:
+        parameters: the road, with only those objects that stand on the stretch.
+        geometry: the whole road's analytic geometry.
+        stretch: stations between which it is built.
+        origin: (3,) local coordinates of the scene's origin: near the stretch, as the scene has float32.
+        tolerance: largest chord error of the road's surface, m.
+        detail: share of the vegetation's triangles, 0 to 1.
+        hidden: what is added now is only needed by other parts.
+        objects: what was added, by role.
+    """
+
+    def __init__(
+        self,
+        parameters: RoadParameters,
+        collection: bpy.types.Collection,
+        tolerance: float,
+        detail: float,
+        stretch: tuple[float, float] | None = None,
+    ) -> None:
+        self.geometry = RoadGeometry(parameters)
+        self.stretch = stretch or (0.0, self.geometry.length)
+        self.parameters = cut(parameters, *stretch) if stretch else parameters
+        self.origin = self._middle() if stretch else np.zeros(3)
+        self.tolerance = tolerance
+        self.detail = detail
+        self.hidden = False
+        self.objects: dict[str, bpy.types.Object] = {}
+        self._collection = collection
+
+    @cached_property
+    def step(self) -> float:
+        """Longest straight piece (m) of what follows the road, so that it keeps the tolerance in the curves."""
+        bend = np.abs(self.geometry.alignment.curvature(np.linspace(*self.stretch, 200))).max()
+        return float(np.clip(np.sqrt(8.0 * self.tolerance / max(bend, 1e-9)), 0.5, 4.0))
+
+    def points(
+        self, name: str, items: Sequence[PointObject], attributes: Mapping[str, NDArray[Any]]
+    ) -> bpy.types.Mesh:
+        """Return a mesh with one vertex per point object, see `meshes.points_mesh`."""
+        return points_mesh(name, self.geometry, items, attributes, self.origin)
+
+    def _middle(self) -> NDArray[np.float64]:
+        """Return the axis's local place in the middle of the stretch, in whole metres."""
+        station = np.array([sum(self.stretch) / 2.0])
+        return np.round([*self.geometry.alignment.position(station)[0], *self.geometry.profile.elevation(station)])
+
+    def surfaces(self, *more: str) -> dict[str, bpy.types.Object]:
+        """Return what objects stand on (inputs ``Road`` and ``Terrain``), and further objects by role."""
+        roles = ("Road", "Terrain", *more)
+        return {role: self.objects[role] for role in roles if role in self.objects}
+
+    def add(
+        self,
+        role: str,
+        mesh: bpy.types.Mesh,
+        group: bpy.types.NodeTree | None = None,
+        inputs: Mapping[str, Any] | None = None,
+        support: bool = False,
+    ) -> None:
+        """Add an object to the model, with its modifier if it has a group."""
+        item = bpy.data.objects.new(role, mesh)
+        mesh.name = f"SR {role}"
+        item[ROLE] = role
+        if support or self.hidden:
+            item[SUPPORT] = True
+            item.hide_viewport = item.hide_render = True
+        self._collection.objects.link(item)
+        if group is not None:
+            modifier = item.modifiers.new("SynthRoads", "NODES")
+            modifier.node_group = group
+            for name, value in (inputs or {}).items():
+                set_modifier_input(modifier, name, int(signed([value])[0]) if name.endswith("Instance") else value)
+        self.objects[role] = item
+
+    def add_instance(self, role: str, collection: bpy.types.Collection) -> bpy.types.Object:
+        """Add an empty that shows a collection."""
+        item = bpy.data.objects.new(role, None)
+        item[ROLE] = role
+        item.instance_type, item.instance_collection = "COLLECTION", collection
+        self._collection.objects.link(item)
+        self.objects[role] = item
+        return item

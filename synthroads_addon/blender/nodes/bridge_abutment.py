@@ -1,0 +1,61 @@
+"""SR Bridge Abutment: bearing seat, back wall and wing walls."""
+
+from __future__ import annotations
+
+import bpy
+
+from . import operations as op
+from .bridge_deck import PAVEMENT, WEB
+from .builder import Operand, Tree, Value, node_group
+from .solids import box, painted
+
+SEAT = 0.9
+"""Depth of the bearing seat, m."""
+BEARING = 0.1
+"""Height of the bearings, m."""
+_DEPTH, _WALL = 1.5, 0.5
+"""Depth of the abutment, thickness of the wing walls, m."""
+_INSIDE = 0.06  # m from the deck's edge to the wing walls
+
+
+def bridge_abutment_group() -> bpy.types.NodeTree:
+    """Return the group SR Bridge Abutment."""
+    return node_group("SR Bridge Abutment", _build)
+
+
+def _build(tree: Tree) -> None:
+    """An abutment whose face looks to -x and stands on x = 0; the deck's underside is z = 0."""
+
+    def metres(name: str, default: float, limits: tuple[float, float], description: str) -> Value:
+        return tree.number(name, default, limits, unit="m", description=description)
+
+    width = metres("Width", 10.0, (2.0, 60.0), "Width of the deck")
+    height = metres("Thickness", 1.2, (0.3, 5.0), "Height of the deck")
+    foot = metres("Foot", -6.0, (-50.0, 50.0), "z of the walls' lower edge")
+    wing = metres("Wing Length", 8.0, (1.6, 50.0), "Length of the wing walls, from the face")
+    concrete = tree.input("Concrete Material", "Material", description="Material of the walls")
+    steel = tree.input("Steel Material", "Material", description="Material of the bearings")
+    wide = width - 2.0 * _INSIDE
+
+    def wall(start: float, end: Operand, top: Value, size: Operand, middle: Operand = 0.0) -> Value:
+        corner = op.vector(tree, start, middle, foot)
+        length = op.vector(tree, end, middle, top) - corner
+        return box(tree, length + op.vector(tree, 0.0, size), corner + length * 0.5)
+
+    with tree.frame("Seat and back wall"):
+        level = height * 0.0 - BEARING
+        walls = [wall(0.0, _DEPTH, level, wide)]
+        walls.append(wall(SEAT + 0.04, _DEPTH - 0.01, height - PAVEMENT * 0.5, wide - 0.02))
+    with tree.frame("Wing walls"):
+        for side in (1.0, -1.0):
+            beside = (wide * 0.5 - _WALL / 2) * side
+            walls.append(wall(_DEPTH - 0.02, wing, height - PAVEMENT * 0.6, _WALL, beside))
+    with tree.frame("Bearings below the webs"):
+        beside = width * (0.25 * sum(WEB))
+        pads = [
+            box(tree, (0.5, 0.6, BEARING + 0.02), op.vector(tree, SEAT / 2, beside * side, -BEARING / 2))
+            for side in (1.0, -1.0)
+        ]
+    with tree.frame("All"):
+        mesh = op.join(painted(op.join(*walls), concrete), painted(op.join(*pads), steel))
+    tree.output("Mesh", mesh, description="The abutment")

@@ -1,0 +1,40 @@
+"""What spans the road: how high the pavement lies below it."""
+
+from __future__ import annotations
+
+from ...core.cloud.labels import class_id
+from . import operations as op
+from .builder import Operand, Value
+
+SPACING = 0.05
+"""Distance (m) of the points across the road at which the pavement's height is looked up: 3.5 mm at 7 % crossfall."""
+_ROWS = 7
+_NOTHING = -1e5
+
+
+def pavement_near(road: Value, reach: Value) -> Value:
+    """Return the paved faces of the road within `reach` (m) of the origin in plan."""
+    tree = road.tree
+    place = op.position(tree)
+    flat = op.vector(tree, op.component(place, "X"), op.component(place, "Y"))
+    near = tree.node("ShaderNodeVectorMath", flat, operation="LENGTH")["Value"] < reach
+    paved = op.named(tree, "class_id", "INT").equals(class_id("road"))
+    return op.separate(road, paved & near, "FACE")
+
+
+def highest_below(pavement: Value, start: Value, end: Value, depth: tuple[Value, Value], shear: Operand = 0.0) -> Value:
+    """Return the z of the pavement's highest point below a rectangle, a single number; 0 where there is none.
+
+    The rectangle lies between x = `start` and x = `end`, and between the two y of `depth`; `shear` moves it by
+    `shear` * x in y.
+    """
+    tree = pavement.tree
+    columns = op.rounded_up((end - start) / SPACING) + 1
+    points, column, row = op.grid(tree, columns, _ROWS)
+    x = start + (end - start) * (column / (columns - 1.0))
+    y = depth[0] + (depth[1] - depth[0]) * (row / (_ROWS - 1.0)) + x * shear
+    points = op.set_position(points, op.vector(tree, x, y, 500.0))
+    ray = tree.node("GeometryNodeRaycast", target_geometry=pavement, ray_length=1000.0)
+    z = op.switch(ray["Is Hit"], _NOTHING, op.component(ray["Hit Position"], "Z"))
+    highest = tree.node("GeometryNodeAttributeStatistic", points, attribute=z, data_type="FLOAT")["Max"]
+    return op.switch(highest > 0.5 * _NOTHING, 0.0, highest)

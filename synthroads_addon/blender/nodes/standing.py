@@ -1,0 +1,65 @@
+"""What stands at one place: points on the surface, and bodies put on them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from . import operations as op
+from .backbone import height_on, raised
+from .builder import Operand, Tree, Value
+from .strip import INSTANCES
+
+BURIED = 0.3
+"""Depth to which posts and foundations are modelled below the surface, m."""
+
+
+@dataclass(frozen=True)
+class Standing:
+    """The inputs of a group that puts something on points.
+
+    Attributes:
+        points: places in plan, with ``heading`` (rad, the turn about z) and ``elevation`` (m above the surface).
+        road, terrain: objects whose surfaces things stand on.
+        instance: instance number of the faces.
+    """
+
+    points: Value
+    road: Value
+    terrain: Value
+    instance: Value
+
+    def places(self) -> Value:
+        """Return the points on the surface."""
+        return on_surface(self.points, self.road, self.terrain)
+
+    def labelled(self, mesh: Value, class_id: int) -> Value:
+        """Give every face its class and its instance."""
+        return op.store(op.store(mesh, "class_id", class_id, "FACE"), "instance_id", self.instance, "FACE")
+
+
+def declare_standing(tree: Tree) -> Standing:
+    """Declare the inputs of a group that puts something on points."""
+    return Standing(
+        points=tree.input("Points", "Geometry", description="Places; heading (rad) and elevation (m) as attributes"),
+        road=tree.input("Road", "Object", description="Surface that it stands on"),
+        terrain=tree.input("Terrain", "Object", description="Surface beside the road"),
+        instance=tree.integer("Instance", 0, INSTANCES, description="Instance number of the faces"),
+    )
+
+
+def on_surface(points: Value, road: Value, terrain: Value) -> Value:
+    """Put points onto the surfaces of two objects, and up by their attribute ``elevation``."""
+    tree = points.tree
+    place = op.position(tree)
+    height = height_on(op.object_geometry(road), op.object_geometry(terrain), place)
+    flat = tree.node("ShaderNodeVectorMath", place, (1.0, 1.0, 0.0), operation="MULTIPLY").value
+    return op.set_position(points, raised(flat, height + op.named(tree, "elevation")))
+
+
+def put_on(points: Value, body: Value, scale: Operand = 1.0) -> Value:
+    """Return the body on every point, turned by the point's ``heading``; attributes of the points go with it."""
+    tree = points.tree
+    turn = op.turn(tree, z=op.named(tree, "heading"))
+    return op.realize(
+        tree.node("GeometryNodeInstanceOnPoints", points, instance=body, rotation=turn, scale=scale).value
+    )

@@ -1,0 +1,34 @@
+"""Steel guardrails."""
+
+from __future__ import annotations
+
+import bpy
+
+from ...core.parameters.model import Guardrail
+from ..materials import material
+from ..model_builder import ModelBuilder
+from ..nodes.guardrail import guardrail_group
+
+_SPACER = {"left": 0.07, "right": 0.07, "both": 0.20}
+"""Distance between posts and beam, m: a single rail's face stands 0.2 m from the posts' axis."""
+
+
+def build_guardrails(builder: ModelBuilder) -> None:
+    """Make one object per guardrail."""
+    for name, rail in builder.parameters.of_type(Guardrail).items():
+        inputs = {
+            **builder.surfaces("Backbone"),
+            "Start Station": rail.start_station,
+            "End Station": min(rail.end_station, builder.geometry.length),
+            "Offset": rail.offset,
+            "Left Beam": rail.faces in ("left", "both"),
+            "Right Beam": rail.faces in ("right", "both"),
+            "Spacer": _SPACER[rail.faces],
+            "Height": rail.height,
+            "Post Spacing": rail.post_spacing,
+            "Terminal Length": rail.terminal_length,
+            "Beam Step": builder.step,
+            "Instance": rail.instance,
+            "Material": material("galvanised_steel"),
+        }
+        builder.add(name, bpy.data.meshes.new("SR Guardrail"), guardrail_group(), inputs)

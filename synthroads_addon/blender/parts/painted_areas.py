@@ -1,0 +1,80 @@
+"""Painted areas: hatching of gores, and arrows."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import pairwise
+
+import bpy
+import numpy as np
+from numpy.typing import NDArray
+
+from ...core.parameters.model import Arrow, Hatching
+from ...core.parameters.painted_areas import arrow_outlines, hatching_outlines
+from ..materials import material
+from ..meshes import attribute, fill_polygons, signed
+from ..model_builder import ModelBuilder
+from ..nodes.painted_area import painted_area_group
+
+_LONGEST = 1.0
+"""Outlines are cut into pieces no longer than this (m), so that they follow the road's curves and its crossfall."""
+
+
+def build_painted_areas(builder: ModelBuilder) -> None:
+    """Make all painted areas as one object."""
+    outlines = list(_outlines(builder))
+    if not outlines:
+        return
+    polygons = [polygon for polygon, _ in outlines]
+    sizes = [len(polygon) for polygon in polygons]
+    mesh = bpy.data.meshes.new("SR Painted Areas")
+    corners = np.concatenate(polygons)
+    fill_polygons(mesh, np.column_stack([corners, np.zeros(len(corners))]), sizes)
+    items = [item for _, item in outlines]
+    attribute(mesh, "film", np.repeat([item.film_thickness for item in items], sizes))
+    attribute(mesh, "yellow", np.repeat([float(item.color == "yellow") for item in items], sizes))
+    attribute(mesh, "instance", np.repeat(signed([item.instance for item in items]), sizes))
+    inputs = {
+        "Backbone": builder.objects["Backbone"],
+        "Road": builder.objects["Road"],
+        "Material": material("paint_white"),
+        "Yellow Material": material("paint_yellow"),
+    }
+    builder.add("Painted Areas", mesh, painted_area_group(), inputs)
+
+
+def _outlines(builder: ModelBuilder) -> Iterator[tuple[NDArray[np.float64], Hatching | Arrow]]:
+    # Of the whole road, as an area may reach over the end of the stretch.
+    road = builder.geometry.parameters
+    for hatching in road.of_type(Hatching).values():
+        for outline in hatching_outlines(builder.geometry, hatching):
+            yield from ((piece, hatching) for piece in _pieces(outline, *builder.stretch))
+    for arrow in road.of_type(Arrow).values():
+        for outline in arrow_outlines(arrow):
+            yield from ((piece, arrow) for piece in _pieces(outline, *builder.stretch))
+
+
+def _pieces(outline: NDArray[np.float64], start: float, end: float) -> Iterator[NDArray[np.float64]]:
+    """Cut a convex outline (K, 2) across the road into pieces between two stations that are short along it."""
+    low, high = max(outline[:, 0].min(), start), min(outline[:, 0].max(), end)
+    if low >= high:
+        return
+    cuts = np.linspace(low, high, int(np.ceil((high - low) / _LONGEST)) + 1)
+    for first, last in pairwise(cuts):
+        piece = _clipped(_clipped(outline, first, 1.0), last, -1.0)
+        if len(piece) > 2:
+            yield piece
+
+
+def _clipped(outline: NDArray[np.float64], station: float, keep: float) -> NDArray[np.float64]:
+    """Return the part of a convex outline beyond (``keep`` 1) or before (-1) a station."""
+    inside = (outline[:, 0] - station) * keep >= 0.0
+    corners = []
+    for i, corner in enumerate(outline):
+        previous = outline[i - 1]
+        if inside[i] != inside[i - 1]:
+            share = (station - previous[0]) / (corner[0] - previous[0])
+            corners.append(previous + share * (corner - previous))
+        if inside[i]:
+            corners.append(corner)
+    return np.array(corners)

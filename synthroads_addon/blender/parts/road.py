@@ -1,0 +1,37 @@
+"""The road's surface."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import bpy
+import numpy as np
+
+from ...core.parameters.tessellation import sample_stations
+from ..materials import material
+from ..meshes import attribute, backbone_mesh, fill
+from ..model_builder import ModelBuilder
+from ..nodes.road import road_group
+from ..nodes.road_layout import detail_points, road_inputs, road_layout
+
+_MATERIALS = {"Marking": "paint_white", "Yellow Marking": "paint_yellow", "Verge": "verge", "Median": "median"}
+
+
+def build_surface(builder: ModelBuilder) -> None:
+    """Make the backbone and the road's surface."""
+    station = sample_stations(builder.geometry, builder.tolerance, *builder.stretch)
+    builder.add("Backbone", backbone_mesh(builder.geometry, station, builder.origin), support=True)
+    inputs: dict[str, Any] = {"Backbone": builder.objects["Backbone"]}
+    inputs |= {f"{name} Material": material(entry) for name, entry in _MATERIALS.items()}
+    for side, section in builder.geometry.sections.items():
+        inputs[f"{side.title()} Pavement Material"] = material(section.carriageway.pavement.kind)
+    for name, (share, depth) in detail_points(builder.geometry, station, builder.tolerance).items():
+        mesh = bpy.data.meshes.new("SR Detail")
+        fill(mesh, np.column_stack([share, depth, 0.0 * share]))
+        attribute(mesh, "share", share)
+        attribute(mesh, "depth", depth)
+        role = f"{name} Detail"
+        builder.add(role, mesh, support=True)
+        inputs[role] = builder.objects[role]
+    inputs |= road_inputs(builder.parameters)
+    builder.add("Road", bpy.data.meshes.new("SR Road"), road_group(road_layout(builder.parameters)), inputs)

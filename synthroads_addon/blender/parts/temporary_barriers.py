@@ -1,0 +1,38 @@
+"""Movable barriers of construction zones."""
+
+from __future__ import annotations
+
+import bpy
+
+from ...core.parameters.model import TemporaryBarrier
+from ..materials import material
+from ..model_builder import ModelBuilder
+from ..nodes.temporary_barrier import temporary_barrier_group
+
+LONGEST_PLASTIC = 2.5
+"""Elements up to this length (m) are of plastic, by turns red and white; longer ones are of steel."""
+
+
+def build_temporary_barriers(builder: ModelBuilder) -> None:
+    """Make one object per movable barrier."""
+    for name in builder.parameters.of_type(TemporaryBarrier):
+        # The whole barrier, also on a stretch of the road: colours alternate from its beginning, and it runs obliquely.
+        barrier = builder.geometry.parameters.objects[name]
+        assert isinstance(barrier, TemporaryBarrier)
+        plastic = barrier.segment_length <= LONGEST_PLASTIC
+        inputs = {
+            **builder.surfaces("Backbone"),
+            "Start Station": barrier.start_station,
+            "End Station": barrier.end_station,
+            "Offset": barrier.offset,
+            "End Offset": barrier.end_offset,
+            "Height": barrier.height,
+            "Base Width": barrier.base_width,
+            "Segment Length": barrier.segment_length,
+            "Plastic": plastic,
+            "Instance": barrier.instance,
+            "Material": material("plastic_red" if plastic else "galvanised_steel"),
+            "Second Material": material("plastic_white" if plastic else "galvanised_steel"),
+            "Reflector Material": material("reflector"),
+        }
+        builder.add(name, bpy.data.meshes.new("SR Temporary Barrier"), temporary_barrier_group(), inputs)

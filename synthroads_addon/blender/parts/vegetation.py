@@ -1,0 +1,50 @@
+"""Plants."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import bpy
+
+from ...core.parameters.model import Vegetation
+from ..materials import material
+from ..model_builder import ModelBuilder
+from ..nodes.grass import grass_group
+from ..nodes.shrub import shrub_group
+from ..nodes.tree import tree_group
+from .species import GRASSES, SHRUBS, TREES
+
+_KINDS = {"grass": (grass_group, GRASSES), "shrub": (shrub_group, SHRUBS), "tree": (tree_group, TREES)}
+"""Kind of plant -> its group, and the shapes of its species."""
+_ROADSIDE_SHARE = 0.8
+"""Grass on verges and median, as a share of the density elsewhere; reed grows on neither."""
+
+
+def build_vegetation(builder: ModelBuilder) -> None:
+    """Make one object per stand of plants."""
+    if "Terrain" not in builder.objects or builder.detail == 0.0:
+        return
+    for name, plants in builder.parameters.of_type(Vegetation).items():
+        inputs: dict[str, Any] = {
+            **builder.surfaces(),
+            "Density": plants.density,
+            "Band Start": plants.band_start,
+            "Band End": plants.band_end,
+            "Smallest Height": plants.height_min,
+            "Largest Height": plants.height_max,
+            "Seed": plants.seed % 2**30,
+            "Detail": builder.detail,
+            "Instance": plants.instance,
+        }
+        group, shapes = _KINDS[plants.kind]
+        inputs |= shapes[plants.species]
+        builder.add(name, bpy.data.meshes.new("SR Plants"), group(), inputs | _extra(plants))
+
+
+def _extra(plants: Vegetation) -> dict[str, Any]:
+    """Return the inputs that only one kind of plant has: materials, and the density on verges and median."""
+    if plants.kind == "grass":
+        roadside = plants.density * _ROADSIDE_SHARE * (plants.species != "reed")
+        return {"Roadside Density": roadside, "Material": material(plants.species)}
+    parts = {"Bark Material": "bark", "Leaves Material": "leaves"}
+    return {name: material(f"{plants.species}_{part}") for name, part in parts.items()}
