@@ -43,6 +43,7 @@ COMMANDS = {
     "generate": "make a road, scan it and write cloud, parameters and pictures",
     "parameters": "sample road parameters and write them to standard output",
     "check": "list the rules of the guidelines that a road breaks",
+    "gallery": "render pictures of scenes, objects and materials",
     "tradeoff": "measure error against time for each knob",
 }
 

@@ -1,0 +1,38 @@
+"""Render the gallery: scenes, every kind of object close up, design classes, and materials with their layers."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+
+if __name__ == "__main__":
+    sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
+from headless.cli import Outcome, add_common_arguments, entry
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments of `synthroads gallery`."""
+    parser.add_argument("--output", required=True, type=Path, metavar="DIR", help="folder for the pictures")
+    parser.add_argument("--only", default="", metavar="TEXT", help="only pictures whose name contains this")
+    parser.add_argument("--width", type=int, default=1280, metavar="N", help="width of a picture, pixels (1280)")
+    parser.add_argument("--samples", type=int, default=48, metavar="N", help="samples per pixel (48)")
+    add_common_arguments(parser)
+
+
+def run(arguments: argparse.Namespace) -> Outcome:
+    """Run `synthroads gallery`."""
+    from synthroads_addon.blender.gallery import Quality, make_gallery
+
+    def say(path: str) -> None:
+        if not (arguments.quiet or arguments.json):
+            print(path, flush=True)
+
+    quality = Quality((arguments.width, arguments.width * 9 // 16), arguments.samples)
+    made = make_gallery(arguments.output, quality, arguments.only, say)
+    return 0, {"pictures": [str(path) for path in made]}, f"{len(made)} pictures in {arguments.output}"
+
+
+if __name__ == "__main__":
+    entry("gallery")
