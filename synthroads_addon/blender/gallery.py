@@ -104,9 +104,9 @@ def _built(scene: dict[str, Any]) -> RoadParameters:
 
 
 def _far_ground() -> None:
-    """Add ground up to the horizon a little below the terrain's lowest point, so that the pictures have one."""
-    ends = [corner[2] for corner in bpy.data.objects["Ground"].bound_box]
-    bpy.ops.mesh.primitive_plane_add(size=20_000.0, location=(0.0, 0.0, min(ends) - 0.2))
+    """Add ground up to the horizon below the lowest point of ground and road, so that the pictures have one."""
+    corners = [corner for name in ("Ground", "Backbone") for corner in bpy.data.objects[name].bound_box]
+    bpy.ops.mesh.primitive_plane_add(size=20_000.0, location=(0.0, 0.0, min(z for _, _, z in corners) - 1.5))
     bpy.context.object.data.materials.append(material("grass_ground"))
 
 
