@@ -31,6 +31,8 @@ PRESET = Path(__file__).parents[1] / "presets" / "gallery.json"
 EYE = 1.2
 """Height of a driver's eyes, m."""
 _TOLERANCE = 0.005
+_NEAR = 5.0
+"""What of an object lies nearer than this to its middle is shown close up, m."""
 _PITCH = 1.6
 """Distance of the materials' cubes from middle to middle, m."""
 _DAYLIGHT = Environment(sun_azimuth_deg=215.0, sun_elevation_deg=42.0)
@@ -174,12 +176,13 @@ def _close_up(parameters: RoadParameters, mesh: SceneMesh, instance: int) -> boo
     geometry = RoadGeometry(parameters)
     station, offset = geometry.alignment.project(corners[:, :2].astype(np.float64))
     # Of what is long or scattered, a piece in its middle.
-    middle = np.median(station)
-    near = np.abs(station - middle) < 4.0
-    part = corners[near] if near.any() else corners
-    centre = (part.min(axis=0) + part.max(axis=0)) / 2.0
-    size = float(np.linalg.norm(part.max(axis=0) - part.min(axis=0)))
-    away = max(2.2, 1.25 * min(size, 24.0))
+    anchor = np.argmin(np.abs(station - np.median(station)))
+    near = np.linalg.norm(corners[:, :2] - corners[anchor, :2], axis=1) < _NEAR
+    part, middle, offset = corners[near], station[anchor], offset[near]
+    low, high = part.min(axis=0), part.max(axis=0)
+    centre = (low + high) / 2.0
+    # Far enough for what is long, and for what is tall in a flat picture.
+    away = max(2.2, 1.25 * min(float(np.linalg.norm(high - low)), 24.0), 2.4 * float(high[2] - low[2]))
     heading = float(geometry.alignment.heading(np.array([middle]))[0])
     side = -1.0 if np.median(offset) < 0.0 else 1.0
     # Seen by approaching traffic: from before it, and from the road's side.

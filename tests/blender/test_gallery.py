@@ -1,0 +1,21 @@
+"""The gallery: its pictures are made, and they show something."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from headless.cli import command
+
+
+@pytest.mark.parametrize("only", ["materials-base_color", "materials-lit", "scene-rural-driver"])
+def test_a_picture_is_made(tmp_path: Path, only: str) -> None:
+    arguments = ["--output", str(tmp_path), "--only", only, "--width", "160", "--samples", "1", "--quiet"]
+    assert command("gallery", arguments) == 0
+    assert [path.name for path in tmp_path.iterdir()] == [f"{only}.png"]
+    picture = np.asarray(Image.open(tmp_path / f"{only}.png").convert("L"), dtype=np.float64)
+    assert picture.shape == (90, 160)
+    assert picture.std() > 5.0
