@@ -65,9 +65,11 @@ def build_road(
     builder = ModelBuilder(parameters, collection, tolerance, vegetation_detail, stretch)
     origin = np.array(parameters.transform.translate) + builder.origin
     collection[ORIGIN] = [float(value) for value in origin]
-    for name in (name for name in PARTS if name in needed(wanted)):
-        builder.hidden = name not in wanted
-        PARTS[name](builder)
+    there = needed(wanted)
+    for name, build in PARTS.items():
+        if name in there:
+            builder.hidden = name not in wanted
+            build(builder)
     remove_unused_groups()
     vary(parameters.materials, parameters.environment)
     bpy.context.view_layer.update()

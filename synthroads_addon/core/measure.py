@@ -14,7 +14,6 @@ from .scene_mesh import SceneMesh
 
 Float = NDArray[np.float64]
 
-STRIP_CLASSES = ("road", "road_marking", "roadside")
 
 
 def mesh_height_errors(

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from .builder import Operand, Tree, Value
 
-SMALLEST_AREA = 1e-5
-"""Faces smaller than this (m2) come from strips of no width, cut offset curves, or rows that differ by rounding."""
+SMALLEST_AREA = 1e-7
+"""Faces smaller than this (m2) come from strips of no width or cut offset curves; damage has larger cells."""
 
 _DATA_TYPES = {"VALUE": "FLOAT", "INT": "INT", "BOOLEAN": "BOOLEAN", "VECTOR": "FLOAT_VECTOR"}
 _SWITCH_TYPES = {"VALUE": "FLOAT", "INT": "INT", "BOOLEAN": "BOOLEAN", "VECTOR": "VECTOR"}

@@ -12,8 +12,8 @@ _DETAIL = (
     "Finer columns: a point per column and row (row by row within a column, from the left), with the attributes share "
     "(1 at the left edge, 0 at the right one) and depth (m below the plane); two columns if empty"
 )
-NARROW = 0.01
-"""Strips narrower than this (m) have two columns whatever their detail."""
+NARROW = 0.25
+"""Strips narrower than this (m) have two columns whatever their detail: nothing of it lies there."""
 CLOSED = 1e-4
 """Where a strip is narrower than this (m) it has no faces."""
 FAR = (-1000.0, 1000.0)
@@ -60,7 +60,9 @@ def _build(tree: Tree) -> None:
         share = op.switch(detailed > 0, 1.0 - column, op.sample_index(detail, op.named(tree, "share"), point))
         depth = op.switch(detailed > 0, 0.0, op.sample_index(detail, op.named(tree, "depth"), point))
         # Where a strip closes, rounding would fold its fine columns: they all lie on the right edge.
-        share = op.switch(left - right > NARROW, op.switch(share > 0.999, 0.0, 1.0), share)
+        wide = left - right > NARROW
+        share = op.switch(wide, op.switch(share > 0.999, 0.0, 1.0), share)
+        depth = op.switch(wide, 0.0, depth)
     with tree.frame("Offset, cut where it would fold, and the height there"):
         offset = cut(left * share + right * (1.0 - share), curvature)
         inside = (offset - right) / op.maximum(left - right, 1e-9)

@@ -15,10 +15,7 @@ LONGEST_PLASTIC = 2.5
 
 def build_temporary_barriers(builder: ModelBuilder) -> None:
     """Make one object per movable barrier."""
-    for name in builder.parameters.of_type(TemporaryBarrier):
-        # The whole barrier, also on a stretch of the road: colours alternate from its beginning, and it runs obliquely.
-        barrier = builder.geometry.parameters.objects[name]
-        assert isinstance(barrier, TemporaryBarrier)
+    for name, barrier in builder.parameters.of_type(TemporaryBarrier).items():
         plastic = barrier.segment_length <= LONGEST_PLASTIC
         inputs = {
             **builder.surfaces("Backbone"),

@@ -19,8 +19,6 @@ from numpy.typing import NDArray
 
 from .alignment import Alignment, Element, FloatArray, IntArray
 
-AnyArray = NDArray[Any]  # real or complex
-
 FREE, EQUAL, ZERO = 0, 1, 2
 
 _QUADRATURE = 2.0  # m, step of the integrals in the Jacobian; the residuals themselves are exact

@@ -10,16 +10,15 @@ from .checker_edges import NOSE_BEFORE_END, TurnoutEdges
 from .checker_section import lane_tapers
 from .limits import (
     EMERGENCY_BAY_LENGTH,
+    EMERGENCY_BAY_TAPER,
     EMERGENCY_BAY_WIDTH,
     INTERCHANGE_SPACING,
     TURNOUT_GAP,
     TURNOUT_LANE_LENGTH,
     TURNOUT_LANE_WIDTH,
+    TURNOUT_TAPER,
 )
 from .model_section import Turnout
-
-#: Shortest taper of an exit's or entry's lane, and of an emergency bay, m.
-TAPER, BAY_TAPER = 30.0, 20.0
 
 _NAMES = {"emergency_bay": "emergency bay", "exit": "exit", "entry": "entry"}
 
@@ -67,7 +66,7 @@ def _bay_length(road: Road) -> Iterator[Finding]:
 
 def _taper(road: Road) -> Iterator[Finding]:
     for name, turnout in road.of(Turnout).items():
-        least = TAPER if turnout.ramp else BAY_TAPER
+        least = TURNOUT_TAPER if turnout.ramp else EMERGENCY_BAY_TAPER
         shortest = min(taper for taper in (turnout.taper_in_length, turnout.taper_out_length) if taper > 0.0)
         if below(shortest, least):
             text = f"The {_NAMES[turnout.kind]}'s taper is {shortest:.1f} m long; {least:.0f} m are needed (RAA)."

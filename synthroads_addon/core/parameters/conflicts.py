@@ -15,6 +15,7 @@ from ..schema import Model
 from .limits import (
     CLEARANCE,
     EMERGENCY_BAY_LENGTH,
+    EMERGENCY_BAY_TAPER,
     EMERGENCY_BAY_WIDTH,
     LANE_TAPER_LENGTH,
     LIMITS,
@@ -23,6 +24,7 @@ from .limits import (
     TURNOUT_GAP,
     TURNOUT_LANE_LENGTH,
     TURNOUT_LANE_WIDTH,
+    TURNOUT_TAPER,
 )
 from .model import (
     Environment,
@@ -42,7 +44,7 @@ from .model import (
 from .model_section import Marking
 from .placement_construction import SHORTEST_ALONG, TAPER_OUT, TAPERS_IN
 from .sampler_section import cross_section_of
-from .sampler_turnouts import SHORTEST_BAY_TAPER, SHORTEST_TAPER, RampLimits, features_of, may_change_lanes
+from .sampler_turnouts import RampLimits, features_of, may_change_lanes
 
 LEAST_MEDIAN = min(section.median for section in STANDARD_CROSS_SECTIONS.values())
 """Narrowest median of the standard cross-sections, m."""
@@ -193,12 +195,12 @@ def _turnouts(scenario: RoadScenario) -> Iterator[str]:
     if limits.exits > 0.0 or limits.entries > 0.0:
         yield from _short("turnouts.lane_length", limits.lane_length, TURNOUT_LANE_LENGTH[name], name)
         yield from _short("turnouts.lane_width", limits.lane_width, TURNOUT_LANE_WIDTH, "a turnout")
-        yield from _short("turnouts.taper_length", limits.taper_length, SHORTEST_TAPER, "a turnout")
+        yield from _short("turnouts.taper_length", limits.taper_length, TURNOUT_TAPER, "a turnout")
         ramps = RampLimits(scenario, cross_section_of(scenario))
         yield from _short("turnouts.ramp_length", limits.ramp_length, ramps.shortest, "a ramp to 10 m behind its nose")
     if limits.emergency_bays > 0.0:
         yield from _short("turnouts.bay_length", limits.bay_length, EMERGENCY_BAY_LENGTH, "an emergency bay")
-        yield from _short("turnouts.bay_taper_length", limits.bay_taper_length, SHORTEST_BAY_TAPER, "an emergency bay")
+        yield from _short("turnouts.bay_taper_length", limits.bay_taper_length, EMERGENCY_BAY_TAPER, "an emergency bay")
         yield from _short("turnouts.bay_width", limits.bay_width, EMERGENCY_BAY_WIDTH, "an emergency bay")
 
 

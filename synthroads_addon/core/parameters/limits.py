@@ -113,6 +113,9 @@ TURNOUT_LANE_LENGTH = {"EKA1A": 250.0, "EKA1B": 250.0, "EKA2": 200.0, "EKA3": 15
 """Shortest deceleration or acceleration lane, m."""
 TURNOUT_LANE_WIDTH = 3.5
 """Narrowest deceleration or acceleration lane, m."""
+TURNOUT_TAPER = 30.0
+EMERGENCY_BAY_TAPER = 20.0
+"""Shortest taper of a deceleration or acceleration lane, and of an emergency bay, m."""
 EMERGENCY_BAY_WIDTH = 3.0
 EMERGENCY_BAY_LENGTH = 40.0
 """Narrowest and shortest emergency bay at full width, m."""

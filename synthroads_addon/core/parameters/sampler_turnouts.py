@@ -18,12 +18,14 @@ from ..road_scenario import FreeCrossSection, Interval, RoadScenario
 from ..schema import rounded
 from .limits import (
     EMERGENCY_BAY_LENGTH,
+    EMERGENCY_BAY_TAPER,
     EMERGENCY_BAY_WIDTH,
     INTERCHANGE_SPACING,
     LANE_TAPER_LENGTH,
     TURNOUT_GAP,
     TURNOUT_LANE_LENGTH,
     TURNOUT_LANE_WIDTH,
+    TURNOUT_TAPER,
     StandardCrossSection,
 )
 from .model_furniture import Side
@@ -40,8 +42,6 @@ FARTHEST_REACH = 90.0
 """A ramp reaches at most this far from the centreline, so that what stands beside it has an offset below 100 m."""
 BESIDE_LANE_CHANGE = 10.0
 """Before it begins to close, and behind, a lane is there, and gone, for at least this far, m."""
-SHORTEST_TAPER, SHORTEST_BAY_TAPER = 30.0, 20.0
-"""Shortest taper of an exit's or entry's lane, and of an emergency bay, m (RAA, unconfirmed)."""
 _BESIDE_ROAD = 2.0  # ground beside the road's edge that is left within the terrain, m
 _INTERCHANGE_EVERY, _BAY_EVERY = 3000.0, 1000.0  # a long road may have another one after this length, m
 
@@ -136,7 +136,7 @@ def features_of(scenario: RoadScenario, section: StandardCrossSection, ramps: Ra
     """Return the features that a carriageway may have. Those that can't be within the limits are left out."""
     limits, design_class = scenario.turnouts, scenario.design_class
     taper, lane = limits.taper_length, limits.lane_length
-    with_ramp = (bounds(taper, SHORTEST_TAPER), bounds(lane, TURNOUT_LANE_LENGTH[design_class]), ramps.lengths)
+    with_ramp = (bounds(taper, TURNOUT_TAPER), bounds(lane, TURNOUT_LANE_LENGTH[design_class]), ramps.lengths)
     apart = INTERCHANGE_SPACING[design_class]
     every = apart or _INTERCHANGE_EVERY
     features = [
@@ -144,7 +144,7 @@ def features_of(scenario: RoadScenario, section: StandardCrossSection, ramps: Ra
         Feature("entry", limits.entries, with_ramp, BLEND + STEP, apart, every),
     ]
     if ramps.room_for_bay:
-        bay_tapers = bounds(limits.bay_taper_length, SHORTEST_BAY_TAPER)
+        bay_tapers = bounds(limits.bay_taper_length, EMERGENCY_BAY_TAPER)
         bay = (bay_tapers, bounds(limits.bay_length, EMERGENCY_BAY_LENGTH), bay_tapers)
         features.append(Feature("emergency_bay", limits.emergency_bays, bay, every=_BAY_EVERY))
     if may_change_lanes(scenario, section):

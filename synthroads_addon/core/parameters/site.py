@@ -109,10 +109,3 @@ class Site:
         ends = np.cumsum(lengths)
         borders = np.column_stack([np.concatenate([[0.0], ends[:-1]]), ends]).ravel()
         return borders, np.array([(e.curvature_start, e.curvature_end) for e in elements]).ravel()
-
-    def clear_distance(self, side: Side, start: float, end: float) -> float:
-        """Return the largest distance (m) of a carriageway's paved edge between two stations."""
-        section = self.sections[side]
-        low, high = min(start, end), max(start, end)
-        inside = [s for s in section.kinks() if low < s < high]
-        return float(section.paved_edge([low, *inside, high]).max())

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from itertools import pairwise
 
-from .model import LineMarking, LineObject, PointObject, RoadParameters, Vegetation, Vehicle
+from .model import LineMarking, LineObject, PointObject, RoadParameters, TemporaryBarrier, Vegetation, Vehicle
 from .model_base import RoadObject
 
 LONGEST = 500.0
@@ -24,7 +24,7 @@ def stretches(length: float, longest: float = LONGEST) -> list[tuple[float, floa
 def cut(parameters: RoadParameters, start: float, end: float) -> RoadParameters:
     """Return a set with only what stands between two stations (the end is the next stretch's, but for the last one).
 
-    The road itself stays whole. What is periodic (posts, dashes) is cut in its rhythm.
+    The road itself stays whole, and so does what runs obliquely. What is periodic (posts, dashes) is cut in its rhythm.
     """
     last = end >= parameters.alignment.length
     objects: dict[str, RoadObject] = {}
@@ -34,7 +34,7 @@ def cut(parameters: RoadParameters, start: float, end: float) -> RoadParameters:
                 objects[name] = item
         elif isinstance(item, LineObject | LineMarking):
             if item.end_station > start and item.start_station < end:
-                objects[name] = _cut(item, start, end)
+                objects[name] = item if isinstance(item, TemporaryBarrier) else _cut(item, start, end)
         elif isinstance(item, Vegetation):
             # The same seed would put the same plants on every stretch.
             objects[name] = item.model_copy(update={"seed": item.seed + int(start)})
