@@ -43,6 +43,8 @@ COMMANDS = {
     "generate": "make a road, scan it and write cloud, parameters and pictures",
     "parameters": "sample road parameters and write them to standard output",
     "check": "list the rules of the guidelines that a road breaks",
+    "cloud": "describe, thin out, map, convert and draw point cloud files",
+    "scan": "scan a scene that is there already: .blend, .glb, .obj and others",
     "gallery": "render pictures of scenes, objects and materials",
     "tradeoff": "measure error against time for each knob",
 }

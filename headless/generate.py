@@ -55,6 +55,11 @@ def summary(report: dict[str, Any], output: Path) -> str:
         )
     if "points" in counts:
         lines.append(f"{counts['points']:,} points from {counts['pulses']:,} pulses, {counts['triangles']:,} triangles")
+        if counts["below_threshold"] > counts["points"]:
+            lines.append(
+                f"{counts['below_threshold']:,} echoes were too weak to be detected: "
+                f"range, weather (attenuation {counts['attenuation']:.3g} per metre) or dark surfaces"
+            )
     for name, stage in report["stages"].items():
         lines.append(f"  {name:<12} {stage['seconds']:8.2f} s   peak {stage['peak_memory_mb'] or 0:7.0f} MB")
     lines.append(f"  {'in all':<12} {report['seconds']:8.2f} s")

@@ -9,18 +9,18 @@ from typing import Any
 import numpy as np
 
 from .blender.model import build_road
-from .blender.scene import scene_mesh
+from .blender.scene import scanned_scene
 from .core.cloud.points import PointBlock, concatenate
 from .core.measure import mesh_height_errors
 from .core.parameters.geometry import RoadGeometry
 from .core.parameters.sampler import sample_road
 from .core.progress import peak_memory_mb
-from .core.random_streams import stream
 from .core.scanning.beam import RINGS
-from .core.scanning.pattern import pulse_count
+from .core.scanning.motion import ScannedScene
 from .core.scanning.scan import Scan, scan_pulses
-from .core.scenario import Scenario, load_scenario
-from .pipeline import make_scan
+from .core.scanning.target import Target
+from .core.scenario import load_scenario
+from .pipeline import make_scan, road_path
 
 CONVERGED = max(RINGS)
 """Rays per pulse of the footprint that counts as truth."""
@@ -45,16 +45,16 @@ def measure_row(scenario_name: str, knob: str, value: Any) -> dict[str, Any]:
     start = time.process_time()
     settings = scenario.settings()
     build_road(parameters, settings.tolerance, settings.vegetation_detail)
-    mesh = scene_mesh()
+    scene = scanned_scene(geometry=geometry, speed_factor=scenario.scan.traffic_speed_factor)
     built = time.process_time()
-    scan = make_scan(scenario, geometry, mesh)
+    scan = make_scan(scenario, scene, road_path(scenario, geometry), parameters.environment)
     ready = time.process_time()
     points, rays = _sample(scan)
     seconds = time.process_time() - ready
-    share = _WINDOWS * _WINDOW / pulse_count(scan.setting, scan.path.strips[0])
-    errors: dict[str, float] = {"height_mm": 1e3 * float(np.abs(mesh_height_errors(mesh, geometry)).max())}
+    share = _WINDOWS * _WINDOW / scan.pulses(scan.path.strips[0])
+    errors: dict[str, float] = {"height_mm": 1e3 * float(np.abs(mesh_height_errors(scene.static, geometry)).max())}
     peak = peak_memory_mb()
-    errors |= _beam_errors(scenario, scan, points)
+    errors |= _beam_errors(scan, scene, points)
     return {
         "knob": knob,
         "value": value,
@@ -64,7 +64,7 @@ def measure_row(scenario_name: str, knob: str, value: Any) -> dict[str, Any]:
         "scan_seconds": round(seconds / share, 3),
         "rays_per_second": round(rays / seconds),
         "peak_memory_mb": peak,
-        "triangles": len(mesh.triangles),
+        "triangles": scan.target.triangles,
         "errors": {name: round(error, 6) for name, error in errors.items()},
     }
 
@@ -73,20 +73,20 @@ def _sample(scan: Scan) -> tuple[PointBlock, int]:
     """Scan the same pulses whatever the setting; return their first returns and the number of rays cast."""
     parts, rays = [], 0
     for strip in scan.path.strips:
-        firsts = np.linspace(0, pulse_count(scan.setting, strip) - _WINDOW, _WINDOWS).astype(int)
+        firsts = np.linspace(0, scan.pulses(strip) - _WINDOW, _WINDOWS).astype(int)
         for first in firsts:
-            result = scan_pulses(scan, strip, int(first), _WINDOW, stream(0, "no noise"))
+            result = scan_pulses(scan, strip, int(first), _WINDOW)
             parts.append(result.points)
             rays += result.rays
     points = concatenate(parts)
     return points.select(points.return_number == 1), rays
 
 
-def _beam_errors(scenario: Scenario, scan: Scan, points: PointBlock) -> dict[str, float]:
+def _beam_errors(scan: Scan, scene: ScannedScene, points: PointBlock) -> dict[str, float]:
     """Compare first returns with those of the converged footprint, pulse by pulse (told by their time)."""
     if scan.rays_per_pulse == CONVERGED:
         return {"position_mm": 0.0, "intensity_percent": 0.0, "labels_percent": 0.0}
-    truth, _ = _sample(replace(scan, rays_per_pulse=CONVERGED, caster=_fast(scan, scenario)))
+    truth, _ = _sample(replace(scan, rings=RINGS[CONVERGED], target=_fast(scan, scene)))
     _times, mine, true = np.intersect1d(points.gps_time, truth.gps_time, return_indices=True)
     a, b = points.select(mine), truth.select(true)
     return {
@@ -96,8 +96,10 @@ def _beam_errors(scenario: Scenario, scan: Scan, points: PointBlock) -> dict[str
     }
 
 
-def _fast(scan: Scan, scenario: Scenario) -> Any:
-    """Return a fast caster for the truth."""
+def _fast(scan: Scan, scene: ScannedScene) -> Target:
+    """Return a fast target for the truth."""
     from .blender.casters import make_caster
 
-    return scan.caster if scan.caster.name == "embree" else make_caster("auto", scan.mesh)
+    if scan.target.caster.name == "embree":
+        return scan.target
+    return Target(scene, lambda mesh: make_caster("auto", mesh))

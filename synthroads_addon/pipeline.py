@@ -25,14 +25,20 @@ from .core.errors import InputError
 from .core.files import output_folder
 from .core.parameters.geometry import RoadGeometry
 from .core.parameters.model import RoadParameters, read_parameters
+from .core.parameters.model_surroundings import Environment
 from .core.parameters.sampler import sample_road
 from .core.parameters.tessellation import sample_stations
 from .core.progress import Progress, StageTimer, silent
+from .core.scanning.beam import RINGS
 from .core.scanning.devices import scanner_setting
-from .core.scanning.path import FlightPath
-from .core.scanning.scan import BlockResult, Scan, scan_block, surfaces_of
+from .core.scanning.motion import ScannedScene
+from .core.scanning.path import Path as ScanPath
+from .core.scanning.path import RoadGuide, make_path
+from .core.scanning.scan import BlockResult, Scan, scan_block
+from .core.scanning.surfaces import surfaces_of
+from .core.scanning.target import Target
+from .core.scanning.weather import attenuation, weather_of
 from .core.scenario import Scenario
-from .core.scene_mesh import SceneMesh
 from .core.schema import canonical_json
 
 FILES = {
@@ -74,6 +80,7 @@ class ScanCounts:
     rays: int = 0
     points: int = 0
     below_threshold: int = 0
+    saturated: int = 0
     intensity_clipped: int = 0
     by_class: np.ndarray = field(default_factory=lambda: np.zeros(256, dtype=np.int64))
 
@@ -82,6 +89,7 @@ class ScanCounts:
         self.pulses += result.pulses
         self.rays += result.rays
         self.below_threshold += result.below_threshold
+        self.saturated += result.saturated
         self.points += len(result.points)
         self.by_class += np.bincount(result.points.class_id, minlength=256)
 
@@ -133,28 +141,50 @@ def road_parameters(job: Job) -> tuple[RoadParameters, dict[str, Any]]:
     return sample_road(scenario.road, scenario.seed, scenario.title), {}
 
 
-def make_scan(scenario: Scenario, geometry: RoadGeometry, mesh: SceneMesh) -> Scan:
-    """Return the scan that a scenario asks for, ready to be cut into blocks; builds the caster."""
+def make_scan(
+    scenario: Scenario, scene: ScannedScene, path: ScanPath, environment: Environment | None = None
+) -> Scan:
+    """Return the scan that a scenario asks for, ready to be cut into blocks; builds the casters.
+
+    Args:
+        scene: what is scanned.
+        path: the scanner's.
+        environment: the road's, for its weather; clear if None.
+    """
     from .blender.casters import make_caster
     from .blender.materials import constants
 
+    settings, setting = scenario.settings(), scanner_setting(scenario.scan)
+    rings = scenario.scan.beam_rings
     return Scan(
-        mesh=mesh,
-        surfaces=surfaces_of(constants(mesh.materials).values()),
-        caster=make_caster(scenario.scan.caster, mesh),
-        setting=scanner_setting(scenario.scan),
-        path=FlightPath(geometry, scenario.scan.platform),
-        rays_per_pulse=scenario.settings().rays_per_pulse,
+        target=Target(scene, lambda mesh: make_caster(scenario.scan.caster, mesh)),
+        surfaces=surfaces_of(constants(scene.static.materials).values(), scenario.scan.reflection),
+        setting=setting,
+        path=path,
+        rings=RINGS[settings.rays_per_pulse] if rings is None else rings,
         seed=scenario.seed,
-        attenuation=scenario.scan.attenuation,
+        noise=scenario.scan.noise,
+        attenuation=_attenuation(scenario, environment, setting.device.wavelength_nm),
+        beam=scenario.scan.beam,
+        wanted=frozenset({"rgb"} | ({"true_range", "true_xyz"} if scenario.scan.keep_truth else set())),
     )
+
+
+def _attenuation(scenario: Scenario, environment: Environment | None, wavelength_nm: float) -> float:
+    """Return the attenuation per metre of range: given, of the scan's weather, or of the road's."""
+    if scenario.scan.attenuation is not None:
+        return scenario.scan.attenuation
+    return attenuation(scenario.scan.weather or weather_of(environment or Environment()), wavelength_nm)
 
 
 def scan_blocks(scan: Scan, threads: int = 0) -> Iterator[BlockResult]:
     """Yield the blocks of a scan in their order, computed side by side; only a few are held at a time."""
+    tasks = iter(scan.blocks())
+    if scan.target.caster.main_thread_only:
+        yield from (scan_block(scan, *task) for task in tasks)
+        return
     workers = threads or available_cores()
     with _pool(workers) as pool:
-        tasks = iter(scan.blocks())
         pending: list[Future[BlockResult]] = [
             pool.submit(scan_block, scan, *task) for task in islice(tasks, workers + 1)
         ]
@@ -197,7 +227,7 @@ def _scene_outputs(
     """Build the model and write what needs it."""
     from .blender.files import empty_file, save_scene
     from .blender.model import build_road
-    from .blender.scene import scene_mesh
+    from .blender.scene import scanned_scene
 
     settings, wanted = job.scenario.settings(), job.scenario.outputs
     counts: dict[str, Any] = {}
@@ -207,11 +237,13 @@ def _scene_outputs(
         build_road(parameters, settings.tolerance, settings.vegetation_detail)
     if set(wanted) & {"cloud", "previews"}:
         with timer.stage("scene mesh"):
-            mesh = scene_mesh()
+            scene = scanned_scene(geometry=geometry, speed_factor=job.scenario.scan.traffic_speed_factor)
         with timer.stage("caster"):
-            scan = make_scan(job.scenario, geometry, mesh)
+            scan = make_scan(job.scenario, scene, road_path(job.scenario, geometry), parameters.environment)
+        del scene
         with timer.stage("scan"):
-            for share in (task := ScanToFiles(job.scenario, scan, geometry, folder)).run():
+            view = top_view(geometry) if "previews" in wanted else None
+            for share in (task := ScanToFiles(job.scenario, scan, folder, parameters.metadata.epsg, view)).run():
                 timer.progress("scan", share)
         counts = task.summary()
     if "scene" in wanted:
@@ -223,61 +255,72 @@ def _scene_outputs(
 class ScanToFiles:
     """A scan into the cloud and the previews, a block at a time, so that its caller can show progress or stop it.
 
+    Args:
+        scenario: says which files are wanted.
+        scan: see `make_scan`.
+        folder: where the files go.
+        epsg: map coordinate system; None if unknown.
+        view: raster for the previews; None without.
+
     Attributes:
         counts: what was counted so far.
     """
 
-    def __init__(self, scenario: Scenario, scan: Scan, geometry: RoadGeometry, folder: Path) -> None:
-        self.scenario, self.scan, self.geometry, self.folder = scenario, scan, geometry, folder
+    def __init__(
+        self, scenario: Scenario, scan: Scan, folder: Path, epsg: int | None = None, view: TopView | None = None
+    ) -> None:
+        self.scenario, self.scan, self.folder, self.epsg, self.view = scenario, scan, folder, epsg, view
         self.counts = ScanCounts()
-        # 16 bits are full for a white target at a right angle at half the flight height: nothing but a retro-reflector
-        # is brighter, and the weakest echoes still have hundreds of steps.
-        self.intensity_scale = 65535.0 * max(1.0, scan.path.platform.height / 2.0) ** 2
+        # 16 bits are full for a white target at a right angle at half the usual range: only what is nearer or a
+        # retro-reflector is brighter, and the weakest echoes still have hundreds of steps.
+        self.intensity_scale = 65535.0 * max(1.0, scan.path.typical_range / 2.0) ** 2
 
     def run(self) -> Generator[float, None, None]:
         """Scan; yield the share that is done after each block. The files are complete when the iteration ends."""
-        epsg = self.geometry.parameters.metadata.epsg
-        view = _top_view(self.geometry) if "previews" in self.scenario.outputs else None
         total = len(self.scan.blocks())
-        with _cloud_writer(self.folder, self.scenario, epsg, self.scan, self.intensity_scale) as writer:
+        with self._cloud_writer() as writer:
             for number, result in enumerate(scan_blocks(self.scan, self.scenario.scan.threads), start=1):
                 self.counts.add(result)
                 if writer:
                     writer.write(result.points)
-                if view:
-                    view.add(result.points)
+                if self.view:
+                    self.view.add(result.points)
                 yield number / total
         self.counts.intensity_clipped = writer.clipped if writer else 0
-        if view:
-            view.save(self.folder, epsg)
+        if self.view:
+            self.view.save(self.folder, self.epsg)
+
+    @contextmanager
+    def _cloud_writer(self) -> Iterator[LasWriter | None]:
+        if "cloud" not in self.scenario.outputs:
+            yield None
+            return
+        origin = self.scan.target.origin
+        with LasWriter(self.folder / "cloud.laz", self.epsg, origin, self.intensity_scale) as writer:
+            yield writer
 
     def summary(self) -> dict[str, Any]:
         """Return the counts as JSON data."""
         names = {row.id: row.name for row in classes()} | {255: "unlabelled"}
         by_class = {names.get(i, str(i)): int(n) for i, n in enumerate(self.counts.by_class) if n}
-        mesh = self.scan.mesh
+        target = self.scan.target
         return {
-            "triangles": len(mesh.triangles),
-            "vertices": len(mesh.vertices),
-            "caster": self.scan.caster.name,
+            "triangles": target.triangles,
+            "vertices": target.vertices,
+            "caster": target.caster.name,
             **{name: value for name, value in asdict(self.counts).items() if name != "by_class"},
+            "attenuation": self.scan.attenuation,
             "intensity_scale": self.intensity_scale,
             "points_by_class": by_class,
         }
 
 
-@contextmanager
-def _cloud_writer(
-    folder: Path, scenario: Scenario, epsg: int, scan: Scan, intensity_scale: float
-) -> Iterator[LasWriter | None]:
-    if "cloud" not in scenario.outputs:
-        yield None
-        return
-    with LasWriter(folder / "cloud.laz", epsg, scan.mesh.origin, intensity_scale) as writer:
-        yield writer
+def road_path(scenario: Scenario, geometry: RoadGeometry) -> ScanPath:
+    """Return the scanner's path along a road."""
+    return make_path(scenario.scan.platform, RoadGuide(geometry))
 
 
-def _top_view(geometry: RoadGeometry) -> TopView:
+def top_view(geometry: RoadGeometry) -> TopView:
     """Return a raster that holds the whole swath."""
     origin = np.array(geometry.parameters.transform.translate)[:2]
     stations = np.linspace(0.0, geometry.length, 50)

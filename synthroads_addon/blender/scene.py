@@ -2,88 +2,261 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
-from dataclasses import dataclass, field
-from typing import Any
+from collections.abc import Collection, Hashable, Mapping
+from dataclasses import dataclass, replace
+from itertools import chain, count
+from typing import TypeAlias
 
 import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from ..core.cloud.labels import UNLABELLED, classes
+from ..core.class_mapping import ClassMapping
 from ..core.errors import InputError
-from ..core.scene_mesh import SceneMesh, empty_scene_mesh
-from .materials import table_name
+from ..core.parameters.geometry import RoadGeometry
+from ..core.scanning.motion import (
+    LaneMotion,
+    LinearMotion,
+    Motion,
+    MovingMesh,
+    ScannedScene,
+    checked_factor,
+    lane_motions,
+)
+from ..core.scene_mesh import SceneMesh
 from .model import ORIGIN
-from .model_builder import SUPPORT
-from .scene_labels import CLASS_PROPERTY, INSTANCE_PROPERTY
+from .model_builder import ROLE, SUPPORT
+from .scene_labels import Label, Labels, velocity_of
+from .scene_reading import Part, Places, Whole, placed, read_part, slot_names
 
-_SMALLEST_AREA = 1e-12
+Float = NDArray[np.float64]
+Source: TypeAlias = bpy.types.Depsgraph | bpy.types.Scene | None
 
-
-@dataclass
-class _Part:
-    """Triangles of one mesh, and the places where it stands.
-
-    Attributes:
-        vertices: (V, 3) float32 in the mesh's own frame.
-        triangles: (T, 3) int32.
-        material: (T,) uint16 indices into the scene's materials.
-        class_id, instance_id: (T,) labels of the faces, or None if the mesh has none.
-        places: per use: matrix (4, 4) float64, class and instance of the object.
-    """
-
-    vertices: NDArray[np.float32]
-    triangles: NDArray[np.int32]
-    material: NDArray[np.uint16]
-    class_id: NDArray[np.uint8] | None
-    instance_id: NDArray[np.uint32] | None
-    places: list[tuple[NDArray[np.float64], int, int]] = field(default_factory=list)
+_FARTHEST_FROM_MOTION = 100.0
+"""A vehicle whose vertices are farther (m) than this from where it should be is one of another road."""
 
 
 def scene_mesh(
-    source: bpy.types.Depsgraph | bpy.types.Scene | None = None,
+    source: Source = None,
     objects: Collection[bpy.types.Object] | None = None,
+    classes: ClassMapping | None = None,
+    number_objects: bool = False,
 ) -> SceneMesh:
     """Return the triangles of the evaluated scene: everything that is visible in it and has faces.
 
-    A face's class is its attribute ``class_id``, else its object's custom property ``synthroads_class``, else
-    the class that a collection of the object is named after, else unlabelled; its instance likewise is the
-    attribute ``instance_id`` or the property ``synthroads_instance``, else 0. Triangles without area are left
-    out.
+    A face's class is its attribute ``class_id``, else its object's custom property ``synthroads_class``, else the class
+    that a collection of the object is named after, else unlabelled; names can have classes as well, see `ClassMapping`.
+    Its instance likewise is the attribute ``instance_id`` or the property ``synthroads_instance``, else 0. Triangles
+    without area are left out. Nothing in the scene changes.
 
     Args:
         source: a depsgraph, or a scene (its first view layer); the current scene if None.
         objects: only these and what they instance; all if None.
+        classes: classes by name.
+        number_objects: each object (one that shows a collection is one) without a number gets one, in the order of
+            their names, from 1 on past those that are taken.
 
     Raises:
-        InputError: an object's vertices aren't finite, or its class is unknown; names the object.
+        InputError: an object's vertices aren't finite, or a custom property isn't what it must be; names the object.
     """
     depsgraph = _depsgraph(source)
-    scene = depsgraph.scene
-    by_collection = _classes_by_collection(scene)
-    chosen = None if objects is None else {item.original for item in objects}
-    parts: dict[tuple[object, ...], _Part] = {}
-    materials: dict[str, int] = {}
-    for use in depsgraph.object_instances:
-        # Curves, texts, surfaces and metaballs come a second time as the mesh that they make.
-        item, owner = use.object, (use.parent if use.is_instance else use.object)
-        if item.type != "MESH" or not len(item.data.polygons) or SUPPORT in owner.original:
-            continue
-        if chosen is not None and owner.original not in chosen:
-            continue
-        slots = _slot_names(item)
+    reading = _Reading(depsgraph, objects, classes)
+    whole = reading.whole(_origin(depsgraph.scene), number_objects)
+    return placed(reading.pairs(None), whole)
+
+
+def scanned_scene(
+    source: Source = None,
+    objects: Collection[bpy.types.Object] | None = None,
+    classes: ClassMapping | None = None,
+    geometry: RoadGeometry | None = None,
+    speed_factor: float = 1.0,
+    *,
+    number_objects: bool = False,
+) -> ScannedScene:
+    """Return the evaluated scene as `scene_mesh` does, but what moves apart from what stands.
+
+    Vehicles of the road's model move along their lanes, see `LaneMotion`; those with a speed of 0 stand. One that the
+    user moved is at the time 0 where he put it, and drives on from there as far beside its lane as it is now. Anything
+    else moves straight on if it, or what it is parented to, has the custom property ``synthroads_velocity``:
+    (vx, vy, vz), m/s; what such an object shows or carries moves with it as one body.
+
+    Args:
+        source, objects, classes, number_objects: see `scene_mesh`.
+        geometry: the road that the scene was built from; if None its vehicles stand.
+        speed_factor: share of all speeds that they have in the scan, >= 0; with 0 everything stands.
+
+    Raises:
+        InputError: as `scene_mesh`; a velocity isn't three numbers, the factor is negative, or the geometry is that of
+            another road.
+    """
+    checked_factor(speed_factor)
+    depsgraph = _depsgraph(source)
+    origin = _origin(depsgraph.scene)
+    lanes: dict[str, LaneMotion] = {}
+    if geometry is not None:
+        lanes = lane_motions(geometry, speed_factor, origin - np.array(geometry.parameters.transform.translate))
+    reading = _Reading(depsgraph, objects, classes, lanes, speed_factor)
+    whole = reading.whole(origin, number_objects)
+    moving = tuple(_moving(reading, carrier, motion, whole) for carrier, motion in reading.motions.items())
+    return ScannedScene(placed(reading.pairs(None), whole), moving, reading.labels.by_name.unmatched())
+
+
+def _moving(reading: _Reading, carrier: Hashable, motion: Motion, whole: Whole) -> MovingMesh:
+    """Return what one carrier moves, in the motion's own frame."""
+    rotation, translation, _ = motion.pose(np.zeros(1))
+    into = np.eye(4)
+    into[:3, :3] = rotation[0].T
+    into[:3, 3] = -rotation[0].T @ translation[0]
+    mesh = placed(reading.pairs(carrier), whole, into)
+    if len(mesh) and isinstance(motion, LaneMotion):
+        far = float(np.abs(mesh.vertices).max())
+        if far > _FARTHEST_FROM_MOTION:
+            wrong = f"must be that of the road in the scene: a vehicle is {far:.0f} m off its lane"
+            raise InputError("geometry", None, wrong)
+    return MovingMesh(mesh, motion)
+
+
+@dataclass(frozen=True)
+class _Known:
+    """What all uses of one mesh by one object have in common.
+
+    Attributes:
+        part: key of the mesh's part.
+        label: number of the label.
+        lane: motion of a vehicle of the model, before it was moved.
+        velocity: of anything else that moves, m/s, with the key of what moves it.
+    """
+
+    part: tuple[Hashable, ...]
+    label: int
+    lane: tuple[str, LaneMotion] | None
+    velocity: tuple[Hashable, Float] | None
+
+
+class _Reading:
+    """One walk through an evaluated scene: its meshes, and who uses them where.
+
+    Attributes:
+        labels: of its objects.
+        motions: of what moves, by carrier.
+    """
+
+    def __init__(
+        self,
+        depsgraph: bpy.types.Depsgraph,
+        objects: Collection[bpy.types.Object] | None,
+        classes: ClassMapping | None,
+        lanes: Mapping[str, LaneMotion] | None = None,
+        speed_factor: float = 0.0,
+    ) -> None:
+        self.labels = Labels(depsgraph.scene, classes)
+        self.motions: dict[Hashable, Motion] = {}
+        self._chosen = None if objects is None else {item.original for item in objects}
+        self._lanes = lanes or {}
+        self._speed_factor = speed_factor
+        self._materials: dict[str, int] = {}
+        self._parts: dict[tuple[Hashable, ...], Part] = {}
+        self._labels: list[Label] = []
+        self._nameless: dict[int, str] = {}
+        self._uses: dict[Hashable, dict[tuple[Hashable, ...], Places]] = {}
+        self._walk(depsgraph)
+
+    def pairs(self, carrier: Hashable) -> list[tuple[Part, Places]]:
+        """Return the parts that a carrier moves (that stand, for None) and their places; only once for each."""
+        pairs = [(self._parts[key], places) for key, places in self._uses.pop(carrier, {}).items()]
+        if not self._uses:
+            self._parts.clear()  # what is placed needn't be held twice
+        return pairs
+
+    def whole(self, origin: Float, number_objects: bool) -> Whole:
+        """Return what all meshes have in common."""
+        labels = self._numbered() if number_objects else self._labels
+        return Whole(labels, tuple(self._materials), origin)
+
+    def _walk(self, depsgraph: bpy.types.Depsgraph) -> None:
+        known: dict[tuple[int, int, int], _Known | None] = {}
+        for use in depsgraph.object_instances:
+            # Curves, texts, surfaces and metaballs come a second time as the mesh that they make.
+            item = use.object
+            if item.type != "MESH":
+                continue
+            owner = use.parent if use.is_instance else item
+            # A million uses may share one mesh: what they have in common is found once.
+            key = (item.data.as_pointer(), item.original.as_pointer(), owner.as_pointer())
+            if key not in known:
+                known[key] = self._look(item, owner)
+            about = known[key]
+            if about is None:
+                continue
+            matrix = list(chain.from_iterable(use.matrix_world))
+            carrier = self._carrier(about, matrix) if about.lane or about.velocity else None
+            places = self._uses.setdefault(carrier, {}).setdefault(about.part, Places())
+            places.matrices.fromlist(matrix)
+            places.labels.append(about.label)
+
+    def _look(self, item: bpy.types.Object, owner: bpy.types.Object) -> _Known | None:
+        """Return what is known of an evaluated object and its owner; None if they aren't scanned."""
+        original, shown_by = item.original, owner.original
+        if not len(item.data.polygons) or SUPPORT in shown_by:
+            return None
+        if self._chosen is not None and shown_by not in self._chosen:
+            return None
+        slots = slot_names(item)
         # Materials may be linked to the object, so that the same mesh can look different.
-        key = (item.data.as_pointer(), *slots)
-        if key not in parts:
-            parts[key] = _read(item.name, item.data, slots, materials)
-        label = _object_class(item, owner, by_collection)
-        number = item.original.get(INSTANCE_PROPERTY, owner.original.get(INSTANCE_PROPERTY, 0))
-        parts[key].places.append((np.array(use.matrix_world), label, int(number)))
-    return _assemble(list(parts.values()), tuple(materials), _origin(scene))
+        part = (item.data.as_pointer(), *slots)
+        if part not in self._parts:
+            self._parts[part] = read_part(item.name, item.data, slots, self._materials, self.labels.by_name)
+        label = self.labels.of(original, shown_by)
+        self._labels.append(label)
+        if label.instance < 0 and self._parts[part].instance_id is None:
+            self._nameless[len(self._labels) - 1] = shown_by.name_full
+        role = original.get(ROLE, shown_by.get(ROLE))
+        lane = (role, self._lanes[role]) if role in self._lanes else None
+        return _Known(part, len(self._labels) - 1, lane, self._velocity(original, shown_by))
+
+    def _velocity(self, item: bpy.types.Object, owner: bpy.types.Object) -> tuple[Hashable, Float] | None:
+        """Return the key of what moves an original object, and its velocity; None if nothing does."""
+        inside = velocity_of(item) if item != owner else None
+        found = inside or velocity_of(owner)
+        if not found or not self._speed_factor or not found[1].any():
+            return None
+        # What moves inside of a collection does so wherever the collection is shown.
+        return (found[0].name_full, owner.name_full if inside else ""), found[1] * self._speed_factor
+
+    def _carrier(self, known: _Known, matrix: list[float]) -> Hashable:
+        """Return the key of what moves a use, whose motion is in `motions` then; its own velocity counts first."""
+        if known.velocity is not None:
+            key, velocity = known.velocity
+            if key not in self.motions:
+                self.motions[key] = LinearMotion(velocity, matrix[3:12:4])
+            return key
+        assert known.lane is not None
+        role, motion = known.lane
+        key = (role, *matrix)
+        if key not in self.motions:
+            place = np.array(matrix).reshape(4, 4)
+            if not np.array_equal(place, np.eye(4)):
+                middle = motion.pose(np.zeros(1))[1][0]
+                motion = motion.from_elsewhere(place[:3, :3] @ middle + place[:3, 3])
+            self.motions[key] = motion
+        return key
+
+    def _numbered(self) -> list[Label]:
+        """Return the labels with a number for each object that has none."""
+        taken = {label.instance for label in self._labels}
+        for part in self._parts.values():
+            if part.instance_id is not None:
+                taken |= set(np.unique(part.instance_id).tolist())
+        free = (number for number in count(1) if number not in taken)
+        numbers = {name: next(free) for name in sorted(set(self._nameless.values()))}
+        labels = list(self._labels)
+        for index, name in self._nameless.items():
+            labels[index] = replace(labels[index], instance=numbers[name])
+        return labels
 
 
-def _depsgraph(source: bpy.types.Depsgraph | bpy.types.Scene | None) -> bpy.types.Depsgraph:
+def _depsgraph(source: Source) -> bpy.types.Depsgraph:
     if isinstance(source, bpy.types.Depsgraph):
         return source
     if source is None or source == bpy.context.scene:
@@ -93,126 +266,8 @@ def _depsgraph(source: bpy.types.Depsgraph | bpy.types.Scene | None) -> bpy.type
     return layer.depsgraph
 
 
-def _origin(scene: bpy.types.Scene) -> NDArray[np.float64]:
+def _origin(scene: bpy.types.Scene) -> Float:
     for collection in scene.collection.children_recursive:
         if ORIGIN in collection:
             return np.array(collection[ORIGIN], dtype=np.float64)
     return np.zeros(3)
-
-
-def _classes_by_collection(scene: bpy.types.Scene) -> dict[str, int]:
-    """Return the class of each object (by name) that is in a collection named after a class."""
-    ids = {row.name: row.id for row in classes()}
-    result: dict[str, int] = {}
-    for collection in scene.collection.children_recursive:
-        if collection.name in ids:
-            result |= {item.name: ids[collection.name] for item in collection.all_objects}
-    return result
-
-
-def _object_class(item: bpy.types.Object, owner: bpy.types.Object, by_collection: dict[str, int]) -> int:
-    for candidate in (item.original, owner.original):
-        name = candidate.get(CLASS_PROPERTY)
-        if name is None:
-            continue
-        ids = {row.name: row.id for row in classes()}
-        if name not in ids:
-            raise InputError(f"{candidate.name}: {CLASS_PROPERTY}", name, f"must be one of {', '.join(ids)}")
-        return ids[name]
-    return by_collection.get(item.original.name, by_collection.get(owner.original.name, UNLABELLED))
-
-
-def _slot_names(item: bpy.types.Object) -> list[str]:
-    names = [table_name(material) for material in item.data.materials]
-    for index, slot in enumerate(item.material_slots[: len(names)]):
-        if slot.link == "OBJECT":
-            names[index] = table_name(slot.material)
-    return names or [table_name(None)]
-
-
-def _read(name: str, mesh: bpy.types.Mesh, slots: list[str], materials: dict[str, int]) -> _Part:
-    vertices = np.empty((len(mesh.vertices), 3), np.float32)
-    mesh.vertices.foreach_get("co", vertices.ravel())
-    if not np.isfinite(vertices).all():
-        raise InputError(f"{name}: vertices", None, "must be finite numbers")
-    mesh.calc_loop_triangles()
-    count = len(mesh.loop_triangles)
-    triangles, face = np.empty((count, 3), np.int32), np.empty(count, np.int32)
-    mesh.loop_triangles.foreach_get("vertices", triangles.ravel())
-    mesh.loop_triangle_polygons.foreach_get("value", face)
-    slot = _face_values(mesh, "material_index")
-    index = np.array([materials.setdefault(entry, len(materials)) for entry in slots], np.uint16)
-    material = (
-        np.zeros(count, np.uint16) + index[0]
-        if slot is None
-        else index[np.clip(slot, 0, len(index) - 1)][face]
-    )
-    label, number = _face_values(mesh, "class_id"), _face_values(mesh, "instance_id")
-    if label is not None:
-        label = np.where((label >= 0) & (label <= UNLABELLED), label, UNLABELLED).astype(np.uint8)[face]
-    if number is not None:
-        number = number.view(np.uint32)[face]
-    return _Part(vertices, triangles, material, label, number)
-
-
-def _face_values(mesh: bpy.types.Mesh, name: str) -> NDArray[Any] | None:
-    """Return the (F,) int32 values of a face attribute, or None."""
-    attribute = mesh.attributes.get(name)
-    if (
-        attribute is None
-        or attribute.domain != "FACE"
-        or attribute.data_type not in ("INT", "INT8", "BOOLEAN")
-    ):
-        return None
-    values = np.empty(len(mesh.polygons), np.int32)
-    attribute.data.foreach_get("value", values)
-    return values
-
-
-def _assemble(parts: list[_Part], materials: tuple[str, ...], origin: NDArray[np.float64]) -> SceneMesh:
-    """Place all parts and join them."""
-    vertex_count = sum(len(part.vertices) * len(part.places) for part in parts)
-    triangle_count = sum(len(part.triangles) * len(part.places) for part in parts)
-    if not triangle_count:
-        return empty_scene_mesh(origin)
-    mesh: dict[str, NDArray[Any]] = {
-        "vertices": np.empty((vertex_count, 3), np.float32),
-        "triangles": np.empty((triangle_count, 3), np.int32),
-        "class_id": np.empty(triangle_count, np.uint8),
-        "instance_id": np.empty(triangle_count, np.uint32),
-        "material": np.empty(triangle_count, np.uint16),
-    }
-    vertex = triangle = 0
-    for part in parts:
-        for matrix, label, number in part.places:
-            faces = slice(triangle, triangle + len(part.triangles))
-            mesh["vertices"][vertex : vertex + len(part.vertices)] = _moved(part.vertices, matrix)
-            mirrored = np.linalg.det(matrix[:3, :3]) < 0.0
-            mesh["triangles"][faces] = (part.triangles[:, ::-1] if mirrored else part.triangles) + vertex
-            mesh["class_id"][faces] = label if part.class_id is None else part.class_id
-            mesh["instance_id"][faces] = number if part.instance_id is None else part.instance_id
-            mesh["material"][faces] = part.material
-            vertex, triangle = vertex + len(part.vertices), faces.stop
-    keep = _with_area(mesh["vertices"], mesh["triangles"])
-    if not keep.all():
-        mesh |= {name: array[keep] for name, array in mesh.items() if name != "vertices"}
-    return SceneMesh(**mesh, materials=materials, origin=origin)
-
-
-def _moved(vertices: NDArray[np.float32], matrix: NDArray[np.float64]) -> NDArray[Any]:
-    if np.array_equal(matrix, np.eye(4)):
-        return vertices
-    return vertices @ matrix[:3, :3].T + matrix[:3, 3]
-
-
-def _with_area(
-    vertices: NDArray[np.float32], triangles: NDArray[np.int32], block: int = 1 << 18
-) -> NDArray[np.bool_]:
-    """Return which triangles have an area (T,)."""
-    keep = np.empty(len(triangles), bool)
-    for start in range(0, len(triangles), block):
-        corner = vertices[triangles[start : start + block]]
-        a, b = corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]
-        cross = np.stack([a[:, i] * b[:, j] - a[:, j] * b[:, i] for i, j in ((1, 2), (2, 0), (0, 1))])
-        keep[start : start + block] = (cross * cross).sum(axis=0) > (2.0 * _SMALLEST_AREA) ** 2
-    return keep

@@ -10,51 +10,11 @@ from typing import Any, Literal, get_args
 from pydantic import Field
 
 from .errors import InputError, nearest_name
-from .road_scenario import Finite, RoadScenario, ScenarioModel
+from .road_scenario import RoadScenario, ScenarioModel
+from .scan_scenario import ScanScenario
 from .schema import quantity, read_json
 
 SCENARIOS = Path(__file__).parents[1] / "presets" / "scenarios"
-
-class Platform(ScenarioModel):
-    """What carries the scanner, and its strips."""
-
-    kind: Literal["uav"] = Field("uav", description="Platform.")
-    height: float = quantity(60.0, ge=2, le=2000, unit="m", description="Height above the road.")
-    speed: float = quantity(8.0, ge=0.1, le=100, unit="m/s", description="Speed over ground.")
-    lateral_offsets: tuple[Finite, ...] = Field(
-        (10.0, -10.0),
-        min_length=1,
-        max_length=64,
-        description="Offset of each strip from the centreline, m; every second strip is flown back.",
-    )
-
-
-class Noise(ScenarioModel):
-    """Random errors of the measurement."""
-
-    range_sigma: float | None = quantity(
-        None, ge=0, le=1, unit="m", description="Standard deviation of the range; the device's if not given."
-    )
-
-
-class ScanScenario(ScenarioModel):
-    """How the road is scanned. What isn't given is the device's own value."""
-
-    device: str = Field("riegl-minivux-3uav", description="Device preset or file.")
-    pulse_rate_khz: float | None = quantity(None, gt=0, le=5000, unit="kHz", description="Pulse repetition rate.")
-    field_of_view_deg: float | None = quantity(None, gt=0, le=360, unit="deg", description="Field of view.")
-    lines_per_second: float | None = quantity(None, gt=0, le=1000, unit="1/s", description="Scan lines per second.")
-    platform: Platform = Field(Platform(), description="Platform and path.")
-    noise: Noise = Field(Noise(), description="Measurement noise.")
-    attenuation: float = quantity(
-        0.0, ge=0, le=1, unit="1/m", description="Attenuation per metre of range (there and back)."
-    )
-    rays_per_pulse: Literal[1, 7, 19, 37, 61] | None = Field(
-        None, description="Rays that sample a pulse's footprint; the fidelity's if not given."
-    )
-    caster: Literal["auto", "embree", "bvhtree"] = Field("auto", description="How rays are cast.")
-    threads: int = quantity(0, ge=0, le=1024, unit="1", description="Threads; 0 uses every core.")
-
 
 Output = Literal["parameters", "cloud", "centerline", "scene", "previews"]
 OUTPUTS: tuple[Output, ...] = get_args(Output)

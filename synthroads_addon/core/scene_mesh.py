@@ -103,7 +103,7 @@ class SceneMesh:
         return np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
 
 
-def empty_scene_mesh(origin: NDArray[np.float64]) -> SceneMesh:
+def empty_scene_mesh(origin: NDArray[np.float64], materials: tuple[str, ...] = ()) -> SceneMesh:
     """Return a mesh without triangles."""
     return SceneMesh(
         vertices=np.empty((0, 3), np.float32),
@@ -111,6 +111,6 @@ def empty_scene_mesh(origin: NDArray[np.float64]) -> SceneMesh:
         class_id=np.empty(0, np.uint8),
         instance_id=np.empty(0, np.uint32),
         material=np.empty(0, np.uint16),
-        materials=(),
+        materials=materials,
         origin=origin,
     )

@@ -7,6 +7,7 @@ import traceback
 import bpy
 
 from ..core.errors import Cancelled, InputError
+from ..core.parameters.geometry import RoadGeometry
 from ..core.parameters.sampler import sample_road
 from . import scan_job
 from .road import find_road, objects_of, recall, remember
@@ -171,7 +172,7 @@ def _is_free(operator: type[bpy.types.Operator], context: bpy.types.Context) -> 
 def _scan_of(context: bpy.types.Context) -> ScanJob:
     """Return the scan that the panel asks for: the road as it is edited now, the scanner as it is set now."""
     from ..blender.read_back import edited_parameters
-    from ..blender.scene import scene_mesh
+    from ..blender.scene import scanned_scene
 
     settings, road = context.scene.synthroads, find_road(context.scene)
     assert road  # poll() has seen it
@@ -179,10 +180,11 @@ def _scan_of(context: bpy.types.Context) -> ScanJob:
     parameters = edited_parameters(parameters, objects_of(road))
     scenario = built.model_copy(update={"scan": settings.scenario().scan})
     target = settings.folder()
-    mesh = scene_mesh()
-    if len(mesh.triangles) == 0:
+    geometry = RoadGeometry(parameters)
+    scene = scanned_scene(geometry=geometry, speed_factor=scenario.scan.traffic_speed_factor)
+    if len(scene.static.triangles) == 0 and not scene.moving:
         raise InputError("Scene", None, "nothing that could be scanned is visible")
-    return ScanJob(scenario, parameters, mesh, target, settings.overwrite)
+    return ScanJob(scenario, parameters, scene, target, settings.overwrite)
 
 
 def _refuse(operator: bpy.types.Operator, error: InputError) -> set[str]:

@@ -59,7 +59,7 @@ class SYNTHROADS_PT_scanner(_Sidebar, bpy.types.Panel):
     def draw(self, context: bpy.types.Context) -> None:
         """Show the scanner's settings and its button."""
         layout, settings = _column(self), context.scene.synthroads
-        for name in ("device", "height", "speed", "output", "overwrite"):
+        for name in ("device", "platform", "height", "speed", "output", "overwrite"):
             layout.prop(settings, name)
         job = scan_job.latest
         if job and job.running:

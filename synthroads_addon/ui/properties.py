@@ -17,15 +17,10 @@ from pydantic import BaseModel
 from ..core.errors import InputError
 from ..core.parameters.limits import STANDARD_CROSS_SECTIONS, design_class_of
 from ..core.road_scenario import RoadScenario
+from ..core.scan_scenario import Platform, ScanScenario
 from ..core.scanning.devices import device_names, load_device
-from ..core.scenario import (
-    FIDELITIES,
-    Platform,
-    ScanScenario,
-    Scenario,
-    load_scenario,
-    scenario_names,
-)
+from ..core.scanning.path import USUAL
+from ..core.scenario import FIDELITIES, Scenario, load_scenario, scenario_names
 from ..core.schema import unit_of
 
 ROAD_FIELDS = {
@@ -36,6 +31,7 @@ ROAD_FIELDS = {
 }
 SCAN_FIELDS = {
     "device": "scan.device",
+    "platform": "scan.platform.kind",
     "height": "scan.platform.height",
     "speed": "scan.platform.speed",
 }
@@ -44,18 +40,21 @@ SCAN_FIELDS = {
 OUTPUTS = ("parameters", "cloud", "centerline", "previews")
 """What a scan from the panel writes; the scene itself is open already."""
 
+PLATFORM_NAMES = {"uav": "UAV", "vehicle": "Vehicle", "tripod": "Tripod", "airborne": "Aircraft"}
+_DEVICE_SETTINGS = ("pulse_rate_khz", "field_of_view_deg", "lines_per_second", "angle_step_deg")
 _UNITS = {"m": "LENGTH", "m/s": "VELOCITY"}
 _LARGEST_INTEGER = 2**31 - 1  # Blender's integers have 32 bits
 _KEPT = ("seed", "fidelity")  # choosing a scenario leaves these as they are: they say which and how fine, not what
 
 
-def number(model: type[BaseModel], name: str) -> Any:
+def number(model: type[BaseModel], name: str, default: float | None = None) -> Any:
     """Return a float or int property with the limits, default, unit and description of a field of the schema.
 
     Blender's limits are inclusive: a limit that the schema excludes is refused when the scenario is made.
     """
     field = model.model_fields[name]
-    arguments = {"name": name.replace("_", " ").title(), "default": field.default, "description": tooltip(model, name)}
+    arguments: dict[str, Any] = {"name": name.replace("_", " ").title(), "description": tooltip(model, name)}
+    arguments["default"] = field.default if default is None else default
     for limit in field.metadata:
         if isinstance(limit, annotated_types.Ge | annotated_types.Gt):
             arguments["min"] = getattr(limit, "ge", getattr(limit, "gt", None))
@@ -98,12 +97,23 @@ def _devices() -> Iterator[tuple[str, str, str]]:
         yield name, device.title, f"{device.wavelength_nm:g} nm, {rates} kHz, {device.maximum_returns} returns at most"
 
 
+def _platforms() -> Iterator[tuple[str, str, str]]:
+    for kind, usual in USUAL.items():
+        yield kind, PLATFORM_NAMES[kind], f"Usually {usual.height:g} m up, at {usual.speed:g} m/s"
+
+
+def _take_usual(settings: "SYNTHROADS_PG_settings", context: bpy.types.Context) -> None:
+    """Show what is usual for the chosen platform."""
+    settings.height, settings.speed = USUAL[settings.platform].height, USUAL[settings.platform].speed
+
+
 def _take_over(settings: "SYNTHROADS_PG_settings", context: bpy.types.Context) -> None:
     """Show the chosen scenario's own values."""
     scenario = load_scenario(settings.preset)
     for name, path in (ROAD_FIELDS | SCAN_FIELDS).items():
-        if name not in _KEPT:
-            setattr(settings, name, attrgetter(path)(scenario))
+        value = attrgetter(path)(scenario)
+        if name not in _KEPT and value is not None:  # a height or speed that isn't given came with the platform
+            setattr(settings, name, value)
 
 
 class SYNTHROADS_PG_settings(bpy.types.PropertyGroup):
@@ -136,8 +146,15 @@ class SYNTHROADS_PG_settings(bpy.types.PropertyGroup):
         default=ScanScenario.model_fields["device"].default,
         description="Laser scanner",
     )
-    height: number(Platform, "height")
-    speed: number(Platform, "speed")
+    platform: bpy.props.EnumProperty(
+        name="Platform",
+        items=list(_platforms()),
+        default=Platform.model_fields["kind"].default,
+        description=tooltip(Platform, "kind"),
+        update=_take_usual,
+    )
+    height: number(Platform, "height", USUAL["uav"].height)
+    speed: number(Platform, "speed", USUAL["uav"].speed)
     output: bpy.props.StringProperty(
         name="Output",
         subtype="DIR_PATH",
@@ -153,7 +170,12 @@ class SYNTHROADS_PG_settings(bpy.types.PropertyGroup):
         """Return the job that the panel describes; raise `InputError` where a value is refused."""
         changes = [f"{path}={_plain(getattr(self, name))}" for name, path in (ROAD_FIELDS | SCAN_FIELDS).items()]
         # The panel asks for the cross-section only: the design class follows where the scenario's doesn't have it.
-        design_class = design_class_of(self.cross_section, load_scenario(self.preset).road.design_class)
+        preset = load_scenario(self.preset)
+        design_class = design_class_of(self.cross_section, preset.road.design_class)
+        if self.device != preset.scan.device:  # the scenario's pulse rate and angles are those of its own device
+            changes += [f"scan.{name}=null" for name in _DEVICE_SETTINGS]
+        if self.platform != preset.scan.platform.kind:  # and its strips those of its own platform
+            changes.append("scan.platform.lateral_offsets=null")
         changes += [f'road.design_class="{design_class}"', f"outputs={json.dumps(OUTPUTS)}"]
         return load_scenario(self.preset, changes)
 

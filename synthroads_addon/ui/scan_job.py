@@ -14,10 +14,10 @@ from ..core.files import output_folder
 from ..core.parameters.geometry import RoadGeometry
 from ..core.parameters.model import RoadParameters
 from ..core.parameters.tessellation import sample_stations
+from ..core.scanning.motion import ScannedScene
 from ..core.scenario import Scenario
-from ..core.scene_mesh import SceneMesh
 from ..core.schema import canonical_json
-from ..pipeline import FILES, Job, ScanToFiles, check, make_scan
+from ..pipeline import FILES, Job, ScanToFiles, check, make_scan, road_path, top_view
 
 
 class ScanJob:
@@ -26,7 +26,7 @@ class ScanJob:
     Args:
         scenario: the road's and the scan's settings.
         parameters: the road that the scene shows.
-        mesh: what is scanned.
+        scene: what is scanned.
         target: folder for the files.
         overwrite: replace files that are already there.
 
@@ -41,7 +41,7 @@ class ScanJob:
     """
 
     def __init__(
-        self, scenario: Scenario, parameters: RoadParameters, mesh: SceneMesh, target: Path, overwrite: bool
+        self, scenario: Scenario, parameters: RoadParameters, scene: ScannedScene, target: Path, overwrite: bool
     ) -> None:
         check(Job(scenario, target, overwrite=overwrite))
         self.target = target
@@ -50,7 +50,7 @@ class ScanJob:
         self.error: Exception | None = None
         self._stopping = Event()
         self._thread: Thread | None = None
-        self._steps = self._write_files(scenario, parameters, mesh, overwrite)
+        self._steps = self._write_files(scenario, parameters, scene, overwrite)
         next(self._steps)
 
     def run(self) -> None:
@@ -93,7 +93,7 @@ class ScanJob:
             self.error = error
 
     def _write_files(
-        self, scenario: Scenario, parameters: RoadParameters, mesh: SceneMesh, overwrite: bool
+        self, scenario: Scenario, parameters: RoadParameters, scene: ScannedScene, overwrite: bool
     ) -> Generator[float, None, None]:
         """Write all files, yielding the share that is done: first once the folder is found to be writable."""
         names = [name for output in scenario.outputs for name in FILES[output]] + ["report.json"]
@@ -101,7 +101,8 @@ class ScanJob:
             yield 0.0
             geometry = RoadGeometry(parameters)
             stations = sample_stations(geometry, scenario.settings().tolerance)
-            task = ScanToFiles(scenario, make_scan(scenario, geometry, mesh), geometry, folder)
+            scan = make_scan(scenario, scene, road_path(scenario, geometry), parameters.environment)
+            task = ScanToFiles(scenario, scan, folder, parameters.metadata.epsg, top_view(geometry))
             yield from task.run()
             texts = {
                 "parameters.json": parameters.to_json(),

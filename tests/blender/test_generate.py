@@ -16,9 +16,10 @@ from synthroads_addon.core.errors import InputError
 from synthroads_addon.core.measure import misplaced_points
 from synthroads_addon.core.parameters.geometry import RoadGeometry
 from synthroads_addon.core.parameters.model import read_parameters
+from synthroads_addon.core.scanning.pulses import Poses, make_pulses
 from synthroads_addon.core.scanning.scan import scan_block
 from synthroads_addon.core.scenario import load_scenario
-from synthroads_addon.pipeline import FILES, Job, generate, make_scan
+from synthroads_addon.pipeline import FILES, Job, generate, make_scan, road_path
 
 ROOT = Path(__file__).parents[2]
 REAL_AXIS = ROOT.parent / "shared" / "real" / "als_rural2lane_t211-278_axis.csv"
@@ -85,24 +86,29 @@ def test_a_written_set_gives_the_same_road_again(tmp_path: Path) -> None:
 
 @pytest.fixture(scope="module")
 def demo():
-    """The demo scene at standard fidelity: parameters, geometry and scene mesh."""
+    """The demo scene at standard fidelity: scenario, geometry and what is scanned."""
     from synthroads_addon.blender.model import build_road
-    from synthroads_addon.blender.scene import scene_mesh
+    from synthroads_addon.blender.scene import scanned_scene
     from synthroads_addon.core.parameters.sampler import sample_road
 
     scenario = load_scenario("rq31-600m", ["scan.noise.range_sigma=0", "scan.rays_per_pulse=1"])
     parameters = sample_road(scenario.road, scenario.seed)
     build_road(parameters, scenario.settings().tolerance)
-    return scenario, RoadGeometry(parameters), scene_mesh()
+    geometry = RoadGeometry(parameters)
+    return scenario, geometry, scanned_scene(geometry=geometry)
+
+
+def scan_of(scenario, geometry, scene):
+    return make_scan(scenario, scene, road_path(scenario, geometry))
 
 
 @pytest.mark.keep_scene
 @pytest.mark.parametrize(("sigma", "rays"), [(0.0, 1), (0.01, 1)])
 def test_labels_of_the_pavement_agree_with_the_parameters(demo, sigma: float, rays: int) -> None:
     """99.9 % of the pavement's points lie in a strip of their class within 2 cm (+ three sigma with noise)."""
-    scenario, geometry, mesh = demo
+    scenario, geometry, scene = demo
     changed = scenario.scan.model_copy(update={"noise": scenario.scan.noise.model_copy(update={"range_sigma": sigma})})
-    scan = make_scan(scenario.model_copy(update={"scan": changed}), geometry, mesh)
+    scan = scan_of(scenario.model_copy(update={"scan": changed}), geometry, scene)
     points = concatenate([scan_block(scan, *task).points for task in scan.blocks()[::5]])
     wrong = misplaced_points(points, geometry, 0.02 + 3 * sigma)
     print(f"{wrong.mean():.4%} of {len(wrong)} points of the pavement lie outside the strips of their class")
@@ -114,11 +120,11 @@ def test_labels_of_the_pavement_agree_with_the_parameters(demo, sigma: float, ra
 
 @pytest.mark.keep_scene
 def test_points_of_the_road_lie_on_the_analytic_surface(demo) -> None:
-    scenario, geometry, mesh = demo
-    scan = make_scan(scenario, geometry, mesh)
+    scenario, geometry, scene = demo
+    scan = scan_of(scenario, geometry, scene)
     points = concatenate([scan_block(scan, *task).points for task in scan.blocks()[::7]])
     road = points.select(points.class_id == 1)
-    local = road.xyz - mesh.origin
+    local = road.xyz - scene.static.origin
     station, offset = geometry.alignment.project(local[:, :2])
     error = local[:, 2] - geometry.elevation(station, offset)
     error = error[np.isfinite(error)]
@@ -131,17 +137,18 @@ def test_points_of_the_road_lie_on_the_analytic_surface(demo) -> None:
 def test_casters_agree(demo) -> None:
     """Same face for 99.99 % of 200,000 rays with ranges within 0.1 mm; every other ray passes an edge that closely."""
     from synthroads_addon.blender.casters import make_caster
-    from synthroads_addon.core.scanning.pattern import rotating_mirror
+    from synthroads_addon.core.scanning.caster import FacePlanes
 
-    scenario, geometry, mesh = demo
-    scan = make_scan(scenario, geometry, mesh)
+    scenario, geometry, scene = demo
+    mesh, scan = scene.static, scan_of(scenario, geometry, scene)
     rng = np.random.default_rng(5)
     rays = []
     for strip in scan.path.strips:
+        poses = Poses.between(scan, strip, strip.start_time, strip.start_time + strip.duration)
         firsts = rng.integers(0, 7_400_000, 100)
-        rays += [rotating_mirror(scan.setting, scan.path, strip, int(first), 1000) for first in firsts]
-    origins = np.concatenate([p.origin for p in rays])
-    directions = np.concatenate([p.direction for p in rays])
+        rays += [make_pulses(scan, strip, poses, None, int(first), 1000) for first in firsts]
+    origins = np.concatenate([p.origin.T for p in rays])
+    directions = np.concatenate([p.direction.T for p in rays])
     hits = {}
     for name in ("bvhtree", "embree"):
         caster = make_caster(name, mesh)
@@ -153,7 +160,8 @@ def test_casters_agree(demo) -> None:
     same = a == b
     other = np.flatnonzero(~same)
     both = same & (a >= 0)
-    ranges = {n: scan.planes.ranges(h[both], origins[both], directions[both])[0] for n, h in hits.items()}
+    planes = FacePlanes(mesh)
+    ranges = {n: planes.meet(h[both], origins[both].T, directions[both].T)[0] for n, h in hits.items()}
     assert np.abs(ranges["bvhtree"] - ranges["embree"]).max() == 0.0  # one face, one plane: the same float64 range
     near = [
         min(edge_distance(mesh, face, origins[i], directions[i]) for face in (a[i], b[i]) if face >= 0) for i in other

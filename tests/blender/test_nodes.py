@@ -25,7 +25,7 @@ from synthroads_addon.blender.nodes.road import road_group
 from synthroads_addon.blender.nodes.road_layout import MarkingLayout, SideLayout
 from synthroads_addon.blender.nodes.strip import strip_group
 from synthroads_addon.blender.nodes.vehicle import vehicle_group
-from synthroads_addon.blender.nodes.vehicle_models import CHASSIS
+from synthroads_addon.core.parameters.chassis import CHASSIS
 
 LAYOUT = (
     SideLayout("Left", 3, (MarkingLayout("outer", "outer_edge", 0), MarkingLayout("dashes", "lane", 1))),

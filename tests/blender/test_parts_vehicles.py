@@ -9,11 +9,12 @@ import pytest
 from synthroads_addon.blender.compat import set_modifier_input
 from synthroads_addon.blender.materials import material
 from synthroads_addon.blender.nodes.vehicle import COLOR
-from synthroads_addon.blender.nodes.vehicle_models import CHASSIS, model_group
+from synthroads_addon.blender.nodes.vehicle_models import model_group
 from synthroads_addon.blender.parts.vehicles import MATERIALS
 from synthroads_addon.blender.scene import scene_mesh
 from synthroads_addon.core.cloud.labels import class_id
 from synthroads_addon.core.materials import materials
+from synthroads_addon.core.parameters.chassis import CHASSIS
 from synthroads_addon.core.parameters.model import Carriageway, Vehicle
 from synthroads_addon.core.parameters.vehicles import COLORS, VEHICLE_TYPES
 from synthroads_addon.core.scene_mesh import SceneMesh
@@ -84,7 +85,7 @@ class TestModels:
     @pytest.mark.parametrize("model", MODELS)
     def test_it_has_windows_wheels_lights_and_a_plate(self, model: str) -> None:
         mesh = alone(model)
-        for name in ("car_paint", "glass", "rubber", "lamp_glass", "lamp_red", "sheeting_white"):
+        for name in ("car_paint", "glass", "rubber", "lamp_glass", "lamp_red", "number_plate"):
             assert of_material(mesh, name).any(), name
         front, rear = (mesh.vertices[mesh.triangles[of_material(mesh, m)]] for m in ("lamp_glass", "lamp_red"))
         assert front[..., 1].min() > 0.0 > rear[..., 1].max()

@@ -17,8 +17,10 @@ from synthroads_addon.core.errors import Cancelled, InputError
 from synthroads_addon.core.parameters.limits import STANDARD_CROSS_SECTIONS
 from synthroads_addon.core.parameters.model import read_parameters
 from synthroads_addon.core.road_scenario import RoadScenario
+from synthroads_addon.core.scan_scenario import Platform
 from synthroads_addon.core.scanning.devices import device_names
-from synthroads_addon.core.scenario import FIDELITIES, Platform, Scenario, load_scenario, scenario_names
+from synthroads_addon.core.scanning.path import USUAL
+from synthroads_addon.core.scenario import FIDELITIES, Scenario, load_scenario, scenario_names
 from synthroads_addon.pipeline import FILES, Job, generate
 from synthroads_addon.ui import operators, properties, scan_job
 
@@ -130,8 +132,10 @@ def test_registering_twice_leaves_no_trace() -> None:
 def test_numbers_are_the_schemas(settings: Any, name: str) -> None:
     model, field = NUMBERS[name]
     schema = model.model_json_schema()["properties"][field]
+    schema |= schema.get("anyOf", [{}])[0]  # a field that may be left out
     shown = settings.bl_rna.properties[name]
-    assert shown.default == schema["default"]
+    usual = getattr(USUAL["uav"], name, None)
+    assert shown.default == (schema["default"] if usual is None else usual)
     assert shown.hard_min == np.float32(schema["minimum"])
     assert shown.hard_max == np.float32(schema["maximum"]) or shown.hard_max == 2**31 - 1 < schema["maximum"]
     assert shown.description == schema["description"].removesuffix(".")
@@ -143,11 +147,14 @@ def test_numbers_are_the_schemas(settings: Any, name: str) -> None:
 
 
 def test_choices_are_the_schemas(settings: Any) -> None:
-    shown = {name: settings.bl_rna.properties[name] for name in ("preset", "fidelity", "cross_section", "device")}
+    names = ("preset", "fidelity", "cross_section", "device", "platform")
+    shown = {name: settings.bl_rna.properties[name] for name in names}
     choices = {name: [item.identifier for item in entry.enum_items] for name, entry in shown.items()}
     assert choices["preset"] == scenario_names()
     assert choices["fidelity"] == list(FIDELITIES)
     assert choices["device"] == device_names()
+    assert choices["platform"] == list(USUAL)
+    assert shown["platform"].default == Scenario().scan.platform.kind
     for name in choices["cross_section"]:
         choose(settings, cross_section=name)
         assert settings.scenario().road.cross_section == name

@@ -1,17 +1,21 @@
 """LAZ files keep every attribute, say what they are, and never appear half-written."""
 
 import json
+import struct
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import laspy
 import numpy as np
 import pytest
 
+from synthroads_addon.core.cloud.attributes import ATTRIBUTES, COLUMNS, columns
 from synthroads_addon.core.cloud.labels import classes, las_codes
 from synthroads_addon.core.cloud.las import LasWriter
 from synthroads_addon.core.cloud.points import concatenate
 from synthroads_addon.core.errors import InputError, OutputError
+from tests.core.cloud_points import with_every_attribute
 
 SCALE = 65535 * 900.0
 ORIGIN = np.array([294_000.0, 5_628_000.0, 180.0])
@@ -100,5 +104,147 @@ def test_class_table_is_complete() -> None:
     rows = classes()
     assert [row.id for row in rows] == list(range(17))
     assert len({row.las for row in rows}) == 17
-    assert {row.five for row in rows} == {"ground", "road", "road_marking", "vegetation", "road_furniture"}
     assert all(row.las in (2, 5, 11, 17) or 64 <= row.las <= 255 for row in rows)
+
+
+def raw_header(path: Path) -> dict[str, Any]:
+    """Return the public header block's fields (LAS 1.4 R15, table 3) and the VLRs, read byte by byte."""
+    data = path.read_bytes()
+    names = "day year header_size offset_to_points vlrs format record_length".split()
+    fields = dict(zip(names, struct.unpack_from("<HHHIIBH", data, 90), strict=True))
+    fields |= {"signature": data[:4], "encoding": struct.unpack_from("<H", data, 6)[0], "version": tuple(data[24:26])}
+    fields["legacy"] = struct.unpack_from("<6I", data, 107)
+    fields["scale"], fields["offset"] = (np.array(struct.unpack_from("<3d", data, at)) for at in (131, 155))
+    bounds = struct.unpack_from("<6d", data, 179)
+    fields["max"], fields["min"] = np.array(bounds[::2]), np.array(bounds[1::2])
+    fields["waveform"], fields["evlr_start"], fields["evlrs"], fields["count"] = struct.unpack_from("<QQIQ", data, 227)
+    fields["by_return"] = np.array(struct.unpack_from("<15Q", data, 255))
+    at, records = fields["header_size"], []
+    for _ in range(fields["vlrs"]):
+        reserved, user, number, length = struct.unpack_from("<H16sHH", data, at)
+        assert reserved == 0
+        records.append((user.rstrip(b"\0").decode(), number, data[at + 54 : at + 54 + length]))
+        at += 54 + length
+    assert at == fields["offset_to_points"]
+    return fields | {"records": records}
+
+
+@pytest.mark.parametrize("name", ["cloud.laz", "cloud.las"])
+def test_header_keeps_the_rules_of_las_14(tmp_path: Path, points, name: str) -> None:
+    block = with_every_attribute(points)
+    with LasWriter(tmp_path / name, 25832, ORIGIN, SCALE, ATTRIBUTES) as writer:
+        writer.write(block)
+    head = raw_header(tmp_path / name)
+    assert (head["signature"], head["version"], head["header_size"]) == (b"LASF", (1, 4), 375)
+    assert head["encoding"] == 0b10000  # WKT, and nothing else
+    assert head["format"] == (7 | 128 if name.endswith("laz") else 7)
+    assert head["legacy"] == (0,) * 6
+    assert (head["waveform"], head["evlr_start"], head["evlrs"]) == (0, 0, 0)
+    assert (head["count"], head["by_return"].sum()) == (len(block), len(block))
+    np.testing.assert_array_equal(head["by_return"], np.bincount(block.return_number, minlength=16)[1:])
+    steps = np.rint((block.xyz - head["offset"]) / head["scale"])
+    np.testing.assert_array_equal(head["min"], steps.min(axis=0) * head["scale"] + head["offset"])
+    np.testing.assert_array_equal(head["max"], steps.max(axis=0) * head["scale"] + head["offset"])
+    records = {(user, number): data for user, number, data in head["records"]}
+    assert len(records) == len(head["records"])
+    assert records["LASF_Projection", 2112].startswith(b"PROJCS[")
+    assert records["LASF_Projection", 2112].endswith(b"]\0")
+    assert ("laszip encoded", 22204) in records or name.endswith("las")
+    _check_extra_bytes(records["LASF_Spec", 4], head)
+
+
+def _check_extra_bytes(data: bytes, head: dict[str, Any]) -> None:
+    """Check the record of extra bytes (LAS 1.4 R15, table 24) against the table of columns."""
+    expected = columns(ATTRIBUTES)
+    assert len(data) == 192 * len(expected)
+    sizes = {1: 1, 3: 2, 4: 2, 5: 4, 6: 4}
+    total = 0
+    for at, column in zip(range(0, len(data), 192), expected, strict=True):
+        reserved, kind, options, name = struct.unpack_from("<HBB32s", data, at)
+        assert (reserved, name.rstrip(b"\0").decode()) == (0, column.name)
+        assert options == (0 if column.whole else 0b11000)  # scale and offset are relevant; nothing else is set
+        assert data[at + 36 : at + 40] == bytes(4)
+        if not column.whole:
+            assert struct.unpack_from("<d", data, at + 112)[0] == column.scale
+            shift = head["offset"][column.component] if column.local else 0.0
+            assert struct.unpack_from("<d", data, at + 136)[0] == shift
+        assert data[at + 160 : at + 192].rstrip(b"\0").decode() == column.description
+        total += sizes[kind]
+    assert head["record_length"] == 36 + total
+
+
+def test_an_independent_reader_reads_every_attribute(tmp_path: Path, points) -> None:
+    """LASzip's own code, which has nothing in common with the writer's."""
+    pytest.importorskip("laszip")
+    block = with_every_attribute(points)
+    with LasWriter(tmp_path / "cloud.laz", 25832, ORIGIN, SCALE, ATTRIBUTES) as writer:
+        writer.write(block)
+    with laspy.open(tmp_path / "cloud.laz", laz_backend=laspy.LazBackend.Laszip) as reader:
+        las = reader.read()
+    names = list(las.point_format.extra_dimension_names)
+    assert names == [column.name for column in columns(ATTRIBUTES)]
+    assert np.abs(las.xyz - block.xyz).max() <= 0.0005 + 1e-9
+    np.testing.assert_array_equal(las.gps_time, block.gps_time)
+    for attribute in ATTRIBUTES:
+        for column in COLUMNS[attribute]:
+            error = np.abs(np.asarray(las[column.name]) - column.of(block)).max()
+            rounding = 8e-6  # of angles in single precision
+            assert error <= (0 if column.whole else column.scale / 2 + rounding), column.name
+
+
+def test_many_blocks_of_odd_sizes_fill_whole_chunks(tmp_path: Path) -> None:
+    """The buffer is flushed in the middle of blocks; the file is the same as from one block."""
+    from tests.core.conftest import make_points
+
+    block = make_points(130_001)
+    write(tmp_path / "one.las", block)
+    bounds = [0, 1, 32_768, 32_769, 99_000, 130_001]
+    write(tmp_path / "many.las", *(block.select(slice(a, b)) for a, b in zip(bounds, bounds[1:], strict=False)))
+    assert (tmp_path / "one.las").read_bytes() == (tmp_path / "many.las").read_bytes()
+
+
+def test_more_points_than_the_buffer_holds(tmp_path: Path, monkeypatch) -> None:
+    from synthroads_addon.core.cloud import las as las_module
+    from tests.core.conftest import make_points
+
+    block = make_points(5_000)
+    write(tmp_path / "large.laz", block)
+    monkeypatch.setattr(las_module, "_BUFFER", 999)
+    monkeypatch.setattr(las_module, "_SLICE", 100)
+    write(tmp_path / "small.laz", block)
+    assert (tmp_path / "large.laz").read_bytes() == (tmp_path / "small.laz").read_bytes()
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"class_id": np.full(10, 300)}, "class_id must lie from 0 to 255"),
+        ({"class_id": np.full(10, -1)}, "class_id must lie from 0 to 255"),
+        ({"return_number": np.full(10, 16, dtype=np.uint8)}, "at most 15"),
+        ({"scan_angle_deg": np.full(10, 181.0)}, "scan_angle is at most 180"),
+        ({"scan_angle_deg": np.full(10, 1e6)}, "scan_angle must lie from"),
+        ({"intensity": np.full(10, np.nan)}, "intensity must not be negative or NaN"),
+        ({"intensity": np.full(10, -1e-6)}, "intensity must not be negative or NaN"),
+        ({"gps_time": np.full(10, np.nan)}, "gps_time must be finite"),
+        ({"range": np.full(10, np.nan)}, "range must lie from"),
+        ({"range": np.full(10, 1e6)}, "range must lie from 0 to 429497"),
+        ({"xyz": np.full((10, 3), np.nan)}, "within 2147 km"),
+        ({"strip": np.full(10, 70_000)}, "strip must lie from 0 to 65535"),
+        ({"rgb": np.full((10, 3), 65_536)}, "rgb must lie from 0 to 65535"),
+    ],
+    ids=lambda value: value if isinstance(value, str) else "-".join(value),
+)
+def test_what_does_not_fit_is_refused_by_name(tmp_path: Path, points, change, message: str) -> None:
+    bad = replace(points.select(slice(0, 10)), **change)
+    with pytest.raises(OutputError, match=message):
+        write(tmp_path / "cloud.laz", bad)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_attribute_that_the_points_lack_is_refused(tmp_path: Path, points) -> None:
+    with (
+        pytest.raises(OutputError, match="normal"),
+        LasWriter(tmp_path / "cloud.laz", None, ORIGIN, SCALE, ("normal",)) as writer,
+    ):
+        writer.write(points)
+    assert list(tmp_path.iterdir()) == []

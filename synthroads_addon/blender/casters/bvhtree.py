@@ -14,9 +14,10 @@ class BVHTreeCaster:
     """Casts rays with Blender's bounding volume tree; always there, and slow."""
 
     name = "bvhtree"
+    main_thread_only = False
 
     def __init__(self, mesh: SceneMesh) -> None:
-        self._tree = BVHTree.FromPolygons(mesh.vertices.tolist(), mesh.triangles.tolist(), all_triangles=True)
+        self._tree = BVHTree.FromPolygons(mesh.vertices, mesh.triangles, all_triangles=True)
 
     def cast(
         self, origins: NDArray[np.float32], directions: NDArray[np.float32], maximum_range: float

@@ -11,12 +11,18 @@ from ...core.scene_mesh import SceneMesh
 
 
 class EmbreeCaster:
-    """Casts rays with Embree, in its robust mode (no ray slips through an edge that two faces share)."""
+    """Casts rays with Embree.
+
+    Args:
+        mesh: what rays are cast at.
+        robust: no ray slips through an edge that two faces share; a little slower.
+    """
 
     name = "embree"
+    main_thread_only = False
 
-    def __init__(self, mesh: SceneMesh) -> None:
-        self._scene = EmbreeScene(robust=True)
+    def __init__(self, mesh: SceneMesh, robust: bool = True) -> None:
+        self._scene = EmbreeScene(robust=robust)
         self._empty = len(mesh.triangles) == 0
         if not self._empty:
             self._mesh = TriangleMesh(self._scene, mesh.vertices, mesh.triangles)

@@ -5,9 +5,10 @@ from __future__ import annotations
 import bpy
 
 from ...core.cloud.labels import class_id
+from ...core.parameters.chassis import CHASSIS
 from . import operations as op
 from .builder import Tree, Value, node_group
-from .vehicle_models import CHASSIS, model_group
+from .vehicle_models import model_group
 from .vehicle_parts import declare_materials
 
 COLOR = "vehicle_color"

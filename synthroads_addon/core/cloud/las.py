@@ -1,65 +1,49 @@
 """LAS 1.4 / LAZ, point format 7, written block by block under a temporary name.
 
-Besides the standard fields each point has these extra bytes: ``class_id`` (see `labels`; the standard field
-``classification`` holds its LAS code), ``instance_id``, ``range`` (m) and ``incidence`` (deg). The scale of the 16-bit
-intensity stands as JSON in the VLR ``SynthRoads`` 1.
+Besides the standard fields each point has as extra bytes ``class_id`` (see `labels`; the standard field
+``classification`` holds its LAS code), ``instance_id`` and the attributes asked for (`attributes.COLUMNS`). The scale
+of the 16-bit intensity and the table of classes stand as JSON in the VLR ``SynthRoads`` 1.
 """
 
 from __future__ import annotations
 
+from contextlib import suppress
 from datetime import date
-from pathlib import Path
-from types import TracebackType
+from typing import Any
 
 import laspy
+import lazrs
 import numpy as np
 from laspy.vlrs.known import WktCoordinateSystemVlr
 from numpy.typing import NDArray
 
-from ..crs import wkt
 from ..errors import OutputError
 from ..schema import canonical_json
-from .labels import las_codes
+from .attributes import Column
 from .points import PointBlock
+from .writing import CloudWriter
 
 SCALE = 0.001
 """Size of a coordinate's step, m."""
 SCAN_ANGLE_STEP = 0.006
 """Degrees per step of the scan angle (LAS 1.4 R15, table 14)."""
-_EXTRA = (
-    laspy.ExtraBytesParams("class_id", "uint8", "SynthRoads class"),
-    laspy.ExtraBytesParams("instance_id", "uint32", "object's instance number"),
-    laspy.ExtraBytesParams("range", "uint32", "measured range, m", offsets=[0.0], scales=[0.0001]),
-    laspy.ExtraBytesParams("incidence", "uint16", "incidence angle, deg", offsets=[0.0], scales=[0.01]),
-)
+NO_STRIP = 65535
+"""`PointBlock.strip` of points of no strip, which LAS numbers 0; strips count from 1 there."""
+_CHUNK = 50_000
+"""Points in a chunk of LAZ, the unit of its compression: whole ones are compressed side by side."""
+_BUFFER = 8 * _CHUNK
+_SLICE = 32_768
+"""Points that are packed at a time: their intermediate arrays then stay in the processor's cache."""
 
 
-class LasWriter:
-    """Writes point blocks to a LAZ (or, by its ending, LAS) file; a context manager.
+class LasWriter(CloudWriter):
+    """Writes point blocks to a LAZ (or, by its ending, LAS) file; see `CloudWriter`."""
 
-    The file appears under its name only when the context ends without an exception.
+    faults = (OSError, lazrs.LazrsError)
 
-    Args:
-        path: file to write.
-        epsg: map coordinate system, or None.
-        offset: (3,) LAS offsets, map coordinates near the points, m.
-        intensity_scale: 16-bit steps per unit of `PointBlock.intensity`.
-
-    Attributes:
-        count: points written so far.
-        clipped: points whose intensity exceeded 16 bits.
-    """
-
-    def __init__(self, path: Path, epsg: int | None, offset: NDArray[np.float64], intensity_scale: float) -> None:
-        self.path = path
-        self.intensity_scale = intensity_scale
-        self.count = 0
-        self.clipped = 0
-        self._codes = las_codes()
-        self._header = self._make_header(epsg, np.floor(np.asarray(offset, dtype=np.float64)))
-        self._temporary = path.with_name(f".{path.name}.partial")
-
-    def __enter__(self) -> LasWriter:
+    def _open(self) -> None:
+        self._header = self._make_header()
+        self._codes = self.scheme.las_codes()
         self._file = self._temporary.open("wb")
         self._writer = laspy.LasWriter(
             self._file,
@@ -68,68 +52,118 @@ class LasWriter:
             laz_backend=laspy.LazBackend.LazrsParallel,
             closefd=False,
         )
-        return self
+        self._buffer = np.zeros(_BUFFER, dtype=self._header.point_format.dtype())
+        self._held = 0
+        self._low = np.full(3, np.iinfo(np.int32).max, dtype=np.int64)
+        self._high = np.full(3, np.iinfo(np.int32).min, dtype=np.int64)
+        self._by_return = np.zeros(16, dtype=np.int64)
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        try:
-            if kind is None:
-                self._writer.close()
-        except OSError as problem:
-            kind = type(problem)
-            raise OutputError(str(self.path), None, f"cannot be written ({problem.strerror})") from None
-        finally:
+    def _append(self, block: PointBlock) -> None:
+        first = 0
+        while first < len(block):
+            last = min(first + _SLICE, first + _BUFFER - self._held, len(block))
+            self._pack(block.select(slice(first, last)), self._buffer[self._held : self._held + last - first])
+            self._held += last - first
+            first = last
+            if self._held == _BUFFER:
+                self._flush()
+
+    def _finish(self) -> None:
+        self._flush()
+        header, count = self._writer.header, int(self._by_return.sum())
+        if count:
+            header.mins = self._low * header.scales + header.offsets
+            header.maxs = self._high * header.scales + header.offsets
+        header.point_count = count
+        header.number_of_points_by_return = self._by_return[1:].astype(np.uint64)
+        self._writer.close()
+        self._file.close()
+
+    def _abandon(self) -> None:
+        with suppress(AttributeError, OSError):
             self._file.close()
-            if kind is None:
-                self._temporary.replace(self.path)
-            else:
-                self._temporary.unlink(missing_ok=True)
+        with suppress(OSError):
+            self._temporary.unlink(missing_ok=True)
 
-    def write(self, block: PointBlock) -> None:
-        """Append a block; raise `OutputError` if a coordinate doesn't fit into LAS integers or the disk is full."""
-        if len(block) == 0:
-            return
-        record = laspy.ScaleAwarePointRecord.zeros(len(block), header=self._header)
-        steps = np.rint((block.xyz - self._header.offsets) / self._header.scales)
-        if not np.all(np.abs(steps) < 2**31):
-            worst = block.xyz[np.abs(steps).max(axis=1).argmax()]
+    def _flush(self) -> None:
+        """Hand the packed points on. laspy's own bookkeeping sorts and searches them: ours is kept while packing."""
+        if self._held:
+            record = laspy.PackedPointRecord(self._buffer[: self._held], self._header.point_format)
+            self._writer.point_writer.write_points(record)
+            self._held = 0
+
+    def _pack(self, block: PointBlock, record: NDArray[Any]) -> None:
+        """Turn points into LAS records, in place."""
+        self._pack_coordinates(block.xyz, record)
+        brightness = block.intensity * self.intensity_scale
+        np.rint(brightness, out=brightness)
+        if not brightness.min() >= 0:  # nor where it is NaN
+            raise OutputError(str(self.path), float(brightness.min()), "intensity must not be negative or NaN")
+        if brightness.max() > 65535:
+            self.clipped += int(np.count_nonzero(brightness > 65535))
+            np.minimum(brightness, 65535, out=brightness)
+        record["intensity"] = brightness
+        rgb = self.integers(block.rgb, "uint16", "rgb")
+        record["red"], record["green"], record["blue"] = rgb[:, 0], rgb[:, 1], rgb[:, 2]
+        self._pack_returns(block, record)
+        record["gps_time"] = self.finite(block.gps_time, "gps_time")
+        record["scan_angle"] = self._scan_angle(block)
+        record["point_source_id"] = self.integers(block.strip, "uint16", "strip") + np.uint16(1)
+        for column in self.columns:
+            record[column.name] = self.stored(column, block)
+        record["classification"] = self._codes[record["class_id"]]
+
+    def _pack_coordinates(self, xyz: NDArray[np.float64], record: NDArray[Any]) -> None:
+        steps = np.empty((3, len(xyz)))  # a row per axis: its extremes are found ten times as fast
+        np.subtract(xyz.T, self._header.offsets[:, None], out=steps)
+        steps *= 1.0 / SCALE
+        np.rint(steps, out=steps)
+        low, high = steps.min(axis=1), steps.max(axis=1)
+        if not (np.all(low >= -(2**31)) and np.all(high < 2**31)):
+            worst = xyz[np.abs(steps).max(axis=0).argmax()]
             raise OutputError(str(self.path), worst.tolist(), "coordinates must lie within 2147 km of the offset")
-        record.X, record.Y, record.Z = steps.astype(np.int32).T
-        brightness = np.rint(block.intensity * self.intensity_scale)
-        self.clipped += int(np.count_nonzero(brightness > 65535))
-        record.intensity = np.clip(brightness, 0, 65535).astype(np.uint16)
-        record.red, record.green, record.blue = block.rgb.T
-        record.classification = self._codes[block.class_id]
-        record.return_number = block.return_number
-        record.number_of_returns = block.number_of_returns
-        record.gps_time = block.gps_time
-        record.scan_angle = np.rint(block.scan_angle_deg / SCAN_ANGLE_STEP).astype(np.int16)
-        record.point_source_id = block.strip + 1
-        record["class_id"] = block.class_id
-        record["instance_id"] = block.instance_id
-        record["range"] = block.range
-        record["incidence"] = block.incidence_deg
-        try:
-            self._writer.write_points(record)
-        except OSError as problem:
-            raise OutputError(str(self.path), None, f"cannot be written ({problem.strerror})") from None
-        self.count += len(block)
+        record["X"], record["Y"], record["Z"] = steps
+        self._low = np.minimum(self._low, low.astype(np.int64))
+        self._high = np.maximum(self._high, high.astype(np.int64))
 
-    def _make_header(self, epsg: int | None, offset: NDArray[np.float64]) -> laspy.LasHeader:
+    def _pack_returns(self, block: PointBlock, record: NDArray[Any]) -> None:
+        """Pack return number and number of returns, four bits each."""
+        number = self.integers(block.return_number, "uint8", "return_number")
+        of = self.integers(block.number_of_returns, "uint8", "number_of_returns")
+        most = max(number.max(), of.max())
+        if most > 15:
+            raise OutputError(str(self.path), int(most), "returns of a pulse must be at most 15")
+        record["bit_fields"] = number | (of << np.uint8(4))
+        self._by_return += np.bincount(number, minlength=16)
+
+    def _scan_angle(self, block: PointBlock) -> NDArray[np.int16]:
+        steps = self.integers(block.scan_angle_deg, "int16", "scan_angle", SCAN_ANGLE_STEP)
+        if max(-int(steps.min()), int(steps.max())) > 30_000:
+            raise OutputError(str(self.path), float(np.abs(block.scan_angle_deg).max()), "scan_angle is at most 180")
+        return steps
+
+    def _make_header(self) -> laspy.LasHeader:
         header = laspy.LasHeader(point_format=7, version="1.4")
-        header.offsets, header.scales = offset, np.full(3, SCALE)
+        header.offsets, header.scales = self.offset, np.full(3, SCALE)
         header.system_identifier = "SynthRoads simulation"
         header.generating_software = "SynthRoads"
         # No wall clock in files: the same seed gives the same bytes on any day.
         header.creation_date = date(2000, 1, 1)
         header.global_encoding.wkt = True
-        header.add_extra_dims(list(_EXTRA))
+        header.add_extra_dims([self._extra_bytes(column) for column in self.columns])
         for extra in header.vlrs.get("ExtraBytesVlr")[0].extra_bytes_structs:
-            # laspy 2.7 takes the smallest and largest value from the first point of each block only; both are optional.
+            # Smallest and largest value are optional, and unknown until the end.
             extra.options &= ~(extra.MIN_BIT_MASK | extra.MAX_BIT_MASK)
-        notes = canonical_json({"intensity_scale": self.intensity_scale, "classes": "extra byte class_id"})
-        header.vlrs.append(laspy.VLR("SynthRoads", 1, "intensity scale", notes.encode()))
-        if epsg is not None:
-            header.vlrs.append(WktCoordinateSystemVlr(wkt(epsg)))
+        notes = canonical_json(self.notes())
+        header.vlrs.append(laspy.VLR("SynthRoads", 1, "intensity scale, classes", notes.encode()))
+        if self.crs_text:
+            header.vlrs.append(WktCoordinateSystemVlr(self.crs_text))
         return header
+
+    def _extra_bytes(self, column: Column) -> laspy.ExtraBytesParams:
+        if column.scale is None:
+            return laspy.ExtraBytesParams(column.name, column.dtype, column.description)
+        shift = self.offset[column.component] if column.local and column.component is not None else 0.0
+        return laspy.ExtraBytesParams(
+            column.name, column.dtype, column.description, offsets=[float(shift)], scales=[column.scale]
+        )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,6 +26,15 @@ class PointBlock:
         strip: (N,) uint16 from 0.
         range: (N,) float64 measured range, m.
         incidence_deg: (N,) float32 angle between beam and surface normal.
+
+    Only where something asks for them, else None:
+        normal: (N, 3) float32 unit normals towards the scanner.
+        material: (N,) uint16 index into the scene mesh's materials.
+        scanner: (N, 3) float64 map coordinates of where the pulse left the scanner.
+        true_range: (N,) float64 without any error, m.
+        true_xyz: (N, 3) float64 without any error.
+        roughness, metallic, specular: (N,) float32 material layers.
+        color_source: (N,) uint8, which image, or the material, gave colour and layers.
     """
 
     xyz: NDArray[np.float64]
@@ -39,16 +49,29 @@ class PointBlock:
     strip: NDArray[np.uint16]
     range: NDArray[np.float64]
     incidence_deg: NDArray[np.float32]
+    normal: NDArray[np.float32] | None = None
+    material: NDArray[np.uint16] | None = None
+    scanner: NDArray[np.float64] | None = None
+    true_range: NDArray[np.float64] | None = None
+    true_xyz: NDArray[np.float64] | None = None
+    roughness: NDArray[np.float32] | None = None
+    metallic: NDArray[np.float32] | None = None
+    specular: NDArray[np.float32] | None = None
+    color_source: NDArray[np.uint8] | None = None
 
     def __len__(self) -> int:
         return len(self.xyz)
 
-    def select(self, keep: NDArray[np.bool_] | NDArray[np.intp]) -> PointBlock:
-        """Return the points chosen by a mask or by indices."""
-        return PointBlock(**{f.name: getattr(self, f.name)[keep] for f in fields(self)})
+    def select(self, keep: NDArray[np.bool_] | NDArray[np.intp] | slice) -> PointBlock:
+        """Return the points chosen by a mask, indices or a slice."""
+        return PointBlock(**{name: array[keep] for name, array in self.attributes().items()})
+
+    def attributes(self) -> dict[str, NDArray[Any]]:
+        """Return the arrays that are there, by name."""
+        return {f.name: array for f in fields(self) if (array := getattr(self, f.name)) is not None}
 
 
 def concatenate(blocks: list[PointBlock]) -> PointBlock:
-    """Return one block of all points, in order; at least one block is needed."""
-    names = [f.name for f in fields(PointBlock)]
+    """Return one block of all points, in order; at least one block is needed, and all have the same attributes."""
+    names = blocks[0].attributes()
     return PointBlock(**{name: np.concatenate([getattr(block, name) for block in blocks]) for name in names})

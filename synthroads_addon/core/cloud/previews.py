@@ -1,19 +1,25 @@
-"""Pictures of a cloud from above, gathered block by block: by class, by intensity, in colour."""
+"""Pictures of a cloud, gathered block by block: from above by class, intensity and colour, and a cross-section."""
 
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from PIL import Image, ImageDraw, ImageFont
 
-from .labels import class_colors, class_id, classes
+from .labels import ClassScheme, class_scheme
+from .picture import PAPER, Axes, GrayBar, class_legend, framed, gray, nice_step
 from .points import PointBlock
+from .raster import Raster
 
 WIDTH = 1800
-_MARGIN, _FOOTER = 12, 72
-_PAPER, _INK = (226, 231, 238), (40, 40, 44)
+"""Width of the pictures, pixels."""
+_LOWEST = 320
+"""Height (pixels), more or less, that a cross-section is exaggerated to, if it is lower."""
+_MOST_PIXELS = 1600
+_SECTION_PAPER = (172, 187, 204)
+"""White markings and dark pavement, both only points here, stand out from it."""
 
 
 class TopView:
@@ -21,114 +27,138 @@ class TopView:
 
     Args:
         start, end: (2,) map coordinates of the road's ends.
-        half_width: reach to either side of the line between them, m; what lies beyond is left out.
+        low, high: reach to the right and to the left of the line between them, m; what lies beyond is left out.
+        scheme: what the points' classes are; the 17 if not given.
     """
 
-    def __init__(self, start: NDArray[np.float64], end: NDArray[np.float64], low: float, high: float) -> None:
+    def __init__(
+        self,
+        start: NDArray[np.float64],
+        end: NDArray[np.float64],
+        low: float,
+        high: float,
+        scheme: ClassScheme | None = None,
+    ) -> None:
         chord = np.asarray(end) - np.asarray(start)
         length = max(float(np.hypot(*chord)), 1.0)
         self.along = chord / length if length > 1.0 else np.array([1.0, 0.0])
         self.start = np.asarray(start, dtype=np.float64)
+        self.scheme = scheme or class_scheme("17")
         border = 0.02 * length + 1.0
-        self.left, self.low = -border, low
-        self.pixel = max(length + 2 * border, high - low) / WIDTH
-        self.width = max(1, int(np.ceil((length + 2 * border) / self.pixel)))
-        self.height = max(1, int(np.ceil((high - low) / self.pixel)))
-        cells = self.width * self.height
-        self.count = np.zeros(cells)
-        self.intensity = np.zeros(cells)
-        self.rgb = np.zeros((3, cells))
-        self.top = np.full(cells, -np.inf)
-        self.label = np.full(cells, 255, dtype=np.uint8)
+        pixel = max(length + 2 * border, high - low) / WIDTH
+        size = (max(1, int(np.ceil((length + 2 * border) / pixel))), max(1, int(np.ceil((high - low) / pixel))))
+        self.raster = Raster(-border, low, size, pixel, pixel)
+        self.pixel = pixel
+        # A line is thinner than a pixel: let it win over the pavement.
         self._lift = np.zeros(256)
-        self._lift[class_id("road_marking")] = 0.3  # a line is thinner than a pixel: let it win over the pavement
+        self._lift[[row.id for row in self.scheme.rows if row.name == "road_marking"]] = 0.3
+        self._measure = Brightness()
 
     def add(self, block: PointBlock) -> None:
         """Add a block's points."""
         relative = block.xyz[:, :2] - self.start
         across = relative @ np.array([-self.along[1], self.along[0]])
-        column = np.floor((relative @ self.along - self.left) / self.pixel).astype(np.intp)
-        row = self.height - 1 - np.floor((across - self.low) / self.pixel).astype(np.intp)
-        inside = (column >= 0) & (column < self.width) & (row >= 0) & (row < self.height)
-        cell = (row * self.width + column)[inside]
-        if len(cell) == 0:
-            return
-        first, last = int(cell.min()), int(cell.max()) + 1
-        window, size = slice(first, last), last - first
+        height = block.xyz[:, 2] + self._lift[block.class_id]
+        self.raster.add(block, (relative @ self.along, across), height, self._measure.of(block))
 
-        def total(weights: NDArray[np.float64] | None = None) -> NDArray[np.float64]:
-            return np.bincount(cell - first, weights, size).astype(np.float64)
-
-        self.count[window] += total()
-        self.intensity[window] += total((block.intensity * block.range**2)[inside])
-        for channel in range(3):
-            self.rgb[channel, window] += total(block.rgb[inside, channel].astype(np.float64))
-        self._keep_highest(cell, block.xyz[inside, 2], block.class_id[inside])
-
-    def save(self, folder: Path, epsg: int) -> list[Path]:
+    def save(self, folder: Path, epsg: int | None, has_color: bool = True) -> list[Path]:
         """Write ``preview_class.png``, ``preview_intensity.png`` and ``preview_rgb.png``; return their paths."""
-        filled = self.count > 0
-        number = np.maximum(self.count, 1)
-        pictures = {
-            "class": (class_colors()[self.label], [(c.name.replace("_", " "), c.color) for c in self._present()]),
-            "intensity": self._gray(self.intensity / number, filled),
-            "rgb": ((self.rgb / number / 256).T, []),
+        raster = self.raster
+        filled = raster.count > 0
+        shades, bar = gray(raster.intensity(), filled, self._measure.text)
+        pictures: dict[str, tuple[NDArray[Any], list | GrayBar | None]] = {
+            "class": (self.scheme.colors()[raster.label], class_legend(self.scheme.rows, raster.label[filled])),
+            "intensity": (shades, bar),
         }
+        if has_color:
+            pictures["rgb"] = (raster.rgb(), None)
+        system = f"   EPSG:{epsg}" if epsg else ""
+        axes = Axes(raster.left, raster.low, self.pixel, self.pixel)
+        north = (float(self.along[1]), float(self.along[0]))
         paths = []
-        for name, (pixels, legend) in pictures.items():
-            canvas = np.where(filled[:, None], pixels, _PAPER).astype(np.uint8)
+        for name, (colors, legend) in pictures.items():
+            title = f"{name}   {int(raster.count.sum()):,} points{system}   pixel {self.pixel:.3g} m"
             paths.append(folder / f"preview_{name}.png")
-            self._draw(canvas.reshape(self.height, self.width, 3), name, legend, epsg).save(paths[-1])
+            framed(raster.picture(colors, PAPER), title, legend, axes, north).save(paths[-1])
         return paths
 
-    def _keep_highest(self, cell: NDArray[np.intp], z: NDArray[np.float64], label: NDArray[np.uint8]) -> None:
-        height = z + self._lift[label]
-        higher = height > self.top[cell]
-        cell, height, label = cell[higher], height[higher], label[higher]
-        order = np.argsort(height, kind="stable")
-        self.top[cell[order]] = height[order]
-        self.label[cell[order]] = label[order]
 
-    def _present(self) -> list:
-        seen = set(np.unique(self.label).tolist())
-        return [row for row in classes() if row.id in seen]
+class CrossSection:
+    """A cut through the cloud, seen along the road: distances from the cut's middle, to the left negative.
 
-    def _gray(self, values: NDArray[np.float64], filled: NDArray[np.bool_]) -> tuple[NDArray[np.float64], list]:
-        low, high = np.quantile(values[filled], [0.005, 0.995]) if filled.any() else (0.0, 1.0)
-        gray = np.clip((values - low) / max(high - low, 1e-12), 0, 1) * 255
-        legend = [
-            (f"{low:.2f}", (0, 0, 0)),
-            (f"{high:.2f}  intensity x squared range (white target = 1)", (255, 255, 255)),
-        ]
-        return np.repeat(gray[:, None], 3, axis=1), legend
+    Args:
+        middle: (2,) map coordinates of the cut's middle.
+        right: (2,) direction of the cut, to the right as one looks along the road.
+        reach: length of the cut to either side, m.
+        depth: thickness of the slab whose points are drawn, m.
+        heights: lowest and highest height, m.
+        scheme: what the points' classes are; the 17 if not given.
+        by_class: colour by class, else by intensity.
+    """
 
-    def _draw(self, pixels: NDArray[np.uint8], name: str, legend: list, epsg: int) -> Image.Image:
-        font = ImageFont.load_default(size=17)
-        size = (max(self.width, WIDTH // 2) + 2 * _MARGIN, self.height + 2 * _MARGIN + _FOOTER)
-        picture = Image.new("RGB", size, _PAPER)
-        picture.paste(Image.fromarray(pixels), (_MARGIN, _MARGIN))
-        draw = ImageDraw.Draw(picture)
-        line = self.height + 2 * _MARGIN + 4
-        step = 50 if self.pixel < 0.5 else 10 ** np.ceil(np.log10(self.pixel * 100))
-        draw.rectangle([_MARGIN, line + 8, _MARGIN + step / self.pixel, line + 13], fill=_INK)
-        draw.text((_MARGIN, line + 18), f"{step:g} m", fill=_INK, font=font)
-        self._north(draw, (_MARGIN + step / self.pixel + 45, line + 26))
-        x = _MARGIN + step / self.pixel + 90
-        title = f"{name}   {int(self.count.sum()):,} points   EPSG:{epsg}   pixel {self.pixel:.2f} m"
-        draw.text((x, line), title, fill=_INK, font=font)
-        for text, color in legend:
-            draw.rectangle([x, line + 30, x + 16, line + 46], fill=color, outline=_INK)
-            draw.text((x + 22, line + 28), text, fill=_INK, font=font)
-            x += 40 + draw.textlength(text, font=font)
-        return picture
+    def __init__(
+        self,
+        middle: NDArray[np.float64],
+        right: NDArray[np.float64],
+        reach: float,
+        depth: float,
+        heights: tuple[float, float],
+        scheme: ClassScheme | None = None,
+        by_class: bool = True,
+    ) -> None:
+        self.middle = np.asarray(middle, dtype=np.float64)
+        self.right = np.asarray(right, dtype=np.float64) / np.hypot(*right)
+        self.depth = depth
+        self.scheme = scheme or class_scheme("17")
+        self.by_class = by_class
+        pixel = 2 * reach / WIDTH
+        low, high = heights[0] - 0.5, heights[1] + 0.5
+        wanted = _LOWEST * pixel / (high - low)
+        self.exaggeration = 1.0 if wanted <= 1 else min(10.0, nice_step(1.4 * wanted))
+        up = max(pixel / self.exaggeration, (high - low) / _MOST_PIXELS)
+        self.exaggeration = pixel / up
+        self.raster = Raster(-reach, low, (WIDTH, max(1, int(np.ceil((high - low) / up)))), pixel, up)
+        self._measure = Brightness()
 
-    def _north(self, draw: ImageDraw.ImageDraw, centre: tuple[float, float]) -> None:
-        """Draw an arrow to the north: the picture is turned by the road's direction."""
-        right, up = self.along[1], self.along[0]  # north in picture axes
-        x, y = centre
-        tip = (x + 20 * right, y - 20 * up)
-        draw.line([(x - 20 * right, y + 20 * up), tip], fill=_INK, width=2)
-        for side in (-1, 1):
-            draw.line([tip, (x + 10 * right + side * 6 * up, y - 10 * up + side * 6 * right)], fill=_INK, width=2)
-        beside = (x + 30 * right, y - 30 * up)
-        draw.text(beside, "N", fill=_INK, font=ImageFont.load_default(size=14), anchor="mm")
+    def add(self, block: PointBlock) -> None:
+        """Add a block's points; those outside the slab are left out."""
+        relative = block.xyz[:, :2] - self.middle
+        away = np.abs(relative @ np.array([-self.right[1], self.right[0]]))
+        inside = np.flatnonzero(away <= self.depth / 2)
+        if len(inside):
+            part = block.select(inside)
+            place = (relative[inside] @ self.right, part.xyz[:, 2])
+            self.raster.add(part, place, -away[inside], self._measure.of(part))
+
+    def save(self, path: Path, what: str = "cross-section") -> Path:
+        """Write the picture; ``what`` begins its title."""
+        raster = self.raster
+        filled = raster.count > 0
+        legend: list | GrayBar
+        colors: NDArray[Any]
+        if self.by_class:
+            colors, legend = self.scheme.colors()[raster.label], class_legend(self.scheme.rows, raster.label[filled])
+        else:
+            colors, legend = gray(raster.intensity(), filled, self._measure.text)
+        scale = "" if abs(self.exaggeration - 1) < 0.01 else f"   heights x {self.exaggeration:.3g}"
+        title = f"{what}   {int(raster.count.sum()):,} points in {self.depth:g} m{scale}"
+        axes = Axes(raster.left, raster.low, raster.across, raster.up)
+        framed(raster.picture(colors, _SECTION_PAPER), title, legend, axes, ticks=True).save(path)
+        return path
+
+
+class Brightness:
+    """What is drawn as intensity: times the squared range where the points have one, so that nearness doesn't show.
+
+    Attributes:
+        text: what it is.
+    """
+
+    text = "intensity as stored"
+
+    def of(self, block: PointBlock) -> NDArray[np.float64]:
+        """Return a block's values (N,)."""
+        if not len(block) or np.isnan(block.range[0]):
+            return block.intensity
+        self.text = "intensity x squared range (white target = 1)"
+        return block.intensity * block.range**2

@@ -13,9 +13,15 @@ Float = NDArray[np.float64]
 
 
 class Caster(Protocol):
-    """Finds the first face that each ray meets. Safe to call from several threads at once."""
+    """Finds the first face that each ray meets.
+
+    Attributes:
+        name: as `scan.caster` in a scenario.
+        main_thread_only: whether `cast` must be called from Blender's main thread; else any threads may, side by side.
+    """
 
     name: str
+    main_thread_only: bool
 
     def cast(
         self, origins: NDArray[np.float32], directions: NDArray[np.float32], maximum_range: float
@@ -34,30 +40,52 @@ class FacePlanes:
     """The planes of a mesh's faces in float64: n . x = c.
 
     Attributes:
-        planes: (T, 4) unit normal and c; the normal of a face without area is 0.
+        planes: (4, T) unit normal and c, a row each; the normal of a face without area is 0.
     """
 
     def __init__(self, mesh: SceneMesh) -> None:
-        corner = mesh.vertices[mesh.triangles[:, 0]].astype(np.float64)
-        normals = mesh.normals()
-        self.planes: Float = np.column_stack([normals, np.einsum("ij,ij->i", normals, corner)])
+        self.planes: Float = np.empty((4, len(mesh.triangles)))
+        for start in range(0, len(mesh.triangles), _BLOCK):
+            self._fill(mesh, slice(start, start + _BLOCK))
 
-    def ranges(self, faces: NDArray[np.int32], origins: Float, directions: Float) -> tuple[Float, Float, Float]:
-        """Return range, cosine of incidence and unit normals towards the scanner of rays that hit ``faces``.
+    def _fill(self, mesh: SceneMesh, block: slice) -> None:
+        a, b, c = (mesh.vertices[mesh.triangles[block, i]].T.astype(np.float64) for i in range(3))
+        b -= a
+        c -= a
+        normal = self.planes[:3, block]
+        for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
+            normal[i] = b[j] * c[k] - b[k] * c[j]
+        length = np.sqrt(np.einsum("ij,ij->j", normal, normal))
+        normal /= np.where(length > 0.0, length, 1.0)
+        self.planes[3, block] = np.einsum("ij,ij->j", normal, a)
+
+    def meet(self, faces: NDArray[np.int32], origins: Float, directions: Float) -> tuple[Float, Float]:
+        """Return where rays meet the planes of ``faces``: range (m) and n . d, whose size is the cosine of incidence.
 
         Args:
-            faces: (N,) faces hit; all >= 0.
-            origins: (N, 3) in float64.
-            directions: (N, 3) unit vectors in float64.
+            faces: (...) all >= 0.
+            origins: (3, ...) in float64; of the faces' shape, or one that spreads to it.
+            directions: (3, ...) unit vectors in float64; of the faces' shape.
 
         Returns:
-            (N,) range in m, (N,) cosine of the incidence angle in 0 to 1 (surfaces have two sides), (N, 3) normals.
+            (...) range, not finite for a ray in the plane or a face without area; (...) n . d, negative where the ray
+            meets the side that the normal points to.
         """
-        plane = self.planes[faces]
-        normal = plane[:, :3]
-        along = np.einsum("ij,ij->i", normal, directions)
-        height = plane[:, 3] - np.einsum("ij,ij->i", normal, origins)
+        height, product = np.take(self.planes[3], faces), np.empty(faces.shape)
+        along = np.zeros(faces.shape)
+        for i in range(3):
+            normal = np.take(self.planes[i], faces)
+            along += np.multiply(normal, directions[i], out=product)
+            height -= np.multiply(normal, origins[i], out=product)
         with np.errstate(divide="ignore", invalid="ignore"):
-            distance = height / along
-        facing = np.where(along[:, None] > 0.0, -normal, normal)
-        return distance, np.minimum(np.abs(along), 1.0), facing
+            height /= along
+        return height, along
+
+    def normals(self, faces: NDArray[np.int32], along: Float) -> Float:
+        """Return (3, H) unit normals of faces, turned towards rays with n . d = ``along`` (H,)."""
+        result = np.take(self.planes[:3], faces, axis=1)
+        result *= np.where(along > 0.0, -1.0, 1.0)
+        return result
+
+
+_BLOCK = 1 << 16

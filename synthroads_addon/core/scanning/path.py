@@ -1,62 +1,53 @@
-"""The platform's path: strips along the centreline, there and back."""
+"""Where the scanner is at any time: `make_path` for every kind of platform, and what paths follow."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
 
-import numpy as np
-from numpy.typing import NDArray
+from ..errors import InputError
+from ..scan_scenario import Platform
+from .path_base import KNOT_ERROR, KNOT_RANGE, TURNAROUND, USUAL, Path, Strip, Usual
+from .path_guides import Guide, RoadGuide, SmoothedGuide
+from .path_moving import MovingPath
+from .path_polyline import PolylineGuide
+from .path_trajectory import TrajectoryPath
+from .path_tripod import TripodPath
 
-from ..parameters.geometry import RoadGeometry
-from ..scenario import Platform
-
-Float = NDArray[np.float64]
-
-TURNAROUND = 10.0
-"""Seconds between two strips."""
-
-
-@dataclass(frozen=True)
-class Strip:
-    """One pass along the road.
-
-    Attributes:
-        index: number of the strip, from 0.
-        start_time: time of its first pulse, s.
-        duration: s.
-        lateral_offset: offset from the centreline, m.
-        forward: with the stations, or against them.
-    """
-
-    index: int
-    start_time: float
-    duration: float
-    lateral_offset: float
-    forward: bool
+__all__ = [
+    "KNOT_ERROR",
+    "KNOT_RANGE",
+    "TURNAROUND",
+    "USUAL",
+    "Guide",
+    "MovingPath",
+    "Path",
+    "PolylineGuide",
+    "RoadGuide",
+    "SmoothedGuide",
+    "Strip",
+    "TrajectoryPath",
+    "TripodPath",
+    "Usual",
+    "make_path",
+]
 
 
-class FlightPath:
-    """Strips at a constant height above the centreline's elevation, parallel to the centreline.
+def make_path(platform: Platform, guide: Guide, origin: Sequence[float] | None = None) -> Path:
+    """Return the path of a platform.
+
+    Args:
+        platform: what carries the scanner, and where; what it leaves open is usual for its kind (`USUAL`).
+        guide: the centreline that it follows.
+        origin: map coordinates of the local origin (m), for a trajectory's file; the guide's if not given.
 
     Raises:
-        InputError: never; the platform's limits are checked by the scenario.
+        InputError: the path would turn back on itself, a station isn't on the guide, the ground below isn't known, or
+            the trajectory's file is missing or wrong.
     """
-
-    def __init__(self, geometry: RoadGeometry, platform: Platform) -> None:
-        self.geometry = geometry
-        self.platform = platform
-        duration = geometry.length / platform.speed
-        self.strips = tuple(
-            Strip(i, i * (duration + TURNAROUND), duration, offset, i % 2 == 0)
-            for i, offset in enumerate(platform.lateral_offsets)
-        )
-
-    def pose(self, strip: Strip, time: Float) -> tuple[Float, Float]:
-        """Return local positions (N, 3) and headings (N,) in radians at times (N,) since the first strip's start."""
-        run = (time - strip.start_time) * self.platform.speed
-        station = run if strip.forward else self.geometry.length - run
-        plan, heading, _ = self.geometry.alignment.frame(station)
-        left = np.stack([-np.sin(heading), np.cos(heading)], axis=1)
-        height = self.geometry.profile.elevation(station) + self.platform.height
-        position = np.column_stack([plan + strip.lateral_offset * left, height])
-        return position, heading if strip.forward else heading + np.pi
+    if platform.kind == "trajectory":
+        return TrajectoryPath(platform, guide, origin)
+    if platform.file is not None:
+        raise InputError("scan.platform.file", platform.file, f"only a trajectory has one, not a {platform.kind}")
+    if platform.kind == "tripod":
+        return TripodPath(platform, guide)
+    return MovingPath(platform, guide)

@@ -1,13 +1,14 @@
-"""From the rays of a pulse to its returns: echoes closer than the range resolution are one."""
+"""From the surfaces that the rays of a pulse meet to its returns: echoes closer than the range resolution are one."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 from numpy.typing import NDArray
 
 Float = NDArray[np.float64]
+Index = NDArray[np.intp]
 
 
 @dataclass(frozen=True)
@@ -16,80 +17,138 @@ class Echoes:
 
     Attributes:
         pulse: (N,) index of the pulse.
-        ray: (N,) flat index (pulse * K + k) of the ray that carries the most energy of the return.
-        range: (N,) mean range of the return's rays, weighted by ``share * reflectance``, m.
-        intensity: (N,) sum over the return's rays.
+        hit: (N,) the hit that carries the most energy of the return: k * P + p for ray k of pulse p, and K * P + b for
+            the b-th hit behind a permeable surface.
+        range: (N,) mean range of the return's hits by their weights, m.
+        intensity: (N,) sum over the return's hits.
+        weight: (N,) likewise.
     """
 
-    pulse: NDArray[np.intp]
-    ray: NDArray[np.intp]
+    pulse: Index
+    hit: Index
     range: Float
+    intensity: Float
+    weight: Float
+
+
+@dataclass(frozen=True)
+class Marks:
+    """What hits add to returns; all arrays have one shape.
+
+    Attributes:
+        distance: m; inf where nothing is hit.
+        weight: in the mean range, positive.
+        intensity: of each hit.
+    """
+
+    distance: Float
+    weight: Float
     intensity: Float
 
 
-def group_returns(ranges: Float, weights: Float, intensities: Float, resolution: float) -> Echoes:
-    """Group the rays of every pulse into returns.
+def group_returns(first: Marks, behind: Marks, pulse: Index, resolution: float) -> Echoes:
+    """Group the hits of every pulse into returns.
 
-    Sorted by range, a ray that lies farther than ``resolution`` behind the one before begins a new return.
+    Sorted by range, a hit that lies farther than ``resolution`` behind the one before begins a new return. A return's
+    range is the mean of its hits by weight, so that the mean over all returns by their summed weights is the mean over
+    the footprint.
 
     Args:
-        ranges: (P, K) m; inf where a ray hit nothing.
-        weights: (P, K) weight of each ray in the mean range.
-        intensities: (P, K) intensity that each ray adds.
+        first: (K, P) of what K rays of P pulses meet first.
+        behind: (B,) of what lies behind permeable surfaces.
+        pulse: (B,) pulses of these.
         resolution: m.
     """
-    _pulses, _rays = ranges.shape
-    nearest, farthest = ranges.min(axis=1), ranges.max(axis=1)
+    nearest, farthest = first.distance.min(axis=0), first.distance.max(axis=0)
+    single = (farthest <= nearest + resolution) & (farthest < np.inf)
+    mixed = ~single & (nearest < np.inf)
+    if len(pulse):
+        single[pulse] = False
+        mixed[pulse] = True
+    one = _whole_pulses(np.flatnonzero(single), np.where(single, nearest, 0.0), first)
+    chosen = np.flatnonzero(mixed)
+    if not len(chosen):
+        return one
+    return _merged(one, _split_pulses(chosen, first, behind, pulse, resolution))
+
+
+def _whole_pulses(pulse: Index, nearest: Float, first: Marks) -> Echoes:
+    """Return one echo for each of the pulses whose rays all hit within the resolution."""
+    rays, pulses = first.distance.shape
+    if rays == 1:
+        columns = (np.take(array[0], pulse) for array in (first.distance, first.intensity, first.weight))
+        return Echoes(pulse, pulse, *columns)
+    # Worked out for all pulses and taken of these: most are. Differences to the nearest keep the last digits.
+    near = first.distance - nearest
     with np.errstate(invalid="ignore"):
-        single = farthest - nearest <= resolution  # NaN (nothing hit at all) is not single
-    mixed = np.flatnonzero(~single & np.isfinite(nearest))
-    one = _whole_pulses(np.flatnonzero(single), ranges, weights, intensities)
-    several = _split_pulses(mixed, ranges, weights, intensities, resolution)
-    merged = [np.concatenate([getattr(one, f), getattr(several, f)]) for f in ("pulse", "ray", "range", "intensity")]
-    order = np.lexsort((merged[2], merged[0]))
-    return Echoes(*(column[order] for column in merged))
+        near *= first.weight
+        total = first.weight.sum(axis=0)
+        mean = nearest + near.sum(axis=0) / total
+    energy = first.intensity.sum(axis=0)
+    strongest = first.intensity.argmax(axis=0)
+    columns = (np.take(array, pulse) for array in (mean, energy, total))
+    return Echoes(pulse, np.take(strongest, pulse) * pulses + pulse, *columns)
 
 
-def _whole_pulses(pulse: NDArray[np.intp], ranges: Float, weights: Float, intensities: Float) -> Echoes:
-    """Return one echo for each pulse whose rays all hit within the resolution."""
-    if ranges.shape[1] == 1:
-        return Echoes(pulse, pulse, ranges[pulse, 0], intensities[pulse, 0])
-    reference = ranges[pulse].min(axis=1)
-    weight = weights[pulse]
-    # Averaging differences to the nearest ray keeps the last digits of long ranges.
-    mean = reference + np.einsum("pk,pk->p", weight, ranges[pulse] - reference[:, None]) / weight.sum(axis=1)
-    energy = intensities[pulse]
-    strongest = pulse * ranges.shape[1] + energy.argmax(axis=1)
-    return Echoes(pulse, strongest, mean, energy.sum(axis=1))
-
-
-def _split_pulses(
-    pulse: NDArray[np.intp], ranges: Float, weights: Float, intensities: Float, resolution: float
-) -> Echoes:
-    """Return the echoes of pulses whose rays hit at several ranges, or partly nothing."""
-    rays = ranges.shape[1]
-    order = np.argsort(ranges[pulse], axis=1, kind="stable")
-    flat = (pulse[:, None] * rays + order).ravel()
-    distance = ranges.ravel()[flat]
-    hit = np.isfinite(distance)
-    flat, distance = flat[hit], distance[hit]
-    owner = flat // rays
-    begins = np.ones(len(flat), dtype=bool)
-    begins[1:] = (np.diff(owner) != 0) | (np.diff(distance) > resolution)
-    starts = np.flatnonzero(begins)
-    if len(starts) == 0:
+def _split_pulses(chosen: Index, first: Marks, behind: Marks, pulse: Index, resolution: float) -> Echoes:
+    """Return the echoes of pulses that meet surfaces at several ranges, or partly nothing, or something behind."""
+    rays, pulses = first.distance.shape
+    near = np.take(first.distance, chosen, axis=1)
+    ray, column = np.nonzero(near < np.inf)
+    hit = np.concatenate([ray * pulses + chosen[column], rays * pulses + np.arange(len(pulse))])
+    owner = np.concatenate([chosen[column], pulse])
+    reach = np.concatenate([near[ray, column], behind.distance])
+    if not len(hit):
         nothing = np.empty(0, dtype=np.intp)
-        return Echoes(nothing, nothing, np.empty(0), np.empty(0))
+        return Echoes(nothing, nothing, np.empty(0), np.empty(0), np.empty(0))
+    # One key for both: ranges of some kilometres keep a micrometre beside the pulses of a chunk.
+    order = np.argsort(owner * (2.0 * max(1.0, float(reach.max()))) + reach, kind="stable")
+    hit, owner, reach = hit[order], owner[order], reach[order]
+    begins = np.ones(len(hit), dtype=bool)
+    begins[1:] = (owner[1:] != owner[:-1]) | (np.diff(reach) > resolution)
+    starts = np.flatnonzero(begins)
     group = np.cumsum(begins) - 1
-    weight, energy = weights.ravel()[flat], intensities.ravel()[flat]
-    nearest = distance[starts]
-    mean = nearest + np.add.reduceat(weight * (distance - nearest[group]), starts) / np.add.reduceat(weight, starts)
-    strongest = np.lexsort((-energy, group))[starts]
-    return Echoes(owner[starts], flat[strongest], mean, np.add.reduceat(energy, starts))
+    share = _of_both(first.weight, behind.weight, hit)
+    energy = _of_both(first.intensity, behind.intensity, hit)
+    begin, total = reach[starts], np.add.reduceat(share, starts)
+    mean = begin + np.add.reduceat(share * (reach - begin[group]), starts) / total
+    strongest = hit[_strongest(energy, group, starts)]
+    return Echoes(owner[starts], strongest, mean, np.add.reduceat(energy, starts), total)
+
+
+def _of_both(first: Float, behind: Float, hit: Index) -> Float:
+    """Return the values of hits, see `Echoes.hit`."""
+    result = np.take(first.ravel(), hit, mode="clip")
+    late = np.flatnonzero(hit >= first.size)
+    result[late] = behind[hit[late] - first.size]
+    return np.asarray(result)
+
+
+def _strongest(energy: Float, group: Index, starts: Index) -> Index:
+    """Return of each group the first of its members that have the most energy."""
+    brightest = np.flatnonzero(energy == np.maximum.reduceat(energy, starts)[group])
+    owner = group[brightest]
+    first = np.ones(len(owner), dtype=bool)
+    first[1:] = owner[1:] != owner[:-1]
+    return np.asarray(brightest[first])
+
+
+def _merged(one: Echoes, several: Echoes) -> Echoes:
+    """Return both in the order of pulses; no pulse is in both."""
+    pulse = np.concatenate([one.pulse, several.pulse])
+    order = np.argsort(pulse, kind="stable")
+    names = ("hit", "range", "intensity", "weight")
+    columns = (np.concatenate([getattr(one, name), getattr(several, name)]) for name in names)
+    return Echoes(pulse[order], *(column[order] for column in columns))
+
+
+def chosen_echoes(echoes: Echoes, which: NDArray[np.bool_] | Index) -> Echoes:
+    """Return the echoes chosen by a mask or by indices."""
+    return Echoes(*(getattr(echoes, field.name)[which] for field in fields(Echoes)))
 
 
 def number_returns(
-    pulse: NDArray[np.intp], maximum: int
+    pulse: Index, maximum: int
 ) -> tuple[NDArray[np.bool_], NDArray[np.uint8], NDArray[np.uint8]]:
     """Return which echoes are recorded, and for these the return number and the number of returns.
 
@@ -97,11 +156,16 @@ def number_returns(
         pulse: (N,) pulse of each echo, non-decreasing; within a pulse ordered by range.
         maximum: most returns recorded of one pulse; farther ones are lost.
     """
+    if not len(pulse):
+        return np.empty(0, dtype=bool), np.empty(0, dtype=np.uint8), np.empty(0, dtype=np.uint8)
     begins = np.ones(len(pulse), dtype=bool)
-    begins[1:] = np.diff(pulse) != 0
+    begins[1:] = pulse[1:] != pulse[:-1]
     starts = np.flatnonzero(begins)
-    group = np.cumsum(begins) - 1
-    number = np.arange(len(pulse)) - starts[group] + 1 if len(pulse) else np.empty(0, dtype=np.intp)
+    if len(starts) == len(pulse):
+        ones = np.ones(len(pulse), dtype=np.uint8)
+        return begins, ones, ones
+    length = np.diff(starts, append=len(pulse))
+    number = np.arange(len(pulse)) - np.repeat(starts, length) + 1
     keep = number <= maximum
-    counts = np.minimum(np.bincount(group, minlength=len(starts)), maximum) if len(pulse) else group
-    return keep, number[keep].astype(np.uint8), counts[group[keep]].astype(np.uint8)
+    counts = np.repeat(np.minimum(length, maximum), length)
+    return keep, number[keep].astype(np.uint8), counts[keep].astype(np.uint8)

@@ -1,54 +1,37 @@
-"""One block of pulses, from the path to the points. Pure arrays: the caster is the only thing that knows the scene."""
+"""One block of pulses, from the path to the points. Pure arrays: the casters are all that knows the scene."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterator
 from dataclasses import dataclass, field
-from functools import cached_property
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..cloud.points import PointBlock
-from ..materials import Material
-from ..random_streams import stream
-from ..scene_mesh import SceneMesh
-from .beam import beam_pattern
-from .caster import Caster, FacePlanes
+from ..cloud.points import PointBlock, concatenate
+from ..scan_scenario import Noise
+from .beam import BeamPattern, beam_pattern, conical, cylindrical_offsets
 from .devices import ScannerSetting
-from .path import FlightPath, Strip
-from .pattern import Pulses, pulse_count, rotating_mirror
-from .radiometry import lambert_intensity, lit_color, reflectivity
-from .returns import Echoes, group_returns, number_returns
+from .path import Path, Strip
+from .pattern import shot_count, shots
+from .pulses import Errors, Poses, Pulses, make_pulses, reaching_scene
+from .radiometry import lit_color, received, returned_share, saturated
+from .returns import Echoes, Marks, chosen_echoes, group_returns, number_returns
+from .surfaces import Surfaces
+from .target import Target
+from .trace import Hits, Rays, Traced, trace
+from .track import Track
 
 Float = NDArray[np.float64]
+Index = NDArray[np.intp]
 
 RAYS_PER_BLOCK = 2**18
 """Rays of one block at most; what keeps memory bounded. Fixed, as blocks carry their own random streams."""
-
-
-@dataclass(frozen=True)
-class Surfaces:
-    """Constant materials by their index in the scene mesh: (M, 3) base colour, (M,) metallic, (M,) specular."""
-
-    base_color: Float
-    metallic: Float
-    specular: Float
-
-    @cached_property
-    def reflectivity(self) -> Float:
-        """Return R of each material, (M,)."""
-        return reflectivity(self.base_color, self.metallic, self.specular)
-
-
-def surfaces_of(rows: Iterable[Material]) -> Surfaces:
-    """Return the constants of materials in the order of the scene mesh's."""
-    rows = list(rows)
-    return Surfaces(
-        np.array([row.base_color for row in rows], dtype=np.float64).reshape(-1, 3),
-        np.array([row.metallic for row in rows], dtype=np.float64),
-        np.array([row.specular for row in rows], dtype=np.float64),
-    )
+RAYS_PER_CHUNK = 2**17
+"""Rays that are worked on at once: fewer are slow by the number of calls, more by memory. No result depends on it."""
+_UNCOUNTED = 1e-6
+"""Least reflectance that a hit has in a return's mean range, so that black surfaces have a range as well."""
 
 
 @dataclass(frozen=True)
@@ -56,40 +39,43 @@ class Scan:
     """All that the blocks of one scan share.
 
     Attributes:
-        noise: whether the range noise is added.
         attenuation: 1/m of range.
+        wanted: names of `PointBlock`'s optional arrays to be filled, and ``rgb`` if the materials are to colour it.
     """
 
-    mesh: SceneMesh
+    target: Target
     surfaces: Surfaces
-    caster: Caster
     setting: ScannerSetting
-    path: FlightPath
-    rays_per_pulse: int
+    path: Path
+    rings: tuple[int, ...]
     seed: int
+    noise: Noise = Noise()  # noqa: RUF009 (frozen)
     attenuation: float = 0.0
-    planes: FacePlanes = field(init=False)
-    bounds: Float = field(init=False)
+    beam: Literal["conical", "cylindrical"] = "conical"
+    wanted: frozenset[str] = frozenset({"rgb"})
+    pattern: BeamPattern = field(init=False)
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "planes", FacePlanes(self.mesh))
-        vertices = self.mesh.vertices
-        bounds = np.array([vertices.min(axis=0), vertices.max(axis=0)], dtype=np.float64) if len(vertices) else None
-        object.__setattr__(self, "bounds", bounds)
+        object.__setattr__(self, "pattern", beam_pattern(self.rings))
+
+    @property
+    def rays_per_pulse(self) -> int:
+        """Return how many rays sample a pulse."""
+        return len(self.pattern.weights)
 
     @property
     def pulses_per_block(self) -> int:
         """Return the fixed number of pulses of a block."""
         return max(1, RAYS_PER_BLOCK // self.rays_per_pulse)
 
+    def pulses(self, strip: Strip) -> int:
+        """Return how many pulses a strip has."""
+        return shot_count(self.setting, strip.duration)
+
     def blocks(self) -> list[tuple[Strip, int]]:
         """Return (strip, number) of every block, in the order of time."""
         size = self.pulses_per_block
-        return [
-            (strip, block)
-            for strip in self.path.strips
-            for block in range(-(-pulse_count(self.setting, strip) // size))
-        ]
+        return [(strip, block) for strip in self.path.strips for block in range(-(-self.pulses(strip) // size))]
 
 
 @dataclass(frozen=True)
@@ -100,130 +86,200 @@ class BlockResult:
     pulses: int
     rays: int
     below_threshold: int
+    saturated: int
 
 
 def scan_block(scan: Scan, strip: Strip, block: int) -> BlockResult:
     """Scan one block; blocks can be computed in any order and by any worker."""
     first = block * scan.pulses_per_block
-    count = min(scan.pulses_per_block, pulse_count(scan.setting, strip) - first)
-    return scan_pulses(scan, strip, first, count, stream(scan.seed, "range noise", strip.index, block))
+    count = min(scan.pulses_per_block, scan.pulses(strip) - first)
+    return scan_pulses(scan, strip, first, count, block)
 
 
-def scan_pulses(scan: Scan, strip: Strip, first: int, count: int, noise: np.random.Generator) -> BlockResult:
-    """Scan pulses ``first`` to ``first + count`` of a strip; memory grows with their number."""
-    pulses = rotating_mirror(scan.setting, scan.path, strip, first, count)
-    # Drawn for every pulse and return there could be, so that one more return leaves the others' noise alone.
-    errors = noise.normal(size=(count, scan.setting.device.maximum_returns))
-    facing = _reaching_scene(scan, pulses)
-    pulses = Pulses(*(getattr(pulses, name)[facing] for name in Pulses.__dataclass_fields__))
-    directions = beam_directions(scan, pulses)
-    faces = _cast(scan, pulses, directions)
-    echoes, rays = _echoes(scan, pulses, directions, faces)
-    strong = echoes.intensity >= scan.setting.threshold
-    points = _points(scan, strip, pulses, echoes, rays, np.flatnonzero(strong), errors[facing])
-    return BlockResult(points, count, faces.size, int(np.count_nonzero(~strong)))
+def scan_pulses(scan: Scan, strip: Strip, first: int, count: int, key: int = 0) -> BlockResult:
+    """Scan pulses ``first`` to ``first + count`` of a strip; ``key`` is that of their random numbers."""
+    errors = Errors.drawn(scan, strip, count, key)
+    poses = Poses.between(scan, strip, *(_time(scan, strip, i) for i in (first, first + count - 1)))
+    size = max(1, RAYS_PER_CHUNK // scan.rays_per_pulse)
+    parts = [
+        _scan_chunk(scan, strip, poses, errors, first + start, start, min(size, count - start))
+        for start in range(0, count, size)
+    ]
+    return BlockResult(
+        concatenate([part.points for part in parts]),
+        *(sum(getattr(part, name) for part in parts) for name in ("pulses", "rays", "below_threshold", "saturated")),
+    )
 
 
-def beam_directions(scan: Scan, pulses: Pulses) -> Float:
-    """Return unit directions (P, K, 3) of the rays that sample each pulse's footprint."""
-    pattern = beam_pattern(scan.rays_per_pulse)
+def _time(scan: Scan, strip: Strip, pulse: int) -> float:
+    return strip.start_time + float(shots(scan.setting, pulse, 1, False).time[0])
+
+
+def _scan_chunk(
+    scan: Scan, strip: Strip, poses: Poses, errors: Errors, first: int, offset: int, count: int
+) -> BlockResult:
+    """Scan a few pulses: their arrays stay in the processor's cache.
+
+    Args:
+        errors: of the whole block.
+        first: first pulse, counted within the strip.
+        offset: the same, counted within the block.
+    """
+    own = slice(offset, offset + count)
+    pulses = make_pulses(scan, strip, poses, None if errors.angle is None else errors.angle[:, own], first, count)
+    number = np.arange(offset, offset + count)  # of each pulse within the block
+    towards = reaching_scene(scan, pulses, poses.motions)
+    if towards is not None:
+        chosen = np.flatnonzero(towards)
+        pulses, number = pulses.select(chosen), number[chosen]
+    rays = beam_rays(scan, pulses, poses.motions)
+    traced = trace(
+        scan.target, scan.surfaces, rays, poses.motions, scan.setting.minimum_range, scan.setting.maximum_range
+    )
+    echoes = echoes_of(scan, traced)
+    strong = np.flatnonzero(echoes.intensity >= scan.setting.threshold)
+    weak = len(echoes.pulse) - len(strong)
+    if weak:
+        echoes = chosen_echoes(echoes, strong)
+    if errors.lost is not None:
+        echoes = _kept(echoes, errors.lost[number])
+    points, clipped = _points(scan, strip, pulses, traced, echoes, errors, number, poses.motions)
+    return BlockResult(points, count, traced.first.face.size, weak, clipped)
+
+
+def beam_rays(scan: Scan, pulses: Pulses, motions: list[Track]) -> Rays:
+    """Return the rays that sample the pulses' footprints."""
+    origin, share = pulses.origin[:, None, :], scan.pattern.weights[:, None]
     if scan.rays_per_pulse == 1:
-        return pulses.direction[:, None, :]
-    # The full angle at 1/e^2 is twice the radius; tangent, since the footprint is measured across the axis.
-    radius = np.tan(np.array(scan.setting.divergence) / 2.0)
-    x, y = (pattern.across * radius).T
-    rays = (
-        pulses.direction[:, None, :]
-        + x[None, :, None] * pulses.in_plane[:, None, :]
-        + y[None, :, None] * pulses.across[:, None, :]
-    )
-    return np.asarray(rays / np.sqrt(1.0 + x * x + y * y)[None, :, None])
-
-
-def _reaching_scene(scan: Scan, pulses: Pulses) -> NDArray[np.bool_]:
-    """Return the mask (P,) of pulses whose cone meets the scene's bounding box at all: the rest need no rays."""
-    if scan.bounds is None:
-        return np.zeros(len(pulses.time), dtype=bool)
+        return Rays(origin, pulses.direction[:, None, :], share, pulses.time)
+    assert pulses.in_plane is not None
+    assert pulses.across is not None
+    divergence = scan.setting.divergence
+    if scan.beam == "conical":
+        direction = conical(pulses.direction, pulses.in_plane, pulses.across, scan.pattern, divergence)
+        return Rays(origin, direction, share, pulses.time)
     reach = scan.setting.maximum_range
-    margin = reach * max(scan.setting.divergence) * 2.0
-    low, high = scan.bounds[0] - margin, scan.bounds[1] + margin
-    # 0 * inf cannot occur: a direction component of 0 is moved off by less than a rounding error.
-    direction = np.where(np.abs(pulses.direction) < 1e-300, 1e-300, pulses.direction)
-    with np.errstate(over="ignore"):
-        near, far = (low - pulses.origin) / direction, (high - pulses.origin) / direction
-    enter = np.minimum(near, far).max(axis=1)
-    leave = np.maximum(near, far).min(axis=1)
-    return np.asarray((leave >= np.maximum(enter, 0.0)) & (enter <= reach))
+    distance = scan.target.cast(pulses.origin, pulses.direction, reach, pulses.time, motions).distance
+    offsets = cylindrical_offsets(pulses.in_plane, pulses.across, scan.pattern, divergence, distance)
+    direction = np.repeat(pulses.direction[:, None, :], scan.rays_per_pulse, axis=1)
+    return Rays(origin + offsets, direction, share, pulses.time)
 
 
-def _cast(scan: Scan, pulses: Pulses, directions: Float) -> NDArray[np.int32]:
-    """Return the faces (P, K) that the rays hit."""
-    count, rays = directions.shape[:2]
-    origins = np.repeat(pulses.origin.astype(np.float32), rays, axis=0)
-    flat = np.ascontiguousarray(directions.reshape(-1, 3), dtype=np.float32)
-    return scan.caster.cast(origins, flat, scan.setting.maximum_range).reshape(count, rays)
+def echoes_of(scan: Scan, traced: Traced) -> Echoes:
+    """Return the returns of a chunk, before the threshold."""
+    first, behind = (_marks(scan, hits) for hits in (traced.first, traced.behind))
+    return group_returns(first, behind, traced.pulse, scan.setting.range_resolution)
 
 
-@dataclass(frozen=True)
-class _Rays:
-    """What is known of each ray that hit: face, cosine and normal; `slot` maps flat ray indices to rows."""
+def _marks(scan: Scan, hits: Hits) -> Marks:
+    """Return what hits add to returns."""
+    surfaces, material = scan.surfaces, hits.material.ravel()
+    reflectance = np.take(surfaces.reflectivity, material)
+    cosine = np.abs(hits.along.ravel())
+    facets = (np.take(surfaces.facet_a, material), np.take(surfaces.facet_b, material)) if surfaces.rough else ()
+    brightness = returned_share(cosine, reflectance, *facets)
+    if surfaces.retroreflective:
+        shining = np.flatnonzero(np.take(surfaces.shining, material))
+        own = material[shining]
+        brightness[shining] = returned_share(
+            cosine[shining],
+            reflectance[shining],
+            surfaces.facet_a[own],
+            surfaces.facet_b[own],
+            surfaces.retro[own],
+            surfaces.inverse_lobe_squared[own],
+        )
+    brightness = brightness.reshape(hits.face.shape)
+    brightness *= hits.share
+    weight = np.maximum(reflectance, _UNCOUNTED, out=reflectance).reshape(hits.face.shape)
+    weight *= hits.share
+    return Marks(hits.distance, weight, received(brightness, hits.distance, scan.attenuation))
 
-    face: NDArray[np.int32]
-    cosine: Float
-    normal: Float
-    slot: NDArray[np.intp]
 
-
-def _echoes(scan: Scan, pulses: Pulses, directions: Float, faces: NDArray[np.int32]) -> tuple[Echoes, _Rays]:
-    """Return the returns of a block, before the threshold, and the rays that they stem from."""
-    hit = np.flatnonzero(faces.ravel() >= 0)
-    face = faces.ravel()[hit]
-    owner = hit // faces.shape[1]
-    distance, cosine, normal = scan.planes.ranges(face, pulses.origin[owner], directions.reshape(-1, 3)[hit])
-    share = beam_pattern(scan.rays_per_pulse).weights[hit % faces.shape[1]]
-    reflectance = scan.surfaces.reflectivity[scan.mesh.material[face]]
-    within = np.isfinite(distance) & (distance >= scan.setting.minimum_range)
-    within &= distance <= scan.setting.maximum_range
-    ranges = np.full(faces.shape, np.inf)
-    weights, energy = np.zeros(faces.shape), np.zeros(faces.shape)
-    ranges.ravel()[hit] = np.where(within, distance, np.inf)
-    weights.ravel()[hit] = share * np.maximum(reflectance, 1e-6)
-    energy.ravel()[hit] = np.where(
-        within, share * lambert_intensity(reflectance, cosine, distance, scan.attenuation), 0.0
-    )
-    slot = np.full(faces.size, -1, dtype=np.intp)
-    slot[hit] = np.arange(len(hit))
-    echoes = group_returns(ranges, weights, energy, scan.setting.range_resolution)
-    return echoes, _Rays(face, cosine, normal, slot)
+def _kept(echoes: Echoes, lost: NDArray[np.bool_]) -> Echoes:
+    """Return the echoes that are not lost at random, by their number within the pulse."""
+    keep, number, _ = number_returns(echoes.pulse, lost.shape[1])
+    chosen = np.flatnonzero(keep)
+    chosen = chosen[~lost[echoes.pulse[chosen], number - 1]]
+    return chosen_echoes(echoes, chosen)
 
 
 def _points(
     scan: Scan,
     strip: Strip,
     pulses: Pulses,
+    traced: Traced,
     echoes: Echoes,
-    rays: _Rays,
-    strong: NDArray[np.intp],
-    errors: Float,
-) -> PointBlock:
-    """Return the points of the echoes above the threshold, with range noise."""
-    keep, number, returns = number_returns(echoes.pulse[strong], scan.setting.device.maximum_returns)
-    chosen = strong[keep]
-    pulse, row = echoes.pulse[chosen], rays.slot[echoes.ray[chosen]]
-    face = rays.face[row]
-    distance = echoes.range[chosen] + scan.setting.range_sigma * errors[pulse, number - 1]
-    local = pulses.origin[pulse] + distance[:, None] * pulses.direction[pulse]
-    return PointBlock(
-        xyz=local + scan.mesh.origin,
-        intensity=echoes.intensity[chosen],
-        rgb=lit_color(scan.surfaces.base_color[scan.mesh.material[face]], rays.normal[row]),
-        class_id=scan.mesh.class_id[face],
-        instance_id=scan.mesh.instance_id[face],
+    errors: Errors,
+    number_in_block: Index,
+    motions: list[Track],
+) -> tuple[PointBlock, int]:
+    """Return the points of the echoes, and how many of them saturated the detector."""
+    keep, number, returns = number_returns(echoes.pulse, scan.setting.device.maximum_returns)
+    if not keep.all():
+        echoes = chosen_echoes(echoes, keep)
+    pulse, hit, target = echoes.pulse, echoes.hit, scan.target
+    face, along = traced.pick("face", hit), traced.pick("along", hit)
+    distance = echoes.range + scan.noise.range_bias
+    if errors.range is not None:
+        most = scan.setting.device.maximum_returns
+        distance = distance + scan.setting.range_sigma * errors.of_range(number_in_block[pulse], number, most)
+    intensity, clipped = saturated(echoes.intensity, scan.setting.saturation)
+    normal = None
+    if scan.wanted & {"rgb", "normal"}:
+        normal = target.normals(face, along, pulses.time[pulse], motions)
+    points = PointBlock(
+        xyz=_places(pulses.measured_origin, pulses.measured_direction, pulse, distance, target.origin),
+        intensity=intensity,
+        rgb=_colors(scan, face, normal),
+        class_id=target.class_id[face],
+        instance_id=target.instance_id[face],
         return_number=number,
         number_of_returns=returns,
         gps_time=pulses.time[pulse],
         scan_angle_deg=np.rad2deg(pulses.scan_angle[pulse]).astype(np.float32),
-        strip=np.full(len(chosen), strip.index, dtype=np.uint16),
+        strip=np.full(len(pulse), strip.index, dtype=np.uint16),
         range=distance,
-        incidence_deg=np.rad2deg(np.arccos(rays.cosine[row])).astype(np.float32),
+        incidence_deg=np.rad2deg(np.arccos(np.minimum(np.abs(along), 1.0))).astype(np.float32),
+        **dict(_optional(scan, pulses, pulse, echoes.range, face, normal)),
     )
+    return points, clipped
+
+
+def _places(origin: Float, direction: Float, pulse: Index, distance: Float, map_origin: Float) -> Float:
+    """Return (N, 3) map coordinates."""
+    result = np.empty((len(pulse), 3))
+    for axis in range(3):
+        place = np.take(direction[axis], pulse)
+        place *= distance
+        place += np.take(origin[axis], pulse)
+        place += map_origin[axis]
+        result[:, axis] = place
+    return result
+
+
+def _colors(scan: Scan, face: NDArray[np.int32], normal: Float | None) -> NDArray[np.uint16]:
+    if "rgb" not in scan.wanted or normal is None:
+        return np.zeros((len(face), 3), dtype=np.uint16)
+    return lit_color(scan.surfaces.base_color[scan.target.material[face]], normal.T)
+
+
+def _optional(
+    scan: Scan, pulses: Pulses, pulse: Index, distance: Float, face: NDArray[np.int32], normal: Float | None
+) -> Iterator[tuple[str, Any]]:
+    """Yield the optional arrays that are wanted, by name."""
+    wanted, origin = scan.wanted, scan.target.origin
+    if "normal" in wanted and normal is not None:
+        yield "normal", np.ascontiguousarray(normal.T, dtype=np.float32)
+    if "scanner" in wanted:
+        yield "scanner", pulses.origin.T[pulse] + origin
+    if "true_range" in wanted:
+        yield "true_range", distance
+    if "true_xyz" in wanted:
+        yield "true_xyz", _places(pulses.origin, pulses.direction, pulse, distance, origin)
+    material = scan.target.material[face]
+    if "material" in wanted:
+        yield "material", material
+    for name in ("roughness", "metallic", "specular"):
+        if name in wanted:
+            yield name, getattr(scan.surfaces, name)[material].astype(np.float32)

@@ -1,0 +1,133 @@
+"""Scan a scene that is there already: .blend, .glb, .gltf, .obj, .ply, .stl, .fbx or .usd; the file is only read."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from pathlib import Path
+from typing import Any
+
+if __name__ == "__main__":
+    sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
+from headless import generate
+from headless.cli import Outcome, add_changes_argument, add_common_arguments, entry, progress_bar
+from synthroads_addon.core.errors import InputError
+from synthroads_addon.core.scenario import Scenario, apply_change, load_scenario, scenario_names
+
+_FIELDS = {
+    "device": "scan.device",
+    "height": "scan.platform.height",
+    "speed": "scan.platform.speed",
+    "rays": "scan.rays_per_pulse",
+    "seed": "seed",
+    "fidelity": "fidelity",
+}
+"""Arguments that are short for fields of the scenario."""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments of `synthroads scan`."""
+    names = ", ".join(scenario_names())
+    parser.add_argument("scene", type=Path, metavar="SCENE", help="file with the scene")
+    parser.add_argument("--output", required=True, type=Path, metavar="DIR", help="folder for the files")
+    parser.add_argument("--device", metavar="NAME", help="scanner: a preset's name or a file (the scenario's own)")
+    where = parser.add_mutually_exclusive_group()
+    where.add_argument("--path", type=Path, metavar="FILE", help="follow this line, CSV (x, y, z) or GeoJSON")
+    where.add_argument("--trajectory", metavar="FILE", help="CSV: time, x, y, z, roll, pitch, heading")
+    where.add_argument(
+        "--tripod",
+        type=_place,
+        action="append",
+        default=[],
+        metavar="X,Y[,Z]",
+        help="stand here, on the surface or with the scanner at Z (can be repeated; --tripod=-4,7 where X < 0)",
+    )
+    parser.add_argument("--height", type=float, metavar="M", help="flight height, or that of the scanner on a tripod")
+    parser.add_argument("--speed", type=float, metavar="M/S", help="speed over ground")
+    parser.add_argument("--rays", type=int, metavar="N", help="rays per pulse (the fidelity's own)")
+    parser.add_argument("--classes", type=Path, metavar="FILE", help="JSON: classes by names, see docs/scan.md")
+    parser.add_argument("--scenario", metavar="NAME_OR_FILE", help=f"take the scan from it: {names}, or a .json file")
+    add_changes_argument(parser)
+    parser.add_argument("--seed", type=int, metavar="N", help="seed of the noise (1)")
+    parser.add_argument("--fidelity", choices=("draft", "standard", "high"), help="point on the trade-off")
+    parser.add_argument("--epsg", type=int, metavar="N", help="coordinate system of the map")
+    parser.add_argument("--origin", type=_origin, metavar="X,Y,Z", help="map coordinates of the scene's origin (0,0,0)")
+    parser.add_argument("--up", choices=("y", "z"), help="what points up in .obj (y), .ply and .stl (z)")
+    parser.add_argument("--overwrite", action="store_true", help="replace files that are already there")
+    add_common_arguments(parser)
+
+
+def run(arguments: argparse.Namespace) -> Outcome:
+    """Run `synthroads scan`."""
+    scenario = scenario_of(arguments)
+    from synthroads_addon.scene_scan import SceneScan, scan_scene
+
+    job = SceneScan(
+        scenario=scenario,
+        output=arguments.output,
+        scene=arguments.scene,
+        path=arguments.path,
+        tripods=tuple(arguments.tripod),
+        classes=arguments.classes,
+        epsg=arguments.epsg,
+        origin=arguments.origin,
+        up=arguments.up,
+        overwrite=arguments.overwrite,
+    )
+    report = scan_scene(job, progress_bar(arguments))
+    return 0, report, summary(report, arguments.output)
+
+
+def scenario_of(arguments: argparse.Namespace) -> Scenario:
+    """Return the scenario that the arguments stand for."""
+    given = {name: getattr(arguments, name) for name in _FIELDS if getattr(arguments, name) is not None}
+    changes = list(arguments.changes)
+    changes += [f"{_FIELDS[name]}={json.dumps(value)}" for name, value in given.items()]
+    if arguments.trajectory:
+        for name in ("height", "speed"):
+            if name in given:
+                raise InputError(f"--{name}", given[name], "can't be given with --trajectory, which says it")
+        changes += ['scan.platform.kind="trajectory"', f"scan.platform.file={json.dumps(arguments.trajectory)}"]
+    if arguments.tripod:
+        if "speed" in given:
+            raise InputError("--speed", given["speed"], "can't be given with --tripod, which doesn't move")
+        changes.append('scan.platform.kind="tripod"')
+    if arguments.scenario:
+        return load_scenario(arguments.scenario, changes)
+    data: Any = Scenario().to_dict()
+    for change in changes:
+        data = apply_change(data, change)
+    return Scenario.from_dict(data)
+
+
+def summary(report: dict[str, Any], output: Path) -> str:
+    """Return the report for people: that of `synthroads generate`, with classes and warnings."""
+    counts = report["counts"]
+    rows = sorted(counts["points_by_class"].items(), key=lambda row: -row[1])
+    lines = [f"  {name:<20} {number:>12,} points" for name, number in rows]
+    lines += [f"warning: {text}" for text in report["warnings"]]
+    return "\n".join([*lines, generate.summary(report, output)])
+
+
+def _place(text: str) -> tuple[float, ...]:
+    return _numbers(text, (2, 3), "X,Y or X,Y,Z")
+
+
+def _origin(text: str) -> tuple[float, ...]:
+    return _numbers(text, (3,), "X,Y,Z")
+
+
+def _numbers(text: str, counts: tuple[int, ...], wanted: str) -> tuple[float, ...]:
+    try:
+        values = tuple(float(part) for part in text.split(","))
+    except ValueError:
+        values = ()
+    if len(values) not in counts or not all(abs(value) < 1e9 for value in values):
+        raise argparse.ArgumentTypeError(f"is '{text}': must be {wanted} in metres")
+    return values
+
+
+if __name__ == "__main__":
+    entry("scan")

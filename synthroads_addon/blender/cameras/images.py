@@ -1,0 +1,91 @@
+"""Images along the path, rendered before the scan and kept in files that the scan reads from."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import bpy
+import numpy as np
+from mathutils import Matrix
+
+from ...core.colour import MaterialLayers
+from ...core.colour_images import ImageLayers, RenderedImage
+from ...core.colour_views import View
+from .stage import Rendered, Stage
+
+_LARGEST_HALF = 65504.0
+_SENSOR = 36.0
+
+
+class RenderedLayers(ImageLayers):
+    """Layers from images that are files of a temporary folder, mapped into memory page by page.
+
+    Attributes:
+        report: images, pixels, layers and bytes, as JSON data.
+    """
+
+    def __init__(self, stage: Stage, views: Sequence[View], fallback: MaterialLayers, exposure: float) -> None:
+        """Begin without an image; `render` makes them."""
+        super().__init__((), stage.passes.channels, fallback)
+        self._stage, self._views, self._exposure = stage, views, exposure
+        self._folder = tempfile.TemporaryDirectory(prefix="synthroads-")
+        self.report: dict[str, Any] = {}
+
+    def render(self, progress: Callable[[float], None]) -> None:
+        """Render all images; must run on Blender's main thread. Calls `progress` with the share that is done."""
+        for number, view in enumerate(self._views):
+            aim(self._stage.camera, view)
+            self.images.append(self._kept(number, view, self._stage.render(*view.size)))
+            progress((number + 1) / len(self._views))
+        self._locate()
+        self.report = {
+            "images": self._stage.images,
+            "pixels": self._stage.pixels,
+            "layers": list(self.channels),
+            "bytes": sum(i.layers.nbytes + i.depth.nbytes + i.material.nbytes for i in self.images),
+        }
+
+    def _kept(self, number: int, view: View, rendered: Rendered) -> RenderedImage:
+        light = ("sun", "sky")
+        parts = [
+            values * np.float32(self._exposure) if name in light else values
+            for name, values in rendered.layers.items()
+        ]
+        height, width = rendered.material.shape
+        joined = np.concatenate(parts, axis=2) if parts else np.zeros((height, width, 0), np.float32)
+        assert rendered.depth is not None
+        layers = np.clip(joined, 0.0, _LARGEST_HALF).astype(np.float16)
+        material = np.rint(rendered.material).astype(np.uint16)
+        return RenderedImage(
+            view,
+            self._mapped(f"{number}-layers", layers),
+            self._mapped(f"{number}-depth", rendered.depth),
+            self._mapped(f"{number}-material", material),
+        )
+
+    def _mapped(self, name: str, array: np.ndarray[Any, Any]) -> np.ndarray[Any, Any]:
+        path = Path(self._folder.name) / f"{name}.npy"
+        np.save(path, array)
+        # An empty array can't be mapped.
+        return np.load(path, mmap_mode="r" if array.size else None)
+
+    def close(self) -> None:
+        """Remove the files."""
+        self.images.clear()
+        self._folder.cleanup()
+
+
+def aim(camera: bpy.types.Object, view: View) -> None:
+    """Set a camera object to a view."""
+    data, (width, height) = camera.data, view.size
+    data.type, data.sensor_fit, data.sensor_width = "PERSP", "HORIZONTAL", _SENSOR
+    data.lens = view.focal * _SENSOR / width
+    data.shift_x = (width / 2.0 - view.centre[0]) / width
+    data.shift_y = (view.centre[1] - height / 2.0) / width
+    data.clip_start, data.clip_end = 0.05, 1e5
+    matrix = np.eye(4)
+    matrix[:3, :3], matrix[:3, 3] = view.rotation, view.position
+    camera.matrix_world = Matrix(matrix.tolist())

@@ -1,0 +1,111 @@
+"""Sun and sky of a road's environment, for the time of rendering."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
+
+import bpy
+import numpy as np
+from mathutils import Vector
+from numpy.typing import NDArray
+
+from ...core.colour_light import SunAndSky, exposed, sun_direction
+from ...core.parameters.model_surroundings import Environment
+from ..compat import sky_texture
+from .stage import SUN_GROUP, Passes, stage
+
+_SUN_STRENGTH = 4.2
+_SUN_COLOR = (1.0, 0.93, 0.84)
+_SKY_STRENGTH = 0.16
+_SUN_ANGLE = math.radians(0.53)
+_PROBE_SAMPLES = 128
+
+
+@dataclass(frozen=True)
+class Daylight:
+    """Lamp, sky, and what they make of a white surface.
+
+    Attributes:
+        sun: lamp.
+        world: sky.
+        light: both as white surfaces see them, exposed.
+        exposure: factor from rendered radiance to exposed values.
+    """
+
+    sun: bpy.types.Object
+    world: bpy.types.World
+    light: SunAndSky
+    exposure: float
+
+
+@contextmanager
+def daylight(environment: Environment, sharp: bool) -> Iterator[Daylight]:
+    """Yield a sun and a sky; afterwards nothing is left of them.
+
+    Args:
+        environment: the road's.
+        sharp: the sun is a point, so that one sample gives its shadows without noise.
+    """
+    towards = sun_direction(environment)
+    elevation = math.radians(environment.sun_elevation_deg)
+    with ExitStack() as stack:
+        lamp = bpy.data.lights.new("SR Stage Sun", "SUN")
+        stack.callback(lambda: bpy.data.lights.remove(lamp))
+        lamp.energy, lamp.color = _SUN_STRENGTH * environment.sun_strength, _SUN_COLOR
+        lamp.angle = 0.0 if sharp else _SUN_ANGLE
+        sun = bpy.data.objects.new("SR Stage Sun", lamp)
+        stack.callback(lambda: bpy.data.objects.remove(sun))
+        sun.rotation_euler = Vector(towards).to_track_quat("Z", "Y").to_euler()
+        world = bpy.data.worlds.new("SR Stage Sky")
+        stack.callback(lambda: bpy.data.worlds.remove(world))
+        _fill(world, elevation, environment)
+        # A lamp's irradiance falls on a matt surface, which spreads it over pi.
+        facing = np.array(_SUN_COLOR) * lamp.energy / math.pi
+        light, exposure = exposed(towards, facing, _sky_radiance(world))
+        yield Daylight(sun, world, light, exposure)
+
+
+def _fill(world: bpy.types.World, elevation: float, environment: Environment) -> None:
+    if world.node_tree is None:
+        world.use_nodes = True
+    nodes, links = world.node_tree.nodes, world.node_tree.links
+    nodes.clear()
+    sky = sky_texture(nodes, max(elevation, math.radians(1.0)), math.radians(environment.sun_azimuth_deg))
+    background, output = nodes.new("ShaderNodeBackground"), nodes.new("ShaderNodeOutputWorld")
+    background.inputs["Strength"].default_value = _SKY_STRENGTH * (0.4 + 0.6 * environment.sun_strength)
+    links.new(sky.outputs["Color"], background.inputs["Color"])
+    links.new(background.outputs["Background"], output.inputs["Surface"])
+
+
+def _sky_radiance(world: bpy.types.World) -> NDArray[np.float64]:
+    """Return the radiance (3,) of a white matt horizontal surface under a sky, by rendering one."""
+    with ExitStack() as stack:
+        mesh = bpy.data.meshes.new("SR Probe")
+        stack.callback(lambda: bpy.data.meshes.remove(mesh))
+        mesh.from_pydata([(-1.0, -1.0, 0.0), (1.0, -1.0, 0.0), (1.0, 1.0, 0.0), (-1.0, 1.0, 0.0)], [], [(0, 1, 2, 3)])
+        white = bpy.data.materials.new("SR Probe")
+        stack.callback(lambda: bpy.data.materials.remove(white))
+        _make_matt(white)
+        mesh.materials.append(white)
+        item = bpy.data.objects.new("SR Probe", mesh)
+        stack.callback(lambda: bpy.data.objects.remove(item))
+        scene = bpy.data.scenes.new("SR Probe")
+        stack.callback(lambda: bpy.data.scenes.remove(scene))
+        scene.collection.objects.link(item)
+        probe = stack.enter_context(stage(scene, (), Passes((), lit=True, samples=_PROBE_SAMPLES), (), world))
+        probe.camera.location = (0.0, 0.0, 1.0)
+        probe.camera.data.type, probe.camera.data.ortho_scale = "ORTHO", 0.5
+        return probe.render(8, 8).layers[SUN_GROUP].reshape(-1, 3).mean(axis=0).astype(np.float64)
+
+
+def _make_matt(white: bpy.types.Material) -> None:
+    if white.node_tree is None:
+        white.use_nodes = True
+    nodes = white.node_tree.nodes
+    nodes.clear()
+    matt, output = nodes.new("ShaderNodeBsdfDiffuse"), nodes.new("ShaderNodeOutputMaterial")
+    matt.inputs["Color"].default_value = (1.0, 1.0, 1.0, 1.0)
+    white.node_tree.links.new(matt.outputs[0], output.inputs["Surface"])

@@ -1,0 +1,240 @@
+"""The stage: a scene of its own in which the objects of another are rendered, and of which nothing is left."""
+
+from __future__ import annotations
+
+import os
+import sys
+import tempfile
+from collections.abc import Iterator, Sequence
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import bpy
+import numpy as np
+from numpy.typing import NDArray
+
+from ...core.colour import MATERIAL_LAYERS
+from .exr import read_layers
+from .surfaces import NUMBER, prepared_materials
+from .versions import eevee_engine, multilayer_exr
+
+NAME = "SR Stage"
+SUN_GROUP, SKY_GROUP = "sun", "sky"
+"""Light groups of the lit image, where both are rendered."""
+_POSITION, _DEPTH = "Position", "Depth"
+
+
+@dataclass(frozen=True)
+class Passes:
+    """What is rendered.
+
+    Attributes:
+        layers: of the materials, see `MATERIAL_LAYERS`.
+        lit: light of the sun that the surfaces reflect.
+        sky: that of the sky as well, apart.
+        depth: depth along the camera's axis.
+        position: place that each pixel shows.
+        samples: samples per pixel.
+        bounces: reflections that the light is followed over.
+    """
+
+    layers: Sequence[str]
+    lit: bool
+    sky: bool = False
+    depth: bool = False
+    position: bool = False
+    samples: int = 1
+    bounces: int = 0
+
+    @property
+    def channels(self) -> dict[str, int]:
+        """Return the layers that come back, in order, and their components."""
+        light = {SUN_GROUP: 3} if self.lit else {}
+        light |= {SKY_GROUP: 3} if self.sky else {}
+        return {name: MATERIAL_LAYERS[name] for name in self.layers} | light
+
+
+@dataclass(frozen=True)
+class Rendered:
+    """One rendered image, rows from the top.
+
+    Attributes:
+        layers: by channel: (H, W, C) float32.
+        material: (H, W): number of the material plus 1, 0 for none.
+        depth: (H, W) m, or None.
+        position: (H, W, 3) local, m, or None.
+    """
+
+    layers: dict[str, NDArray[np.float32]]
+    material: NDArray[np.float32]
+    depth: NDArray[np.float32] | None
+    position: NDArray[np.float32] | None
+
+
+class Stage:
+    """Renders the visible objects of a scene, under lights of its own.
+
+    Attributes:
+        scene: the temporary scene.
+        camera: its camera object.
+        folder: for files; gone afterwards.
+        images: images rendered so far.
+        pixels: pixels rendered so far.
+    """
+
+    def __init__(self, scene: bpy.types.Scene, camera: bpy.types.Object, passes: Passes, folder: Path) -> None:
+        self.scene, self.camera, self.passes, self.folder = scene, camera, passes, folder
+        self.images = self.pixels = 0
+
+    def render(self, width: int, height: int) -> Rendered:
+        """Render an image through the camera as it is; must run on Blender's main thread."""
+        render, path = self.scene.render, self.folder / "image.exr"
+        render.resolution_x, render.resolution_y, render.resolution_percentage = width, height, 100
+        render.filepath = str(path)
+        with _silence():
+            bpy.ops.render.render(write_still=True, scene=self.scene.name)
+        self.images, self.pixels = self.images + 1, self.pixels + width * height
+        return self._read(read_layers(path))
+
+    def _read(self, channels: dict[str, NDArray[Any]]) -> Rendered:
+        def several(name: str, parts: str) -> NDArray[np.float32]:
+            return np.stack([channels[f"{name}.{part}"] for part in parts], axis=-1)
+
+        layers = {
+            name: several(name, "RGB") if MATERIAL_LAYERS[name] == 3 else several(name, "X")
+            for name in self.passes.layers
+        }
+        if self.passes.sky:
+            layers |= {group: several(f"Combined_{group}", "RGB") for group in (SUN_GROUP, SKY_GROUP)}
+        elif self.passes.lit:
+            layers[SUN_GROUP] = several("Combined", "RGB")
+        numbers = (f"{NUMBER}.X", "Material Index.X", "IndexMA.X")
+        number = next(channels[name] for name in numbers if name in channels)
+        depth = channels[f"{_DEPTH}.Z"] if self.passes.depth else None
+        position = several(_POSITION, "XYZ") if self.passes.position else None
+        return Rendered(layers, number, depth, position)
+
+
+@contextmanager
+def stage(
+    source: bpy.types.Scene,
+    materials: Sequence[str],
+    passes: Passes,
+    lights: Sequence[bpy.types.Object],
+    world: bpy.types.World | None,
+    engine: str = "cycles",
+) -> Iterator[Stage]:
+    """Yield a stage with the objects that are visible in a scene; afterwards nothing of it is left.
+
+    Args:
+        source: whose objects are rendered.
+        materials: the scene mesh's.
+        passes: what is rendered.
+        lights: lamps, in place of the scene's own.
+        world: the sky, or None for blackness.
+        engine: ``cycles`` or ``eevee``.
+    """
+    known = {item.name for item in bpy.data.images}
+    with ExitStack() as stack:
+        folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="synthroads-")))
+        stack.enter_context(prepared_materials(materials, passes.layers, engine == "eevee"))
+        stack.callback(_forget_images, known)
+        scene = bpy.data.scenes.new(NAME)
+        stack.callback(lambda: bpy.data.scenes.remove(scene))
+        data = bpy.data.cameras.new(NAME)
+        stack.callback(lambda: bpy.data.cameras.remove(data))
+        camera = bpy.data.objects.new(NAME, data)
+        stack.callback(lambda: bpy.data.objects.remove(camera))
+        for item in (*visible_objects(source), *lights, camera):
+            scene.collection.objects.link(item)
+        scene.camera, scene.world = camera, world
+        scene.frame_set(source.frame_current, subframe=source.frame_subframe)
+        _set_engine(scene, engine, passes)
+        _set_passes(scene, passes, lights, world)
+        multilayer_exr(scene.render.image_settings)
+        yield Stage(scene, camera, passes, folder)
+
+
+def visible_objects(source: bpy.types.Scene) -> list[bpy.types.Object]:
+    """Return the objects that a scene shows, but for lamps and cameras: its current view layer, else its first."""
+    layer = bpy.context.view_layer if source == bpy.context.scene else source.view_layers[0]
+    layer.update()
+    return [
+        item
+        for item in layer.objects
+        if item.type not in ("LIGHT", "CAMERA", "LIGHT_PROBE") and item.visible_get(view_layer=layer)
+    ]
+
+
+def _set_engine(scene: bpy.types.Scene, engine: str, passes: Passes) -> None:
+    scene.render.use_compositing = scene.render.use_sequencer = False
+    scene.render.film_transparent = True
+    scene.view_settings.view_transform = "Raw"
+    if engine == "eevee":
+        scene.render.engine = eevee_engine()
+        scene.eevee.taa_render_samples = passes.samples
+        scene.render.filter_size = 0.0
+        return
+    scene.render.engine = "CYCLES"
+    # Keeps geometry and search trees from image to image.
+    scene.render.use_persistent_data = True
+    cycles = scene.cycles
+    cycles.samples, cycles.use_adaptive_sampling, cycles.use_denoising = passes.samples, False, False
+    cycles.max_bounces = cycles.diffuse_bounces = cycles.glossy_bounces = passes.bounces
+    cycles.transparent_max_bounces = 8
+    cycles.pixel_filter_type, cycles.filter_width = "BLACKMAN_HARRIS", 0.01
+    cycles.use_auto_tile = False
+    cycles.seed = 0
+    preferences = bpy.context.preferences.addons.get("cycles")
+    if preferences and preferences.preferences.has_active_device():
+        cycles.device = "GPU"
+
+
+def _set_passes(
+    scene: bpy.types.Scene, passes: Passes, lights: Sequence[bpy.types.Object], world: bpy.types.World | None
+) -> None:
+    layer = scene.view_layers[0]
+    layer.use_pass_material_index = scene.render.engine == "CYCLES"
+    if not layer.use_pass_material_index:
+        output = layer.aovs.add()
+        output.name, output.type = NUMBER, "VALUE"
+    layer.use_pass_z, layer.use_pass_position = passes.depth, passes.position
+    for name in passes.layers:
+        output = layer.aovs.add()
+        output.name, output.type = name, "COLOR" if MATERIAL_LAYERS[name] == 3 else "VALUE"
+    if not passes.sky:
+        return
+    for name in (SUN_GROUP, SKY_GROUP):
+        layer.lightgroups.add(name=name)
+    for item in lights:
+        item.lightgroup = SUN_GROUP
+    if world is not None:
+        world.lightgroup = SKY_GROUP
+
+
+@contextmanager
+def _silence() -> Iterator[None]:
+    """Drop what Blender itself writes to the standard output: lines for each image."""
+    if sys.stdout is not None:
+        sys.stdout.flush()
+    try:
+        kept = os.dup(1)
+    except OSError:
+        # A Blender without a console has no standard output.
+        yield
+        return
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    try:
+        os.dup2(nowhere, 1)
+        yield
+    finally:
+        os.dup2(kept, 1)
+        os.close(nowhere)
+        os.close(kept)
+
+
+def _forget_images(known: set[str]) -> None:
+    for item in [item for item in bpy.data.images if item.name not in known]:
+        bpy.data.images.remove(item)

@@ -1,0 +1,21 @@
+"""What rendering needs that differs between Blender versions."""
+
+from __future__ import annotations
+
+import bpy
+
+HAS_RETURN_CAMERA = bpy.app.version >= (5, 0, 0)
+"""Whether Cycles has custom cameras."""
+
+
+def eevee_engine() -> str:
+    """Return the identifier of EEVEE."""
+    return "BLENDER_EEVEE_NEXT" if bpy.app.version < (5, 0, 0) else "BLENDER_EEVEE"
+
+
+def multilayer_exr(settings: bpy.types.ImageFormatSettings) -> None:
+    """Have renders written as uncompressed multilayer EXR files of 32-bit floats."""
+    if hasattr(settings, "media_type"):
+        settings.media_type = "MULTI_LAYER_IMAGE"
+    settings.file_format = "OPEN_EXR_MULTILAYER"
+    settings.color_depth, settings.exr_codec = "32", "NONE"

@@ -1,0 +1,234 @@
+"""What rays can meet: the static scene and what moves in it, their faces numbered one after the other."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..scene_mesh import SceneMesh
+from .caster import Caster, FacePlanes
+from .motion import MovingMesh, ScannedScene
+from .track import Track
+
+Float = NDArray[np.float64]
+Faces = NDArray[np.int32]
+
+_CHUNK = 512
+"""Rays side by side that are told together whether they come near a moving object."""
+
+
+@dataclass(frozen=True)
+class _Part:
+    """A mesh of the target.
+
+    Attributes:
+        first: number of its first face among all.
+        radius: of the sphere around ``centre`` (own frame) that holds it, m.
+    """
+
+    caster: Caster
+    planes: FacePlanes
+    first: int
+    count: int
+    centre: Float
+    radius: float
+
+
+@dataclass(frozen=True)
+class Met:
+    """What rays meet first; one value per ray, in the shape of the rays.
+
+    Attributes:
+        face: int32 of all faces of the target, -1 for none.
+        distance: m, inf for none.
+        along: n . d of the face's normal and the ray.
+    """
+
+    face: Faces
+    distance: Float
+    along: Float
+
+
+class Target:
+    """The scene as rays meet it.
+
+    Args:
+        scene: static mesh and moving ones.
+        make_caster: gives a caster of a mesh.
+
+    Attributes:
+        class_id: (F,) uint8 of all faces.
+        instance_id: (F,) uint32.
+        material: (F,) uint16 indices into ``materials``.
+        origin: (3,) float64 map coordinates of the local origin, m.
+        caster: the static mesh's.
+        bounds: (2, 3) float64 smallest and largest corner of the static mesh, m; None without vertices.
+    """
+
+    def __init__(self, scene: ScannedScene, make_caster: Callable[[SceneMesh], Caster]) -> None:
+        static = scene.static
+        self.materials = static.materials
+        self.origin = static.origin
+        self.moving: tuple[MovingMesh, ...] = scene.moving
+        meshes = [static, *(part.mesh for part in scene.moving)]
+        self.class_id = _joined([mesh.class_id for mesh in meshes])
+        self.instance_id = _joined([mesh.instance_id for mesh in meshes])
+        self.material = _joined([mesh.material for mesh in meshes])
+        self.triangles = len(self.class_id)
+        self.vertices = sum(len(mesh.vertices) for mesh in meshes)
+        firsts = np.cumsum([0, *(len(mesh.triangles) for mesh in meshes)])
+        self._parts = [
+            _part(mesh, make_caster(mesh), int(first)) for mesh, first in zip(meshes, firsts[:-1], strict=True)
+        ]
+        self.caster = self._parts[0].caster
+        self.bounds = (
+            np.array([static.vertices.min(axis=0), static.vertices.max(axis=0)], dtype=np.float64)
+            if len(static.vertices)
+            else None
+        )
+
+    def motions(self, begin: float, end: float, spacing: float) -> list[Track]:
+        """Return the moving parts' poses between two times, on knots ``spacing`` (s) apart."""
+        return [Track.of(part.motion.pose, begin, end, spacing) for part in self.moving]
+
+    def moving_bounds(self, motions: list[Track]) -> list[Float]:
+        """Return (2, 3) smallest and largest corner that each moving part reaches on its way, if it is there."""
+        boxes = (track.swept(part.centre, part.radius) for part, track in zip(self._parts[1:], motions, strict=True))
+        return [np.array(box) for box in boxes if box is not None]
+
+    def cast(
+        self, origins: Float, directions: Float, maximum_range: float, times: Float, motions: list[Track]
+    ) -> Met:
+        """Return what each ray meets first.
+
+        Args:
+            origins: (3, ...) float64, local; of the directions' shape, or one that spreads to it.
+            directions: (3, ...) unit vectors.
+            maximum_range: m.
+            times: (...) when each ray is cast, s; spreads likewise.
+            motions: see `motions`; they must span ``times``.
+        """
+        met = _cast(self._parts[0], origins, directions, maximum_range)
+        if not self.moving:
+            return met
+        shape = directions.shape
+        flat_origins = np.broadcast_to(origins, shape).reshape(3, -1)
+        flat_directions, flat_times = directions.reshape(3, -1), np.broadcast_to(times, shape[1:]).ravel()
+        nearest = Met(*(getattr(met, name).ravel() for name in ("face", "distance", "along")))
+        for part, track in zip(self._parts[1:], motions, strict=True):
+            _cast_moving(part, track, flat_origins, flat_directions, flat_times, maximum_range, nearest)
+        return Met(*(getattr(nearest, name).reshape(shape[1:]) for name in ("face", "distance", "along")))
+
+    def normals(self, faces: Faces, along: Float, times: Float, motions: list[Track]) -> Float:
+        """Return (3, H) unit normals, local, turned towards the rays that met the faces."""
+        result = np.empty((3, len(faces)))
+        for number, part in enumerate(self._parts):
+            mine = np.flatnonzero((faces >= part.first) & (faces < part.first + part.count))
+            if not len(mine):
+                continue
+            normal = part.planes.normals(faces[mine] - part.first, along[mine])
+            if number:
+                rotation, _, _ = motions[number - 1].at(times[mine])
+                normal = np.einsum("ijn,jn->in", rotation.reshape(3, 3, -1), normal)
+            result[:, mine] = normal
+        return result
+
+
+def _joined(arrays: list[NDArray[Any]]) -> NDArray[Any]:
+    return arrays[0] if len(arrays) == 1 else np.concatenate(arrays)
+
+
+def _part(mesh: SceneMesh, caster: Caster, first: int) -> _Part:
+    if len(mesh.vertices):
+        low, high = mesh.vertices.min(axis=0).astype(np.float64), mesh.vertices.max(axis=0).astype(np.float64)
+    else:
+        low = high = np.zeros(3)
+    centre = (low + high) / 2.0
+    radius = float(np.linalg.norm(high - low) / 2.0) + 1e-3
+    return _Part(caster, FacePlanes(mesh), first, len(mesh.triangles), centre, radius)
+
+
+def _cast(part: _Part, origins: Float, directions: Float, maximum_range: float) -> Met:
+    """Cast rays at one part in its own frame; face numbers are those of all parts."""
+    shape = directions.shape[1:]
+    single = np.empty((2, *shape, 3), dtype=np.float32)
+    for i in range(3):
+        single[0, ..., i] = origins[i]
+        single[1, ..., i] = directions[i]
+    face = part.caster.cast(single[0].reshape(-1, 3), single[1].reshape(-1, 3), maximum_range).reshape(shape)
+    if not part.count:
+        return Met(face, np.full(shape, np.inf), np.zeros(shape))
+    # A miss is worked out with the first face and then forgotten: that is less work than to sort them out before.
+    distance, along = part.planes.meet(np.maximum(face, 0), origins, directions)
+    missed = ~(np.isfinite(distance) & (face >= 0))
+    distance[missed] = np.inf
+    if part.first:
+        face = face + np.int32(part.first)
+    if missed.any():
+        face[missed] = -1
+    return Met(face, distance, along)
+
+
+def _cast_moving(
+    part: _Part,
+    track: Track,
+    origins: Float,
+    directions: Float,
+    times: Float,
+    maximum_range: float,
+    nearest: Met,
+) -> None:
+    """Put a moving part's hits in place of farther ones; all arrays are flat."""
+    near = _near_sphere(part, track, origins, directions, times, np.minimum(nearest.distance, maximum_range))
+    if not len(near):
+        return
+    rotation, place, present = track.at(times[near])
+    near, rotation, place = near[present], rotation[:, present], place[:, present]
+    own = _cast(
+        part, _inverse(rotation, origins[:, near] - place), _inverse(rotation, directions[:, near]), maximum_range
+    )
+    closer = np.flatnonzero(own.distance < nearest.distance[near])
+    for name in ("face", "distance", "along"):
+        getattr(nearest, name)[near[closer]] = getattr(own, name)[closer]
+
+
+def _near_sphere(
+    part: _Part, track: Track, origins: Float, directions: Float, times: Float, reach: Float
+) -> NDArray[np.intp]:
+    """Return the rays that come nearer to the part's middle than its radius before their ``reach``."""
+    chunks = _chunks_near(part, track, origins, directions, reach)
+    if not len(chunks):
+        return chunks
+    rotation, place, _ = track.at(times[chunks])
+    middle = np.einsum("ijn,j->in", rotation.reshape(3, 3, -1), part.centre) + place
+    middle -= origins[:, chunks]
+    direction = directions[:, chunks]
+    ahead = np.einsum("in,in->n", middle, direction)
+    middle -= np.clip(ahead, 0.0, reach[chunks]) * direction
+    return chunks[np.einsum("in,in->n", middle, middle) <= part.radius**2]
+
+
+def _chunks_near(part: _Part, track: Track, origins: Float, directions: Float, reach: Float) -> NDArray[np.intp]:
+    """Return the rays of the chunks whose bounding box touches that of the part on its way: a cheap first look."""
+    box = track.swept(part.centre, part.radius)
+    if box is None:
+        return np.empty(0, dtype=np.intp)
+    low, high = box
+    starts = np.arange(0, len(reach), _CHUNK)
+    apart = np.zeros(len(starts), dtype=bool)
+    for i in range(3):
+        end = origins[i] + reach * directions[i]
+        smallest = np.minimum(np.minimum.reduceat(end, starts), np.minimum.reduceat(origins[i], starts))
+        largest = np.maximum(np.maximum.reduceat(end, starts), np.maximum.reduceat(origins[i], starts))
+        apart |= (smallest > high[i]) | (largest < low[i])
+    keep = np.repeat(~apart, np.diff(starts, append=len(reach)))
+    return np.flatnonzero(keep)
+
+
+def _inverse(rotation: Float, vectors: Float) -> Float:
+    """Return vectors (3, N) turned back by rotations (9, N)."""
+    return np.asarray(np.einsum("jin,jn->in", rotation.reshape(3, 3, -1), vectors))

@@ -1,0 +1,92 @@
+"""Poses of a platform or a vehicle between knots: exact at these, linear between."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Float = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Track:
+    """Poses at evenly spaced times.
+
+    Between two knots position and rotation matrix are linear: for knots that are near enough the matrix stays a
+    rotation within rounding (its error is an eighth of the squared angle between two knots).
+
+    Attributes:
+        begin: time of the first knot, s.
+        spacing: s between two.
+        rotation: (9, K) matrices, own frame -> local, row by row.
+        position: (3, K) m.
+        present: (K,) whether it is there at all.
+    """
+
+    begin: float
+    spacing: float
+    rotation: Float
+    position: Float
+    present: NDArray[np.bool_]
+
+    @classmethod
+    def of(cls, pose: Callable[[Float], Any], begin: float, end: float, spacing: float) -> Track:
+        """Return the track of ``pose(time (K,)) -> (rotation (K, 3, 3), position (K, 3), present (K,))``.
+
+        Knots are whole multiples of the spacing, so that no result depends on where a block begins.
+        """
+        times = track_knots(begin, end, spacing)
+        rotation, position, present = pose(times)
+        count = len(times)
+        return cls(
+            float(times[0]),
+            spacing,
+            np.ascontiguousarray(np.reshape(rotation, (count, 9)).T),
+            np.ascontiguousarray(np.transpose(position)),
+            np.asarray(present, dtype=bool),
+        )
+
+    def at(self, times: Float) -> tuple[Float, Float, NDArray[np.bool_]]:
+        """Return rotation (9, N), position (3, N) and presence (N,) at times within the track."""
+        knot = (times - self.begin) / self.spacing
+        index = np.clip(knot.astype(np.intp), 0, len(self.present) - 2)
+        knot -= index
+        rotation = _between(self.rotation, index, knot)
+        position = _between(self.position, index, knot)
+        if self.present.all():
+            return rotation, position, np.ones(len(times), dtype=bool)
+        return rotation, position, self.present[index] & self.present[index + 1]
+
+    def swept(self, centre: Float, radius: float) -> tuple[Float, Float] | None:
+        """Return the smallest and largest corner (3,) that a sphere reaches on the way; None where it is never there.
+
+        Args:
+            centre: (3,) of the sphere, own frame, m.
+            radius: m.
+        """
+        there = np.flatnonzero(self.present)
+        if not len(there):
+            return None
+        rotation = self.rotation[:, there].reshape(3, 3, -1)
+        middle = np.einsum("ijn,j->in", rotation, centre) + self.position[:, there]
+        return middle.min(axis=1) - radius, middle.max(axis=1) + radius
+
+
+def track_knots(begin: float, end: float, spacing: float) -> Float:
+    """Return the knots (K,), at least two, that span two times: whole multiples of ``spacing``."""
+    first = int(np.floor(begin / spacing))
+    last = max(int(np.ceil(end / spacing)), first + 1)
+    return np.arange(first, last + 1) * spacing
+
+
+def _between(values: Float, index: NDArray[np.intp], share: Float) -> Float:
+    """Return (C, N) values between knots ``index`` and ``index + 1``."""
+    step = np.diff(values, axis=1)
+    result = np.take(step, index, axis=1)
+    result *= share
+    result += np.take(values, index, axis=1)
+    return result

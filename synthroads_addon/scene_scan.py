@@ -1,0 +1,217 @@
+"""The job "scan a scene": what others made -> triangles with classes -> scan -> cloud and previews.
+
+The scene is only read: nothing is added to it, and its file isn't written.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from . import version
+from .core.class_mapping import ClassMapping
+from .core.cloud.previews import TopView
+from .core.crs import wkt
+from .core.errors import InputError
+from .core.files import output_folder
+from .core.parameters.axis_read import read_axis
+from .core.parameters.geometry import RoadGeometry
+from .core.parameters.model import RoadParameters
+from .core.progress import Progress, StageTimer, silent
+from .core.scanning.devices import scanner_setting
+from .core.scanning.motion import ScannedScene
+from .core.scanning.path import USUAL, PolylineGuide, RoadGuide, make_path
+from .core.scanning.path import Path as ScanPath
+from .core.scanning.path_positions import PositionsPath
+from .core.scanning.trajectory_file import read_trajectory
+from .core.scenario import Output, Scenario
+from .core.scene_extent import bounds, elevation_at, middle_line
+from .core.scene_mesh import SceneMesh
+from .core.schema import canonical_json, read_json
+from .pipeline import FILES, Job, ScanToFiles, _closing, make_scan, top_view
+
+if TYPE_CHECKING:
+    from .blender.foreign import UpAxis
+
+OUTPUTS: tuple[Output, ...] = ("cloud", "previews")
+"""What a scan of a scene writes beside ``report.json``, as far as the scenario asks for it."""
+_BORDER = 2.0  # m, of the previews
+
+
+@dataclass(frozen=True)
+class SceneScan:
+    """What `scan_scene` is asked for.
+
+    Attributes:
+        scenario: scan, fidelity and seed; its road is not looked at.
+        output: folder for the files.
+        scene: file to open, or the scene that is open if None.
+        path: CSV or GeoJSON of a line that the platform follows, in map coordinates.
+        tripods: positions (x, y) or (x, y, z) of a tripod in map coordinates; z is that of the scanner itself.
+        classes: JSON file with classes by name, see `ClassMapping`.
+        epsg: of the map; that of the scene's road, or unknown, if None.
+        origin: map coordinates of the scene's own origin, m; those of the scene's road, or 0, if None.
+        up: see `blender.foreign.open_scene`.
+        overwrite: replace files that are already there.
+    """
+
+    scenario: Scenario
+    output: Path
+    scene: Path | None = None
+    path: Path | None = None
+    tripods: tuple[tuple[float, ...], ...] = ()
+    classes: Path | None = None
+    epsg: int | None = None
+    origin: tuple[float, float, float] | None = None
+    up: UpAxis | None = None
+    overwrite: bool = False
+
+
+@dataclass(frozen=True)
+class _Read:
+    """What was read of a scene."""
+
+    scene: ScannedScene
+    road: RoadParameters | None
+    warnings: list[str]
+
+
+def scan_scene(job: SceneScan, progress: Progress = silent) -> dict[str, Any]:
+    """Scan a scene; return the report that is also written to ``report.json``.
+
+    Raises:
+        InputError: an input is wrong or the output can't be written; nothing is left half-written.
+    """
+    mapping = check_scene_scan(job)
+    scenario = job.scenario
+    wanted = tuple(name for name in OUTPUTS if name in scenario.outputs)
+    names = [name for output in wanted for name in FILES[output]] + ["report.json"]
+    timer = StageTimer(progress)
+    report: dict[str, Any] = {"type": "Report", "generator": f"SynthRoads {version()}"}
+    with output_folder(job.output, names, job.overwrite) as folder:
+        with timer.stage("scene"):
+            _open(job)
+        with timer.stage("scene mesh"):
+            found = _read(job, mapping)
+        static = found.scene.static
+        geometry = RoadGeometry(found.road) if found.road else None
+        with timer.stage("caster"):
+            path = scene_path(job, static, geometry)
+            scan = make_scan(scenario, found.scene, path, found.road.environment if found.road else None)
+        epsg = found.road.metadata.epsg if found.road and job.epsg is None else job.epsg
+        with timer.stage("scan"):
+            view = None if "previews" not in wanted else top_view(geometry) if geometry else scene_view(static)
+            for share in (task := ScanToFiles(scenario, scan, folder, epsg, view)).run():
+                timer.progress("scan", share)
+        report |= {"scene": job.scene.name if job.scene else None, "counts": task.summary()}
+        report["warnings"] = found.warnings + _of_counts(task)
+        report |= _closing(Job(scenario, job.output), timer)
+        report["scenario"] = {name: value for name, value in report["scenario"].items() if name != "road"}
+        (folder / "report.json").write_text(canonical_json(report), encoding="utf-8")
+    return report
+
+
+def check_scene_scan(job: SceneScan) -> ClassMapping | None:
+    """Refuse a job that can't be done before any work starts; return the classes by name."""
+    from .blender.foreign import check_scene_file
+
+    platform = job.scenario.scan.platform
+    if job.scene is not None:
+        check_scene_file(job.scene, job.up)
+    if not set(job.scenario.outputs) & set(OUTPUTS):
+        raise InputError("outputs", list(job.scenario.outputs), f"must name at least one of {', '.join(OUTPUTS)}")
+    if job.tripods and platform.kind != "tripod":
+        raise InputError("scan.platform.kind", platform.kind, "must be tripod where its positions are given")
+    if job.path and (job.tripods or platform.kind == "trajectory"):
+        raise InputError("--path", str(job.path), "can't be given together with a trajectory or a tripod's positions")
+    if job.path:
+        read_axis(job.path)
+    if platform.kind == "trajectory" and platform.file:
+        read_trajectory(platform.file)
+    if platform.height is not None and any(len(place) == 3 for place in job.tripods):
+        raise InputError("--height", platform.height, "can't be given with a tripod whose z is the scanner's own")
+    scanner_setting(job.scenario.scan)
+    if job.epsg is not None:
+        wkt(job.epsg)
+    if job.classes is None:
+        return None
+    return ClassMapping.from_dict(read_json(job.classes), source=str(job.classes))
+
+
+def _open(job: SceneScan) -> None:
+    from .blender.foreign import open_scene
+
+    if job.scene is not None:
+        open_scene(job.scene, job.up)
+
+
+def _read(job: SceneScan, mapping: ClassMapping | None) -> _Read:
+    """Return the open scene's triangles and road; refuse a scene in which there is nothing to scan."""
+    from .blender.foreign import open_scene_warnings
+    from .blender.kept_road import open_road
+    from .blender.scene import scanned_scene
+
+    road = open_road()
+    if road and job.origin is not None:
+        raise InputError("--origin", list(job.origin), "can't be given: the road in the scene has one of its own")
+    factor = job.scenario.scan.traffic_speed_factor
+    geometry = RoadGeometry(road) if road else None
+    scene = scanned_scene(classes=mapping, geometry=geometry, speed_factor=factor, number_objects=True)
+    if not len(scene.static) and not scene.moving:
+        name = str(job.scene) if job.scene else "open scene"
+        raise InputError(name, None, "holds nothing visible with faces that could be scanned")
+    if job.origin is not None:
+        scene = replace(scene, static=replace(scene.static, origin=np.array(job.origin, dtype=np.float64)))
+    unused = [f"{job.classes}: nothing in the scene is named as in {entry}" for entry in scene.unmatched]
+    return _Read(scene, road, open_scene_warnings() + unused)
+
+
+def scene_path(job: SceneScan, mesh: SceneMesh, geometry: RoadGeometry | None) -> ScanPath:
+    """Return the scanner's path: given, along the scene's road, or straight over its middle.
+
+    A path of one's own or over the middle has one strip unless the platform has lateral offsets.
+    """
+    platform, origin = job.scenario.scan.platform, mesh.origin.tolist()
+    if job.tripods:
+        return PositionsPath(platform, [_scanner_place(job, place, mesh) for place in job.tripods])
+    if geometry and not job.path:
+        return make_path(platform, RoadGuide(geometry))
+    if platform.lateral_offsets is None and platform.kind in ("uav", "airborne"):
+        platform = platform.model_copy(update={"lateral_offsets": (0.0,)})
+    guide = PolylineGuide.read(job.path, origin) if job.path else PolylineGuide(middle_line(mesh), origin)
+    return make_path(platform, guide, origin)
+
+
+def _scanner_place(job: SceneScan, place: tuple[float, ...], mesh: SceneMesh) -> list[float]:
+    """Return the local place (3,) of a tripod's scanner: above the highest surface unless it has a z."""
+    local = [value - base for value, base in zip(place, mesh.origin, strict=False)]
+    if len(local) == 3:
+        return local
+    ground = elevation_at(mesh, *local)
+    if ground is None:
+        shown = ",".join(f"{value:g}" for value in place)
+        raise InputError("--tripod", shown, "there is no surface below: give the scanner's elevation, X,Y,Z")
+    height = job.scenario.scan.platform.height
+    return [*local, ground + (USUAL["tripod"].height if height is None else height)]
+
+
+def scene_view(mesh: SceneMesh) -> TopView:
+    """Return a raster that holds the scene, its longer side from left to right."""
+    low, high = bounds(mesh)
+    start, end = (low + mesh.origin)[:2], (high + mesh.origin)[:2]
+    axis = int(np.argmax(end - start))
+    reach = float((end - start)[1 - axis]) / 2.0 + _BORDER
+    middle = (start + end)[1 - axis] / 2.0
+    start[1 - axis] = end[1 - axis] = middle
+    return TopView(start, end, -reach, reach)
+
+
+def _of_counts(task: ScanToFiles) -> list[str]:
+    counts = task.counts
+    if not counts.points:
+        return ["not one pulse came back: is the scene within the scanner's range and field of view?"]
+    unlabelled = int(counts.by_class[255])
+    return [f"{unlabelled:,} points have no class"] if unlabelled else []

@@ -1,0 +1,116 @@
+"""A digest of everything in the open file, to prove that something left it as it was."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterator
+from typing import Any
+
+import bpy
+import numpy as np
+
+_COLLECTIONS = """
+    scenes objects meshes curves materials node_groups collections images textures worlds lights cameras texts
+    actions armatures libraries metaballs lattices shape_keys fonts volumes hair_curves pointclouds
+"""
+_LEFT_OUT = {
+    # follows from other data, or is Blender's own book-keeping
+    "rna_type", "bl_rna", "is_evaluated", "is_runtime_data", "session_uid", "tag", "original", "id_data", "library",
+    # of meshes: held by the attributes, or calculated from them
+    "attributes", "vertices", "edges", "loops", "polygons", "loop_triangles", "loop_triangle_polygons",
+    "vertex_normals", "polygon_normals", "corner_normals", "uv_layers",
+    "vertex_colors", "color_attributes", "vertex_paint_masks",
+    "uv_layer_stencil", "uv_layer_clone", "skin_vertices", "vertex_creases", "edge_creases", "normals_domain",
+    # large or irrelevant
+    "pixels", "preview", "depsgraph",
+}  # fmt: skip
+
+
+def digest() -> str:
+    """Return a digest of all data blocks of the open file: every property, array, node, link and custom property."""
+    result = hashlib.sha256()
+    for line in lines():
+        result.update(line.encode())
+    return result.hexdigest()
+
+
+def lines() -> Iterator[str]:
+    """Yield what the digest is made of, one text per value."""
+    bpy.context.view_layer.update()
+    yield f"open scene {bpy.context.scene.name} {bpy.context.view_layer.name}\n"
+    for item in bpy.context.view_layer.objects:
+        yield f"{item.name} selected {item.select_get()} hidden {item.hide_get()} seen {item.visible_get()}\n"
+    yield f"active {bpy.context.view_layer.objects.active}\n"
+    for name in _COLLECTIONS.split():
+        for item in getattr(bpy.data, name, ()):
+            yield from _values(item, f"{name}[{item.name}]", {item.as_pointer()})
+
+
+def _values(item: Any, path: str, seen: set[int]) -> Iterator[str]:
+    if isinstance(item, bpy.types.Mesh):
+        yield from _arrays(item, path)
+    if hasattr(item, "keys") and isinstance(item, bpy.types.bpy_struct):
+        try:
+            keys = sorted(set(item.keys()) - set(item.bl_rna.properties.keys()))
+        except TypeError:  # this kind has no custom properties
+            keys = []
+        yield from (f"{path}[{key!r}] = {_plain(item[key])}\n" for key in keys)
+    for prop in item.bl_rna.properties:
+        if prop.identifier not in _LEFT_OUT:
+            yield from _property(item, prop, f"{path}.{prop.identifier}", seen)
+
+
+def _property(item: Any, prop: Any, path: str, seen: set[int]) -> Iterator[str]:
+    try:
+        value = getattr(item, prop.identifier)
+    except (AttributeError, RuntimeError, TypeError):
+        return
+    if prop.type == "COLLECTION":
+        for number, entry in enumerate(value):
+            yield from _pointer(entry, f"{path}[{number}]", seen)
+    elif prop.type == "POINTER":
+        yield from _pointer(value, path, seen)
+    elif callable(value):
+        return
+    else:
+        yield f"{path} = {_plain(value)}\n"
+
+
+def _pointer(value: Any, path: str, seen: set[int]) -> Iterator[str]:
+    if value is None or not isinstance(value, bpy.types.bpy_struct):
+        yield f"{path} = {value}\n"
+    elif isinstance(value, bpy.types.ID) and not value.is_embedded_data:
+        yield f"{path} -> {type(value).__name__} {value.name_full}\n"
+    elif isinstance(value, bpy.types.Node | bpy.types.NodeSocket) and ".links" in path:
+        yield f"{path} -> {value.name}\n"
+    elif value.as_pointer() not in seen:
+        yield from _values(value, path, seen | {value.as_pointer()})
+
+
+def _arrays(mesh: bpy.types.Mesh, path: str) -> Iterator[str]:
+    for attribute in mesh.attributes:
+        fields = {"FLOAT_VECTOR": ("vector", 3), "FLOAT2": ("vector", 2), "FLOAT_COLOR": ("color", 4)}
+        field, width = fields.get(attribute.data_type, ("value", 2 if attribute.data_type == "INT32_2D" else 1))
+        values = np.zeros(len(attribute.data) * width, np.float64)
+        if attribute.data_type not in ("STRING", "BYTE_COLOR", "QUATERNION", "FLOAT4X4", "INT16_2D"):
+            attribute.data.foreach_get(field, values)
+        kind = f"{attribute.name} {attribute.domain} {attribute.data_type}"
+        yield f"{path} {kind} {hashlib.sha256(values.tobytes()).hexdigest()}\n"
+    starts = np.zeros(len(mesh.polygons), np.int32)
+    mesh.polygons.foreach_get("loop_start", starts)
+    yield f"{path} faces {hashlib.sha256(starts.tobytes()).hexdigest()}\n"
+
+
+def _plain(value: Any) -> str:
+    if hasattr(value, "to_dict"):
+        value = value.to_dict()
+    if hasattr(value, "to_list"):
+        value = value.to_list()
+    if isinstance(value, set | frozenset):
+        value = sorted(value)
+    if isinstance(value, str | int | float | bool | dict) or value is None:
+        return repr(value)
+    try:
+        return repr([_plain(entry) for entry in value])
+    except TypeError:
+        return repr(value)

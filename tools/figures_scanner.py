@@ -1,0 +1,168 @@
+"""Pictures and tables of the scanner for the documentation: platforms, reflection models, rays per pulse.
+
+    python tools/figures_scanner.py --output docs/pictures
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import laspy
+import matplotlib as mpl
+import numpy as np
+
+ROOT = Path(__file__).resolve().parents[1]
+sys.path.insert(0, str(ROOT))
+
+from synthroads_addon.core.cloud.labels import classes  # noqa: E402
+from synthroads_addon.core.parameters.geometry import RoadGeometry  # noqa: E402
+from synthroads_addon.core.parameters.sampler import sample_road  # noqa: E402
+from synthroads_addon.core.scanning.beam import RINGS, beam_pattern  # noqa: E402
+from synthroads_addon.core.scenario import load_scenario  # noqa: E402
+from synthroads_addon.pipeline import Job, generate  # noqa: E402
+
+mpl.use("Agg")
+from matplotlib import pyplot  # noqa: E402
+
+REACH, ASIDE, PIXEL = 105.0, 42.0, 0.15
+"""Half the length and width that a picture shows, and its pixel, m."""
+SHORT = ["road.half_width=40"]
+PLATFORMS = {
+    "UAV, rotating mirror": ("rq31-600m", ["road.length=200"]),
+    "mobile mapping, two heads": ("mobile-mapping-300m", ["road.length=200"]),
+    "tripod, panoramic": ("tripod-200m", []),
+    "aircraft": ("airborne-1000m", []),
+    "trajectory file": ("rq31-600m", ["road.length=200"]),
+}
+
+
+def main() -> None:
+    """Make all of them."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--output", type=Path, required=True)
+    parser.add_argument("--only", choices=FIGURES, nargs="+", default=list(FIGURES))
+    arguments = parser.parse_args()
+    arguments.output.mkdir(parents=True, exist_ok=True)
+    for name in arguments.only:
+        FIGURES[name](arguments.output)
+
+
+def scan(scenario: str, changes: list[str], folder: Path) -> laspy.LasData:
+    """Generate a cloud and read it."""
+    wanted = ["fidelity=draft", 'outputs=["cloud"]', *changes]
+    generate(Job(load_scenario(scenario, wanted), folder, overwrite=True, new_file=True))
+    return laspy.read(folder / "cloud.laz")
+
+
+def platforms(output: Path) -> None:
+    """Draw the cloud of each platform from above, by class."""
+    figure, axes = pyplot.subplots(len(PLATFORMS), 1, figsize=(9, 3.9 * len(PLATFORMS)))
+    with tempfile.TemporaryDirectory() as folder:
+        for axis, (title, (name, changes)) in zip(axes, PLATFORMS.items(), strict=True):
+            path = _trajectory(Path(folder), name, changes) if title == "trajectory file" else []
+            cloud = scan(name, [*SHORT, *changes, *path], Path(folder) / "scan")
+            _draw(axis, cloud, title)
+    figure.tight_layout()
+    figure.savefig(output / "scan-platforms.png", dpi=100, metadata={"Software": None})
+
+
+def _trajectory(folder: Path, name: str, changes: list[str]) -> list[str]:
+    """Write a trajectory that weaves about the road's beginning; return the changes that fly it."""
+    scenario = load_scenario(name, changes)
+    geometry = RoadGeometry(sample_road(scenario.road, scenario.seed))
+    station = np.linspace(0.0, geometry.length, 400)
+    plan, heading, _ = geometry.alignment.frame(station)
+    sway = 25.0 * np.sin(station / 30.0)
+    turn = heading + np.arctan(25.0 / 30.0 * np.cos(station / 30.0))
+    place = plan + sway[:, None] * np.stack([-np.sin(heading), np.cos(heading)], axis=1)
+    origin = np.array(geometry.parameters.transform.translate)
+    x, y, z = np.column_stack([place, geometry.profile.elevation(station) + 50.0]).T + origin[:, None]
+    rows = zip(station / 10.0, x, y, z, 90.0 - np.rad2deg(turn), strict=True)
+    lines = [f"{t:.4f},{a:.4f},{b:.4f},{c:.4f},0,0,{h:.6f}" for t, a, b, c, h in rows]
+    file = folder / "flight.csv"
+    file.write_text("\n".join(["time,x,y,z,roll,pitch,heading", *lines]), encoding="utf-8")
+    return ["scan.platform.kind=trajectory", f"scan.platform.file={file}"]
+
+
+def _draw(axis: Any, cloud: laspy.LasData, title: str) -> None:
+    """Draw a cloud from above along its longer side: the class of each pixel's highest point."""
+    plan = np.column_stack([cloud.x, cloud.y])
+    plan = plan - plan.mean(axis=0)
+    _, _, turn = np.linalg.svd(plan[:: max(1, len(plan) // 10_000)], full_matrices=False)
+    along, across = (plan @ turn.T).T
+    keep = np.flatnonzero((np.abs(along) < REACH) & (np.abs(across) < ASIDE))
+    order = keep[np.argsort(np.asarray(cloud.z)[keep], kind="stable")]
+    colors = np.full((256, 3), 128, dtype=np.uint8)
+    for row in classes():
+        colors[row.id] = row.color
+    picture = np.full((int(2 * ASIDE / PIXEL) + 1, int(2 * REACH / PIXEL) + 1, 3), 255, dtype=np.uint8)
+    place = ((across[order] + ASIDE) / PIXEL).astype(int), ((along[order] + REACH) / PIXEL).astype(int)
+    picture[place] = colors[np.asarray(cloud["class_id"])[order]]
+    axis.imshow(picture, extent=(-REACH, REACH, -ASIDE, ASIDE), origin="lower", interpolation="nearest")
+    axis.set_title(f"{title}: {len(plan):,} points", fontsize=10, loc="left")
+    axis.set(ylabel="m")
+
+
+def intensity_histograms(output: Path) -> None:
+    """Draw the intensities of both reflection models on one road, asphalt, markings and grass."""
+    figure, axes = pyplot.subplots(1, 3, figsize=(13, 3.6))
+    clouds = {}
+    with tempfile.TemporaryDirectory() as folder:
+        for model in ("lambert", "oren_nayar"):
+            changes = ["road.length=100", f"scan.reflection={model}"]
+            clouds[model] = scan("rq31-600m", changes, Path(folder) / model)
+    names = {row.name: row.id for row in classes()}
+    for axis, name in zip(axes, ("road", "road_marking", "vegetation"), strict=True):
+        for model, cloud in clouds.items():
+            chosen = np.asarray(cloud["class_id"]) == names[name]
+            # Times the squared range: what is left is the surface and the angle.
+            value = cloud.intensity[chosen] * np.asarray(cloud["range"])[chosen] ** 2 / cloud_scale(cloud)
+            axis.hist(value, bins=120, range=(0.0, np.quantile(value, 0.999) * 1.3), histtype="step", label=model)
+        axis.set(title=name.replace("_", " "), xlabel="intensity x range squared", ylabel="points")
+        axis.legend()
+    figure.tight_layout()
+    figure.savefig(output / "intensity-models.png", dpi=100, metadata={"Software": None})
+
+
+def cloud_scale(cloud: laspy.LasData) -> float:
+    """Return 16-bit steps per unit of intensity."""
+    import json
+
+    note = next(vlr for vlr in cloud.header.vlrs if vlr.user_id == "SynthRoads")
+    return float(json.loads(note.record_data)["intensity_scale"])
+
+
+def convergence(output: Path) -> None:
+    """Print the error of the mean range on a slanted plane against rays per pulse."""
+    print("| rays per pulse | error of the mean range (mm) | of the spread within the pulse (mm) |\n|---|---|---|")
+    distance, tilt, sigma = 300.0, np.deg2rad(75.0), np.tan(1e-3) / 2.0
+    nodes, weights = np.polynomial.hermite_e.hermegauss(80)
+    x, y = (axis.ravel() * sigma for axis in np.meshgrid(nodes, nodes))
+    truth = _moments(distance, tilt, x, y, np.outer(weights, weights).ravel() / weights.sum() ** 2)
+    for rays, rings in RINGS.items():
+        pattern = beam_pattern(rings)
+        x, y = (pattern.across * np.tan(1e-3)).T
+        mean, spread = _moments(distance, tilt, x, y, pattern.weights)
+        print(f"| {rays} | {1e3 * (mean - truth[0]):.6f} | {1e3 * (spread - truth[1]):.4f} |")
+
+
+def _moments(distance: float, tilt: float, x: Any, y: Any, weights: Any) -> tuple[float, float]:
+    """Return mean and standard deviation of the range of rays (x, y) on a plane tilted against their axis."""
+    reach = distance * np.sqrt(1.0 + x * x + y * y) / (1.0 - x * np.tan(tilt))
+    mean = float((weights * reach).sum())
+    return mean, float(np.sqrt((weights * (reach - mean) ** 2).sum()))
+
+
+FIGURES: dict[str, Callable[[Path], None]] = {
+    "platforms": platforms,
+    "intensity_histograms": intensity_histograms,
+    "convergence": convergence,
+}
+
+if __name__ == "__main__":
+    main()

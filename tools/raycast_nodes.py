@@ -1,0 +1,112 @@
+"""A caster by Blender's Geometry Nodes, for comparison only: docs/casters.md says why SynthRoads doesn't use it."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import bpy
+import numpy as np
+from numpy.typing import NDArray
+
+from synthroads_addon.blender.compat import set_modifier_input
+from synthroads_addon.blender.nodes.builder import Tree
+from synthroads_addon.core.scene_mesh import SceneMesh
+
+
+class RaycastNodesCaster:
+    """Casts rays with the *Raycast* node, on Blender's main thread; the node itself uses every core.
+
+    It lives in a scene of its own, whose data `close` removes from the open file.
+    """
+
+    name = "raycast nodes"
+    main_thread_only = True
+
+    def __init__(self, mesh: SceneMesh) -> None:
+        self._scene = bpy.data.scenes.new("SR Rays")
+        self._rays = self._object("SR Rays", bpy.data.meshes.new("SR Rays"))
+        self._target = self._object("SR Target", _target_mesh(mesh))
+        self._group = _cast_group()
+        self._modifier = self._rays.modifiers.new("SR Cast", "NODES")
+        self._modifier.node_group = self._group
+        set_modifier_input(self._modifier, "Target", self._target)
+
+    def cast(
+        self, origins: NDArray[np.float32], directions: NDArray[np.float32], maximum_range: float
+    ) -> NDArray[np.int32]:
+        """Return the (N,) indices of the faces hit, -1 for none; see `core.scanning.caster.Caster.cast`."""
+        if not len(origins):
+            return np.empty(0, np.int32)
+        points = self._rays.data
+        points.clear_geometry()
+        points.vertices.add(len(origins))
+        points.vertices.foreach_set("co", origins.ravel())
+        _store(points, "direction", "FLOAT_VECTOR", "POINT", "vector", directions)
+        set_modifier_input(self._modifier, "Range", maximum_range)
+        layer = self._scene.view_layers[0]
+        layer.update()
+        result = self._rays.evaluated_get(layer.depsgraph).data
+        faces = np.empty(len(origins), np.int32)
+        result.attributes["face"].data.foreach_get("value", faces)
+        # The node gives 0 where nothing is hit, and the target's faces are counted from 1.
+        return faces - 1
+
+    def close(self) -> None:
+        """Remove all data of its own from the open file."""
+        meshes = [self._rays.data, self._target.data]
+        for item in (self._rays, self._target):
+            bpy.data.objects.remove(item)
+        for mesh in meshes:
+            bpy.data.meshes.remove(mesh)
+        bpy.data.node_groups.remove(self._group)
+        bpy.data.scenes.remove(self._scene)
+
+    def _object(self, name: str, mesh: bpy.types.Mesh) -> bpy.types.Object:
+        item = bpy.data.objects.new(name, mesh)
+        self._scene.collection.objects.link(item)
+        return item
+
+
+def _target_mesh(mesh: SceneMesh) -> bpy.types.Mesh:
+    """Return Blender's mesh of the triangles, with each face's number, from 1, as the attribute ``number``."""
+    target = bpy.data.meshes.new("SR Target")
+    target.vertices.add(len(mesh.vertices))
+    target.vertices.foreach_set("co", mesh.vertices.ravel())
+    target.loops.add(mesh.triangles.size)
+    target.loops.foreach_set("vertex_index", mesh.triangles.ravel())
+    target.polygons.add(len(mesh.triangles))
+    target.polygons.foreach_set("loop_start", np.arange(0, mesh.triangles.size, 3, dtype=np.int32))
+    target.update(calc_edges=True)
+    _store(target, "number", "INT", "FACE", "value", np.arange(1, len(mesh.triangles) + 1, dtype=np.int32))
+    return target
+
+
+def _store(mesh: bpy.types.Mesh, name: str, kind: str, domain: str, field: str, values: NDArray[Any]) -> None:
+    attribute = mesh.attributes.get(name) or mesh.attributes.new(name, kind, domain)
+    attribute.data.foreach_set(field, values.ravel())
+
+
+def _cast_group() -> bpy.types.NodeTree:
+    """Return the group that casts a ray from each point along its ``direction`` and stores the ``face`` it meets.
+
+    The face's number is the only output of *Raycast* that is used, so that each ray is cast once.
+    """
+    group = bpy.data.node_groups.new("SR Cast", "GeometryNodeTree")
+    group.is_modifier = True
+    tree = Tree(group)
+    points = tree.input("Geometry", "Geometry", description="Points where rays begin")
+    target = tree.input("Target", "Object", description="What they are cast at")
+    reach = tree.number("Range", 100.0, (0.0, 1e6), unit="m", description="Length of the rays")
+    direction = tree.node("GeometryNodeInputNamedAttribute", data_type="FLOAT_VECTOR", name="direction")
+    number = tree.node("GeometryNodeInputNamedAttribute", data_type="INT", name="number")
+    cast = tree.node(
+        "GeometryNodeRaycast",
+        data_type="INT",
+        target_geometry=tree.node("GeometryNodeObjectInfo", target)["Geometry"],
+        attribute=number.value,
+        ray_direction=direction.value,
+        ray_length=reach,
+    )
+    store = {"data_type": "INT", "domain": "POINT", "name": "face", "value": cast["Attribute"]}
+    tree.output("Geometry", tree.node("GeometryNodeStoreNamedAttribute", points, **store).value)
+    return group
