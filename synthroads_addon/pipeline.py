@@ -4,25 +4,30 @@ from __future__ import annotations
 
 import platform as machine
 import sys
-from collections.abc import Generator, Iterator
+from collections.abc import Callable, Generator, Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
-from contextlib import contextmanager
-from dataclasses import asdict, dataclass, field
+from contextlib import ExitStack, contextmanager
+from dataclasses import asdict, dataclass, field, replace
 from itertools import islice
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import laspy
 import numpy as np
 
 from . import version
 from .core.cloud.centerline import centerline_geojson
+from .core.cloud.grid import GridSubsampler
 from .core.cloud.labels import classes
-from .core.cloud.las import LasWriter
+from .core.cloud.points import PointBlock
 from .core.cloud.previews import TopView
+from .core.cloud.roughness import micro_relief
+from .core.cloud.writing import CloudWriter, open_writer
+from .core.colour import FROM_MATERIAL, FROM_RETURN, LayerSource
 from .core.crs import wkt
 from .core.errors import InputError
 from .core.files import output_folder
+from .core.materials import Material
 from .core.parameters.geometry import RoadGeometry
 from .core.parameters.model import RoadParameters, read_parameters
 from .core.parameters.model_surroundings import Environment
@@ -31,15 +36,19 @@ from .core.parameters.tessellation import sample_stations
 from .core.progress import Progress, StageTimer, silent
 from .core.scanning.beam import RINGS
 from .core.scanning.devices import scanner_setting
+from .core.scanning.finish import LAYERS, OPTIONAL, Finish
 from .core.scanning.motion import ScannedScene
 from .core.scanning.path import Path as ScanPath
-from .core.scanning.path import RoadGuide, make_path
+from .core.scanning.path import RoadGuide, Strip, make_path
 from .core.scanning.scan import BlockResult, Scan, scan_block
 from .core.scanning.surfaces import surfaces_of
 from .core.scanning.target import Target
 from .core.scanning.weather import attenuation, weather_of
 from .core.scenario import Scenario
 from .core.schema import canonical_json
+
+if TYPE_CHECKING:
+    from .blender.cameras import ColourJob
 
 FILES = {
     "parameters": ("parameters.json",),
@@ -48,7 +57,14 @@ FILES = {
     "scene": ("scene.blend",),
     "previews": ("preview_class.png", "preview_intensity.png", "preview_rgb.png"),
 }
-"""The files that each output of a scenario stands for; ``report.json`` is always written."""
+"""The files that each output of a scenario stands for, with one format of the cloud; see `file_names`."""
+
+
+def file_names(scenario: Scenario, outputs: Sequence[str]) -> list[str]:
+    """Return the names of all files that outputs stand for, and of the report, which is always written."""
+    files = FILES | {"cloud": scenario.cloud.file_names()}
+    return [name for output in outputs for name in files[output]] + ["report.json"]
+
 
 
 @dataclass
@@ -83,6 +99,7 @@ class ScanCounts:
     saturated: int = 0
     intensity_clipped: int = 0
     by_class: np.ndarray = field(default_factory=lambda: np.zeros(256, dtype=np.int64))
+    by_source: np.ndarray = field(default_factory=lambda: np.zeros(256, dtype=np.int64))
 
     def add(self, result: BlockResult) -> None:
         """Add one block."""
@@ -92,6 +109,8 @@ class ScanCounts:
         self.saturated += result.saturated
         self.points += len(result.points)
         self.by_class += np.bincount(result.points.class_id, minlength=256)
+        if result.sources is not None:
+            self.by_source += result.sources
 
 
 def generate(job: Job, progress: Progress = silent) -> dict[str, Any]:
@@ -102,7 +121,7 @@ def generate(job: Job, progress: Progress = silent) -> dict[str, Any]:
     """
     check(job)
     wanted = job.scenario.outputs
-    names = [name for output in wanted for name in FILES[output]] + ["report.json"]
+    names = file_names(job.scenario, wanted)
     timer = StageTimer(progress)
     report: dict[str, Any] = {"type": "Report", "generator": f"SynthRoads {version()}"}
     with output_folder(job.output, names, job.overwrite) as folder:
@@ -113,7 +132,7 @@ def generate(job: Job, progress: Progress = silent) -> dict[str, Any]:
             _write_texts(folder, wanted, parameters, geometry, job.scenario)
         if set(wanted) & {"scene", "cloud", "previews"}:
             report["counts"] = _scene_outputs(job, folder, parameters, geometry, timer)
-        report |= _closing(job, timer)
+        report |= closing(job.scenario, timer)
         (folder / "report.json").write_text(canonical_json(report), encoding="utf-8")
     return report
 
@@ -121,6 +140,11 @@ def generate(job: Job, progress: Progress = silent) -> dict[str, Any]:
 def check(job: Job) -> None:
     """Refuse a job that can't be done before any work starts."""
     scanner_setting(job.scenario.scan)
+    job.scenario.cloud.scheme()
+    if set(job.scenario.outputs) & {"cloud", "previews"}:
+        from .blender.cameras import check_colour
+
+        check_colour(job.scenario.colour)
     wkt(job.scenario.road.epsg)
     if job.parameters and job.axis:
         raise InputError("--axis", str(job.axis), "can't be given together with --parameters")
@@ -152,13 +176,12 @@ def make_scan(
         environment: the road's, for its weather; clear if None.
     """
     from .blender.casters import make_caster
-    from .blender.materials import constants
 
     settings, setting = scenario.settings(), scanner_setting(scenario.scan)
     rings = scenario.scan.beam_rings
     return Scan(
         target=Target(scene, lambda mesh: make_caster(scenario.scan.caster, mesh)),
-        surfaces=surfaces_of(constants(scene.static.materials).values(), scenario.scan.reflection),
+        surfaces=surfaces_of(material_rows(scene.static.materials), scenario.scan.reflection),
         setting=setting,
         path=path,
         rings=RINGS[settings.rays_per_pulse] if rings is None else rings,
@@ -166,8 +189,72 @@ def make_scan(
         noise=scenario.scan.noise,
         attenuation=_attenuation(scenario, environment, setting.device.wavelength_nm),
         beam=scenario.scan.beam,
-        wanted=frozenset({"rgb"} | ({"true_range", "true_xyz"} if scenario.scan.keep_truth else set())),
+        wanted=measured_arrays(scenario),
+        targets=needs_targets(scenario),
     )
+
+
+def kept_arrays(scenario: Scenario) -> frozenset[str]:
+    """Return the names of `PointBlock`'s optional arrays that the files hold."""
+    return scenario.cloud.arrays() & frozenset(OPTIONAL) if "cloud" in scenario.outputs else frozenset()
+
+
+def measured_arrays(scenario: Scenario) -> frozenset[str]:
+    """Return the names of `PointBlock`'s optional arrays that the scan itself must fill."""
+    relief = {"normal", "material"} if scenario.scan.relief > 0.0 else set()
+    return (kept_arrays(scenario) - set(LAYERS) - {"color_source"}) | relief
+
+
+def wanted_layers(scenario: Scenario) -> frozenset[str]:
+    """Return what the points get besides what the scanner measures: ``rgb`` and material layers."""
+    return frozenset({"rgb"}) | (kept_arrays(scenario) & set(LAYERS))
+
+
+def needs_targets(scenario: Scenario) -> bool:
+    """Return whether the scan must say where its points were seen."""
+    return bool(wanted_layers(scenario)) or scenario.scan.relief > 0.0
+
+
+def make_finish(scenario: Scenario, scan: Scan, source: LayerSource | None) -> Finish:
+    """Return what is done to the points after the scan."""
+    rows = material_rows(scan.target.materials)
+    return Finish(
+        source=source,
+        wanted=wanted_layers(scenario),
+        surfaces=scan.surfaces,
+        intensity_from_layers=scenario.colour.intensity_from_layers,
+        relief=micro_relief(scan.target.materials, rows) if scenario.scan.relief > 0.0 else None,
+        strength=scenario.scan.relief,
+        octaves=scenario.settings().relief_octaves,
+        seed=scenario.seed,
+        kept=kept_arrays(scenario),
+    )
+
+
+def colour_job(
+    scenario: Scenario, scan: Scan, scene: ScannedScene, environment: Environment | None = None
+) -> ColourJob:
+    """Return what the cameras are asked for."""
+    from .blender.cameras import ColourJob
+
+    layers = wanted_layers(scenario) | ({"base_color"} if scenario.colour.intensity_from_layers else set())
+    return ColourJob(
+        scenario=scenario.colour,
+        fidelity=scenario.fidelity,
+        wanted=frozenset(layers),
+        mesh=scene.static,
+        environment=environment or Environment(),
+        path=scan.path,
+        field_of_view=scan.setting.field_of_view,
+        seed=scenario.seed,
+    )
+
+
+def material_rows(names: Sequence[str]) -> list[Material]:
+    """Return the means of materials of the open file."""
+    from .blender.materials import constants
+
+    return list(constants(names).values())
 
 
 def _attenuation(scenario: Scenario, environment: Environment | None, wavelength_nm: float) -> float:
@@ -177,20 +264,43 @@ def _attenuation(scenario: Scenario, environment: Environment | None, wavelength
     return attenuation(scenario.scan.weather or weather_of(environment or Environment()), wavelength_nm)
 
 
-def scan_blocks(scan: Scan, threads: int = 0) -> Iterator[BlockResult]:
-    """Yield the blocks of a scan in their order, computed side by side; only a few are held at a time."""
+def scan_blocks(scan: Scan, threads: int = 0, finish: Finish | None = None) -> Iterator[BlockResult]:
+    """Yield the blocks of a scan in their order, computed side by side; only a few are held at a time.
+
+    Args:
+        scan: see `make_scan`.
+        threads: as many blocks are worked on at once; 0 for every core.
+        finish: what is done to the points; where its source renders, that happens in the calling thread.
+    """
     tasks = iter(scan.blocks())
+    renders = finish is not None and getattr(finish.source, "main_thread_only", False)
+
+    def work(strip: Strip, block: int) -> BlockResult:
+        result = scan_block(scan, strip, block)
+        return result if finish is None or renders else finished(result, finish)
+
     if scan.target.caster.main_thread_only:
-        yield from (scan_block(scan, *task) for task in tasks)
-        return
-    workers = threads or available_cores()
+        results: Iterator[BlockResult] = (work(*task) for task in tasks)
+    else:
+        results = _side_by_side(work, tasks, threads or available_cores())
+    for result in results:
+        yield finished(result, finish) if finish is not None and renders else result
+
+
+def finished(result: BlockResult, finish: Finish) -> BlockResult:
+    """Return a block with its points finished."""
+    points, sources = finish(result.points, result.seen)
+    return replace(result, points=points, seen=None, sources=sources)
+
+
+def _side_by_side(
+    work: Callable[[Strip, int], BlockResult], tasks: Iterator[tuple[Strip, int]], workers: int
+) -> Iterator[BlockResult]:
     with _pool(workers) as pool:
-        pending: list[Future[BlockResult]] = [
-            pool.submit(scan_block, scan, *task) for task in islice(tasks, workers + 1)
-        ]
+        pending: list[Future[BlockResult]] = [pool.submit(work, *task) for task in islice(tasks, workers + 1)]
         while pending:
             yield pending.pop(0).result()
-            pending += [pool.submit(scan_block, scan, *task) for task in islice(tasks, 1)]
+            pending += [pool.submit(work, *task) for task in islice(tasks, 1)]
 
 
 def available_cores() -> int:
@@ -226,6 +336,7 @@ def _scene_outputs(
 ) -> dict[str, Any]:
     """Build the model and write what needs it."""
     from .blender.files import empty_file, save_scene
+    from .blender.kept_road import remember
     from .blender.model import build_road
     from .blender.scene import scanned_scene
 
@@ -234,22 +345,46 @@ def _scene_outputs(
     if job.new_file:
         empty_file()
     with timer.stage("model"):
-        build_road(parameters, settings.tolerance, settings.vegetation_detail)
+        model = build_road(parameters, settings.tolerance, settings.vegetation_detail)
+        remember(model.collection, parameters, job.scenario, "")
     if set(wanted) & {"cloud", "previews"}:
         with timer.stage("scene mesh"):
             scene = scanned_scene(geometry=geometry, speed_factor=job.scenario.scan.traffic_speed_factor)
+        environment = parameters.environment
         with timer.stage("caster"):
-            scan = make_scan(job.scenario, scene, road_path(job.scenario, geometry), parameters.environment)
+            scan = make_scan(job.scenario, scene, road_path(job.scenario, geometry), environment)
+        cameras = colour_job(job.scenario, scan, scene, environment)
         del scene
-        with timer.stage("scan"):
-            view = top_view(geometry) if "previews" in wanted else None
-            for share in (task := ScanToFiles(job.scenario, scan, folder, parameters.metadata.epsg, view)).run():
-                timer.progress("scan", share)
-        counts = task.summary()
+        view = top_view(geometry) if "previews" in wanted else None
+        counts = scan_to_files(job.scenario, scan, cameras, folder, parameters.metadata.epsg, view, timer)
     if "scene" in wanted:
         with timer.stage("scene file"):
             save_scene(folder / "scene.blend")
     return counts
+
+
+def scan_to_files(
+    scenario: Scenario,
+    scan: Scan,
+    cameras: ColourJob,
+    folder: Path,
+    epsg: int | None,
+    view: TopView | None,
+    timer: StageTimer,
+) -> dict[str, Any]:
+    """Render what the colours need, scan, and write the cloud and the previews; return the counts as JSON data."""
+    from .blender.cameras import layer_source
+
+    with ExitStack() as stack:
+        with timer.stage("images"):
+            source = stack.enter_context(
+                layer_source(cameras, progress=lambda share: timer.progress("images", share))
+            )
+        with timer.stage("scan"):
+            task = ScanToFiles(scenario, scan, source, folder, epsg, view)
+            for share in task.run():
+                timer.progress("scan", share)
+        return task.summary()
 
 
 class ScanToFiles:
@@ -258,6 +393,7 @@ class ScanToFiles:
     Args:
         scenario: says which files are wanted.
         scan: see `make_scan`.
+        source: of colours and layers.
         folder: where the files go.
         epsg: map coordinate system; None if unknown.
         view: raster for the previews; None without.
@@ -267,37 +403,59 @@ class ScanToFiles:
     """
 
     def __init__(
-        self, scenario: Scenario, scan: Scan, folder: Path, epsg: int | None = None, view: TopView | None = None
+        self,
+        scenario: Scenario,
+        scan: Scan,
+        source: LayerSource,
+        folder: Path,
+        epsg: int | None = None,
+        view: TopView | None = None,
     ) -> None:
         self.scenario, self.scan, self.folder, self.epsg, self.view = scenario, scan, folder, epsg, view
+        self.finish = make_finish(scenario, scan, source)
         self.counts = ScanCounts()
         # 16 bits are full for a white target at a right angle at half the usual range: only what is nearer or a
         # retro-reflector is brighter, and the weakest echoes still have hundreds of steps.
-        self.intensity_scale = 65535.0 * max(1.0, scan.path.typical_range / 2.0) ** 2
+        usual = 65535.0 * max(1.0, scan.path.typical_range / 2.0) ** 2
+        self.intensity_scale = scenario.cloud.intensity_scale or usual
 
     def run(self) -> Generator[float, None, None]:
         """Scan; yield the share that is done after each block. The files are complete when the iteration ends."""
         total = len(self.scan.blocks())
-        with self._cloud_writer() as writer:
-            for number, result in enumerate(scan_blocks(self.scan, self.scenario.scan.threads), start=1):
+        with ExitStack() as stack:
+            writers, grid = self._writers(stack), self._grid(stack)
+            results = scan_blocks(self.scan, self.scenario.scan.threads, self.finish)
+            for number, result in enumerate(results, start=1):
                 self.counts.add(result)
-                if writer:
-                    writer.write(result.points)
-                if self.view:
-                    self.view.add(result.points)
+                if grid:
+                    grid.add(result.points)
+                else:
+                    self._keep(result.points, writers)
                 yield number / total
-        self.counts.intensity_clipped = writer.clipped if writer else 0
+            for block in grid.blocks() if grid else ():
+                self._keep(block, writers)
+        self.counts.points = writers[0].count if writers else self.counts.points
+        self.counts.intensity_clipped = writers[0].clipped if writers else 0
         if self.view:
             self.view.save(self.folder, self.epsg)
 
-    @contextmanager
-    def _cloud_writer(self) -> Iterator[LasWriter | None]:
+    def _keep(self, points: PointBlock, writers: list[CloudWriter]) -> None:
+        for writer in writers:
+            writer.write(points)
+        if self.view:
+            self.view.add(points)
+
+    def _writers(self, stack: ExitStack) -> list[CloudWriter]:
+        """Return the cloud's writers; they are closed with the stack."""
         if "cloud" not in self.scenario.outputs:
-            yield None
-            return
-        origin = self.scan.target.origin
-        with LasWriter(self.folder / "cloud.laz", self.epsg, origin, self.intensity_scale) as writer:
-            yield writer
+            return []
+        cloud, origin = self.scenario.cloud, self.scan.target.origin
+        options = (self.epsg, origin, self.intensity_scale, cloud.attributes, cloud.scheme())
+        return [stack.enter_context(open_writer(self.folder / name, *options)) for name in cloud.file_names()]
+
+    def _grid(self, stack: ExitStack) -> GridSubsampler | None:
+        spacing = self.scenario.cloud.point_spacing
+        return stack.enter_context(GridSubsampler(spacing, self.folder)) if spacing else None
 
     def summary(self) -> dict[str, Any]:
         """Return the counts as JSON data."""
@@ -308,11 +466,19 @@ class ScanToFiles:
             "triangles": target.triangles,
             "vertices": target.vertices,
             "caster": target.caster.name,
-            **{name: value for name, value in asdict(self.counts).items() if name != "by_class"},
+            **{name: value for name, value in asdict(self.counts).items() if not name.startswith("by_")},
             "attenuation": self.scan.attenuation,
             "intensity_scale": self.intensity_scale,
             "points_by_class": by_class,
+            "points_by_colour_source": self._shares_by_source(),
+            "rendered": getattr(self.finish.source, "report", {}),
         }
+
+    def _shares_by_source(self) -> dict[str, float]:
+        """Return the share of the points that took their colour from each source."""
+        total = max(1, int(self.counts.by_source.sum()))
+        names = {FROM_MATERIAL: "material", FROM_RETURN: "return", 1: "image", 2: "next image"}
+        return {names.get(i, f"image {i}"): round(int(n) / total, 6) for i, n in enumerate(self.counts.by_source) if n}
 
 
 def road_path(scenario: Scenario, geometry: RoadGeometry) -> ScanPath:
@@ -335,13 +501,13 @@ def top_view(geometry: RoadGeometry) -> TopView:
     return TopView(plan[0] + origin, plan[-1] + origin, float(across.min()) - 2, float(across.max()) + 2)
 
 
-def _closing(job: Job, timer: StageTimer) -> dict[str, Any]:
+def closing(scenario: Scenario, timer: StageTimer) -> dict[str, Any]:
     """Return the part of the report that is the same for every job."""
     bpy = sys.modules.get("bpy")  # not there if nothing needed Blender
     return {
-        "seed": job.scenario.seed,
-        "settings": asdict(job.scenario.settings()),
-        "scenario": job.scenario.to_dict(),
+        "seed": scenario.seed,
+        "settings": asdict(scenario.settings()),
+        "scenario": scenario.to_dict(),
         "seconds": round(timer.seconds, 3),
         "stages": timer.stages,
         "versions": {

@@ -31,7 +31,7 @@ from .core.scenario import Output, Scenario
 from .core.scene_extent import bounds, elevation_at, middle_line
 from .core.scene_mesh import SceneMesh
 from .core.schema import canonical_json, read_json
-from .pipeline import FILES, Job, ScanToFiles, _closing, make_scan, top_view
+from .pipeline import closing, colour_job, file_names, make_scan, scan_to_files, top_view
 
 if TYPE_CHECKING:
     from .blender.foreign import UpAxis
@@ -88,7 +88,7 @@ def scan_scene(job: SceneScan, progress: Progress = silent) -> dict[str, Any]:
     mapping = check_scene_scan(job)
     scenario = job.scenario
     wanted = tuple(name for name in OUTPUTS if name in scenario.outputs)
-    names = [name for output in wanted for name in FILES[output]] + ["report.json"]
+    names = file_names(scenario, wanted)
     timer = StageTimer(progress)
     report: dict[str, Any] = {"type": "Report", "generator": f"SynthRoads {version()}"}
     with output_folder(job.output, names, job.overwrite) as folder:
@@ -102,13 +102,12 @@ def scan_scene(job: SceneScan, progress: Progress = silent) -> dict[str, Any]:
             path = scene_path(job, static, geometry)
             scan = make_scan(scenario, found.scene, path, found.road.environment if found.road else None)
         epsg = found.road.metadata.epsg if found.road and job.epsg is None else job.epsg
-        with timer.stage("scan"):
-            view = None if "previews" not in wanted else top_view(geometry) if geometry else scene_view(static)
-            for share in (task := ScanToFiles(scenario, scan, folder, epsg, view)).run():
-                timer.progress("scan", share)
-        report |= {"scene": job.scene.name if job.scene else None, "counts": task.summary()}
-        report["warnings"] = found.warnings + _of_counts(task)
-        report |= _closing(Job(scenario, job.output), timer)
+        view = None if "previews" not in wanted else top_view(geometry) if geometry else scene_view(static)
+        cameras = colour_job(scenario, scan, found.scene, found.road.environment if found.road else None)
+        counts = scan_to_files(scenario, scan, cameras, folder, epsg, view, timer)
+        report |= {"scene": job.scene.name if job.scene else None, "counts": counts}
+        report["warnings"] = found.warnings + _of_counts(counts)
+        report |= closing(scenario, timer)
         report["scenario"] = {name: value for name, value in report["scenario"].items() if name != "road"}
         (folder / "report.json").write_text(canonical_json(report), encoding="utf-8")
     return report
@@ -209,9 +208,8 @@ def scene_view(mesh: SceneMesh) -> TopView:
     return TopView(start, end, -reach, reach)
 
 
-def _of_counts(task: ScanToFiles) -> list[str]:
-    counts = task.counts
-    if not counts.points:
+def _of_counts(counts: dict[str, Any]) -> list[str]:
+    if not counts["points"]:
         return ["not one pulse came back: is the scene within the scanner's range and field of view?"]
-    unlabelled = int(counts.by_class[255])
+    unlabelled = int(counts["points_by_class"].get("unlabelled", 0))
     return [f"{unlabelled:,} points have no class"] if unlabelled else []

@@ -2,14 +2,13 @@
 
     python tools/benchmark_scan.py
 
-Times are of one thread's processor; each block is scanned a few times and the median taken, as other work on the
-machine disturbs single runs. The ratio is the time within the caster over all the time: 100 % is the bare caster.
+Times are of one thread's processor; blocks spread over a strip are scanned a few times each and the median taken, as
+other work on the machine disturbs single runs. The ratio is the time within the caster over all the time.
 """
 
 from __future__ import annotations
 
 import argparse
-import statistics
 import sys
 import time
 from pathlib import Path
@@ -29,6 +28,9 @@ from synthroads_addon.core.scanning.caster import Caster  # noqa: E402
 from synthroads_addon.core.scanning.scan import Scan, scan_block  # noqa: E402
 from synthroads_addon.core.scenario import load_scenario  # noqa: E402
 from synthroads_addon.pipeline import make_scan, road_path  # noqa: E402
+
+BLOCKS = 8
+"""Blocks of a strip that are scanned."""
 
 
 class TimedCaster:
@@ -69,25 +71,28 @@ def main() -> None:
     for rays in (1, 7, 19, 61):
         changed = load_scenario(arguments.scenario, [f"scan.rays_per_pulse={rays}", *arguments.changes])
         scan = make_scan(changed, scene, road_path(changed, geometry))
-        ours, bare = measured(scan, arguments.repeat)
-        print(f"| {rays} | {ours / 1e6:.2f} M | {bare / 1e6:.2f} M | {100 * ours / bare:.0f} % |")
+        ours, share = measured(scan, arguments.repeat)
+        print(f"| {rays} | {ours / 1e6:.2f} M | {ours / share / 1e6:.2f} M | {100 * share:.0f} % |")
 
 
 def measured(scan: Scan, repeat: int) -> tuple[float, float]:
-    """Return rays per second of one thread: with everything, and within the caster alone."""
+    """Return rays per second of one thread with everything, and the share of the time within the caster."""
     part = scan.target._parts[0]
     timed = TimedCaster(part.caster)
     object.__setattr__(part, "caster", timed)
     strip = scan.path.strips[0]
-    blocks = np.linspace(0, scan.pulses(strip) // scan.pulses_per_block - 1, 3).astype(int)
-    ours, bare = [], []
-    for block in np.repeat(blocks, repeat):
-        timed.rays, timed.seconds = 0, 0.0
-        begin = time.thread_time()
-        scan_block(scan, strip, int(block))
-        ours.append(timed.rays / (time.thread_time() - begin))
-        bare.append(timed.rays / timed.seconds)
-    return statistics.median(ours), statistics.median(bare)
+    blocks = np.linspace(0, scan.pulses(strip) // scan.pulses_per_block - 1, BLOCKS).astype(int)
+    rays, whole, casting = 0, 0.0, 0.0
+    for block in blocks:
+        runs = []
+        for _ in range(repeat):
+            timed.rays, timed.seconds = 0, 0.0
+            begin = time.thread_time()
+            scan_block(scan, strip, int(block))
+            runs.append((time.thread_time() - begin, timed.seconds))
+        seconds = sorted(runs)[repeat // 2]
+        rays, whole, casting = rays + timed.rays, whole + seconds[0], casting + seconds[1]
+    return rays / whole, casting / whole
 
 
 if __name__ == "__main__":

@@ -1,6 +1,6 @@
 """Time and errors of the points' colours by source, image spacing, ground sampling distance and samples.
 
-    python tools/figures_colour.py --output docs/pictures
+    python tools/figures_colour.py --output out/colour
 
 needs Blender 5.0 or newer as a Python package: a pixel per return is the truth. Writes ``colour.md`` (a table),
 ``colour.json`` and ``colour.png``. Times are processor seconds, so that they compare on a busy machine.
@@ -272,9 +272,9 @@ def plot(found: list[Row], path: Path) -> None:
         own = [row for row in found if row.source == "images" and row.spacing == spacing]
         cost = [row.preparing + row.per_million for row in own]
         axes.plot(cost, [row.colour_mean for row in own], marker=marker, label=f"images every {spacing:g} m")
-        for row, x in zip(own, cost, strict=True):
+        for row, x in zip(own, cost, strict=True) if marker == "D" else ():
             name = f"{100 * row.distance:g} cm"
-            axes.annotate(name, (x, row.colour_mean), (4, 5), textcoords="offset points", fontsize=8)
+            axes.annotate(name, (x, row.colour_mean), (5, 6), textcoords="offset points", fontsize=8)
     for source, color in (("material", "0.4"), ("returns", "crimson")):
         row = next(row for row in found if row.source == source)
         name = "material's mean" if source == "material" else "a pixel per return (truth)"
@@ -291,7 +291,7 @@ def plot(found: list[Row], path: Path) -> None:
 def main() -> None:
     """Run the command."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--output", type=Path, default=Path("docs/pictures"))
+    parser.add_argument("--output", type=Path, default=Path("out/colour"))
     parser.add_argument("--returns", type=int, default=500_000, help="rays that are cast")
     options = parser.parse_args()
     from synthroads_addon.blender.cameras import HAS_RETURN_CAMERA

@@ -138,6 +138,11 @@ class Targets:
         return Targets(*(getattr(self, f.name)[rows] for f in fields(self)))
 
 
+def joined_targets(parts: Sequence[Targets]) -> Targets:
+    """Return the points of several parts, in order; at least one part is needed."""
+    return Targets(*(np.concatenate([getattr(part, f.name) for part in parts]) for f in fields(Targets)))
+
+
 class MaterialLayers:
     """Each material's means, under sun and sky without shadows of objects. Can be used by many threads at once."""
 

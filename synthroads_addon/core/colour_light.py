@@ -9,10 +9,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from .parameters.model_surroundings import Environment
 from .random_streams import stream
-from .scanning.radiometry import SUN
 
 Float = NDArray[np.float64]
 
+SUN = np.array([0.35, -0.45, 0.82]) / np.linalg.norm([0.35, -0.45, 0.82])
+"""Direction of a usual sun, where no environment says another."""
 WHITE = 0.9
 """Exposure: linear value of a white matt horizontal surface in the sun."""
 GROUND_ALBEDO = 0.2

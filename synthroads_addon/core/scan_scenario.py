@@ -33,7 +33,7 @@ class Platform(ScenarioModel):
         3, ge=1, le=9, unit="1", description="Degree of the smoothed path's polynomials."
     )
     zigzag_amplitude: float = quantity(5.0, ge=0, le=500, unit="m", description="Sway to either side.")
-    zigzag_wavelength: float = quantity(100.0, ge=5, le=5000, unit="m", description="Length of a whole sway; at least the amplitude.")
+    zigzag_wavelength: float = quantity(100.0, ge=5, le=5000, unit="m", description="Length of a sway.")
     stations: tuple[Finite, ...] | None = Field(
         None, min_length=1, max_length=1000, description="Stations of a tripod's positions, m."
     )
@@ -107,7 +107,9 @@ class ScanScenario(ScenarioModel):
     )
     platform: Platform = Field(Platform(), description="Platform and path.")
     noise: Noise = Field(Noise(), description="Measurement noise.")
-    keep_truth: bool = Field(False, description="Keep each point's noise-free range and position.")
+    relief: float = quantity(
+        1.0, ge=0, le=100, unit="1", description="Strength of the surfaces' micro-relief in the cloud; 0 is none."
+    )
     reflection: Literal["lambert", "oren_nayar"] = Field("lambert", description="How rough surfaces reflect.")
     attenuation: float | None = quantity(
         None, ge=0, le=1, unit="1/m", description="Attenuation per metre of range (there and back); else the weather's."

@@ -9,6 +9,8 @@ from typing import Any, Literal, get_args
 
 from pydantic import Field
 
+from .cloud_scenario import CloudScenario
+from .colour_scenario import ColourScenario
 from .errors import InputError, nearest_name
 from .road_scenario import RoadScenario, ScenarioModel
 from .scan_scenario import ScanScenario
@@ -36,6 +38,8 @@ class Scenario(ScenarioModel):
     )
     road: RoadScenario = Field(RoadScenario(), description="The road's limits.")
     scan: ScanScenario = Field(ScanScenario(), description="The scan.")
+    colour: ColourScenario = Field(ColourScenario(), description="Colours and material layers.")
+    cloud: CloudScenario = Field(CloudScenario(), description="The cloud's files and what they hold.")
     outputs: tuple[Output, ...] = Field(
         OUTPUTS, description="Files wanted; nothing is computed that none of them needs."
     )
@@ -51,6 +55,7 @@ class Scenario(ScenarioModel):
             tolerance=pick(self.geometric_tolerance, preset.tolerance),
             vegetation_detail=pick(self.vegetation_detail, preset.vegetation_detail),
             rays_per_pulse=pick(self.scan.rays_per_pulse, preset.rays_per_pulse),
+            relief_octaves=preset.relief_octaves,
         )
 
 
@@ -62,17 +67,19 @@ class Settings:
         tolerance: largest chord error of the model's road surface, m.
         vegetation_detail: share of the plants that are built, 0 to 1.
         rays_per_pulse: rays that sample a pulse's footprint.
+        relief_octaves: octaves of the surfaces' micro-relief.
     """
 
     tolerance: float
     vegetation_detail: float
     rays_per_pulse: int
+    relief_octaves: int = 4
 
 
 FIDELITIES = {
-    "draft": Settings(tolerance=0.020, vegetation_detail=0.3, rays_per_pulse=1),
-    "standard": Settings(tolerance=0.005, vegetation_detail=1.0, rays_per_pulse=7),
-    "high": Settings(tolerance=0.001, vegetation_detail=1.0, rays_per_pulse=19),
+    "draft": Settings(tolerance=0.020, vegetation_detail=0.3, rays_per_pulse=1, relief_octaves=2),
+    "standard": Settings(tolerance=0.005, vegetation_detail=1.0, rays_per_pulse=7, relief_octaves=4),
+    "high": Settings(tolerance=0.001, vegetation_detail=1.0, rays_per_pulse=19, relief_octaves=6),
 }
 
 

@@ -6,11 +6,11 @@ import traceback
 
 import bpy
 
+from ..blender.kept_road import find_road, objects_of, recall, remember
 from ..core.errors import Cancelled, InputError
 from ..core.parameters.geometry import RoadGeometry
 from ..core.parameters.sampler import sample_road
 from . import scan_job
-from .road import find_road, objects_of, recall, remember
 from .scan_job import ScanJob, scanning
 from .view import look_along
 

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import bpy
 
+from ..blender.kept_road import BUILT_FROM, find_road
 from ..blender.model_builder import ROLE
 from . import scan_job
 from .operators import SYNTHROADS_OT_build, SYNTHROADS_OT_cancel_scan, SYNTHROADS_OT_scan
 from .properties import SYNTHROADS_PG_settings
-from .road import BUILT_FROM, find_road
 from .scan_job import ScanJob
 
 _SOLID = {"MESH", "CURVE", "SURFACE", "META", "FONT"}

@@ -9,6 +9,7 @@ from threading import Event, Thread
 
 from .. import version
 from ..core.cloud.centerline import centerline_geojson
+from ..core.colour import MaterialLayers, surface_constants
 from ..core.errors import Cancelled
 from ..core.files import output_folder
 from ..core.parameters.geometry import RoadGeometry
@@ -17,7 +18,7 @@ from ..core.parameters.tessellation import sample_stations
 from ..core.scanning.motion import ScannedScene
 from ..core.scenario import Scenario
 from ..core.schema import canonical_json
-from ..pipeline import FILES, Job, ScanToFiles, check, make_scan, road_path, top_view
+from ..pipeline import Job, ScanToFiles, check, file_names, make_scan, material_rows, road_path, top_view
 
 
 class ScanJob:
@@ -96,13 +97,16 @@ class ScanJob:
         self, scenario: Scenario, parameters: RoadParameters, scene: ScannedScene, overwrite: bool
     ) -> Generator[float, None, None]:
         """Write all files, yielding the share that is done: first once the folder is found to be writable."""
-        names = [name for output in scenario.outputs for name in FILES[output]] + ["report.json"]
+        names = file_names(scenario, scenario.outputs)
         with output_folder(self.target, names, overwrite) as folder:
+            rows = material_rows(scene.static.materials)
             yield 0.0
             geometry = RoadGeometry(parameters)
             stations = sample_stations(geometry, scenario.settings().tolerance)
             scan = make_scan(scenario, scene, road_path(scenario, geometry), parameters.environment)
-            task = ScanToFiles(scenario, scan, folder, parameters.metadata.epsg, top_view(geometry))
+            # Rendering would hold up the window: colours are the materials' own.
+            source = MaterialLayers(surface_constants(rows))
+            task = ScanToFiles(scenario, scan, source, folder, parameters.metadata.epsg, top_view(geometry))
             yield from task.run()
             texts = {
                 "parameters.json": parameters.to_json(),

@@ -319,7 +319,7 @@ def on_mesh(mesh: SceneMesh, points: Float) -> Float:
 
 
 def scanned(scene: ScannedScene, geometry: RoadGeometry, *changes: str) -> PointBlock:
-    options = ["scan.noise.range_sigma=0", "scan.rays_per_pulse=1", "scan.keep_truth=true", "scan.threads=1"]
+    options = ["scan.noise.range_sigma=0", "scan.rays_per_pulse=1", 'cloud.attributes=["noise_free"]', "scan.threads=1"]
     scenario = load_scenario("rq31-600m", [*options, *changes])
     scan = make_scan(scenario, scene, _Drone(geometry))
     # What a pulse meets behind a window is a return of its own, and no return lies between two surfaces.

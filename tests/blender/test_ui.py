@@ -31,6 +31,7 @@ NUMBERS: dict[str, tuple[type[BaseModel], str]] = {
     "speed": (Platform, "speed"),
 }
 CHEAP = ["road.half_width=20", "scan.lines_per_second=50", "scan.platform.lateral_offsets=[0]"]  # not in the panel
+CHEAP += ["colour.source=material"]
 SMALL = {"length": 120.0, "speed": 40.0, "seed": 3}
 SAME = ["fidelity=draft", "road.length=120", "scan.platform.speed=40", "seed=3", *CHEAP]
 WRITTEN = sorted([n for o in ("parameters", "cloud", "centerline", "previews") for n in FILES[o]] + ["report.json"])

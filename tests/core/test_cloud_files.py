@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import resource
 import zipfile
+from contextlib import suppress
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 
 import laspy
@@ -115,7 +117,7 @@ def test_any_points_in_any_blocks_round_trip(tmp_path: Path, data, count, wanted
     )
     block = replace(block, true_xyz=block.xyz, scanner=block.xyz)
     edges = sorted({0, count, *(min(cut, count) for cut in cuts)})
-    parts = [block.select(slice(a, b)) for a, b in zip(edges, edges[1:], strict=False)]
+    parts = [block.select(slice(a, b)) for a, b in pairwise(edges)]
     path = tmp_path / f"cloud{suffix}"
     write(path, block.select(slice(0, 0)), *parts, attributes=tuple(wanted))
     arrays = {c.array for name in wanted for c in COLUMNS[name]} | {
@@ -209,7 +211,18 @@ def test_truncated_files_are_refused(tmp_path: Path, points, ending: str) -> Non
     for share in (0.001, 0.01, 0.3, 0.7, 0.999):
         path.write_bytes(data[: int(len(data) * share)])
         with pytest.raises(InputError, match=f"cloud{ending}"):
-            read(path)
+            open_cloud(path)  # before any point is read
+
+
+def test_number_of_records_that_cannot_be(tmp_path: Path, points) -> None:
+    """Four thousand million records in a header are refused at once, not looked for one by one."""
+    path = tmp_path / "cloud.las"
+    write(path, points, attributes=())
+    data = bytearray(path.read_bytes())
+    data[100:104] = bytes([255] * 4)
+    path.write_bytes(data)
+    with pytest.raises(InputError, match="its header is damaged"):
+        open_cloud(path)
 
 
 def test_what_is_no_cloud_is_refused(tmp_path: Path, ending: str) -> None:
@@ -232,17 +245,15 @@ def test_damaged_files_never_end_in_a_traceback(tmp_path: Path, points, ending: 
     reach = 3_000 if seed % 2 else len(data)
     data[rng.integers(0, min(reach, len(data)), 20)] ^= rng.integers(1, 256, 20).astype(np.uint8)
     path.write_bytes(data.tobytes())
-    try:
-        for _ in read_cloud(path):
-            pass
-    except InputError as error:
-        assert f"cloud{ending}" in str(error)
+    with suppress(InputError):
+        read(path)
 
 
 def test_unknown_ending(tmp_path: Path) -> None:
-    for action in (lambda: open_cloud(tmp_path / "cloud.lax"), lambda: open_writer(tmp_path / "a.xyz", None, ORIGIN, 1.0)):
-        with pytest.raises(InputError, match=r"must end in \.laz, \.las, \.ply, \.e57, \.npz"):
-            action()
+    with pytest.raises(InputError, match=r"must end in \.laz, \.las, \.ply, \.e57, \.npz \(did you mean"):
+        open_cloud(tmp_path / "cloud.lax")
+    with pytest.raises(InputError, match=r"must end in \.laz, \.las, \.ply, \.e57, \.npz"):
+        open_writer(tmp_path / "a.xyz", None, ORIGIN, 1.0)
 
 
 def test_conversion_through_every_format_loses_nothing(tmp_path: Path, points) -> None:
@@ -252,7 +263,7 @@ def test_conversion_through_every_format_loses_nothing(tmp_path: Path, points) -
     block = replace(block, rgb=block.rgb // 257 * 257, true_xyz=block.xyz, scanner=block.xyz)
     write(tmp_path / "a.laz", block)
     steps = ["a.laz", "b.ply", "c.e57", "d.npz", "e.las", "f.laz"]
-    for source, output in zip(steps, steps[1:], strict=False):
+    for source, output in pairwise(steps):
         convert(tmp_path / source, tmp_path / output)
     assert (tmp_path / "f.laz").read_bytes() == (tmp_path / "a.laz").read_bytes()
 
@@ -313,9 +324,9 @@ def test_foreign_e57_with_a_turned_pose(tmp_path: Path) -> None:
     local = np.array([[1.0, 0.0, 0.0], [0.0, 2.0, 0.5]])
     data = {f"cartesian{axis}": local[:, i] for i, axis in enumerate("XYZ")}
     with pye57.E57(str(tmp_path / "cloud.e57"), mode="w") as file:
-        half = np.sqrt(0.5)
-        for shift in (0.0, 100.0):  # two scans, each turned by a quarter to the left
-            file.write_scan_raw(data, rotation=np.array([half, 0, 0, half]), translation=np.array([10.0 + shift, 20, 30]))
+        quarter = np.array([np.sqrt(0.5), 0, 0, np.sqrt(0.5)])  # to the left
+        for shift in (0.0, 100.0):  # two scans
+            file.write_scan_raw(data, rotation=quarter, translation=np.array([10.0 + shift, 20, 30]))
     found = read(tmp_path / "cloud.e57")
     first = [[10, 21, 30], [8, 20, 30.5]]
     np.testing.assert_allclose(found.xyz, [*first, *([x + 100, y, z] for x, y, z in first)], atol=1e-6)
@@ -353,7 +364,7 @@ def test_npz_dates_are_not_of_the_clock(tmp_path: Path, points) -> None:
 
 @pytest.mark.parametrize(("version", "kind"), [("1.2", 3), ("1.2", 1), ("1.4", 6), ("1.4", 8)])
 def test_plain_las_of_any_version(tmp_path: Path, version: str, kind: int) -> None:
-    """Files of others have no class_id: it holds their LAS codes, and strips and unknown fields aren't lost sight of."""
+    """Files of others have no class_id: it holds their LAS codes; unknown fields are named."""
     header = laspy.LasHeader(version=version, point_format=kind)
     header.offsets, header.scales = [100.0, 200.0, 0.0], [0.01] * 3
     header.add_extra_dim(laspy.ExtraBytesParams("tile", "uint16"))

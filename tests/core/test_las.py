@@ -3,6 +3,7 @@
 import json
 import struct
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -110,7 +111,7 @@ def test_class_table_is_complete() -> None:
 def raw_header(path: Path) -> dict[str, Any]:
     """Return the public header block's fields (LAS 1.4 R15, table 3) and the VLRs, read byte by byte."""
     data = path.read_bytes()
-    names = "day year header_size offset_to_points vlrs format record_length".split()
+    names = ["day", "year", "header_size", "offset_to_points", "vlrs", "format", "record_length"]
     fields = dict(zip(names, struct.unpack_from("<HHHIIBH", data, 90), strict=True))
     fields |= {"signature": data[:4], "encoding": struct.unpack_from("<H", data, 6)[0], "version": tuple(data[24:26])}
     fields["legacy"] = struct.unpack_from("<6I", data, 107)
@@ -199,7 +200,7 @@ def test_many_blocks_of_odd_sizes_fill_whole_chunks(tmp_path: Path) -> None:
     block = make_points(130_001)
     write(tmp_path / "one.las", block)
     bounds = [0, 1, 32_768, 32_769, 99_000, 130_001]
-    write(tmp_path / "many.las", *(block.select(slice(a, b)) for a, b in zip(bounds, bounds[1:], strict=False)))
+    write(tmp_path / "many.las", *(block.select(slice(a, b)) for a, b in pairwise(bounds)))
     assert (tmp_path / "one.las").read_bytes() == (tmp_path / "many.las").read_bytes()
 
 

@@ -10,11 +10,9 @@ from hypothesis import strategies as st
 from synthroads_addon.core.scanning.radiometry import (
     EDGE_ON,
     NEAREST,
-    SUN,
     facet_slope,
     facet_terms,
     lambert_intensity,
-    lit_color,
     oren_nayar_intensity,
     received,
     reflectivity,
@@ -157,10 +155,3 @@ def test_reflectivity_formula() -> None:
     assert reflectivity(color, 0.0, 0.04) == pytest.approx(0.04 + luminance / 2)
     assert reflectivity(color, 1.0, 0.04) == pytest.approx(luminance)
     assert reflectivity([1.0, 1.0, 1.0], 0.25, 0.1) == pytest.approx(0.75 * 0.6 + 0.25)
-
-
-def test_colour_is_srgb_of_the_linear_base() -> None:
-    color = lit_color(np.array([[0.0, 0.5, 1.0]]), SUN[None, :])
-    assert color[0, 0] == 0
-    assert color[0, 2] == 65535
-    assert color[0, 1] / 65535 == pytest.approx(0.7354, abs=1e-3)

@@ -57,12 +57,14 @@ def check_colour(scenario: ColourScenario) -> None:
     """Refuse what this Blender can't do.
 
     Raises:
-        InputError: a pixel per return in a Blender before 5.0, or with EEVEE.
+        InputError: a pixel per return in a Blender before 5.0, or with EEVEE; EEVEE with whole light paths.
     """
     if scenario.source == "returns" and not HAS_RETURN_CAMERA:
         raise InputError("colour: source", "returns", "needs Blender 5.0 or newer; this one has images")
     if scenario.source == "returns" and scenario.engine != "cycles":
         raise InputError("colour: engine", scenario.engine, "must be cycles for a pixel per return")
+    if scenario.lighting == "path" and scenario.engine != "cycles":
+        raise InputError("colour: lighting", scenario.lighting, "must be direct for eevee")
 
 
 @contextmanager
@@ -105,9 +107,13 @@ def layer_source(
             job.path, scene_sample(job.mesh), settings, job.field_of_view, job.scenario.max_resolution
         )
         images = RenderedLayers(set_up, views, fallback, exposure)
-        stack.callback(images.close)
-        images.render(progress)
-        yield images
+        try:
+            images.render(progress)
+            # The scan needs the renderer's memory.
+            stack.close()
+            yield images
+        finally:
+            images.close()
 
 
 def _passes(job: ColourJob, constants: SurfaceConstants) -> Passes:

@@ -54,6 +54,8 @@ class ReturnCamera:
         worst: largest distance between a return and what its pixel shows, of those used, m.
     """
 
+    main_thread_only = True
+
     def __init__(self, stage: Stage, fallback: MaterialLayers, exposure: float) -> None:
         self._stage, self.material, self._exposure = stage, fallback, exposure
         self._blocks = 0

@@ -197,13 +197,14 @@ def _set_passes(
 ) -> None:
     layer = scene.view_layers[0]
     layer.use_pass_material_index = scene.render.engine == "CYCLES"
-    if not layer.use_pass_material_index:
-        output = layer.aovs.add()
-        output.name, output.type = NUMBER, "VALUE"
     layer.use_pass_z, layer.use_pass_position = passes.depth, passes.position
     for name in passes.layers:
         output = layer.aovs.add()
         output.name, output.type = name, "COLOR" if MATERIAL_LAYERS[name] == 3 else "VALUE"
+    if not layer.use_pass_material_index:
+        # EEVEE has no such pass. In 5.2 values that are declared before colours come back 0.
+        output = layer.aovs.add()
+        output.name, output.type = NUMBER, "VALUE"
     if not passes.sky:
         return
     for name in (SUN_GROUP, SKY_GROUP):

@@ -68,8 +68,6 @@ class E57Reader(CloudReader):
         """See `CloudReader`."""
         done = 0
         for scan, fields, count in zip(self._scans, self._fields, self._counts, strict=True):
-            if count == 0:
-                continue
             wanted = [name for name in sorted(_STANDARD | self._own()) if name in fields]
             room = min(size, count)
             arrays = {name: np.zeros(room) for name in wanted}

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import TracebackType
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -66,7 +66,7 @@ class CloudReader(ABC):
 
     header: CloudHeader
 
-    def __enter__(self) -> CloudReader:
+    def __enter__(self) -> Self:
         return self
 
     def __exit__(

@@ -7,7 +7,7 @@ import json
 from abc import ABC, abstractmethod
 from pathlib import Path
 from types import TracebackType
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -72,7 +72,7 @@ class CloudWriter(ABC):
         if not np.isfinite(self.offset).all() or not (0 < self.intensity_scale < np.inf):
             raise InputError("offset, intensity_scale", [*self.offset, intensity_scale], "must be finite numbers")
 
-    def __enter__(self) -> CloudWriter:
+    def __enter__(self) -> Self:
         try:
             self._open()
         except self.faults as problem:

@@ -59,11 +59,11 @@ class FacePlanes:
         normal /= np.where(length > 0.0, length, 1.0)
         self.planes[3, block] = np.einsum("ij,ij->j", normal, a)
 
-    def meet(self, faces: NDArray[np.int32], origins: Float, directions: Float) -> tuple[Float, Float]:
+    def meet(self, faces: NDArray[np.intp], origins: Float, directions: Float) -> tuple[Float, Float]:
         """Return where rays meet the planes of ``faces``: range (m) and n . d, whose size is the cosine of incidence.
 
         Args:
-            faces: (...) all >= 0.
+            faces: (...); where negative the result has no meaning.
             origins: (3, ...) in float64; of the faces' shape, or one that spreads to it.
             directions: (3, ...) unit vectors in float64; of the faces' shape.
 
@@ -71,17 +71,18 @@ class FacePlanes:
             (...) range, not finite for a ray in the plane or a face without area; (...) n . d, negative where the ray
             meets the side that the normal points to.
         """
-        height, product = np.take(self.planes[3], faces), np.empty(faces.shape)
+        # Clipped, indices needn't be checked one by one before.
+        height, product = np.take(self.planes[3], faces, mode="clip"), np.empty(faces.shape)
         along = np.zeros(faces.shape)
         for i in range(3):
-            normal = np.take(self.planes[i], faces)
+            normal = np.take(self.planes[i], faces, mode="clip")
             along += np.multiply(normal, directions[i], out=product)
             height -= np.multiply(normal, origins[i], out=product)
         with np.errstate(divide="ignore", invalid="ignore"):
             height /= along
         return height, along
 
-    def normals(self, faces: NDArray[np.int32], along: Float) -> Float:
+    def normals(self, faces: NDArray[np.intp], along: Float) -> Float:
         """Return (3, H) unit normals of faces, turned towards rays with n . d = ``along`` (H,)."""
         result = np.take(self.planes[:3], faces, axis=1)
         result *= np.where(along > 0.0, -1.0, 1.0)

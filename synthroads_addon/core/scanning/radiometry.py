@@ -1,4 +1,4 @@
-"""How bright an echo is: reflectivity, the laser equation, and the colours of constant materials.
+"""How bright an echo is: reflectivity, the laser equation, retro-reflection and the detector.
 
 An echo's intensity is ``I0 * share / d^2 * exp(-a d)``; `returned_share` is what the surface does, `received` the rest.
 Lambert's and Oren and Nayar's surfaces and retro-reflection are in it. Mirror-like reflection and refraction are left
@@ -6,8 +6,6 @@ out on purpose. An ideal white target, struck at a right angle at 1 m, gives 1.
 """
 
 from __future__ import annotations
-
-from functools import cache
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -181,27 +179,3 @@ def saturated(intensity: Float, limit: float) -> tuple[Float, int]:
     """
     clipped = int(np.count_nonzero(intensity > limit))
     return (np.minimum(intensity, limit), clipped) if clipped else (intensity, 0)
-
-
-SUN = np.array([0.35, -0.45, 0.82]) / np.linalg.norm([0.35, -0.45, 0.82])
-_SKY = 0.45
-
-
-def lit_color(base_color: ArrayLike, normals: Float) -> NDArray[np.uint16]:
-    """Return (N, 3) 16-bit sRGB of constant materials under sun and sky, without shadows.
-
-    Args:
-        base_color: (N, 3) linear RGB.
-        normals: (N, 3) unit normals towards the viewer.
-    """
-    irradiance = _SKY + (1.0 - _SKY) * np.clip(normals @ SUN, 0.0, 1.0)
-    linear = np.clip(np.asarray(base_color) * irradiance[:, None], 0.0, 1.0)
-    return np.take(_encoded(), np.rint(linear * 65535.0).astype(np.int32))
-
-
-@cache
-def _encoded() -> NDArray[np.uint16]:
-    """Return the sRGB value of each of 2^16 steps of linear light (IEC 61966-2-1)."""
-    linear = np.arange(65536) / 65535.0
-    encoded = np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
-    return np.asarray(encoded * 65535.0 + 0.5, dtype=np.uint16)

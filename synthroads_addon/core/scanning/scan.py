@@ -10,13 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..cloud.points import PointBlock, concatenate
+from ..colour import Targets, joined_targets
 from ..scan_scenario import Noise
 from .beam import BeamPattern, beam_pattern, conical, cylindrical_offsets
 from .devices import ScannerSetting
 from .path import Path, Strip
 from .pattern import shot_count, shots
 from .pulses import Errors, Poses, Pulses, make_pulses, reaching_scene
-from .radiometry import lit_color, received, returned_share, saturated
+from .radiometry import received, returned_share, saturated
 from .returns import Echoes, Marks, chosen_echoes, group_returns, number_returns
 from .surfaces import Surfaces
 from .target import Target
@@ -28,7 +29,7 @@ Index = NDArray[np.intp]
 
 RAYS_PER_BLOCK = 2**18
 """Rays of one block at most; what keeps memory bounded. Fixed, as blocks carry their own random streams."""
-RAYS_PER_CHUNK = 2**17
+RAYS_PER_CHUNK = 2**16
 """Rays that are worked on at once: fewer are slow by the number of calls, more by memory. No result depends on it."""
 _UNCOUNTED = 1e-6
 """Least reflectance that a hit has in a return's mean range, so that black surfaces have a range as well."""
@@ -40,7 +41,8 @@ class Scan:
 
     Attributes:
         attenuation: 1/m of range.
-        wanted: names of `PointBlock`'s optional arrays to be filled, and ``rgb`` if the materials are to colour it.
+        wanted: names of `PointBlock`'s optional arrays to be filled.
+        targets: whether to say where each point was seen, for colours and relief: `BlockResult.seen`.
     """
 
     target: Target
@@ -52,7 +54,8 @@ class Scan:
     noise: Noise = Noise()  # noqa: RUF009 (frozen)
     attenuation: float = 0.0
     beam: Literal["conical", "cylindrical"] = "conical"
-    wanted: frozenset[str] = frozenset({"rgb"})
+    wanted: frozenset[str] = frozenset()
+    targets: bool = False
     pattern: BeamPattern = field(init=False)
 
     def __post_init__(self) -> None:
@@ -80,13 +83,23 @@ class Scan:
 
 @dataclass(frozen=True)
 class BlockResult:
-    """The points of one block and what was counted on the way."""
+    """The points of one block and what was counted on the way.
+
+    Attributes:
+        points: as measured.
+        seen: where, if the scan was to say so.
+        pulses, rays: emitted, and cast at what is first in their way.
+        below_threshold, saturated: returns that the detector lost or clipped.
+        sources: (256,) points by the source of their colour, once they are finished.
+    """
 
     points: PointBlock
+    seen: Targets | None
     pulses: int
     rays: int
     below_threshold: int
     saturated: int
+    sources: NDArray[np.int64] | None = None
 
 
 def scan_block(scan: Scan, strip: Strip, block: int) -> BlockResult:
@@ -107,6 +120,7 @@ def scan_pulses(scan: Scan, strip: Strip, first: int, count: int, key: int = 0) 
     ]
     return BlockResult(
         concatenate([part.points for part in parts]),
+        joined_targets([part.seen for part in parts if part.seen is not None]) if scan.targets else None,
         *(sum(getattr(part, name) for part in parts) for name in ("pulses", "rays", "below_threshold", "saturated")),
     )
 
@@ -143,8 +157,8 @@ def _scan_chunk(
         echoes = chosen_echoes(echoes, strong)
     if errors.lost is not None:
         echoes = _kept(echoes, errors.lost[number])
-    points, clipped = _points(scan, strip, pulses, traced, echoes, errors, number, poses.motions)
-    return BlockResult(points, count, traced.first.face.size, weak, clipped)
+    points, seen, clipped = _points(scan, strip, pulses, traced, echoes, errors, number, poses.motions)
+    return BlockResult(points, seen, count, traced.first.face.size, weak, clipped)
 
 
 def beam_rays(scan: Scan, pulses: Pulses, motions: list[Track]) -> Rays:
@@ -213,8 +227,8 @@ def _points(
     errors: Errors,
     number_in_block: Index,
     motions: list[Track],
-) -> tuple[PointBlock, int]:
-    """Return the points of the echoes, and how many of them saturated the detector."""
+) -> tuple[PointBlock, Targets | None, int]:
+    """Return the points of the echoes, where they were seen, and how many of them saturated the detector."""
     keep, number, returns = number_returns(echoes.pulse, scan.setting.device.maximum_returns)
     if not keep.all():
         echoes = chosen_echoes(echoes, keep)
@@ -226,12 +240,12 @@ def _points(
         distance = distance + scan.setting.range_sigma * errors.of_range(number_in_block[pulse], number, most)
     intensity, clipped = saturated(echoes.intensity, scan.setting.saturation)
     normal = None
-    if scan.wanted & {"rgb", "normal"}:
+    if scan.targets or "normal" in scan.wanted:
         normal = target.normals(face, along, pulses.time[pulse], motions)
     points = PointBlock(
         xyz=_places(pulses.measured_origin, pulses.measured_direction, pulse, distance, target.origin),
         intensity=intensity,
-        rgb=_colors(scan, face, normal),
+        rgb=np.zeros((len(pulse), 3), dtype=np.uint16),
         class_id=target.class_id[face],
         instance_id=target.instance_id[face],
         return_number=number,
@@ -243,7 +257,28 @@ def _points(
         incidence_deg=np.rad2deg(np.arccos(np.minimum(np.abs(along), 1.0))).astype(np.float32),
         **dict(_optional(scan, pulses, pulse, echoes.range, face, normal)),
     )
-    return points, clipped
+    seen = _seen(scan, pulses, echoes, face, normal, motions) if scan.targets and normal is not None else None
+    return points, seen, clipped
+
+
+def _seen(
+    scan: Scan, pulses: Pulses, echoes: Echoes, face: Index, normal: Float, motions: list[Track]
+) -> Targets:
+    """Return where the points were seen, in the scene as it stands at the time 0: as it is rendered."""
+    pulse, target = echoes.pulse, scan.target
+    time = pulses.time[pulse]
+    scanner = np.take(pulses.origin, pulse, axis=1)
+    position = scanner + echoes.range * np.take(pulses.direction, pulse, axis=1)
+    if target.moving:
+        begin, offset, normal = target.at_start(face, position, time, motions, (scanner - position, normal))
+        position, scanner = begin, begin + offset
+    return Targets(
+        position=np.ascontiguousarray(position.T),
+        scanner=np.ascontiguousarray(scanner.T),
+        normal=np.ascontiguousarray(normal.T),
+        material=target.material[face],
+        time=time,
+    )
 
 
 def _places(origin: Float, direction: Float, pulse: Index, distance: Float, map_origin: Float) -> Float:
@@ -258,14 +293,8 @@ def _places(origin: Float, direction: Float, pulse: Index, distance: Float, map_
     return result
 
 
-def _colors(scan: Scan, face: NDArray[np.int32], normal: Float | None) -> NDArray[np.uint16]:
-    if "rgb" not in scan.wanted or normal is None:
-        return np.zeros((len(face), 3), dtype=np.uint16)
-    return lit_color(scan.surfaces.base_color[scan.target.material[face]], normal.T)
-
-
 def _optional(
-    scan: Scan, pulses: Pulses, pulse: Index, distance: Float, face: NDArray[np.int32], normal: Float | None
+    scan: Scan, pulses: Pulses, pulse: Index, distance: Float, face: Index, normal: Float | None
 ) -> Iterator[tuple[str, Any]]:
     """Yield the optional arrays that are wanted, by name."""
     wanted, origin = scan.wanted, scan.target.origin
@@ -277,9 +306,5 @@ def _optional(
         yield "true_range", distance
     if "true_xyz" in wanted:
         yield "true_xyz", _places(pulses.origin, pulses.direction, pulse, distance, origin)
-    material = scan.target.material[face]
     if "material" in wanted:
-        yield "material", material
-    for name in ("roughness", "metallic", "specular"):
-        if name in wanted:
-            yield name, getattr(scan.surfaces, name)[material].astype(np.float32)
+        yield "material", scan.target.material[face]

@@ -15,7 +15,7 @@ from .motion import MovingMesh, ScannedScene
 from .track import Track
 
 Float = NDArray[np.float64]
-Faces = NDArray[np.int32]
+Faces = NDArray[np.intp]
 
 _CHUNK = 512
 """Rays side by side that are told together whether they come near a moving object."""
@@ -43,7 +43,7 @@ class Met:
     """What rays meet first; one value per ray, in the shape of the rays.
 
     Attributes:
-        face: int32 of all faces of the target, -1 for none.
+        face: number among all faces of the target, -1 for none.
         distance: m, inf for none.
         along: n . d of the face's normal and the ray.
     """
@@ -123,6 +123,31 @@ class Target:
             _cast_moving(part, track, flat_origins, flat_directions, flat_times, maximum_range, nearest)
         return Met(*(getattr(nearest, name).reshape(shape[1:]) for name in ("face", "distance", "along")))
 
+    def at_start(
+        self, faces: Faces, places: Float, times: Float, motions: list[Track], vectors: tuple[Float, ...] = ()
+    ) -> tuple[Float, ...]:
+        """Return places on faces, and directions there, as they are in the scene at the time 0.
+
+        Args:
+            faces: (H,).
+            places: (3, H) local, m, at ``times``.
+            times: (H,) s.
+            motions: see `motions`.
+            vectors: (3, H) each; turned only.
+        """
+        results = (places.copy(), *(vector.copy() for vector in vectors))
+        for part, moving, track in zip(self._parts[1:], self.moving, motions, strict=True):
+            mine = np.flatnonzero((faces >= part.first) & (faces < part.first + part.count))
+            if not len(mine):
+                continue
+            rotation, place, _ = track.at(times[mine])
+            begin_rotation, begin_place, _ = moving.motion.pose(np.zeros(1))
+            own = _inverse(rotation, places[:, mine] - place)
+            results[0][:, mine] = begin_rotation[0] @ own + begin_place[0][:, None]
+            for result, vector in zip(results[1:], vectors, strict=True):
+                result[:, mine] = begin_rotation[0] @ _inverse(rotation, vector[:, mine])
+        return results
+
     def normals(self, faces: Faces, along: Float, times: Float, motions: list[Track]) -> Float:
         """Return (3, H) unit normals, local, turned towards the rays that met the faces."""
         result = np.empty((3, len(faces)))
@@ -159,16 +184,20 @@ def _cast(part: _Part, origins: Float, directions: Float, maximum_range: float) 
     for i in range(3):
         single[0, ..., i] = origins[i]
         single[1, ..., i] = directions[i]
-    face = part.caster.cast(single[0].reshape(-1, 3), single[1].reshape(-1, 3), maximum_range).reshape(shape)
+    found = part.caster.cast(single[0].reshape(-1, 3), single[1].reshape(-1, 3), maximum_range)
+    face = found.reshape(shape).astype(np.intp)
     if not part.count:
         return Met(face, np.full(shape, np.inf), np.zeros(shape))
-    # A miss is worked out with the first face and then forgotten: that is less work than to sort them out before.
-    distance, along = part.planes.meet(np.maximum(face, 0), origins, directions)
-    missed = ~(np.isfinite(distance) & (face >= 0))
-    distance[missed] = np.inf
+    # A miss is worked out with some face and then forgotten: that is less work than to sort them out before.
+    distance, along = part.planes.meet(face, origins, directions)
+    missed = face < 0
+    if not along.all():  # in the face's plane, or a face without area
+        missed |= ~np.isfinite(distance)
+    np.copyto(distance, np.inf, where=missed)
     if part.first:
-        face = face + np.int32(part.first)
-    if missed.any():
+        face += part.first
+        face[missed] = -1
+    elif not along.all():
         face[missed] = -1
     return Met(face, distance, along)
 

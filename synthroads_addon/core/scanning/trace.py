@@ -46,7 +46,7 @@ class Hits:
     """Surfaces that rays meet; all arrays have one shape.
 
     Attributes:
-        face: int32 of all faces of the target; -1 for none.
+        face: number among all faces of the target; -1 for none.
         material: uint16 of the face; any for none.
         distance: range from the ray's origin, m; inf for none, or where it is out of the device's reach.
         along: n . d of the face's normal and the ray.
@@ -54,7 +54,7 @@ class Hits:
             shape of the others.
     """
 
-    face: NDArray[np.int32]
+    face: NDArray[np.intp]
     material: NDArray[np.uint16]
     distance: Float
     along: Float
@@ -94,17 +94,18 @@ def trace(
     The shares taken along one ray never add up to more than its own.
     """
     met = target.cast(rays.origin, rays.direction, farthest, rays.time, motions)
-    material = np.take(target.material, np.maximum(met.face, 0)) if target.triangles else met.face.astype(np.uint16)
+    material = np.take(target.material, met.face, mode="clip") if target.triangles else met.face.astype(np.uint16)
     if not surfaces.permeable:
-        first = Hits(met.face, material, _within(met.distance, nearest, farthest), met.along, rays.share)
+        first = Hits(met.face, material, _within(met.distance, nearest, np.inf), met.along, rays.share)
         return _traced(first, [], [])
-    on = np.flatnonzero(np.take(surfaces.pervious, material) & (met.distance < farthest))
+    on = np.flatnonzero(np.take(surfaces.pervious, material, mode="clip"))
+    on = on[np.take(met.distance, on) < farthest]
     through = surfaces.transmission[np.take(material, on)]
     share = np.broadcast_to(rays.share, material.shape).copy()
     left = np.take(share, on)
     share.ravel()[on] = left * (1.0 - through)
     start = np.take(met.distance, on)
-    first = Hits(met.face, material, _within(met.distance, nearest, farthest), met.along, share)
+    first = Hits(met.face, material, _within(met.distance, nearest, np.inf), met.along, share)
     layers, pulses = [], []
     left *= through
     for _ in range(LAYERS - 1):
@@ -139,6 +140,11 @@ def _traced(first: Hits, layers: list[Hits], pulses: list[NDArray[np.intp]]) -> 
 
 
 def _within(distance: Float, nearest: float, farthest: float) -> Float:
-    """Return ranges; inf where nothing is recorded: what lies there has taken its share of the light all the same."""
+    """Return ranges; inf where nothing is recorded: what lies there has taken its share of the light all the same.
+
+    What rays meet first is never farther than they were cast, so there ``farthest`` is inf.
+    """
+    if distance.size == 0 or (farthest == np.inf and distance.min() >= nearest):
+        return distance
     outside = (distance < nearest) | (distance > farthest)
     return np.where(outside, np.inf, distance) if outside.any() else distance
