@@ -1,7 +1,7 @@
 #!/bin/sh
 # The source checks once and the tests on both Blender LTS releases, as far as their Pythons are here.
 # usage: run_tests.sh EXTRAS_OF_3.11 EXTRAS_OF_3.13 MARKERS [PYTEST_ARGUMENT...]
-# PYTHON=COMMAND in the environment: that interpreter alone.
+# PYTHON=COMMAND in the environment: that interpreter alone. TEST_WORKERS=N: processes side by side; 2 if not given.
 set -eu
 
 extras_311=${1:?}
@@ -9,6 +9,8 @@ extras_313=${2:?}
 markers=${3:?}
 shift 3
 cd "$(dirname "$0")/.."
+# The processes share the cores already; spinning threads of linear algebra would only slow each other down.
+export OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1
 
 versions="3.11 3.13"
 if [ -n "${PYTHON:-}" ]; then
@@ -50,7 +52,7 @@ for version in $versions; do
     fi
     start=$(date +%s)
     status=0
-    "$python" -m pytest -q -m "$markers" "$@" || status=$?
+    "$python" -m pytest -q -n "${TEST_WORKERS:-2}" --dist loadfile -m "$markers" "$@" || status=$?
     seconds=$(($(date +%s) - start))
     if [ "$status" -eq 0 ]; then
         note "Python $version ($blender): tests passed, $seconds s"

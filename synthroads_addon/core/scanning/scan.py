@@ -257,18 +257,24 @@ def _points(
         incidence_deg=np.rad2deg(np.arccos(np.minimum(np.abs(along), 1.0))).astype(np.float32),
         **dict(_optional(scan, pulses, pulse, echoes.range, face, normal)),
     )
-    seen = _seen(scan, pulses, echoes, face, normal, motions) if scan.targets and normal is not None else None
+    seen = None
+    if scan.targets and normal is not None:
+        ray, reach = traced.ray_of(hit), traced.pick("distance", hit)
+        seen = _seen(scan, traced.rays, ray, reach, face, normal, motions)
     return points, seen, clipped
 
 
 def _seen(
-    scan: Scan, pulses: Pulses, echoes: Echoes, face: Index, normal: Float, motions: list[Track]
+    scan: Scan, rays: Rays, ray: Index, reach: Float, face: Index, normal: Float, motions: list[Track]
 ) -> Targets:
-    """Return where the points were seen, in the scene as it stands at the time 0: as it is rendered."""
-    pulse, target = echoes.pulse, scan.target
-    time = pulses.time[pulse]
-    scanner = np.take(pulses.origin, pulse, axis=1)
-    position = scanner + echoes.range * np.take(pulses.direction, pulse, axis=1)
+    """Return where the points were seen, in the scene as it stands at the time 0: as it is rendered.
+
+    That is on the surface that gave most of the return: the mean of all its hits may lie in the air between them.
+    """
+    target, pulse = scan.target, ray % len(rays.time)
+    time = rays.time[pulse]
+    scanner = np.take(rays.origin.reshape(3, -1), ray if rays.origin.shape[1] > 1 else pulse, axis=1)
+    position = scanner + reach * np.take(rays.direction.reshape(3, -1), ray, axis=1)
     if target.moving:
         begin, offset, normal = target.at_start(face, position, time, motions, (scanner - position, normal))
         position, scanner = begin, begin + offset

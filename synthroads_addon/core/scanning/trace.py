@@ -66,14 +66,28 @@ class Traced:
     """All that the rays of a block meet.
 
     Attributes:
+        rays: the rays.
         first: (K, P) what each ray meets first.
         behind: (B,) what rays meet behind permeable surfaces.
-        pulse: (B,) pulses of these.
+        ray: (B,) rays of these: k * P + p for ray k of pulse p.
     """
 
+    rays: Rays
     first: Hits
     behind: Hits
-    pulse: NDArray[np.intp]
+    ray: NDArray[np.intp]
+
+    @property
+    def pulse(self) -> NDArray[np.intp]:
+        """Return the pulses (B,) of what lies behind."""
+        return np.asarray(self.ray % self.first.face.shape[1])
+
+    def ray_of(self, hits: NDArray[np.intp]) -> NDArray[np.intp]:
+        """Return the rays of hits, numbered as in `returns.Echoes`."""
+        late = np.flatnonzero(hits >= self.first.face.size)
+        result = hits.copy()
+        result[late] = self.ray[hits[late] - self.first.face.size]
+        return result
 
     def pick(self, name: str, hits: NDArray[np.intp]) -> NDArray[Any]:
         """Return an attribute of chosen hits, numbered as in `returns.Echoes`."""
@@ -97,7 +111,7 @@ def trace(
     material = np.take(target.material, met.face, mode="clip") if target.triangles else met.face.astype(np.uint16)
     if not surfaces.permeable:
         first = Hits(met.face, material, _within(met.distance, nearest, np.inf), met.along, rays.share)
-        return _traced(first, [], [])
+        return _traced(rays, first, [], [])
     on = np.flatnonzero(np.take(surfaces.pervious, material, mode="clip"))
     on = on[np.take(met.distance, on) < farthest]
     through = surfaces.transmission[np.take(material, on)]
@@ -106,7 +120,7 @@ def trace(
     share.ravel()[on] = left * (1.0 - through)
     start = np.take(met.distance, on)
     first = Hits(met.face, material, _within(met.distance, nearest, np.inf), met.along, share)
-    layers, pulses = [], []
+    layers, rays_on = [], []
     left *= through
     for _ in range(LAYERS - 1):
         bright = np.flatnonzero(left > FAINTEST * np.take(rays.share, on // material.shape[1]))
@@ -123,20 +137,20 @@ def trace(
         own = np.take(target.material, face)
         through = np.take(surfaces.transmission, own)
         layers.append(Hits(face, own, _within(start, nearest, farthest), met.along[hit], left * (1.0 - through)))
-        pulses.append(pulse[hit])
+        rays_on.append(on)
         left = left * through
-    return _traced(first, layers, pulses)
+    return _traced(rays, first, layers, rays_on)
 
 
-def _traced(first: Hits, layers: list[Hits], pulses: list[NDArray[np.intp]]) -> Traced:
+def _traced(rays: Rays, first: Hits, layers: list[Hits], on: list[NDArray[np.intp]]) -> Traced:
     """Return everything; of what lies behind only what is within reach."""
     if not layers:
         nothing = Hits(*(np.empty(0, dtype=getattr(first, field.name).dtype) for field in fields(Hits)))
-        return Traced(first, nothing, np.empty(0, dtype=np.intp))
+        return Traced(rays, first, nothing, np.empty(0, dtype=np.intp))
     behind = Hits(*(np.concatenate([getattr(layer, field.name) for layer in layers]) for field in fields(Hits)))
     inside = np.flatnonzero(behind.distance < np.inf)
     chosen = Hits(*(getattr(behind, field.name)[inside] for field in fields(Hits)))
-    return Traced(first, chosen, np.concatenate(pulses)[inside])
+    return Traced(rays, first, chosen, np.concatenate(on)[inside])
 
 
 def _within(distance: Float, nearest: float, farthest: float) -> Float:
