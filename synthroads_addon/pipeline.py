@@ -207,12 +207,14 @@ def measured_arrays(scenario: Scenario) -> frozenset[str]:
 
 def wanted_layers(scenario: Scenario) -> frozenset[str]:
     """Return what the points get besides what the scanner measures: ``rgb`` and material layers."""
-    return frozenset({"rgb"}) | (kept_arrays(scenario) & set(LAYERS))
+    rgb = {"rgb"} if scenario.colour.rgb else set()
+    return frozenset(rgb | (kept_arrays(scenario) & set(LAYERS)))
 
 
 def needs_targets(scenario: Scenario) -> bool:
     """Return whether the scan must say where its points were seen."""
-    return bool(wanted_layers(scenario)) or scenario.scan.relief > 0.0
+    layers = bool(wanted_layers(scenario)) or scenario.colour.intensity_from_layers
+    return layers or scenario.scan.relief > 0.0
 
 
 def make_finish(scenario: Scenario, scan: Scan, source: LayerSource | None) -> Finish:

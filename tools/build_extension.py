@@ -48,6 +48,7 @@ NOT_BUNDLED = frozenset({"numpy", "colorama"})
 
 # Where a wheel's fields say too little.
 LICENCES = {
+    "OpenEXR": "BSD-3-Clause",
     "embreex": "BSD-2-Clause; holds Intel Embree and oneTBB: Apache-2.0, https://www.apache.org/licenses/LICENSE-2.0",
     "rasterio": "BSD-3-Clause; holds GDAL and PROJ: MIT, GEOS: LGPL-2.1-or-later, and free libraries that these use",
 }

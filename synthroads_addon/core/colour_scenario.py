@@ -29,6 +29,7 @@ class ColourScenario(ScenarioModel):
         description="Images along the path, a pixel per return (Blender 5.0 and newer), or each material's mean; "
         "auto takes a pixel per return where Blender has it.",
     )
+    rgb: bool = Field(True, description="Whether the points are coloured; without, RGB is 0 and needs no light.")
     engine: Engine = Field("cycles", description="Renderer of the images.")
     mode: ColourMode = Field(
         "lit",

@@ -12,8 +12,8 @@ _MATERIALS = {
     "emergency_phone": {
         "Body": "plastic_orange",
         "Plinth": "concrete",
-        "Band": "plastic_white",
-        "Writing": "plastic_white",
+        "Band": "sheeting_white",
+        "Writing": "sheeting_white",
         "Panel": "plastic_black",
     },
     "utility": {"Body": "cabinet_grey", "Plinth": "concrete", "Fitting": "plastic_black"},

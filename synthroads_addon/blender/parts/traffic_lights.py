@@ -19,7 +19,7 @@ def build_traffic_lights(builder: ModelBuilder) -> None:
             "Instance": light.instance,
             "Post Material": material("galvanised_steel"),
             "Housing Material": material("plastic_black"),
-            "Rim Material": material("plastic_white"),
+            "Rim Material": material("sheeting_white"),
             "Red Material": material("lamp_red"),
             "Yellow Material": material("lamp_yellow"),
             "Green Material": material("lamp_green"),
