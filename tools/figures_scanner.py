@@ -15,6 +15,7 @@ from typing import Any
 import laspy
 import matplotlib as mpl
 import numpy as np
+from numpy.typing import NDArray
 
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
@@ -91,21 +92,52 @@ def _trajectory(folder: Path, name: str, changes: list[str]) -> list[str]:
 
 def _draw(axis: Any, cloud: laspy.LasData, title: str) -> None:
     """Draw a cloud from above along its longer side: the class of each pixel's highest point."""
-    plan = np.column_stack([cloud.x, cloud.y])
-    plan = plan - plan.mean(axis=0)
-    _, _, turn = np.linalg.svd(plan[:: max(1, len(plan) // 10_000)], full_matrices=False)
-    along, across = (plan @ turn.T).T
-    keep = np.flatnonzero((np.abs(along) < REACH) & (np.abs(across) < ASIDE))
-    order = keep[np.argsort(np.asarray(cloud.z)[keep], kind="stable")]
     colors = np.full((256, 3), 128, dtype=np.uint8)
     for row in classes():
         colors[row.id] = row.color
+    everything = np.ones(len(cloud), dtype=bool)
+    _draw_colors(axis, cloud, everything, colors[np.asarray(cloud["class_id"])], f"{title}: {len(cloud):,} points")
+
+
+def _draw_colors(
+    axis: Any, cloud: laspy.LasData, which: NDArray[np.bool_], color: NDArray[np.uint8], title: str
+) -> None:
+    """Draw chosen points from above along the cloud's longer side, the highest on top.
+
+    Args:
+        which: mask of the cloud's points.
+        color: (N, 3) of those chosen.
+    """
+    plan = np.column_stack([cloud.x, cloud.y])
+    plan = plan - plan.mean(axis=0)
+    _, _, turn = np.linalg.svd(plan[:: max(1, len(plan) // 10_000)], full_matrices=False)
+    along, across = (plan[which] @ turn.T).T
+    keep = np.flatnonzero((np.abs(along) < REACH) & (np.abs(across) < ASIDE))
+    order = keep[np.argsort(np.asarray(cloud.z)[which][keep], kind="stable")]
     picture = np.full((int(2 * ASIDE / PIXEL) + 1, int(2 * REACH / PIXEL) + 1, 3), 255, dtype=np.uint8)
     place = ((across[order] + ASIDE) / PIXEL).astype(int), ((along[order] + REACH) / PIXEL).astype(int)
-    picture[place] = colors[np.asarray(cloud["class_id"])[order]]
+    picture[place] = color[order]
     axis.imshow(picture, extent=(-REACH, REACH, -ASIDE, ASIDE), origin="lower", interpolation="nearest")
-    axis.set_title(f"{title}: {len(plan):,} points", fontsize=10, loc="left")
+    axis.set_title(title, fontsize=10, loc="left")
     axis.set(ylabel="m")
+
+
+def clouds(output: Path) -> None:
+    """Draw the colours of two strips of one scan, between which the clouds' shadows have drifted."""
+    changes = ["road.length=200", "road.half_width=40", "scan.lines_per_second=50"]
+    changes += ['road.environment.cloud_cover={"minimum":0.45,"maximum":0.45}']
+    with tempfile.TemporaryDirectory() as folder:
+        cloud = scan("rq31-600m", changes, Path(folder) / "scan")
+    figure, axes = pyplot.subplots(2, 1, figsize=(9, 7.6))
+    time = np.asarray(cloud.gps_time)
+    strips = np.asarray(cloud.point_source_id)
+    for axis, strip in zip(axes, (1, 2), strict=True):
+        mine = strips == strip
+        title = f"strip {strip}, {time[mine].min():.0f} to {time[mine].max():.0f} s"
+        rgb = np.column_stack([cloud.red, cloud.green, cloud.blue])[mine] >> 8
+        _draw_colors(axis, cloud, mine, rgb.astype(np.uint8), title)
+    figure.tight_layout()
+    figure.savefig(output / "cloud-shadows.png", dpi=100, metadata={"Software": None})
 
 
 def intensity_histograms(output: Path) -> None:
@@ -162,6 +194,7 @@ FIGURES: dict[str, Callable[[Path], None]] = {
     "platforms": platforms,
     "intensity_histograms": intensity_histograms,
     "convergence": convergence,
+    "clouds": clouds,
 }
 
 if __name__ == "__main__":

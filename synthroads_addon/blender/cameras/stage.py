@@ -142,7 +142,7 @@ def stage(
         stack.enter_context(prepared_materials(materials, passes.layers, engine == "eevee"))
         stack.callback(_forget_images, known)
         scene = bpy.data.scenes.new(NAME)
-        stack.callback(lambda: bpy.data.scenes.remove(scene))
+        stack.callback(_strike, scene)
         data = bpy.data.cameras.new(NAME)
         stack.callback(lambda: bpy.data.cameras.remove(data))
         camera = bpy.data.objects.new(NAME, data)
@@ -155,6 +155,19 @@ def stage(
         _set_passes(scene, passes, lights, world)
         multilayer_exr(scene.render.image_settings)
         yield Stage(scene, camera, passes, folder)
+
+
+def _strike(scene: bpy.types.Scene) -> None:
+    """Remove the scene and what its renderer kept.
+
+    A renderer that outlives its scene still knows the objects, and Blender 4.5 crashes now and then when one of these
+    is removed later.
+    """
+    scene.render.use_persistent_data = False
+    for item in list(scene.collection.objects):
+        scene.collection.objects.unlink(item)
+    bpy.data.scenes.remove(scene)
+    bpy.context.view_layer.update()
 
 
 def visible_objects(source: bpy.types.Scene) -> list[bpy.types.Object]:
