@@ -95,6 +95,6 @@ class ColourSettings:
 
 COLOUR_FIDELITIES = {
     "draft": ColourSettings(image_spacing=40.0, ground_sampling_distance=0.25, samples=4),
-    "standard": ColourSettings(image_spacing=30.0, ground_sampling_distance=0.12, samples=16),
+    "standard": ColourSettings(image_spacing=30.0, ground_sampling_distance=0.15, samples=16),
     "high": ColourSettings(image_spacing=15.0, ground_sampling_distance=0.06, samples=64),
 }

@@ -51,6 +51,7 @@ class ReturnCamera:
     are given up for the material's means.
 
     Attributes:
+        main_thread_only: it renders, which only Blender's main thread may.
         worst: largest distance between a return and what its pixel shows, of those used, m.
     """
 

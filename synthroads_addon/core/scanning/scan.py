@@ -91,6 +91,7 @@ class BlockResult:
         pulses, rays: emitted, and cast at what is first in their way.
         below_threshold, saturated: returns that the detector lost or clipped.
         sources: (256,) points by the source of their colour, once they are finished.
+        blocks: how many blocks these are.
     """
 
     points: PointBlock
@@ -100,6 +101,19 @@ class BlockResult:
     below_threshold: int
     saturated: int
     sources: NDArray[np.int64] | None = None
+    blocks: int = 1
+
+
+def joined_results(results: list[BlockResult]) -> BlockResult:
+    """Return several blocks that aren't finished yet as one, in their order."""
+    seen = [result.seen for result in results if result.seen is not None]
+    counts = ("pulses", "rays", "below_threshold", "saturated")
+    return BlockResult(
+        concatenate([result.points for result in results]),
+        joined_targets(seen) if seen else None,
+        *(sum(getattr(result, name) for result in results) for name in counts),
+        blocks=sum(result.blocks for result in results),
+    )
 
 
 def scan_block(scan: Scan, strip: Strip, block: int) -> BlockResult:
