@@ -107,12 +107,18 @@ class BlockResult:
 def joined_results(results: list[BlockResult]) -> BlockResult:
     """Return several blocks that aren't finished yet as one, in their order."""
     seen = [result.seen for result in results if result.seen is not None]
-    counts = ("pulses", "rays", "below_threshold", "saturated")
+
+    def total(name: str) -> int:
+        return sum(getattr(result, name) for result in results)
+
     return BlockResult(
-        concatenate([result.points for result in results]),
-        joined_targets(seen) if seen else None,
-        *(sum(getattr(result, name) for result in results) for name in counts),
-        blocks=sum(result.blocks for result in results),
+        points=concatenate([result.points for result in results]),
+        seen=joined_targets(seen) if seen else None,
+        pulses=total("pulses"),
+        rays=total("rays"),
+        below_threshold=total("below_threshold"),
+        saturated=total("saturated"),
+        blocks=total("blocks"),
     )
 
 
