@@ -98,6 +98,11 @@ class Stage:
         self.images, self.pixels = self.images + 1, self.pixels + width * height
         return self._read(read_layers(path))
 
+    def forget(self) -> None:
+        """Have the renderer drop what it keeps from image to image."""
+        self.scene.render.use_persistent_data = False
+        self.scene.render.use_persistent_data = True
+
     def _read(self, channels: dict[str, NDArray[Any]]) -> Rendered:
         def several(name: str, parts: str) -> NDArray[np.float32]:
             return np.stack([channels[f"{name}.{part}"] for part in parts], axis=-1)
