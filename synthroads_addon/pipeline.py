@@ -217,7 +217,7 @@ def needs_targets(scenario: Scenario) -> bool:
     return layers or scenario.scan.relief > 0.0
 
 
-def make_finish(scenario: Scenario, scan: Scan, source: LayerSource | None) -> Finish:
+def make_finish(scenario: Scenario, scan: Scan, source: LayerSource) -> Finish:
     """Return what is done to the points after the scan."""
     rows = material_rows(scan.target.materials)
     return Finish(
@@ -277,7 +277,7 @@ def scan_blocks(scan: Scan, threads: int = 0, finish: Finish | None = None) -> I
         finish: what is done to the points; where its source renders, that happens in the calling thread.
     """
     tasks = iter(scan.blocks())
-    renders = finish is not None and getattr(finish.source, "main_thread_only", False)
+    renders = finish is not None and finish.source.main_thread_only
 
     def work(strip: Strip, block: int) -> BlockResult:
         result = scan_block(scan, strip, block)
@@ -496,7 +496,7 @@ class ScanToFiles:
             "intensity_scale": self.intensity_scale,
             "points_by_class": by_class,
             "points_by_colour_source": self._shares_by_source(),
-            "rendered": getattr(self.finish.source, "report", {}),
+            "rendered": self.finish.source.report,
         }
 
     def _shares_by_source(self) -> dict[str, float]:

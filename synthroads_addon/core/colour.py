@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, fields
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,7 +36,17 @@ class LayerValues:
 
 
 class LayerSource(Protocol):
-    """Gives points their layers."""
+    """Gives points their layers.
+
+    Attributes:
+        main_thread_only: it renders, which only Blender's main thread may; else any threads, side by side.
+    """
+
+    main_thread_only: bool
+
+    @property
+    def report(self) -> dict[str, Any]:
+        """Return what was rendered, as JSON data; empty without."""
 
     def sample(
         self,
@@ -146,9 +156,16 @@ def joined_targets(parts: Sequence[Targets]) -> Targets:
 class MaterialLayers:
     """Each material's means, under sun and sky without shadows of objects. Can be used by many threads at once."""
 
+    main_thread_only = False
+
     def __init__(self, constants: SurfaceConstants, shading: Shading | None = None) -> None:
         self.constants = constants
         self.shading = shading or Shading()
+
+    @property
+    def report(self) -> dict[str, Any]:
+        """Return that nothing was rendered."""
+        return {}
 
     def sample(
         self,

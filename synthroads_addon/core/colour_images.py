@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -55,6 +56,8 @@ class ImageLayers:
     behind an edge mixes in, and grazing views stay usable.
     """
 
+    main_thread_only = False
+
     def __init__(self, images: Sequence[RenderedImage], channels: dict[str, int], material: MaterialLayers) -> None:
         """Take images with these channels (name and components, in order), and what to take where none shows a point.
 
@@ -63,6 +66,7 @@ class ImageLayers:
         """
         self.images = list(images)
         self.material = material
+        self.report: dict[str, Any] = {}
         starts = np.cumsum([0, *channels.values()])
         self.channels = {
             name: slice(int(a), int(b)) for name, a, b in zip(channels, starts[:-1], starts[1:], strict=True)

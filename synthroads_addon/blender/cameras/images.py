@@ -32,7 +32,6 @@ class RenderedLayers(ImageLayers):
         super().__init__((), stage.passes.channels, fallback)
         self._stage, self._views, self._exposure = stage, views, exposure
         self._folder = tempfile.TemporaryDirectory(prefix="synthroads-")
-        self.report: dict[str, Any] = {}
 
     def render(self, progress: Callable[[float], None]) -> None:
         """Render all images; must run on Blender's main thread. Calls `progress` with the share that is done."""

@@ -25,7 +25,7 @@ class Finish:
     """The work on points that are measured already; the same for every block, whatever the order.
 
     Attributes:
-        source: of colours and layers; None where no colour and no layer is wanted.
+        source: of colours and layers.
         wanted: ``rgb`` and `LAYERS` that the points get.
         surfaces: the materials' means, which the scan was made with.
         intensity_from_layers: each point's intensity is that of its own layers.
@@ -36,7 +36,7 @@ class Finish:
         kept: `PointBlock`'s optional arrays that stay; the others were needed on the way.
     """
 
-    source: LayerSource | None
+    source: LayerSource
     wanted: frozenset[str]
     surfaces: Surfaces
     intensity_from_layers: bool
@@ -49,7 +49,7 @@ class Finish:
     def __call__(self, points: PointBlock, seen: Targets | None) -> tuple[PointBlock, NDArray[np.int64]]:
         """Return the finished points, and how many took their colour from each source (256,)."""
         counts = np.zeros(256, dtype=np.int64)
-        if seen is not None and self.source is not None:
+        if seen is not None and (self.wanted or self.intensity_from_layers):
             points, source = self._coloured(points, seen)
             counts += np.bincount(source, minlength=256)
         if seen is not None and self.relief is not None and self.strength > 0.0:
@@ -58,7 +58,6 @@ class Finish:
         return replace(points, **dropped), counts
 
     def _coloured(self, points: PointBlock, seen: Targets) -> tuple[PointBlock, NDArray[np.uint8]]:
-        assert self.source is not None
         layers = self.wanted | (_OF_INTENSITY if self.intensity_from_layers else frozenset())
         values = self.source.sample(seen.position, seen.scanner, seen.normal, seen.material, seen.time, layers)
         changes: dict[str, Any] = {name: values.arrays[name] for name in self.wanted}

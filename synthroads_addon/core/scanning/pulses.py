@@ -30,7 +30,8 @@ class Errors:
     others' errors alone.
 
     Attributes:
-        range: (2, P) float32 of the block, in units of one sigma; None without. See `of_range`.
+        range: (2, P) float32 of the block, or as many as a pulse can have returns if these are more, in units of one
+            sigma; None without. See `of_range`.
         angle: (2, P) rad; None without.
         lost: (P, returns) bool; None without.
     """
@@ -49,7 +50,9 @@ class Errors:
         shape = (count, scan.setting.device.maximum_returns)
         angle, dropout = scan.noise.angle_sigma_mrad * 1e-3, scan.noise.dropout
         return cls(
-            source("range noise").standard_normal((2, count), dtype=np.float32) if scan.setting.range_sigma else None,
+            source("range noise").standard_normal((2, max(shape)), dtype=np.float32)
+            if scan.setting.range_sigma
+            else None,
             source("angle noise").normal(scale=angle, size=(2, count)) if angle else None,
             source("dropouts").random(shape, dtype=np.float32) < dropout if dropout else None,
         )

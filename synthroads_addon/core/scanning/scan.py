@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, Literal
 
 import numpy as np
@@ -105,7 +105,7 @@ class BlockResult:
 
 
 def joined_results(results: list[BlockResult]) -> BlockResult:
-    """Return several blocks that aren't finished yet as one, in their order."""
+    """Return several blocks, or parts of one, that aren't finished yet as one, in their order."""
     seen = [result.seen for result in results if result.seen is not None]
 
     def total(name: str) -> int:
@@ -138,11 +138,7 @@ def scan_pulses(scan: Scan, strip: Strip, first: int, count: int, key: int = 0) 
         _scan_chunk(scan, strip, poses, errors, first + start, start, min(size, count - start))
         for start in range(0, count, size)
     ]
-    return BlockResult(
-        concatenate([part.points for part in parts]),
-        joined_targets([part.seen for part in parts if part.seen is not None]) if scan.targets else None,
-        *(sum(getattr(part, name) for part in parts) for name in ("pulses", "rays", "below_threshold", "saturated")),
-    )
+    return replace(joined_results(parts), blocks=1)
 
 
 def _time(scan: Scan, strip: Strip, pulse: int) -> float:

@@ -191,13 +191,12 @@ def _cast(part: _Part, origins: Float, directions: Float, maximum_range: float) 
     # A miss is worked out with some face and then forgotten: that is less work than to sort them out before.
     distance, along = part.planes.meet(face, origins, directions)
     missed = face < 0
-    if not along.all():  # in the face's plane, or a face without area
+    edge_on = not along.all()  # in the face's plane, or a face without area
+    if edge_on:
         missed |= ~np.isfinite(distance)
     np.copyto(distance, np.inf, where=missed)
-    if part.first:
-        face += part.first
-        face[missed] = -1
-    elif not along.all():
+    face += part.first
+    if part.first or edge_on:
         face[missed] = -1
     return Met(face, distance, along)
 
