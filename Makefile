@@ -4,8 +4,8 @@
 PYTHON ?=
 OUT ?= out
 PLATFORM ?=
-# Extras of the two test environments. `ml` joins the first when ml/ has code: torch is large.
-EXTRAS_3_11 ?= blender,dev
+# Extras of the two test environments: `ml` in the first only, as torch for Python 3.13 comes with gigabytes of CUDA.
+EXTRAS_3_11 ?= blender,dev,ml
 EXTRAS_3_13 ?= blender,dev
 
 export PYTHON
@@ -30,9 +30,9 @@ test-slow: ## the tests that take long, and nothing else
 	@sh tools/run_tests.sh "$(EXTRAS_3_11)" "$(EXTRAS_3_13)" "slow"
 
 lint: ## check the source: ruff and mypy
-	@python=$$($(ENVIRONMENT) dev) && "$$python" tools/lint.py
+	@python=$$($(ENVIRONMENT) dev,ml) && "$$python" tools/lint.py
 
-extension: ## build the Blender extension: dist/*.zip (PLATFORM=windows-x64, macos-arm64 or all)
+extension: ## build the Blender extensions: dist/*.zip (PLATFORM=windows-x64, macos-arm64 or all)
 	@python=$$($(ENVIRONMENT) blender) && \
 	"$$python" tools/build_extension.py $(if $(PLATFORM),--platform $(PLATFORM))
 

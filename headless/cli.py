@@ -1,6 +1,6 @@
 """The console command `synthroads`: parses, runs, and turns errors into exit codes.
 
-Exit codes: 0 done; 1 a defect of ours; 2 bad input; 3 violations found; 130 interrupted.
+Exit codes: 0 done; 1 a defect of ours; 2 bad input; 3 violations found, or scenes of a set failed; 130 interrupted.
 """
 
 from __future__ import annotations
@@ -14,8 +14,8 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-from synthroads_addon import version
 from synthroads_addon.core.errors import InputError
+from synthroads_addon.core.generator import generator
 from synthroads_addon.core.progress import Progress, silent
 
 
@@ -24,14 +24,16 @@ def _missing(error: ModuleNotFoundError) -> str:
     name = (error.name or "").partition(".")[0]
     if name in ("", "headless", "ml", "synthroads_addon"):
         raise error
+    extra = "ml" if name in ("torch", "scipy", "skimage", "matplotlib") else "blender"
     return (
         f"error: the package {name} is missing: in Blender install and enable the SynthRoads extension, "
-        "elsewhere run pip install 'synthroads[blender]'"
+        f"elsewhere run pip install 'synthroads[{extra}]'"
     )
 
 
 try:
     from synthroads_addon.core.schema import canonical_json
+    from synthroads_addon.core.twin import TWIN_FORMATS
 except ModuleNotFoundError as error:  # Blender itself has none of the packages that the extension brings
     print(_missing(error), file=sys.stderr)
     raise SystemExit(2) from None
@@ -43,11 +45,20 @@ COMMANDS = {
     "generate": "make a road, scan it and write cloud, parameters and pictures",
     "parameters": "sample road parameters and write them to standard output",
     "check": "list the rules of the guidelines that a road breaks",
+    "twin": "write a road's geometric-semantic model: CityJSON, IFC, OpenDRIVE, GeoJSON",
+    "dataset": "make a data set of many scenes from a recipe",
     "cloud": "describe, thin out, map, convert and draw point cloud files",
     "scan": "scan a scene that is there already: .blend, .glb, .obj and others",
+    "calibrate": "compare intensities of materials with a real cloud, and fit them",
     "gallery": "render pictures of scenes, objects and materials",
     "tradeoff": "measure error against time for each knob",
+    "train": "train a segmentation or centreline model",
+    "evaluate": "measure a trained model",
+    "predict": "label a cloud, or find its road, with a trained model",
+    "reconstruct": "turn a cloud into the parameters of its road",
 }
+_LEARNING = ("train", "evaluate", "predict", "reconstruct")
+"""Commands whose modules are in `ml`."""
 
 
 class _Parser(argparse.ArgumentParser):
@@ -60,18 +71,22 @@ class _Parser(argparse.ArgumentParser):
 def main(argv: Sequence[str] | None = None) -> int:
     """Run one sub-command; return its exit code."""
     parser = _Parser(prog="synthroads", description="Synthetic motorways, scanned and labelled.")
-    parser.add_argument("--version", action="version", version=f"SynthRoads {version()}")
+    parser.add_argument("--version", action="version", version=generator())
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
     for name, summary in COMMANDS.items():
-        module = import_module(f"headless.{name}")
+        module = _module(name)
         module.add_arguments(commands.add_parser(name, help=summary, description=module.__doc__))
     arguments = parser.parse_args(argv)
-    return run(import_module(f"headless.{arguments.command}").run, arguments)
+    return run(_module(arguments.command).run, arguments)
+
+
+def _module(name: str) -> Any:
+    return import_module(f"{'ml' if name in _LEARNING else 'headless'}.{name}")
 
 
 def command(name: str, argv: Sequence[str] | None = None) -> int:
-    """Run the sub-command `name` by itself, as ``python -m headless.NAME`` does."""
-    module = import_module(f"headless.{name}")
+    """Run the sub-command `name` by itself, as ``python -m headless.NAME`` or ``python -m ml.NAME`` does."""
+    module = _module(name)
     parser = _Parser(prog=f"synthroads {name}", description=module.__doc__)
     module.add_arguments(parser)
     return run(module.run, parser.parse_args(argv))
@@ -81,6 +96,17 @@ def add_changes_argument(parser: argparse.ArgumentParser) -> None:
     """Add ``--set PATH=VALUE``, gathered in ``changes``."""
     text = "change one field of the scenario, e.g. road.length=800 (can be repeated)"
     parser.add_argument("--set", action="append", default=[], metavar="PATH=VALUE", dest="changes", help=text)
+
+
+def add_twin_argument(parser: argparse.ArgumentParser, default: Sequence[str] = ()) -> None:
+    """Add ``--twin FORMATS``, a list of names of formats in ``twin``."""
+    text = f"geometric-semantic models, with commas: {', '.join(TWIN_FORMATS)} ({','.join(default) or 'none'})"
+    parser.add_argument("--twin", type=_listed, default=list(default), metavar="FORMATS", help=text)
+
+
+def _listed(text: str) -> list[str]:
+    """Return the names in a list with commas, each once."""
+    return list(dict.fromkeys(text.split(",")))
 
 
 def add_common_arguments(parser: argparse.ArgumentParser) -> None:

@@ -38,8 +38,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     mapping.add_argument("--per-class", action="store_true", help="each class on the target's class of that name")
     change = tools.add_parser("convert", help="write another format, or merged classes")
     _file_arguments(change)
-    change.add_argument("--classes", metavar="NAME_OR_FILE", help="5, or a .json file of classes (the cloud's own)")
     _preview_arguments(tools.add_parser("preview", help="draw from above and a cross-section"))
+    for tool in (thin, change):
+        tool.add_argument("--classes", metavar="NAME_OR_FILE", help="5, or a .json file of classes (the cloud's own)")
     for tool in (thin, mapping, change):
         tool.add_argument("--overwrite", action="store_true", help="replace a file that is already there")
         add_common_arguments(tool)
@@ -118,7 +119,12 @@ def _subsample(arguments: argparse.Namespace) -> Outcome:
     from synthroads_addon.core.cloud.tools import subsample
 
     done = subsample(
-        arguments.file, arguments.output, arguments.grid, arguments.overwrite, progress_bar(arguments)
+        arguments.file,
+        arguments.output,
+        arguments.grid,
+        arguments.classes,
+        arguments.overwrite,
+        progress_bar(arguments),
     )
     return 0, done, f"{done['points']:,} of {done['points_read']:,} points written to {arguments.output}"
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import json
 import sys
 from pathlib import Path
 from typing import Any
@@ -10,7 +11,14 @@ from typing import Any
 if __name__ == "__main__":
     sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from headless.cli import Outcome, add_changes_argument, add_common_arguments, entry, progress_bar
+from headless.cli import (
+    Outcome,
+    add_changes_argument,
+    add_common_arguments,
+    add_twin_argument,
+    entry,
+    progress_bar,
+)
 from synthroads_addon.core.scenario import load_scenario, scenario_names
 
 
@@ -23,6 +31,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--fidelity", choices=("draft", "standard", "high"), help="point on the trade-off")
     parser.add_argument("--parameters", type=Path, metavar="FILE", help="take this road instead of sampling one")
     parser.add_argument("--axis", type=Path, metavar="FILE", help="centreline, CSV (x, y, z in order) or GeoJSON")
+    add_twin_argument(parser)
     add_changes_argument(parser)
     parser.add_argument("--overwrite", action="store_true", help="replace files that are already there")
     add_common_arguments(parser)
@@ -35,6 +44,8 @@ def run(arguments: argparse.Namespace) -> Outcome:
         changes.append(f"seed={arguments.seed}")
     if arguments.fidelity:
         changes.append(f"fidelity={arguments.fidelity}")
+    if arguments.twin:
+        changes.append(f"twin={json.dumps(arguments.twin)}")
     scenario = load_scenario(arguments.scenario, changes)
     from synthroads_addon.pipeline import Job, generate
 

@@ -79,28 +79,39 @@ def _plot(results: list[dict[str, Any]], path: Path) -> None:
     mpl.use("Agg")
     from matplotlib import pyplot
 
-    panels = [name for name in ROW_TITLES if any(_varies(results, knob, name) for knob in _knobs(results))]
-    figure, axes = pyplot.subplots(1, max(1, len(panels)), figsize=(5.2 * max(1, len(panels)), 4.4), squeeze=False)
-    for axis, name in zip(axes[0], panels, strict=False):
-        for knob in _knobs(results):
-            if _varies(results, knob, name):
-                _draw_knob(axis, [row for row in results if row["knob"] == knob], knob, name)
-        axis.set(xlabel="processor time of the whole job (s)", ylabel=ROW_TITLES[name])
+    measured = [row for row in results if "left_out" not in row]
+    panels = [name for name in ROW_TITLES if any(_varies(measured, knob, name) for knob in _knobs(measured))]
+    columns = min(3, max(1, len(panels)))
+    lines = -(-max(1, len(panels)) // columns)
+    figure, axes = pyplot.subplots(lines, columns, figsize=(5.2 * columns, 4.2 * lines), squeeze=False)
+    for axis in axes.flat[len(panels) :]:
+        axis.set_visible(False)
+    for axis, name in zip(axes.flat, panels, strict=False):
+        for knob in _knobs(measured):
+            if _varies(measured, knob, name):
+                _draw_knob(axis, [row for row in measured if row["knob"] == knob], knob, name)
+        axis.set(xlabel="processor time of the whole job (s)", ylabel=ROW_TITLES[name], xscale="log")
+        axis.xaxis.set_major_formatter("{x:g}")
+        axis.xaxis.set_minor_formatter("{x:g}")
+        axis.tick_params(axis="x", which="both", labelsize=7, rotation=45)
         axis.set_ylim(0, 1.15 * axis.get_ylim()[1])
         axis.grid(alpha=0.3)
-        axis.legend(fontsize=9)
+        axis.legend(fontsize=8)
     figure.tight_layout()
     figure.savefig(path, dpi=110, metadata={"Software": None})
 
 
-def _knobs(results: list[dict[str, Any]]) -> list[str]:
-    return list(dict.fromkeys(row["knob"] for row in results))
+def _knobs(measured: list[dict[str, Any]]) -> list[str]:
+    return list(dict.fromkeys(row["knob"] for row in measured))
 
 
-def _varies(results: list[dict[str, Any]], knob: str, name: str) -> bool:
+def _varies(measured: list[dict[str, Any]], knob: str, name: str) -> bool:
     """Return whether a knob changes a kind of error at all: a flat line says nothing."""
-    errors = [row["errors"][name] for row in results if row["knob"] == knob]
-    return knob == "fidelity" or max(errors) - min(errors) > 0.5 * max(errors)
+    errors = [row["errors"][name] for row in measured if row["knob"] == knob and name in row["errors"]]
+    largest = max(abs(row["errors"].get(name, 0.0)) for row in measured)
+    if not errors or (knob != "fidelity" and max(map(abs, errors)) < 0.05 * largest):
+        return False
+    return knob == "fidelity" or max(errors) - min(errors) > 0.5 * max(map(abs, errors))
 
 
 def _draw_knob(axis: Any, rows_of_knob: list[dict[str, Any]], knob: str, name: str) -> None:
@@ -109,7 +120,7 @@ def _draw_knob(axis: Any, rows_of_knob: list[dict[str, Any]], knob: str, name: s
     axis.plot(x, y, "*" if preset else "o-", label=knob.replace("_", " "), markersize=14 if preset else 6)
     for row, a, b in zip(rows_of_knob, x, y, strict=True):
         axis.annotate(
-            str(row["value"]), (a, b), textcoords="offset points", xytext=(8, -14 if preset else 5), fontsize=9
+            str(row["value"]), (a, b), textcoords="offset points", xytext=(8, -14 if preset else 5), fontsize=8
         )
 
 

@@ -1,45 +1,46 @@
-"""Rows of the trade-off: one setting, its time, its errors against the analytic road and the converged footprint."""
+"""Rows of the trade-off: one setting, the time and memory of the whole job, and its errors against truth."""
 
 from __future__ import annotations
 
+import tempfile
 import time
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any
 
-import numpy as np
-
+from .blender.cameras import HAS_RETURN_CAMERA, layer_source
 from .blender.model import build_road
 from .blender.scene import scanned_scene
-from .core.cloud.points import PointBlock, concatenate
-from .core.measure import mesh_height_errors
+from .core.colour import LayerSource, LayerValues, Targets, shares_by_source
 from .core.parameters.geometry import RoadGeometry
+from .core.parameters.model import RoadParameters
 from .core.parameters.sampler import sample_road
 from .core.progress import peak_memory_mb
-from .core.scanning.beam import RINGS
 from .core.scanning.motion import ScannedScene
-from .core.scanning.scan import Scan, scan_pulses
-from .core.scanning.target import Target
-from .core.scenario import load_scenario
-from .pipeline import make_scan, road_path
+from .core.scanning.scan import BlockResult, Scan, joined_results, scan_block
+from .core.scanning.stretches import spread
+from .core.scenario import Scenario, load_scenario
+from .core.tradeoff import KNOBS
+from .measuring_errors import LAYERS, Sample, errors_of
+from .scan_files import ScanToFiles, colour_job, make_scan, road_path
 
-CONVERGED = max(RINGS)
-"""Rays per pulse of the footprint that counts as truth."""
-_WINDOWS, _WINDOW = 30, 4000
-"""Windows of each strip that are scanned, spread evenly over it, and the pulses of each."""
+_STRETCHES, _SECONDS = 16, 0.08
+"""Stretches of each strip that are scanned, spread evenly over it, and the duration of each."""
+_QUIET = ("scan.noise.range_sigma=0", 'outputs=["cloud"]')
+_FEW = 64
+"""Points that bring the scene into a renderer."""
 
 
 def measure_row(scenario_name: str, knob: str, value: Any) -> dict[str, Any]:
-    """Measure one row of the trade-off.
+    """Measure one row of the trade-off; it says why if this Blender can't do it.
 
     Times are processor seconds, which other work on the machine hardly touches: building the model, building the
-    caster's tree, and the whole scan, projected from a sample of its pulses. Errors:
-
-    - height: largest vertical distance of 100,000 random points of the road's mesh from the analytic surface;
-    - position and intensity: first returns against those of the same pulses with 61 rays, 95th percentile;
-    - labels: share of the first returns whose class is another.
+    caster's tree, rendering the images, and the rest of the job - scan, colours, relief, thinning out and the file -
+    projected from stretches of the path. Errors: see `measuring_errors`.
     """
-    path = {"rays_per_pulse": "scan.rays_per_pulse", "caster": "scan.caster"}.get(knob, knob)
-    scenario = load_scenario(scenario_name, ["scan.noise.range_sigma=0", f"{path}={value}"])
+    scenario = load_scenario(scenario_name, [*_QUIET, *KNOBS[knob].rows[value]])
+    if scenario.colour.source == "returns" and not HAS_RETURN_CAMERA:
+        return {"knob": knob, "value": value, "left_out": "a pixel per return needs Blender 5.0 or newer"}
     parameters = sample_road(scenario.road, scenario.seed)
     geometry = RoadGeometry(parameters)
     start = time.process_time()
@@ -49,57 +50,92 @@ def measure_row(scenario_name: str, knob: str, value: Any) -> dict[str, Any]:
     built = time.process_time()
     scan = make_scan(scenario, scene, road_path(scenario, geometry), parameters.environment)
     ready = time.process_time()
-    points, rays = _sample(scan)
-    seconds = time.process_time() - ready
-    share = _WINDOWS * _WINDOW / scan.pulses(scan.path.strips[0])
-    errors: dict[str, float] = {"height_mm": 1e3 * float(np.abs(mesh_height_errors(scene.static, geometry)).max())}
-    peak = peak_memory_mb()
-    errors |= _beam_errors(scan, scene, points)
+    cost, errors = _run(scenario, knob, parameters, scene, scan)
     return {
         "knob": knob,
         "value": value,
-        "seconds": round(ready - start + seconds / share, 3),
+        "seconds": round(ready - start + cost.image_seconds + cost.scan_seconds, 3),
         "model_seconds": round(built - start, 3),
         "caster_seconds": round(ready - built, 3),
-        "scan_seconds": round(seconds / share, 3),
-        "rays_per_second": round(rays / seconds),
-        "peak_memory_mb": peak,
+        "image_seconds": round(cost.image_seconds, 3),
+        "scan_seconds": round(cost.scan_seconds, 3),
+        "rays_per_second": cost.rays_per_second,
+        "peak_memory_mb": cost.peak_memory_mb,
         "triangles": scan.target.triangles,
-        "errors": {name: round(error, 6) for name, error in errors.items()},
+        "images": cost.rendered.get("images", 0),
+        "megapixels": round(cost.rendered.get("pixels", 0) / 1e6, 3),
+        "shares": cost.shares,
+        **errors,
     }
 
 
-def _sample(scan: Scan) -> tuple[PointBlock, int]:
-    """Scan the same pulses whatever the setting; return their first returns and the number of rays cast."""
-    parts, rays = [], 0
-    for strip in scan.path.strips:
-        firsts = np.linspace(0, scan.pulses(strip) - _WINDOW, _WINDOWS).astype(int)
-        for first in firsts:
-            result = scan_pulses(scan, strip, int(first), _WINDOW)
-            parts.append(result.points)
-            rays += result.rays
-    points = concatenate(parts)
-    return points.select(points.return_number == 1), rays
+@dataclass(frozen=True)
+class _Cost:
+    """What the job after the caster costs.
+
+    Attributes:
+        image_seconds: before the first point.
+        scan_seconds: from there to the file, of the whole path.
+        rays_per_second: of that.
+        rendered: as a report has it, before the first point.
+        shares: of the points by the source of their colour.
+    """
+
+    image_seconds: float
+    scan_seconds: float
+    rays_per_second: int
+    peak_memory_mb: float | None
+    rendered: dict[str, Any]
+    shares: dict[str, float]
 
 
-def _beam_errors(scan: Scan, scene: ScannedScene, points: PointBlock) -> dict[str, float]:
-    """Compare first returns with those of the converged footprint, pulse by pulse (told by their time)."""
-    if scan.rays_per_pulse == CONVERGED:
-        return {"position_mm": 0.0, "intensity_percent": 0.0, "labels_percent": 0.0}
-    truth, _ = _sample(replace(scan, rings=RINGS[CONVERGED], target=_fast(scan, scene)))
-    _times, mine, true = np.intersect1d(points.gps_time, truth.gps_time, return_indices=True)
-    a, b = points.select(mine), truth.select(true)
-    return {
-        "position_mm": 1e3 * float(np.quantile(np.linalg.norm(a.xyz - b.xyz, axis=1), 0.95)),
-        "intensity_percent": 100.0 * float(np.quantile(np.abs(a.intensity / b.intensity - 1.0), 0.95)),
-        "labels_percent": 100.0 * float(np.mean(a.class_id != b.class_id)),
-    }
+def _run(
+    scenario: Scenario, knob: str, parameters: RoadParameters, scene: ScannedScene, scan: Scan
+) -> tuple[_Cost, dict[str, Any]]:
+    """Do the job on stretches of the path; return what it costs and the errors."""
+    coloured = "colour" in KNOBS[knob].errors
+    job = colour_job(scenario, scan, scene, parameters.environment)
+    if coloured:
+        job = replace(job, wanted=LAYERS)
+    path = spread(scan.path, _STRETCHES, _SECONDS)
+    part = replace(scan, path=path)
+    result = _measured(part)
+    start = time.process_time()
+    with layer_source(job) as source:
+        if coloured and result.seen is not None:
+            _coloured(source, result.seen.select(slice(0, _FEW)))
+        prepared, rendered = time.process_time(), dict(source.report)
+        task = _to_file(scenario, part, source)
+        done = time.process_time()
+        peak = peak_memory_mb()
+        values = _coloured(source, result.seen) if coloured and result.seen is not None else None
+    seconds = done - prepared
+    cost = _Cost(
+        image_seconds=prepared - start,
+        scan_seconds=seconds / path.share,
+        rays_per_second=round(task.counts.rays / seconds),
+        peak_memory_mb=peak,
+        rendered=rendered,
+        shares=shares_by_source(task.counts.by_source),
+    )
+    sample = Sample(scenario, scene, part, result, values, task.counts.points)
+    return cost, errors_of(KNOBS[knob], sample, parameters, job)
 
 
-def _fast(scan: Scan, scene: ScannedScene) -> Target:
-    """Return a fast target for the truth."""
-    from .blender.casters import make_caster
+def _measured(part: Scan) -> BlockResult:
+    """Return the points, with all that errors are taken of, as they are before anything is done to them."""
+    part = replace(part, targets=True, wanted=part.wanted | {"normal", "material"})
+    return joined_results([scan_block(part, *block) for block in part.blocks()])
 
-    if scan.target.caster.name == "embree":
-        return scan.target
-    return Target(scene, lambda mesh: make_caster("auto", mesh))
+
+def _coloured(source: LayerSource, seen: Targets) -> LayerValues:
+    return source.sample(seen.position, seen.scanner, seen.normal, seen.material, seen.time, LAYERS)
+
+
+def _to_file(scenario: Scenario, part: Scan, source: LayerSource) -> ScanToFiles:
+    """Scan into a file that is thrown away."""
+    with tempfile.TemporaryDirectory(prefix="synthroads-") as folder:
+        task = ScanToFiles(scenario, part, source, Path(folder))
+        for _ in task.run():
+            pass
+    return task

@@ -4,51 +4,31 @@ from __future__ import annotations
 
 import platform as machine
 import sys
-from collections.abc import Callable, Generator, Iterator, Sequence
-from concurrent.futures import Future, ThreadPoolExecutor
-from contextlib import ExitStack, contextmanager
-from dataclasses import asdict, dataclass, field, replace
-from itertools import islice
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import laspy
 import numpy as np
 
 from . import version
 from .core.cloud.centerline import centerline_geojson
-from .core.cloud.grid import GridSubsampler
-from .core.cloud.labels import classes
-from .core.cloud.points import PointBlock
-from .core.cloud.previews import TopView
-from .core.cloud.roughness import micro_relief
-from .core.cloud.writing import CloudWriter, open_writer
-from .core.colour import FROM_MATERIAL, FROM_RETURN, LayerSource
 from .core.crs import wkt
 from .core.errors import InputError
 from .core.files import output_folder
-from .core.materials import Material
+from .core.generator import generator
 from .core.parameters.geometry import RoadGeometry
 from .core.parameters.model import RoadParameters, read_parameters
-from .core.parameters.model_surroundings import Environment
 from .core.parameters.sampler import sample_road
 from .core.parameters.tessellation import sample_stations
 from .core.progress import Progress, StageTimer, silent
-from .core.scanning.beam import RINGS
 from .core.scanning.devices import scanner_setting
-from .core.scanning.finish import LAYERS, OPTIONAL, Finish
 from .core.scanning.motion import ScannedScene
-from .core.scanning.path import Path as ScanPath
-from .core.scanning.path import RoadGuide, Strip, make_path
-from .core.scanning.scan import BlockResult, Scan, joined_results, scan_block
-from .core.scanning.surfaces import surfaces_of
-from .core.scanning.target import Target
-from .core.scanning.weather import attenuation, weather_of
 from .core.scenario import Scenario
 from .core.schema import canonical_json
-
-if TYPE_CHECKING:
-    from .blender.cameras import ColourJob
+from .core.twin import check_formats, twin_file_names, write_twin
+from .scan_files import available_cores, colour_job, make_scan, road_path, scan_to_files, top_view
 
 FILES = {
     "parameters": ("parameters.json",),
@@ -64,7 +44,6 @@ def file_names(scenario: Scenario, outputs: Sequence[str]) -> list[str]:
     """Return the names of all files that outputs stand for, and of the report, which is always written."""
     files = FILES | {"cloud": scenario.cloud.file_names()}
     return [name for output in outputs for name in files[output]] + ["report.json"]
-
 
 
 @dataclass
@@ -88,31 +67,6 @@ class Job:
     new_file: bool = False
 
 
-@dataclass
-class ScanCounts:
-    """What was counted while scanning."""
-
-    pulses: int = 0
-    rays: int = 0
-    points: int = 0
-    below_threshold: int = 0
-    saturated: int = 0
-    intensity_clipped: int = 0
-    by_class: np.ndarray = field(default_factory=lambda: np.zeros(256, dtype=np.int64))
-    by_source: np.ndarray = field(default_factory=lambda: np.zeros(256, dtype=np.int64))
-
-    def add(self, result: BlockResult) -> None:
-        """Add one block."""
-        self.pulses += result.pulses
-        self.rays += result.rays
-        self.below_threshold += result.below_threshold
-        self.saturated += result.saturated
-        self.points += len(result.points)
-        self.by_class += np.bincount(result.points.class_id, minlength=256)
-        if result.sources is not None:
-            self.by_source += result.sources
-
-
 def generate(job: Job, progress: Progress = silent) -> dict[str, Any]:
     """Run the main job; return the report that is also written to ``report.json``.
 
@@ -121,17 +75,20 @@ def generate(job: Job, progress: Progress = silent) -> dict[str, Any]:
     """
     check(job)
     wanted = job.scenario.outputs
-    names = file_names(job.scenario, wanted)
+    names = [*file_names(job.scenario, wanted), *twin_file_names(job.scenario.twin)]
     timer = StageTimer(progress)
-    report: dict[str, Any] = {"type": "Report", "generator": f"SynthRoads {version()}"}
+    report = opening()
     with output_folder(job.output, names, job.overwrite) as folder:
         with timer.stage("parameters"):
             parameters, axis_report = road_parameters(job)
             geometry = RoadGeometry(parameters)
             report |= axis_report
-            _write_texts(folder, wanted, parameters, geometry, job.scenario)
+            write_texts(folder, wanted, parameters, geometry, job.scenario)
+        if job.scenario.twin:
+            with timer.stage("twin"):
+                write_twin(parameters, folder, job.scenario.twin, job.scenario.settings().tolerance)
         if set(wanted) & {"scene", "cloud", "previews"}:
-            report["counts"] = _scene_outputs(job, folder, parameters, geometry, timer)
+            report["counts"] = _scene_outputs(job, folder, parameters, timer)
         report |= closing(job.scenario, timer)
         (folder / "report.json").write_text(canonical_json(report), encoding="utf-8")
     return report
@@ -141,14 +98,16 @@ def check(job: Job) -> None:
     """Refuse a job that can't be done before any work starts."""
     scanner_setting(job.scenario.scan)
     job.scenario.cloud.scheme()
+    job.scenario.own_materials()
     if set(job.scenario.outputs) & {"cloud", "previews"}:
         from .blender.cameras import check_colour
 
         check_colour(job.scenario.colour)
     wkt(job.scenario.road.epsg)
+    check_formats(job.scenario.twin)
     if job.parameters and job.axis:
         raise InputError("--axis", str(job.axis), "can't be given together with --parameters")
-    if not job.scenario.outputs:
+    if not job.scenario.outputs and not job.scenario.twin:
         raise InputError("outputs", [], f"must name at least one of {', '.join(FILES)}")
 
 
@@ -165,187 +124,10 @@ def road_parameters(job: Job) -> tuple[RoadParameters, dict[str, Any]]:
     return sample_road(scenario.road, scenario.seed, scenario.title), {}
 
 
-def make_scan(
-    scenario: Scenario, scene: ScannedScene, path: ScanPath, environment: Environment | None = None
-) -> Scan:
-    """Return the scan that a scenario asks for, ready to be cut into blocks; builds the casters.
-
-    Args:
-        scene: what is scanned.
-        path: the scanner's.
-        environment: the road's, for its weather; clear if None.
-    """
-    from .blender.casters import make_caster
-
-    settings, setting = scenario.settings(), scanner_setting(scenario.scan)
-    rings = scenario.scan.beam_rings
-    return Scan(
-        target=Target(scene, lambda mesh: make_caster(scenario.scan.caster, mesh)),
-        surfaces=surfaces_of(material_rows(scene.static.materials), scenario.scan.reflection),
-        setting=setting,
-        path=path,
-        rings=RINGS[settings.rays_per_pulse] if rings is None else rings,
-        seed=scenario.seed,
-        noise=scenario.scan.noise,
-        attenuation=_attenuation(scenario, environment, setting.device.wavelength_nm),
-        beam=scenario.scan.beam,
-        wanted=measured_arrays(scenario),
-        targets=needs_targets(scenario),
-    )
-
-
-def kept_arrays(scenario: Scenario) -> frozenset[str]:
-    """Return the names of `PointBlock`'s optional arrays that the files hold."""
-    return scenario.cloud.arrays() & frozenset(OPTIONAL) if "cloud" in scenario.outputs else frozenset()
-
-
-def measured_arrays(scenario: Scenario) -> frozenset[str]:
-    """Return the names of `PointBlock`'s optional arrays that the scan itself must fill."""
-    relief = {"normal", "material"} if scenario.scan.relief > 0.0 else set()
-    return (kept_arrays(scenario) - set(LAYERS) - {"color_source"}) | relief
-
-
-def wanted_layers(scenario: Scenario) -> frozenset[str]:
-    """Return what the points get besides what the scanner measures: ``rgb`` and material layers."""
-    rgb = {"rgb"} if scenario.colour.rgb else set()
-    return frozenset(rgb | (kept_arrays(scenario) & set(LAYERS)))
-
-
-def needs_targets(scenario: Scenario) -> bool:
-    """Return whether the scan must say where its points were seen."""
-    layers = bool(wanted_layers(scenario)) or scenario.colour.intensity_from_layers
-    return layers or scenario.scan.relief > 0.0
-
-
-def make_finish(scenario: Scenario, scan: Scan, source: LayerSource) -> Finish:
-    """Return what is done to the points after the scan."""
-    rows = material_rows(scan.target.materials)
-    return Finish(
-        source=source,
-        wanted=wanted_layers(scenario),
-        surfaces=scan.surfaces,
-        intensity_from_layers=scenario.colour.intensity_from_layers,
-        relief=micro_relief(scan.target.materials, rows) if scenario.scan.relief > 0.0 else None,
-        strength=scenario.scan.relief,
-        octaves=scenario.settings().relief_octaves,
-        seed=scenario.seed,
-        kept=kept_arrays(scenario),
-    )
-
-
-def colour_job(
-    scenario: Scenario, scan: Scan, scene: ScannedScene, environment: Environment | None = None
-) -> ColourJob:
-    """Return what the cameras are asked for."""
-    from .blender.cameras import ColourJob
-
-    layers = wanted_layers(scenario) | ({"base_color"} if scenario.colour.intensity_from_layers else set())
-    return ColourJob(
-        scenario=scenario.colour,
-        fidelity=scenario.fidelity,
-        wanted=frozenset(layers),
-        mesh=scene.static,
-        environment=environment or Environment(),
-        path=scan.path,
-        field_of_view=scan.setting.field_of_view,
-        seed=scenario.seed,
-    )
-
-
-def material_rows(names: Sequence[str]) -> list[Material]:
-    """Return the means of materials of the open file."""
-    from .blender.materials import constants
-
-    return list(constants(names).values())
-
-
-def _attenuation(scenario: Scenario, environment: Environment | None, wavelength_nm: float) -> float:
-    """Return the attenuation per metre of range: given, of the scan's weather, or of the road's."""
-    if scenario.scan.attenuation is not None:
-        return scenario.scan.attenuation
-    return attenuation(scenario.scan.weather or weather_of(environment or Environment()), wavelength_nm)
-
-
-def scan_blocks(scan: Scan, threads: int = 0, finish: Finish | None = None) -> Iterator[BlockResult]:
-    """Yield the blocks of a scan in their order, computed side by side; only a few are held at a time.
-
-    Where colours are rendered return by return, several blocks come as one.
-
-    Args:
-        scan: see `make_scan`.
-        threads: as many blocks are worked on at once; 0 for every core.
-        finish: what is done to the points; where its source renders, that happens in the calling thread.
-    """
-    tasks = iter(scan.blocks())
-    renders = finish is not None and finish.source.main_thread_only
-
-    def work(strip: Strip, block: int) -> BlockResult:
-        result = scan_block(scan, strip, block)
-        return result if finish is None or renders else finished(result, finish)
-
-    if scan.target.caster.main_thread_only:
-        results: Iterator[BlockResult] = (work(*task) for task in tasks)
-    else:
-        results = _side_by_side(work, tasks, threads or available_cores())
-    if finish is None or not renders:
-        yield from results
-        return
-    for result in _in_batches(results):
-        yield finished(result, finish)
-
-
-RETURNS_AT_ONCE = 400_000
-"""Points that are rendered together: each rendering takes a tenth of a second whatever their number."""
-
-
-def _in_batches(results: Iterator[BlockResult]) -> Iterator[BlockResult]:
-    """Yield blocks joined until they have `RETURNS_AT_ONCE`."""
-    batch: list[BlockResult] = []
-    for result in results:
-        batch.append(result)
-        if sum(len(one.points) for one in batch) >= RETURNS_AT_ONCE:
-            yield joined_results(batch)
-            batch = []
-    if batch:
-        yield joined_results(batch)
-
-
-def finished(result: BlockResult, finish: Finish) -> BlockResult:
-    """Return a block with its points finished."""
-    points, sources = finish(result.points, result.seen)
-    return replace(result, points=points, seen=None, sources=sources)
-
-
-def _side_by_side(
-    work: Callable[[Strip, int], BlockResult], tasks: Iterator[tuple[Strip, int]], workers: int
-) -> Iterator[BlockResult]:
-    with _pool(workers) as pool:
-        pending: list[Future[BlockResult]] = [pool.submit(work, *task) for task in islice(tasks, workers + 1)]
-        while pending:
-            yield pending.pop(0).result()
-            pending += [pool.submit(work, *task) for task in islice(tasks, 1)]
-
-
-def available_cores() -> int:
-    """Return how many cores this process may use."""
-    import os
-
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-
-
-@contextmanager
-def _pool(workers: int) -> Iterator[ThreadPoolExecutor]:
-    """Yield a thread pool that drops what it has not begun when the work is stopped."""
-    pool = ThreadPoolExecutor(workers)
-    try:
-        yield pool
-    finally:
-        pool.shutdown(wait=True, cancel_futures=True)
-
-
-def _write_texts(
-    folder: Path, wanted: tuple[str, ...], parameters: RoadParameters, geometry: RoadGeometry, scenario: Scenario
+def write_texts(
+    folder: Path, wanted: Sequence[str], parameters: RoadParameters, geometry: RoadGeometry, scenario: Scenario
 ) -> None:
+    """Write the files that hold the road itself, as far as they are wanted."""
     if "parameters" in wanted:
         (folder / "parameters.json").write_text(parameters.to_json(), encoding="utf-8")
     if "centerline" in wanted:
@@ -354,14 +136,12 @@ def _write_texts(
         (folder / "centerline.geojson").write_text(text, encoding="utf-8")
 
 
-def _scene_outputs(
-    job: Job, folder: Path, parameters: RoadParameters, geometry: RoadGeometry, timer: StageTimer
-) -> dict[str, Any]:
+def _scene_outputs(job: Job, folder: Path, parameters: RoadParameters, timer: StageTimer) -> dict[str, Any]:
     """Build the model and write what needs it."""
     from .blender.files import empty_file, save_scene
     from .blender.kept_road import remember
+    from .blender.materials import vary
     from .blender.model import build_road
-    from .blender.scene import scanned_scene
 
     settings, wanted = job.scenario.settings(), job.scenario.outputs
     counts: dict[str, Any] = {}
@@ -369,161 +149,53 @@ def _scene_outputs(
         empty_file()
     with timer.stage("model"):
         model = build_road(parameters, settings.tolerance, settings.vegetation_detail)
+        if job.scenario.materials_table:
+            vary(parameters.materials, parameters.environment, job.scenario.own_materials())
         remember(model.collection, parameters, job.scenario, "")
     if set(wanted) & {"cloud", "previews"}:
-        with timer.stage("scene mesh"):
-            scene = scanned_scene(geometry=geometry, speed_factor=job.scenario.scan.traffic_speed_factor)
-        environment = parameters.environment
-        with timer.stage("caster"):
-            scan = make_scan(job.scenario, scene, road_path(job.scenario, geometry), environment)
-        cameras = colour_job(job.scenario, scan, scene, environment)
-        del scene
-        view = top_view(geometry) if "previews" in wanted else None
-        counts = scan_to_files(job.scenario, scan, cameras, folder, parameters.metadata.epsg, view, timer)
+        counts = scan_open_road(job.scenario, parameters, folder, timer)
     if "scene" in wanted:
         with timer.stage("scene file"):
             save_scene(folder / "scene.blend")
     return counts
 
 
-def scan_to_files(
-    scenario: Scenario,
-    scan: Scan,
-    cameras: ColourJob,
-    folder: Path,
-    epsg: int | None,
-    view: TopView | None,
-    timer: StageTimer,
+def scan_open_road(
+    scenario: Scenario, parameters: RoadParameters, folder: Path, timer: StageTimer
 ) -> dict[str, Any]:
-    """Render what the colours need, scan, and write the cloud and the previews; return the counts as JSON data."""
-    from .blender.cameras import layer_source
+    """Scan the open scene, which shows a road, and write the cloud and the previews; must run in the main thread.
 
-    with ExitStack() as stack:
-        with timer.stage("images"):
-            source = stack.enter_context(
-                layer_source(cameras, progress=lambda share: timer.progress("images", share))
-            )
-        with timer.stage("scan"):
-            task = ScanToFiles(scenario, scan, source, folder, epsg, view)
-            for share in task.run():
-                timer.progress("scan", share)
-        return task.summary()
+    Returns:
+        the counts, as JSON data.
 
-
-class ScanToFiles:
-    """A scan into the cloud and the previews, a block at a time, so that its caller can show progress or stop it.
-
-    Args:
-        scenario: says which files are wanted.
-        scan: see `make_scan`.
-        source: of colours and layers.
-        folder: where the files go.
-        epsg: map coordinate system; None if unknown.
-        view: raster for the previews; None without.
-
-    Attributes:
-        counts: what was counted so far.
+    Raises:
+        InputError: nothing visible could be scanned, or see `scanned_scene`, `make_scan` and `check_colour`.
     """
+    from .blender.scene import scanned_scene
 
-    def __init__(
-        self,
-        scenario: Scenario,
-        scan: Scan,
-        source: LayerSource,
-        folder: Path,
-        epsg: int | None = None,
-        view: TopView | None = None,
-    ) -> None:
-        self.scenario, self.scan, self.folder, self.epsg, self.view = scenario, scan, folder, epsg, view
-        self.finish = make_finish(scenario, scan, source)
-        self.counts = ScanCounts()
-        # 16 bits are full for a white target at a right angle at half the usual range: only what is nearer or a
-        # retro-reflector is brighter, and the weakest echoes still have hundreds of steps.
-        usual = 65535.0 * max(1.0, scan.path.typical_range / 2.0) ** 2
-        self.intensity_scale = scenario.cloud.intensity_scale or usual
-
-    def run(self) -> Generator[float, None, None]:
-        """Scan; yield the share that is done after each block. The files are complete when the iteration ends."""
-        total = len(self.scan.blocks())
-        with ExitStack() as stack:
-            writers, grid = self._writers(stack), self._grid(stack)
-            results = scan_blocks(self.scan, self.scenario.scan.threads, self.finish)
-            done = 0
-            for result in results:
-                done += result.blocks
-                self.counts.add(result)
-                if grid:
-                    grid.add(result.points)
-                else:
-                    self._keep(result.points, writers)
-                yield done / total
-            for block in grid.blocks() if grid else ():
-                self._keep(block, writers)
-        self.counts.points = writers[0].count if writers else self.counts.points
-        self.counts.intensity_clipped = writers[0].clipped if writers else 0
-        if self.view:
-            self.view.save(self.folder, self.epsg)
-
-    def _keep(self, points: PointBlock, writers: list[CloudWriter]) -> None:
-        for writer in writers:
-            writer.write(points)
-        if self.view:
-            self.view.add(points)
-
-    def _writers(self, stack: ExitStack) -> list[CloudWriter]:
-        """Return the cloud's writers; they are closed with the stack."""
-        if "cloud" not in self.scenario.outputs:
-            return []
-        cloud, origin = self.scenario.cloud, self.scan.target.origin
-        options = (self.epsg, origin, self.intensity_scale, cloud.attributes, cloud.scheme())
-        return [stack.enter_context(open_writer(self.folder / name, *options)) for name in cloud.file_names()]
-
-    def _grid(self, stack: ExitStack) -> GridSubsampler | None:
-        spacing = self.scenario.cloud.point_spacing
-        return stack.enter_context(GridSubsampler(spacing, self.folder)) if spacing else None
-
-    def summary(self) -> dict[str, Any]:
-        """Return the counts as JSON data."""
-        names = {row.id: row.name for row in classes()} | {255: "unlabelled"}
-        by_class = {names.get(i, str(i)): int(n) for i, n in enumerate(self.counts.by_class) if n}
-        target = self.scan.target
-        return {
-            "triangles": target.triangles,
-            "vertices": target.vertices,
-            "caster": target.caster.name,
-            **{name: value for name, value in asdict(self.counts).items() if not name.startswith("by_")},
-            "attenuation": self.scan.attenuation,
-            "intensity_scale": self.intensity_scale,
-            "points_by_class": by_class,
-            "points_by_colour_source": self._shares_by_source(),
-            "rendered": self.finish.source.report,
-        }
-
-    def _shares_by_source(self) -> dict[str, float]:
-        """Return the share of the points that took their colour from each source."""
-        total = max(1, int(self.counts.by_source.sum()))
-        names = {FROM_MATERIAL: "material", FROM_RETURN: "return", 1: "image", 2: "next image"}
-        return {names.get(i, f"image {i}"): round(int(n) / total, 6) for i, n in enumerate(self.counts.by_source) if n}
+    geometry, environment = RoadGeometry(parameters), parameters.environment
+    with timer.stage("scene mesh"):
+        scene = scanned_scene(geometry=geometry, speed_factor=scenario.scan.traffic_speed_factor)
+    check_not_empty(scene)
+    with timer.stage("caster"):
+        scan = make_scan(
+            scenario, scene, road_path(scenario, geometry), environment, variation=parameters.materials
+        )
+    cameras = colour_job(scenario, scan, scene, environment)
+    del scene
+    view = top_view(geometry) if "previews" in scenario.outputs else None
+    return scan_to_files(scenario, scan, cameras, folder, parameters.metadata.epsg, view, timer)
 
 
-def road_path(scenario: Scenario, geometry: RoadGeometry) -> ScanPath:
-    """Return the scanner's path along a road."""
-    return make_path(scenario.scan.platform, RoadGuide(geometry))
+def check_not_empty(scene: ScannedScene) -> None:
+    """Refuse a scene without anything to scan."""
+    if not len(scene.static) and not scene.moving:
+        raise InputError("Scene", None, "nothing that could be scanned is visible")
 
 
-def top_view(geometry: RoadGeometry) -> TopView:
-    """Return a raster that holds the whole swath."""
-    origin = np.array(geometry.parameters.transform.translate)[:2]
-    stations = np.linspace(0.0, geometry.length, 50)
-    terrain = geometry.parameters.terrain
-    reach = terrain.half_width if terrain else float(np.abs(geometry.offsets(stations)).max())
-    plan, heading, _ = geometry.alignment.frame(stations)
-    left = np.stack([-np.sin(heading), np.cos(heading)], axis=1)
-    chord = plan[-1] - plan[0]
-    normal = np.array([-chord[1], chord[0]]) / max(np.hypot(*chord), 1e-9)
-    edges = np.concatenate([plan + reach * left, plan - reach * left])
-    across = (edges - plan[0]) @ normal
-    return TopView(plan[0] + origin, plan[-1] + origin, float(across.min()) - 2, float(across.max()) + 2)
+def opening() -> dict[str, Any]:
+    """Return the head of every job's report."""
+    return {"type": "Report", "generator": generator()}
 
 
 def closing(scenario: Scenario, timer: StageTimer) -> dict[str, Any]:

@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from . import version
 from .core.class_mapping import ClassMapping
 from .core.cloud.previews import TopView
 from .core.crs import wkt
@@ -31,7 +30,8 @@ from .core.scenario import Output, Scenario
 from .core.scene_extent import bounds, elevation_at, middle_line
 from .core.scene_mesh import SceneMesh
 from .core.schema import canonical_json, read_json
-from .pipeline import closing, colour_job, file_names, make_scan, scan_to_files, top_view
+from .pipeline import closing, file_names, opening
+from .scan_files import colour_job, make_scan, scan_to_files, top_view
 
 if TYPE_CHECKING:
     from .blender.foreign import UpAxis
@@ -90,7 +90,7 @@ def scan_scene(job: SceneScan, progress: Progress = silent) -> dict[str, Any]:
     wanted = tuple(name for name in OUTPUTS if name in scenario.outputs)
     names = file_names(scenario, wanted)
     timer = StageTimer(progress)
-    report: dict[str, Any] = {"type": "Report", "generator": f"SynthRoads {version()}"}
+    report = opening()
     with output_folder(job.output, names, job.overwrite) as folder:
         with timer.stage("scene"):
             _open(job)
@@ -100,7 +100,8 @@ def scan_scene(job: SceneScan, progress: Progress = silent) -> dict[str, Any]:
         geometry = RoadGeometry(found.road) if found.road else None
         with timer.stage("caster"):
             path = scene_path(job, static, geometry)
-            scan = make_scan(scenario, found.scene, path, found.road.environment if found.road else None)
+            air, variation = (found.road.environment, found.road.materials) if found.road else (None, None)
+            scan = make_scan(scenario, found.scene, path, air, variation=variation)
         epsg = found.road.metadata.epsg if found.road and job.epsg is None else job.epsg
         view = None if "previews" not in wanted else top_view(geometry) if geometry else scene_view(static)
         cameras = colour_job(scenario, scan, found.scene, found.road.environment if found.road else None)
@@ -133,6 +134,7 @@ def check_scene_scan(job: SceneScan) -> ClassMapping | None:
     if platform.height is not None and any(len(place) == 3 for place in job.tripods):
         raise InputError("--height", platform.height, "can't be given with a tripod whose z is the scanner's own")
     scanner_setting(job.scenario.scan)
+    job.scenario.own_materials()
     if job.epsg is not None:
         wkt(job.epsg)
     if job.classes is None:

@@ -20,7 +20,8 @@ HAS_BPY = importlib.util.find_spec("bpy") is not None
 BLENDER_FOLDER = Path(tempfile.mkdtemp(prefix="synthroads-blender-"))
 os.environ["BLENDER_USER_RESOURCES"] = str(BLENDER_FOLDER)
 
-collect_ignore = [] if HAS_BPY else ["blender"]
+HAS_TORCH = importlib.util.find_spec("torch") is not None
+collect_ignore = [name for name, there in (("blender", HAS_BPY), ("ml", HAS_TORCH)) if not there]
 
 # The same examples in every run, and no time limit for one: the machine may be busy with something else.
 hypothesis.settings.register_profile("synthroads", deadline=None, derandomize=True)
@@ -28,12 +29,13 @@ hypothesis.settings.load_profile("synthroads")
 
 
 def pytest_report_header() -> str:
-    """Say which Blender the tests run on, without importing it."""
+    """Say which Blender the tests run on, without importing it, and whether they learn."""
+    learning = "" if HAS_TORCH else "; torch is not installed: tests/ml is left out"
     if not HAS_BPY:
-        return "bpy is not installed: tests/blender is left out"
+        return f"bpy is not installed: tests/blender is left out{learning}"
     spec = importlib.util.find_spec("bpy")
     folders = Path(spec.origin).parent.glob("[0-9].[0-9]*") if spec and spec.origin else []
-    return f"bpy {', '.join(folder.name for folder in folders)}"
+    return f"bpy {', '.join(folder.name for folder in folders)}{learning}"
 
 
 def _needs_blender(request: pytest.FixtureRequest) -> bool:

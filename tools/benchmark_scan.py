@@ -27,7 +27,7 @@ from synthroads_addon.core.parameters.sampler import sample_road  # noqa: E402
 from synthroads_addon.core.scanning.caster import Caster  # noqa: E402
 from synthroads_addon.core.scanning.scan import Scan, scan_block  # noqa: E402
 from synthroads_addon.core.scenario import load_scenario  # noqa: E402
-from synthroads_addon.pipeline import make_scan, road_path  # noqa: E402
+from synthroads_addon.scan_files import make_scan, road_path  # noqa: E402
 
 BLOCKS = 8
 """Blocks of a strip that are scanned."""

@@ -1,8 +1,8 @@
-"""Build the Blender extension: the add-on, its manifest and the wheels it needs, in one zip per platform.
+"""Build the Blender extensions: the add-on with its wheels, and what elevation models need, each a zip per platform.
 
     python tools/build_extension.py [--platform linux-x64|windows-x64|macos-arm64|all] [--output-dir dist]
 
-The add-on is copied beside a completed manifest in a folder of its own (no committed file is touched), then built and
+Its source is copied beside a completed manifest in a folder of its own (no committed file is touched), then built and
 validated by Blender's own tool, which comes with the `bpy` package. Each platform's zip holds wheels for every Python
 that a supported Blender has. The same source and the same list of wheels give the same bytes.
 """
@@ -23,13 +23,38 @@ import sys
 import tempfile
 import tomllib
 import zipfile
+from dataclasses import dataclass
 from email.message import Message
+from itertools import product
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
 PACKAGE = ROOT / "synthroads_addon"
 MANIFEST = ROOT / "blender_manifest.toml"
-WHEEL_LIST = ROOT / "tools" / "extension_wheels.txt"
+
+
+@dataclass(frozen=True)
+class Extension:
+    """One of the extensions.
+
+    Attributes:
+        name: id in Blender.
+        source: folder with its Python code.
+        manifest: what it says of itself, still without platform and wheels.
+        wheel_list: file with the wheels it brings.
+    """
+
+    name: str
+    source: Path
+    manifest: Path
+    wheel_list: Path
+
+
+_ELEVATION = ROOT / "tools" / "elevation_models"
+EXTENSIONS = (
+    Extension("synthroads", PACKAGE, MANIFEST, ROOT / "tools" / "extension_wheels.txt"),
+    Extension("synthroads_elevation_models", _ELEVATION, _ELEVATION / MANIFEST.name, _ELEVATION / "wheels.txt"),
+)
 
 # Blender 4.5 and 5.0 have Python 3.11, the official 5.1 and 5.2 have 3.13, Debian's 5.2 has 3.14.
 PYTHON_VERSIONS = ("3.11", "3.13", "3.14")
@@ -53,7 +78,7 @@ LICENCES = {
     "rasterio": "BSD-3-Clause; holds GDAL and PROJ: MIT, GEOS: LGPL-2.1-or-later, and free libraries that these use",
 }
 
-LEFT_OUT = shutil.ignore_patterns("__pycache__", "*.py[co]", ".*", "*.blend[1-9]")
+LEFT_OUT = shutil.ignore_patterns("__pycache__", "*.py[co]", ".*", "*.blend[1-9]", "wheels.txt", MANIFEST.name)
 ZIP_DATE = (1980, 1, 1, 0, 0, 0)
 
 
@@ -89,18 +114,18 @@ def normal_name(name: str) -> str:
     return re.sub(r"[-_.]+", "-", name).lower()
 
 
-def read_wheel_list() -> list[str]:
-    """Return the lines `name==version` of the list of wheels."""
-    lines = (line.split("#")[0].strip() for line in WHEEL_LIST.read_text(encoding="utf-8").splitlines())
+def read_wheel_list(path: Path) -> list[str]:
+    """Return the lines `name==version` of a list of wheels."""
+    lines = (line.split("#")[0].strip() for line in path.read_text(encoding="utf-8").splitlines())
     return [line for line in lines if line]
 
 
-def fetch_wheels(target: str, cache: Path) -> list[Path]:
-    """Return the wheels of all Pythons for one platform, sorted by name; download what the cache lacks."""
-    pins = read_wheel_list()
+def fetch_wheels(extension: Extension, target: str, cache: Path) -> list[Path]:
+    """Return an extension's wheels of all Pythons for one platform, sorted by name; download what the cache lacks."""
+    pins = read_wheel_list(extension.wheel_list)
     wheels: dict[str, Path] = {}
     for version in PYTHON_VERSIONS:
-        folder = cache / target / f"cp{version.replace('.', '')}"
+        folder = cache / extension.name / target / f"cp{version.replace('.', '')}"
         stamp = folder / "complete.json"
         if not stamp.exists() or json.loads(stamp.read_text(encoding="utf-8")) != pins:
             part = folder.with_name(f"{folder.name}.part-{os.getpid()}")
@@ -133,7 +158,7 @@ def wheel_metadata(wheel: Path) -> Message:
         return email.parser.Parser().parsestr(archive.read(name).decode("utf-8"))
 
 
-def check_complete(wheels: list[Path]) -> None:
+def check_complete(extension: Extension, wheels: list[Path]) -> None:
     """Raise BuildError if a wheel needs a package that is neither bundled nor in Blender."""
     metadata = [wheel_metadata(wheel) for wheel in wheels]
     present = {normal_name(fields["Name"]) for fields in metadata} | NOT_BUNDLED
@@ -143,7 +168,7 @@ def check_complete(wheels: list[Path]) -> None:
                 continue
             needed = normal_name(re.split(r"[^A-Za-z0-9._-]", requirement, maxsplit=1)[0])
             if needed not in present:
-                raise BuildError(f"{fields['Name']} needs {requirement}: add it to tools/{WHEEL_LIST.name}")
+                raise BuildError(f"{fields['Name']} needs {requirement}: add it to {extension.wheel_list.name}")
 
 
 def licence(fields: Message) -> str:
@@ -169,24 +194,30 @@ def third_party_notice(wheels: list[Path]) -> str:
 # --- staging ---------------------------------------------------------------------------------------------------------
 
 
-def stage(target: str, wheels: list[Path], folder: Path) -> None:
-    """Fill an empty folder with all that the extension holds."""
-    shutil.copytree(PACKAGE, folder, ignore=LEFT_OUT, dirs_exist_ok=True)
+def stage(extension: Extension, target: str, wheels: list[Path], folder: Path) -> None:
+    """Fill an empty folder with all that an extension holds."""
+    shutil.copytree(extension.source, folder, ignore=LEFT_OUT, dirs_exist_ok=True)
     shutil.copy(ROOT / "LICENSE", folder)
     (folder / "THIRD_PARTY.txt").write_text(third_party_notice(wheels), encoding="utf-8", newline="\n")
     (folder / "wheels").mkdir()
     for wheel in wheels:
         shutil.copy(wheel, folder / "wheels")
-    manifest = complete_manifest(target, [f"./wheels/{wheel.name}" for wheel in wheels])
+    manifest = complete_manifest(extension, target, [f"./wheels/{wheel.name}" for wheel in wheels])
     (folder / MANIFEST.name).write_text(manifest, encoding="utf-8", newline="\n")
 
 
-def complete_manifest(target: str, wheels: list[str]) -> str:
-    """Return the text of the manifest with the platform and the wheels added, before the first table as TOML wants."""
-    committed = MANIFEST.read_text(encoding="utf-8")
+def version() -> str:
+    """Return the project's version."""
+    return str(tomllib.loads(MANIFEST.read_text(encoding="utf-8"))["version"])
+
+
+def complete_manifest(extension: Extension, target: str, wheels: list[str]) -> str:
+    """Return the text of the manifest with what it lacks added, before the first table as TOML wants."""
+    committed = extension.manifest.read_text(encoding="utf-8")
     tables = re.search(r"^\[", committed, flags=re.MULTILINE)
     split = tables.start() if tables else len(committed)
-    added = f"platforms = {toml_list([target])}\nwheels = {toml_list(wheels)}\n\n"
+    own = "" if extension.manifest == MANIFEST else f"version = {json.dumps(version())}\n"
+    added = f"{own}platforms = {toml_list([target])}\nwheels = {toml_list(wheels)}\n\n"
     return committed[:split] + added + committed[split:]
 
 
@@ -198,15 +229,14 @@ def toml_list(items: list[str]) -> str:
 # --- building --------------------------------------------------------------------------------------------------------
 
 
-def build(target: str, output_dir: Path, cache: Path) -> Path:
-    """Build and validate the extension for one platform; return the zip."""
-    wheels = fetch_wheels(target, cache)
-    check_complete(wheels)
-    version = tomllib.loads(MANIFEST.read_text(encoding="utf-8"))["version"]
+def build(extension: Extension, target: str, output_dir: Path, cache: Path) -> Path:
+    """Build and validate an extension for one platform; return the zip."""
+    wheels = fetch_wheels(extension, target, cache)
+    check_complete(extension, wheels)
     output_dir.mkdir(parents=True, exist_ok=True)
-    archive = output_dir / f"synthroads-{version}-{target.replace('-', '_')}.zip"
+    archive = output_dir / f"{extension.name}-{version()}-{target.replace('-', '_')}.zip"
     with tempfile.TemporaryDirectory(prefix="synthroads-") as folder:
-        stage(target, wheels, Path(folder))
+        stage(extension, target, wheels, Path(folder))
         run_tool("build", "--source-dir", folder, "--output-filepath", str(archive))
     make_reproducible(archive)
     run_tool("validate", str(archive))
@@ -239,7 +269,7 @@ def run_tool(*arguments: str) -> None:
 
 def parse_arguments(argv: list[str] | None) -> argparse.Namespace:
     """Return the options of the command line."""
-    parser = argparse.ArgumentParser(description="Build the Blender extension, one zip per platform.")
+    parser = argparse.ArgumentParser(description="Build the Blender extensions, a zip of each per platform.")
     parser.add_argument(
         "--platform", choices=[*PLATFORM_TAGS, "all"], default=current_platform(), help="default: the current one"
     )
@@ -257,8 +287,9 @@ def main(argv: list[str] | None = None) -> int:
         print(f"no wheels are known for {options.platform}: choose --platform {'|'.join(PLATFORM_TAGS)}|all")
         return 2
     try:
-        for target in PLATFORM_TAGS if options.platform == "all" else [options.platform]:
-            archive = build(target, options.output_dir, options.wheel_cache)
+        targets = PLATFORM_TAGS if options.platform == "all" else [options.platform]
+        for target, extension in product(targets, EXTENSIONS):
+            archive = build(extension, target, options.output_dir, options.wheel_cache)
             checksum = hashlib.sha256(archive.read_bytes()).hexdigest()
             print(f"{archive}  {archive.stat().st_size / 1e6:.1f} MB  sha256 {checksum[:16]}")
     except BuildError as error:

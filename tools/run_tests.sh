@@ -52,7 +52,16 @@ for version in $versions; do
     fi
     start=$(date +%s)
     status=0
-    "$python" -m pytest -q -n "${TEST_WORKERS:-2}" --dist loadfile -m "$markers" "$@" || status=$?
+    # Blender has processes of its own: once ifcopenshell has worked in one, Blender 5.2's OBJ exporter aborts there.
+    for part in "tests/blender" "tests --ignore=tests/blender"; do
+        code=0
+        # Without a limit on restarts a worker that crashes can leave the others waiting for ever.
+        # shellcheck disable=SC2086 # the part is meant to be split
+        "$python" -m pytest -q -n "${TEST_WORKERS:-2}" --dist loadfile --max-worker-restart 0 -m "$markers" "$@" \
+            $part || code=$?
+        # 5: none of the part's tests has these markers
+        if [ "$code" -ne 0 ] && [ "$code" -ne 5 ]; then status=$code; fi
+    done
     seconds=$(($(date +%s) - start))
     if [ "$status" -eq 0 ]; then
         note "Python $version ($blender): tests passed, $seconds s"

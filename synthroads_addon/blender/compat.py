@@ -34,6 +34,13 @@ def modifier_input(modifier: bpy.types.NodesModifier, name: str) -> Any:
     return modifier[identifier]
 
 
+def shown_input(modifier: bpy.types.NodesModifier, identifier: str) -> tuple[Any, str]:
+    """Return what a layout's `prop` takes to show an input by its identifier: the data and the property's name."""
+    if _INPUTS_ARE_PROPERTIES:
+        return getattr(modifier.properties.inputs, identifier), "value"
+    return modifier, f'["{identifier}"]'
+
+
 def sky_texture(nodes: bpy.types.Nodes, elevation: float, azimuth: float) -> bpy.types.ShaderNodeTexSky:
     """Add a physical sky without sun disc; elevation and azimuth (clockwise from north) of the sun in rad."""
     node = nodes.new("ShaderNodeTexSky")

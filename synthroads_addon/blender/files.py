@@ -15,6 +15,6 @@ def empty_file() -> None:
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
 
 
-def save_scene(path: Path) -> None:
-    """Save a compressed copy of the open file; the open file keeps its own name and state."""
-    bpy.ops.wm.save_as_mainfile(filepath=str(path), copy=True, compress=True, check_existing=False)
+def save_scene(path: Path, compress: bool = True) -> None:
+    """Save a copy of the open file, compressed if not told otherwise; the open file keeps its own name and state."""
+    bpy.ops.wm.save_as_mainfile(filepath=str(path), copy=True, compress=compress, check_existing=False)

@@ -13,6 +13,7 @@ from ..core.parameters.alignment import clip_offset
 from ..core.parameters.geometry import RoadGeometry
 from ..core.parameters.model import PointObject, Terrain
 from ..core.parameters.terrain import GROUND_MARGIN, ground_elevation
+from ..core.turns import aside
 from .nodes.road_layout import varying_widths
 
 Float = NDArray[np.float64]
@@ -42,6 +43,16 @@ def ground_mesh(
     geometry: RoadGeometry, terrain: Terrain, tolerance: float, stretch: tuple[float, float], origin: Float
 ) -> bpy.types.Mesh:
     """Return the ground before the road was built: a grid of stations and offsets, wider than the terrain."""
+    vertices, faces = aside(lambda: _ground_grid(geometry, terrain, tolerance, stretch))
+    mesh = bpy.data.meshes.new("SR Ground")
+    fill(mesh, vertices - origin, faces=faces)
+    return mesh
+
+
+def _ground_grid(
+    geometry: RoadGeometry, terrain: Terrain, tolerance: float, stretch: tuple[float, float]
+) -> tuple[Float, NDArray[np.intp]]:
+    """Return the local vertices (V, 3) of the ground and its faces (F, 4)."""
     bend = terrain.undulation * (2.0 * np.pi / terrain.wavelength) ** 2
     spacing = float(np.clip(np.sqrt(8.0 * tolerance / max(bend, 1e-9)), 1.5, 4.0))
 
@@ -60,9 +71,7 @@ def ground_mesh(
     corner = np.arange(len(station) - 1)[:, None] * len(offset) + np.arange(len(offset) - 1)
     # Offsets grow to the left: forwards along the stations, then right, is seen from above against the clock.
     faces = np.stack([corner, corner + len(offset), corner + len(offset) + 1, corner + 1], axis=-1)
-    mesh = bpy.data.meshes.new("SR Ground")
-    fill(mesh, np.column_stack([plan.reshape(-1, 2), height]) - origin, faces=faces.reshape(-1, 4))
-    return mesh
+    return np.column_stack([plan.reshape(-1, 2), height]), faces.reshape(-1, 4)
 
 
 def points_mesh(

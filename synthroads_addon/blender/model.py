@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+import time
+from collections.abc import Collection, Generator
 from dataclasses import dataclass
 
 import bpy
@@ -10,14 +11,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..core.parameters.model import RoadParameters
+from ..core.turns import Turns
 from .materials import vary
 from .model_builder import ROLE, ModelBuilder
 from .nodes.builder import remove_unused_groups
 from .parts import PARTS, needed
+from .staging import Made, in_scene, new_staging, remove_staged, remove_with_meshes
 
 COLLECTION = "SynthRoads"
 ORIGIN = "synthroads_origin"
 """Custom property of the collection: map coordinates of the local origin."""
+
+_TURN = 0.03
+"""Seconds that a build may take before it lets its caller go on."""
+_EVALUATION, _MOST_AT_ONCE = 0.1, 32
+"""Seconds that Blender's evaluation of new objects is to take, and how many are evaluated together at most."""
 
 
 @dataclass(frozen=True)
@@ -45,6 +53,8 @@ def build_road(
 ) -> RoadModel:
     """Build the road in the current scene; a road built before is replaced, other objects stay as they are.
 
+    If it can't be built, the file is as it was before.
+
     Args:
         parameters: the road.
         tolerance: largest chord error of the road's surface, m.
@@ -54,35 +64,134 @@ def build_road(
 
     Raises:
         ValueError: a part that there is none of.
+        InputError: an asset of the set can't be read.
     """
-    wanted = set(PARTS if parts is None else parts)
-    if wanted - set(PARTS):
-        raise ValueError(f"parts: {sorted(wanted - set(PARTS))} are not among {tuple(PARTS)}")
-    remove_road()
-    collection = bpy.data.collections.get(COLLECTION) or bpy.data.collections.new(COLLECTION)
-    if COLLECTION not in bpy.context.scene.collection.children:
-        bpy.context.scene.collection.children.link(collection)
-    builder = ModelBuilder(parameters, collection, tolerance, vegetation_detail, stretch)
-    origin = np.array(parameters.transform.translate) + builder.origin
-    collection[ORIGIN] = [float(value) for value in origin]
-    there = needed(wanted)
-    for name, build in PARTS.items():
-        if name in there:
-            builder.hidden = name not in wanted
-            build(builder)
-    remove_unused_groups()
-    vary(parameters.materials, parameters.environment)
+    work = _Build(parameters, tolerance, vegetation_detail, parts, stretch)
+    try:
+        with work.made.noted():
+            work.build()
+    except BaseException:
+        work.made.remove()
+        raise
+    model = work.swap()
     bpy.context.view_layer.update()
-    return RoadModel(collection, builder.objects, origin)
+    return model
 
 
-def remove_road() -> None:
-    """Remove the objects that `build_road` made, and its collection unless the user keeps something in it."""
-    for item in [item for item in bpy.data.objects if ROLE in item]:
-        mesh = item.data
-        bpy.data.objects.remove(item)
-        if mesh is not None and mesh.users == 0:
-            bpy.data.meshes.remove(mesh)
+def build_steps(
+    parameters: RoadParameters,
+    tolerance: float,
+    vegetation_detail: float = 1.0,
+    parts: Collection[str] | None = None,
+    stretch: tuple[float, float] | None = None,
+) -> Generator[float | None, None, RoadModel]:
+    """Build the road as `build_road` does, in steps between which the window may live; return the model.
+
+    The new road grows beside the one built before, and takes its place in the last step. Each object is evaluated in a
+    step of its own, which Blender can't interrupt. Close the generator to give up: all that was made is removed, and
+    the file is as it was. After an undo or when another file was opened, only closing is allowed.
+
+    Yields:
+        the share that is done, 0 to 1, or None while there is nothing to do in this thread.
+    """
+    work = _Build(parameters, tolerance, vegetation_detail, parts, stretch)
+    turns = Turns(work.build, "SynthRoads build")
+    try:
+        more = True
+        while more:
+            with work.made.noted():
+                more = turns.take(_TURN)
+                if not turns.is_aside:
+                    work.evaluate()
+            yield None if turns.is_aside else work.share
+    except BaseException:
+        turns.close()
+        work.made.remove()
+        raise
+    model = work.swap()
+    work.evaluate()
+    return model
+
+
+class _Build:
+    """A road that is being built: in a collection of its own, until it takes the place of the one built before.
+
+    Attributes:
+        made: data-blocks that were made for it.
+        share: of it that is done, 0 to 1.
+    """
+
+    def __init__(
+        self,
+        parameters: RoadParameters,
+        tolerance: float,
+        detail: float,
+        parts: Collection[str] | None,
+        stretch: tuple[float, float] | None,
+    ) -> None:
+        self._wanted = set(PARTS if parts is None else parts)
+        if self._wanted - set(PARTS):
+            raise ValueError(f"parts: {sorted(self._wanted - set(PARTS))} are not among {tuple(PARTS)}")
+        self._scene = bpy.context.scene.name
+        remove_staged()
+        self.made = Made()
+        self.share = 0.0
+        with self.made.noted():
+            self._collection = new_staging(bpy.context.scene)
+        self._builder = ModelBuilder(parameters, self._collection, tolerance, detail, stretch)
+
+    def build(self) -> None:
+        """Make the objects; see `core.turns` for how this is done in steps."""
+        there = needed(self._wanted)
+        for number, (name, build) in enumerate(PARTS.items()):
+            if name in there:
+                self._builder.hidden = name not in self._wanted
+                build(self._builder)
+            self.share = (number + 1) / len(PARTS)
+
+    def evaluate(self) -> None:
+        """Have Blender work out what is new."""
+        scene = bpy.data.scenes[self._scene]
+        layer = bpy.context.view_layer if scene == bpy.context.scene else scene.view_layers[0]
+        begin = time.perf_counter()
+        layer.update()
+        # Objects in plenty are small: together they are evaluated faster, as each time the whole scene is looked at.
+        change = _EVALUATION / max(time.perf_counter() - begin, 1e-9)
+        self._builder.at_once = int(np.clip(self._builder.at_once * np.clip(change, 0.25, 2.0), 1, _MOST_AT_ONCE))
+
+    def swap(self) -> RoadModel:
+        """Put the new road in the place of the one built before."""
+        parameters, builder = self._builder.parameters, self._builder
+        remove_road(keep=self._collection)
+        collection = bpy.data.collections.get(COLLECTION)
+        if collection is None:
+            collection = self._collection
+            collection.name = COLLECTION
+        else:
+            if not in_scene(collection, bpy.data.scenes[self._scene]):
+                bpy.data.scenes[self._scene].collection.children.link(collection)
+            for item in builder.objects.values():
+                collection.objects.link(item)
+            bpy.data.collections.remove(self._collection)
+        for role, item in builder.objects.items():
+            item.name = role  # its mesh keeps the name it has: to rename a mesh is to evaluate all that hangs on it
+        self.made.keep(collection)
+        origin = np.array(parameters.transform.translate) + builder.origin
+        collection[ORIGIN] = [float(value) for value in origin]
+        remove_unused_groups()
+        vary(parameters.materials, parameters.environment)
+        return RoadModel(collection, builder.objects, origin)
+
+
+def remove_road(keep: bpy.types.Collection | None = None) -> None:
+    """Remove the objects that `build_road` made, and its collection unless the user keeps something in it.
+
+    Args:
+        keep: the objects of this collection stay.
+    """
+    staying = set(keep.objects) if keep else set()
+    objects = [item for item in bpy.data.objects if ROLE in item and item not in staying]
+    remove_with_meshes(objects)
     collection = bpy.data.collections.get(COLLECTION)
     if collection is not None and not collection.all_objects:
         bpy.data.collections.remove(collection)

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from ..core.parameters.geometry import RoadGeometry
 from ..core.parameters.model import PointObject, RoadParameters
 from ..core.parameters.stretch import cut
+from ..core.turns import pause, rest
 from .compat import set_modifier_input
 from .meshes import points_mesh, signed
 
@@ -34,6 +35,7 @@ class ModelBuilder:
         detail: share of the vegetation's triangles, 0 to 1.
         hidden: what is added now is only needed by other parts.
         objects: what was added, by role.
+        at_once: how many objects may be added in one turn.
     """
 
     def __init__(
@@ -52,6 +54,8 @@ class ModelBuilder:
         self.detail = detail
         self.hidden = False
         self.objects: dict[str, bpy.types.Object] = {}
+        self.at_once = 1
+        self._unseen = 0
         self._collection = collection
 
     @cached_property
@@ -97,7 +101,7 @@ class ModelBuilder:
             modifier.node_group = group
             for name, value in (inputs or {}).items():
                 set_modifier_input(modifier, name, int(signed([value])[0]) if name.endswith("Instance") else value)
-        self.objects[role] = item
+        self._added(role, item)
 
     def add_instance(self, role: str, collection: bpy.types.Collection) -> bpy.types.Object:
         """Add an empty that shows a collection."""
@@ -105,5 +109,13 @@ class ModelBuilder:
         item[ROLE] = role
         item.instance_type, item.instance_collection = "COLLECTION", collection
         self._collection.objects.link(item)
-        self.objects[role] = item
+        self._added(role, item)
         return item
+
+    def _added(self, role: str, item: bpy.types.Object) -> None:
+        self.objects[role] = item
+        self._unseen += 1
+        if self._unseen >= self.at_once:
+            self._unseen = 0
+            rest()  # so that they are evaluated in a turn of their own
+        pause()

@@ -27,6 +27,8 @@ _ROLES = {"Terrain": "terrain"}
 """Roles of objects that are not the ids of what they show."""
 _RENAMED = {"Smallest Height": "height_min", "Largest Height": "height_max"}
 """Inputs that are not named as their fields."""
+_BEAM_OF_SIDE = ("Left Beam", "Right Beam")
+_BEAMS = frozenset(_BEAM_OF_SIDE)
 _MARKING_FIELDS = {
     "Width": "width",
     "Dash": "dash_length",
@@ -62,16 +64,39 @@ def edited_parameters(parameters: RoadParameters, objects: Mapping[str, bpy.type
     return RoadParameters.from_dict(data)
 
 
+def carried_inputs(parameters: RoadParameters, role: str, modifier: bpy.types.NodesModifier) -> frozenset[str]:
+    """Return the names of a modifier's inputs that `edited_parameters` carries back into the parameter set."""
+    if role == "Road":
+        return frozenset(_road_inputs(parameters))
+    item = parameters.objects.get(_ROLES.get(role, role))
+    if item is None:
+        return frozenset()
+    return frozenset(_named_fields(item, modifier)) | (_BEAMS if isinstance(item, Guardrail) else frozenset())
+
+
+def _road_inputs(parameters: RoadParameters) -> Iterator[str]:
+    for carriageway in parameters.of_type(Carriageway).values():
+        side = carriageway.side.title()
+        yield from (input_name(side, strip) for strip, _ in own_widths(carriageway))
+        yield from (f"{side} Verge Slope", f"{side} Turns About Inner Edge")
+    for name in parameters.of_type(LineMarking):
+        yield from (f"{name} {label}" for label in _MARKING_FIELDS)
+
+
+def _named_fields(item: RoadObject, modifier: bpy.types.NodesModifier) -> dict[str, str]:
+    """Return the inputs that are named as fields of an object, and those fields."""
+    pairs = ((name, _RENAMED.get(name, name.lower().replace(" ", "_"))) for name in _input_names(modifier))
+    fields = type(item).model_fields
+    return {name: field for name, field in pairs if field in fields and isinstance(getattr(item, field), float)}
+
+
 def _plain(item: RoadObject, modifier: bpy.types.NodesModifier) -> RoadObject:
     """Return an object with the inputs that are named as its fields."""
-    update: dict[str, Any] = {}
-    for name in _input_names(modifier):
-        field = _RENAMED.get(name, name.lower().replace(" ", "_"))
-        value = getattr(item, field, None)
-        if isinstance(value, float) and field in type(item).model_fields:
-            update[field] = _value(value, modifier, name)
+    update: dict[str, Any] = {
+        field: _value(getattr(item, field), modifier, name) for name, field in _named_fields(item, modifier).items()
+    }
     if isinstance(item, Guardrail):
-        left, right = (bool(modifier_input(modifier, name)) for name in ("Left Beam", "Right Beam"))
+        left, right = (bool(modifier_input(modifier, name)) for name in _BEAM_OF_SIDE)
         update["faces"] = {(True, False): "left", (False, True): "right"}.get((left, right), "both")
     return item.model_copy(update=update)
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Hashable, Mapping
+from collections.abc import Callable, Collection, Generator, Hashable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from itertools import chain, count
 from typing import TypeAlias
@@ -24,16 +24,19 @@ from ..core.scanning.motion import (
     lane_motions,
 )
 from ..core.scene_mesh import SceneMesh
+from .changes import Changes
 from .model import ORIGIN
 from .model_builder import ROLE, SUPPORT
 from .scene_labels import Label, Labels, velocity_of
-from .scene_reading import Part, Places, Whole, placed, read_part, slot_names
+from .scene_reading import Copied, Part, Places, Whole, copy_mesh, placed, slot_names
 
 Float = NDArray[np.float64]
 Source: TypeAlias = bpy.types.Depsgraph | bpy.types.Scene | None
 
 _FARTHEST_FROM_MOTION = 100.0
 """A vehicle whose vertices are farther (m) than this from where it should be is one of another road."""
+_ATTEMPTS = 4
+"""How often a scene is read that changes meanwhile: the last time in one step."""
 
 
 def scene_mesh(
@@ -61,6 +64,7 @@ def scene_mesh(
     """
     depsgraph = _depsgraph(source)
     reading = _Reading(depsgraph, objects, classes)
+    reading.copy_all()
     whole = reading.whole(_origin(depsgraph.scene), number_objects)
     return placed(reading.pairs(None), whole)
 
@@ -90,16 +94,75 @@ def scanned_scene(
         InputError: as `scene_mesh`; a velocity isn't three numbers, the factor is negative, or the geometry is that of
             another road.
     """
+    steps = scanned_scene_steps(source, objects, classes, geometry, speed_factor, number_objects=number_objects)
+    while True:
+        try:
+            next(steps)
+        except StopIteration as end:
+            copied: CopiedScene = end.value
+            return copied.put_together()
+
+
+def scanned_scene_steps(
+    source: Source = None,
+    objects: Collection[bpy.types.Object] | None = None,
+    classes: ClassMapping | None = None,
+    geometry: RoadGeometry | None = None,
+    speed_factor: float = 1.0,
+    *,
+    number_objects: bool = False,
+) -> Generator[float, None, CopiedScene]:
+    """Read the evaluated scene as `scanned_scene` does, in steps in the main thread between which the window may live.
+
+    Each mesh is copied in a step of its own. If the user changes something meanwhile, it begins again; if he goes on
+    changing things, all is read in one step. After an undo, or when another file was opened, it must be closed.
+
+    Yields:
+        the share that is done, 0 to 1.
+
+    Returns:
+        what was read.
+    """
     checked_factor(speed_factor)
-    depsgraph = _depsgraph(source)
-    origin = _origin(depsgraph.scene)
-    lanes: dict[str, LaneMotion] = {}
-    if geometry is not None:
-        lanes = lane_motions(geometry, speed_factor, origin - np.array(geometry.parameters.transform.translate))
-    reading = _Reading(depsgraph, objects, classes, lanes, speed_factor)
+    reading: _Reading | None = None
+    attempt = 0
+    with Changes() as changes:
+        while reading is None or not reading.complete:
+            attempt += 1
+            depsgraph = _depsgraph(source)
+            changes.forget()
+            origin = _origin(depsgraph.scene)
+            lanes: dict[str, LaneMotion] = {}
+            if geometry is not None:
+                lanes = lane_motions(geometry, speed_factor, origin - np.array(geometry.parameters.transform.translate))
+            reading = _Reading(depsgraph, objects, classes, lanes, speed_factor)
+            if attempt == _ATTEMPTS:
+                reading.copy_all()
+            for share in reading.copies():
+                yield share
+                if changes.seen:
+                    break
+    done = reading
+    return CopiedScene(done.materials, lambda: _put_together(done, origin, number_objects))
+
+
+def _put_together(reading: _Reading, origin: Float, number_objects: bool) -> ScannedScene:
     whole = reading.whole(origin, number_objects)
     moving = tuple(_moving(reading, carrier, motion, whole) for carrier, motion in reading.motions.items())
     return ScannedScene(placed(reading.pairs(None), whole), moving, reading.labels.by_name.unmatched())
+
+
+@dataclass(frozen=True)
+class CopiedScene:
+    """What `scanned_scene_steps` has read.
+
+    Attributes:
+        materials: the scene's, in the order of the indices in its meshes.
+        put_together: returns the scene; to be called once. It touches no data of Blender: a thread may call it.
+    """
+
+    materials: tuple[str, ...]
+    put_together: Callable[[], ScannedScene]
 
 
 def _moving(reading: _Reading, carrier: Hashable, motion: Motion, whole: Whole) -> MovingMesh:
@@ -134,8 +197,26 @@ class _Known:
     velocity: tuple[Hashable, Float] | None
 
 
+@dataclass(frozen=True)
+class _Waiting:
+    """A mesh that has not been copied yet: that of an object, after its modifiers.
+
+    Attributes:
+        name: of the object, for messages.
+        item: the object's name and its library's.
+        slots: names of its materials.
+    """
+
+    name: str
+    item: tuple[str, str | None]
+    slots: list[str]
+
+
 class _Reading:
     """One walk through an evaluated scene: its meshes, and who uses them where.
+
+    What the walk finds is looked at at once. Objects' own meshes are found again at any time, and are copied
+    afterwards, one by one, by `copies`.
 
     Attributes:
         labels: of its objects.
@@ -156,23 +237,65 @@ class _Reading:
         self._lanes = lanes or {}
         self._speed_factor = speed_factor
         self._materials: dict[str, int] = {}
+        self._waiting: dict[tuple[Hashable, ...], _Waiting] = {}
+        self._copied: dict[tuple[Hashable, ...], Copied] = {}
         self._parts: dict[tuple[Hashable, ...], Part] = {}
         self._labels: list[Label] = []
-        self._nameless: dict[int, str] = {}
+        self._nameless: dict[int, tuple[str, tuple[Hashable, ...]]] = {}
         self._uses: dict[Hashable, dict[tuple[Hashable, ...], Places]] = {}
+        self._depsgraph = depsgraph
         self._walk(depsgraph)
+
+    def copies(self) -> Iterator[float]:
+        """Copy the meshes that wait, one in each step; yield the share of them that is done.
+
+        It ends early where a mesh is no longer what it was.
+        """
+        total = max(1, len(self._waiting))
+        while self._waiting:
+            key, waiting = next(iter(self._waiting.items()))
+            item = bpy.data.objects.get(waiting.item)
+            mesh = item.evaluated_get(self._depsgraph).data if item is not None else None
+            if not isinstance(mesh, bpy.types.Mesh) or mesh.as_pointer() != key[0]:
+                return  # the user has changed it
+            self._copy(key, waiting.name, mesh, waiting.slots)
+            del self._waiting[key]
+            yield 1.0 - len(self._waiting) / total
+
+    @property
+    def materials(self) -> tuple[str, ...]:
+        """Return the names of the materials, in the order of their indices."""
+        return tuple(self._materials)
+
+    @property
+    def complete(self) -> bool:
+        """Return whether no mesh waits."""
+        return not self._waiting
+
+    def copy_all(self) -> None:
+        """Copy the meshes that wait."""
+        for _ in self.copies():
+            pass
+
+    def _copy(self, key: tuple[Hashable, ...], name: str, mesh: bpy.types.Mesh, slots: list[str]) -> None:
+        self._copied[key] = copy_mesh(name, mesh, slots, self._materials, self.labels.by_name)
 
     def pairs(self, carrier: Hashable) -> list[tuple[Part, Places]]:
         """Return the parts that a carrier moves (that stand, for None) and their places; only once for each."""
-        pairs = [(self._parts[key], places) for key, places in self._uses.pop(carrier, {}).items()]
+        pairs = [(self._part(key), places) for key, places in self._uses.pop(carrier, {}).items()]
         if not self._uses:
             self._parts.clear()  # what is placed needn't be held twice
         return pairs
 
+    def _part(self, key: tuple[Hashable, ...]) -> Part:
+        if key in self._copied:
+            self._parts[key] = self._copied.pop(key).part()
+        return self._parts[key]
+
     def whole(self, origin: Float, number_objects: bool) -> Whole:
         """Return what all meshes have in common."""
         labels = self._numbered() if number_objects else self._labels
-        return Whole(labels, tuple(self._materials), origin)
+        return Whole(labels, self.materials, origin)
 
     def _walk(self, depsgraph: bpy.types.Depsgraph) -> None:
         known: dict[tuple[int, int, int], _Known | None] = {}
@@ -205,12 +328,19 @@ class _Reading:
         slots = slot_names(item)
         # Materials may be linked to the object, so that the same mesh can look different.
         part = (item.data.as_pointer(), *slots)
-        if part not in self._parts:
-            self._parts[part] = read_part(item.name, item.data, slots, self._materials, self.labels.by_name)
+        if part not in self._waiting and part not in self._copied:
+            for name in slots:
+                self._materials.setdefault(name, len(self._materials))
+            place = (original.name, original.library.filepath if original.library else None)
+            own = original.evaluated_get(self._depsgraph).data == item.data
+            if own and bpy.data.objects.get(place) == original:
+                self._waiting[part] = _Waiting(item.name, place, slots)
+            else:  # of a geometry's instance, or of a curve: only seen in passing
+                self._copy(part, item.name, item.data, slots)
         label = self.labels.of(original, shown_by)
         self._labels.append(label)
-        if label.instance < 0 and self._parts[part].instance_id is None:
-            self._nameless[len(self._labels) - 1] = shown_by.name_full
+        if label.instance < 0:
+            self._nameless[len(self._labels) - 1] = (shown_by.name_full, part)
         role = original.get(ROLE, shown_by.get(ROLE))
         lane = (role, self._lanes[role]) if role in self._lanes else None
         return _Known(part, len(self._labels) - 1, lane, self._velocity(original, shown_by))
@@ -245,13 +375,14 @@ class _Reading:
     def _numbered(self) -> list[Label]:
         """Return the labels with a number for each object that has none."""
         taken = {label.instance for label in self._labels}
-        for part in self._parts.values():
-            if part.instance_id is not None:
-                taken |= set(np.unique(part.instance_id).tolist())
+        for copied in self._copied.values():
+            if copied.instance_id is not None:
+                taken |= set(np.unique(copied.instance_id.view(np.uint32)).tolist())
         free = (number for number in count(1) if number not in taken)
-        numbers = {name: next(free) for name in sorted(set(self._nameless.values()))}
+        nameless = {i: name for i, (name, key) in self._nameless.items() if self._copied[key].instance_id is None}
+        numbers = {name: next(free) for name in sorted(set(nameless.values()))}
         labels = list(self._labels)
-        for index, name in self._nameless.items():
+        for index, name in nameless.items():
             labels[index] = replace(labels[index], instance=numbers[name])
         return labels
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ctypes
 from array import array
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
@@ -80,10 +81,53 @@ def slot_names(item: bpy.types.Object) -> list[str]:
     return names or [table_name(None)]
 
 
-def read_part(
+@dataclass
+class Copied:
+    """What is copied of an evaluated mesh, as fast as memory allows; `part` makes the rest of it without Blender.
+
+    Attributes:
+        name: of its object, for messages.
+        vertices: (V, 3) float32.
+        corners: (C,) int32 vertices of the faces' corners.
+        triangles: (T, 3) int32 corners of the triangles; None if all faces are triangles.
+        face: (T,) int32 face of each triangle; None if all faces are triangles.
+        slot, class_id, instance_id: (F,) int32 values of the faces, or None if the mesh has none.
+        materials: (S,) uint16 indices of the slots' materials into the scene's.
+        material_class: see `Part`.
+    """
+
+    name: str
+    vertices: NDArray[np.float32]
+    corners: NDArray[np.int32]
+    triangles: NDArray[np.int32] | None
+    face: NDArray[np.int32] | None
+    slot: NDArray[np.int32] | None
+    class_id: NDArray[np.int32] | None
+    instance_id: NDArray[np.int32] | None
+    materials: NDArray[np.uint16]
+    material_class: NDArray[np.int16] | None
+
+    def part(self) -> Part:
+        """Return the mesh's triangles; raise `InputError` if its vertices aren't finite."""
+        if not np.isfinite(self.vertices).all():
+            raise InputError(f"{self.name}: vertices", None, "must be finite numbers")
+        corners, face, label, number = self.corners, self.face, self.class_id, self.instance_id
+        material: NDArray[np.uint16] | int = int(self.materials[0])
+        if self.slot is not None:
+            material = _by_triangle(self.materials[np.clip(self.slot, 0, len(self.materials) - 1)], face)
+        labels = None
+        if label is not None:
+            labels = np.where((label >= 0) & (label <= UNLABELLED), label, UNLABELLED).astype(np.uint8)
+            labels = _by_triangle(labels, face)
+        numbers = None if number is None else _by_triangle(number.view(np.uint32), face)
+        triangles = corners.reshape(-1, 3) if self.triangles is None else corners[self.triangles]
+        return Part(self.vertices, triangles, material, labels, numbers, self.material_class)
+
+
+def copy_mesh(
     name: str, mesh: bpy.types.Mesh, slots: Sequence[str], materials: dict[str, int], by_name: NameClasses
-) -> Part:
-    """Return an evaluated mesh as arrays.
+) -> Copied:
+    """Return what is needed of an evaluated mesh.
 
     Args:
         name: of its object, for messages.
@@ -91,43 +135,50 @@ def read_part(
         slots: names of its materials.
         materials: indices of all materials so far; new ones are added.
         by_name: classes of materials.
-
-    Raises:
-        InputError: its vertices aren't finite.
     """
+    # Attributes are copied as a block, where `vertices` and `loops` are read one by one.
     vertices = np.empty((len(mesh.vertices), 3), np.float32)
-    # An attribute is copied as a block, where `vertices` and `loops` are read one by one.
     mesh.attributes["position"].data.foreach_get("vector", vertices.ravel())
-    if not np.isfinite(vertices).all():
-        raise InputError(f"{name}: vertices", None, "must be finite numbers")
-    triangles, face = _triangles(mesh)
-    index = np.array([materials.setdefault(entry, len(materials)) for entry in slots], np.uint16)
-    slot = _face_values(mesh, "material_index") if len(set(slots)) > 1 else None
-    material: NDArray[np.uint16] | int = int(index[0])
-    if slot is not None:
-        material = _by_triangle(index[np.clip(slot, 0, len(index) - 1)], face)
-    label, number = _face_values(mesh, "class_id"), _face_values(mesh, "instance_id")
-    if label is not None:
-        label = np.where((label >= 0) & (label <= UNLABELLED), label, UNLABELLED).astype(np.uint8)
-        label = _by_triangle(label, face)
-    if number is not None:
-        number = _by_triangle(number.view(np.uint32), face)
-    return Part(vertices, triangles, material, label, number, _material_classes(slots, materials, by_name))
+    corners = np.empty(len(mesh.loops), np.int32)
+    mesh.attributes[".corner_vert"].data.foreach_get("value", corners)
+    triangles = face = None
+    if len(corners) != 3 * len(mesh.polygons):
+        mesh.calc_loop_triangles()
+        triangles = triangle_corners(mesh)
+        face = np.empty(len(triangles), np.int32)
+        mesh.loop_triangle_polygons.foreach_get("value", face)
+    return Copied(
+        name,
+        vertices,
+        corners,
+        triangles,
+        face,
+        _face_values(mesh, "material_index") if len(set(slots)) > 1 else None,
+        _face_values(mesh, "class_id"),
+        _face_values(mesh, "instance_id"),
+        np.array([materials.setdefault(entry, len(materials)) for entry in slots], np.uint16),
+        _material_classes(slots, materials, by_name),
+    )
 
 
-def _triangles(mesh: bpy.types.Mesh) -> tuple[NDArray[np.int32], NDArray[np.int32] | None]:
-    """Return the triangles (T, 3) and the face (T,) that each belongs to; None where these are the same."""
-    faces, corners = len(mesh.polygons), len(mesh.loops)
-    if corners == 3 * faces:
-        triangles = np.empty((faces, 3), np.int32)
-        mesh.attributes[".corner_vert"].data.foreach_get("value", triangles.ravel())
-        return triangles, None
-    mesh.calc_loop_triangles()
-    count = len(mesh.loop_triangles)
-    triangles, face = np.empty((count, 3), np.int32), np.empty(count, np.int32)
-    mesh.loop_triangles.foreach_get("vertices", triangles.ravel())
-    mesh.loop_triangle_polygons.foreach_get("value", face)
-    return triangles, face
+def triangle_corners(mesh: bpy.types.Mesh) -> NDArray[np.int32]:
+    """Return the corners (T, 3) of a mesh's triangles, which must have been calculated.
+
+    Blender has them as an array of three 32-bit numbers each but hands them out one by one, a hundred times slower
+    than they can be copied. So they are copied from where it says that they are, if that is laid out as expected.
+    """
+    triangles = mesh.loop_triangles
+    count = len(triangles)
+    result = np.empty((count, 3), np.int32)
+    first = triangles[0].as_pointer() if count else 0
+    probes = {0, 1, count // 2, count - 1} & set(range(count))
+    if any(triangles[i].as_pointer() != first + result.strides[0] * i for i in probes):
+        triangles.foreach_get("loops", result.ravel())
+        return result
+    ctypes.memmove(result.ctypes.data, first, result.nbytes)
+    if any(tuple(result[i]) != tuple(triangles[i].loops) for i in probes):
+        triangles.foreach_get("loops", result.ravel())
+    return result
 
 
 def _by_triangle(values: NDArray[Any], face: NDArray[np.int32] | None) -> NDArray[Any]:

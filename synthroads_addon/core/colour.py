@@ -17,8 +17,9 @@ Float = NDArray[np.float64]
 
 MATERIAL_LAYERS: dict[str, int] = {"base_color": 3, "roughness": 1, "metallic": 1, "specular": 1}
 """Layers of the surface itself, and their components."""
-FROM_MATERIAL, FROM_RETURN = 0, 255
-"""`LayerValues.source` of a material's mean and of a pixel per return; n in between is the n-th best image."""
+FROM_MATERIAL, NEARBY, FROM_RETURN = 0, 254, 255
+"""`LayerValues.source` of a material's mean, of a place of the same material close by, and of a pixel per return; n in
+between is the n-th best image."""
 _FALSE_COLOUR = ("roughness", "metallic", "specular")
 
 
@@ -28,11 +29,31 @@ class LayerValues:
 
     Attributes:
         arrays: by layer: ``rgb`` (N, 3) uint16 sRGB, ``base_color`` (N, 3) float32 linear, the others (N,) float32.
-        source: (N,) uint8: `FROM_MATERIAL`, `FROM_RETURN`, or the rank of the image, from 1.
+        source: (N,) uint8: `FROM_MATERIAL`, `NEARBY`, `FROM_RETURN`, or the rank of the image, from 1.
     """
 
     arrays: dict[str, NDArray[np.generic]]
     source: NDArray[np.uint8]
+
+
+def source_name(number: int) -> str:
+    """Return what a `LayerValues.source` is called in reports."""
+    names = {FROM_MATERIAL: "material", 1: "image", NEARBY: "nearby", FROM_RETURN: "return"}
+    return names.get(number, "next image")
+
+
+def shares_by_source(counts: NDArray[np.integer]) -> dict[str, float]:
+    """Return the share of the points that took their values from each source, by `source_name`.
+
+    Args:
+        counts: (256,) points by source.
+    """
+    total = max(1, int(counts.sum()))
+    shares: dict[str, float] = {}
+    for number in np.flatnonzero(counts):
+        name = source_name(int(number))
+        shares[name] = shares.get(name, 0.0) + int(counts[number]) / total
+    return {name: round(share, 6) for name, share in shares.items()}
 
 
 class LayerSource(Protocol):

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .colour import FROM_MATERIAL, LayerValues, MaterialLayers, Targets
-from .colour_views import View
+from .colour import FROM_MATERIAL, NEARBY, LayerValues, MaterialLayers, Targets
+from .colour_nearby import REACH, light_nearby, sample_nearby
+from .colour_views import RenderedImage, View
 
 Float = NDArray[np.float64]
 
@@ -18,6 +18,8 @@ CANDIDATES = 8
 """Images nearest to the scanner that a point can take its values from; all of three places where that is more."""
 TRIES = 3
 """Of these, how many of the best are looked into."""
+ALL_CANDIDATES = 24
+"""As `CANDIDATES`, of the points that none of the best shows; of these images all are looked into."""
 DISTANCE_WEIGHT = 0.25
 """What twice the scanner's range counts for in the choice of an image, rad: ln 2 times this."""
 TOLERANCE = 0.03
@@ -29,31 +31,15 @@ _LEAST_WEIGHT = 0.05
 _NOWHERE = np.float32(1e9)
 
 
-@dataclass(frozen=True)
-class RenderedImage:
-    """One camera's image, rows from the top.
-
-    Attributes:
-        view: the camera.
-        layers: (H, W, C) float16 in the order of `ImageLayers.channels`.
-        depth: (H, W) float32 along the axis, m.
-        material: (H, W) uint16: index in the scene mesh's materials plus 1; 0 where there is nothing.
-    """
-
-    view: View
-    layers: NDArray[np.float16]
-    depth: NDArray[np.float32]
-    material: NDArray[np.uint16]
-
-
 class ImageLayers:
     """Layers from images along the path, else from the materials. Can be used by many threads at once.
 
     A point takes the image whose ray differs least from the scanner's: the angle between both, plus `DISTANCE_WEIGHT`
     times the logarithm of how much farther away the camera is. Where the point is hidden there, the next best, and
-    so on; in the end the material's means. Of the four pixels around the point's projection those count that show the
-    same material at the depth of the plane through the point, so that neither what stands before it nor what lies
-    behind an edge mixes in, and grazing views stay usable.
+    so on, through all images around. What none of them shows takes a place of its material close by, see
+    `colour_nearby`; in the end the material's means. Of the four pixels around the point's projection those count that
+    show the same material at the depth of the plane through the point, so that neither what stands before it nor what
+    lies behind an edge mixes in, and grazing views stay usable.
     """
 
     main_thread_only = False
@@ -77,7 +63,8 @@ class ImageLayers:
         """Note where the images were taken."""
         self._places = np.array([image.view.position for image in self.images]).reshape(-1, 3)
         places, count = np.unique(self._places, axis=0, return_counts=True)
-        self._candidates = max(CANDIDATES, 3 * int(count.max(initial=0)))
+        most = int(count.max(initial=0))
+        self._candidates, self._all = max(CANDIDATES, 3 * most), max(ALL_CANDIDATES, 9 * most)
         # Points whose scanner stood within one such cube share their candidates.
         apart = np.linalg.norm(np.diff(places, axis=0), axis=1) if len(places) > 1 else np.ones(1)
         self._cell = max(float(np.median(apart)) / 2.0, 0.5)
@@ -116,7 +103,9 @@ class ImageLayers:
 
     def _take(self, points: Targets, taken: NDArray[np.float32], source: NDArray[np.uint8]) -> None:
         """Do so for points that the scanner saw from about one place."""
-        chosen, best = self._ranked(points)
+        chosen, misfit = self._misfits(points, self._candidates)
+        order = np.argsort(misfit, axis=0, kind="stable")[:TRIES]
+        best = np.where(np.take_along_axis(misfit, order, axis=0) >= _NOWHERE, -1, order)
         for rank in range(best.shape[0]):
             left = np.flatnonzero((source == FROM_MATERIAL) & (best[rank] >= 0))
             slots = best[rank, left]
@@ -126,11 +115,43 @@ class ImageLayers:
                 values, shown = sample_image(image, points.position[rows], points.normal[rows], points.material[rows])
                 rows = rows[shown]
                 taken[rows], source[rows], points.time[rows] = values, rank + 1, image.view.time
+        hidden = np.flatnonzero(source == FROM_MATERIAL)
+        if len(hidden):
+            few, values, own = points.select(hidden), taken[hidden], source[hidden]
+            self._take_hidden(few, values, own)
+            taken[hidden], source[hidden], points.time[hidden] = values, own, few.time
 
-    def _ranked(self, points: Targets) -> tuple[NDArray[np.intp], NDArray[np.int8]]:
-        """Return the candidate images (C,) and, best first, the candidates (T, N) of each point; -1 for none."""
+    def _take_hidden(self, points: Targets, taken: NDArray[np.float32], source: NDArray[np.uint8]) -> None:
+        """Fill in what any image around shows of points that the best ones don't, and then what it shows close by.
+
+        These are few: it is quicker to look at all of them in image by image than to go by their own order.
+        """
+        chosen, misfit = self._misfits(points, self._all)
+        shows = (misfit < _NOWHERE).any(axis=1)
+        chosen, misfit = chosen[shows], misfit[shows]
+        rank = np.argsort(np.argsort(misfit, axis=0, kind="stable"), axis=0)
+        least = np.full(len(points), _NOWHERE)
+        for slot, number in enumerate(chosen):
+            rows = np.flatnonzero(misfit[slot] < least)
+            image = self.images[number]
+            values, shown = sample_image(image, points.position[rows], points.normal[rows], points.material[rows])
+            rows = rows[shown]
+            taken[rows], points.time[rows], least[rows] = values, image.view.time, misfit[slot, rows]
+            source[rows] = rank[slot, rows] + 1
+        away = np.where(source == FROM_MATERIAL, REACH, 0.0)
+        for slot, number in enumerate(chosen):
+            rows = np.flatnonzero((away > 0.0) & (misfit[slot] < _NOWHERE))
+            image = self.images[number]
+            values, closer, distance = sample_nearby(image, points.position[rows], points.material[rows], away[rows])
+            rows = rows[closer]
+            taken[rows], points.time[rows], source[rows], away[rows] = values, image.view.time, NEARBY, distance
+        near = np.flatnonzero(source == NEARBY)
+        taken[near] = light_nearby(self.material, points.select(near), taken[near], self.channels)
+
+    def _misfits(self, points: Targets, candidates: int) -> tuple[NDArray[np.intp], NDArray[np.float32]]:
+        """Return the images (C,) nearest to the scanner and how badly they suit each point (C, N)."""
         away = np.linalg.norm(self._places - points.scanner.mean(axis=0), axis=1)
-        chosen = np.argsort(away, kind="stable")[: self._candidates]
+        chosen = np.argsort(away, kind="stable")[:candidates]
         middle = points.position.mean(axis=0)
         at = (points.position - middle).astype(np.float32)
         scanned = (points.scanner - points.position).astype(np.float32)
@@ -139,9 +160,7 @@ class ImageLayers:
         misfit = np.empty((len(chosen), len(points)), np.float32)
         for row, number in enumerate(chosen):
             misfit[row] = _misfit(self.images[number].view, at, middle, scanned, reach, normal)
-        order = np.argsort(misfit, axis=0, kind="stable")[: min(TRIES, len(chosen))]
-        unseen = np.take_along_axis(misfit, order, axis=0) >= _NOWHERE
-        return chosen, np.where(unseen, -1, order).astype(np.int8)
+        return chosen, misfit
 
 
 def _misfit(

@@ -78,10 +78,33 @@ class View:
             scale = self.focal / depth
             return self.centre[0] + right * scale, self.centre[1] - up * scale, depth
 
+    def place(self, column: NDArray[np.integer], row: NDArray[np.integer], depth: NDArray[np.floating]) -> Float:
+        """Return the places (..., 3) that the middles of pixels (...) show at depths (...) along the axis, m."""
+        right, up = (column + 0.5 - self.centre[0]) / self.focal, (self.centre[1] - row - 0.5) / self.focal
+        ray = np.stack([right, up, -np.ones_like(right)], axis=-1) @ self.rotation.T
+        return np.asarray(self.position + depth.astype(np.float64)[..., None] * ray)
+
     @property
     def pixels(self) -> int:
         """Return the number of pixels."""
         return self.size[0] * self.size[1]
+
+
+@dataclass(frozen=True)
+class RenderedImage:
+    """One camera's image, rows from the top.
+
+    Attributes:
+        view: the camera.
+        layers: (H, W, C) float16 in the order of `ImageLayers.channels`.
+        depth: (H, W) float32 along the axis, m.
+        material: (H, W) uint16: index in the scene mesh's materials plus 1; 0 where there is nothing.
+    """
+
+    view: View
+    layers: NDArray[np.float16]
+    depth: NDArray[np.float32]
+    material: NDArray[np.uint16]
 
 
 def views_along(

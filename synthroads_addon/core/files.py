@@ -47,3 +47,31 @@ def output_folder(target: Path, names: Iterable[str], overwrite: bool) -> Iterat
         shutil.rmtree(temporary, ignore_errors=True)
         if made and target.exists() and not any(target.iterdir()):
             target.rmdir()
+
+
+def write_file(path: Path, content: bytes, field: str = "--output", overwrite: bool = False) -> None:
+    """Write one file under a temporary name beside it and rename it.
+
+    Args:
+        path: of the file; its folder is made if it isn't there.
+        content: of the file.
+        field: what the caller calls the path, for the message.
+        overwrite: whether a file that is there may be replaced.
+
+    Raises:
+        OutputError: it is there already, or it can't be written.
+    """
+    if path.exists() and not overwrite:
+        raise OutputError(field, str(path), "is there already; --overwrite replaces it")
+    temporary = None
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with tempfile.NamedTemporaryFile(prefix=".partial-", dir=path.parent, delete=False) as file:
+            temporary = Path(file.name)
+            file.write(content)
+        temporary.chmod(0o644)
+        temporary.replace(path)
+    except OSError as error:
+        if temporary is not None:
+            temporary.unlink(missing_ok=True)
+        raise OutputError(field, str(path), f"cannot be written ({error.strerror})") from None

@@ -7,6 +7,8 @@ paint has lost its beads with its film, and beads under water retro-reflect litt
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 
 from .materials import Material, materials
@@ -26,9 +28,17 @@ _POROUS = ("asphalt", "concrete", "soil", "verge", *_PAINTS)
 _DEFAULT = MaterialVariation()
 
 
-def varied(name: str, variation: MaterialVariation, environment: Environment) -> Material:
-    """Return a material of the table as a road with this variation and weather has it; KeyError for other names."""
-    result = _aged(name, materials()[name], variation)
+def varied(
+    name: str, variation: MaterialVariation, environment: Environment, own: Mapping[str, Material] | None = None
+) -> Material:
+    """Return a material of the table as a road with this variation and weather has it; KeyError for other names.
+
+    Args:
+        name: of the material.
+        variation, environment: the road's.
+        own: materials that take the place of the shipped table's, or stand beside them.
+    """
+    result = _aged(name, {**materials(), **(own or {})}, variation)
     if environment.wetness > 0.0 and name in _POROUS:
         result = _wet(result, environment.wetness)
     return result
@@ -47,7 +57,8 @@ def _wet(dry: Material, wet: float) -> Material:
     )
 
 
-def _aged(name: str, mean: Material, variation: MaterialVariation) -> Material:
+def _aged(name: str, table: Mapping[str, Material], variation: MaterialVariation) -> Material:
+    mean = table[name]
     if name == "asphalt":
         return _scaled(mean, variation.asphalt_brightness * _of_age(variation) / _of_age(_DEFAULT))
     if name == "concrete":
@@ -56,7 +67,7 @@ def _aged(name: str, mean: Material, variation: MaterialVariation) -> Material:
         return _scaled(mean, variation.soil_brightness)
     if name in _PAINTS:
         worn = (variation.paint_wear - _DEFAULT.paint_wear) / (1.0 - _DEFAULT.paint_wear)
-        return _mixed(mean, materials()["asphalt"], worn)
+        return _mixed(mean, table["asphalt"], worn)
     if name in _GRASSES:
         dry = (variation.grass_dryness - _DEFAULT.grass_dryness) / (1.0 - _DEFAULT.grass_dryness)
         return _mixed(mean, mean.model_copy(update={"base_color": DRY_GRASS}), dry)
@@ -77,7 +88,7 @@ def _scaled(mean: Material, factor: float, specular: float | None = None) -> Mat
 def _mixed(mean: Material, other: Material, share: float) -> Material:
     """Return a material between two; a negative share goes beyond the first, away from the other.
 
-    Roughness, transmission and the lobe of the retro-reflection stay the first's.
+    Roughness, transmission, spread and the lobe of the retro-reflection stay the first's.
     """
 
     def between(name: str) -> float:

@@ -14,16 +14,24 @@ What only the scanner reads is assumed as follows; `docs/radiometry.md` has the 
   paint, steel); else they follow from the roughness.
 - **Retro-reflection** is the effective reflectance of the retro term alone, pi times the coefficient of
   retro-reflection (cd/lx/m2) at a right angle; a perfect diffuser has 1.
+- **Spread** says how the brightness differs from place to place of one material, see `scanning.spread`. The shipped
+  table has none; `synthroads calibrate` fits it to real clouds.
 """
 
 from __future__ import annotations
 
+import json
+import os
+from collections.abc import Mapping
 from functools import cache
+from pathlib import Path
 from typing import Annotated
 
 from pydantic import Field
 
 from .cloud.labels import PRESETS
+from .errors import InputError
+from .files import write_file
 from .scanning.radiometry import facet_slope, reflectivity
 from .schema import Model, quantity, read_json
 
@@ -52,6 +60,15 @@ class Material(Model):
     retro_lobe_deg: float = quantity(
         45.0, gt=0, le=180, unit="deg", description="Entrance angle at which it has fallen to 1/e."
     )
+    spread_below: float = quantity(
+        0.0, ge=0, le=2, unit="1", description="Spread (one sigma of the logarithm) of the brightness below its median."
+    )
+    spread_above: float = quantity(
+        0.0, ge=0, le=2, unit="1", description="Spread (one sigma of the logarithm) of the brightness above its median."
+    )
+    spread_wavelength: float = quantity(
+        1.0, ge=0.01, le=1000, unit="m", description="Longest wavelength of the brightness's variation."
+    )
 
     @property
     def reflectivity(self) -> float:
@@ -75,3 +92,56 @@ def materials() -> dict[str, Material]:
     """Return the shipped table by name."""
     path = PRESETS / "materials.json"
     return MaterialTable.from_dict(read_json(path), source=str(path)).materials
+
+
+def material_table_path(name_or_file: str) -> Path:
+    """Return the file of a shipped table of materials (``shifted``), or the one named.
+
+    Raises:
+        InputError: it is neither a shipped table's name nor ends in ``.json``.
+    """
+    if Path(name_or_file).suffix.lower() == ".json":
+        return Path(name_or_file)
+    shipped = sorted(path.stem for path in (PRESETS / "material_tables").glob("*.json"))
+    if name_or_file not in shipped:
+        known = ", ".join(shipped)
+        raise InputError("materials_table", name_or_file, f"must be a .json file or one of {known}")
+    return PRESETS / "material_tables" / f"{name_or_file}.json"
+
+
+def read_material_table(path: str | os.PathLike[str]) -> dict[str, Material]:
+    """Return the materials of a table of one's own by name; what it doesn't name stays the shipped table's.
+
+    Raises:
+        MissingFileError: there is no such file, or it can't be read.
+        InputError: it isn't a material table.
+    """
+    return MaterialTable.from_dict(read_json(Path(path)), source=os.fspath(path)).materials
+
+
+def write_material_table(path: Path, rows: Mapping[str, Material], overwrite: bool = False) -> None:
+    """Write a material table, a line per material, under a temporary name first; the same rows give the same bytes.
+
+    Args:
+        path: ends in ``.json``; its folder is there.
+        rows: materials by name.
+        overwrite: whether the file may be replaced.
+
+    Raises:
+        OutputError: it is there already, or can't be written.
+        InputError: the name doesn't end in ``.json``.
+    """
+    if path.suffix != ".json":
+        raise InputError("--save", str(path), "must end in .json")
+    lines = ",\n".join(f"  {json.dumps(name)}: {_line(row)}" for name, row in rows.items())
+    write_file(path, f'{{\n "materials": {{\n{lines}\n }}\n}}\n'.encode(), "--save", overwrite)
+
+
+def _line(row: Material) -> str:
+    """Return a material as one line: what it must have, and what differs from the defaults."""
+    told = {
+        name: value
+        for name, value in row.to_dict().items()
+        if name not in Material.model_fields or value != Material.model_fields[name].default
+    }
+    return json.dumps(told)

@@ -248,7 +248,7 @@ class RoadScenario(ScenarioModel):
     vegetation: VegetationLimits = Field(VegetationLimits(), description="Species and sizes of plants.")
     environment: EnvironmentLimits = Field(EnvironmentLimits(), description="Light and weather.")
     materials: MaterialLimits = Field(MaterialLimits(), description="Variation of materials.")
-    assets: tuple[str, ...] = Field((), description="Libraries of free assets (JSON files) to place from.")
+    assets: tuple[str, ...] = Field((), description="Libraries of free assets to place from: roadside, or JSON files.")
 
     @model_validator(mode="after")
     def _known(self) -> RoadScenario:

@@ -12,9 +12,11 @@ from pydantic import Field
 from .cloud_scenario import CloudScenario
 from .colour_scenario import ColourScenario
 from .errors import InputError, nearest_name
+from .materials import Material, material_table_path, read_material_table
 from .road_scenario import RoadScenario, ScenarioModel
 from .scan_scenario import ScanScenario
 from .schema import quantity, read_json
+from .twin import TwinFormat
 
 SCENARIOS = Path(__file__).parents[1] / "presets" / "scenarios"
 
@@ -36,6 +38,9 @@ class Scenario(ScenarioModel):
     vegetation_detail: float | None = quantity(
         None, ge=0, le=1, unit="1", description="Share of the vegetation built; the fidelity's if not given."
     )
+    materials_table: str | None = Field(
+        None, description="JSON file, or shipped table, of materials in place of the usual ones of the same names."
+    )
     road: RoadScenario = Field(RoadScenario(), description="The road's limits.")
     scan: ScanScenario = Field(ScanScenario(), description="The scan.")
     colour: ColourScenario = Field(ColourScenario(), description="Colours and material layers.")
@@ -43,6 +48,16 @@ class Scenario(ScenarioModel):
     outputs: tuple[Output, ...] = Field(
         OUTPUTS, description="Files wanted; nothing is computed that none of them needs."
     )
+
+    twin: tuple[TwinFormat, ...] = Field((), description="Formats of the geometric-semantic model that are wanted.")
+
+    def own_materials(self) -> dict[str, Material]:
+        """Return the materials of the scenario's own table by name; none if it has none.
+
+        Raises:
+            InputError: the file isn't there or no material table.
+        """
+        return read_material_table(material_table_path(self.materials_table)) if self.materials_table else {}
 
     def settings(self) -> Settings:
         """Return the numbers that the fidelity stands for, after the scenario's own."""
@@ -113,16 +128,23 @@ def load_scenario(name_or_file: str, changes: list[str] | None = None) -> Scenar
 
 def apply_change(data: Any, change: str) -> Any:
     """Return the scenario's JSON data with one ``path=value`` applied; the value is JSON, or else plain text."""
+    path, value = parsed_change(change)
+    return _with_value(data, path, value)
+
+
+def parsed_change(change: str) -> tuple[str, Any]:
+    """Return path and value of ``path=value``; raise `InputError` if it has another form."""
     path, equals, text = change.partition("=")
     if not equals or not path:
         raise InputError("--set", change, "must be path=value, e.g. road.length=800")
     try:
-        value = json.loads(text)
+        return path, json.loads(text)
     except ValueError:
-        value = text
+        return path, text
+
+
+def _with_value(data: Any, path: str, value: Any) -> Any:
     if not isinstance(data, dict):
         raise InputError("scenario", data, "must be a JSON object")
-    result = dict(data)
     head, dot, rest = path.partition(".")
-    result[head] = apply_change(result.get(head, {}), f"{rest}={text}") if dot else value
-    return result
+    return {**data, head: _with_value(data.get(head, {}), rest, value) if dot else value}

@@ -178,6 +178,29 @@ def read_json(path: Path | str) -> Any:
         raise InputError(str(path), None, f"must be valid JSON ({error})") from None
 
 
+def read_yaml(path: Path) -> Any:
+    """Return a YAML (or JSON) file as plain data; YAML's own types (dates, say) are refused, as JSON has none.
+
+    Raises:
+        MissingFileError: there is no such file, or it can't be read.
+        InputError: it isn't YAML.
+    """
+    import yaml
+
+    try:
+        # YAML 1.1 takes 1e-3 for text, since it lacks a point; people who write it mean the number.
+        loader: Any = type("Loader", (yaml.SafeLoader,), {})
+        loader.add_implicit_resolver("tag:yaml.org,2002:float", _EXPONENT, list("-+0123456789"))
+        data = yaml.load(path.read_text(encoding="utf-8"), Loader=loader)
+        return json.loads(json.dumps(data, allow_nan=False))
+    except FileNotFoundError:
+        raise MissingFileError(str(path), None, "no such file") from None
+    except OSError as error:
+        raise MissingFileError(str(path), None, f"cannot be read ({error.strerror})") from None
+    except (yaml.YAMLError, UnicodeDecodeError, ValueError, TypeError, RecursionError) as error:
+        raise InputError(str(path), None, f"must be valid YAML ({' '.join(str(error).split())})") from None
+
+
 def unit_of(field: FieldInfo) -> str:
     """Return the unit declared by `quantity`, or an empty string."""
     extra = field.json_schema_extra
@@ -195,6 +218,7 @@ def _finite(text: str) -> float:
     return value
 
 
+_EXPONENT = re.compile(r"[-+]?\d+[eE][-+]?\d+$")
 _WORDING = {
     "missing": "is required",
     "model_type": "must be a JSON object",

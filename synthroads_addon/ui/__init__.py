@@ -1,24 +1,63 @@
-"""The sidebar panel "SynthRoads": properties from the schema, operators that call the library, panels."""
+"""The sidebar panel "SynthRoads": properties from the schema, operators that call the library, panels.
+
+Each module has the classes that Blender is to know in `CLASSES`, and where it keeps something of its own in Blender,
+`register` and `unregister`. Panels come in the order of their `bl_order`, but a parent before its children.
+"""
 
 from __future__ import annotations
 
 import bpy
 
-from . import operators, panels, properties
+from . import (
+    build,
+    calibration,
+    cloud_view,
+    edit,
+    export,
+    file_lists,
+    long_operator,
+    panels,
+    preferences,
+    presets,
+    properties,
+    road_files,
+    rules,
+    scan,
+    swatches,
+)
 
-CLASSES = (*properties.CLASSES, *operators.CLASSES, *panels.CLASSES)
+MODULES = (
+    preferences,
+    properties,
+    long_operator,
+    build,
+    scan,
+    file_lists,
+    presets,
+    road_files,
+    panels,
+    rules,
+    edit,
+    swatches,
+    cloud_view,
+    export,
+    calibration,
+)
 
 
 def register() -> None:
-    """Register every class and attach the settings to scenes."""
-    for cls in CLASSES:
-        bpy.utils.register_class(cls)
-    bpy.types.Scene.synthroads = bpy.props.PointerProperty(type=properties.SYNTHROADS_PG_settings)
+    """Register every class and attach the settings."""
+    for module in MODULES:
+        for cls in module.CLASSES:
+            bpy.utils.register_class(cls)
+        if hasattr(module, "register"):
+            module.register()
 
 
 def unregister() -> None:
-    """Undo `register`; a scan that is at work is stopped."""
-    operators.stop_scan()
-    del bpy.types.Scene.synthroads
-    for cls in reversed(CLASSES):
-        bpy.utils.unregister_class(cls)
+    """Undo `register`; what is at work is stopped."""
+    for module in reversed(MODULES):
+        if hasattr(module, "unregister"):
+            module.unregister()
+        for cls in reversed(module.CLASSES):
+            bpy.utils.unregister_class(cls)

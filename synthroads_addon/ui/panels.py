@@ -1,123 +1,126 @@
-"""The sidebar panel in the 3D view."""
+"""The panels in the 3D view's sidebar: those made of the scenario's fields (`sheets`), and what some have beside."""
 
 from __future__ import annotations
+
+from typing import Any, ClassVar
 
 import bpy
 
 from ..blender.kept_road import BUILT_FROM, find_road
-from ..blender.model_builder import ROLE
-from . import scan_job
-from .operators import SYNTHROADS_OT_build, SYNTHROADS_OT_cancel_scan, SYNTHROADS_OT_scan
-from .properties import SYNTHROADS_PG_settings
-from .scan_job import ScanJob
-
-_SOLID = {"MESH", "CURVE", "SURFACE", "META", "FONT"}
-
-
-class _Sidebar:
-    bl_category = "SynthRoads"
-    bl_space_type = "VIEW_3D"
-    bl_region_type = "UI"
-
-
-class SYNTHROADS_PT_main(_Sidebar, bpy.types.Panel):
-    """The panel that holds the others."""
-
-    bl_label = "SynthRoads"
-
-    def draw(self, context: bpy.types.Context) -> None:
-        """Show what everything starts from."""
-        layout, settings = _column(self), context.scene.synthroads
-        layout.prop(settings, "preset")
-        layout.prop(settings, "fidelity")
+from .build import SYNTHROADS_OT_build
+from .common import Sidebar, column, large_button
+from .drawing import draw_field, value_row
+from .long_operator import draw_job
+from .panel_scan import draw_folder, draw_scan
+from .presets import (
+    SYNTHROADS_MT_devices,
+    SYNTHROADS_MT_scenarios,
+    SYNTHROADS_OT_random_road,
+    device_title,
+    scenario_title,
+)
+from .road_files import draw_road_files, source_of
+from .sheets import SHEETS, Sheet, fields_of
 
 
-class SYNTHROADS_PT_road(_Sidebar, bpy.types.Panel):
-    """What the road is."""
+class SheetPanel(Sidebar):
+    """A panel that shows the fields of its sheet."""
 
-    bl_label = "Road"
-    bl_parent_id = "SYNTHROADS_PT_main"
+    sheet: ClassVar[Sheet]
+    layout: bpy.types.UILayout
 
     def draw(self, context: bpy.types.Context) -> None:
-        """Show the road's settings and its button."""
-        layout, settings = _column(self), context.scene.synthroads
-        for name in ("cross_section", "length", "seed"):
-            layout.prop(settings, name)
+        """Show the fields."""
+        self.draw_fields(column(self), context.scene.synthroads)
+
+    def draw_fields(self, layout: bpy.types.UILayout, settings: Any) -> None:
+        """Show the fields, each by what belongs to its kind."""
+        for field in fields_of(self.sheet):
+            draw_field(layout, settings, field)
+
+
+class MainPanel(SheetPanel):
+    """What everything starts from."""
+
+    def draw(self, context: bpy.types.Context) -> None:
+        """Show which scenario the settings were taken from, and how fine all is."""
+        layout, settings = column(self), context.scene.synthroads
+        layout.menu(SYNTHROADS_MT_scenarios.bl_idname, text=scenario_title(settings.preset), icon="PRESET")
+        self.draw_fields(layout, settings)
+
+
+class RoadPanel(SheetPanel):
+    """What the road is, and the buttons that build it."""
+
+    def draw(self, context: bpy.types.Context) -> None:
+        """Show the fields, whether the road is older than they are, and the buttons."""
+        layout, settings = column(self), context.scene.synthroads
+        self.draw_fields(layout, settings)
+        if (seed := settings.exact_seed()) != settings.seed:
+            layout.label(text=f"Seed of the file: {seed}", icon="INFO")
         road = find_road(context.scene)
-        if road and road.get(BUILT_FROM) != settings.road_values():
+        if road and source_of(road):
+            layout.label(text=f"Built from {source_of(road)}", icon="FILE")
+        elif road and road.get(BUILT_FROM) != settings.road_values():
             layout.label(text="Changed since it was built", icon="INFO")
-        text = "Rebuild Road" if road else "Build Road"
-        _button(layout).operator(SYNTHROADS_OT_build.bl_idname, text=text, icon="MOD_BUILD")
+        if draw_job(layout):
+            return
+        row = large_button(layout)
+        row.operator(SYNTHROADS_OT_build.bl_idname, text="Rebuild Road" if road else "Build Road", icon="MOD_BUILD")
+        row.operator(SYNTHROADS_OT_random_road.bl_idname, text="Random Road", icon="FILE_REFRESH")
+        draw_road_files(layout)
 
 
-class SYNTHROADS_PT_scanner(_Sidebar, bpy.types.Panel):
-    """How it is scanned."""
+class ScannerPanel(SheetPanel):
+    """What scans, and the button that scans."""
 
-    bl_label = "Scanner"
-    bl_parent_id = "SYNTHROADS_PT_main"
+    def draw_fields(self, layout: bpy.types.UILayout, settings: Any) -> None:
+        """Show the fields; devices have a menu."""
+        for field in fields_of(self.sheet):
+            if field.path == "scan.device":
+                layout.menu(SYNTHROADS_MT_devices.bl_idname, text=device_title(settings.scan.device), icon="PRESET")
+            else:
+                draw_field(layout, settings, field)
 
     def draw(self, context: bpy.types.Context) -> None:
-        """Show the scanner's settings and its button."""
-        layout, settings = _column(self), context.scene.synthroads
-        for name in ("device", "platform", "height", "speed", "output", "overwrite"):
-            layout.prop(settings, name)
-        job = scan_job.latest
-        if job and job.running:
-            _progress(layout, job)
-            return
-        if find_road(context.scene) is None:
-            layout.label(text="Build a road first", icon="INFO")
-        else:
-            _others(layout, context)
-            if settings.needs_saved_file():
-                _ask_to_save(layout)
-        _button(layout).operator(SYNTHROADS_OT_scan.bl_idname, icon="LIGHT_AREA")
-        if job and job.points is not None:
-            _result(layout, settings, job)
+        """Show the fields, the folder and the button."""
+        layout = column(self)
+        self.draw_fields(layout, context.scene.synthroads)
+        draw_scan(layout, context)
 
 
-def _column(panel: bpy.types.Panel) -> bpy.types.UILayout:
-    layout = panel.layout
-    layout.use_property_split = True
-    layout.use_property_decorate = False
-    return layout
+class OutputPanel(SheetPanel):
+    """Which files are written, and where."""
+
+    def draw(self, context: bpy.types.Context) -> None:
+        """Show the folder and the fields."""
+        layout, settings = column(self), context.scene.synthroads
+        draw_folder(layout, settings)
+        value_row(layout, "").prop(settings, "overwrite")
+        self.draw_fields(layout, settings)
 
 
-def _button(layout: bpy.types.UILayout) -> bpy.types.UILayout:
-    row = layout.row()
-    row.scale_y = 1.4
-    return row
+_OWN_PANELS: dict[str, type[SheetPanel]] = {
+    "main": MainPanel,
+    "road": RoadPanel,
+    "scanner": ScannerPanel,
+    "output": OutputPanel,
+}
 
 
-def _progress(layout: bpy.types.UILayout, job: ScanJob) -> None:
-    row = layout.row(align=True)
-    row.scale_y = 1.4
-    row.progress(factor=job.share, text=job.state)
-    row.operator(SYNTHROADS_OT_cancel_scan.bl_idname, text="", icon="X")
+def _panel(sheet: Sheet) -> type:
+    """Return the class of a panel."""
+    base = _OWN_PANELS.get(sheet.name, SheetPanel)
+    parent = {"bl_parent_id": f"SYNTHROADS_PT_{sheet.parent}"} if sheet.parent else {}
+    members = {
+        "__doc__": sheet.title,
+        "bl_idname": sheet.panel,
+        "bl_label": sheet.title,
+        "bl_order": sheet.order,
+        "bl_options": {"DEFAULT_CLOSED"} if sheet.closed else set(),
+        "sheet": sheet,
+    }
+    return type(sheet.panel, (base, bpy.types.Panel), members | parent)
 
 
-def _ask_to_save(layout: bpy.types.UILayout) -> None:
-    row = layout.row(align=True)
-    row.alert = True
-    row.label(text="Save the file, or choose a folder", icon="ERROR")
-    row.operator("wm.save_mainfile", text="", icon="FILE_TICK")
-
-
-def _others(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
-    """Say that objects of the user's own are scanned as well."""
-    count = sum(item.type in _SOLID and ROLE not in item for item in context.visible_objects)
-    if count:
-        text = "1 other object is scanned too" if count == 1 else f"{count} other objects are scanned too"
-        layout.label(text=text, icon="INFO")
-
-
-def _result(layout: bpy.types.UILayout, settings: SYNTHROADS_PG_settings, job: ScanJob) -> None:
-    """Show what the last scan wrote, as long as the panel names its folder."""
-    if settings.needs_saved_file() or not settings.output or settings.folder() != job.target:
-        return
-    row = layout.row(align=True)
-    row.label(text=f"{job.points:,} points written", icon="CHECKMARK")
-    row.operator("wm.path_open", text="", icon="FILE_FOLDER").filepath = str(job.target)
-
-
-CLASSES = (SYNTHROADS_PT_main, SYNTHROADS_PT_road, SYNTHROADS_PT_scanner)
+CLASSES = tuple(_panel(sheet) for sheet in SHEETS)

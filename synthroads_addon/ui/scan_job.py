@@ -1,138 +1,175 @@
-"""A scan into a folder that runs beside the window and can be stopped. Once begun it touches no Blender data."""
+"""A scan of the open scene's road into a folder.
+
+Where nothing is rendered the scene is read in the window's thread, and the rest needs a thread. Rendering needs the
+main thread of a Blender: that is another one, which works on a copy of the file.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Generator
-from dataclasses import asdict
+from collections.abc import Callable, Generator
+from dataclasses import dataclass
 from pathlib import Path
-from threading import Event, Thread
+from typing import Any, TypeAlias
 
-from .. import version
-from ..core.cloud.centerline import centerline_geojson
-from ..core.colour import MaterialLayers, surface_constants
-from ..core.errors import Cancelled
+from ..blender.cameras import material_layers
+from ..blender.cameras.surfaces import scene_constants
+from ..blender.files import save_scene
+from ..blender.scene import CopiedScene, scanned_scene_steps
+from ..core.colour import LayerSource
 from ..core.files import output_folder
+from ..core.materials import Material
 from ..core.parameters.geometry import RoadGeometry
 from ..core.parameters.model import RoadParameters
-from ..core.parameters.tessellation import sample_stations
-from ..core.scanning.motion import ScannedScene
+from ..core.progress import StageTimer
 from ..core.scenario import Scenario
 from ..core.schema import canonical_json
-from ..pipeline import Job, ScanToFiles, check, file_names, make_scan, material_rows, road_path, top_view
+from ..core.twin import twin_file_names, write_twin
+from ..pipeline import Job as PipelineJob
+from ..pipeline import check, check_not_empty, closing, file_names, opening, write_texts
+from ..scan_files import ScanToFiles, make_scan, material_rows, may_render, road_path, top_view, wanted_layers
+from .job import Aside, Report, Step, Work
+from .rendered_scan import SavedScene, save_open_scene
 
 
-class ScanJob:
-    """One scan into a folder. It is refused at once if it can't be done; nothing half-written is ever left.
-
-    Args:
-        scenario: the road's and the scan's settings.
-        parameters: the road that the scene shows.
-        scene: what is scanned.
-        target: folder for the files.
-        overwrite: replace files that are already there.
+@dataclass(frozen=True)
+class RoadScan:
+    """What is scanned, and where the files go.
 
     Attributes:
+        scenario: the road's and the scan's settings.
+        parameters: the road that the scene shows.
         target: folder for the files.
-        share: how much is done, 0 to 1.
-        points: how many points were written; None until all files are complete.
-        error: what ended it early, if something did; `Cancelled` after `stop`.
-
-    Raises:
-        InputError: a setting is wrong or the folder can't be written.
+        overwrite: replace files that are already there.
     """
 
-    def __init__(
-        self, scenario: Scenario, parameters: RoadParameters, scene: ScannedScene, target: Path, overwrite: bool
-    ) -> None:
-        check(Job(scenario, target, overwrite=overwrite))
-        self.target = target
-        self.share = 0.0
-        self.points: int | None = None
-        self.error: Exception | None = None
-        self._stopping = Event()
-        self._thread: Thread | None = None
-        self._steps = self._write_files(scenario, parameters, scene, overwrite)
-        next(self._steps)
+    scenario: Scenario
+    parameters: RoadParameters
+    target: Path
+    overwrite: bool
 
-    def run(self) -> None:
-        """Do the whole work; raise what goes wrong."""
+
+@dataclass(frozen=True)
+class Written:
+    """What a scan has written: so many points into a folder."""
+
+    points: int
+    target: Path
+
+
+_READ = 0.1
+"""Share of a scan's progress that the reading of the scene takes up."""
+
+
+@dataclass(frozen=True)
+class _Output:
+    """Where the thread's files go, and what it tells."""
+
+    folder: Path
+    timer: StageTimer
+    report: Report
+
+
+_Measure: TypeAlias = Callable[[_Output], dict[str, Any]]
+"""Scans, writes the cloud and the previews, and returns the counts. It touches no data of Blender."""
+
+
+def scan_work(scan: RoadScan) -> Work[Written]:
+    """Scan the open scene; nothing half-written is ever left, and the scene is only read.
+
+    Raises:
+        InputError: a setting is wrong or the folder can't be written; in its first step.
+    """
+    scenario = scan.scenario
+    check(PipelineJob(scenario, scan.target, overwrite=scan.overwrite))
+    names = [*file_names(scenario, scenario.outputs), *twin_file_names(scenario.twin)]
+    timer, renders = StageTimer(), may_render(scenario)
+    with output_folder(scan.target, names, scan.overwrite) as folder:
+        yield Step(0.0, "Reading")
+        measure = yield from (_saved(scan, folder, timer) if renders else _read(scan, timer))
+        if "scene" in scenario.outputs:
+            with timer.stage("scene file"):
+                save_scene(folder / "scene.blend")
+
+        def write(report: Report) -> int:
+            return _write_files(scan, measure, _Output(folder, timer, report))
+
+        points = yield Aside(write, "Rendering" if renders else "Scanning", _READ, 1.0)
+    return Written(points, scan.target)
+
+
+def _saved(scan: RoadScan, folder: Path, timer: StageTimer) -> Generator[Step, None, _Measure]:
+    """Save a copy of the open file; return what has another Blender scan it."""
+    with timer.stage("scene copy"):
+        saved = save_open_scene(scan.scenario, scan.parameters, folder)
+    yield Step(_READ)
+    return lambda output: _scan_saved(saved, output)
+
+
+def _scan_saved(saved: SavedScene, output: _Output) -> dict[str, Any]:
+    done = saved.scan(output.report)
+    output.timer.stages.update(done.stages)
+    return done.counts
+
+
+def _read(scan: RoadScan, timer: StageTimer) -> Generator[Step, None, _Measure]:
+    """Read the open scene; return what scans it."""
+    speed_factor = scan.scenario.scan.traffic_speed_factor
+    with timer.stage("scene mesh"):
+        steps = scanned_scene_steps(geometry=RoadGeometry(scan.parameters), speed_factor=speed_factor)
+        copied = yield from _shares(steps)
+    rows, constants = material_rows(copied.materials), scene_constants(copied.materials)
+    # The materials' own: what is rendered takes the other way.
+    lit = "rgb" in wanted_layers(scan.scenario) and scan.scenario.colour.mode == "lit"
+    source = material_layers(scan.scenario.colour, constants, lit, scan.parameters.environment, scan.scenario.seed)
+    return lambda output: _scan_copied(scan, copied, (rows, source), output)
+
+
+def _shares(steps: Generator[float, None, CopiedScene]) -> Generator[Step, None, CopiedScene]:
+    """Pass on the steps of reading as shares of the whole."""
+    while True:
         try:
-            for share in self._steps:
-                self.share = share
-                if self._stopping.is_set():
-                    raise Cancelled("the scan was cancelled")
-        finally:
-            self._steps.close()
-
-    def start(self) -> None:
-        """Do the work in a thread of its own, so that the window stays alive."""
-        self._thread = Thread(target=self._run_and_keep_error, name="SynthRoads scan")
-        self._thread.start()
-
-    @property
-    def running(self) -> bool:
-        """Return whether its thread is at work."""
-        return self._thread is not None and self._thread.is_alive()
-
-    @property
-    def state(self) -> str:
-        """Return what it is doing, in words for the window."""
-        if self._stopping.is_set():
-            return "Stopping"
-        return f"Scanning {self.share:.0%}" if self.share else "Preparing"
-
-    def stop(self, wait: bool = False) -> None:
-        """Have the thread stop after the block at hand; `wait` until it has."""
-        self._stopping.set()
-        if wait and self._thread is not None:
-            self._thread.join()
-
-    def _run_and_keep_error(self) -> None:
-        try:
-            self.run()
-        except Exception as error:
-            self.error = error
-
-    def _write_files(
-        self, scenario: Scenario, parameters: RoadParameters, scene: ScannedScene, overwrite: bool
-    ) -> Generator[float, None, None]:
-        """Write all files, yielding the share that is done: first once the folder is found to be writable."""
-        names = file_names(scenario, scenario.outputs)
-        with output_folder(self.target, names, overwrite) as folder:
-            rows = material_rows(scene.static.materials)
-            yield 0.0
-            geometry = RoadGeometry(parameters)
-            stations = sample_stations(geometry, scenario.settings().tolerance)
-            scan = make_scan(scenario, scene, road_path(scenario, geometry), parameters.environment)
-            # Rendering would hold up the window: colours are the materials' own.
-            source = MaterialLayers(surface_constants(rows))
-            task = ScanToFiles(scenario, scan, source, folder, parameters.metadata.epsg, top_view(geometry))
-            yield from task.run()
-            texts = {
-                "parameters.json": parameters.to_json(),
-                "centerline.geojson": canonical_json(centerline_geojson(geometry, stations)),
-                "report.json": canonical_json(_report(scenario, task)),
-            }
-            for name, text in texts.items():
-                (folder / name).write_text(text, encoding="utf-8")
-        self.points = task.counts.points
+            yield Step(_READ * next(steps))
+        except StopIteration as end:
+            return end.value
+        except BaseException:
+            steps.close()
+            raise
 
 
-def _report(scenario: Scenario, task: ScanToFiles) -> dict[str, object]:
-    return {
-        "type": "Report",
-        "generator": f"SynthRoads {version()}",
-        "counts": task.summary(),
-        "seed": scenario.seed,
-        "settings": asdict(scenario.settings()),
-        "scenario": scenario.to_dict(),
-    }
+def _scan_copied(
+    scan: RoadScan, copied: CopiedScene, materials: tuple[list[Material], LayerSource], output: _Output
+) -> dict[str, Any]:
+    """Scan what was read."""
+    scenario, parameters, timer, (rows, source) = scan.scenario, scan.parameters, output.timer, materials
+    geometry = RoadGeometry(parameters)
+    with timer.stage("scene mesh"):
+        scene = copied.put_together()
+    check_not_empty(scene)
+    output.report(0.02)
+    with timer.stage("caster"):
+        path = road_path(scenario, geometry)
+        prepared = make_scan(scenario, scene, path, parameters.environment, rows, parameters.materials)
+    del scene
+    output.report(0.05)
+    view = top_view(geometry) if "previews" in scenario.outputs else None
+    task = ScanToFiles(scenario, prepared, source, output.folder, parameters.metadata.epsg, view, rows)
+    with timer.stage("scan"):
+        for share in task.run():
+            output.report(0.05 + 0.95 * share)
+    return task.summary()
 
 
-latest: ScanJob | None = None
-"""The scan that the window runs, or ran last."""
-
-
-def scanning() -> bool:
-    """Return whether the window runs a scan."""
-    return latest is not None and latest.running
+def _write_files(scan: RoadScan, measure: _Measure, output: _Output) -> int:
+    """Write all files; return the number of points. Runs in a thread: it touches no data of Blender."""
+    scenario, parameters = scan.scenario, scan.parameters
+    write_texts(output.folder, scenario.outputs, parameters, RoadGeometry(parameters), scenario)
+    if scenario.twin:
+        with output.timer.stage("twin"):
+            write_twin(parameters, output.folder, scenario.twin, scenario.settings().tolerance)
+    report = opening()
+    if set(scenario.outputs) & {"cloud", "previews"}:
+        report["counts"] = measure(output)
+    points = report.get("counts", {}).get("points", 0)
+    report |= closing(scenario, output.timer)
+    (output.folder / "report.json").write_text(canonical_json(report), encoding="utf-8")
+    return int(points)

@@ -10,7 +10,8 @@ from synthroads_addon.blender.cameras import HAS_RETURN_CAMERA, RenderedLayers, 
 from synthroads_addon.blender.cameras.images import aim
 from synthroads_addon.blender.cameras.stage import Passes, stage
 from synthroads_addon.blender.materials import material as table_material
-from synthroads_addon.core.colour import FROM_MATERIAL, FROM_RETURN, MATERIAL_LAYERS
+from synthroads_addon.core.colour import FROM_MATERIAL, FROM_RETURN, MATERIAL_LAYERS, NEARBY
+from synthroads_addon.core.colour_nearby import REACH
 from synthroads_addon.core.colour_scenario import ColourSettings
 from synthroads_addon.core.colour_views import scene_sample, views_along
 from synthroads_addon.core.errors import InputError
@@ -44,7 +45,7 @@ def test_points_have_the_surfaces_own_values(source: str) -> None:
     expected = ground_values(ground["position"])
     # The width of a pixel and a bit, from the checkerboard's edges.
     away = edge_distance(ground["position"]) > 0.06
-    seen = values.source != FROM_MATERIAL
+    seen = ~np.isin(values.source, (FROM_MATERIAL, NEARBY))
     for name, wanted in expected.items():
         error = np.abs(values.arrays[name] - wanted)[seen & away]
         assert error.max() < ACCURACY[source], name
@@ -62,8 +63,12 @@ def test_points_below_a_plate_never_take_its_colour(source: str) -> None:
     with layer_source(job(mesh, {"base_color"}, source=source)) as layers:
         values = layers.sample(**ground, wanted=frozenset({"base_color"}))
     error = np.abs(values.arrays["base_color"] - ground_values(ground["position"])["base_color"])[:, 1:]
-    seen = values.source != FROM_MATERIAL
+    seen = ~np.isin(values.source, (FROM_MATERIAL, NEARBY))
     assert error[seen].max() < ACCURACY[source]
+    # What is taken from close by is ground that is as close; the plate's colours differ by far more.
+    near = values.source == NEARBY
+    assert (error[near] < REACH / 40.0 + ACCURACY[source]).all()
+    assert near.any() == (source == "images")
     # A pixel per return shows what is below; images can't, and the mean is taken.
     assert seen.mean() > (0.999 if source == "returns" else 0.05)
     if source == "images":

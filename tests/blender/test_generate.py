@@ -19,7 +19,8 @@ from synthroads_addon.core.parameters.model import read_parameters
 from synthroads_addon.core.scanning.pulses import Poses, make_pulses
 from synthroads_addon.core.scanning.scan import scan_block
 from synthroads_addon.core.scenario import load_scenario
-from synthroads_addon.pipeline import FILES, Job, generate, make_scan, road_path
+from synthroads_addon.pipeline import FILES, Job, generate
+from synthroads_addon.scan_files import make_scan, road_path
 
 ROOT = Path(__file__).parents[2]
 REAL_AXIS = ROOT.parent / "shared" / "real" / "als_rural2lane_t211-278_axis.csv"

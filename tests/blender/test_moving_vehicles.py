@@ -25,7 +25,7 @@ from synthroads_addon.core.scanning.motion import LaneMotion, MovingMesh, Scanne
 from synthroads_addon.core.scanning.path import Strip
 from synthroads_addon.core.scenario import load_scenario
 from synthroads_addon.core.scene_mesh import SceneMesh
-from synthroads_addon.pipeline import make_scan, scan_blocks
+from synthroads_addon.scan_files import make_scan, scan_blocks
 from tests.blender.furnished_road import Data, Float, road_data
 from tests.blender.test_parts_vehicles import MODELS, VEHICLES, alone, vehicle
 

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from synthroads_addon.blender.nodes.delineator import REFLECTOR
-from synthroads_addon.blender.nodes.kilometre_board import _POST as BOARD_POST
 from synthroads_addon.core.cloud.labels import class_id
+from synthroads_addon.core.parameters.body_shapes import KILOMETRE_POST
 from synthroads_addon.core.parameters.model import Cabinet, Delineator, KilometreBoard, Pole, TrafficLight
 from synthroads_addon.core.parameters.model_base import ObjectT
 from tests.blender.furnished_road import (
@@ -128,7 +128,7 @@ class TestKilometreBoard:
         assert np.count_nonzero(along < -0.99) == np.count_nonzero(along > 0.99) > 10
         assert len(along) == np.count_nonzero(np.abs(along) > 0.99)
         post = own(road, name, "galvanised_steel")
-        assert np.ptp(post[..., :2], axis=(0, 1)).max() == pytest.approx(BOARD_POST, abs=MEASURE)
+        assert np.ptp(post[..., :2], axis=(0, 1)).max() == pytest.approx(KILOMETRE_POST, abs=MEASURE)
 
     def test_longer_numbers_have_more_faces(self, road: FurnishedRoad) -> None:
         before = len(road.mesh("board").triangles)

@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 
 from synthroads_addon.blender.materials import material
 from synthroads_addon.blender.nodes.pictograms import NAMES, PICTOGRAMS
-from synthroads_addon.blender.nodes.sign import RAIL
 from synthroads_addon.blender.nodes.sign_face import RAISED, sign_face_group
 from synthroads_addon.blender.nodes.sign_outline import SHAPES
 from synthroads_addon.blender.nodes.sign_writing import LETTERS, LINES
@@ -22,6 +21,7 @@ from synthroads_addon.blender.parts.sign_faces import FaceStyle, face_inputs
 from synthroads_addon.blender.scene import scene_mesh
 from synthroads_addon.core.cloud.labels import class_id
 from synthroads_addon.core.materials import materials
+from synthroads_addon.core.parameters.body_shapes import SIGN_RAIL
 from synthroads_addon.core.parameters.model import TrafficSign
 from synthroads_addon.core.parameters.signs import Pictogram, sign_catalogue
 from synthroads_addon.core.scene_mesh import SceneMesh
@@ -107,7 +107,7 @@ class TestSign:
         assert low[0] + high[0] == pytest.approx(0.0, abs=MEASURE)
         assert low[2] == pytest.approx(sign.lower_edge, abs=MEASURE)
         assert high[2] == pytest.approx(sign.lower_edge + sign.height, abs=MEASURE)
-        front = -(sign.post_diameter / 2 + RAIL + PLATE)
+        front = -(sign.post_diameter / 2 + SIGN_RAIL + PLATE)
         drawn = RAISED if sign.text or name in sign_catalogue().signs else 0.0
         assert (low[1], high[1]) == (pytest.approx(front - drawn, abs=5e-4), pytest.approx(front, abs=5e-4))
 
@@ -129,7 +129,7 @@ class TestSign:
     def test_its_plate_is_closed(self, road: FurnishedRoad, name: str) -> None:
         sign, mesh = sign_of(road, name), road.mesh(name)
         own = own_frame(road, name, corners(mesh, is_front(mesh) | of_material(mesh, "board_back")))
-        front = -(sign.post_diameter / 2 + RAIL)
+        front = -(sign.post_diameter / 2 + SIGN_RAIL)
         plate = own[(own[..., 1].max(axis=1) < front + 2e-4) & (own[..., 1].min(axis=1) > front - PLATE - RAISED / 2)]
         assert open_edges(plate) == 0
         area = np.linalg.norm(np.cross(plate[:, 1] - plate[:, 0], plate[:, 2] - plate[:, 0]), axis=1).sum() / 2

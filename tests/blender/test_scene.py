@@ -15,7 +15,7 @@ from synthroads_addon.blender.materials import PROPERTY, constants, material
 from synthroads_addon.blender.meshes import fill
 from synthroads_addon.blender.model_builder import SUPPORT
 from synthroads_addon.blender.scene import scanned_scene, scene_mesh
-from synthroads_addon.blender.scene_reading import Part, read_part
+from synthroads_addon.blender.scene_reading import Copied, copy_mesh
 from synthroads_addon.core.class_mapping import ClassMapping
 from synthroads_addon.core.cloud.labels import UNLABELLED, class_id, classes
 from synthroads_addon.core.errors import InputError
@@ -354,11 +354,11 @@ class TestSize:
             bpy.context.scene.collection.objects.link(item)
         read: list[str] = []
 
-        def counted(name: str, *rest: Any) -> Part:
+        def counted(name: str, *rest: Any) -> Copied:
             read.append(name)
-            return read_part(name, *rest)
+            return copy_mesh(name, *rest)
 
-        monkeypatch.setattr(scene, "read_part", counted)
+        monkeypatch.setattr(scene, "copy_mesh", counted)
         whole = scene_mesh()
         assert len(read) == 1
         assert len(whole) == 12 * 500

@@ -1,22 +1,35 @@
-"""The trade-off measures each row in a process of its own and writes table, JSON and plot."""
+"""The trade-off measures each row in a process of its own and writes tables, JSON and plot."""
+
+from __future__ import annotations
 
 import json
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
+import pytest
+
+from synthroads_addon.blender.cameras import HAS_RETURN_CAMERA
 from synthroads_addon.core.scenario import load_scenario
 from synthroads_addon.core.schema import canonical_json
-from synthroads_addon.core.tradeoff import KNOBS, ROW_TITLES, rows
+from synthroads_addon.core.tradeoff import KNOBS, ROW_TITLES
+from synthroads_addon.measuring import measure_row
 
 ROOT = Path(__file__).parents[2]
+COLOURS = {"colour_median", "colour_95", "layers_rmse"}
 
 
 def small_scenario(folder: Path) -> Path:
     changes = ["road.length=120", "road.half_width=30", "scan.platform.lateral_offsets=[5]", "vegetation_detail=0.2"]
+    changes += ["scan.pulse_rate_khz=100", "scan.field_of_view_deg=360", "colour.ground_sampling_distance=0.3"]
     path = folder / "small.json"
     path.write_text(canonical_json(load_scenario("rq31-600m", changes).to_dict()))
     return path
+
+
+def row(folder: Path, knob: str, value: Any) -> dict[str, Any]:
+    return measure_row(str(small_scenario(folder)), knob, value)
 
 
 def test_a_knob_is_measured(tmp_path: Path) -> None:
@@ -29,10 +42,11 @@ def test_a_knob_is_measured(tmp_path: Path) -> None:
     slow, fast = json.loads((tmp_path / "out" / "tradeoff.json").read_text())["rows"]
     assert (slow["value"], fast["value"]) == ("bvhtree", "embree")
     assert fast["rays_per_second"] > slow["rays_per_second"]
-    for row in (slow, fast):
-        assert set(row["errors"]) == set(ROW_TITLES)
-        assert 0 < row["errors"]["height_mm"] < 5
-        assert row["errors"]["position_mm"] > 0
+    for result in (slow, fast):
+        assert result["errors"].keys() == ROW_TITLES.keys() - COLOURS - {"relief_mm"}
+        assert 0 < result["errors"]["height_mm"] < 5
+        assert result["errors"]["position_mm"] > 0
+        assert result["images"] == 0
     # Both casters see the same scene.
     assert abs(slow["errors"]["position_mm"] - fast["errors"]["position_mm"]) < 0.05 * fast["errors"]["position_mm"]
 
@@ -44,5 +58,44 @@ def test_unknown_knob_is_refused(tmp_path: Path) -> None:
     assert "--knobs is 'speed'" in done.stderr
 
 
-def test_every_row_is_named() -> None:
-    assert len(list(rows(KNOBS))) == sum(len(values) for values in KNOBS.values())
+def test_colours_of_images_are_nearer_to_the_truth_than_the_materials(tmp_path: Path) -> None:
+    material, images = (row(tmp_path, "colour_source", value) for value in ("material", "images"))
+    assert material["shares"] == {"material": 1.0}
+    assert material["images"] == 0 < images["images"]
+    assert images["shares"]["material"] < 0.02
+    assert images["image_seconds"] > material["image_seconds"]
+    for result in (material, images):
+        assert result["errors"].keys() == COLOURS
+        truth = "a pixel per return" if HAS_RETURN_CAMERA else "images of 0.06 m"
+        assert result["colour_truth"].startswith(truth)
+    by_source = images["errors_by_source"]
+    assert by_source.keys() == images["shares"].keys() >= {"image", "material"}
+    assert by_source["image"]["colour_95"] < by_source["material"]["colour_95"]
+    for name in COLOURS - {"layers_rmse"}:
+        assert 0.0 < images["errors"][name] < material["errors"][name]
+    # A pixel of 25 cm hardly knows a material's variation better than its mean does: it is no worse, within chance.
+    assert 0.0 < images["errors"]["layers_rmse"] < 1.05 * material["errors"]["layers_rmse"]
+
+
+def test_a_pixel_per_return_is_the_truth_or_says_what_it_needs(tmp_path: Path) -> None:
+    result = row(tmp_path, "colour_source", "returns")
+    if HAS_RETURN_CAMERA:
+        assert result["shares"]["return"] > 0.99
+        assert max(result["errors"].values()) == pytest.approx(0.0, abs=1e-6)
+    else:
+        assert "Blender 5.0" in result["left_out"]
+
+
+def test_relief_and_spacing_leave_their_errors(tmp_path: Path) -> None:
+    none, full = (row(tmp_path, "roughness_adjustment", value)["errors"]["relief_mm"] for value in (0, 1))
+    assert none > 3.0
+    assert full < 0.5 * none
+    whole, thin = (row(tmp_path, "point_spacing", value)["errors"]["density_percent"] for value in ("none", 0.2))
+    assert abs(whole) < 2.0
+    assert 20.0 < thin < 100.0
+
+
+def test_every_row_is_a_scenario() -> None:
+    for knob in KNOBS.values():
+        for changes in knob.rows.values():
+            load_scenario("rq31-600m", list(changes))

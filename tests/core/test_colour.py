@@ -14,6 +14,7 @@ from synthroads_addon.core.colour import (
     Shading,
     encode,
     needed_layers,
+    shares_by_source,
     surface_constants,
 )
 from synthroads_addon.core.colour_light import SHADE, SUN, WHITE, CloudShadows, SunAndSky, exposed, sun_direction
@@ -49,6 +50,14 @@ def test_materials_give_their_means_under_a_usual_sun_and_sky() -> None:
     expected = np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055) * 65535.0
     assert np.abs(values.arrays["rgb"].astype(float) - expected).max() <= 2.0
     assert (values.source == FROM_MATERIAL).all()
+
+
+def test_shares_name_every_source() -> None:
+    counts = np.zeros(256, int)
+    counts[[0, 1, 2, 7, 254, 255]] = 10, 50, 20, 10, 5, 5
+    shares = shares_by_source(counts)
+    assert shares == {"material": 0.1, "image": 0.5, "next image": 0.3, "nearby": 0.05, "return": 0.05}
+    assert shares_by_source(np.zeros(256, int)) == {}
 
 
 def test_only_wanted_layers_are_given() -> None:

@@ -1,11 +1,11 @@
-"""CIEDE2000 as the figures on colours use it: the test data of Sharma, Wu and Dalal (2005), table 1."""
+"""CIEDE2000 as the trade-off measures colours by it: the test data of Sharma, Wu and Dalal (2005), table 1."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 
-from tools.figures_colour import ciede2000, lab
+from synthroads_addon.core.colour_difference import ciede2000, lab
 
 PAIRS = [
     ((50.0, 2.6772, -79.7751), (50.0, 0.0, -82.7485), 2.0425),

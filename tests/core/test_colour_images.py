@@ -9,10 +9,20 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from synthroads_addon.core.colour import FROM_MATERIAL, MATERIAL_LAYERS, MaterialLayers, Shading, surface_constants
-from synthroads_addon.core.colour_images import ImageLayers, RenderedImage, sample_image
+from synthroads_addon.core.colour import (
+    FROM_MATERIAL,
+    MATERIAL_LAYERS,
+    NEARBY,
+    MaterialLayers,
+    Shading,
+    encode,
+    surface_constants,
+)
+from synthroads_addon.core.colour_images import ImageLayers, sample_image
+from synthroads_addon.core.colour_light import SunAndSky
+from synthroads_addon.core.colour_nearby import REACH
 from synthroads_addon.core.colour_scenario import ColourSettings
-from synthroads_addon.core.colour_views import View, views_along
+from synthroads_addon.core.colour_views import RenderedImage, View, views_along
 from synthroads_addon.core.materials import materials
 
 DOWN = np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
@@ -122,6 +132,81 @@ def test_the_image_with_the_scanners_view_is_taken_then_the_next() -> None:
     images[1].depth[...] = 1.0
     hidden = _sampled(_layers(images), places)
     assert hidden.source.tolist() == [1, 2, 1, FROM_MATERIAL]
+
+
+def test_what_the_best_images_hide_is_looked_for_in_all_around() -> None:
+    """Only the farthest of ten images shows the point: it comes after the three best."""
+    images = [_ground_image(_view(x)) for x in np.arange(10.0)]
+    for image in images[:9]:
+        image.depth[...], image.layers[...] = 1.0, 1.0
+    values = _sampled(_layers(images), np.zeros((1, 3)))
+    assert values.source.tolist() == [10]
+    np.testing.assert_allclose(values.arrays["base_color"], _field(np.zeros((1, 3))), atol=5e-4)
+
+
+def _hidden_by(material: int, above: float) -> RenderedImage:
+    """Return an image of the ground below a plate of a material in its right half, brighter than all else."""
+    image = _ground_image(_view())
+    image.material[:, 200:], image.layers[:, 200:] = material + 1, 2.0
+    image.depth[:, 200:] -= np.float32(above)
+    return image
+
+
+def _edge_places() -> tuple[np.ndarray, np.ndarray]:
+    """Return places on the ground (N, 3) below and beside such a plate, and how far below it they lie (N,), m."""
+    places = np.random.default_rng(1).uniform(-1.0, 1.0, (3000, 3)) * [1.0, 1.0, 0.0]
+    return places, -places[:, 1]
+
+
+@pytest.mark.parametrize(("material", "above"), [(1, 0.1), (1, 5.0), (0, 1.01 * REACH), (0, 5.0)])
+def test_hidden_points_take_their_own_surface_close_by_and_never_what_hides_them(material: int, above: float) -> None:
+    """Neither another material, however close, nor the same from farther away."""
+    places, below = _edge_places()
+    values = _sampled(_layers([_hidden_by(material, above)]), places)
+    near = values.source == NEARBY
+    pixel = 0.1
+    assert (values.source[below < -pixel] == 1).all()
+    assert near[(below > pixel) & (below < 1.9 * pixel)].all()
+    assert (values.source[below > REACH + pixel] == FROM_MATERIAL).all()
+    error = np.abs(values.arrays["base_color"] - _field(places))[near]
+    assert error.max() < REACH / 200.0 + 1e-3
+    assert error.max() > 1e-3, "it is another place"
+
+
+def test_the_nearest_place_of_all_images_is_taken() -> None:
+    hiding = _hidden_by(1, 5.0)
+    other = _hidden_by(1, 5.0)
+    # The other image, which suits less, shows ground that is nearer to the point.
+    other.material[:, :201], other.layers[:, :201] = 1, 0.25
+    other.depth[:, :201] = 50.0
+    shifted = RenderedImage(_view(0.5), other.layers, other.depth, other.material)
+    place = np.array([[0.0, -0.15, 0.0]])
+    assert _sampled(_layers([hiding]), place).arrays["base_color"][0, 1] > 0.45
+    values = _sampled(_layers([hiding, shifted]), place)
+    assert values.source.tolist() == [NEARBY]
+    np.testing.assert_allclose(values.arrays["base_color"], 0.25)
+
+
+@pytest.mark.parametrize("lit", [True, False])
+def test_light_from_close_by_is_that_of_the_points_own_slope(lit: bool) -> None:
+    light = SunAndSky(np.array([0.0, 0.6, 0.8]), np.full(3, 0.8), np.full(3, 0.1), np.full(3, 0.1))
+    varies = {name: np.zeros(len(ROWS), bool) for name in MATERIAL_LAYERS}
+    varies["base_color"][0] = True
+    image = _ground_image(_view())
+    image.depth[:, 200:] = 1.0
+    color, own = np.array([0.2, 0.3, 0.4], np.float32), np.array([0.0, -0.6, 0.8])
+    sun = color * light.sunlight(np.array([[0.0, 0.0, 1.0]])) * lit
+    stack = np.concatenate([np.broadcast_to(part, (*image.depth.shape, 3)) for part in (color, sun)], axis=2)
+    image = RenderedImage(image.view, stack.astype(np.float16), image.depth, image.material)
+    constants = surface_constants(ROWS, varies)
+    layers = ImageLayers([image], {"base_color": 3, "sun": 3}, MaterialLayers(constants, Shading("lit", light)))
+    places, normal = np.array([[0.0, -0.15, 0.0]]), own[None]
+    values = layers.sample(
+        places, places + [0.0, 0.0, 50.0], normal, np.zeros(1, np.uint16), np.zeros(1), frozenset({"rgb"})
+    )
+    assert values.source.tolist() == [NEARBY]
+    expected = color * (light.sunlight(normal) * lit + light.sky(normal))
+    np.testing.assert_allclose(values.arrays["rgb"] / 65535.0, encode(expected) / 65535.0, atol=1e-3)
 
 
 def test_points_of_a_whole_strip_find_the_images_along_it() -> None:

@@ -433,7 +433,7 @@ def test_no_permission(tmp_path: Path) -> None:
 def test_without_rasterio_it_says_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = plane_file(tmp_path / "dem.tif", 20, 30)
     monkeypatch.setitem(sys.modules, "rasterio", None)
-    with pytest.raises(InputError, match="an elevation model needs rasterio, which doesn't load here"):
+    with pytest.raises(InputError, match="an elevation model needs rasterio: in Blender install the extension"):
         read_elevation_model(path, EPSG)
 
 

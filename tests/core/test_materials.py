@@ -1,6 +1,7 @@
 """The material table's optical fields, and what age, wear and rain do to them."""
 
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -9,7 +10,7 @@ from hypothesis import strategies as st
 
 from synthroads_addon.core.errors import InputError
 from synthroads_addon.core.material_variation import varied
-from synthroads_addon.core.materials import Material, materials
+from synthroads_addon.core.materials import Material, material_table_path, materials, read_material_table
 from synthroads_addon.core.parameters.model_surroundings import Environment, MaterialVariation
 from synthroads_addon.core.scanning.radiometry import facet_slope, facet_terms, returned_share
 
@@ -139,3 +140,12 @@ def test_materials_of_earlier_files_have_no_optics() -> None:
 def test_impossible_values_are_refused(field, value) -> None:
     with pytest.raises(InputError, match=field):
         Material.from_dict(materials()["asphalt"].to_dict() | {field: value})
+
+
+def test_shipped_tables_have_names_and_others_are_files(tmp_path: Path) -> None:
+    shifted = read_material_table(material_table_path("shifted"))
+    assert set(shifted) <= set(materials())
+    assert all(0 < row.reflectivity < 1 for row in shifted.values())
+    assert material_table_path(str(tmp_path / "own.json")) == tmp_path / "own.json"
+    with pytest.raises(InputError, match="shifted"):
+        material_table_path("shiftet")

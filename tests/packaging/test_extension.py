@@ -23,7 +23,7 @@ def _build(folder: Path) -> Path:
     command = [sys.executable, ROOT / "tools" / "build_extension.py", "--output-dir", folder]
     answer = subprocess.run(command, capture_output=True, text=True, check=False)
     assert answer.returncode == 0, answer.stdout + answer.stderr
-    (archive,) = folder.glob("*.zip")
+    (archive,) = folder.glob("synthroads-*.zip")
     return archive
 
 
@@ -76,10 +76,28 @@ def test_holds_no_tests_caches_or_tools(names: list[str]) -> None:
 def test_holds_wheels_for_every_python(names: list[str], manifest: dict[str, list[str]]) -> None:
     wheels = [name for name in names if name.endswith(".whl")]
     assert sorted(manifest["wheels"]) == sorted(f"./{name}" for name in wheels)
-    for package in ("embreex", "lazrs", "openexr", "pillow", "pydantic_core", "rasterio"):
+    for package in ("embreex", "lazrs", "openexr", "pillow", "pydantic_core"):
         tags = {Path(wheel).name.split("-")[2] for wheel in wheels if Path(wheel).name.startswith(f"{package}-")}
         assert tags == PYTHON_TAGS, package
     assert not [wheel for wheel in wheels if Path(wheel).name.startswith("numpy-")], "Blender has NumPy"
+
+
+def test_is_no_larger_than_it_must_be(archive: Path) -> None:
+    assert archive.stat().st_size < 85e6
+
+
+def test_elevation_models_come_by_an_extension_of_their_own(archive: Path, manifest: dict[str, list[str]]) -> None:
+    (other,) = archive.parent.glob("synthroads_elevation_models-*.zip")
+    with zipfile.ZipFile(other) as content:
+        names = content.namelist()
+        own = tomllib.loads(content.read("blender_manifest.toml").decode("utf-8"))
+    rasterio = {Path(name).name.split("-")[2] for name in names if name.startswith("wheels/rasterio-")}
+    assert rasterio == PYTHON_TAGS
+    assert {name for name in names if "/" not in name} == {
+        "LICENSE", "THIRD_PARTY.txt", "__init__.py", "blender_manifest.toml",
+    }
+    assert (own["version"], own["platforms"]) == (manifest["version"], manifest["platforms"])
+    assert sorted(own["wheels"]) == sorted(f"./{name}" for name in names if name.endswith(".whl"))
 
 
 def test_lists_the_licences_of_all_wheels(archive: Path, names: list[str]) -> None:
@@ -92,7 +110,9 @@ def test_lists_the_licences_of_all_wheels(archive: Path, names: list[str]) -> No
 
 
 def test_same_source_gives_the_same_bytes(archive: Path, tmp_path: Path) -> None:
-    assert _build(tmp_path).read_bytes() == archive.read_bytes()
+    again = _build(tmp_path)
+    for first, second in zip(sorted(archive.parent.glob("*.zip")), sorted(again.parent.glob("*.zip")), strict=True):
+        assert first.read_bytes() == second.read_bytes()
 
 
 # The wheels that Blender unpacks come before those of the environment, so that they are the ones tried.
@@ -108,7 +128,8 @@ sys.path.insert(0, str(wheels))
 import bpy
 
 MODULE = "bl_ext.user_default.synthroads"
-bpy.ops.extensions.package_install_files(filepath=sys.argv[1], repo="user_default", enable_on_install=True)
+for archive in sys.argv[2:]:
+    bpy.ops.extensions.package_install_files(filepath=archive, repo="user_default", enable_on_install=True)
 enabled = MODULE in bpy.context.preferences.addons
 import embreex.rtcore_scene, importlib, laspy, lazrs, numpy, PIL.Image, pydantic, rasterio, tqdm
 importlib.import_module(MODULE + ".core.scenario")
@@ -117,7 +138,7 @@ bpy.ops.preferences.addon_disable(module=MODULE)
 disabled = MODULE not in bpy.context.preferences.addons
 bpy.ops.preferences.addon_enable(module=MODULE)
 again = MODULE in bpy.context.preferences.addons
-Path(sys.argv[2]).write_text(json.dumps({
+Path(sys.argv[1]).write_text(json.dumps({
     "enabled": enabled,
     "disabled": disabled,
     "enabled again": again,
@@ -138,7 +159,7 @@ def test_blender_installs_enables_and_disables_it(archive: Path, tmp_path: Path)
     result = tmp_path / "result.json"
     (tmp_path / "blender").mkdir()
     answer = subprocess.run(
-        [sys.executable, "-c", INSTALL, archive, result],
+        [sys.executable, "-c", INSTALL, result, *sorted(archive.parent.glob("*.zip"))],
         cwd=tmp_path,
         env={**os.environ, "BLENDER_USER_RESOURCES": str(tmp_path / "blender")},
         capture_output=True,

@@ -14,11 +14,12 @@ from packaging.utils import canonicalize_name
 ROOT = Path(__file__).resolve().parents[2]
 MANIFEST = tomllib.loads((ROOT / "blender_manifest.toml").read_text(encoding="utf-8"))
 PYPROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+WHEEL_LISTS = [ROOT / "tools" / name for name in ("extension_wheels.txt", "elevation_models/wheels.txt")]
 PINS = {
     canonicalize_name(requirement.name): str(next(iter(requirement.specifier)).version)
     for requirement in map(
         Requirement,
-        re.findall(r"^[^#\s].*", (ROOT / "tools/extension_wheels.txt").read_text(encoding="utf-8"), re.MULTILINE),
+        re.findall(r"^[^#\s].*", "\n".join(path.read_text(encoding="utf-8") for path in WHEEL_LISTS), re.MULTILINE),
     )
 }
 BASE = [Requirement(text) for text in PYPROJECT["project"]["dependencies"]]

@@ -22,7 +22,16 @@ from .stage import Passes, stage
 from .surfaces import scene_constants
 from .versions import HAS_RETURN_CAMERA
 
-__all__ = ["HAS_RETURN_CAMERA", "ColourJob", "RenderedLayers", "ReturnCamera", "check_colour", "layer_source"]
+__all__ = [
+    "HAS_RETURN_CAMERA",
+    "ColourJob",
+    "RenderedLayers",
+    "ReturnCamera",
+    "check_colour",
+    "layer_source",
+    "material_layers",
+    "takes_returns",
+]
 
 _BOUNCES = 3
 """Reflections that whole light paths are followed over."""
@@ -57,14 +66,22 @@ def check_colour(scenario: ColourScenario) -> None:
     """Refuse what this Blender can't do.
 
     Raises:
-        InputError: a pixel per return in a Blender before 5.0, or with EEVEE; EEVEE with whole light paths.
+        InputError: a pixel per return in a Blender before 5.0 or without OSL, or with EEVEE; EEVEE with whole light
+            paths.
     """
     if scenario.source == "returns" and not HAS_RETURN_CAMERA:
-        raise InputError("colour: source", "returns", "needs Blender 5.0 or newer; this one has images")
+        raise InputError("colour: source", "returns", "needs Blender 5.0 or newer, with OSL; this one has images")
     if scenario.source == "returns" and scenario.engine != "cycles":
         raise InputError("colour: engine", scenario.engine, "must be cycles for a pixel per return")
     if scenario.lighting == "path" and scenario.engine != "cycles":
         raise InputError("colour: lighting", scenario.lighting, "must be direct for eevee")
+
+
+def takes_returns(scenario: ColourScenario) -> bool:
+    """Return whether what is rendered is a pixel per return here, and not images."""
+    return scenario.source == "returns" or (
+        scenario.source == "auto" and scenario.engine == "cycles" and HAS_RETURN_CAMERA
+    )
 
 
 @contextmanager
@@ -84,7 +101,6 @@ def layer_source(
     constants = scene_constants(job.mesh.materials)
     passes = _passes(job, constants)
     lit = "rgb" in job.wanted and job.scenario.mode == "lit"
-    clouds = CloudShadows(job.environment, job.seed) if lit and job.environment.cloud_cover > 0.0 else None
     with ExitStack() as stack:
         light, exposure, world = SunAndSky(), 1.0, None
         lamps: tuple[bpy.types.Object, ...] = ()
@@ -92,7 +108,7 @@ def layer_source(
             day = stack.enter_context(daylight(job.environment, job.scenario.lighting == "direct"))
             light, exposure, lamps = day.light, day.exposure, (day.sun,)
             world = day.world if passes.sky else None
-        fallback = MaterialLayers(constants, Shading(job.scenario.mode, light, clouds))
+        fallback = material_layers(job.scenario, constants, lit, job.environment, job.seed, light)
         if job.scenario.source == "material" or not passes.channels:
             yield fallback
             return
@@ -116,6 +132,30 @@ def layer_source(
             images.close()
 
 
+def material_layers(
+    scenario: ColourScenario,
+    constants: SurfaceConstants,
+    lit: bool,
+    environment: Environment,
+    seed: int,
+    light: SunAndSky | None = None,
+) -> MaterialLayers:
+    """Return the materials' own values: all of it where nothing is rendered, else for what no image shows.
+
+    It touches no data of Blender.
+
+    Args:
+        scenario: how.
+        constants: means of the scene's materials.
+        lit: lit colours are wanted.
+        environment: its clouds drift over the scene.
+        seed: of the clouds.
+        light: that of the images; the usual one if None.
+    """
+    clouds = CloudShadows(environment, seed) if lit and environment.cloud_cover > 0.0 else None
+    return MaterialLayers(constants, Shading(scenario.mode, light or SunAndSky(), clouds))
+
+
 def _passes(job: ColourJob, constants: SurfaceConstants) -> Passes:
     """Return what must be rendered: no layer that isn't wanted, and none that is constant on every material."""
     scenario = job.scenario
@@ -124,9 +164,7 @@ def _passes(job: ColourJob, constants: SurfaceConstants) -> Passes:
     needed = needed_layers(job.wanted, scenario.mode)
     if whole:
         needed -= {"base_color"} - job.wanted
-    returns = scenario.source == "returns" or (
-        scenario.source == "auto" and scenario.engine == "cycles" and HAS_RETURN_CAMERA
-    )
+    returns = takes_returns(scenario)
     return Passes(
         layers=constants.varying(needed),
         lit=lit,

@@ -12,8 +12,8 @@ import numpy as np
 from mathutils import Matrix
 
 from ...core.colour import MaterialLayers
-from ...core.colour_images import ImageLayers, RenderedImage
-from ...core.colour_views import View
+from ...core.colour_images import ImageLayers
+from ...core.colour_views import RenderedImage, View
 from .stage import Rendered, Stage
 
 _LARGEST_HALF = 65504.0

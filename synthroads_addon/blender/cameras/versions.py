@@ -4,8 +4,18 @@ from __future__ import annotations
 
 import bpy
 
-HAS_RETURN_CAMERA = bpy.app.version >= (5, 0, 0)
-"""Whether Cycles has custom cameras."""
+
+def _compiles_shaders() -> bool:
+    """Return whether this Blender's Cycles was built with Open Shading Language: Debian's isn't."""
+    try:
+        import _cycles
+    except ImportError:
+        return False
+    return hasattr(_cycles, "osl_compile")
+
+
+HAS_RETURN_CAMERA = bpy.app.version >= (5, 0, 0) and _compiles_shaders()
+"""Whether Cycles has custom cameras, and can compile their shaders."""
 
 
 def eevee_engine() -> str:

@@ -9,6 +9,9 @@ from numpy.typing import NDArray
 
 from ...core.scene_mesh import SceneMesh
 
+_AT_ONCE = 20_000
+"""Triangles that are handed over together: meanwhile no other thread runs, and Blender's window stands still."""
+
 
 class EmbreeCaster:
     """Casts rays with Embree.
@@ -23,9 +26,15 @@ class EmbreeCaster:
 
     def __init__(self, mesh: SceneMesh, robust: bool = True) -> None:
         self._scene = EmbreeScene(robust=robust)
-        self._empty = len(mesh.triangles) == 0
-        if not self._empty:
-            self._mesh = TriangleMesh(self._scene, mesh.vertices, mesh.triangles)
+        self._meshes: list[TriangleMesh] = []
+        firsts = range(0, len(mesh.triangles), _AT_ONCE)
+        for first in firsts:
+            triangles = mesh.triangles[first : first + _AT_ONCE]
+            used, corners = np.unique(triangles, return_inverse=True)
+            corners = corners.reshape(triangles.shape).astype(np.int32)
+            self._meshes.append(TriangleMesh(self._scene, mesh.vertices[used], corners))
+        self._firsts = np.array(firsts, np.int32)
+        if self._meshes:
             # The tree is built by the first ray: cast one here, before threads do.
             self._scene.run(np.zeros((1, 3), np.float32), np.array([[0, 0, 1]], np.float32))
 
@@ -33,7 +42,11 @@ class EmbreeCaster:
         self, origins: NDArray[np.float32], directions: NDArray[np.float32], maximum_range: float
     ) -> NDArray[np.int32]:
         """Return the (N,) indices of the faces hit, -1 for none; see `Caster.cast`."""
-        if self._empty or len(origins) == 0:
+        if not self._meshes or len(origins) == 0:
             return np.full(len(origins), -1, dtype=np.int32)
         limit = np.full(len(origins), maximum_range, dtype=np.float32)
-        return np.asarray(self._scene.run(origins, directions, dists=limit))
+        if len(self._meshes) == 1:
+            return np.asarray(self._scene.run(origins, directions, dists=limit))
+        found = self._scene.run(origins, directions, dists=limit, output=1)
+        mesh, face = found["geomID"], found["primID"]
+        return np.where(mesh >= 0, self._firsts[np.maximum(mesh, 0)] + face, np.int32(-1))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 
 import bpy
 
@@ -43,11 +43,18 @@ def material(name: str) -> bpy.types.Material:
     return made
 
 
-def vary(variation: MaterialVariation, environment: Environment) -> None:
-    """Give the materials that the file has their means on a road with this variation and weather."""
+def vary(
+    variation: MaterialVariation, environment: Environment, own: Mapping[str, Material] | None = None
+) -> None:
+    """Give the materials that the file has their means on a road with this variation and weather.
+
+    Args:
+        variation, environment: the road's.
+        own: materials in place of the shipped table's.
+    """
     for item in bpy.data.materials:
         if PROPERTY in item and item[PROPERTY] in materials():
-            mean = varied(item[PROPERTY], variation, environment)
+            mean = varied(item[PROPERTY], variation, environment, own)
             if mean.to_json() != item.get(MEAN):
                 _shade(item, mean)
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import bpy
 
 from ...core.cloud.labels import class_id
+from ...core.parameters.body_shapes import BEACON_BLADE, BEACON_BLADE_BOTTOM, BEACON_FOOT
 from . import operations as op
 from .backbone import height_on
 from .builder import Tree, Value, node_group
@@ -12,11 +13,6 @@ from .solids import box, flipped, moved, painted, prism, put
 
 CELLS = (2, 8)
 """Cells across and up a blade, each cut by the border of a stripe: of 0.25 m x 1 m they are squares."""
-FOOT = (0.40, 0.80, 0.11)
-"""Rubber foot: across the blade, along the road, height, m."""
-BLADE_BOTTOM = 0.16
-"""Lower edge of the blade above the surface, m."""
-_BLADE_THICKNESS = 0.045
 _LENS = (0.095, 0.075)
 _HEXADECAGON = 16
 
@@ -51,7 +47,7 @@ def _build(tree: Tree) -> None:
     with tree.frame("Beacons"):
         turned = op.turn(tree, z=op.named(tree, "heading"))
         place, tall = op.position(tree), op.named(tree, "height")
-        bottom = place + (0.0, 0.0, BLADE_BOTTOM)
+        bottom = place + (0.0, 0.0, BEACON_BLADE_BOTTOM)
         parts = [put(points, foot, place, 1.0, turned)]
         for side, blade in zip((1, -1), blades, strict=True):
             chosen = op.separate(points, op.named(tree, "pass_side", "INT").equals(side))
@@ -67,12 +63,12 @@ def _build(tree: Tree) -> None:
 
 def _foot(tree: Tree) -> Value:
     """Return the foot: a slab with chamfered corners and edges, a little sunk."""
-    x, y, _ = FOOT
+    x, y, _ = BEACON_FOOT
     corner = 0.06
     outline = [(x / 2, -y / 2 + corner), (x / 2, y / 2 - corner), (x / 2 - corner, y / 2), (corner - x / 2, y / 2)]
     outline += [(-a, -b) for a, b in outline]
-    slab = prism(tree, outline, (1.0, 1.0, FOOT[2] * 0.7 + 0.01))
-    upper = prism(tree, outline, (0.86, 0.92, FOOT[2]))
+    slab = prism(tree, outline, (1.0, 1.0, BEACON_FOOT[2] * 0.7 + 0.01))
+    upper = prism(tree, outline, (0.86, 0.92, BEACON_FOOT[2]))
     return op.join(moved(slab, (0.0, 0.0, -0.01)), upper)
 
 
@@ -82,7 +78,7 @@ def _blade(tree: Tree, red: Value, white: Value, side: int) -> Value:
     faces = []
     for front in (True, False):
         # Seen from the front they rise to the right. A mirror turns the faces round.
-        y = -_BLADE_THICKNESS / 2 - 0.002
+        y = -BEACON_BLADE / 2 - 0.002
         scale = (float(side), 1.0, 1.0)
         face = tree.node(
             "GeometryNodeTransform", stripes, translation=(0.0, y if front else -y, 0.0), scale=scale
@@ -91,7 +87,7 @@ def _blade(tree: Tree, red: Value, white: Value, side: int) -> Value:
     mesh = painted(op.join(*faces), white)
     first = (op.named(tree, "stripe", "INT") % 2).equals(0)
     mesh = tree.node("GeometryNodeSetMaterial", mesh, first, material=red).value
-    plate = box(tree, (1.0, _BLADE_THICKNESS, 1.0), (0.0, 0.0, 0.5))
+    plate = box(tree, (1.0, BEACON_BLADE, 1.0), (0.0, 0.0, 0.5))
     return op.join(painted(plate, white), mesh)
 
 

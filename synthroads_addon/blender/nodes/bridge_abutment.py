@@ -4,17 +4,14 @@ from __future__ import annotations
 
 import bpy
 
+from ...core.parameters.body_shapes import BRIDGE_ABUTMENT, BRIDGE_BEARING, BRIDGE_SEAT
 from . import operations as op
 from .bridge_deck import PAVEMENT, WEB
 from .builder import Operand, Tree, Value, node_group
 from .solids import box, painted
 
-SEAT = 0.9
-"""Depth of the bearing seat, m."""
-BEARING = 0.1
-"""Height of the bearings, m."""
-_DEPTH, _WALL = 1.5, 0.5
-"""Depth of the abutment, thickness of the wing walls, m."""
+_WALL = 0.5
+"""Thickness of the wing walls, m."""
 _INSIDE = 0.06  # m from the deck's edge to the wing walls
 
 
@@ -43,17 +40,17 @@ def _build(tree: Tree) -> None:
         return box(tree, length + op.vector(tree, 0.0, size), corner + length * 0.5)
 
     with tree.frame("Seat and back wall"):
-        level = height * 0.0 - BEARING
-        walls = [wall(0.0, _DEPTH, level, wide)]
-        walls.append(wall(SEAT + 0.04, _DEPTH - 0.01, height - PAVEMENT * 0.5, wide - 0.02))
+        level = height * 0.0 - BRIDGE_BEARING
+        walls = [wall(0.0, BRIDGE_ABUTMENT, level, wide)]
+        walls.append(wall(BRIDGE_SEAT + 0.04, BRIDGE_ABUTMENT - 0.01, height - PAVEMENT * 0.5, wide - 0.02))
     with tree.frame("Wing walls"):
         for side in (1.0, -1.0):
             beside = (wide * 0.5 - _WALL / 2) * side
-            walls.append(wall(_DEPTH - 0.02, wing, height - PAVEMENT * 0.6, _WALL, beside))
+            walls.append(wall(BRIDGE_ABUTMENT - 0.02, wing, height - PAVEMENT * 0.6, _WALL, beside))
     with tree.frame("Bearings below the webs"):
-        beside = width * (0.25 * sum(WEB))
+        beside, below = width * (0.25 * sum(WEB)), -BRIDGE_BEARING / 2
         pads = [
-            box(tree, (0.5, 0.6, BEARING + 0.02), op.vector(tree, SEAT / 2, beside * side, -BEARING / 2))
+            box(tree, (0.5, 0.6, BRIDGE_BEARING + 0.02), op.vector(tree, BRIDGE_SEAT / 2, beside * side, below))
             for side in (1.0, -1.0)
         ]
     with tree.frame("All"):

@@ -4,19 +4,18 @@ from __future__ import annotations
 
 import bpy
 
+from ...core.parameters.body_shapes import BRIDGE_DECK
 from . import operations as op
 from .bridge_railing import bridge_railing_group
 from .builder import Tree, Value, node_group
 from .solids import box, flipped, loft, moved, painted
 
-WEB = (0.24, 0.52)
+WEB = BRIDGE_DECK[1][0], BRIDGE_DECK[2][0]
 """Where the webs begin and end beside the middle, as shares of half the deck's width."""
 PAVEMENT = 0.05
 """Thickness of the asphalt, m."""
 EDGE = 0.1
 """Width of an edge beam as a share of the deck's."""
-# Half of the section, from the middle of the lower side to the top: y as a share of half the width, z of the height.
-_SECTION = [(0.18, 0.6), (WEB[0], 0.0), (WEB[1], 0.0), (0.6, 0.62), (0.985, 0.78), (0.985, 1.0)]
 # An edge beam: 1 for its inner side and 0 for the outer one; 1 for the back of its nose; 1 on top, 0 and -1 below.
 _BEAM = [(0.0, 0.0, -1.0), (0.0, 0.0, 1.0), (1.0, 0.0, 1.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 1.0, -1.0)]
 _CURB = 0.15
@@ -69,7 +68,7 @@ def _build(tree: Tree) -> None:
 
 
 def _deck(tree: Tree, ends: tuple[Value, Value], width: Value, height: Value) -> Value:
-    half = [(0.0, y, z) for y, z in _SECTION]
+    half = [(0.0, y, z) for y, z in BRIDGE_DECK]
     outline = half + [(x, -y, z) for x, y, z in reversed(half)]
 
     def place(point: Value, row: Value) -> Value:

@@ -6,16 +6,14 @@ import math
 
 import bpy
 
+from ...core.parameters.body_shapes import BRIDGE_BEARING, BRIDGE_PIER_LENGTH
 from . import operations as op
-from .bridge_abutment import BEARING
 from .bridge_deck import WEB
 from .builder import Tree, Value, node_group
 from .solids import box, loft, painted
 
 _ROUND = 8
 """Points of a rounded end."""
-_LENGTH = 0.5
-"""Length as a share of the deck's width."""
 
 
 def bridge_pier_group() -> bpy.types.NodeTree:
@@ -34,7 +32,7 @@ def _build(tree: Tree) -> None:
     # z says which end a point belongs to.
     outline = [(x, y, 1.0) for x, y in end] + [(-x, -y, -1.0) for x, y in end]
     with tree.frame("Body"):
-        straight = (op.maximum(deck * _LENGTH, width * 1.02) - width) * 0.5
+        straight = (op.maximum(deck * BRIDGE_PIER_LENGTH, width * 1.02) - width) * 0.5
 
         def place(point: Value, row: Value) -> Value:
             y = op.component(point, "Y") * width + op.component(point, "Z") * straight
@@ -43,7 +41,7 @@ def _build(tree: Tree) -> None:
         body = loft(tree, lambda number: op.choose(number, outline), len(outline), 2, place)
     with tree.frame("Bearings"):
         beside = op.minimum(deck * (0.25 * sum(WEB)), straight)
-        size = op.vector(tree, op.minimum(width * 0.8, 0.6), 0.5, BEARING + 0.02)
-        pads = [box(tree, size, op.vector(tree, 0.0, beside * side, -BEARING / 2)) for side in (1.0, -1.0)]
+        size = op.vector(tree, op.minimum(width * 0.8, 0.6), 0.5, BRIDGE_BEARING + 0.02)
+        pads = [box(tree, size, op.vector(tree, 0.0, beside * side, -BRIDGE_BEARING / 2)) for side in (1.0, -1.0)]
     tree.output("Body", painted(body, concrete), description="The pier, from z = -1 to 0")
     tree.output("Bearings", painted(op.join(*pads), steel), description="The bearings")

@@ -24,6 +24,7 @@ from typing import Any
 
 import bpy
 
+from ...core.turns import pause
 from .layout import arrange
 
 KEY = "synthroads_key"
@@ -270,6 +271,7 @@ class Tree:
             self.group.links.new(value.source(), socket)
 
     def _new(self, kind: str) -> bpy.types.Node:
+        pause()  # a large group takes a second: each node updates the whole tree
         raw = self.group.nodes.new(kind)
         raw.parent = self._frame
         return raw

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import bpy
 
 from ...core.cloud.labels import class_id
+from ...core.parameters.body_shapes import CONCRETE_FLANKS, CONCRETE_TIP
 from . import operations as op
 from .backbone import first_station, last_station
 from .builder import Tree, Value, node_group
@@ -14,16 +15,8 @@ from .foot import foot_at
 from .solids import loft
 from .strip import INSTANCES
 
-# One flank from the foot to the top, as shares of half the foot's width and of the height (EN 1317 barriers of
-# 0.54 m x 0.90 m and 0.60 m x 0.81 m).
-_FLANKS = {
-    "step": [(1.0, 0.0), (0.945, 0.275), (0.70, 0.29), (0.445, 0.972), (0.40, 1.0)],
-    "new_jersey": [(1.0, 0.0), (1.0, 0.095), (0.44, 0.41), (0.31, 0.972), (0.265, 1.0)],
-}
 BURIED = 0.1
 """Depth of the foot below the surface, m."""
-TIP = 0.08
-"""Height at which a ramped end breaks off, m."""
 
 
 def concrete_barrier_group() -> bpy.types.NodeTree:
@@ -33,7 +26,7 @@ def concrete_barrier_group() -> bpy.types.NodeTree:
 
 def _outline(profile: str) -> list[tuple[float, float, float]]:
     """Return a profile, clockwise as seen along the road: x to the left, y 0, z; the two buried points have z = -1."""
-    left = [(1.0, -1.0), *_FLANKS[profile]]
+    left = [(1.0, -1.0), *CONCRETE_FLANKS[profile]]
     return [(x, 0.0, z) for x, z in left] + [(-x, 0.0, z) for x, z in reversed(left)]
 
 
@@ -88,7 +81,7 @@ def _build(tree: Tree) -> None:
         line = op.store(op.store(line, "left", left), "foot", foot)
         inside = op.minimum(station - barrier.first, barrier.last - station)
         share = op.switch(ramp > 1e-3, 1.0, op.minimum(inside / op.maximum(ramp, 1e-3), 1.0))
-        line = op.store(line, "tall", op.maximum(barrier.height * share, TIP))
+        line = op.store(line, "tall", op.maximum(barrier.height * share, CONCRETE_TIP))
     with tree.frame("Profile swept along the rows"):
         mesh = op.without_degenerate(_swept(tree, line, barrier))
     with tree.frame("Labels"):

@@ -5,20 +5,11 @@ from __future__ import annotations
 import bpy
 
 from ...core.cloud.labels import class_id
+from ...core.parameters.body_shapes import DELINEATOR
 from . import operations as op
 from .builder import Tree, Value, node_group
 from .standing import on_surface, put_on
 
-# Cross-section from above, x away from the road, y along the driver's way: a triangle 0.12 m wide.
-SECTION = [
-    (-0.06, -0.050),
-    (-0.045, -0.055),
-    (0.05, -0.014),
-    (0.06, 0.0),
-    (0.05, 0.014),
-    (-0.045, 0.055),
-    (-0.06, 0.05),
-]
 _SLANT = 0.6
 """Rise of the top and of the black band away from the road, m/m."""
 # Rows of the body from below: z on the axis; the slant applies above the surface only.
@@ -67,16 +58,16 @@ def _set_material(mesh: Value, material: Value, selection: Value | bool = True) 
 
 def _body(tree: Tree, white: Value, black: Value) -> Value:
     rows = len(_LEVELS)
-    mesh, column, row = op.grid(tree, len(SECTION) + 1, rows)
-    section = op.choose(column, [(x, y, 0.0) for x, y in (*SECTION, SECTION[0])])
+    mesh, column, row = op.grid(tree, len(DELINEATOR) + 1, rows)
+    section = op.choose(column, [(x, y, 0.0) for x, y in (*DELINEATOR, DELINEATOR[0])])
     level = op.component(op.choose(row, [(0.0, 0.0, z) for z in _LEVELS]), "Z")
     slant = op.switch(row > 1, 0.0, op.component(section, "X") * _SLANT)
     mesh = op.set_position(mesh, section + op.vector(tree, 0.0, 0.0, level + slant))
     # Faces of a grid run column by column, rows - 1 of them each.
     banded = (op.index(tree) % (rows - 1)).equals(_BAND)
     mesh = _set_material(_set_material(mesh, white), black, banded)
-    lid = tree.node("GeometryNodeMeshCircle", vertices=len(SECTION), fill_type="NGON").value
-    outline = op.choose(op.index(tree), [(x, y, _LEVELS[-1] + _SLANT * x) for x, y in SECTION])
+    lid = tree.node("GeometryNodeMeshCircle", vertices=len(DELINEATOR), fill_type="NGON").value
+    outline = op.choose(op.index(tree), [(x, y, _LEVELS[-1] + _SLANT * x) for x, y in DELINEATOR])
     return op.join(mesh, _set_material(op.set_position(lid, outline), white))
 
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import bpy
 
 from ...core.cloud.labels import class_id
+from ...core.parameters.body_shapes import GANTRY_BOARD, GANTRY_DISPLAY, GANTRY_HANGER, GANTRY_OVERHANG
 from . import operations as op
 from .backbone import height_on
 from .builder import Tree, Value, node_group
@@ -18,12 +19,6 @@ from .gantry_post import gantry_post_group
 from .solids import box, moved, painted, put, row_of_points
 from .strip import INSTANCES
 
-HANGER = 0.18
-"""Distance between beam and boards, m."""
-BOARD, DISPLAY = 0.05, 0.28
-"""Depth of a painted board and of a display, m."""
-_OVERHANG = 0.3
-"""Share of what a board is higher than the beam that hangs below it."""
 _LADDER_FOOT, _RUNG = 2.3, 0.3  # m
 _ENCLOSED = 0.02
 """The posts at the ends of the beam enclose it by so much, m."""
@@ -128,7 +123,7 @@ def _build(tree: Tree) -> None:
 
 def _thickness(signs: Value) -> Value:
     """Return the depth of a sign's body (a field on the signs' points)."""
-    return op.switch(op.named(signs.tree, "display", "INT").equals(1), BOARD, DISPLAY)
+    return op.switch(op.named(signs.tree, "display", "INT").equals(1), GANTRY_BOARD, GANTRY_DISPLAY)
 
 
 def _levels(tree: Tree, gantry: _Gantry, signs: Value, road: Value) -> tuple[Value, Value]:
@@ -138,14 +133,14 @@ def _levels(tree: Tree, gantry: _Gantry, signs: Value, road: Value) -> tuple[Val
         return tree.node("GeometryNodeAttributeStatistic", signs, attribute=value, data_type="FLOAT")["Max"]
 
     reach = op.maximum(op.unary("ABSOLUTE", gantry.left), op.unary("ABSOLUTE", gantry.right)) + 10.0
-    beyond = _thickness(signs) + HANGER
+    beyond = _thickness(signs) + GANTRY_HANGER
     front, rear = (
         gantry.depth * 0.5 + op.maximum(most(op.switch(op.named(tree, "facing") * side > 0.0, 0.0, beyond)), 0.0)
         for side in (1.0, -1.0)
     )
     below = highest_below(pavement_near(road, reach), -gantry.left, -gantry.right, (-front, rear))
     low = below + gantry.clearance
-    return low, low + op.maximum(most(op.named(tree, "height")) - gantry.height, 0.0) * _OVERHANG
+    return low, low + op.maximum(most(op.named(tree, "height")) - gantry.height, 0.0) * GANTRY_OVERHANG
 
 
 def _posts(tree: Tree, gantry: _Gantry, surfaces: tuple[Value, Value], bottom: Value) -> Value:
@@ -199,7 +194,7 @@ def _placed(tree: Tree, gantry: _Gantry, signs: Value, low: Value, bottom: Value
     z = op.switch(behind, low + tall * 0.5, bottom + gantry.height * 0.5)
     thickness = _thickness(signs)
     signs = op.store(signs, "thickness", thickness)
-    y = op.named(tree, "facing") * -1.0 * (gantry.depth * 0.5 + HANGER + thickness)
+    y = op.named(tree, "facing") * -1.0 * (gantry.depth * 0.5 + GANTRY_HANGER + thickness)
     signs = op.set_position(signs, op.vector(tree, op.component(op.position(tree), "X"), y, z))
     return op.store(signs, "level", bottom + gantry.height * 0.5 - z)
 
@@ -217,11 +212,11 @@ def _boards(tree: Tree, gantry: _Gantry, signs: Value) -> tuple[Value, Value]:
     hangers = []
     for side in (-1.0, 1.0):
         x = wide * (0.32 * side)
-        back = op.named(tree, "facing") * (thick + HANGER / 2)
-        upright = op.vector(tree, 0.1, HANGER + 0.01, op.maximum(tall - 0.2, tall * 0.5))
+        back = op.named(tree, "facing") * (thick + GANTRY_HANGER / 2)
+        upright = op.vector(tree, 0.1, GANTRY_HANGER + 0.01, op.maximum(tall - 0.2, tall * 0.5))
         hangers.append(put(signs, box(tree, 1.0), op.position(tree) + op.vector(tree, x, back), upright, facing))
         # A clamp that reaches into the beam.
-        inwards = op.named(tree, "facing") * (thick + HANGER + gantry.depth * 0.1)
+        inwards = op.named(tree, "facing") * (thick + GANTRY_HANGER + gantry.depth * 0.1)
         clamp = op.vector(tree, 0.16, gantry.depth * 0.3 + 0.05, gantry.height * 0.3)
         place = op.position(tree) + op.vector(tree, x, inwards, op.named(tree, "level"))
         hangers.append(put(signs, box(tree, 1.0), place, clamp, facing))

@@ -7,31 +7,30 @@ from dataclasses import dataclass
 import bpy
 
 from ...core.cloud.labels import class_id
+from ...core.parameters.body_shapes import (
+    GUARDRAIL_BEAM,
+    GUARDRAIL_LOWEST_POST,
+    GUARDRAIL_POST,
+    GUARDRAIL_POST_TOP,
+    GUARDRAIL_TIP,
+)
 from . import operations as op
 from .backbone import first_station, height_on, last_station, look_up, raised, station_ribbon
 from .builder import Operand, Tree, Value, node_group
 from .strip import INSTANCES
 
-# The A profile of 0.31 m as a polyline (m): depth towards traffic, 0, height under the top edge.
-_SHEET = [
-    (0.010, 0.000), (0.040, -0.006), (0.074, -0.030), (0.081, -0.052), (0.074, -0.080), (0.012, -0.124),
-    (0.003, -0.140), (0.003, -0.170), (0.012, -0.186), (0.074, -0.230), (0.081, -0.258), (0.074, -0.280),
-    (0.040, -0.304), (0.010, -0.310),
-]  # fmt: skip
 _THICKNESS = 0.003
-BEAM_PROFILE = [(x, 0.0, z) for x, z in _SHEET] + [(x - _THICKNESS, 0.0, z) for x, z in reversed(_SHEET)]
+BEAM_PROFILE = [(x, 0.0, z) for x, z in GUARDRAIL_BEAM]
+BEAM_PROFILE += [(x - _THICKNESS, 0.0, z) for x, z in reversed(GUARDRAIL_BEAM)]
 BEAM_PROFILE.append(BEAM_PROFILE[0])
 
-# A post of 100 x 55 mm: across the road, along it.
-_POST = [(0.05, -0.010), (0.05, 0.0275), (-0.05, 0.0275), (-0.05, -0.0275), (0.05, -0.0275)]
-POST_DEPTH = 0.05
+# Across the road, along it; open at its back.
+_HALF, _SIDE = GUARDRAIL_POST[0] / 2, GUARDRAIL_POST[1] / 2
+_POST = [(_HALF, -0.010), (_HALF, _SIDE), (-_HALF, _SIDE), (-_HALF, -_SIDE), (_HALF, -_SIDE)]
+POST_DEPTH = _HALF
 """From a post's axis to the back of a beam that is bolted to it, m."""
 BURIED = 0.35
 """Depth to which posts are modelled below the surface, m."""
-TIP = -0.02
-"""Top of the beam at its very ends above the surface, m."""
-_POST_TOP = 0.03
-_LOWEST_POST = 0.15
 
 
 def guardrail_group() -> bpy.types.NodeTree:
@@ -62,7 +61,7 @@ class Rail:
         """Return the height of the beam's top edge above the surface."""
         inside = op.minimum(station - self.first, self.last - station) / op.maximum(ramp, 1e-3)
         share = op.switch(ramp > 1e-3, 1.0, op.minimum(inside, 1.0))
-        return self.height * share + TIP * (1.0 - share)
+        return self.height * share + GUARDRAIL_TIP * (1.0 - share)
 
     def foot_at(self, station: Value, ribbon: Value, surfaces: tuple[Value, Value]) -> tuple[Value, Value]:
         """Return the point on the surface under the posts' axis, and the vector to the left."""
@@ -128,7 +127,7 @@ def _build(tree: Tree) -> None:
         posts = op.delete_points(posts, beyond | (station < begin))
         foot, left = rail.foot_at(station, ribbon, surfaces)
         posts = op.set_position(op.store(posts, "left", left), foot)
-        posts = op.delete_points(posts, op.named(tree, "tall") < _LOWEST_POST)
+        posts = op.delete_points(posts, op.named(tree, "tall") < GUARDRAIL_LOWEST_POST)
         parts += _instances(tree, posts, rail.spacer, rail.beams)
     with tree.frame("Labels"):
         mesh = op.label(op.realize(op.join(*parts)), class_id("guardrail"), instance, material)
@@ -185,7 +184,7 @@ def _instances(tree: Tree, posts: Value, spacer: Value, beams: dict[float, Value
             "GeometryNodeInstanceOnPoints", points, instance=body, rotation=upright, scale=scale
         ).value
 
-    parts = [on_posts(_post(tree), -BURIED, op.vector(tree, 1.0, 1.0, tall + (BURIED - _POST_TOP)))]
+    parts = [on_posts(_post(tree), -BURIED, op.vector(tree, 1.0, 1.0, tall + (BURIED - GUARDRAIL_POST_TOP)))]
     for side, wanted in beams.items():
         # A little shorter than the gap: faces that coincide with the post's or the beam's have no first hit.
         box = tree.node("GeometryNodeMeshCube", size=(0.96, 0.1, 0.22)).value

@@ -7,14 +7,13 @@ import math
 import bpy
 
 from ...core.cloud.labels import class_id
+from ...core.parameters.body_shapes import KILOMETRE_POST
 from . import operations as op
 from .builder import Tree, node_group
 from .sign_face import declare_face, sign_face_group
 from .sign_posts import sign_posts_group
 from .solids import moved
 from .standing import declare_standing, put_on
-
-_POST = 0.042  # diameter, m
 
 
 def kilometre_board_group() -> bpy.types.NodeTree:
@@ -47,7 +46,7 @@ def _build(tree: Tree) -> None:
             road=standing.road,
             terrain=standing.terrain,
             top=middle,
-            post_diameter=_POST,
+            post_diameter=KILOMETRE_POST,
             material=material,
         ).value
     with tree.frame("Labels"):

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import bpy
 
 from ...core.cloud.labels import class_id
+from ...core.parameters.body_shapes import SHORTEST_ELEMENT
 from . import operations as op
 from .backbone import first_station, last_station
 from .builder import Tree, Value, node_group
@@ -22,8 +23,6 @@ BURIED = 0.4
 """Depth of posts and plinths below the surface, m."""
 _PLINTH_SHARE, _HIGHEST_PLINTH = 0.25, 0.5
 _PLAY = 0.005  # m, between a panel and a post
-_SHORTEST_BAY = 0.1
-"""A rest of this share of the posts' spacing makes the last bay longer instead of one more bay."""
 
 
 def noise_barrier_group() -> bpy.types.NodeTree:
@@ -76,7 +75,7 @@ def _build(tree: Tree) -> None:
         axis = op.object_geometry(backbone)
         surfaces = op.object_geometry(road), op.object_geometry(terrain)
     with tree.frame("Number of bays"):
-        count = op.rounded_up(op.maximum((wall.last - wall.first) / wall.spacing - _SHORTEST_BAY, 1.0))
+        count = op.rounded_up(op.maximum((wall.last - wall.first) / wall.spacing - SHORTEST_ELEMENT, 1.0))
     with tree.frame("Posts"):
         posts = _posts(tree, wall, count, axis, surfaces)
         posts = painted(op.realize(posts), steel)

@@ -7,9 +7,10 @@ from dataclasses import dataclass
 import bpy
 
 from ...core.cloud.labels import class_id
+from ...core.parameters.body_shapes import BRIDGE_BEARING, BRIDGE_BURIED, BRIDGE_SEAT
 from . import operations as op
 from .backbone import height_on
-from .bridge_abutment import BEARING, SEAT, bridge_abutment_group
+from .bridge_abutment import bridge_abutment_group
 from .bridge_deck import EDGE, bridge_deck_group
 from .bridge_embankment import bridge_embankment_group
 from .bridge_pier import bridge_pier_group
@@ -20,8 +21,6 @@ from .strip import INSTANCES
 
 _WINGS = (3.0, 12.0)
 """Shortest and longest wing walls, m."""
-_BURIED = 0.8
-"""Depth of walls and piers below the ground, m."""
 
 
 def overpass_group() -> bpy.types.NodeTree:
@@ -131,8 +130,8 @@ def _deck(bridge: _Bridge, low: Value, wings: dict[float, Value]) -> Value:
     left, right = bridge.faces[-1.0], bridge.faces[1.0]
     deck = bridge.tree.call(
         bridge_deck_group(),
-        deck_start=left - SEAT,
-        deck_end=right + SEAT,
+        deck_start=left - BRIDGE_SEAT,
+        deck_end=right + BRIDGE_SEAT,
         start=left - wings[-1.0],
         end=right + wings[1.0],
         width=bridge.width,
@@ -152,7 +151,7 @@ def _abutment(bridge: _Bridge, low: Value, feet: dict[float, Value], wings: dict
         bridge_abutment_group(),
         width=bridge.width,
         thickness=bridge.thickness,
-        foot=feet[side] - low - _BURIED,
+        foot=feet[side] - low - BRIDGE_BURIED,
         wing_length=wings[side],
         concrete_material=bridge.materials["Concrete"],
         steel_material=bridge.materials["Steel"],
@@ -173,9 +172,10 @@ def _piers(bridge: _Bridge, points: Value, surfaces: tuple[Value, Value], shear:
     )
     x = op.component(op.position(tree), "X")
     plan = op.vector(tree, x, x * shear)
-    points = op.store(points, "foot", height_on(*surfaces, plan) - _BURIED)
-    tall = low - BEARING - op.named(tree, "foot")
-    bodies = put(points, pier["Body"], plan + op.vector(tree, 0.0, 0.0, low - BEARING), op.vector(tree, 1.0, 1.0, tall))
+    points = op.store(points, "foot", height_on(*surfaces, plan) - BRIDGE_BURIED)
+    tall = low - BRIDGE_BEARING - op.named(tree, "foot")
+    top = plan + op.vector(tree, 0.0, 0.0, low - BRIDGE_BEARING)
+    bodies = put(points, pier["Body"], top, op.vector(tree, 1.0, 1.0, tall))
     return op.realize(op.join(bodies, put(points, pier["Bearings"], plan + op.vector(tree, 0.0, 0.0, low))))
 
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import bpy
 
 from ...core.cloud.labels import class_id
+from ...core.parameters.body_shapes import SIGN_RAIL
 from . import operations as op
 from .builder import Tree, Value, node_group
 from .sign_face import declare_face, sign_face_group
@@ -25,8 +26,6 @@ _BEHIND = {
     "octagon": (0.93, 1.0, 0.6),
     "arrow": (0.9, 1.0, 0.7),
 }
-RAIL = 0.04
-"""Depth of the rails between face and posts, m."""
 _RAIL_SPACING = 0.9  # m
 _PLAY = 0.0005  # m between rails and what is before and behind them
 _CLAMP = (0.006, 0.05)  # m beyond the post, and in height
@@ -72,7 +71,7 @@ def _build(tree: Tree) -> None:
         top, spread, long = (op.component(behind, axis) for axis in "XYZ")
     with tree.frame("Face, in front of the posts"):
         plate = tree.call(sign_face_group(), instance=standing.instance, **face).value
-        front = (sign.diameter * 0.5 + face["thickness"] + RAIL) * -1.0
+        front = (sign.diameter * 0.5 + face["thickness"] + SIGN_RAIL) * -1.0
         plate = moved(plate, op.vector(tree, 0.0, front, sign.lower_edge + face["height"] * 0.5))
     mounting = _mounting(tree, sign, spread, long)
     with tree.frame("Put onto the points"):
@@ -106,8 +105,8 @@ def _mounting(tree: Tree, sign: _Sign, spread: Value, long: Value) -> Value:
             return sign.lower_edge + face["height"] * spread * ((number + 0.5) / count)
 
         # A little less deep than the gap: faces that coincide with the plate's have no first hit.
-        bar = box(tree, op.vector(tree, face["width"] * long, RAIL - 2.0 * _PLAY, RAIL))
-        depth = (sign.diameter + RAIL) * -0.5
+        bar = box(tree, op.vector(tree, face["width"] * long, SIGN_RAIL - 2.0 * _PLAY, SIGN_RAIL))
+        depth = (sign.diameter + SIGN_RAIL) * -0.5
         rails = put(row_of_points(tree, count), bar, op.vector(tree, 0.0, depth, level(op.index(tree))))
     with tree.frame("Clamps around the posts"):
         radius, height = sign.diameter * 0.5 + _CLAMP[0], _CLAMP[1]

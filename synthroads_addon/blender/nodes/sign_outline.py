@@ -2,24 +2,12 @@
 
 from __future__ import annotations
 
-import math
-
 import bpy
 
+from ...core.parameters.body_shapes import SIGN_OUTLINES
 from . import operations as op
 from .builder import Tree, Value, node_group
 
-# Corners anticlockwise, in shares of the width and the height around the middle.
-_OCTAGON = math.tan(math.pi / 8.0) / 2.0
-_CORNERS: dict[str, list[tuple[float, float]]] = {
-    "rectangle": [(0.5, 0.5), (-0.5, 0.5), (-0.5, -0.5), (0.5, -0.5)],
-    "triangle": [(0.0, 0.5), (-0.5, -0.5), (0.5, -0.5)],
-    "octagon": [
-        (0.5, _OCTAGON), (_OCTAGON, 0.5), (-_OCTAGON, 0.5), (-0.5, _OCTAGON),
-        (-0.5, -_OCTAGON), (-_OCTAGON, -0.5), (_OCTAGON, -0.5), (0.5, -_OCTAGON),
-    ],
-    "arrow": [(0.5, 0.0), (0.3, 0.5), (-0.5, 0.5), (-0.5, -0.5), (0.3, -0.5)],
-}  # fmt: skip
 SHAPES = ("round", "triangle", "rectangle", "octagon", "arrow")
 """Shapes by their number in the group's input."""
 _STEPS, _ROUND_STEPS = 5, 13
@@ -83,19 +71,19 @@ def _directions(tree: Tree, before: Value, after: Value, share: Value) -> tuple[
 
 
 def _table() -> list[tuple[float, float, float]]:
-    return [(x, y, 0.0) for corners in _CORNERS.values() for x, y in corners]
+    return [(x, y, 0.0) for corners in SIGN_OUTLINES.values() for x, y in corners]
 
 
 def _of_shape(tree: Tree, shape: Value) -> tuple[Value, Value, Value]:
     """Return where the shape's corners start in the table, their number, and the number of points on each."""
     starts, total = {}, 0
-    for name, corners in _CORNERS.items():
+    for name, corners in SIGN_OUTLINES.items():
         starts[name], total = total, total + len(corners)
     rows = []
     for name in SHAPES:
         outline = "rectangle" if name == "round" else name
         points = _ROUND_STEPS if name == "round" else _STEPS
-        rows.append((float(starts[outline]), float(len(_CORNERS[outline])), float(points)))
+        rows.append((float(starts[outline]), float(len(SIGN_OUTLINES[outline])), float(points)))
     row = op.choose(shape, rows)
     start, count, steps = (op.rounded_up(op.component(row, axis)) for axis in "XYZ")
     return start, count, steps

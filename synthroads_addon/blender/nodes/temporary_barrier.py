@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import bpy
 
 from ...core.cloud.labels import class_id
+from ...core.parameters.body_shapes import SHORTEST_ELEMENT, TEMPORARY_FLANKS, TEMPORARY_GAP
 from . import operations as op
 from .backbone import first_station, last_station
 from .builder import Tree, Value, node_group
@@ -14,14 +15,8 @@ from .foot import foot_at
 from .solids import box, loft, painted, put
 from .strip import INSTANCES
 
-# One flank from the foot to the top, as shares of half the foot's width and of the height.
-_STEEL = [(1.0, -0.02), (1.0, 0.05), (0.5, 0.17), (0.3, 0.3), (0.3, 0.62), (0.5, 0.72), (0.5, 0.92), (0.36, 1.0)]
-_PLASTIC = [(1.0, -0.02), (1.0, 0.16), (0.66, 0.4), (0.58, 0.62), (0.62, 0.66), (0.62, 0.78), (0.55, 0.82), (0.45, 1.0)]
-GAP = 0.03
-"""Gap between two elements, m."""
+_STEEL, _PLASTIC = TEMPORARY_FLANKS["steel"], TEMPORARY_FLANKS["plastic"]
 _REFLECTOR = (0.12, 0.02, 0.06)
-_SHORTEST = 0.1
-"""A rest of this share of an element makes the last one longer instead of one more."""
 
 
 def temporary_barrier_group() -> bpy.types.NodeTree:
@@ -96,12 +91,12 @@ def _build(tree: Tree) -> None:
 
 def _elements(tree: Tree, barrier: _Barrier, begin: Value, end: Value) -> Value:
     """Return one point per element with its number and the stations that it lies between."""
-    whole = (barrier.last - barrier.first) / barrier.length - _SHORTEST
+    whole = (barrier.last - barrier.first) / barrier.length - SHORTEST_ELEMENT
     count = op.rounded_up(op.maximum(whole, 1.0))
     points = op.store(tree.node("GeometryNodeMeshLine", count=count).value, "number", op.index(tree))
     start = barrier.first + op.index(tree) * barrier.length
     stop = op.switch(op.index(tree) < count - 1, barrier.last, start + barrier.length)
-    for name, station in {"from": start + GAP / 2, "to": stop - GAP / 2}.items():
+    for name, station in {"from": start + TEMPORARY_GAP / 2, "to": stop - TEMPORARY_GAP / 2}.items():
         points = op.store(points, name, op.minimum(op.maximum(station, begin), end))
     return op.delete_points(points, op.named(tree, "to") - op.named(tree, "from") < 0.05)
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import bpy
 
 from ...core.cloud.labels import class_id
+from ...core.parameters.body_shapes import TRAFFIC_LIGHT_POST
 from . import operations as op
 from .builder import Tree, Value, node_group
 from .solids import box, loft, moved, painted, put, row_of_points
@@ -19,7 +20,6 @@ _CHAMBER = (1.3, 0.7, 1.25)
 _BOARD_WIDTH = 1.9
 _MARGIN = 0.05  # m of the board above and below the housing
 _RIM = 0.018  # m of white around the board
-_POST = 0.089  # diameter, m
 _VISOR_STEPS = 9
 _VISOR_THICKNESS = 0.004  # m
 
@@ -73,7 +73,7 @@ def _build(tree: Tree) -> None:
 
     with tree.frame("Post"):
         tall = light.height + (BURIED - 0.03)
-        parts = [painted(moved(tube(tree, _POST / 2, tall), (0.0, 0.0, -BURIED)), light.steel)]
+        parts = [painted(moved(tube(tree, TRAFFIC_LIGHT_POST / 2, tall), (0.0, 0.0, -BURIED)), light.steel)]
     with tree.frame("Board with its rim, and housing"):
         parts += _housing(tree, light)
     with tree.frame("Lights by their number from above: red, yellow, green, yellow"):
@@ -90,13 +90,13 @@ def _build(tree: Tree) -> None:
 
 def _front(light: _Light) -> Value:
     """Return the y of the housing's front."""
-    return light.diameter * -_CHAMBER[1] - (_POST / 2 + 0.01)
+    return light.diameter * -_CHAMBER[1] - (TRAFFIC_LIGHT_POST / 2 + 0.01)
 
 
 def _housing(tree: Tree, light: _Light) -> list[Value]:
     tall = light.diameter * _CHAMBER[2] * light.count
     middle = light.height - _MARGIN - tall * 0.5
-    wide, back = light.diameter * _BOARD_WIDTH, -_POST / 2 - 0.005
+    wide, back = light.diameter * _BOARD_WIDTH, -TRAFFIC_LIGHT_POST / 2 - 0.005
     rim = box(tree, op.vector(tree, wide, 0.004, tall + 2 * _MARGIN), op.vector(tree, 0.0, back, middle))
     size = op.vector(tree, wide - 2 * _RIM, 0.008, tall + 2 * (_MARGIN - _RIM))
     board = box(tree, size, op.vector(tree, 0.0, back - 0.001, middle))

@@ -11,9 +11,10 @@ import numpy as np
 from mathutils import Vector
 
 from ...core.errors import InputError
-from ...core.parameters.assets import LibraryAsset, read_asset_library
+from ...core.parameters.assets import LibraryAsset, library_file, read_asset_library
 from ...core.parameters.model import Asset
 from ...core.parameters.surface import surface_elevation
+from ...core.turns import by_caller
 from ..meshes import on_plan
 from ..model_builder import ModelBuilder
 from ..scene_labels import CLASS_PROPERTY, INSTANCE_PROPERTY
@@ -29,7 +30,7 @@ def build_assets(builder: ModelBuilder) -> None:
         MissingFileError, InputError: a library or an asset's file is missing or cannot be read.
     """
     for name, item in builder.parameters.of_type(Asset).items():
-        library = Path(item.library)
+        library = library_file(item.library)
         asset = read_asset_library(library).assets.get(item.name)
         if asset is None:
             raise InputError(f"objects.{name}.name", item.name, f"the library {library} has no such asset")
@@ -57,7 +58,7 @@ def _collection(path: Path, asset: LibraryAsset) -> bpy.types.Collection:
             return existing
     read = {".blend": _read_blend, ".glb": _read_glb, ".obj": _read_obj}[path.suffix.lower()]
     try:
-        objects = read(path, asset.object)
+        objects = by_caller(lambda: read(path, asset.object))  # importers need Blender's main thread
     except (OSError, RuntimeError) as error:
         raise InputError(str(path), None, f"cannot be read as an asset ({str(error).splitlines()[0]})") from None
     if not objects:

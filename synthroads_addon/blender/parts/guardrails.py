@@ -4,13 +4,11 @@ from __future__ import annotations
 
 import bpy
 
+from ...core.parameters.body_shapes import GUARDRAIL_SPACER
 from ...core.parameters.model import Guardrail
 from ..materials import material
 from ..model_builder import ModelBuilder
 from ..nodes.guardrail import guardrail_group
-
-_SPACER = {"left": 0.07, "right": 0.07, "both": 0.20}
-"""Distance between posts and beam, m: a single rail's face stands 0.2 m from the posts' axis."""
 
 
 def build_guardrails(builder: ModelBuilder) -> None:
@@ -23,7 +21,7 @@ def build_guardrails(builder: ModelBuilder) -> None:
             "Offset": rail.offset,
             "Left Beam": rail.faces in ("left", "both"),
             "Right Beam": rail.faces in ("right", "both"),
-            "Spacer": _SPACER[rail.faces],
+            "Spacer": GUARDRAIL_SPACER[rail.faces],
             "Height": rail.height,
             "Post Spacing": rail.post_spacing,
             "Terminal Length": rail.terminal_length,

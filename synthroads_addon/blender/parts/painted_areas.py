@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from itertools import pairwise
 
 import bpy
 import numpy as np
 from numpy.typing import NDArray
 
 from ...core.parameters.model import Arrow, Hatching
-from ...core.parameters.painted_areas import arrow_outlines, hatching_outlines
+from ...core.parameters.painted_areas import arrow_outlines, hatching_outlines, pieces
+from ...core.turns import aside
 from ..materials import material
 from ..meshes import attribute, fill_polygons, signed
 from ..model_builder import ModelBuilder
@@ -22,7 +22,7 @@ _LONGEST = 1.0
 
 def build_painted_areas(builder: ModelBuilder) -> None:
     """Make all painted areas as one object."""
-    outlines = list(_outlines(builder))
+    outlines = aside(lambda: list(_outlines(builder)))
     if not outlines:
         return
     polygons = [polygon for polygon, _ in outlines]
@@ -57,24 +57,5 @@ def _outlines(builder: ModelBuilder) -> Iterator[tuple[NDArray[np.float64], Hatc
 def _pieces(outline: NDArray[np.float64], start: float, end: float) -> Iterator[NDArray[np.float64]]:
     """Cut a convex outline (K, 2) across the road into pieces between two stations that are short along it."""
     low, high = max(outline[:, 0].min(), start), min(outline[:, 0].max(), end)
-    if low >= high:
-        return
-    cuts = np.linspace(low, high, int(np.ceil((high - low) / _LONGEST)) + 1)
-    for first, last in pairwise(cuts):
-        piece = _clipped(_clipped(outline, first, 1.0), last, -1.0)
-        if len(piece) > 2:
-            yield piece
-
-
-def _clipped(outline: NDArray[np.float64], station: float, keep: float) -> NDArray[np.float64]:
-    """Return the part of a convex outline beyond (``keep`` 1) or before (-1) a station."""
-    inside = (outline[:, 0] - station) * keep >= 0.0
-    corners = []
-    for i, corner in enumerate(outline):
-        previous = outline[i - 1]
-        if inside[i] != inside[i - 1]:
-            share = (station - previous[0]) / (corner[0] - previous[0])
-            corners.append(previous + share * (corner - previous))
-        if inside[i]:
-            corners.append(corner)
-    return np.array(corners)
+    if low < high:
+        yield from pieces(outline, np.linspace(low, high, int(np.ceil((high - low) / _LONGEST)) + 1))

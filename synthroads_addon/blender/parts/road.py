@@ -8,6 +8,7 @@ import bpy
 import numpy as np
 
 from ...core.parameters.tessellation import sample_stations
+from ...core.turns import aside
 from ..materials import material
 from ..meshes import attribute, backbone_mesh, fill
 from ..model_builder import ModelBuilder
@@ -19,13 +20,14 @@ _MATERIALS = {"Marking": "paint_white", "Yellow Marking": "paint_yellow", "Verge
 
 def build_surface(builder: ModelBuilder) -> None:
     """Make the backbone and the road's surface."""
-    station = sample_stations(builder.geometry, builder.tolerance, *builder.stretch)
+    station = aside(lambda: sample_stations(builder.geometry, builder.tolerance, *builder.stretch))
     builder.add("Backbone", backbone_mesh(builder.geometry, station, builder.origin), support=True)
     inputs: dict[str, Any] = {"Backbone": builder.objects["Backbone"]}
     inputs |= {f"{name} Material": material(entry) for name, entry in _MATERIALS.items()}
     for side, section in builder.geometry.sections.items():
         inputs[f"{side.title()} Pavement Material"] = material(section.carriageway.pavement.kind)
-    for name, (share, depth) in detail_points(builder.geometry, station, builder.tolerance).items():
+    details = aside(lambda: detail_points(builder.geometry, station, builder.tolerance))
+    for name, (share, depth) in details.items():
         mesh = bpy.data.meshes.new("SR Detail")
         fill(mesh, np.column_stack([share, depth, 0.0 * share]))
         attribute(mesh, "share", share)

@@ -4,13 +4,11 @@ from __future__ import annotations
 
 import bpy
 
+from ...core.parameters.body_shapes import LONGEST_PLASTIC
 from ...core.parameters.model import TemporaryBarrier
 from ..materials import material
 from ..model_builder import ModelBuilder
 from ..nodes.temporary_barrier import temporary_barrier_group
-
-LONGEST_PLASTIC = 2.5
-"""Elements up to this length (m) are of plastic, by turns red and white; longer ones are of steel."""
 
 
 def build_temporary_barriers(builder: ModelBuilder) -> None:

@@ -18,7 +18,7 @@ from .labels import ClassScheme, class_scheme
 from .points import PointBlock, concatenate
 from .previews import CrossSection, TopView
 from .quantiles import IntensityMapping, steps_per_unit
-from .reading import CloudReader, open_cloud
+from .reading import BLOCK, CloudReader, open_cloud
 from .writing import CloudWriter, check_ending, open_writer
 
 PREVIEWS = ("preview_class.png", "preview_intensity.png", "preview_rgb.png", "preview_section.png")
@@ -26,12 +26,18 @@ PREVIEWS = ("preview_class.png", "preview_intensity.png", "preview_rgb.png", "pr
 
 
 def convert(
-    source: Path, output: Path, classes: str | None = None, overwrite: bool = False, progress: Progress = silent
+    source: Path,
+    output: Path,
+    classes: str | None = None,
+    overwrite: bool = False,
+    progress: Progress = silent,
+    block: int = BLOCK,
 ) -> dict[str, Any]:
     """Write a cloud in the format of another ending, or with merged classes; return what was done as JSON data.
 
     Args:
         classes: scheme for `class_scheme`; the cloud's own if None.
+        block: points that are read at a time; the output doesn't depend on it.
 
     Raises:
         InputError: a file can't be read, or the scheme is unknown or doesn't suit the cloud.
@@ -41,22 +47,29 @@ def convert(
     with open_cloud(source) as cloud:
         scheme = _scheme_of(cloud, classes)
         with _writer_like(cloud, output, scheme) as writer:
-            for block in _watched(cloud.blocks(), cloud.header.count, progress, "convert"):
-                writer.write(block)
+            for points in _watched(cloud.blocks(block), cloud.header.count, progress, "convert"):
+                writer.write(points)
         return _done(cloud, writer)
 
 
 def subsample(
-    source: Path, output: Path, cell: float, overwrite: bool = False, progress: Progress = silent
+    source: Path,
+    output: Path,
+    cell: float,
+    classes: str | None = None,
+    overwrite: bool = False,
+    progress: Progress = silent,
+    block: int = BLOCK,
 ) -> dict[str, Any]:
     """Write one point per occupied cell of a cubic grid; see `GridSubsampler` and `convert`."""
     _check_output(source, output, overwrite)
     with open_cloud(source) as cloud, GridSubsampler(cell, output.parent) as grid:
-        for block in _watched(cloud.blocks(), cloud.header.count, progress, "read"):
-            grid.add(block)
-        with _writer_like(cloud, output, _scheme_of(cloud, None)) as writer:
-            for block in grid.blocks():
-                writer.write(block)
+        scheme = _scheme_of(cloud, classes)
+        for points in _watched(cloud.blocks(block), cloud.header.count, progress, "read"):
+            grid.add(points)
+        with _writer_like(cloud, output, scheme) as writer:
+            for points in grid.blocks():
+                writer.write(points)
         return _done(cloud, writer) | {"grid": cell, "points_read": grid.taken}
 
 

@@ -23,6 +23,7 @@ from .site import Site
 Float = NDArray[np.float64]
 
 SUFFIXES = (".blend", ".glb", ".obj")
+LIBRARIES = Path(__file__).parents[2] / "presets" / "assets"
 FARTHEST = 100.0
 """Largest offset of an object, m."""
 
@@ -108,14 +109,24 @@ class AssetLibrary(ScenarioModel):
     )
 
 
-def read_asset_library(path: str | os.PathLike[str]) -> AssetLibrary:
+def library_names() -> list[str]:
+    """Return the names of the built-in libraries."""
+    return sorted(path.parent.name for path in LIBRARIES.glob("*/library.json"))
+
+
+def library_file(name_or_file: str) -> Path:
+    """Return the file of a built-in library, or of one's own."""
+    return LIBRARIES / name_or_file / "library.json" if name_or_file in library_names() else Path(name_or_file)
+
+
+def read_asset_library(name_or_file: str | os.PathLike[str]) -> AssetLibrary:
     """Read a library and see that its assets' files are there; the last ones read are kept until they change.
 
     Raises:
         MissingFileError: the library, or a file that it names, doesn't exist or cannot be read.
         InputError: a field is unknown or wrong.
     """
-    name = os.fspath(path)
+    name = str(library_file(os.fspath(name_or_file)))
     try:
         found = Path(name).stat()
     except OSError as error:

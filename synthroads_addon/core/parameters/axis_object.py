@@ -9,8 +9,36 @@ import numpy as np
 
 from ..road_scenario import RoadScenario
 from ..schema import rounded
-from .axis_fit import fit_axis, read_axis
+from .axis_fit import AxisFit, fit_axis, read_axis
 from .model import AlignmentObject, HorizontalElement, VerticalPoint
+
+_FLATTEST = 1e7
+"""A rounding of a larger radius (m) bends by less than a millimetre over a hundred metres: it is written as a kink."""
+_PLAY = 1e-5  # of a radius: roundings that touch must not overlap once stations and elevations are rounded
+
+
+def alignment_object(fit: AxisFit) -> AlignmentObject:
+    """Return a fitted axis as the alignment of a parameter set, with the instance number 1."""
+    start, heading, _ = fit.alignment.frame(0.0)
+    return AlignmentObject(
+        instance=1,
+        start_x=rounded(float(start[0])),
+        start_y=rounded(float(start[1])),
+        start_heading_deg=rounded(float(np.rad2deg(np.angle(np.exp(1j * heading)))), 12),
+        horizontal=tuple(
+            HorizontalElement.between(rounded(e.length), e.curvature_start, e.curvature_end)
+            for e in fit.alignment.elements
+        ),
+        vertical=tuple(
+            VerticalPoint(station=rounded(p.station), elevation=rounded(p.elevation), radius=_written(p.radius))
+            for p in fit.profile.points
+        ),
+    )
+
+
+def _written(radius: float) -> float:
+    """Return the radius of a rounding as it is written."""
+    return radius * (1.0 - _PLAY) if radius < _FLATTEST else 0.0
 
 
 def fitted_axis(path: Path, scenario: RoadScenario) -> tuple[AlignmentObject, RoadScenario, dict[str, Any]]:
@@ -26,29 +54,14 @@ def fitted_axis(path: Path, scenario: RoadScenario) -> tuple[AlignmentObject, Ro
     points = read_axis(path)
     origin = np.round(points.mean(axis=0))
     fit = fit_axis(points - origin)
-    start, heading, _ = fit.alignment.frame(0.0)
-    horizontal = tuple(
-        HorizontalElement.between(rounded(e.length), e.curvature_start, e.curvature_end) for e in fit.alignment.elements
-    )
-    vertical = tuple(
-        VerticalPoint(station=rounded(p.station), elevation=rounded(p.elevation), radius=p.radius)
-        for p in fit.profile.points
-    )
-    alignment = AlignmentObject(
-        instance=1,
-        start_x=rounded(start[0]),
-        start_y=rounded(start[1]),
-        start_heading_deg=rounded(float(np.rad2deg(heading)), 12),
-        horizontal=horizontal,
-        vertical=vertical,
-    )
+    alignment = alignment_object(fit)
     road = scenario.model_copy(
         update={"length": alignment.length, "map_origin": tuple(float(value) for value in origin)}
     )
     report = {
         "file": path.name,
         "points": fit.points,
-        "elements": len(horizontal),
+        "elements": len(alignment.horizontal),
         "horizontal": {
             "rms": round(fit.rms, 4),
             "p95": round(fit.p95, 4),

@@ -12,6 +12,7 @@ an element, unless the data are exact.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
@@ -265,7 +266,7 @@ def simplified(data: Data, fit: Fit, free_knots: bool, goal: Goal) -> Fit | None
     while len(batch) > 1:
         chain, _ = foresee(data, fit, [edit for _, edit in batch], free_knots, goal)
         trial = _refined(data, fit, chain, free_knots)
-        if goal.score(trial) - present <= 0.5 * sum(change for change, _ in batch):
+        if goal.score(trial) - present <= 0.5 * math.fsum(change for change, _ in batch):
             return trial
         batch = batch[: len(batch) // 2]
     trials = []

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from typing import Any
 
@@ -109,7 +110,7 @@ def _unguarded(road: Road, edges: Edges, index: int, reach: tuple[float, float])
     before, behind = reach if edges.traffic > 0 else reach[::-1]
     spans = road.barriers.spans(between) + _ramps(edges)
     missing = list(gaps(spans, max(body.start - before, 0.0), min(body.end + behind, road.length), BARRIER_GAP))
-    return (sum(end - start for start, end in missing), missing[0][0]) if missing else None
+    return (math.fsum(end - start for start, end in missing), missing[0][0]) if missing else None
 
 
 def _obstacle_barrier(road: Road) -> Iterator[Finding]:

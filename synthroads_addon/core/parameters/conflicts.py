@@ -6,6 +6,7 @@ which there is none.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator
 from functools import lru_cache
 
@@ -232,7 +233,7 @@ def _features(scenario: RoadScenario) -> Iterator[str]:
     if limits.emergency_bays >= 1.0 and not ramps.room_for_bay:
         yield f"turnouts.emergency_bays {narrow}"
     certain = [feature for feature in features_of(scenario, section, ramps) if feature.share >= 1.0]
-    need = sum(feature.least for feature in certain) + TURNOUT_GAP * (len(certain) - 1)
+    need = math.fsum(feature.least for feature in certain) + TURNOUT_GAP * (len(certain) - 1)
     if certain and need > scenario.length:
         fields = " and ".join(f"{_SHARES[feature.kind]} is 1" for feature in certain)
         yield f"{fields}, {need:.0f} m are needed and length is {scenario.length:g} m"

@@ -10,6 +10,9 @@ from .section import CarriagewaySection
 
 Float = NDArray[np.float64]
 
+_SLIVER = 2e-4
+"""Columns of a mesh are at least this share of a strip's width apart: below a millimetre."""
+
 
 def damage_depth(section: CarriagewaySection, station: Float, offset: Float) -> Float:
     """Return the depth (N,) of ruts and potholes at stations and offsets (N,), m; where both are, the deeper one."""
@@ -83,10 +86,16 @@ def damage_columns(section: CarriagewaySection, strip: int, tolerance: float) ->
         shares.append(_shares(section, strip, pothole.station, np.linspace(low, high, cells + 1)))
     together = np.unique(np.concatenate(shares))
     inside = together[(together >= 0.0) & (together <= 1.0)]
-    # Columns closer than a thousandth of the strip would only make slivers.
-    keep = np.append(np.diff(inside) > 1e-3, True)
-    keep[0] = True
-    return inside[keep]
+    return spaced(inside)
+
+
+def spaced(shares: Float) -> Float:
+    """Return sorted shares (K,) of a strip's width, both ends included, without those that only make slivers."""
+    kept = [shares[0]]
+    for share in shares[1:-1].tolist():
+        if min(share - kept[-1], shares[-1] - share) > _SLIVER:
+            kept.append(share)
+    return np.array([*kept, shares[-1]])
 
 
 def _shares(section: CarriagewaySection, strip: int, station: float, distance: Float) -> Float:

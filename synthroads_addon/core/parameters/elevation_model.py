@@ -225,7 +225,9 @@ def read_elevation_model(path: str | os.PathLike[str], epsg: int, corridor: Corr
         import rasterio
         from rasterio.errors import CRSError, RasterioError
     except ImportError as error:
-        raise InputError(name, None, f"an elevation model needs rasterio, which doesn't load here ({error})") from None
+        missing = isinstance(error, ModuleNotFoundError)
+        wanted = "in Blender install the extension SynthRoads Elevation Models" if missing else "it doesn't load here"
+        raise InputError(name, None, f"an elevation model needs rasterio: {wanted} ({error})") from None
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # what it warns of is refused below

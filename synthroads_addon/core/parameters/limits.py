@@ -61,7 +61,7 @@ class StandardCrossSection:
     @property
     def paved_width(self) -> float:
         """Return the width from the inner edge strip to the hard shoulder, m."""
-        return sum(self.lanes) + self.hard_shoulder + self.outer_edge_strip + self.inner_edge_strip
+        return math.fsum(self.lanes) + self.hard_shoulder + self.outer_edge_strip + self.inner_edge_strip
 
 
 STANDARD_CROSS_SECTIONS = {

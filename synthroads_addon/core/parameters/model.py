@@ -8,6 +8,7 @@ positive to the left), slopes in percent, angles in degrees in JSON (`_deg`). Co
 from __future__ import annotations
 
 import builtins
+import math
 import re
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -182,7 +183,7 @@ class AlignmentObject(RoadObject):
     @property
     def length(self) -> float:
         """Return the length of the centreline, m."""
-        return sum(element.length for element in self.horizontal)
+        return math.fsum(element.length for element in self.horizontal)
 
 
 AnyObject = Annotated[

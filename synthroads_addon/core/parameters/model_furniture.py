@@ -209,7 +209,7 @@ class Asset(PointObject):
     """A free asset out of a library file: a .blend, .glb or .obj."""
 
     type: Literal["Asset"] = "Asset"
-    library: str = Field(description="The library's file (JSON), absolute, or relative to the working directory.")
+    library: str = Field(description="Built-in library, or a JSON file, absolute or relative to the working directory.")
     name: str = Field(description="Name of the asset in its library.")
     class_name: str = Field(description="Semantic class of its faces.")
     scale: float = quantity(1.0, gt=0, le=100, unit="1", description="Scale of the asset.")

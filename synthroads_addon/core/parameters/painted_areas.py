@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from itertools import pairwise
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -84,6 +87,28 @@ def arrow_outlines(arrow: Arrow) -> list[Float]:
     rotation = np.column_stack([along, [-along[1], along[0]]])
     parts = [(np.array(part) - (0.5, 0.0)) * arrow.length @ rotation.T for part in ARROWS[arrow.kind]]
     return [_counter_clockwise(part + (arrow.station, arrow.offset)) for part in parts]
+
+
+def pieces(outline: Float, cuts: Float) -> Iterator[Float]:
+    """Yield a convex outline (K, 2) cut across the road into pieces between one station and the next (m)."""
+    for first, last in pairwise(cuts):
+        piece = _clipped(_clipped(outline, first, 1.0), last, -1.0)
+        if len(piece) > 2:
+            yield piece
+
+
+def _clipped(outline: Float, station: float, keep: float) -> Float:
+    """Return the part of a convex outline beyond (``keep`` 1) or before (-1) a station."""
+    inside = (outline[:, 0] - station) * keep >= 0.0
+    corners = []
+    for i, corner in enumerate(outline):
+        previous = outline[i - 1]
+        if inside[i] != inside[i - 1]:
+            share = (station - previous[0]) / (corner[0] - previous[0])
+            corners.append(previous + share * (corner - previous))
+        if inside[i]:
+            corners.append(corner)
+    return np.array(corners).reshape(-1, 2)
 
 
 def _shape(geometry: RoadGeometry, turnout: Turnout) -> tuple[CarriagewaySection, TurnoutShape]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from bisect import bisect_right
 from collections.abc import Iterator
 
@@ -44,7 +45,7 @@ def delineator_stations(elements: tuple[HorizontalElement, ...]) -> NDArray[np.f
     widest_radius, widest = DELINEATOR_SPACING[-1]
     tightest = max(max(abs(e.curvature_start), abs(e.curvature_end)) for e in elements)
     if tightest <= 1.0 / widest_radius:
-        length = sum(e.length for e in elements)
+        length = math.fsum(e.length for e in elements)
         first = min(widest, length) / 2.0
         return first + widest * np.arange(int((length - first) / widest) + 1)
     spacing = _Spacing(elements, widest)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from bisect import bisect_left, bisect_right
 from collections.abc import Iterable
 
@@ -59,7 +60,7 @@ def draw_start(rng: np.random.Generator, ranges: list[Range], length: float) -> 
     rooms = [(start, end - start - length) for start, end in ranges if end - start >= length]
     if not rooms:
         return None
-    left = rng.random() * sum(room for _, room in rooms)
+    left = rng.random() * math.fsum(room for _, room in rooms)
     for start, room in rooms:
         if left <= room:
             return start + left

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ... import version
+from ..generator import generator
 from ..random_streams import stream
 from ..road_scenario import RoadScenario
 from ..schema import rounded
@@ -83,7 +83,7 @@ def sample_road(
             identifier=f"{section}-{scenario.design_class.lower()}-{seed}",
             title=title,
             seed=seed,
-            generator=f"SynthRoads {version()}",
+            generator=generator(),
             referenceSystem=EPSG_URI.format(scenario.epsg),
         ),
         # A given axis has heights of its own.

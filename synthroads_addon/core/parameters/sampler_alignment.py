@@ -80,8 +80,8 @@ class HorizontalSampler:
         self.room = self.length - self.parts[0].length
         while joint := self._joint():
             self.parts += joint
-            self.room -= sum(part.length for part in joint)
-            self.turned += sum(part.length * (part.start + part.end) / 2 for part in joint)
+            self.room -= math.fsum(part.length for part in joint)
+            self.turned += math.fsum(part.length * (part.start + part.end) / 2 for part in joint)
         self._share_out()
         return self._elements()
 
@@ -143,7 +143,7 @@ class HorizontalSampler:
         Every rule for lengths is linear in them, so that what lies between two sets that keep it keeps it as well.
         """
         least, drawn = lengths
-        spare, asked = room - sum(least), sum(drawn) - sum(least)
+        spare, asked = room - math.fsum(least), math.fsum(drawn) - math.fsum(least)
         if spare < 0.0:
             return []
         share = min(1.0, spare / asked) if asked > 0.0 else 0.0
@@ -214,7 +214,7 @@ class HorizontalSampler:
     def _share_out(self) -> None:
         """Give the length that is left to straights and arcs, within the longest straight and turn."""
         self.parts = _merged(self.parts)
-        spare = self.length - sum(part.length for part in self.parts)
+        spare = self.length - math.fsum(part.length for part in self.parts)
         growing = [part for part in self.parts if part.grows]
         room = np.array([self._room(part) for part in growing])
         weights = self.rng.uniform(0.2, 1.0, len(growing)) * np.minimum(room, spare + 1e-9)
@@ -240,7 +240,7 @@ class HorizontalSampler:
         """Round lengths and curvatures; the last length takes what rounding leaves."""
         parts = [part for part in self.parts if part.length > 1e-6]
         lengths = [rounded(part.length) for part in parts[:-1]]
-        lengths.append(rounded(self.length - sum(lengths)))
+        lengths.append(rounded(self.length - math.fsum(lengths)))
         curvatures = [(rounded(part.start, 12), rounded(part.end, 12)) for part in parts]
         return tuple(HorizontalElement.between(n, *k) for n, k in zip(lengths, curvatures, strict=True))
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping
 from itertools import groupby, pairwise
 from typing import Literal
@@ -126,7 +127,7 @@ def _room_beside(site: Site) -> float:
     for road in site.carriageways.values():
         strips = (road.inner_edge_strip_width, road.outer_edge_strip_width, road.hard_shoulder_width, road.verge_width)
         widths = (road.inner_offset, *strips, *(lane.width for lane in road.lanes))
-        edges.append(sum(nominal_width(width) for width in widths))
+        edges.append(math.fsum(nominal_width(width) for width in widths))
     return site.terrain.half_width - min(edges)
 
 
@@ -157,7 +158,7 @@ def _mixed(
     shares = sorted(rng.uniform(0.5, 1.5, len(species)).tolist(), reverse=True)
     for name, part in zip(species, shares, strict=True):
         band = (band_start, site.terrain.half_width)
-        yield _plants(rng, kind, name, rounded(density * part / sum(shares)), band, heights)
+        yield _plants(rng, kind, name, rounded(density * part / math.fsum(shares)), band, heights)
 
 
 def _belts(site: Site, room: float) -> Iterator[tuple[str, Vegetation]]:

@@ -69,7 +69,7 @@ class Feature:
     @property
     def least(self) -> float:
         """Return the shortest stretch that it takes, m."""
-        return self.fixed + sum(low for low, _ in self.lengths)
+        return self.fixed + math.fsum(low for low, _ in self.lengths)
 
 
 @dataclass(frozen=True)
@@ -179,12 +179,12 @@ def arrange(features: tuple[Feature, ...], length: float, rng: np.random.Generat
     chosen = [feature for _, feature in order]
     spare = length - closest([(feature, feature.least) for feature in chosen])[-1]
     extras = [[(high - low) * rng.random() for low, high in feature.lengths] for feature in chosen]
-    granted = min(1.0, spare / max(sum(map(sum, extras)), 1e-9))
+    granted = min(1.0, spare / max(math.fsum(map(math.fsum, extras)), 1e-9))
     lengths = [
         tuple(rounded(low + extra * granted) for (low, _), extra in zip(feature.lengths, own, strict=True))
         for feature, own in zip(chosen, extras, strict=True)
     ]
-    begins = closest([(f, f.fixed + sum(own)) for f, own in zip(chosen, lengths, strict=True)])
+    begins = closest([(f, f.fixed + math.fsum(own)) for f, own in zip(chosen, lengths, strict=True)])
     spare = max(0.0, length - begins.pop())
     shifts = sorted(spare * rng.random() for _ in chosen)
     return [
@@ -231,7 +231,7 @@ def sample_turnout(
             instance=1,
             carriageway=carriageway,
             kind="emergency_bay",
-            start_station=direction.lowest_station(place.begin, sum(place.lengths)),
+            start_station=direction.lowest_station(place.begin, math.fsum(place.lengths)),
             taper_in_length=place.lengths[0],
             lane_length=place.lengths[1],
             taper_out_length=place.lengths[2],
@@ -245,7 +245,7 @@ def sample_turnout(
         instance=1,
         carriageway=carriageway,
         kind="exit" if leaving else "entry",
-        start_station=direction.lowest_station(begin, sum(place.lengths)),
+        start_station=direction.lowest_station(begin, math.fsum(place.lengths)),
         taper_in_length=taper if leaving else 0.0,
         lane_length=lane,
         taper_out_length=0.0 if leaving else taper,

@@ -10,9 +10,12 @@ from numpy.typing import NDArray
 
 from ..cloud.points import PointBlock
 from ..cloud.roughness import MicroRelief, adjusted
-from ..colour import LayerSource, Targets
-from .radiometry import reflectivity
-from .surfaces import Surfaces
+from ..colour import LayerSource, LayerValues, Targets
+from .devices import ScannerSetting
+from .radiometry import reflectivity, returned_share, saturated
+from .returns import number_returns
+from .scan import BlockResult
+from .surfaces import Surfaces, brightness_of
 
 LAYERS = ("roughness", "metallic", "specular")
 """Material layers that points can keep."""
@@ -27,8 +30,10 @@ class Finish:
     Attributes:
         source: of colours and layers.
         wanted: ``rgb`` and `LAYERS` that the points get.
-        surfaces: the materials' means, which the scan was made with.
-        intensity_from_layers: each point's intensity is that of its own layers.
+        surfaces: the means of the scene's materials, which the layers vary around.
+        scanned: the materials' means that the scan was made with.
+        setting: the scanner's, for its detector.
+        intensity_from_layers: each point's intensity is that of its own layers; the scan left the detector to this.
         relief: of the materials; None without.
         strength: of the relief.
         octaves: of the relief.
@@ -39,6 +44,8 @@ class Finish:
     source: LayerSource
     wanted: frozenset[str]
     surfaces: Surfaces
+    scanned: Surfaces
+    setting: ScannerSetting
     intensity_from_layers: bool
     relief: MicroRelief | None
     strength: float
@@ -46,27 +53,70 @@ class Finish:
     seed: int
     kept: frozenset[str]
 
-    def __call__(self, points: PointBlock, seen: Targets | None) -> tuple[PointBlock, NDArray[np.int64]]:
-        """Return the finished points, and how many took their colour from each source (256,)."""
-        counts = np.zeros(256, dtype=np.int64)
-        if seen is not None and (self.wanted or self.intensity_from_layers):
-            points, source = self._coloured(points, seen)
-            counts += np.bincount(source, minlength=256)
-        if seen is not None and self.relief is not None and self.strength > 0.0:
-            points = adjusted(points, seen.position, self.relief, self.strength, self.seed, self.octaves)
+    def __call__(self, result: BlockResult) -> BlockResult:
+        """Return a block, or several joined, with its points finished."""
+        if result.seen is not None and (self.wanted or self.intensity_from_layers):
+            result = self._coloured(result, result.seen)
+        points = result.points
+        if result.seen is not None and self.relief is not None and self.strength > 0.0:
+            points = adjusted(points, result.seen.position, self.relief, self.strength, self.seed, self.octaves)
         dropped: dict[str, Any] = {name: None for name in OPTIONAL if name not in self.kept}
-        return replace(points, **dropped), counts
+        return replace(result, points=replace(points, **dropped), seen=None)
 
-    def _coloured(self, points: PointBlock, seen: Targets) -> tuple[PointBlock, NDArray[np.uint8]]:
+    def _coloured(self, result: BlockResult, seen: Targets) -> BlockResult:
         layers = self.wanted | (_OF_INTENSITY if self.intensity_from_layers else frozenset())
         values = self.source.sample(seen.position, seen.scanner, seen.normal, seen.material, seen.time, layers)
         changes: dict[str, Any] = {name: values.arrays[name] for name in self.wanted}
         changes["color_source"] = values.source
         if self.intensity_from_layers:
-            own = reflectivity(*(values.arrays[name] for name in ("base_color", "metallic", "specular")))
-            mean = self.surfaces.reflectivity[seen.material]
-            changes["intensity"] = points.intensity * own / np.maximum(mean, _DARKEST)
-        return replace(points, **changes), values.source
+            changes["intensity"] = result.points.intensity * self._brighter(result.points, seen, values)
+        result = replace(result, points=replace(result.points, **changes))
+        if self.intensity_from_layers:
+            result = detected(result, self.setting)
+        assert result.points.color_source is not None
+        return replace(result, sources=np.bincount(result.points.color_source, minlength=256))
+
+    def _brighter(self, points: PointBlock, seen: Targets, values: LayerValues) -> NDArray[np.float64]:
+        """Return how many times as bright points are by their own layers as by their materials' means (N,).
+
+        A return has the layers of what gave most of it. What beads and prisms send back doesn't depend on them.
+        """
+        own = reflectivity(*(values.arrays[name] for name in ("base_color", "metallic", "specular")))
+        factor = np.asarray(own / np.maximum(self.surfaces.reflectivity[seen.material], _DARKEST))
+        of = self.scanned
+        if not of.retroreflective:
+            return factor
+        shining = np.flatnonzero(of.shining[seen.material])
+        material = seen.material[shining]
+        cosine = np.cos(np.deg2rad(points.incidence_deg[shining].astype(np.float64)))
+        usual = brightness_of(of, material, cosine)
+        beads = usual - returned_share(cosine, of.reflectivity[material], of.facet_a[material], of.facet_b[material])
+        factor[shining] = (factor[shining] * (usual - beads) + beads) / np.maximum(usual, _DARKEST)
+        return factor
+
+
+def detected(result: BlockResult, setting: ScannerSetting) -> BlockResult:
+    """Return what the detector makes of echoes in a block, or several joined, that were kept for it until now.
+
+    Weak echoes are lost, those beyond the device's largest number as well, and what is left is numbered anew and
+    saturates. The returns of a pulse have one time and lie side by side.
+    """
+    points = result.points
+    strong = np.flatnonzero(points.intensity >= setting.threshold)
+    time, strip = points.gps_time[strong], points.strip[strong]
+    begins = np.ones(len(strong), dtype=bool)
+    begins[1:] = (time[1:] != time[:-1]) | (strip[1:] != strip[:-1])
+    recorded, number, returns = number_returns(np.cumsum(begins), setting.device.maximum_returns)
+    rows = strong[recorded]
+    points = points.select(rows)
+    intensity, clipped = saturated(points.intensity, setting.saturation)
+    return replace(
+        result,
+        points=replace(points, intensity=intensity, return_number=number, number_of_returns=returns),
+        seen=None if result.seen is None else result.seen.select(rows),
+        below_threshold=result.below_threshold + len(result.points) - len(strong),
+        saturated=clipped,
+    )
 
 
 OPTIONAL = (

@@ -47,7 +47,7 @@ class Errors:
         def source(purpose: str) -> np.random.Generator:
             return stream(scan.seed, purpose, strip.index, key)
 
-        shape = (count, scan.setting.device.maximum_returns)
+        shape = (count, scan.most_returns)
         angle, dropout = scan.noise.angle_sigma_mrad * 1e-3, scan.noise.dropout
         return cls(
             source("range noise").standard_normal((2, max(shape)), dtype=np.float32)

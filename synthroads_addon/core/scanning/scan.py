@@ -17,9 +17,10 @@ from .devices import ScannerSetting
 from .path import Path, Strip
 from .pattern import shot_count, shots
 from .pulses import Errors, Poses, Pulses, make_pulses, reaching_scene
-from .radiometry import received, returned_share, saturated
+from .radiometry import received, saturated
 from .returns import Echoes, Marks, chosen_echoes, group_returns, number_returns
-from .surfaces import Surfaces
+from .spread import spread_factors
+from .surfaces import Surfaces, brightness_of
 from .target import Target
 from .trace import Hits, Rays, Traced, trace
 from .track import Track
@@ -31,6 +32,11 @@ RAYS_PER_BLOCK = 2**18
 """Rays of one block at most; what keeps memory bounded. Fixed, as blocks carry their own random streams."""
 RAYS_PER_CHUNK = 2**16
 """Rays that are worked on at once: fewer are slow by the number of calls, more by memory. No result depends on it."""
+LENIENT = 0.25
+"""Share of the threshold that is enough for an echo whose intensity is yet to change: none is expected to become four
+times as bright as its material's mean makes it."""
+_SPARE = 2
+"""Factor on the returns of a pulse that are kept meanwhile: some are lost to the threshold later."""
 _UNCOUNTED = 1e-6
 """Least reflectance that a hit has in a return's mean range, so that black surfaces have a range as well."""
 
@@ -43,6 +49,8 @@ class Scan:
         attenuation: 1/m of range.
         wanted: names of `PointBlock`'s optional arrays to be filled.
         targets: whether to say where each point was seen, for colours and relief: `BlockResult.seen`.
+        detects_later: intensities are yet to change, see `finish`: every echo that may pass the detector is kept, and
+            nothing saturates.
     """
 
     target: Target
@@ -56,6 +64,7 @@ class Scan:
     beam: Literal["conical", "cylindrical"] = "conical"
     wanted: frozenset[str] = frozenset()
     targets: bool = False
+    detects_later: bool = False
     pattern: BeamPattern = field(init=False)
 
     def __post_init__(self) -> None:
@@ -65,6 +74,11 @@ class Scan:
     def rays_per_pulse(self) -> int:
         """Return how many rays sample a pulse."""
         return len(self.pattern.weights)
+
+    @property
+    def most_returns(self) -> int:
+        """Return how many returns of a pulse are kept at most."""
+        return self.setting.device.maximum_returns * (_SPARE if self.detects_later else 1)
 
     @property
     def pulses_per_block(self) -> int:
@@ -167,7 +181,10 @@ def _scan_chunk(
         scan.target, scan.surfaces, rays, poses.motions, scan.setting.minimum_range, scan.setting.maximum_range
     )
     echoes = echoes_of(scan, traced)
-    strong = np.flatnonzero(echoes.intensity >= scan.setting.threshold)
+    if scan.surfaces.varying:
+        echoes = _uneven(scan, traced, echoes, poses.motions)
+    threshold = scan.setting.threshold * (LENIENT if scan.detects_later else 1.0)
+    strong = np.flatnonzero(echoes.intensity >= threshold)
     weak = len(echoes.pulse) - len(strong)
     if weak:
         echoes = chosen_echoes(echoes, strong)
@@ -204,26 +221,35 @@ def echoes_of(scan: Scan, traced: Traced) -> Echoes:
 def _marks(scan: Scan, hits: Hits) -> Marks:
     """Return what hits add to returns."""
     surfaces, material = scan.surfaces, hits.material.ravel()
-    reflectance = np.take(surfaces.reflectivity, material)
-    cosine = np.abs(hits.along.ravel())
-    facets = (np.take(surfaces.facet_a, material), np.take(surfaces.facet_b, material)) if surfaces.rough else ()
-    brightness = returned_share(cosine, reflectance, *facets)
-    if surfaces.retroreflective:
-        shining = np.flatnonzero(np.take(surfaces.shining, material))
-        own = material[shining]
-        brightness[shining] = returned_share(
-            cosine[shining],
-            reflectance[shining],
-            surfaces.facet_a[own],
-            surfaces.facet_b[own],
-            surfaces.retro[own],
-            surfaces.inverse_lobe_squared[own],
-        )
-    brightness = brightness.reshape(hits.face.shape)
+    brightness = brightness_of(surfaces, material, np.abs(hits.along.ravel())).reshape(hits.face.shape)
     brightness *= hits.share
-    weight = np.maximum(reflectance, _UNCOUNTED, out=reflectance).reshape(hits.face.shape)
+    weight = np.maximum(np.take(surfaces.reflectivity, material), _UNCOUNTED).reshape(hits.face.shape)
     weight *= hits.share
     return Marks(hits.distance, weight, received(brightness, hits.distance, scan.attenuation))
+
+
+def _uneven(scan: Scan, traced: Traced, echoes: Echoes, motions: list[Track]) -> Echoes:
+    """Return the echoes as bright as the places are that gave most of them, see `spread`."""
+    material = traced.pick("material", echoes.hit)
+    own = np.flatnonzero(np.take(scan.surfaces.uneven, material, mode="clip"))
+    if not len(own):
+        return echoes
+    hit = echoes.hit[own]
+    ray, reach, face = traced.ray_of(hit), traced.pick("distance", hit), traced.pick("face", hit)
+    position, _ = _where(traced.rays, ray, reach)
+    if scan.target.moving:
+        (position,) = scan.target.at_start(face, position, traced.rays.time[ray % len(traced.rays.time)], motions)
+    intensity = echoes.intensity.copy()
+    intensity[own] *= spread_factors(scan.surfaces, material[own], position.T, scan.seed)
+    return replace(echoes, intensity=intensity)
+
+
+def _where(rays: Rays, ray: Index, reach: Float) -> tuple[Float, Float]:
+    """Return where rays end after ``reach``, and where they began, (3, N) local, m."""
+    scanner = np.take(
+        rays.origin.reshape(3, -1), ray if rays.origin.shape[1] > 1 else ray % len(rays.time), axis=1
+    )
+    return scanner + reach * np.take(rays.direction.reshape(3, -1), ray, axis=1), scanner
 
 
 def _kept(echoes: Echoes, lost: NDArray[np.bool_]) -> Echoes:
@@ -245,16 +271,16 @@ def _points(
     motions: list[Track],
 ) -> tuple[PointBlock, Targets | None, int]:
     """Return the points of the echoes, where they were seen, and how many of them saturated the detector."""
-    keep, number, returns = number_returns(echoes.pulse, scan.setting.device.maximum_returns)
+    keep, number, returns = number_returns(echoes.pulse, scan.most_returns)
     if not keep.all():
         echoes = chosen_echoes(echoes, keep)
     pulse, hit, target = echoes.pulse, echoes.hit, scan.target
     face, along = traced.pick("face", hit), traced.pick("along", hit)
     distance = echoes.range + scan.noise.range_bias
     if errors.range is not None:
-        most = scan.setting.device.maximum_returns
-        distance = distance + scan.setting.range_sigma * errors.of_range(number_in_block[pulse], number, most)
-    intensity, clipped = saturated(echoes.intensity, scan.setting.saturation)
+        own = errors.of_range(number_in_block[pulse], number, scan.most_returns)
+        distance = distance + scan.setting.range_sigma * own
+    intensity, clipped = saturated(echoes.intensity, np.inf if scan.detects_later else scan.setting.saturation)
     normal = None
     if scan.targets or "normal" in scan.wanted:
         normal = target.normals(face, along, pulses.time[pulse], motions)
@@ -287,10 +313,8 @@ def _seen(
 
     That is on the surface that gave most of the return: the mean of all its hits may lie in the air between them.
     """
-    target, pulse = scan.target, ray % len(rays.time)
-    time = rays.time[pulse]
-    scanner = np.take(rays.origin.reshape(3, -1), ray if rays.origin.shape[1] > 1 else pulse, axis=1)
-    position = scanner + reach * np.take(rays.direction.reshape(3, -1), ray, axis=1)
+    target, time = scan.target, rays.time[ray % len(rays.time)]
+    position, scanner = _where(rays, ray, reach)
     if target.moving:
         begin, offset, normal = target.at_start(face, position, time, motions, (scanner - position, normal))
         position, scanner = begin, begin + offset

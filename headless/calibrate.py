@@ -1,0 +1,249 @@
+"""Expected intensities of materials beside a real cloud's; fit the materials, save them to a material table, plot.
+
+With labels:     synthroads calibrate --real CLOUD --material asphalt=road --material paint_white=road_marking
+Beside an axis:  synthroads calibrate --real CLOUD --axis CSV --paved=-7,-1 --line=-4 \\
+                     --material asphalt=paved --material paint_white=line
+Without a cloud: synthroads calibrate --material asphalt --incidence-deg 0,30,60 --range 50
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+from typing import Any
+
+if __name__ == "__main__":
+    sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
+from headless.cli import Outcome, add_common_arguments, entry, progress_bar
+from synthroads_addon.core.calibration_axis import RoadClasses
+from synthroads_addon.core.calibration_job import PARTS, Calibration, CalibrationJob, Wanted, check, save_fitted, steps
+from synthroads_addon.core.errors import InputError
+from synthroads_addon.core.progress import Progress, silent
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments of `synthroads calibrate`."""
+    parser.formatter_class = argparse.RawDescriptionHelpFormatter
+    parser.add_argument(
+        "--material",
+        action="append",
+        required=True,
+        metavar="NAME[=CLASS]",
+        help="material of the table, and the cloud's class by number or name, or paved or line (can be repeated)",
+    )
+    _cloud_arguments(parser.add_argument_group("the real cloud"))
+    _view_arguments(parser.add_argument_group("how it was seen"))
+    _fit_arguments(parser.add_argument_group("the fit"))
+    files = parser.add_argument_group("files")
+    files.add_argument("--table", type=Path, metavar="FILE", help="material table to begin with (the shipped one)")
+    files.add_argument("--save", type=Path, metavar="FILE", help="write the fitted materials to this table (.json)")
+    files.add_argument("--plot", type=Path, metavar="FILE", help="draw the distributions (.png)")
+    files.add_argument("--overwrite", action="store_true", help="replace files that are already there")
+    add_common_arguments(parser)
+
+
+def _cloud_arguments(group: argparse._ArgumentGroup) -> None:
+    group.add_argument("--real", type=Path, metavar="CLOUD", help="compare with this cloud (.laz, .las, .ply, ...)")
+    group.add_argument("--class-field", metavar="NAME", help="extra attribute of it that holds the classes")
+    group.add_argument("--axis", type=Path, metavar="FILE", help="axis of its road: tells the classes by offset")
+    group.add_argument(
+        "--paved", type=_pair, action="append", default=[], metavar="FROM,TO",
+        help="offsets between which there is pavement, m, positive to the left (can be repeated)",
+    )
+    group.add_argument(
+        "--line", type=_number, action="append", default=[], metavar="M", help="offset of a marking (can be repeated)"
+    )
+    group.add_argument("--line-width", type=float, default=0.15, metavar="M", help="of the markings (0.15)")
+
+
+def _view_arguments(group: argparse._ArgumentGroup) -> None:
+    group.add_argument("--device", metavar="NAME", help="preset or file: its beam's divergence (a ray)")
+    group.add_argument("--incidence-deg", type=_numbers, default=(0.0,), metavar="D,D,...", help="angles (0)")
+    group.add_argument("--range", type=_numbers, default=(60.0,), metavar="M,M,...", help="ranges (60)", dest="ranges")
+    group.add_argument("--scanner", type=_place, metavar="X,Y,Z", help="one place that all was seen from, instead")
+    group.add_argument(
+        "--reflection", choices=("lambert", "oren_nayar"), default="lambert", help="as in the scan (lambert)"
+    )
+    group.add_argument("--attenuation", type=float, default=0.0, metavar="1/M", help="of the air, there and back (0)")
+    group.add_argument("--range-corrected", action="store_true", help="the device takes out the range's influence")
+    group.add_argument("--decibels", type=float, metavar="DB", help="its 16 bits span this many dB (they are linear)")
+    group.add_argument(
+        "--texture", action="append", default=[], metavar="NAME=IMAGE[@M]",
+        help="take a material's colours from an image that shows a surface M wide (1 m; can be repeated)",
+    )
+
+
+def _fit_arguments(group: argparse._ArgumentGroup) -> None:
+    group.add_argument("--no-fit", action="store_true", help="compare only; the gain is still free")
+    group.add_argument(
+        "--fit", metavar="PART,...", default="spread,wavelength",
+        help=f"besides the brightness: any of {', '.join(PARTS)}, or none (spread,wavelength)",
+    )
+    group.add_argument("--hold", metavar="NAME", help="keep this material's brightness: it says what the gain is")
+    group.add_argument("--gain", type=float, metavar="G", help="the device's gain, known from another cloud")
+
+
+def run(arguments: argparse.Namespace) -> Outcome:
+    """Run `synthroads calibrate`."""
+    job = job_of(arguments)
+    check(job)
+    for field, path, ending in (("--save", arguments.save, ".json"), ("--plot", arguments.plot, ".png")):
+        check_target(field, path, ending, arguments.overwrite)
+    if arguments.save and (job.real is None or not job.fit):
+        raise InputError("--save", str(arguments.save), "needs a cloud that materials are fitted to")
+    result = followed(job, progress_bar(arguments))
+    if arguments.save:
+        save_fitted(result, arguments.save, arguments.overwrite)
+    if arguments.plot:
+        from synthroads_addon.core.calibration_plot import save_plot
+
+        save_plot(result, arguments.plot, arguments.overwrite)
+    written = [str(path) for path in (arguments.save, arguments.plot) if path]
+    return 0, result.to_dict(), "\n".join([*summary(result), *(f"written: {path}" for path in written)])
+
+
+def check_target(field: str, path: Path | None, ending: str, overwrite: bool) -> None:
+    """Refuse a file that can't be written as it is asked for, before any work."""
+    if path is None:
+        return
+    if path.suffix.lower() != ending:
+        raise InputError(field, str(path), f"must end in {ending}")
+    if path.exists() and not overwrite:
+        raise InputError(field, str(path), "is there already; --overwrite replaces it")
+
+
+def followed(job: CalibrationJob, progress: Progress = silent) -> Calibration:
+    """Run a job and show its progress."""
+    run = steps(job)
+    while True:
+        try:
+            progress("calibrate", next(run))
+        except StopIteration as end:
+            result: Calibration = end.value
+            return result
+
+
+def job_of(arguments: argparse.Namespace) -> CalibrationJob:
+    """Return the job that the arguments stand for."""
+    textures = dict(_texture(text) for text in arguments.texture)
+    wanted = [_wanted(text, textures) for text in arguments.material]
+    unknown = set(textures) - {one.material for one in wanted}
+    if unknown:
+        raise InputError("--texture", sorted(unknown)[0], "must be one of the materials asked for")
+    if arguments.axis is None and (arguments.paved or arguments.line):
+        raise InputError("--axis", None, "is needed with --paved and --line")
+    road = None
+    if arguments.axis is not None:
+        road = RoadClasses(arguments.axis, tuple(arguments.paved), tuple(arguments.line), arguments.line_width)
+    return CalibrationJob(
+        wanted=tuple(wanted),
+        table=arguments.table,
+        real=arguments.real,
+        class_field=arguments.class_field,
+        road=road,
+        device=arguments.device,
+        incidence_deg=arguments.incidence_deg,
+        ranges=arguments.ranges,
+        scanner=arguments.scanner,
+        reflection=arguments.reflection,
+        attenuation=arguments.attenuation,
+        range_corrected=arguments.range_corrected,
+        decibels=arguments.decibels,
+        fit=not arguments.no_fit,
+        parts=frozenset(_parts(arguments.fit)),
+        hold=arguments.hold,
+        gain=arguments.gain,
+    )
+
+
+def summary(result: Calibration) -> list[str]:
+    """Return the result for people."""
+    data = result.to_dict()
+    lines = [f"gain {data['gain']:g}, one for all classes"] if data["real"] else []
+    for row in data["classes"]:
+        lines.append(f"{row['material']}: reflectivity {row['reflectivity'][0]:.3f} -> {row['reflectivity'][1]:.3f}")
+        if "real" in row:
+            lines.append(f"  {row['points']:,} points, {row['zeros_left_out']:,} zeros left out; {row['told_by']}")
+        lines += _table(row)
+        changed = {name: value for name, value in row["after"].items() if row["before"].get(name) != value}
+        if changed:
+            lines.append(f"  fitted: {', '.join(f'{name} {value}' for name, value in changed.items())}")
+    return lines
+
+
+def _table(row: dict[str, Any]) -> list[str]:
+    lines = ["  percentile" + "".join(f"{name:>12}" for name in row["expected"])]
+    for name in ("real", "expected"):
+        if name in row:
+            lines.append(f"  {name:<10}" + "".join(f"{value:>12,.6g}" for value in row[name].values()))
+    errors = row.get("error_of_interquartile_range", {})
+    if errors:
+        cells = (f"{errors[name]:>12.2%}" if name in errors else " " * 12 for name in row["expected"])
+        lines.append("  error/IQR " + "".join(cells))
+    if row["views"] and not errors:
+        lines.append("   incidence       range" + "".join(f"{name:>12}" for name in ("25", "50", "75")))
+        names = ("25", "50", "75")
+        for view in row["views"]:
+            quartiles = "".join(f"{view[name]:>12,.6g}" for name in names)
+            lines.append(f"  {view['incidence_deg']:>6g} deg {view['range']:>9g} m{quartiles}")
+    return lines
+
+
+def _parts(text: str) -> list[Any]:
+    parts = [] if text == "none" else [part.strip() for part in text.split(",")]
+    for part in parts:
+        if part not in PARTS:
+            raise InputError("--fit", part, f"must be any of {', '.join(PARTS)}, or none")
+    return parts
+
+
+def _wanted(text: str, textures: dict[str, tuple[Path, float]]) -> Wanted:
+    name, _, told = text.partition("=")
+    image, width = textures.get(name, (None, 1.0))
+    return Wanted(name, told or None, image, width)
+
+
+def _texture(text: str) -> tuple[str, tuple[Path, float]]:
+    name, equals, image = text.partition("=")
+    file, _, width = image.rpartition("@") if "@" in image else (image, "", "1")
+    try:
+        size = float(width)
+    except ValueError:
+        size = -1.0
+    if not equals or not file or not 0.0 < size < 1e6:
+        raise InputError("--texture", text, "must be NAME=IMAGE or NAME=IMAGE@WIDTH, e.g. asphalt=road.png@2.5")
+    return name, (Path(file), size)
+
+
+def _numbers(text: str) -> tuple[float, ...]:
+    try:
+        return tuple(float(part) for part in text.split(","))
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"is '{text}': must be numbers, e.g. 0,10,20") from None
+
+
+def _number(text: str) -> float:
+    return _several(text, 1, "a number, m")[0]
+
+
+def _pair(text: str) -> tuple[float, float]:
+    low, high = _several(text, 2, "FROM,TO in metres")
+    return low, high
+
+
+def _place(text: str) -> tuple[float, float, float]:
+    x, y, z = _several(text, 3, "X,Y,Z in metres")
+    return x, y, z
+
+
+def _several(text: str, count: int, wanted: str) -> tuple[float, ...]:
+    values = _numbers(text)
+    if len(values) != count or not all(abs(value) < 1e9 for value in values):
+        raise argparse.ArgumentTypeError(f"is '{text}': must be {wanted}")
+    return values
+
+
+if __name__ == "__main__":
+    entry("calibrate")

@@ -1,0 +1,79 @@
+"""Make a data set of many scenes from a recipe: each scene in a process of its own, resumable, with checksums."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+
+if __name__ == "__main__":
+    sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
+from headless.cli import Outcome, add_common_arguments, entry, progress_bar
+from synthroads_addon.core.dataset.manifest import Manifest, faults, read_manifest
+from synthroads_addon.core.dataset.recipe import Recipe, load_recipe, recipe_names
+from synthroads_addon.core.errors import InputError
+from synthroads_addon.core.scenario import parsed_change
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments of `synthroads dataset`."""
+    known = ", ".join(recipe_names())
+    parser.add_argument("recipe", metavar="RECIPE", help=f"{known}, or a .yaml or .json file")
+    parser.add_argument("--output", required=True, type=Path, metavar="DIR", help="folder for the data set")
+    where = parser.add_mutually_exclusive_group()
+    where.add_argument("--jobs", type=int, metavar="N", help="scenes made at once on this machine (default: 1)")
+    where.add_argument("--scheduler", metavar="ADDRESS", help="Dask scheduler whose workers make them, tcp://HOST:PORT")
+    parser.add_argument("--resume", action="store_true", help="continue what was begun in this folder")
+    parser.add_argument("--verify", action="store_true", help="make nothing: compare every file with its checksum")
+    parser.add_argument("--set", action="append", default=[], metavar="PATH=VALUE", dest="changes", help=_SET)
+    add_common_arguments(parser)
+
+
+_SET = "change one field of every scenario after the recipe's own, e.g. fidelity=draft (can be repeated)"
+
+
+def run(arguments: argparse.Namespace) -> Outcome:
+    """Run `synthroads dataset`."""
+    if arguments.verify:
+        return _verify(arguments.output)
+    if arguments.jobs is not None and not 1 <= arguments.jobs <= 1024:
+        raise InputError("--jobs", arguments.jobs, "must be 1 to 1024")
+    recipe = _changed(load_recipe(arguments.recipe), arguments.changes)
+    from headless.dataset_run import DatasetRun, dask_workers, local_processes
+
+    work = DatasetRun(recipe, arguments.output.absolute(), arguments.resume, progress_bar(arguments))
+    submit = dask_workers(arguments.scheduler) if arguments.scheduler else local_processes(arguments.jobs or 1)
+    manifest = work.run(submit)
+    failed = [scene for scene in manifest.scenes if scene.status == "failed"]
+    return 3 if failed else 0, manifest.to_dict(), summary(manifest, arguments.output)
+
+
+def _changed(recipe: Recipe, changes: list[str]) -> Recipe:
+    """Return a recipe whose scenarios are changed as well; the changes become a part of it."""
+    if not changes:
+        return recipe
+    own = dict(parsed_change(change) for change in changes)
+    groups = [group.model_copy(update={"set": {**group.set, **own}}) for group in recipe.groups]
+    return Recipe.from_dict(recipe.model_copy(update={"groups": tuple(groups)}).to_dict(), "recipe")
+
+
+def _verify(folder: Path) -> Outcome:
+    manifest = read_manifest(folder)
+    found = faults(folder, manifest.scenes)
+    files = sum(len(scene.files or {}) for scene in manifest.scenes)
+    text = "\n".join(found) if found else f"{files:,} files of {len(manifest.scenes)} scenes are as the manifest says"
+    return 3 if found else 0, {"files": files, "faults": found}, text
+
+
+def summary(manifest: Manifest, folder: Path) -> str:
+    """Return what was made, for people."""
+    done = [scene for scene in manifest.scenes if scene.status == "done"]
+    points = sum(scene.points or 0 for scene in done)
+    lines = [f"{len(done)} of {len(manifest.scenes)} scenes, {points:,} points"]
+    lines += [f"failed: {scene.name}: {scene.error}" for scene in manifest.scenes if scene.status == "failed"]
+    return "\n".join([*lines, f"written to {folder}"])
+
+
+if __name__ == "__main__":
+    entry("dataset")

@@ -1,0 +1,315 @@
+"""Making the scenes of a data set side by side, and publishing each as a whole: on this machine or on a Dask cluster.
+
+Whoever runs this is the only one that publishes. A scene is made in a folder of its own below ``.work``, by a process
+of its own; when that has ended well, its folders are moved to their places and the manifest is written anew. What the
+manifest doesn't name isn't there: after a crash it is removed and made again, with the same bytes.
+"""
+
+from __future__ import annotations
+
+import json
+import shutil
+import subprocess
+import sys
+import tempfile
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor, as_completed
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+from threading import Event
+from typing import Any
+
+from headless.dataset_scene import DONE, FAILED, FILES, PUBLISHED
+from synthroads_addon.core.dataset.data_card import data_card
+from synthroads_addon.core.dataset.layouts import layout_descriptions
+from synthroads_addon.core.dataset.manifest import (
+    MANIFEST,
+    Manifest,
+    SceneEntry,
+    check_same_recipe,
+    faults,
+    manifest_text,
+    read_manifest,
+    write_atomically,
+)
+from synthroads_addon.core.dataset.recipe import Recipe, SceneJob, scene_jobs
+from synthroads_addon.core.errors import InputError, OutputError
+from synthroads_addon.core.generator import generator
+from synthroads_addon.core.progress import Progress, silent
+from synthroads_addon.scan_files import available_cores
+
+WORK = ".work"
+LOCK = ".lock"
+ATTEMPTS = 3
+"""A scene whose process is killed (too little memory, a lost node) is tried this often."""
+_TICK = 0.1
+"""Seconds between two looks at a process."""
+_MODULE = Path(__file__).with_name("dataset_scene.py")
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """How a scene's process ended.
+
+    Attributes:
+        folder: where it worked.
+        error: what went wrong, in one line; None if nothing.
+    """
+
+    folder: Path
+    error: str | None = None
+
+
+def run_on_worker(folder: str) -> Outcome:
+    """Run a task on a Dask worker, with its share of the cores."""
+    from distributed import get_worker
+
+    at_once = int(get_worker().state.nthreads)
+    return run_task(folder, max(1, available_cores() // at_once), Event())
+
+
+def run_task(folder: str, threads: int, stopping: Event) -> Outcome:
+    """Run the process of a task that was written to a folder; it is ended when ``stopping`` is set."""
+    path = Path(folder)
+    outcome = Outcome(path, "was not tried")
+    for _ in range(ATTEMPTS):
+        shutil.rmtree(path / FILES, ignore_errors=True)
+        code = _run_process(path, threads, stopping)
+        if stopping.is_set():
+            return Outcome(path, "was stopped")
+        if code == 0 and (path / DONE).is_file():
+            return Outcome(path)
+        if (path / FAILED).is_file():
+            return Outcome(path, str(json.loads((path / FAILED).read_text(encoding="utf-8"))["error"]))
+        outcome = Outcome(path, _reason(code, path / "log.txt"))
+        if code > 0:  # a fault of its own: it would come again
+            return outcome
+    return outcome
+
+
+def _run_process(path: Path, threads: int, stopping: Event) -> int:
+    """Run the process of the task in a folder to its end; return its exit code."""
+    command = [sys.executable, str(_MODULE), str(path / "task.json"), str(threads)]
+    with (path / "log.txt").open("wb") as log, subprocess.Popen(
+        command, stdin=subprocess.PIPE, stdout=log, stderr=log
+    ) as process:  # at the end of this block its standard input is closed, which ends it
+        while process.poll() is None and not stopping.wait(_TICK):
+            pass
+    return process.returncode
+
+
+def _reason(code: int, log: Path) -> str:
+    if code < 0:
+        return f"its process was killed by signal {-code}, {ATTEMPTS} times (too little memory?)"
+    lines = log.read_text(encoding="utf-8", errors="replace").strip().splitlines()
+    return f"exit code {code}: {lines[-1] if lines else 'no message'}"
+
+
+@dataclass
+class DatasetRun:
+    """A data set at work.
+
+    Args:
+        recipe: what is made.
+        folder: where it goes.
+        resume: continue what was begun there.
+        progress: told how many scenes are done.
+
+    Attributes:
+        jobs: all scenes.
+        entries: scenes done or failed, by name.
+    """
+
+    recipe: Recipe
+    folder: Path
+    resume: bool = False
+    progress: Progress = silent
+    jobs: list[SceneJob] = field(init=False)
+    entries: dict[str, SceneEntry] = field(init=False, default_factory=dict)
+
+    def __post_init__(self) -> None:
+        self.jobs = scene_jobs(self.recipe)
+        self._recipe_text = self.recipe.to_json()
+        self._generator = generator()
+
+    def run(self, submit: Submit) -> Manifest:
+        """Make all scenes that aren't there yet; return the manifest.
+
+        Args:
+            submit: see `local_processes` and `dask_workers`.
+
+        Raises:
+            OutputError: the folder holds something else, or can't be written, or another run is at work in it.
+            InputError: what is there was made from another recipe.
+        """
+        with self._locked():
+            self._open()
+            self._write_manifest()
+            missing = [job for job in self.jobs if not self._is_done(job)]
+            for outcome in submit([self._write_task(job) for job in missing]):
+                self._take(outcome)
+                self.progress("scenes", len(self.entries) / len(self.jobs))
+            self._close()
+        return read_manifest(self.folder)
+
+    @contextmanager
+    def _locked(self) -> Iterator[None]:
+        """Keep others out of the folder; the lock goes with the process however it ends."""
+        try:
+            self.folder.mkdir(parents=True, exist_ok=True)
+            lock = (self.folder / LOCK).open("a+")
+        except OSError as error:
+            raise OutputError("--output", str(self.folder), f"cannot be written ({error.strerror})") from None
+        with lock:
+            if not _lock(lock.fileno()):
+                raise OutputError("--output", str(self.folder), "another run is at work in it")
+            yield
+
+    def _open(self) -> None:
+        """Take over what is done, and remove what a run before left unfinished."""
+        if (self.folder / MANIFEST).exists():
+            if not self.resume:
+                raise OutputError("--output", str(self.folder), "already holds a data set; --resume continues it")
+            manifest = check_same_recipe(self.folder, self._recipe_text, self._generator)
+            done = [scene for scene in manifest.scenes if scene.status == "done"]
+            self.entries = {scene.name: scene for scene in done if not faults(self.folder, [scene], checksums=False)}
+        elif any(path.name != LOCK for path in self.folder.iterdir()):
+            raise OutputError("--output", str(self.folder), "holds other files; choose an empty folder")
+        shutil.rmtree(self.folder / WORK, ignore_errors=True)
+        self._remove_unknown()
+        (self.folder / WORK).mkdir()
+        (self.folder / "logs").mkdir(exist_ok=True)
+        write_atomically(self.folder / "recipe.json", self._recipe_text)
+
+    def _remove_unknown(self) -> None:
+        """Remove folders that were published without having come into the manifest."""
+        known = {name for entry in self.entries.values() for name in entry.folders or ()}
+        for pattern in PUBLISHED:
+            for path in self.folder.glob(pattern):
+                if path.is_dir() and path.relative_to(self.folder).as_posix() not in known:
+                    shutil.rmtree(path)
+
+    def _is_done(self, job: SceneJob) -> bool:
+        return job.name in self.entries
+
+    def _write_task(self, job: SceneJob) -> str:
+        """Write down what a process is to make; return its folder."""
+        folder = Path(tempfile.mkdtemp(prefix=f"{job.name}-", dir=self.folder / WORK))
+        task = {
+            "name": job.name,
+            "number": job.number,
+            "split": job.split,
+            "scenario": job.scenario.to_dict(),
+            "recipe": self.recipe.to_dict(),
+        }
+        (folder / "task.json").write_text(json.dumps(task), encoding="utf-8")
+        return str(folder)
+
+    def _take(self, outcome: Outcome) -> None:
+        """Publish a scene that is complete, or note why there is none."""
+        task = json.loads((outcome.folder / "task.json").read_text(encoding="utf-8"))
+        job = self.jobs[task["number"]]
+        about: dict[str, Any] = {"name": job.name, "split": job.split, "seed": job.scenario.seed}
+        if outcome.error is None:
+            done = json.loads((outcome.folder / DONE).read_text(encoding="utf-8"))
+            for name in done["folders"]:
+                target = self.folder / name
+                target.parent.mkdir(parents=True, exist_ok=True)
+                (outcome.folder / FILES / name).rename(target)
+            entry = SceneEntry.from_dict({**about, "status": "done", **done}, "scene")
+            (outcome.folder / "report.json").replace(self.folder / "logs" / f"{job.name}.json")
+        else:
+            entry = SceneEntry.from_dict({**about, "status": "failed", "error": outcome.error}, "scene")
+            (outcome.folder / "log.txt").replace(self.folder / "logs" / f"{job.name}.txt")
+        self.entries[job.name] = entry
+        shutil.rmtree(outcome.folder, ignore_errors=True)
+        self._write_manifest()
+
+    def _write_manifest(self) -> None:
+        entries = [self.entries[job.name] for job in self.jobs if job.name in self.entries]
+        text = manifest_text(self.recipe.title, self._generator, self._recipe_text, entries, len(self.jobs))
+        write_atomically(self.folder / MANIFEST, text)
+
+    def _close(self) -> None:
+        """Write what describes the whole."""
+        manifest = read_manifest(self.folder)
+        texts = layout_descriptions(self.recipe, self.jobs)
+        texts["DATA_CARD.md"] = data_card(self.recipe, manifest, self.jobs)
+        for name, text in texts.items():
+            if (self.folder / name).parent.is_dir():
+                write_atomically(self.folder / name, text)
+        shutil.rmtree(self.folder / WORK, ignore_errors=True)
+
+
+Submit = Callable[[list[str]], Iterator[Outcome]]
+"""Has the tasks in these folders done, and yields how each ended, in any order."""
+
+
+def local_processes(jobs: int) -> Submit:
+    """Return what runs as many processes at once on this machine."""
+
+    threads = max(1, available_cores() // jobs)
+
+    def submit(folders: list[str]) -> Iterator[Outcome]:
+        stopping = Event()
+        pool = ThreadPoolExecutor(jobs)
+        try:
+            for future in as_completed([pool.submit(run_task, folder, threads, stopping) for folder in folders]):
+                yield future.result()
+        finally:
+            stopping.set()
+            pool.shutdown(wait=True, cancel_futures=True)
+
+    return submit
+
+
+def dask_workers(address: str) -> Submit:
+    """Return what has the workers of a Dask cluster do it; they must see the same folder under the same name.
+
+    Raises:
+        InputError: nobody answers at the address, the packages are missing, or the scheduler is lost meanwhile.
+    """
+    try:
+        import distributed
+    except ImportError:
+        raise InputError("--scheduler", address, "needs Dask: pip install 'synthroads[cluster]'") from None
+
+    def submit(folders: list[str]) -> Iterator[Outcome]:
+        try:
+            client = distributed.Client(address, timeout="10s", set_as_default=False)
+        except (OSError, ValueError, TimeoutError) as error:
+            raise InputError("--scheduler", address, f"nobody answers there ({error})") from None
+        with client:
+            futures = client.map(run_on_worker, folders, key=folders, retries=ATTEMPTS, pure=False)
+            yield from _results(client, futures, address)
+
+    return submit
+
+
+def _results(client: Any, futures: list[Any], address: str) -> Iterator[Outcome]:
+    from distributed import as_completed as completed
+
+    for future in completed(futures, loop=client.loop, raise_errors=False):
+        if future.status == "finished":
+            yield future.result()
+        elif future.status == "error":
+            yield Outcome(Path(future.key), f"its worker was lost ({future.exception()})")
+        else:
+            raise InputError("--scheduler", address, "was lost; --resume continues with what is done")
+
+
+def _lock(descriptor: int) -> bool:
+    """Lock an open file against other processes; return whether that was possible."""
+    try:
+        if sys.platform == "win32":
+            import msvcrt
+
+            msvcrt.locking(descriptor, msvcrt.LK_NBLCK, 1)
+        else:
+            import fcntl
+
+            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError:
+        return False
+    return True

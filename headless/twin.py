@@ -1,0 +1,48 @@
+"""Write the geometric-semantic model of a road: CityJSON, IFC, OpenDRIVE and GeoJSON. Needs no Blender."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+
+if __name__ == "__main__":
+    sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
+from headless.cli import Outcome, add_common_arguments, add_twin_argument, entry
+from synthroads_addon.core.errors import InputError
+from synthroads_addon.core.files import output_folder
+from synthroads_addon.core.parameters.model import read_parameters
+from synthroads_addon.core.twin import TOLERANCE, TWIN_FORMATS, check_formats, twin_file_names, write_twin
+
+_LIMITS = (1e-4, 1.0)
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments of `synthroads twin`."""
+    parser.add_argument("parameters", type=Path, metavar="PARAMETERS", help="parameter set (parameters.json)")
+    parser.add_argument("--output", required=True, type=Path, metavar="DIR", help="folder for the files")
+    add_twin_argument(parser, TWIN_FORMATS)
+    text = f"largest chord error of curved lines and surfaces, m ({TOLERANCE:g})"
+    parser.add_argument("--tolerance", type=float, default=TOLERANCE, metavar="M", help=text)
+    parser.add_argument("--overwrite", action="store_true", help="replace files that are already there")
+    add_common_arguments(parser)
+
+
+def run(arguments: argparse.Namespace) -> Outcome:
+    """Run `synthroads twin`."""
+    if not _LIMITS[0] <= arguments.tolerance <= _LIMITS[1]:
+        raise InputError("--tolerance", arguments.tolerance, f"must be from {_LIMITS[0]:g} to {_LIMITS[1]:g} m")
+    formats = arguments.twin
+    check_formats(formats)
+    parameters = read_parameters(arguments.parameters)
+    names = twin_file_names(formats)
+    with output_folder(arguments.output, names, arguments.overwrite) as folder:
+        write_twin(parameters, folder, formats, arguments.tolerance)
+    written = [arguments.output / name for name in names]
+    result = {"files": {kind: str(path) for kind, path in zip(formats, written, strict=True)}}
+    return 0, result, "\n".join(f"written {path} ({path.stat().st_size / 1e6:.2f} MB)" for path in written)
+
+
+if __name__ == "__main__":
+    entry("twin")

@@ -1,0 +1,1 @@
+"""Data sets of many scenes: recipes, manifests, the layouts that training code reads, and data cards."""

@@ -1,0 +1,83 @@
+"""The data card: what a data set is, how it was made, what is in it and under which licence, for people."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Iterable, Sequence
+
+from .manifest import Manifest
+from .recipe import Recipe, SceneJob
+
+_LAYOUTS = {
+    "pointcept": "`pointcept/classes-N/SPLIT/SCENE-TILE/*.npy`: coord (m, from the tile's corner), color, strength, "
+    "segment, instance; -1 is unlabelled. `tile.json` has the corner's map coordinates.",
+    "semantickitti": "`semantickitti/classes-N/sequences/NN`: a tile is a frame; `synthroads.yaml` names classes and "
+    "splits.",
+}
+
+
+def data_card(recipe: Recipe, manifest: Manifest, jobs: Sequence[SceneJob]) -> str:
+    """Return the card as Markdown; it is made from recipe and manifest alone, so that it has the same bytes as well."""
+    return "\n".join([*_head(recipe, manifest), *_how(recipe, jobs), *_content(manifest), *_files(recipe)]) + "\n"
+
+
+def _head(recipe: Recipe, manifest: Manifest) -> list[str]:
+    done = [scene for scene in manifest.scenes if scene.status == "done"]
+    points = sum(scene.points or 0 for scene in done)
+    length = math.fsum(scene.length or 0.0 for scene in done)
+    lines = [f"# {recipe.title}", ""]
+    if recipe.description:
+        lines += [recipe.description, ""]
+    lines += [
+        f"- **Content:** {len(done)} scenes, {length / 1000.0:.2f} km of road, {points:,} points, each with its label",
+        f"- **Licence:** {recipe.licence}",
+        f"- **Made by:** {manifest.generator} from `recipe.json` (seed {recipe.seed}): both give the same bytes",
+        "- **Not real:** no measured data is in it, and no person",
+    ]
+    failed = [scene for scene in manifest.scenes if scene.status == "failed"]
+    return lines + [f"- **Failed:** {scene.name}: {scene.error}" for scene in failed] + [""]
+
+
+def _how(recipe: Recipe, jobs: Sequence[SceneJob]) -> list[str]:
+
+    def named(values: Iterable[str]) -> str:
+        return ", ".join(f"{name} ({count})" for name, count in sorted(Counter(values).items()))
+
+    return [
+        "## How it was made",
+        "",
+        "Each scene is a road drawn within the limits of a scenario by its own seed, built in Blender, and scanned by",
+        "a simulated laser scanner. Class and instance of each point are those of the surface that the beam met.",
+        "",
+        f"- Fidelity: {named(job.scenario.fidelity for job in jobs)}",
+        f"- Laser scanner: {named(job.scenario.scan.device for job in jobs)}",
+        f"- Platform: {named(job.scenario.scan.platform.kind for job in jobs)}",
+        "",
+    ]
+
+
+def _content(manifest: Manifest) -> list[str]:
+    done = [scene for scene in manifest.scenes if scene.status == "done"]
+    lines = ["## Scenes", "", "| scene | split | length (m) | points |", "|---|---|---|---|"]
+    lines += [f"| {scene.name} | {scene.split} | {scene.length or 0.0:.0f} | {scene.points or 0:,} |" for scene in done]
+    totals: dict[str, Counter[str]] = {}
+    for scene in done:
+        totals.setdefault(scene.split, Counter()).update(scene.classes or {})
+    splits = sorted(totals)
+    names = dict.fromkeys(name for scene in done for name in scene.classes or {})
+    lines += ["", "## Points by class", "", f"| class | {' | '.join(splits)} |", "|---|" + "---|" * len(splits)]
+    for name in names:
+        lines.append(f"| {name} | " + " | ".join(f"{totals[split][name]:,}" for split in splits) + " |")
+    return [*lines, ""]
+
+
+def _files(recipe: Recipe) -> list[str]:
+    lines = [
+        "## Files",
+        "",
+        "- `manifest.json`: size and SHA-256 of every file of every scene",
+        "- `scenes/SCENE`: cloud, parameters, centreline and what else the recipe asked for",
+    ]
+    lines += [f"- {_LAYOUTS[name]}" for name in recipe.layouts]
+    return [*lines, "- `logs`: time and memory of each scene (not part of the manifest)"]

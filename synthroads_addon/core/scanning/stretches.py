@@ -1,0 +1,78 @@
+"""Short stretches of a path, to scan or to colour a sample of a job in place of all of it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .path import Path, Strip
+
+Float = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Stretches:
+    """A path of which only stretches are flown; see `path_base.Path`.
+
+    Attributes:
+        whole: the path.
+        strips: its stretches: each has the index of the strip that it is of.
+    """
+
+    whole: Path
+    strips: tuple[Strip, ...]
+
+    @property
+    def knot_spacing(self) -> float:
+        """Return the whole path's."""
+        return self.whole.knot_spacing
+
+    @property
+    def typical_range(self) -> float:
+        """Return the whole path's."""
+        return self.whole.typical_range
+
+    @property
+    def deviation(self) -> float:
+        """Return the whole path's."""
+        return self.whole.deviation
+
+    def pose(self, strip: Strip, time: Float) -> tuple[Float, Float]:
+        """Return the whole path's pose."""
+        return self.whole.pose(self._of(strip), time)
+
+    @property
+    def share(self) -> float:
+        """Return how much of the path's duration the stretches are."""
+        return sum(strip.duration for strip in self.strips) / sum(strip.duration for strip in self.whole.strips)
+
+    def _of(self, stretch: Strip) -> Strip:
+        return next(strip for strip in self.whole.strips if strip.index == stretch.index)
+
+
+def spread(path: Path, count: int, duration: float) -> Stretches:
+    """Return stretches of a duration (s) spread evenly over each strip, from its start to its end.
+
+    A strip that is shorter than all its stretches together is taken whole.
+    """
+    strips: list[Strip] = []
+    for strip in path.strips:
+        if strip.duration <= count * duration:
+            strips.append(strip)
+            continue
+        starts = strip.start_time + np.linspace(0.0, strip.duration - duration, count)
+        strips += [Strip(strip.index, float(start), duration) for start in starts]
+    return Stretches(path, tuple(strips))
+
+
+def middle(path: Path, share: float) -> Stretches:
+    """Return the middle of each strip, a share of its duration long."""
+    return Stretches(
+        path,
+        tuple(
+            Strip(strip.index, strip.start_time + strip.duration * (1.0 - share) / 2.0, strip.duration * share)
+            for strip in path.strips
+        ),
+    )

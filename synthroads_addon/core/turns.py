@@ -1,0 +1,184 @@
+"""Long work in turns: a plain function that can be set down at any depth, and taken up again by its caller.
+
+Building a road calls functions that call functions, sixty node groups deep, and all of it must happen in Blender's main
+thread or while that waits. A generator would have to be threaded through every one of them. So the work has a Python
+thread of its own, but only ever runs while its caller waits for it in `Turns.take`, or while it computes `aside`:
+
+    def work():
+        path = aside(lambda: heavy_numpy())     # both run meanwhile
+        for item in path:
+            add(item)                           # the caller waits
+            pause()                             # hands back if the turn's time is over
+        rest()                                  # hands back in any case
+
+    turns = Turns(work)
+    while turns.take(0.05):
+        ...                                     # the work stands still, or computes aside
+    result = turns.result()
+
+Outside of a `Turns` these three do nothing but their work, so the same function runs straight through as well.
+"""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable
+from enum import Enum
+from typing import Generic, TypeVar
+
+from .errors import Cancelled
+
+T = TypeVar("T")
+R = TypeVar("R")
+
+_here = threading.local()
+_SHORT = 0.005
+"""How long (s) a turn waits for what is computed aside, so that short sums don't cost a turn each."""
+
+
+class _State(Enum):
+    """What a work does: it waits for its turn, has it, computes what needs none, or has ended."""
+
+    WAITING = 0
+    WORKING = 1
+    ASIDE = 2
+    DONE = 3
+
+
+class Turns(Generic[T]):
+    """Work that is done in turns.
+
+    Args:
+        work: what is to be done; it calls `pause`, `rest`, `aside` and `by_caller`.
+        name: of its thread.
+    """
+
+    def __init__(self, work: Callable[[], T], name: str = "SynthRoads turns") -> None:
+        self._work = work
+        self._result: T | None = None
+        self._error: BaseException | None = None
+        self._asked: Callable[[], None] | None = None
+        self._stopping = False
+        self._deadline = 0.0
+        self._state = _State.WAITING
+        self._change = threading.Condition()
+        # A work that is left alone must not keep the process from ending.
+        self._thread = threading.Thread(target=self._run, name=name, daemon=True)
+
+    @property
+    def is_aside(self) -> bool:
+        """Return whether it is computing what needs no turn."""
+        return self._state is _State.ASIDE
+
+    def take(self, seconds: float) -> bool:
+        """Let the work go on for about so long; return whether there is more of it. Raises what goes wrong in it."""
+        self._deadline = time.perf_counter() + seconds
+        with self._change:
+            if self._state is _State.ASIDE:
+                self._change.wait_for(lambda: self._state is not _State.ASIDE, timeout=min(seconds, _SHORT))
+            self._give_turn()
+            while self._asked is not None:
+                asked, self._asked = self._asked, None
+                asked()
+                self._give_turn()
+        if self._error is not None:
+            raise self._error
+        return self._state is not _State.DONE
+
+    def result(self) -> T:
+        """Return what the work returned; only once `take` has said that there is no more of it."""
+        assert self._state is _State.DONE
+        return self._result  # type: ignore[return-value]
+
+    def close(self) -> None:
+        """Stop the work where it stands: it sees `Cancelled` there. Waits until it has ended."""
+        with self._change:
+            self._stopping = True
+            if self._thread.ident is None:
+                self._state = _State.DONE
+            while self._state is not _State.DONE:
+                self._change.wait_for(lambda: self._state is not _State.ASIDE)
+                self._give_turn()
+
+    def _give_turn(self) -> None:
+        """Let the work go on if it waits for that, until it hands back."""
+        if self._state is not _State.WAITING:
+            return
+        self._state = _State.WORKING
+        if self._thread.ident is None:
+            self._thread.start()
+        self._change.notify_all()
+        self._change.wait_for(lambda: self._state is not _State.WORKING)
+
+    # In the work's own thread
+
+    def _run(self) -> None:
+        _here.turns = self
+        try:
+            self._result = self._work()
+        except BaseException as error:
+            self._error = None if self._stopping else error
+        self._hand_back(_State.DONE)
+
+    def _hand_back(self, state: _State) -> None:
+        """Let the caller go on."""
+        with self._change:
+            self._state = state
+            self._change.notify_all()
+
+    def _wait(self) -> None:
+        """Wait for the next turn."""
+        with self._change:
+            self._state = _State.WAITING
+            self._change.notify_all()
+            self._change.wait_for(lambda: self._state is _State.WORKING)
+        if self._stopping:
+            raise Cancelled("the work was stopped")
+
+
+def pause() -> None:
+    """Hand back to the caller if the turn's time is over."""
+    turns: Turns[object] | None = getattr(_here, "turns", None)
+    if turns is not None and time.perf_counter() >= turns._deadline:
+        turns._wait()
+
+
+def rest() -> None:
+    """Hand back to the caller."""
+    turns: Turns[object] | None = getattr(_here, "turns", None)
+    if turns is not None:
+        turns._wait()
+
+
+def aside(compute: Callable[[], R]) -> R:
+    """Return what is computed while the caller goes on; it must touch nothing that the caller may touch."""
+    turns: Turns[object] | None = getattr(_here, "turns", None)
+    if turns is None:
+        return compute()
+    turns._hand_back(_State.ASIDE)
+    try:
+        return compute()
+    finally:
+        turns._wait()
+
+
+def by_caller(function: Callable[[], R]) -> R:
+    """Return what a function returns in the caller's thread: for what only the main thread may do."""
+    turns: Turns[object] | None = getattr(_here, "turns", None)
+    if turns is None:
+        return function()
+    found: list[R] = []
+    errors: list[BaseException] = []
+
+    def run() -> None:
+        try:
+            found.append(function())
+        except BaseException as error:
+            errors.append(error)
+
+    turns._asked = run
+    turns._wait()
+    if errors:
+        raise errors[0]
+    return found[0]

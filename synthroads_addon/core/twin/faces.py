@@ -1,0 +1,145 @@
+"""Polygons in space as arrays: the surfaces and bodies of a semantic model before they are written."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Float = NDArray[np.float64]
+Int = NDArray[np.int64]
+
+FLAT = 0.001
+"""A quadrilateral whose corner lies farther than this (m) from the plane of the others becomes two triangles."""
+
+
+@dataclass(frozen=True)
+class Faces:
+    """Polygons without holes, each anticlockwise as seen from its outer (upper) side.
+
+    Attributes:
+        points: (N, 3) local coordinates, m.
+        corners: (C,) indices into the points, polygon by polygon.
+        sizes: (F,) number of corners of each polygon.
+    """
+
+    points: Float
+    corners: Int
+    sizes: Int
+
+    def __len__(self) -> int:
+        """Return the number of polygons."""
+        return len(self.sizes)
+
+
+def joined(parts: Sequence[Faces]) -> Faces:
+    """Return all polygons of several parts as one; points stay apart."""
+    if not parts:
+        return Faces(np.empty((0, 3)), np.empty(0, np.int64), np.empty(0, np.int64))
+    starts = np.cumsum([0, *(len(part.points) for part in parts[:-1])])
+    return Faces(
+        np.concatenate([part.points for part in parts]),
+        np.concatenate([part.corners + start for part, start in zip(parts, starts, strict=True)]),
+        np.concatenate([part.sizes for part in parts]),
+    )
+
+
+def polygons(points: Float, rings: Iterable[Sequence[int]]) -> Faces:
+    """Return polygons given by their corners' indices."""
+    listed = [np.asarray(ring, dtype=np.int64) for ring in rings]
+    sizes = np.array([len(ring) for ring in listed], dtype=np.int64)
+    return Faces(points, np.concatenate(listed), sizes)
+
+
+def compact(faces: Faces) -> Faces:
+    """Return polygons with only the points that they use."""
+    used, corners = np.unique(faces.corners, return_inverse=True)
+    return Faces(faces.points[used], corners, faces.sizes)
+
+
+def quads(points: Float, corners: Int) -> Faces:
+    """Return quadrilaterals (Q, 4) of points; those that aren't flat become two triangles each, in their place."""
+    flat = twist(points, corners) <= FLAT
+    # Six slots per quadrilateral: the ring of one and two slots left out, or two rings of three.
+    slots = np.where(flat[:, None], corners[:, [0, 1, 2, 3, 0, 0]], corners[:, [0, 1, 2, 0, 2, 3]])
+    keep = np.ones(slots.shape, dtype=bool)
+    keep[flat, 4:] = False
+    counts = np.where(flat, 1, 2)
+    return Faces(points, slots[keep], np.repeat(np.where(flat, 4, 3), counts))
+
+
+def twist(points: Float, corners: Int) -> Float:
+    """Return how far (Q,) from a quadrilateral's first diagonal plane its last corner lies, m.
+
+    A quadrilateral without area (a strip that is nowhere wide there) has none.
+    """
+    a, b, c, d = (points[corners[:, i]] for i in range(4))
+    # The distance of the diagonals: a volume through the area of their parallelogram.
+    across = np.cross(c - a, d - b)
+    area = np.linalg.norm(across, axis=1)
+    volume = np.abs(np.einsum("ij,ij->i", across, b - a))
+    return np.where(area > 1e-9, volume / np.maximum(area, 1e-9), 0.0)
+
+
+def grid_corners(rows: int, columns: int) -> Int:
+    """Return the (Q, 4) corners of a grid's quadrilaterals, row by row.
+
+    Points are numbered row by row; rows follow each other forwards, columns from left to right, so that the
+    quadrilaterals are anticlockwise from above.
+    """
+    first = (np.arange(rows - 1)[:, None] * columns + np.arange(columns - 1)).ravel()
+    return np.stack([first + 1, first + columns + 1, first + columns, first], axis=1)
+
+
+def loft(sections: Float) -> Faces:
+    """Return the closed body through sections (R, K, 3), whose ends are caps; faces look outwards.
+
+    Args:
+        sections: R >= 2 outlines of K corners each, in the same order round.
+    """
+    rows, count = sections.shape[:2]
+    points = sections.reshape(-1, 3)
+    here = np.arange(count)
+    after = np.roll(here, -1)
+    start = (np.arange(rows - 1) * count)[:, None]
+    sides = np.stack([start + here, start + after, start + count + after, start + count + here], axis=-1)
+    last = (rows - 1) * count
+    caps = Faces(points, np.concatenate([here[::-1], last + here]), np.array([count, count]))
+    body = quads(points, sides.reshape(-1, 4))
+    closed = Faces(points, np.concatenate([body.corners, caps.corners]), np.concatenate([body.sizes, caps.sizes]))
+    return closed if volume(closed) >= 0.0 else turned(closed)
+
+
+def turned(faces: Faces) -> Faces:
+    """Return polygons with their other side outwards."""
+    return Faces(faces.points, faces.corners[::-1], faces.sizes[::-1])
+
+
+def volume(faces: Faces) -> float:
+    """Return the volume (m3) that closed polygons enclose; negative where they look inwards."""
+    if not len(faces):
+        return 0.0
+    points = faces.points - faces.points[faces.corners[0]]
+    starts = np.cumsum(faces.sizes) - faces.sizes
+    first = np.repeat(faces.corners[starts], faces.sizes)
+    a, b, c = points[first], points[faces.corners], points[faces.corners[next_corner(faces.sizes)]]
+    return float(np.einsum("ij,ij->", a, np.cross(b, c)) / 6.0)
+
+
+def next_corner(sizes: Int) -> Int:
+    """Return the (C,) index of the corner that follows each corner round its polygon."""
+    following = np.arange(1, int(sizes.sum()) + 1)
+    starts = np.cumsum(sizes) - sizes
+    following[starts + sizes - 1] = starts
+    return following
+
+
+def without_collapsed(corners: Int, sizes: Int) -> tuple[Int, Int, NDArray[np.bool_]]:
+    """Return corners, sizes and which (F,) polygons are left when neighbouring equal corners become one."""
+    apart = corners != corners[next_corner(sizes)]
+    polygon = np.repeat(np.arange(len(sizes)), sizes)
+    left = np.bincount(polygon[apart], minlength=len(sizes))
+    kept = left >= 3
+    return corners[apart & kept[polygon]], left[kept], kept

@@ -1,0 +1,65 @@
+"""A road as IFC 4.3 (IFC4X3_ADD2): alignment, road parts, pavement, markings, furniture, structures, surroundings.
+
+Coordinates are local (x east, y north, z up); an IfcMapConversion says where they lie on the map. `docs/twin-ifc.md`
+has the table of what becomes what.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from ..errors import InputError
+from ..parameters.geometry import RoadGeometry
+from ..parameters.model import PointObject, RoadParameters
+from .ifc_alignment import write_alignment
+from .ifc_barriers import write_barriers
+from .ifc_bridges import write_overpasses
+from .ifc_file import IfcFile
+from .ifc_furniture import write_furniture
+from .ifc_gantries import write_gantries
+from .ifc_markings import write_markings
+from .ifc_project import write_project
+from .ifc_road import write_carriageways, write_road
+from .ifc_scene import Scene
+from .ifc_surroundings import write_surroundings
+from .surfaces import road_stations
+
+_LONGEST = 200_000.0
+"""Longest road that is written as one file, m: as long as scenarios can be."""
+
+
+def write_ifc(parameters: RoadParameters, path: Path, tolerance: float = 0.005) -> None:
+    """Write a road as IFC 4.3. The same road gives the same bytes.
+
+    Args:
+        parameters: the road.
+        path: the file.
+        tolerance: largest chord error of the road's surfaces, m; their vertices are exact.
+
+    Raises:
+        InputError: ifcopenshell isn't installed, the map coordinate system is unknown, or the road is too long.
+    """
+    if parameters.alignment.length > _LONGEST:
+        raise InputError("alignment: length", parameters.alignment.length, "an IFC file holds up to 200 km (200000 m)")
+    ifc = IfcFile(parameters.metadata.identifier)
+    site = write_project(ifc, parameters)
+    geometry = RoadGeometry(parameters)
+    scene = Scene(
+        ifc=ifc,
+        geometry=geometry,
+        axis=write_alignment(ifc, geometry),
+        tolerance=tolerance,
+        stations=road_stations(geometry, tolerance),
+        site=site,
+        road=write_road(ifc, parameters, site),
+    )
+    scene.look_up((item.station, item.offset) for item in parameters.of_type(PointObject).values())
+    write_carriageways(scene)
+    write_markings(scene)
+    write_barriers(scene)
+    write_furniture(scene)
+    write_gantries(scene)
+    write_overpasses(scene)
+    write_surroundings(scene)
+    ifc.relate()
+    ifc.write(path, parameters.metadata.identifier, parameters.metadata.generator)

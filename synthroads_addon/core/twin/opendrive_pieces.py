@@ -1,0 +1,192 @@
+"""Functions of the station as OpenDRIVE holds them: cubics or straight lines, piece by piece."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Float = NDArray[np.float64]
+Function = Callable[[Float], Float]
+"""Stations (N,) -> values (N, F)."""
+
+CLOSE = 1e-6
+"""Stations closer than this (m) are one, and widths (m) below it none: the standard's checker has the same limit."""
+_EXACT = 1e-8  # m, of a cubic from the function that it stands for
+_SAME = 5e-7  # m, between a cubic and the one before it, if that is to go on in its place
+_STEP_DIGITS = 10  # decimals (m) of what a coefficient adds to a width
+_SHORTEST = 1e-4  # m
+_LONGEST = 8.0  # m, of a chord before it is looked at: a wave isn't to be met at its nodes only
+_SHARES = np.array([0.0, 1.0 / 3.0, 2.0 / 3.0, 1.0, 0.08, 0.5, 0.92])
+
+
+@dataclass(frozen=True)
+class Cubics:
+    """Functions of the station in pieces.
+
+    Attributes:
+        borders: (P + 1,) stations at which pieces begin, and the end of the last.
+        coefficients: (P, F, 4) a, b, c, d over the distance from a piece's beginning.
+    """
+
+    borders: Float
+    coefficients: Float
+
+    def at_end(self, piece: int) -> Float:
+        """Return the values (F,) at the end of a piece."""
+        return _value(self.coefficients[piece], self.borders[piece + 1] - self.borders[piece])
+
+
+def merged_stations(stations: Iterable[float], start: float, end: float) -> Float:
+    """Return both ends and the stations between them, sorted, none closer than `CLOSE` to another."""
+    inside = sorted(s for s in stations if start + CLOSE < s < end - CLOSE)
+    found = [start]
+    for station in inside:
+        if station - found[-1] > CLOSE:
+            found.append(station)
+    return np.array([*found, end])
+
+
+def cubics(function: Function, borders: Float) -> Cubics:
+    """Return the cubics that a continuous function consists of; pieces are halved until they are exact.
+
+    Args:
+        function: the function.
+        borders: (P + 1,) stations, increasing, between which it is expected to be smooth.
+    """
+    while True:
+        length = np.diff(borders)
+        values = function((borders[:-1, None] + length[:, None] * _SHARES).ravel())
+        values = values.reshape(len(length), len(_SHARES), -1)
+        found = _through(values, length)
+        wrong = np.abs(_sampled(found, length) - values).max(axis=(1, 2)) > _EXACT
+        wrong &= length > _SHORTEST
+        if not wrong.any():
+            return Cubics(borders, found)
+        borders = np.sort(np.append(borders, (borders[:-1] + length / 2.0)[wrong]))
+
+
+def _through(values: Float, length: Float) -> Float:
+    """Return the coefficients (P, F, 4) through the values at the first four shares, of as low a degree as will do."""
+    f = values[:, :4].transpose(0, 2, 1)
+    f0, f1, f2, f3 = (f[..., i] for i in range(4))
+    h = length[:, None]
+    line = (f3 - f0) / h
+    cubic = (
+        f0,
+        (-11.0 * f0 + 18.0 * f1 - 9.0 * f2 + 2.0 * f3) / (2.0 * h),
+        9.0 * (2.0 * f0 - 5.0 * f1 + 4.0 * f2 - f3) / (2.0 * h**2),
+        9.0 * (f3 - f0 + 3.0 * (f1 - f2)) / (2.0 * h**3),
+    )
+    none = np.zeros(f0.shape)
+    best = np.stack(cubic, axis=-1)
+    # A parabola: the third differences vanish.
+    bend = 4.5 * (f0 - f1 - f2 + f3) / (2.0 * h**2)
+    for lower in ((f0, line - bend * h, bend, none), (f0, line, none, none), (f0, none, none, none)):
+        trial = np.stack(lower, axis=-1)
+        fits = np.abs(_sampled(trial, length) - values).max(axis=1) <= _EXACT / 10.0
+        best = np.where(fits[..., None], trial, best)
+    return _rounded(best, length)
+
+
+def _rounded(coefficients: Float, length: Float) -> Float:
+    """Return coefficients without the bits that differ between machines: what each adds is exact to a fine step."""
+    result = coefficients.copy()
+    for power in (1, 2, 3):
+        decimals = np.ceil(_STEP_DIGITS + power * np.log10(length)).astype(np.int64)
+        for piece, digits in enumerate(decimals.tolist()):
+            result[piece, :, power] = [round(value, digits) for value in coefficients[piece, :, power].tolist()]
+    return result
+
+
+def _sampled(coefficients: Float, length: Float) -> Float:
+    """Return the cubics' values (P, S, F) at all shares of their pieces."""
+    return _value(coefficients[:, None], (length[:, None] * _SHARES)[..., None])
+
+
+def _value(coefficients: Float, u: Float | float) -> Float:
+    a, b, c, d = (coefficients[..., i] for i in range(4))
+    return np.asarray(a + u * (b + u * (c + u * d)))
+
+
+def runs(borders: Float, coefficients: Float) -> list[tuple[float, list[float]]]:
+    """Return where the cubics of one function, (P, 4), begin and what they are; pieces that go on are one.
+
+    A run has the coefficients of its longest piece: those of a short one are known to few digits.
+    """
+    length = np.diff(borders)
+    found: list[tuple[float, list[float]]] = []
+    first = 0
+    while first < len(length):
+        last = first + 1
+        own = coefficients[first]
+        while last < len(length):
+            longest = first + int(np.argmax(length[first : last + 1]))
+            trial = _shifted(coefficients[longest], borders[first] - borders[longest])
+            if not _goes_on(trial, borders, coefficients, (first, last + 1)):
+                break
+            own, last = trial, last + 1
+        whole = np.array([borders[last] - borders[first]])
+        found.append((float(borders[first]), _rounded(own[None, None], whole)[0, 0].tolist()))
+        first = last
+    return found
+
+
+def _goes_on(cubic: Float, borders: Float, coefficients: Float, pieces: tuple[int, int]) -> bool:
+    """Return whether a cubic from the first of some pieces on is what they all are."""
+    first, end = pieces
+    within = np.diff(borders[first : end + 1])[:, None] * np.array([0.0, 0.3, 0.7, 1.0])
+    wanted = _value(coefficients[first:end, None], within)
+    ahead = borders[first:end, None] - borders[first] + within
+    return bool(np.abs(_value(cubic, ahead) - wanted).max() <= _SAME)
+
+
+def _shifted(cubic: Float, by: float) -> Float:
+    """Return a cubic (4,) whose distances are counted from a place that lies `by` (m) ahead."""
+    a, b, c, d = cubic.tolist()
+    return np.array([a + by * (b + by * (c + by * d)), b + by * (2.0 * c + 3.0 * by * d), c + 3.0 * by * d, d])
+
+
+def chords(function: Function, borders: Float, tolerance: float, shortest: float = 1e-3) -> Float:
+    """Return stations (N,), borders included where needed, between which a function is linear within a tolerance.
+
+    Args:
+        function: the function.
+        borders: (P + 1,) stations at which it may bend.
+        tolerance: largest distance of its values from the chords.
+        shortest: no chord that isn't between two borders is made shorter than this, m.
+    """
+    shares = np.array([0.0, 0.23, 0.5, 0.71, 1.0])
+    borders = _no_longer(borders, _LONGEST)
+    found, begin, length = [borders], borders[:-1], np.diff(borders)
+    while len(begin):
+        values = function((begin[:, None] + length[:, None] * shares).ravel()).reshape(len(begin), 5, -1)
+        wanted = values[:, :1] + shares[:, None] * (values[:, -1:] - values[:, :1])
+        wrong = (np.abs(values - wanted).max(axis=(1, 2)) > tolerance) & (length > 2.0 * shortest)
+        half = length[wrong] / 2.0
+        begin = np.concatenate([begin[wrong], begin[wrong] + half])
+        length = np.concatenate([half, half])
+        found.append(begin[len(half) :])
+    stations = np.sort(np.concatenate(found))
+    return _straightened(stations, function(stations))
+
+
+def _no_longer(borders: Float, longest: float) -> Float:
+    """Return the borders and, between those farther apart than `longest` (m), others at even distances."""
+    count = np.maximum(1, np.ceil(np.diff(borders) / longest)).astype(np.int64)
+    nth = np.arange(count.sum()) - np.repeat(np.cumsum(count) - count, count)
+    return np.append(np.repeat(borders[:-1], count) + nth * np.repeat(np.diff(borders) / count, count), borders[-1])
+
+
+def _straightened(stations: Float, values: Float) -> Float:
+    """Return the stations without those at which nothing bends."""
+    kept = [0]
+    for i in range(1, len(stations) - 1):
+        before, after = kept[-1], i + 1
+        share = (stations[i] - stations[before]) / (stations[after] - stations[before])
+        chord = values[before] + share * (values[after] - values[before])
+        if np.abs(values[i] - chord).max() > _EXACT:
+            kept.append(i)
+    return stations[[*kept, len(stations) - 1]]

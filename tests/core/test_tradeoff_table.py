@@ -1,0 +1,63 @@
+"""The trade-off's knobs and tables; stretches of a path."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from synthroads_addon.core.scanning.path import Strip
+from synthroads_addon.core.scanning.stretches import middle, spread
+from synthroads_addon.core.tradeoff import KNOBS, TABLES, markdown, rows
+from tests.core.scan_scenes import Standing
+
+
+def _row(knob: str, value: Any, **more: Any) -> dict[str, Any]:
+    numbers = {"seconds": 12.34, "model_seconds": 1.0, "image_seconds": 2.0, "peak_memory_mb": None}
+    numbers |= {"triangles": 1234567, "rays_per_second": 7, "images": 3, "megapixels": 1.5, "shares": {}, "errors": {}}
+    return {"knob": knob, "value": value, **numbers, **more}
+
+
+def test_every_row_is_named_and_in_a_table() -> None:
+    assert len(list(rows(KNOBS))) == sum(len(knob.rows) for knob in KNOBS.values())
+    assert {knob.table for knob in KNOBS.values()} == TABLES.keys()
+
+
+def test_tables_have_the_columns_that_are_measured() -> None:
+    found = [
+        _row("caster", "embree", errors={"height_mm": 2.5}),
+        _row("colour_source", "images", shares={"image": 0.95, "material": 0.004}, errors={"colour_95": 6.0}),
+        _row("colour_source", "material", shares={"material": 1.0}, colour_truth="a pixel per return"),
+        {"knob": "colour_source", "value": "returns", "left_out": "needs a newer one"},
+    ]
+    text = markdown(found, "rq31-600m")
+    assert "| caster | embree | 12.3 | 1.0 | - | 1,234,567 | 7 | 2.5 |" in text
+    assert "image (%) | material (%) | colour, CIEDE2000 95 % |" in text
+    assert "| 95.00 | 0.40 | 6 |" in text
+    assert "| 0.00 | 100.00 | - |" in text
+    assert "- colour_source returns: needs a newer one" in text
+    assert text.endswith("True colours are those of a pixel per return.\n")
+    assert "Light" not in text
+
+
+@pytest.mark.parametrize(("count", "duration"), [(1, 5.0), (16, 0.08), (4, 100.0)])
+def test_stretches_are_spread_over_each_strip(count: int, duration: float) -> None:
+    path = Standing(speed=2.0)
+    path.strips = (Strip(0, 0.0, 75.0), Strip(1, 80.0, 50.0))
+    part = spread(path, count, duration)
+    short = count * duration > 75.0
+    assert len(part.strips) == (2 if short else 2 * count)
+    assert part.share == pytest.approx(1.0 if short else 2 * count * duration / 125.0)
+    for strip in part.strips:
+        whole = path.strips[strip.index]
+        assert whole.start_time <= strip.start_time
+        assert strip.start_time + strip.duration <= whole.start_time + whole.duration + 1e-9
+    time = part.strips[-1].start_time + np.arange(3.0)
+    for mine, all_of_it in zip(part.pose(part.strips[-1], time), path.pose(path.strips[1], time), strict=True):
+        np.testing.assert_array_equal(mine, all_of_it)
+
+
+def test_the_middle_is_in_the_middle() -> None:
+    (strip,) = middle(Standing(), 0.2).strips
+    assert (strip.start_time, strip.duration) == pytest.approx((30.0, 15.0))
