@@ -1,0 +1,1 @@
+"""A road's centreline and corridor, regressed from slices of a cloud."""

@@ -1,0 +1,107 @@
+"""Standard deviations that mean what they say: one factor per target, found on validation roads.
+
+A model's deviation s of an error e is calibrated if 68 % of all |e| / s lie below 0.994 and 95 % below 1.960, as a
+Gaussian's would. One factor on s can bring one of both shares about; both only if the tails are Gaussian. The factor
+here is the one that misses both by as little as possible, measured in `TOLERANCES`. Beside it stand the factors that
+each share would need by itself (split conformal prediction: quantiles of |e| / s): intervals made with them cover what
+they say on roads like the validation's whatever the tails are.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Float = NDArray[np.float64]
+
+LEVELS = (0.68, 0.95)
+DEVIATIONS = (0.9944578832097532, 1.959963984540054)
+"""Half-widths, in standard deviations, of the intervals in which a Gaussian error lies with probabilities `LEVELS`."""
+TOLERANCES = (0.05, 0.03)
+"""How far the covered shares may be from `LEVELS`."""
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """How the deviations of one target are corrected.
+
+    Attributes:
+        factor: on the model's standard deviation.
+        widths: half-widths of the 68 % and the 95 % interval in units of the model's (uncorrected) standard deviation.
+        before, after: shares that the Gaussian intervals cover on the validation roads, without and with the factor.
+        count: of the errors that it was found on.
+    """
+
+    factor: float = 1.0
+    widths: tuple[float, float] = DEVIATIONS
+    before: tuple[float, float] = (float("nan"), float("nan"))
+    after: tuple[float, float] = (float("nan"), float("nan"))
+    count: int = 0
+
+    @property
+    def holds(self) -> bool:
+        """Whether the one factor brings both shares within their tolerances."""
+        return all(abs(share - level) <= by for share, level, by in zip(self.after, LEVELS, TOLERANCES, strict=True))
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return JSON data."""
+        return asdict(self) | {"holds": self.holds}
+
+    @classmethod
+    def from_dict(cls, data: Mapping[str, Any]) -> Calibration:
+        """Return what `to_dict` gave."""
+        widths, before, after = (_pair(data[name]) for name in ("widths", "before", "after"))
+        return cls(float(data["factor"]), widths, before, after, int(data["count"]))
+
+
+def calibrated(error: Float, std: Float) -> Calibration:
+    """Return the calibration of one target.
+
+    Args:
+        error: (N,) errors; those that aren't finite don't count.
+        std: (N,) the model's standard deviations in the same unit, > 0.
+    """
+    known = np.isfinite(error) & np.isfinite(std)
+    ratio = np.sort(np.abs(error[known]) / std[known])
+    if not len(ratio):
+        return Calibration()
+    widths = tuple(_conformal(ratio, level) for level in LEVELS)
+    # The share that is covered changes only where the interval's end passes an error.
+    tried = np.unique(np.concatenate([ratio / deviation for deviation in DEVIATIONS]))
+    tried = tried[tried > 0.0]
+    factor = float(tried[np.argmin(_missed(ratio, tried))]) if len(tried) else 1.0
+    return Calibration(factor, (widths[0], widths[1]), _covered(ratio, 1.0), _covered(ratio, factor), len(ratio))
+
+
+def all_calibrated(names: Sequence[str], error: Float, std: Float) -> dict[str, Calibration]:
+    """Return the calibration of several targets by name, from errors and deviations (N, T)."""
+    return {name: calibrated(error[:, column], std[:, column]) for column, name in enumerate(names)}
+
+
+def _pair(values: Sequence[float | None]) -> tuple[float, float]:
+    first, second = (float("nan") if value is None else float(value) for value in values)
+    return first, second
+
+
+def _conformal(ratio: Float, level: float) -> float:
+    """Return the ratio below which a new one lies with at least the probability `level` (Vovk et al. 2005)."""
+    rank = int(np.ceil(level * (len(ratio) + 1)))
+    return float(ratio[min(rank, len(ratio)) - 1])
+
+
+def _covered(ratio: Float, factor: float) -> tuple[float, float]:
+    shares = [float(np.searchsorted(ratio, factor * d, side="right") / len(ratio)) for d in DEVIATIONS]
+    return shares[0], shares[1]
+
+
+def _missed(ratio: Float, factors: Float) -> Float:
+    """Return for each factor the larger of the two shares' errors in units of their tolerances."""
+    missed = [
+        np.abs(np.searchsorted(ratio, factors * deviation, side="right") / len(ratio) - level) / tolerance
+        for deviation, level, tolerance in zip(DEVIATIONS, LEVELS, TOLERANCES, strict=True)
+    ]
+    return np.maximum(*missed)

@@ -1,0 +1,255 @@
+"""Effects on sequences of slices, drawn while training: cheap, and carried along to the truth.
+
+Every effect takes its random numbers from the sample's own stream, so that a seed and a number give the same sample,
+whatever worker makes it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field, model_validator
+
+from ml.configuration import Part
+from synthroads_addon.core.schema import quantity
+
+from .corridor import CORRIDOR
+from .frames import Frames
+
+Float = NDArray[np.float64]
+Generator = np.random.Generator
+
+_DARKEST = 1e-5
+"""Intensities below this share of the brightest count as it."""
+
+LEFT, RIGHT, HEADING, HEIGHT = (CORRIDOR.index(name) for name in ("left_edge", "right_edge", "heading", "height"))
+
+
+@dataclass
+class Stretch:
+    """A sequence of S slices with K points; effects change it in place.
+
+    Attributes:
+        xyz: (K, 3) float64 in the slices' frames, m; z still that of the cloud.
+        number: (K,) slice of each point, ascending.
+        intensity: (K,) float64, 0 where there is none.
+        rgb: (K, 3) float64 from 0 to 1.
+        paved, marked: (K,) whether a point is known to lie on the pavement (markings included), or on a marking.
+        has_color: whether the colours mean something.
+        frames: the S frames.
+        center: (S,) y of the true centreline, m, or NaN.
+        corridor: (S, len(CORRIDOR)); height is above the cloud's zero.
+        lines, room: (S, 2) see `Crossings`.
+    """
+
+    xyz: Float
+    number: NDArray[np.intp]
+    intensity: Float
+    rgb: Float
+    paved: NDArray[np.bool_]
+    marked: NDArray[np.bool_]
+    has_color: bool
+    frames: Frames
+    center: Float
+    corridor: Float
+    lines: Float
+    room: Float
+
+    def keep(self, points: NDArray[np.bool_] | NDArray[np.intp]) -> None:
+        """Leave out all points but those of a mask or of ascending indices."""
+        for name in ("xyz", "number", "intensity", "rgb", "paved", "marked"):
+            setattr(self, name, getattr(self, name)[points])
+
+
+class Crop(Part):
+    """Both sides of every slice cut off, so that the middle of what is left isn't the centre.
+
+    A strip reaches to a distance R from the true centre to either side, two numbers drawn for the whole sequence: a
+    road's from ``reach``, a carriageway's from its edge line out to ``beyond`` farther, but at most to the middle of
+    the median. In it every slice, and each of its sides by itself, is cut to a distance between (1 - ``share``) R and
+    R; with the probability ``steady`` the same in all slices, since cuts of their own average out over a sequence.
+    """
+
+    probability: float = quantity(
+        0.5, ge=0, le=1, unit="1", description="Of a road's sequence; a carriageway's always."
+    )
+    reach: tuple[float, float] = Field((4.0, 30.0), description="Smallest and largest R of a road's strip, m.")
+    beyond: tuple[float, float] = Field((0.0, 4.0), description="R of a carriageway's strip beyond its edge line, m.")
+    share: float = quantity(0.75, ge=0, le=0.95, unit="1", description="Largest part of R that is cut off.")
+    steady: float = quantity(0.25, ge=0, le=1, unit="1", description="Probability of cuts that all slices share.")
+
+    @model_validator(mode="after")
+    def _in_order(self) -> Crop:
+        for name, least in (("reach", 0.5), ("beyond", 0.0)):
+            low, high = getattr(self, name)
+            if not least <= low <= high <= 1000.0:
+                raise ValueError(f"{name} must be two ascending numbers from {least:g} to 1000")
+        return self
+
+
+class Effects(Part):
+    """What is done to a sequence while training. Strengths are the largest; each sample draws its own below them."""
+
+    mirror: float = quantity(0.5, ge=0, le=1, unit="1", description="Probability of left and right being swapped.")
+    turn_round: float = quantity(0.5, ge=0, le=1, unit="1", description="Probability of running against the path.")
+    crop: Crop = Field(default=Crop(), description="Sides cut off.")
+    dropout: float = quantity(0.3, ge=0, lt=1, unit="1", description="Share of the points that are left out.")
+    hidden: float = quantity(0.2, ge=0, le=1, unit="1", description="Probability of a hole as behind a vehicle.")
+    empty: float = quantity(0.02, ge=0, le=1, unit="1", description="Probability of a slice without any point.")
+    jitter: float = quantity(0.02, ge=0, le=1, unit="m", description="Standard deviation of the points' noise.")
+    tilt: float = quantity(0.01, ge=0, le=0.2, unit="1", description="Cross slope and grade that are added.")
+    contrast: float = quantity(1.5, ge=0, le=3, unit="1", description="Log of the factor on what isn't pavement.")
+    paint: float = quantity(0.95, ge=0, le=1, unit="1", description="Share of the markings' brightness worn off.")
+    gamma: tuple[float, float] = Field((0.15, 1.5), description="Smallest and largest power of the intensities.")
+    falloff: float = quantity(1.5, ge=0, le=10, unit="1", description="Power of the range fall-off to the sides.")
+    speckle: float = quantity(0.3, ge=0, le=2, unit="1", description="Noise of intensities by their own p90 - p10.")
+    patches: float = quantity(0.2, ge=0, le=2, unit="1", description="The same of patches some metres long and wide.")
+    colorless: float = quantity(0.3, ge=0, le=1, unit="1", description="Probability of the colours being left out.")
+    tint: float = quantity(0.2, ge=0, le=1, unit="1", description="Log of the factor on each colour channel.")
+
+    @model_validator(mode="after")
+    def _powers(self) -> Effects:
+        if not 0.01 <= self.gamma[0] <= self.gamma[1] <= 10.0:
+            raise ValueError("gamma must be two ascending numbers from 0.01 to 10")
+        return self
+
+
+def leave_out(stretch: Stretch, effects: Effects, rng: Generator, carriageway: bool) -> None:
+    """Draw the effects that leave points out.
+
+    Args:
+        stretch: is changed in place.
+        effects: their strengths.
+        rng: the sample's own stream.
+        carriageway: whether the truth is a carriageway's, beside which the other one must not be seen.
+    """
+    crop_sides(stretch, effects.crop, rng, carriageway)
+    drop(stretch, effects, rng)
+
+
+def transform(stretch: Stretch, effects: Effects, rng: Generator) -> None:
+    """Draw the effects that change points. They cost the less the fewer points are left."""
+    for happens, turned in ((effects.mirror, mirror), (effects.turn_round, turn_round)):
+        if rng.random() < happens:
+            turned(stretch)
+    move(stretch, effects, rng)
+    relight(stretch, effects, rng)
+
+
+def crop_sides(stretch: Stretch, crop: Crop, rng: Generator, carriageway: bool) -> None:
+    """Cut off both sides of every slice; slices without a known centre are cut as if it lay at the frame's origin."""
+    count = len(stretch.center)
+    center = np.nan_to_num(stretch.center)
+    happens = rng.random() < crop.probability
+    if carriageway:
+        strip = np.nan_to_num(stretch.lines, nan=3.5) + rng.uniform(*crop.beyond, 2)
+        strip = np.minimum(strip, np.nan_to_num(stretch.room, nan=np.inf))
+    else:
+        # Uniform logarithms: narrow strips differ more from each other than wide ones.
+        low, high = np.log(crop.reach)
+        strip = np.tile(np.exp(rng.uniform(low, high, 2)), (count, 1))
+    reach = strip * (1.0 - rng.uniform(0.0, crop.share, (1 if rng.random() < crop.steady else count, 2)))
+    if not happens:
+        reach = strip if carriageway else np.full((count, 2), np.inf)
+    y = stretch.xyz[:, 1] - center[stretch.number]
+    stretch.keep((y <= reach[stretch.number, 0]) & (-y <= reach[stretch.number, 1]))
+
+
+def drop(stretch: Stretch, effects: Effects, rng: Generator) -> None:
+    """Leave out single points, whole slices, and a hole of some metres."""
+    slices, points = len(stretch.center), len(stretch.number)
+    keep = rng.random(points) >= rng.uniform(0.0, effects.dropout)
+    keep &= (rng.random(slices) >= effects.empty)[stretch.number]
+    if rng.random() < effects.hidden and points:
+        at, length, width = rng.integers(points), rng.uniform(2.0, 12.0), rng.uniform(1.5, 3.0)
+        along = np.abs(stretch.number - stretch.number[at]) <= length / 2.0
+        keep &= ~(along & (np.abs(stretch.xyz[:, 1] - stretch.xyz[at, 1]) <= width / 2.0))
+    stretch.keep(keep)
+
+
+def mirror(stretch: Stretch) -> None:
+    """Swap left and right. The frames are mirrored as well, so that a mirrored sample has no way back to the cloud."""
+    frames = stretch.frames
+    stretch.frames = Frames(frames.position * np.array([1.0, -1.0]), -frames.direction, frames.station)
+    stretch.xyz = stretch.xyz * np.array([1.0, -1.0, 1.0])
+    stretch.center = -stretch.center
+    corridor = stretch.corridor.copy()
+    corridor[:, LEFT], corridor[:, RIGHT] = -stretch.corridor[:, RIGHT], -stretch.corridor[:, LEFT]
+    corridor[:, HEADING] *= -1.0
+    stretch.corridor = corridor
+    stretch.lines, stretch.room = stretch.lines[:, ::-1], stretch.room[:, ::-1]
+
+
+def turn_round(stretch: Stretch) -> None:
+    """Run along the road in the other direction, the last slice first."""
+    last = len(stretch.center) - 1
+    order = np.argsort(last - stretch.number, kind="stable")
+    stretch.keep(order)
+    stretch.number = last - stretch.number
+    stretch.xyz = stretch.xyz * np.array([-1.0, -1.0, 1.0])
+    stretch.center = -stretch.center[::-1]
+    corridor = stretch.corridor[::-1].copy()
+    corridor[:, [LEFT, RIGHT]] = -corridor[:, [RIGHT, LEFT]]
+    stretch.corridor = corridor
+    stretch.lines, stretch.room = stretch.lines[::-1, ::-1], stretch.room[::-1, ::-1]
+    stretch.frames = stretch.frames.turned_round()
+
+
+def move(stretch: Stretch, effects: Effects, rng: Generator) -> None:
+    """Tilt the ground and add noise to the points. Their slices stay what they are."""
+    grade, cross = rng.uniform(-effects.tilt, effects.tilt, 2)
+    middle = (len(stretch.center) - 1) / 2.0
+    x, y = stretch.xyz[:, 0] + stretch.number - middle, stretch.xyz[:, 1]
+    noise = rng.uniform(0.0, effects.jitter) * rng.standard_normal(stretch.xyz.shape)
+    stretch.xyz = stretch.xyz + noise
+    stretch.xyz[:, 2] += grade * x + cross * y
+    stretch.corridor = stretch.corridor.copy()
+    stretch.corridor[:, HEIGHT] += grade * (np.arange(len(stretch.center)) - middle) + cross * stretch.center
+
+
+def relight(stretch: Stretch, effects: Effects, rng: Generator) -> None:
+    """Change intensities and colours as another scanner, other materials and another camera would have."""
+    numbers = rng.uniform(-1.0, 1.0, 6)
+    share = rng.random(5)
+    value = np.maximum(stretch.intensity, 0.0)
+    if value.any():
+        value = _worn(value, stretch, effects.paint * share[0])
+        value = np.where(stretch.paved, value, value * np.exp(effects.contrast * numbers[0]))
+        value *= _falloff(stretch.xyz[:, 1], effects.falloff * share[1], height=20.0 + 15.0 * numbers[1])
+        low, high = np.log(effects.gamma)
+        log = np.exp(low + share[4] * (high - low)) * np.log(np.maximum(value / np.max(value), _DARKEST))
+        # Noise by the spread, so that a scanner that compresses its intensities isn't drowned in it.
+        spread = float(np.subtract(*np.percentile(log, (90.0, 10.0))))
+        noise = effects.speckle * share[2] * rng.standard_normal(len(value))
+        stretch.intensity = np.exp(log + spread * (noise + effects.patches * share[3] * _waves(stretch, rng)))
+    if rng.random() < effects.colorless:
+        stretch.has_color = False
+    elif stretch.has_color:
+        stretch.rgb = np.clip(stretch.rgb * np.exp(effects.tint * (numbers[2] + numbers[3:6])), 0.0, 1.0)
+
+
+def _worn(value: Float, stretch: Stretch, share: float) -> Float:
+    """Return intensities whose markings have lost a share of what they are brighter than the pavement."""
+    bare = stretch.paved & ~stretch.marked
+    if not stretch.marked.any() or not bare.any():
+        return value
+    pavement = float(np.median(value[bare]))
+    return np.where(stretch.marked, value + share * np.minimum(pavement - value, 0.0), value)
+
+
+def _falloff(y: Float, power: float, height: float) -> Float:
+    """Return factors (K,) of intensities that fall off with the range from a scanner above the frame's origin."""
+    return (1.0 + (y / height) ** 2) ** (-power / 2.0)
+
+
+def _waves(stretch: Stretch, rng: Generator) -> Float:
+    """Return a smooth random function of the place (K,) of about unit deviation: waves of 2 to 20 m any way."""
+    count = 6
+    rate = 2.0 * np.pi / np.exp(rng.uniform(np.log(2.0), np.log(20.0), count))
+    way, phase = rng.uniform(0.0, 2.0 * np.pi, (2, count))
+    x, y = stretch.xyz[:, 0] + stretch.number, stretch.xyz[:, 1]
+    angle = x[:, None] * (rate * np.cos(way)) + y[:, None] * (rate * np.sin(way)) + phase
+    result: Float = np.cos(angle).sum(axis=1) * np.sqrt(2.0 / count)
+    return result

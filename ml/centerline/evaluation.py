@@ -1,0 +1,228 @@
+"""Any predictor of centrelines, measured on roads with a known axis.
+
+A predictor is a function from a road and M frames of slices to (M, 2 or more) numbers: y of the centre in each frame, m
+(NaN: none), and its standard deviation, m (NaN: none). Columns of a corridor may follow, see `CORRIDOR_COLUMNS`.
+
+Every predictor sees the same points in the same frames. Both depend on a seed:
+
+- where a strip of points was cut around the axis beforehand, both sides of every slice are cropped at random and
+  independently (`Cropping`), as the middle of what is left must not be the answer;
+- the frames come from a path that strays to either side within a window and errs in its direction. What strays is the
+  axis of a synthetic road, which is scanned far to both sides; for a real one it is the path that is estimated from its
+  *cropped* points.
+
+Slices in which the truth's axis has a gap are left out.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+from itertools import product
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ml.points import ROAD_CLASSES
+from synthroads_addon.core.errors import InputError
+from synthroads_addon.core.random_streams import stream
+
+from . import skeleton, trivial
+from .corridor import CORRIDOR, Truth
+from .frames import Frames, along, displaced, estimated_path
+from .metrics import Spread, figures, over_roads, over_seeds
+from .roads import Road, cropped
+from .slices import SliceSettings
+
+Float = NDArray[np.float64]
+Predictor = Callable[[Road, Frames], Float]
+
+CORRIDOR_COLUMNS = ("center", "center_std", *CORRIDOR, *(f"{name}_std" for name in CORRIDOR))
+"""Columns of a prediction; only the first is needed, those after the second are for pictures."""
+HALF_WIDTH = SliceSettings().half_width
+"""Trivial predictors see points up to this far beside a frame, m, as the models do."""
+
+
+@dataclass(frozen=True)
+class Cropping:
+    """How the sides of slices are cut off, see `roads.cropped`.
+
+    Attributes:
+        share: the largest part of the distance from the axis to the outermost point that is cut off; uniform from 0.
+        length: metres along the axis over which the cuts stay the same. 1: every slice has cuts of its own, which
+            average out over a sequence of slices. Longer ones don't.
+    """
+
+    share: float = 0.5
+    length: float = 1.0
+
+
+@dataclass(frozen=True)
+class Case:
+    """A road as one seed shows it: its points, cropped perhaps, and the frames in which it is looked at."""
+
+    road: Road
+    frames: Frames
+
+
+def case(
+    road: Road, seed: int, *, cropping: Cropping | None, estimated: bool, settings: SliceSettings | None = None
+) -> Case:
+    """Return a road as a seed shows it.
+
+    Args:
+        road: with a known truth.
+        seed: of cuts and of how the path strays.
+        cropping: None: all points stay.
+        estimated: whether the path is found in the points; else it is the axis. Both stray.
+        settings: how far the path strays; those of `SliceSettings` if not given.
+
+    Raises:
+        InputError: the road has no truth.
+    """
+    settings = settings or SliceSettings()
+    seen = road if cropping is None else cropped(road, cropping.share, seed, cropping.length)
+    path = estimated_path(seen.xyz.astype(np.float64)) if estimated else truth_of(road).axis
+    rng = stream(seed, "frames", road.name)
+    strayed = displaced(along(path), rng, settings.window, settings.direction_deg, settings.wander_length)
+    return Case(seen, strayed)
+
+
+def truth_of(road: Road) -> Truth:
+    """Return a road's truth.
+
+    Raises:
+        InputError: it isn't known.
+    """
+    if road.truth is None:
+        raise InputError("road", road.name, "must have a known centreline to be measured on")
+    return road.truth
+
+
+def evaluate(predictor: Predictor, shown: Case) -> dict[str, float]:
+    """Return the figures of one predictor on one road, see `metrics.figures`."""
+    frames = shown.frames
+    predicted = predictor(shown.road, frames)
+    true, _ = truth_of(shown.road).axis.crossing(frames.position, frames.direction)
+    std = predicted[:, 1] if predicted.shape[1] > 1 else None
+    return figures(frames.at(predicted[:, 0]), frames.at(true), frames.station, std)
+
+
+def measure(
+    predictors: Mapping[str, Sequence[Predictor]], cases: Callable[[int], Sequence[Case]], seeds: Sequence[int]
+) -> dict[str, dict[str, dict[str, Spread]]]:
+    """Return figures by predictor and road (`all` being all together), over seeds.
+
+    Args:
+        predictors: by name; one per seed, as models that were trained with it, or one for all seeds.
+        cases: the roads as a seed shows them.
+        seeds: of cuts and frames. The n-th predictor is measured with the n-th seed.
+    """
+    rows: dict[str, dict[str, list[dict[str, float]]]] = {name: {} for name in predictors}
+    for index, seed in enumerate(seeds):
+        shown = cases(seed)
+        for name, versions in predictors.items():
+            if len(versions) not in (1, len(seeds)):
+                raise ValueError(f"{name}: {len(versions)} predictors for {len(seeds)} seeds")
+            predictor = versions[0] if len(versions) == 1 else versions[index]
+            found = {one.road.name: evaluate(predictor, one) for one in shown}
+            for road, row in (*found.items(), ("all", over_roads(found.values()))):
+                rows[name].setdefault(road, []).append(row)
+    return {name: {road: over_seeds(values) for road, values in by_road.items()} for name, by_road in rows.items()}
+
+
+def trivial_predictor(name: str, half_width: float = HALF_WIDTH) -> Predictor:
+    """Return one of `trivial.RULES`."""
+    rule, length = trivial.RULES[name]
+
+    def predict(road: Road, frames: Frames) -> Float:
+        found = road.slices(frames, half_width, length)
+        own = belonging(road)[found.index]
+        y, intensity = found.xy[own, 1], road.intensity[found.index[own]].astype(np.float64)
+        return trivial.centers(rule, found.number[own], y, intensity, len(frames))[:, None]
+
+    return predict
+
+
+def skeleton_predictor(settings: skeleton.SkeletonSettings) -> Predictor:
+    """Return the skeleton baseline; the mask ``classes`` takes the points of the road's classes where there are any."""
+
+    def predict(road: Road, frames: Frames) -> Float:
+        xy, intensity = _mask_points(road, settings.mask)
+        return skeleton.centers(xy, intensity, frames.position, frames.direction, settings)[:, None]
+
+    return predict
+
+
+def _mask_points(road: Road, mask: str) -> tuple[Float, Float]:
+    """Return places (N, 2) and intensities (N,) of the points that the skeleton's mask is made of."""
+    own = belonging(road)
+    paved = np.isin(road.class_id, road.ids_of(ROAD_CLASSES))
+    if mask == "classes" and paved.any():
+        own &= paved
+    return road.xyz[own, :2].astype(np.float64), road.intensity[own].astype(np.float64)
+
+
+def belonging(road: Road) -> NDArray[np.bool_]:
+    """Return which points (N,) belong to the road: of a carriageway those up to the middle of the median."""
+    if road.truth is None or not np.isfinite(road.truth.room).any():
+        return np.ones(len(road), dtype=bool)
+    station, offset = road.truth.axis.project(road.xyz)
+    nearest = np.clip(np.searchsorted(road.truth.axis.station, station), 0, len(road.truth.room) - 1)
+    room = road.truth.room[nearest]
+    return (offset <= room[:, 0]) & (-offset <= room[:, 1])
+
+
+def path_itself(road: Road, frames: Frames) -> Float:
+    """Predict the frames' own origins: what the displaced path alone would be worth."""
+    return np.zeros((len(frames), 1))
+
+
+def trivial_predictors() -> dict[str, list[Predictor]]:
+    """Return all predictors that learn nothing, by name, for `measure`."""
+    found: dict[str, list[Predictor]] = {"the displaced path": [path_itself]}
+    return found | {name: [trivial_predictor(name)] for name in trivial.RULES}
+
+
+@dataclass(frozen=True)
+class GridSearch:
+    """What was tried for the baseline, and what is best.
+
+    Attributes:
+        best: of the settings that find at least `FOUND` of the slices, the one with the smallest mean distance.
+        rows: settings with their figures.
+    """
+
+    best: skeleton.SkeletonSettings
+    rows: list[tuple[skeleton.SkeletonSettings, dict[str, float]]]
+
+
+FOUND = 0.8
+RASTERS = (0.25, 0.5, 1.0, 2.0)
+BRANCHES = (5.0, 10.0, 15.0, 30.0)
+BINS = (1.0, 5.0, 10.0)
+"""m."""
+
+
+def grid_search(shown: Sequence[Case], masks: Sequence[str]) -> GridSearch:
+    """Return the baseline's best settings on the cases of one road, to be frozen for all others."""
+    rows: list[tuple[skeleton.SkeletonSettings, dict[str, float]]] = []
+    for mask, raster, branch in product(masks, RASTERS, BRANCHES):
+        tried = [skeleton.SkeletonSettings(raster, branch, mask, width) for width in BINS]
+        found: list[list[dict[str, float]]] = [[] for _ in tried]
+        for one in shown:
+            frames = one.frames
+            # Thinning takes the time, and doesn't depend on the bins.
+            lines = skeleton.skeletons(*_mask_points(one.road, mask), frames.position, tried[0])
+            for settings, some in zip(tried, found, strict=True):
+                y = skeleton.centers_on(lines, frames.position, frames.direction, settings.bin)
+                some.append(evaluate(partial(_told, y), one))
+        rows.extend((settings, over_roads(some)) for settings, some in zip(tried, found, strict=True))
+    enough = [row for row in rows if row[1]["found"] >= FOUND] or rows
+    best = min(enough, key=lambda row: row[1]["mae"] if np.isfinite(row[1]["mae"]) else np.inf)
+    return GridSearch(best[0], rows)
+
+
+def _told(y: Float, road: Road, frames: Frames) -> Float:
+    return y[:, None]

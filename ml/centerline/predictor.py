@@ -1,0 +1,159 @@
+"""A trained model along a path: what it says about every frame, put together from overlapping sequences."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor
+
+from ml.configuration import Part
+from synthroads_addon.core.random_streams import stream
+from synthroads_addon.core.schema import quantity
+
+from .calibration import Calibration
+from .corridor import CORRIDOR, Truth
+from .frames import Frames, sequences
+from .models import TARGETS, CenterlineModel, both_ways
+from .roads import Road
+from .slices import Sample, SliceSettings, collate, sample, stretch
+
+Float = NDArray[np.float64]
+
+_NEAR = 2
+"""A frame with no point in it nor in this many frames to either side has no prediction."""
+_HEIGHT = TARGETS.index("height")
+
+
+class UseOptions(Part):
+    """How a trained model is used."""
+
+    mirror: bool = True
+    """Average what the model says of the slices and of their mirror image."""
+    step: int = quantity(5, ge=1, le=1000, unit="1", description="Slices from one sequence's start to the next one's.")
+    batch: int = quantity(32, ge=1, le=10_000, unit="1", description="Sequences at a time.")
+
+
+@dataclass(frozen=True)
+class Regression:
+    """What was found in M frames; T are the `TARGETS`, the centre first.
+
+    Attributes:
+        frames: where.
+        value: (M, T) float64; y in the frame (m) of the centre and the edges; the height is the elevation in the road's
+            local coordinates. NaN: nothing found.
+        raw_std: (M, T) the model's own standard deviations.
+        std: (M, T) the same, calibrated.
+    """
+
+    frames: Frames
+    value: Float
+    raw_std: Float
+    std: Float
+
+    @property
+    def center(self) -> Float:
+        """Return y of the centre (M,) in the frames, m."""
+        return self.value[:, 0]
+
+
+class CenterlinePredictor:
+    """A model with its calibration; called with a road and frames it gives what `evaluation` wants of a predictor.
+
+    Args:
+        model: trained.
+        settings: how its slices are cut.
+        use: how it is used.
+        calibration: of each target by name; None: deviations are the model's own.
+    """
+
+    def __init__(
+        self,
+        model: CenterlineModel,
+        settings: SliceSettings,
+        use: UseOptions,
+        calibration: Mapping[str, Calibration] | None = None,
+    ) -> None:
+        self.model = model
+        self.settings = settings
+        self.use = use
+        found = calibration or {}
+        self.calibration = {name: found.get(name, Calibration()) for name in TARGETS}
+
+    def __call__(self, road: Road, frames: Frames) -> Float:
+        """Return (M, 2 + 2 K): centre, its deviation, the corridor, its deviations; the height is an elevation."""
+        found = self.regress(road, frames)
+        return np.column_stack([found.value[:, :1], found.std[:, :1], found.value[:, 1:], found.std[:, 1:]])
+
+    def regress(self, road: Road, frames: Frames) -> Regression:
+        """Return what the model finds.
+
+        A frame in several sequences has the mean of what they say, weighted by the inverse variances. Its variance is
+        their mean as well, since errors of the same points don't average out.
+        """
+        shape = (len(frames), len(TARGETS))
+        weight, value, spread = np.zeros(shape), np.zeros(shape), np.zeros(shape)
+        seen = np.zeros(len(frames), dtype=bool)
+        for number, height, filled, found, std in self._sequences(road, frames):
+            found[:, _HEIGHT] += height
+            inverse = 1.0 / std**2
+            np.add.at(weight, number, inverse)
+            np.add.at(value, number, inverse * found)
+            np.add.at(spread, number, 1.0)
+            np.logical_or.at(seen, number, filled)
+        # The mean of the variances, each weighted by its inverse, is the harmonic one.
+        with np.errstate(invalid="ignore", divide="ignore"):
+            mean, raw = value / weight, np.sqrt(spread / weight)
+        around = np.convolve(seen, np.ones(2 * _NEAR + 1))[_NEAR:-_NEAR] if len(seen) else np.zeros(0)
+        mean[around == 0], raw[around == 0] = np.nan, np.nan
+        factors = np.array([self.calibration[name].factor for name in TARGETS])
+        return Regression(frames, mean, raw, raw * factors)
+
+    def widths(self, found: Regression) -> Float:
+        """Return half-widths (M, T, 2) of the intervals that cover 68 % and 95 % on roads like the validation's."""
+        factors = np.array([self.calibration[name].widths for name in TARGETS])
+        return found.raw_std[:, :, None] * factors
+
+    def _sequences(
+        self, road: Road, frames: Frames
+    ) -> Iterator[tuple[NDArray[np.intp], Float, NDArray[np.bool_], Float, Float]]:
+        """Yield of all slices of some sequences: frame, z origin, whether there are points, values and deviations."""
+        settings = self.settings
+        runs = sequences(frames, settings.slices, min(self.use.step, settings.slices), settings.spacing)
+        device = next(self.model.parameters()).device
+        self.model.eval()
+        for first in range(0, len(runs), self.use.batch):
+            some = runs[first : first + self.use.batch]
+            samples = [self._sample(road, frames, run) for run in some]
+            batch = {name: values.to(device) for name, values in collate(samples).items()}
+            with torch.no_grad():
+                output = both_ways(self.model, batch) if self.use.mirror else self.model(batch)
+            values = _flat(output["center"], output["corridor"])
+            deviations = _flat(output["center_std"], output["corridor_std"])
+            filled = batch["mask"].any(-1).flatten().cpu().numpy()
+            yield some.flatten(), batch["frame"][..., 3].flatten().cpu().numpy(), filled, values, deviations
+
+    def _sample(self, road: Road, frames: Frames, run: NDArray[np.intp]) -> Sample:
+        chosen = frames.select(run)
+        # Which points are left out hangs on the place alone, so that cutting a road into parts changes nothing.
+        place = int(np.floor(1000.0 * chosen.station[0])) & 0xFFFFFFFF
+        return sample(stretch(road, chosen, self.settings), self.settings, stream(0, "frames", place), 0, run)
+
+
+def errors(found: Regression, truth: Truth) -> Float:
+    """Return what was found minus the truth (M, T), NaN where either is missing."""
+    frames = found.frames
+    there = truth.at(frames.position, frames.direction, np.zeros(len(frames)))
+    return found.value - np.column_stack([there.center, there.corridor])
+
+
+def _flat(center: Tensor, corridor: Tensor) -> Float:
+    """Return values (B S, T) of the targets."""
+    joined = torch.cat([center[..., None], corridor], dim=-1).flatten(0, 1)
+    return joined.cpu().numpy().astype(np.float64)
+
+
+assert TARGETS[1:] == CORRIDOR

@@ -1,0 +1,113 @@
+"""The second look: all slices of a sequence moved so that the road found at first runs straight through their middle.
+
+What was found at first is known to a tenth of a kernel point's spacing. Seen from there, every road looks alike: lines
+run straight along the slices, dashes of one slice complete those of another, and what is left to find is small.
+"""
+
+from __future__ import annotations
+
+import torch
+from torch import Tensor, nn
+
+from .layers import GridConvolution, RelativeAttention, cell_features, cell_sums
+
+_NARROW = 6
+"""Features of a cell when all cells of a slice are put side by side."""
+_PARABOLA_UNIT = 5.0
+"""Half the length of a sequence, m: parabolas are fitted in this unit."""
+_FIRST_LOG_STD = -1.5
+
+
+class Refinement(nn.Module):
+    """How far a road's centre lies from where it was first found, from fine cells around that.
+
+    Args:
+        inputs: features of a point.
+        width: features of a cell.
+        context: features of a slice.
+        slices: of a sequence, which see each other; 1: each by itself.
+        reach: the cells divide -reach to reach beside the first guess, m.
+        cells: their number.
+        heads: of the attention.
+    """
+
+    def __init__(
+        self, inputs: int, width: int, context: int, slices: int, reach: float, cells: int, heads: int
+    ) -> None:
+        super().__init__()
+        self.reach, self.cells = reach, cells
+        self.first = nn.Linear(inputs + 2, width)
+        along = 5 if slices > 1 else 1
+        self.grid = nn.ModuleList(GridConvolution(width, along, 5) for _ in range(2))
+        self.narrow = nn.Linear(width, _NARROW)
+        self.wide = nn.Linear(cells * _NARROW, context)
+        self.context = nn.Linear(context, context)
+        self.along = RelativeAttention(slices, context, heads, 0.0) if slices > 1 else None
+        self.out = nn.Sequential(nn.LayerNorm(context), nn.Linear(context, 2))
+
+    def forward(
+        self, coord: Tensor, mask: Tensor, features: Tensor, guess: Tensor, heading: Tensor, context: Tensor
+    ) -> tuple[Tensor, Tensor]:
+        """Look again.
+
+        Args:
+            coord: (B, S, P, 3) points, m.
+            mask: (B, S, P) which of them exist.
+            features: (B, S, P, C).
+            guess: (B, S) y at which the road was found first, m.
+            heading: (B, S) its direction in the slices' frames, rad.
+            context: (B, S, D) of the slices.
+
+        Returns:
+            (B, S) how much farther to the left the centre lies, m, and the logarithm of that's deviation.
+        """
+        aside = guess[..., None] + coord[..., 0] * torch.tan(heading)[..., None]
+        straight = coord - torch.stack([torch.zeros_like(aside), aside, torch.zeros_like(aside)], dim=-1)
+        sums = cell_sums(straight.flatten(0, 1), mask.flatten(0, 1), features.flatten(0, 1), self.reach, self.cells)
+        grid = self.first(cell_features(sums)).unflatten(0, guess.shape)
+        for layer in self.grid:
+            grid = layer(grid)
+        seen = self.wide(self.narrow(grid).flatten(2)) + self.context(context)
+        if self.along is not None:
+            seen = self.along(nn.functional.gelu(seen))
+        residual, log_std = self.out(nn.functional.gelu(seen)).unbind(-1)
+        return residual, log_std + _FIRST_LOG_STD
+
+
+def parabola(frame: Tensor, center: Tensor, weight: Tensor, stiffness: Tensor) -> tuple[Tensor, Tensor]:
+    """Fit a parabola through the centres of each sequence, by weighted least squares in its middle slice's frame.
+
+    Args:
+        frame: (B, S, 4) float64: x, y and direction of the slices' frames.
+        center: (B, S) y of the centres in them, m.
+        weight: (B, S) of the centres, > 0.
+        stiffness: (3,) > 0, what offset, slope and curvature cost: this keeps the fit defined if places coincide.
+
+    Returns:
+        y (B, S) at which the parabola crosses the slices' orthogonals, m, and its direction (B, S) in them, rad.
+    """
+    place, turn = _in_the_middle(frame, center.dtype)
+    left = torch.stack([-torch.sin(turn), torch.cos(turn)], dim=-1)
+    points = place + center[..., None] * left
+    # The middle's own offset costs nothing: a road far from the path is as good as one near it.
+    middle = points.mean(1, keepdim=True)[..., 1]
+    along = points[..., 0] / _PARABOLA_UNIT
+    powers = torch.stack([torch.ones_like(along), along, along * along], dim=-1)
+    weighted = powers * weight[..., None]
+    normal = weighted.transpose(1, 2) @ powers + torch.diag(stiffness)
+    factors = torch.linalg.solve(normal, (weighted * (points[..., 1] - middle)[..., None]).sum(1))
+    value = (powers @ factors[..., None])[..., 0] + middle
+    slope = (factors[:, 1:2] + 2.0 * factors[:, 2:] * along) / _PARABOLA_UNIT
+    # One step of Newton's method along the orthogonal: the parabola is nearly straight from here to there.
+    away = (points[..., 1] - value) / (left[..., 1] - slope * left[..., 0])
+    return center - away, torch.atan(slope) - turn
+
+
+def _in_the_middle(frame: Tensor, dtype: torch.dtype) -> tuple[Tensor, Tensor]:
+    """Return origins (B, S, 2) and directions (B, S) of frames in that of the sequence's middle slice."""
+    middle = frame[:, frame.shape[1] // 2, :]
+    delta = frame[..., :2] - middle[:, None, :2]
+    cos, sin = torch.cos(middle[:, 2:3]), torch.sin(middle[:, 2:3])
+    x, y = delta.unbind(-1)
+    place = torch.stack([cos * x + sin * y, cos * y - sin * x], dim=-1)
+    return place.to(dtype), (frame[..., 2] - middle[:, 2:3]).to(dtype)

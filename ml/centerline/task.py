@@ -1,0 +1,248 @@
+"""The task "centerline" of the commands: training, measuring and using the centreline models."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+import torch
+from pydantic import Field
+from torch import nn
+
+from ml.configuration import Configuration
+from ml.fitting import chosen_device, fit
+from ml.runs import Run, stream_seed
+from ml.tasks import Evaluation, Prediction
+from synthroads_addon.core.errors import InputError, MissingFileError, OutputError
+from synthroads_addon.core.files import write_file
+from synthroads_addon.core.progress import Progress, silent
+from synthroads_addon.core.schema import canonical_json, read_json
+
+from .calibration import DEVIATIONS, Calibration, all_calibrated
+from .data import Batches, BatchOptions, DataOptions, Roads, fixed_batches, quiet, read_roads
+from .effects import Effects
+from .losses import LossOptions, centerline_loss
+from .models import TARGETS, Batch, CenterlineModel, ModelOptions, both_ways, build
+from .predictor import CenterlinePredictor, UseOptions
+from .slices import SliceSettings
+
+CALIBRATION = "calibration.json"
+_FIRST_WEIGHTS = "first weights"
+
+
+class CenterlineConfiguration(Configuration):
+    """Everything that a centreline model depends on."""
+
+    task: Literal["centerline"] = Field("centerline", description="What is learned.")
+    data: DataOptions = Field(description="What is learned from.")
+    slices: SliceSettings = Field(default=SliceSettings(), description="How slices are cut.")
+    effects: Effects = Field(default=Effects(), description="What is done to the samples of the training.")
+    model: ModelOptions = Field(default=ModelOptions(), description="Which model.")
+    loss: LossOptions = Field(default=LossOptions(), description="What it is trained with.")
+    batches: BatchOptions = Field(default=BatchOptions(), description="How much an epoch sees.")
+    use: UseOptions = Field(default=UseOptions(), description="How the trained model is used.")
+    begin_with: str = Field("", description="Folder of a run whose weights this one begins with; random if empty.")
+
+
+def configuration_kind() -> type[CenterlineConfiguration]:
+    """Return the class of this task's configurations."""
+    return CenterlineConfiguration
+
+
+def train(run: Run[CenterlineConfiguration], progress: Progress = silent) -> dict[str, Any]:
+    """Train a model, calibrate its deviations on the validation roads, save both and return the figures."""
+    configuration = run.configuration
+    device = chosen_device(configuration)
+    roads = read_roads(configuration.data, configuration.slices.truth, progress)
+    model = _first_model(configuration).to(device)
+    batches = Batches(
+        roads,
+        configuration.slices,
+        configuration.effects,
+        configuration.batches,
+        configuration.seed,
+        configuration.data.measured_share,
+    )
+    on_device = centerline_loss(configuration.loss, configuration.slices.half_width)
+    fit(
+        model,
+        run,
+        batches,
+        configuration.batches.steps,
+        lambda net, batch: on_device(net, _moved(batch, device)),
+        validate=_validation(configuration, roads, device),
+        progress=progress,
+    )
+    progress("calibrating", 0.0)
+    metrics = _calibrate(run, model, roads, device)
+    run.write_metrics(metrics)
+    return metrics
+
+
+def evaluate(run: Run[CenterlineConfiguration], evaluation: Evaluation, progress: Progress = silent) -> dict[str, Any]:
+    """Measure a trained model beside predictors that learn nothing; write tables and pictures.
+
+    Raises:
+        InputError: the run isn't finished, or the data hold no road with a known centreline.
+    """
+    from .measuring import measure_run
+
+    return measure_run(run.configuration, predictor(run), evaluation, progress)
+
+
+def predict(run: Run[CenterlineConfiguration], prediction: Prediction, progress: Progress = silent) -> dict[str, Any]:
+    """Find the centreline and the corridor in a cloud; write GeoJSON, and beside it the corridor as JSON.
+
+    Raises:
+        InputError: the run isn't finished, the output isn't a .geojson file, or the cloud has no ground.
+        OutputError: an output is already there.
+    """
+    from .using import find_road
+    from .writing import corridor_json, geojson
+
+    lines, corridor = prediction.output, prediction.output.with_suffix(".corridor.json")
+    if lines.suffix.lower() != ".geojson":
+        raise InputError("--output", str(lines), "must end in .geojson for a centreline")
+    for path in (lines, corridor):
+        if path.exists() and not prediction.overwrite:
+            raise OutputError("--output", str(path), "is there already; --overwrite replaces it")
+    ready = predictor(run)
+    found = find_road(ready, prediction.cloud, prediction.path, progress)
+    name = prediction.cloud.stem
+    text = canonical_json(geojson(found, name, ready.settings.spacing))
+    calibration = {name: one.to_dict() for name, one in ready.calibration.items()}
+    table = canonical_json(_plain(corridor_json(found, calibration)))
+    write_file(lines, text.encode(), overwrite=prediction.overwrite)
+    write_file(corridor, table.encode(), overwrite=prediction.overwrite)
+    there = np.isfinite(found.value[:, 0])
+    return {
+        "slices": len(there),
+        "found": float(there.mean()) if len(there) else 0.0,
+        "mean_std": float(found.std[there, 0].mean()) if there.any() else None,
+        "files": [str(lines), str(corridor)],
+    }
+
+
+def predictor(run: Run[CenterlineConfiguration]) -> CenterlinePredictor:
+    """Return a trained run's model, ready to be used.
+
+    Raises:
+        InputError: the training isn't finished.
+    """
+    configuration = run.configuration
+    device = chosen_device(configuration)
+    path = run.folder / CALIBRATION
+    state = run.saved(device)
+    if state is None or not path.is_file():
+        raise InputError(str(run.folder), None, "its training isn't finished; `synthroads train --resume` goes on")
+    model = _empty_model(configuration).to(device)
+    model.load_state_dict(state["model"])
+    calibration = {name: Calibration.from_dict(one) for name, one in read_json(path).items()}
+    return CenterlinePredictor(model, configuration.slices, configuration.use, calibration)
+
+
+def _empty_model(configuration: CenterlineConfiguration) -> CenterlineModel:
+    return build(configuration.model, configuration.slices.half_width, configuration.slices.slices)
+
+
+def _first_model(configuration: CenterlineConfiguration) -> CenterlineModel:
+    """Return the model as its training begins: random, or with the weights of another run.
+
+    Raises:
+        MissingFileError, InputError: there is no such run, or its model is another.
+    """
+    torch.manual_seed(stream_seed(configuration.seed, _FIRST_WEIGHTS))
+    model = _empty_model(configuration)
+    if configuration.begin_with:
+        kinds = {"centerline": CenterlineConfiguration}
+        state = Run.open(Path(configuration.begin_with), kinds).saved()
+        if state is None:
+            raise MissingFileError("begin_with", configuration.begin_with, "holds no weights")
+        try:
+            model.load_state_dict(state["model"])
+        except RuntimeError:
+            raise InputError("begin_with", configuration.begin_with, "holds another model than `model` says") from None
+    return model
+
+
+def _moved(batch: Batch, device: torch.device) -> Batch:
+    return {name: values.to(device) for name, values in batch.items()}
+
+
+def _validation(configuration: CenterlineConfiguration, roads: Roads, device: torch.device) -> Any:
+    """Return what `fit` calls after each epoch: errors and coverage on sequences that stay the same."""
+    crop = quiet(configuration.effects.crop)
+    count = configuration.batches.validation
+    batches = fixed_batches(roads.validation, configuration.slices, crop, count, configuration.seed)
+
+    def validate(model: nn.Module, epoch: int) -> dict[str, float]:
+        error, std = _residuals(model, batches, device)
+        known = np.isfinite(error[:, 0])
+        ratio = np.abs(error[known, 0]) / std[known, 0]
+        return {
+            "validation_mae": float(np.abs(error[known, 0]).mean()),
+            "validation_68": float((ratio <= DEVIATIONS[0]).mean()),
+            "validation_95": float((ratio <= DEVIATIONS[1]).mean()),
+        }
+
+    return validate
+
+
+def _calibrate(
+    run: Run[CenterlineConfiguration], model: CenterlineModel, roads: Roads, device: torch.device
+) -> dict[str, Any]:
+    """Find the calibration, write it to the run's folder, and return the metrics of the validation roads."""
+    configuration = run.configuration
+    crop = quiet(configuration.effects.crop)
+    count, seed = configuration.batches.calibration, configuration.seed + 1
+    batches = fixed_batches(roads.validation, configuration.slices, crop, count, seed)
+    error, std = _residuals(model, batches, device, mirror=configuration.use.mirror)
+    found = all_calibrated(TARGETS, error, std)
+    data = _plain({name: one.to_dict() for name, one in found.items()})
+    write_file(run.folder / CALIBRATION, canonical_json(data).encode(), overwrite=True)
+    center = found["center"]
+    return {
+        "validation_mae": float(np.nanmean(np.abs(error[:, 0]))),
+        "coverage_68": center.after[0],
+        "coverage_95": center.after[1],
+        "calibration_factor": center.factor,
+        "parameters": sum(weights.numel() for weights in model.parameters()),
+        "corridor_mae": {name: _mean_size(error[:, index]) for index, name in enumerate(TARGETS)},
+        "calibration": data,
+    }
+
+
+def _residuals(
+    model: nn.Module, batches: Sequence[Batch], device: torch.device, mirror: bool = False
+) -> tuple[Any, Any]:
+    """Return errors and deviations (N, T) of all slices of some batches; errors are NaN where the truth is."""
+    model.eval()
+    pairs = list(_pairs(model, batches, device, mirror))
+    return tuple(np.concatenate([pair[side] for pair in pairs]).astype(np.float64) for side in (0, 1))
+
+
+def _pairs(model: nn.Module, batches: Sequence[Batch], device: torch.device, mirror: bool) -> Iterator[tuple[Any, Any]]:
+    for batch in batches:
+        moved = _moved(batch, device)
+        with torch.no_grad():
+            output = both_ways(model, moved) if mirror else model(moved)
+        value = torch.cat([output["center"][..., None], output["corridor"]], dim=-1)
+        std = torch.cat([output["center_std"][..., None], output["corridor_std"]], dim=-1)
+        true = torch.cat([moved["center"][..., None], moved["corridor"]], dim=-1)
+        yield (value - true).flatten(0, 1).cpu().numpy(), std.flatten(0, 1).cpu().numpy()
+
+
+def _mean_size(values: Any) -> float | None:
+    known = np.abs(values[np.isfinite(values)])
+    return float(known.mean()) if len(known) else None
+
+
+def _plain(value: Any) -> Any:
+    """Return what JSON can hold: NaN becomes None, tuples become lists."""
+    if isinstance(value, dict):
+        return {name: _plain(item) for name, item in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_plain(item) for item in value]
+    return None if isinstance(value, float) and not np.isfinite(value) else value

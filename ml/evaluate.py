@@ -1,0 +1,39 @@
+"""Measure a trained run on data sets or clouds with known truth, with tables and pictures."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+
+if __name__ == "__main__":
+    sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
+from headless.cli import Outcome, add_common_arguments, entry, progress_bar
+from ml.train import summary
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments of `synthroads evaluate`."""
+    parser.add_argument("run", type=Path, metavar="RUN", help="folder of a trained run")
+    parser.add_argument("data", type=Path, nargs="+", metavar="DATA", help="data sets' folders or clouds")
+    parser.add_argument("--split", default="test", metavar="NAME", help="split of the data sets (test)")
+    parser.add_argument("--output", required=True, type=Path, metavar="DIR", help="folder for tables and pictures")
+    text = "classes of clouds of others, for segmentation: semantickitti, ign or a JSON file"
+    parser.add_argument("--mapping", metavar="MAPPING", help=text)
+    add_common_arguments(parser)
+
+
+def run(arguments: argparse.Namespace) -> Outcome:
+    """Run `synthroads evaluate`."""
+    from ml.runs import Run
+    from ml.tasks import Evaluation, kinds, task
+
+    trained = Run.open(arguments.run, kinds())
+    evaluation = Evaluation(arguments.data, arguments.split, arguments.output, arguments.mapping)
+    metrics = task(trained.configuration.task).evaluate(trained, evaluation, progress_bar(arguments))
+    return 0, metrics, f"evaluated {arguments.run}: {summary(metrics)}"
+
+
+if __name__ == "__main__":
+    entry("evaluate")

@@ -1,0 +1,129 @@
+"""The training loop that all tasks share: AdamW, warm-up and cosine, clipping, exact resuming."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Iterable
+from typing import Any, TypeVar
+
+import torch
+from torch import Tensor, nn
+
+from synthroads_addon.core.errors import InputError
+from synthroads_addon.core.progress import Progress, silent
+
+from .configuration import Configuration, Schedule
+from .runs import Run, stream_seed
+
+M = TypeVar("M", bound=nn.Module)
+Figures = dict[str, float]
+Loss = Callable[[M, Any], tuple[Tensor, Figures]]
+"""Returns what is minimised and further figures, which are averaged over the epoch."""
+
+
+def chosen_device(configuration: Configuration) -> torch.device:
+    """Return the device that a configuration asks for, and set the number of threads.
+
+    Raises:
+        InputError: there is no such device.
+    """
+    if configuration.threads:
+        torch.set_num_threads(configuration.threads)
+    if configuration.device == "auto":
+        return torch.device("cuda" if torch.cuda.is_available() else "cpu")
+    if configuration.device.startswith("cuda") and not torch.cuda.is_available():
+        raise InputError("device", configuration.device, "this PyTorch sees no CUDA device; cpu and auto are possible")
+    return torch.device(configuration.device)
+
+
+def fit(
+    model: M,
+    run: Run[Any],
+    batches: Callable[[int], Iterable[Any]],
+    steps_per_epoch: int,
+    loss: Loss[M],
+    *,
+    validate: Callable[[M, int], Figures] | None = None,
+    progress: Progress = silent,
+) -> None:
+    """Train a model in place, beginning after the run's last checkpoint.
+
+    The result depends on the configuration alone: epoch ``e`` draws its batches from ``batches(e)`` and its dropout
+    from a stream keyed by seed and epoch, so that an interrupted training ends with the same weights.
+
+    Args:
+        model: on the device it is trained on.
+        run: keeps checkpoint and history.
+        batches: the batches of one epoch; the same for the same epoch.
+        steps_per_epoch: how many those are.
+        loss: of one batch; NaN or infinity ends the training.
+        validate: further figures of an epoch, computed after it.
+        progress: told the share of all steps that is done.
+
+    Raises:
+        InputError: the loss is no longer finite.
+    """
+    configuration = run.configuration
+    schedule: Schedule = configuration.schedule
+    optimizer = torch.optim.AdamW(_groups(model, schedule), lr=schedule.learning_rate)
+    state = run.saved(next(model.parameters()).device)
+    first = 0
+    if state is not None:
+        model.load_state_dict(state["model"])
+        optimizer.load_state_dict(state["optimizer"])
+        first = int(state["epoch"])
+    for epoch in range(first, schedule.epochs):
+        begin = time.perf_counter()
+        torch.manual_seed(stream_seed(configuration.seed, "epoch", epoch))
+        model.train()
+        figures: list[Figures] = []
+        for step, batch in enumerate(batches(epoch), start=epoch * steps_per_epoch):
+            rate = learning_rate(schedule, step, schedule.epochs * steps_per_epoch)
+            figures.append(_step(model, optimizer, rate, schedule.clip, loss, batch))
+            progress("training", step / (schedule.epochs * steps_per_epoch))
+        summary = {"epoch": epoch + 1, **_means(figures), "learning_rate": optimizer.param_groups[0]["lr"]}
+        if validate is not None:
+            model.eval()
+            summary |= validate(model, epoch + 1)
+        run.record({**summary, "seconds": round(time.perf_counter() - begin, 3)})
+        run.save({"model": model.state_dict(), "optimizer": optimizer.state_dict(), "epoch": epoch + 1})
+
+
+def learning_rate(schedule: Schedule, step: int, steps: int) -> float:
+    """Return the rate of a step counted from 0: linear up to ``learning_rate``, then a cosine to the final one."""
+    rising = schedule.warmup * steps
+    if step < rising:
+        return schedule.learning_rate * (step + 1) / (rising + 1)
+    share = (step - rising) / max(steps - 1 - rising, 1)
+    span = schedule.learning_rate - schedule.final_learning_rate
+    return schedule.final_learning_rate + 0.5 * span * (1 + math.cos(math.pi * min(share, 1.0)))
+
+
+def _groups(model: nn.Module, schedule: Schedule) -> list[dict[str, Any]]:
+    """Return the parameters to decay and those not to: biases and the scales of norms are left as they are."""
+    matrices = [weight for weight in model.parameters() if weight.ndim > 1]
+    vectors = [weight for weight in model.parameters() if weight.ndim <= 1]
+    return [
+        {"params": matrices, "weight_decay": schedule.weight_decay},
+        {"params": vectors, "weight_decay": 0.0},
+    ]
+
+
+def _step(model: M, optimizer: torch.optim.Optimizer, rate: float, clip: float, loss: Loss[M], batch: Any) -> Figures:
+    for group in optimizer.param_groups:
+        group["lr"] = rate
+    optimizer.zero_grad(set_to_none=True)
+    value, figures = loss(model, batch)
+    if not torch.isfinite(value):
+        raise InputError("schedule.learning_rate", rate, f"the loss became {value.item()}; a smaller rate may help")
+    value.backward()
+    nn.utils.clip_grad_norm_(model.parameters(), clip)
+    optimizer.step()
+    return {"loss": value.item(), **figures}
+
+
+def _means(figures: list[Figures]) -> Figures:
+    if not figures:
+        raise InputError("training data", 0, "an epoch has no batch: more data or a smaller batch are needed")
+    return {name: math.fsum(step[name] for step in figures) / len(figures) for name in figures[0]}

@@ -1,0 +1,189 @@
+"""The pavement's edges and its surface: where it ends on either side, how high it lies, and how it falls."""
+
+from __future__ import annotations
+
+import warnings
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .path import SPACING
+from .profiles import ACROSS, STRETCH, Grid, Profiles, SurfacePoints
+
+Float = NDArray[np.float64]
+
+_FARTHEST = 8.0  # m beyond a carriageway's lines that its edge is looked for
+_MIXED = 0.8  # m to either side of an edge in which pavement and verge are weighed
+_FEWEST = 0.15  # of the bins around an edge must have points
+_CLEAR = 0.2  # m inside of the edges: the surface is measured here
+_ROUNDS = 5
+_BISQUARE = 4.685
+_FEWEST_BINS = 20
+_FEWEST_POINTS = 6
+
+
+def stretch_count(profiles: Profiles) -> int:
+    """Return the number of stretches that profiles are cut into."""
+    return -(-len(profiles.stations) // STRETCH)
+
+
+def stretch_middles(profiles: Profiles) -> Float:
+    """Return the (K,) middles of the stretches, m along the path."""
+    first = profiles.stations[0] - 0.5 * SPACING
+    return first + STRETCH * SPACING * (np.arange(stretch_count(profiles)) + 0.5)
+
+
+@dataclass(frozen=True)
+class Edge:
+    """An edge of the pavement, stretch by stretch.
+
+    Attributes:
+        offsets: (K,) m; NaN where it isn't seen.
+        apart: (K,) distance of the points that it lies midway between, m; 0 where it is found by shares.
+    """
+
+    offsets: Float
+    apart: Float
+
+
+def paved_edge(profiles: Profiles, paved: Grid, begin: Float, sign: int, farthest: float | Float = _FARTHEST) -> Edge:
+    """Return where the pavement ends beyond given offsets (K,), m.
+
+    Args:
+        profiles: S rows along the path.
+        paved: (S, U) share of pavement; NaN without points.
+        begin: (K,) offsets that are paved for sure, one per stretch, m.
+        sign: +1 looks to the left, -1 to the right.
+        farthest: how far beyond ``begin`` it is looked for, m; a number, or (K,).
+
+    The edge parts pavement from what isn't so that the fewest bins are on the wrong side; around it the shares of both
+    are weighed, so that it is found more exactly than the bins.
+    """
+    edges, apart = np.full(len(begin), np.nan), np.zeros(len(begin))
+    reach = np.broadcast_to(np.asarray(farthest, dtype=np.float64), begin.shape)
+    for number, place in enumerate(begin):
+        if not np.isfinite(place) or reach[number] < 2.0 * ACROSS:
+            continue
+        rows = slice(number * STRETCH, (number + 1) * STRETCH)
+        column = profiles.column(place)
+        end = profiles.column(place + sign * reach[number])
+        share = _mean(paved[rows, column : end + sign if end + sign >= 0 else None : sign])
+        edges[number] = _edge(share, float(profiles.offsets[column]), sign)
+        if profiles.points is not None and np.isfinite(edges[number]):
+            edges[number], apart[number] = _between_points(profiles.points, number, edges[number], sign)
+    return Edge(edges, apart)
+
+
+def _between_points(points: SurfacePoints, stretch: int, edge: float, sign: int) -> tuple[float, float]:
+    """Return the offset of an edge that is known to half a metre, midway between the points on its two sides, and how
+    far these are apart."""
+    near = points.near(stretch, edge - _MIXED, edge + _MIXED)
+    offset, paved = points.offset[near][::sign], points.paved[near][::sign]
+    if len(offset) < _FEWEST_POINTS:
+        return edge, 0.0
+    at = int(np.append(0, np.cumsum(np.where(paved, 1, -1))).argmax())
+    if at in (0, len(offset)):
+        return edge, 0.0
+    return 0.5 * float(offset[at - 1] + offset[at]), abs(float(offset[at] - offset[at - 1]))
+
+
+def _edge(share: Float, begin: float, sign: int) -> float:
+    """Return the offset of the edge in a profile (C,) of shares that begins in a bin with a middle."""
+    known = np.isfinite(share)
+    if known.sum() < 4:
+        return float("nan")
+    gain = np.append(0.0, np.cumsum(np.where(known, share - 0.5, 0.0)))
+    at = int(gain.argmax())  # bins before it are paved
+    reach = round(_MIXED / ACROSS)
+    low, high = max(0, at - reach), min(len(share), at + reach)
+    near = share[low:high]
+    seen = np.isfinite(near)
+    # An edge that the cloud or the search ends at is no edge.
+    if at >= len(share) - 1 or at == 0 or seen.mean() < _FEWEST or not np.isfinite(share[at : at + reach]).any():
+        return float("nan")
+    filled = np.where(seen, near, (np.arange(low, high) < at).astype(np.float64))
+    return begin + sign * ACROSS * (low - 0.5 + float(filled.sum()))
+
+
+def _mean(values: Grid) -> Float:
+    known = np.isfinite(values)
+    count = known.sum(axis=0)
+    total = np.where(known, values, 0.0).sum(axis=0)
+    return np.where(count > 0, total / np.maximum(count, 1), np.nan)
+
+
+@dataclass(frozen=True)
+class Surface:
+    """A carriageway's surface, stretch by stretch.
+
+    Attributes:
+        pivot: (K,) offsets at which the heights hold, m.
+        height: (K,) m; NaN where too little was seen.
+        fall: (K,) crossfall, m/m, positive where it falls to the right.
+        height_std, fall_std: (K,) from the scatter about the plane.
+        scatter: (K,) standard deviation of the bins' mean heights about the plane, m.
+    """
+
+    pivot: Float
+    height: Float
+    fall: Float
+    height_std: Float
+    fall_std: Float
+    scatter: Float
+
+
+def surface(profiles: Profiles, low: Float, high: Float, pivot: Float) -> Surface:
+    """Return the surface between two edges (K,), by a line across each stretch, robustly (bisquare).
+
+    Args:
+        profiles: of the road.
+        low, high: (K,) offsets of the pavement's right and left edge, m.
+        pivot: (K,) offsets at which the height is wanted, m.
+    """
+    count = len(pivot)
+    result = np.full((5, count), np.nan)
+    slope = _grade(profiles)
+    for number in range(count):
+        if not (np.isfinite(low[number]) and np.isfinite(high[number]) and high[number] - low[number] > 1.0):
+            continue
+        rows = slice(number * STRETCH, (number + 1) * STRETCH)
+        columns = slice(profiles.column(low[number] + _CLEAR), profiles.column(high[number] - _CLEAR) + 1)
+        height = profiles.height[rows, columns].astype(np.float64)
+        along = profiles.stations[rows] - profiles.stations[rows].mean()
+        height = height - slope[number] * along[:, None]
+        across = np.broadcast_to(profiles.offsets[columns] - pivot[number], height.shape)
+        known = np.isfinite(height)
+        if known.sum() >= _FEWEST_BINS:
+            result[:, number] = _line(across[known], height[known])
+    height, fall, height_std, fall_std, scatter = result
+    return Surface(pivot, height, fall, height_std, fall_std, scatter)
+
+
+def _grade(profiles: Profiles) -> Float:
+    """Return the grade (K,) of the surface along the path, m/m, so that a stretch can be levelled."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", RuntimeWarning)  # rows without points
+        middle = np.nanmedian(profiles.height, axis=1)
+    rows = np.arange(len(middle))
+    known = np.isfinite(middle)
+    filled = np.interp(rows, rows[known], middle[known])
+    smoothed = np.convolve(np.pad(filled, 15, mode="edge"), np.ones(31) / 31, mode="valid")
+    grade = np.gradient(smoothed, SPACING)
+    at = np.minimum(np.arange(stretch_count(profiles)) * STRETCH + STRETCH // 2, len(grade) - 1)
+    return grade[at]
+
+
+def _line(across: Float, height: Float) -> tuple[float, float, float, float, float]:
+    """Return height at 0, slope, their standard deviations, and the scatter of a robust line through bins."""
+    matrix = np.column_stack([np.ones(len(across)), across])
+    weight = np.ones(len(across))
+    solution, scatter, inverse = np.zeros(2), 0.0, np.eye(2)
+    for _ in range(_ROUNDS):
+        inverse = np.linalg.pinv(matrix.T @ (weight[:, None] * matrix))
+        solution = inverse @ (matrix.T @ (weight * height))
+        residual = height - matrix @ solution
+        scatter = max(1.4826 * float(np.median(np.abs(residual))), 1e-6)
+        weight = np.clip(1.0 - (residual / (_BISQUARE * scatter)) ** 2, 0.0, None) ** 2
+    deviation = scatter * np.sqrt(np.maximum(np.diag(inverse), 0.0))
+    return float(solution[0]), float(solution[1]), float(deviation[0]), float(deviation[1]), scatter

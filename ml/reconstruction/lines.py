@@ -1,0 +1,341 @@
+"""Line markings: found in cross profiles, followed along the path, and described: offset, width, dashes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import ndimage
+from scipy.signal import find_peaks
+
+from .path import SPACING
+from .profiles import ACROSS, STRETCH, Grid, Profiles, SurfacePoints
+from .smoothing import mean_with_std, smooth, unseen
+
+Float = NDArray[np.float64]
+
+WAVELENGTH = 40.0
+"""Shorter swings of a line's offset, m, are noise."""
+USUAL = 0.03
+"""Standard deviation of a line's offset in one stretch that is no fault, m."""
+_WINDOW, _STEP = 40, 10  # m: mean profiles in which lines are looked for
+_HEIGHT, _PROMINENCE = 0.10, 0.07  # of a line's peak in a mean profile
+_WIDEST = 1.2  # m: broader peaks are no lines
+_LINK = 0.35  # m that a line may move from one window to the next
+_LOST = 60.0  # m that a line may not be seen
+_NEAR = 0.35  # m to either side of a line that its paint lies within
+_FEWEST = 0.3  # of a row must be painted to count
+_AROUND = 41  # rows around one, in which there is a dash
+_FULL = 0.3  # of a line's usual width: less is no paint
+_FEWEST_POINTS = 4  # on a line in a stretch
+_SOLID = 0.65  # of its length: a line painted there is solid
+_STANDARD_DASHES = ((6.0, 12.0), (4.0, 8.0), (3.0, 6.0), (6.0, 6.0), (3.0, 3.0))
+_DASH_TOLERANCE = 0.6  # m
+
+
+@dataclass(frozen=True, eq=False)
+class Line:
+    """One line along the path.
+
+    Attributes:
+        stations: (K,) middles of the stretches, m; the same for every line.
+        measured: (K,) offset of its middle in each stretch, m; NaN where no paint was seen.
+        offsets: (K,) the same, smoothed, m; NaN before its begin and behind its end.
+        std: (K,) standard deviation of the offsets, m.
+        apart: (K,) distance of the points that each measured offset lies midway between, m; 0 where it is a mean.
+        cover: (K,) share of each stretch that is painted; NaN without points.
+        start, end: stations between which it was seen, m.
+        width: mean width of its paint, m.
+        width_std: standard deviation of the width, m.
+        painted: share of its length that is painted.
+        dash, gap: m; 0 for a solid line.
+        first_dash: station at which a dash begins, m.
+    """
+
+    stations: Float
+    measured: Float
+    offsets: Float
+    std: Float
+    apart: Float
+    cover: Float
+    start: float
+    end: float
+    width: float
+    width_std: float
+    painted: float
+    dash: float
+    gap: float
+    first_dash: float
+
+    @property
+    def solid(self) -> bool:
+        """Return whether it has no dashes."""
+        return self.dash == 0.0
+
+    @property
+    def offset(self) -> float:
+        """Return its median offset, m."""
+        return float(np.nanmedian(self.offsets))
+
+    @property
+    def length(self) -> float:
+        """Return the length that it was seen on, m."""
+        return self.end - self.start
+
+
+def find_lines(profiles: Profiles) -> list[Line]:
+    """Return the lines of profiles from right to left."""
+    lines = [_measured(profiles, *track) for track in _tracks(profiles)]
+    return sorted((line for line in lines if line is not None), key=lambda line: line.offset)
+
+
+def _tracks(profiles: Profiles) -> list[tuple[Float, Float]]:
+    """Return (stations, offsets) of each line, roughly: peaks of mean profiles linked from window to window."""
+    rows = len(profiles.stations)
+    closed: list[list[tuple[float, float]]] = []
+    running: list[list[tuple[float, float]]] = []
+    for row in range(0, max(1, rows - _WINDOW // 2), _STEP):
+        station = float(profiles.stations[row : row + _WINDOW].mean())
+        peaks = _peaks(profiles, profiles.paint[row : row + _WINDOW])
+        running, ended = _linked(running, peaks, station)
+        closed += ended
+    found = [np.array(track) for track in closed + running if len(track) >= 2]
+    return [(track[:, 0], track[:, 1]) for track in found]
+
+
+def _peaks(profiles: Profiles, paint: Grid) -> list[float]:
+    """Return offsets of the narrow peaks of the mean of some profiles."""
+    known = np.isfinite(paint)
+    # Points may lie in rows along the road with empty bins between them: these must not thin out a line's peak.
+    count = ndimage.gaussian_filter1d(known.sum(axis=0).astype(np.float64), 1.0)
+    total = ndimage.gaussian_filter1d(np.where(known, paint, 0.0).sum(axis=0).astype(np.float64), 1.0)
+    mean = np.where(count > 0.05 * len(paint), total / np.maximum(count, 1e-9), 0.0)
+    found, told = find_peaks(mean, height=_HEIGHT, prominence=_PROMINENCE, width=(None, _WIDEST / ACROSS))
+    del told
+    return [float(_vertex(mean, at, profiles.offsets)) for at in found]
+
+
+def _vertex(values: Float, at: int, places: Float) -> float:
+    """Return the place of the parabola's vertex through a peak and its neighbours."""
+    before, here, after = values[at - 1 : at + 2]
+    bend = before - 2.0 * here + after
+    return float(places[at] + (0.5 * ACROSS * (before - after) / bend if bend < 0.0 else 0.0))
+
+
+def _linked(
+    running: list[list[tuple[float, float]]], peaks: list[float], station: float
+) -> tuple[list[list[tuple[float, float]]], list[list[tuple[float, float]]]]:
+    """Return the tracks that go on, with the peaks that continue them or begin new ones, and those that ended."""
+    pairs = sorted(
+        (abs(peak - _expected(track, station)), i, j) for i, track in enumerate(running) for j, peak in enumerate(peaks)
+    )
+    taken: set[int] = set()
+    continued: set[int] = set()
+    for distance, i, j in pairs:
+        if distance <= _LINK and i not in continued and j not in taken:
+            running[i].append((station, peaks[j]))
+            continued.add(i)
+            taken.add(j)
+    ended = [track for track in running if station - track[-1][0] > _LOST]
+    going = [track for track in running if station - track[-1][0] <= _LOST]
+    going += [[(station, peak)] for j, peak in enumerate(peaks) if j not in taken]
+    return going, ended
+
+
+def _expected(track: list[tuple[float, float]], station: float) -> float:
+    """Return where a track should be at a station: straight on from its last 40 m."""
+    if len(track) < 3:
+        return track[-1][1]
+    (s0, u0), (s1, u1) = track[max(-5, -len(track))], track[-1]
+    slope = float(np.clip((u1 - u0) / (s1 - s0), -0.06, 0.06))
+    return u1 + slope * min(station - s1, 20.0)
+
+
+def _measured(profiles: Profiles, stations: Float, offsets: Float) -> Line | None:
+    """Return the line along a track; None where too little paint lies there."""
+    half = _WINDOW / 2.0
+    start = max(profiles.stations[0], stations[0] - half)
+    end = min(profiles.stations[-1], stations[-1] + half)
+    middle, cover = _rows(profiles, stations, offsets)
+    inside = (profiles.stations >= start) & (profiles.stations <= end)
+    usual = float(np.nanpercentile(cover[inside], 90)) if np.isfinite(cover[inside]).any() else 0.0
+    if usual < 0.03:
+        return None
+    share = _painted_share(cover, usual)
+    grid, measured, weights = _stretches(profiles, middle, np.where(inside, share, 0.0))
+    if (weights > 0.0).sum() < 4:
+        return None
+    width, width_std = _width(cover[inside], share[inside])
+    apart = np.zeros(len(grid))
+    if profiles.points is not None:
+        on = np.where(inside & np.isfinite(share), share, 0.0) > 0.5
+        measured, widths, apart = _between_points(profiles, profiles.points, measured, on)
+        weights = np.where(np.isfinite(measured), weights, 0.0)
+        width, width_std = mean_with_std(widths)
+    if (weights > 0.0).sum() < 4:
+        return None
+    smoothed = smooth(measured, weights, STRETCH * SPACING, WAVELENGTH, usual=USUAL)
+    seen = grid[weights > 0.0]
+    start, end = float(seen[0] - STRETCH / 2.0), float(seen[-1] + STRETCH / 2.0)
+    within = (grid >= start) & (grid <= end)
+    painted, dash, gap, first = _dashes(profiles.stations[inside], share[inside])
+    return Line(
+        stations=grid,
+        measured=measured,
+        offsets=np.where(within, smoothed.values, np.nan),
+        std=np.where(within, np.hypot(smoothed.std, unseen(apart, smoothed.scatter)), np.nan),
+        apart=apart,
+        cover=_cover(share),
+        start=start,
+        end=end,
+        width=width,
+        width_std=width_std,
+        painted=painted,
+        dash=dash,
+        gap=gap,
+        first_dash=first,
+    )
+
+
+def _rows(profiles: Profiles, stations: Float, offsets: Float) -> tuple[Float, Float]:
+    """Return, per row of the profiles (S,), the paint's mean offset near a track and its width (m); NaN without points.
+
+    The mean is found twice, the second time around the smoothed first one, so that a track's own error doesn't pull.
+    """
+    place = np.interp(profiles.stations, stations, offsets)
+    middle, _ = _paint_near(profiles, place)
+    local = ndimage.median_filter(np.where(np.isfinite(middle), middle, place), size=21, mode="nearest")
+    return _paint_near(profiles, local)
+
+
+def _paint_near(profiles: Profiles, place: Float) -> tuple[Float, Float]:
+    reach = round(_NEAR / ACROSS)
+    first = np.rint((place - profiles.offsets[0]) / ACROSS).astype(np.int64)
+    columns = first[:, None] + np.arange(-reach, reach + 1)
+    valid = (columns >= 0) & (columns < len(profiles.offsets))
+    columns = np.clip(columns, 0, len(profiles.offsets) - 1)
+    paint = np.take_along_axis(profiles.paint, columns, axis=1).astype(np.float64)
+    paint[~valid] = np.nan
+    known = np.isfinite(paint)
+    clipped = np.clip(np.where(known, paint, 0.0), 0.0, 1.0)
+    total = clipped.sum(axis=1)
+    # Bins that no point fell into are taken to be like the rest of their row.
+    share = known.mean(axis=1)
+    cover = np.where(share > 0.3, total / np.maximum(share, 1e-9) * ACROSS, np.nan)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        mean = (clipped * profiles.offsets[columns]).sum(axis=1) / total
+    return np.where(total > 0.15, mean, np.nan), cover
+
+
+def _painted_share(cover: Float, usual: float) -> Float:
+    """Return the share (S,) of each row that is painted, from the paint's width (S,), m; NaN without points.
+
+    What counts as full is the width around a place: where points lie in rows along the road, a line may have two rows
+    of them here and one there.
+    """
+    known = np.isfinite(cover)
+    around = ndimage.percentile_filter(np.where(known, cover, 0.0), 80, size=_AROUND, mode="nearest")
+    full = np.maximum(around, _FULL * usual)
+    return np.where(known, np.clip(np.nan_to_num(cover) / full, 0.0, 1.0), np.nan)
+
+
+def _stretches(profiles: Profiles, middle: Float, share: Float) -> tuple[Float, Float, Float]:
+    """Return middles of stretches (K,), the paint's offset in each, and its weight (0 without paint)."""
+    count = -(-len(middle) // STRETCH)
+    index = np.arange(len(middle)) // STRETCH
+    weight = np.where(np.isfinite(middle) & np.isfinite(share), np.nan_to_num(share), 0.0)
+    weight[weight < _FEWEST] = 0.0
+    total = np.bincount(index, weight, count)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        mean = np.bincount(index, weight * np.nan_to_num(middle), count) / total
+    grid = profiles.stations[0] - 0.5 * SPACING + STRETCH * SPACING * (np.arange(count) + 0.5)
+    weights = np.where(total > 0.15 * STRETCH, np.minimum(total / STRETCH, 1.0), 0.0)
+    return grid, np.where(weights > 0.0, mean, np.nan), weights
+
+
+def _between_points(
+    profiles: Profiles, points: SurfacePoints, measured: Float, on: NDArray[np.bool_]
+) -> tuple[Float, Float, Float]:
+    """Return a line's middle and width (K,) in each stretch, m, from the points on it and beside it; and how far apart
+    the points are that its middle lies between.
+
+    A scanner that follows the road samples it in rows along it: within a bin all points may lie at one offset. A
+    line's edge is between the outermost point on it and the next one that isn't.
+
+    Args:
+        profiles: S rows.
+        points: of the profiles.
+        measured: (K,) offset of the line by bins; NaN without paint.
+        on: (S,) whether there is paint in each row.
+    """
+    middle, width = np.full(len(measured), np.nan), np.full(len(measured), np.nan)
+    apart = np.zeros(len(measured))
+    first = profiles.stations[0] - 0.5 * SPACING
+    for number in np.flatnonzero(np.isfinite(measured)):
+        near = points.near(int(number), measured[number] - _NEAR - 0.1, measured[number] + _NEAR + 0.1)
+        row = np.clip(((points.station[near] - first) / SPACING).astype(np.int64), 0, len(on) - 1)
+        painted = on[row]
+        offset, marked = points.offset[near][painted].astype(np.float64), points.marked[near][painted]
+        if marked.sum() < _FEWEST_POINTS or len(offset) < 2 * _FEWEST_POINTS:
+            continue
+        low, high = _best_span(marked)
+        if low == 0 or high == len(offset):
+            continue
+        right, left = 0.5 * (offset[low - 1] + offset[low]), 0.5 * (offset[high - 1] + offset[high])
+        middle[number], width[number] = 0.5 * (left + right), left - right
+        gaps = offset[low] - offset[low - 1], offset[high] - offset[high - 1]
+        apart[number] = 0.5 * float(np.hypot(*gaps))
+    return middle, width, apart
+
+
+def _best_span(marked: NDArray[np.bool_]) -> tuple[int, int]:
+    """Return the span (first, behind the last) of points in which most are marked, and outside of which most aren't."""
+    total = np.append(0, np.cumsum(np.where(marked, 1, -1)))
+    lowest = np.minimum.accumulate(total)
+    high = int((total - lowest).argmax())
+    return int(total[: high + 1].argmin()), high
+
+
+def _cover(share: Float) -> Float:
+    """Return the share (K,) of the rows of each stretch that are painted; NaN where none has points."""
+    count = -(-len(share) // STRETCH)
+    index = np.arange(len(share)) // STRETCH
+    known = np.isfinite(share)
+    total = np.bincount(index, known, count)
+    on = np.bincount(index, known & (np.nan_to_num(share) > 0.5), count)
+    return np.where(total > 0.0, on / np.maximum(total, 1.0), np.nan)
+
+
+def _width(cover: Float, share: Float) -> tuple[float, float]:
+    """Return the mean width (m) of the paint in rows (R,) that are painted, and its standard deviation."""
+    return mean_with_std(cover[np.nan_to_num(share) > 0.5])
+
+
+def _dashes(stations: Float, cover: Float) -> tuple[float, float, float, float]:
+    """Return the painted share, dash and gap (m, 0 if solid) and where a dash begins, from the shares of rows (R,).
+
+    The period is the one whose wave the paint follows best; a common pattern is taken where it is that, within 0.6 m.
+    """
+    known = np.isfinite(cover)
+    if known.sum() < 30:
+        return 1.0, 0.0, 0.0, float(stations[0])
+    filled = np.interp(stations, stations[known], cover[known])
+    on = ndimage.median_filter(filled, size=3, mode="nearest") > 0.5
+    share = float(on[known].mean())
+    if share > _SOLID:
+        return share, 0.0, 0.0, float(stations[0])
+    wave = filled[known]
+    periods = np.arange(4.0, 40.0, 0.05)
+    phasor = np.exp(-2j * np.pi * stations[known][None, :] / periods[:, None])
+    strength = np.abs((phasor * (wave - wave.mean())).mean(axis=1))
+    best = int(strength.argmax())
+    period, dash = float(periods[best]), share * float(periods[best])
+    for wanted, gap in _STANDARD_DASHES:
+        if abs(wanted + gap - period) < 0.5 * _DASH_TOLERANCE and abs(wanted - dash) < 2.0 * _DASH_TOLERANCE:
+            dash, period = wanted, wanted + gap
+    angle = float(np.angle((np.exp(2j * np.pi * stations[known] / period) * (wave - wave.mean())).mean()))
+    middle = angle / (2.0 * np.pi) * period  # of a dash
+    first = middle - 0.5 * dash
+    first += period * np.ceil((stations[0] - first) / period)
+    return share, round(dash, 2), round(period - dash, 2), float(first)

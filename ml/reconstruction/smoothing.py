@@ -1,0 +1,181 @@
+"""Smooth values along the road with their standard deviations, unmoved by single outliers."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import cho_solve_banded, cholesky_banded
+
+Float = NDArray[np.float64]
+
+ORDER = 3
+"""Order of the differences that are held small: a curvature that changes linearly costs nothing."""
+_ROUNDS = 6
+_BISQUARE = 4.685  # times the residuals' scale: from here on a value counts nothing
+_FLOOR = 1e-9  # of the mean weight: what holds the solution where nothing was measured
+
+
+@dataclass(frozen=True)
+class Smoothed:
+    """A smoothed sequence.
+
+    Attributes:
+        values: (N,).
+        std: (N,) standard deviation of each smoothed value, from the scatter of what was measured about it.
+        scatter: standard deviation of one measured value about the smoothed ones.
+        used: (N,) weights from 0 (an outlier, or nothing measured) to 1.
+    """
+
+    values: Float
+    std: Float
+    scatter: float
+    used: Float
+
+
+def smooth(
+    values: Float, weights: Float, spacing: float, wavelength: float, order: int = ORDER, usual: float = 0.0
+) -> Smoothed:
+    """Smooth values (N,) at equal spacing by Whittaker's method, robustly (bisquare weights).
+
+    Args:
+        values: (N,); NaN where nothing was measured.
+        weights: (N,) >= 0, how much each counts, e.g. by its number of points.
+        spacing: distance of neighbours, m.
+        wavelength: a wave of this length (m) keeps half of its amplitude; shorter ones vanish.
+        order: of the differences that are held small.
+        usual: standard deviation of single values that is nothing unusual: no fault is seen in it.
+
+    The residuals of neighbours may go together (markings are painted with a slow sway): the standard deviations are
+    widened by the factor that their lag-1 correlation asks for.
+    """
+    known = np.isfinite(values) & (weights > 0.0)
+    count = len(values)
+    if known.sum() <= order:
+        level = float(np.median(values[known])) if known.any() else 0.0
+        return Smoothed(np.full(count, level), np.full(count, np.inf), np.inf, known.astype(np.float64))
+    given = np.where(known, values, 0.0)
+    base = np.where(known, weights, 0.0)
+    base = base / base[known].mean()
+    order = min(order, count - 1)
+    stiffness = (wavelength / (2.0 * np.pi * spacing)) ** (2 * order)
+    penalty = stiffness * _difference_bands(count, order)
+    robust = known.astype(np.float64)
+    fitted, scatter = given, 0.0
+    for _ in range(_ROUNDS):
+        factor, fitted = _solve(penalty, base * robust, given)
+        residual = given - fitted
+        scatter = _scale(residual[known] * np.sqrt(base[known]))
+        reach = _BISQUARE * max(scatter, usual, 1e-9)
+        robust = np.where(known, np.clip(1.0 - (residual * np.sqrt(base) / reach) ** 2, 0.0, None) ** 2, 0.0)
+    factor, fitted = _solve(penalty, base * robust, given)
+    kept = known & (robust > 0.0)
+    residual = (given - fitted)[kept] * np.sqrt(base[kept])
+    scatter = float(np.sqrt(np.mean(residual**2))) if len(residual) else 0.0
+    widening = np.sqrt(correlation_factor(residual))
+    std = scatter * widening * np.sqrt(np.maximum(_inverse_diagonal(factor), 0.0))
+    return Smoothed(fitted, std, scatter, robust)
+
+
+def correlation_factor(residual: Float) -> float:
+    """Return how many values with the lag-1 correlation of residuals (N,) tell as much as one independent value."""
+    if len(residual) < 8:
+        return 1.0
+    centred = residual - residual.mean()
+    square = float(centred @ centred)
+    lag = float(centred[1:] @ centred[:-1]) / square if square > 0.0 else 0.0
+    lag = min(max(lag, 0.0), 0.95)
+    return (1.0 + lag) / (1.0 - lag)
+
+
+def mean_with_std(values: Float, apart: Float | None = None) -> tuple[float, float]:
+    """Return a robust mean of values (N,) in order along the road and its standard deviation.
+
+    Bisquare about the median; the deviation counts as many values as are independent of their neighbours, and what
+    `unseen` tells of the distances ``apart`` (N,) of the points they lie between. NaN and infinity for no values.
+    """
+    known = np.isfinite(values)
+    values = values[known]
+    if not len(values):
+        return float("nan"), float("inf")
+    middle = float(np.median(values))
+    for _ in range(_ROUNDS):
+        scale = max(_scale(values - middle), 1e-9)
+        robust = np.clip(1.0 - ((values - middle) / (_BISQUARE * scale)) ** 2, 0.0, None) ** 2
+        total = float(robust.sum())
+        if total <= 0.0:
+            break
+        middle = float((robust * values).sum() / total)
+    kept = np.abs(values - middle) < _BISQUARE * max(_scale(values - middle), 1e-9)
+    spread = float(np.sqrt(np.mean((values[kept] - middle) ** 2))) if kept.any() else 0.0
+    independent = max(1.0, kept.sum() / correlation_factor(values[kept] - middle))
+    std = spread / float(np.sqrt(independent))
+    return middle, float(np.hypot(std, unseen(apart[known], spread))) if apart is not None else std
+
+
+def unseen(apart: Float, scatter: float) -> float:
+    """Return the standard deviation of an offset that no scatter shows, because the points lie in rows along the road.
+
+    What lies midway between two rows is off by up to half of their distance: evenly distributed, so by
+    distance / sqrt(12). Where the rows wander beside the road, the offsets scatter by as much and their mean is better;
+    where they don't, what is missing in the scatter is an error that all of them share.
+
+    Args:
+        apart: (K,) distances of the rows, m; 0 where the offset is a mean of many points.
+        scatter: standard deviation of single offsets about the mean, m.
+    """
+    rows = apart[np.isfinite(apart) & (apart > 0.0)]
+    if not len(rows):
+        return 0.0
+    return float(np.sqrt(max(0.0, float(np.median(rows)) ** 2 / 12.0 - scatter**2)))
+
+
+def _scale(residual: Float) -> float:
+    """Return a standard deviation from the median of absolute residuals."""
+    return float(1.4826 * np.median(np.abs(residual))) if len(residual) else 0.0
+
+
+def _difference_bands(count: int, order: int) -> Float:
+    """Return D'D of the differences of an order in lower banded form (order + 1, N)."""
+    stencil = np.array([1.0])
+    for _ in range(order):
+        stencil = np.convolve(stencil, [-1.0, 1.0])
+    bands = np.zeros((order + 1, count))
+    rows = count - order
+    for i in range(order + 1):
+        for j in range(i, order + 1):
+            bands[j - i, i : i + rows] += stencil[i] * stencil[j]
+    return bands
+
+
+def _solve(penalty: Float, weights: Float, values: Float) -> tuple[Float, Float]:
+    """Return the banded Cholesky factor and the smoothed values."""
+    bands = penalty.copy()
+    bands[0] += weights + _FLOOR * max(float(weights.mean()), _FLOOR)
+    factor = np.asarray(cholesky_banded(bands, lower=True))
+    return factor, np.asarray(cho_solve_banded((factor, True), weights * values))
+
+
+def _inverse_diagonal(factor: Float) -> Float:
+    """Return the diagonal of the inverse of a banded matrix from its lower Cholesky factor (Takahashi's recursion)."""
+    width, count = factor.shape[0] - 1, factor.shape[1]
+    inverse = np.zeros((width + 1, count + width))  # bands below the diagonal
+    lower = factor / factor[0]
+    pivot = 1.0 / factor[0] ** 2
+    for i in range(count - 1, -1, -1):
+        below = lower[1:, i]
+        block = _block(inverse, i + 1, width)
+        row = -block @ below
+        inverse[1:, i] = row
+        inverse[0, i] = pivot[i] - below @ row
+    return inverse[0, :count]
+
+
+def _block(inverse: Float, start: int, width: int) -> Float:
+    """Return the symmetric (width, width) block of the inverse that begins at a row."""
+    block = np.empty((width, width))
+    for a in range(width):
+        for b in range(a + 1):
+            block[a, b] = block[b, a] = inverse[a - b, start + b]
+    return block

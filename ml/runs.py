@@ -1,0 +1,159 @@
+"""A run's folder: configuration, history, curves, metrics and checkpoint of one training."""
+
+from __future__ import annotations
+
+import io
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Generic, TypeVar
+
+import torch
+
+from synthroads_addon.core.errors import InputError, MissingFileError, OutputError
+from synthroads_addon.core.files import write_file
+from synthroads_addon.core.schema import canonical_json, read_json
+
+from .configuration import Configuration, from_data
+
+CONFIGURATION = "configuration.json"
+CHECKPOINT = "checkpoint.pt"
+HISTORY = "history.json"
+METRICS = "metrics.json"
+CURVES = "curves.png"
+FREE_WHEN_RESUMING = ("threads", "device")
+"""Fields that may change between the parts of one training: they say where it runs, not what it learns."""
+
+C = TypeVar("C", bound=Configuration)
+
+
+@dataclass
+class Run(Generic[C]):
+    """One training.
+
+    Attributes:
+        folder: of its files.
+        configuration: all that it depends on.
+        history: one dictionary of numbers per epoch that is done.
+    """
+
+    folder: Path
+    configuration: C
+    history: list[dict[str, float]] = field(default_factory=list)
+
+    @classmethod
+    def start(cls, folder: Path, configuration: C, *, resume: bool = False, overwrite: bool = False) -> Run[C]:
+        """Make a run's folder, or go on with one that was interrupted.
+
+        Raises:
+            OutputError: the folder holds a run already and neither ``resume`` nor ``overwrite`` says what to do.
+            InputError: the run to resume was made with another configuration.
+        """
+        run = cls(folder, configuration)
+        there = (folder / CONFIGURATION).exists()
+        if there and resume:
+            run._resume(read_json(folder / CONFIGURATION))
+        elif there and not overwrite:
+            raise OutputError("--output", str(folder), "holds a run already; --resume goes on, --overwrite begins anew")
+        else:
+            for name in (CHECKPOINT, HISTORY, METRICS, CURVES):
+                (folder / name).unlink(missing_ok=True)
+        write_file(folder / CONFIGURATION, canonical_json(configuration.to_dict()).encode(), overwrite=True)
+        return run
+
+    @classmethod
+    def open(cls, folder: Path, kinds: Mapping[str, type[C]]) -> Run[C]:
+        """Open a run that was trained, if only in part.
+
+        Raises:
+            MissingFileError: the folder holds no run.
+        """
+        if not (folder / CONFIGURATION).is_file() or not (folder / CHECKPOINT).is_file():
+            raise MissingFileError(str(folder), None, "holds no trained run; `synthroads train` makes one")
+        run = cls(folder, from_data(read_json(folder / CONFIGURATION), kinds, str(folder / CONFIGURATION)))
+        if (folder / HISTORY).is_file():
+            run.history = read_json(folder / HISTORY)
+        return run
+
+    def save(self, state: Mapping[str, Any]) -> None:
+        """Write a checkpoint; the one before stays until the new one is whole."""
+        content = io.BytesIO()
+        torch.save(dict(state), content)
+        write_file(self.folder / CHECKPOINT, content.getvalue(), overwrite=True)
+
+    def saved(self, device: torch.device | str = "cpu") -> dict[str, Any] | None:
+        """Return the last checkpoint, or None if there is none yet.
+
+        Raises:
+            InputError: the file is damaged.
+        """
+        path = self.folder / CHECKPOINT
+        if not path.exists():
+            return None
+        try:
+            state: dict[str, Any] = torch.load(path, map_location=device, weights_only=True)
+        except Exception as problem:  # pickle, zip and torch each have errors of their own
+            raise InputError(str(path), None, f"is no checkpoint, or damaged ({type(problem).__name__})") from None
+        return state
+
+    def record(self, figures: Mapping[str, float]) -> None:
+        """Add an epoch to the history."""
+        self.history.append({name: float(value) for name, value in figures.items()})
+        write_file(self.folder / HISTORY, canonical_json(_plain(self.history)).encode(), overwrite=True)
+
+    def write_metrics(self, metrics: Mapping[str, Any]) -> None:
+        """Write the figures that the trained model reached, and the curves of its training as a picture."""
+        write_file(self.folder / METRICS, canonical_json(_plain(dict(metrics))).encode(), overwrite=True)
+        if self.history:
+            write_file(self.folder / CURVES, _curves(self.history), overwrite=True)
+
+    def _resume(self, before: Any) -> None:
+        now = self.configuration.to_dict()
+        different = [
+            name for name in {**before, **now} if name not in FREE_WHEN_RESUMING and before.get(name) != now.get(name)
+        ]
+        if different:
+            name = different[0]
+            raise InputError(f"--resume: {name}", now.get(name), f"the run was begun with {before.get(name)!r}")
+        state = self.saved()
+        done = 0 if state is None else int(state["epoch"])
+        if done:
+            self.history = read_json(self.folder / HISTORY)[:done]
+
+
+def torch_stream(seed: int, *purpose: str | int) -> torch.Generator:
+    """Return PyTorch's generator of one purpose, as `core.random_streams.stream` does for NumPy."""
+    return torch.Generator().manual_seed(stream_seed(seed, *purpose))
+
+
+def stream_seed(seed: int, *purpose: str | int) -> int:
+    """Return the 63-bit seed of one purpose."""
+    from synthroads_addon.core.random_streams import stream
+
+    return int(stream(seed, *purpose).integers(2**63))
+
+
+def _plain(value: Any) -> Any:
+    """Return what JSON can hold: NaN becomes None."""
+    if isinstance(value, Mapping):
+        return {str(key): _plain(item) for key, item in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_plain(item) for item in value]
+    return None if isinstance(value, float) and math.isnan(value) else value
+
+
+def _curves(history: list[dict[str, float]]) -> bytes:
+    """Return a PNG with one small plot per figure of the history."""
+    from matplotlib.figure import Figure
+
+    names = [name for name in history[-1] if name not in ("epoch", "seconds")]
+    figure = Figure(figsize=(4 * min(len(names), 3), 3 * -(-len(names) // 3)), layout="constrained")
+    for place, name in enumerate(names):
+        axes = figure.add_subplot(-(-len(names) // 3), min(len(names), 3), place + 1)
+        axes.plot([epoch["epoch"] for epoch in history], [epoch.get(name, float("nan")) for epoch in history])
+        axes.set(title=name.replace("_", " "), xlabel="epoch")
+        axes.grid(alpha=0.3)
+    content = io.BytesIO()
+    figure.savefig(content, format="png", dpi=110)
+    return content.getvalue()

@@ -1,0 +1,1 @@
+"""A class for every point: data, recipes, training, scores and prediction on whole clouds."""

@@ -1,0 +1,105 @@
+"""Scores of a network on labelled points of all densities, and the network as it was trained."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+import numpy as np
+import torch
+from torch import Tensor, nn
+
+from ml.runs import Run
+from synthroads_addon.core.errors import InputError
+from synthroads_addon.core.progress import Progress, silent
+
+from .classes import class_names
+from .crops import Item
+from .loading import adaptation_batches, thinned
+from .metrics import IGNORED, Confusion
+from .network import adapted, build, on_device, plan_of, prepared, scores_of
+from .recipes import SegmentationConfiguration
+from .scoring import Classifier, label_tile, score_tile
+from .sources import Source, read_tiles
+from .tiles import Tile, scalings
+
+
+def trained_model(run: Run[SegmentationConfiguration], device: torch.device) -> nn.Module:
+    """Return the network of a trained run.
+
+    Raises:
+        InputError: the checkpoint is damaged or of another network.
+    """
+    state = run.saved(device)
+    if state is None:
+        raise InputError(str(run.folder), None, "holds no checkpoint")
+    model = build(run.configuration).to(device)
+    try:
+        model.load_state_dict(state["model"])
+    except (KeyError, RuntimeError):
+        raise InputError(str(run.folder), None, "its checkpoint is of another network than its configuration") from None
+    return model.eval()
+
+
+def classifier(model: nn.Module, configuration: SegmentationConfiguration, device: torch.device) -> Classifier:
+    """Return what scores the points of an item."""
+
+    neighbourhood = plan_of(configuration).neighbourhood
+
+    def scores(batch: Item) -> Tensor:
+        model.eval()
+        with torch.inference_mode():
+            return scores_of(model, on_device(prepared(batch, neighbourhood), device))
+
+    return scores
+
+
+def score(
+    model: nn.Module,
+    configuration: SegmentationConfiguration,
+    sources: Sequence[Source],
+    device: torch.device,
+    progress: Progress = silent,
+) -> tuple[Confusion, tuple[Tile, Any] | None]:
+    """Return the confusion over all points of some sources, and the first tile with its classes, to be drawn.
+
+    Raises:
+        InputError: the sources tell different classes apart, or a mapping's groups leave out a class.
+    """
+    scheme = configuration.scheme()
+    names = {source.targets(scheme) for source in sources}
+    if len(names) != 1:
+        raise InputError("data.tests", len(names), "sources of one test must tell the same classes apart")
+    confusion = Confusion(names.pop())
+    if configuration.adaptation.adabn:
+        tiles = [tile for source in sources for tile in thinned(source, configuration)]
+        model = adapted(model, adaptation_batches(tiles, configuration), device)
+    scores = classifier(model, configuration, device)
+    shown = None
+    for source in sources:
+        mapping = source.label_mapping()
+        count = len(class_names(scheme))
+        groups = mapping.group_of(class_names(scheme)) if mapping else np.arange(count, dtype=np.int16)
+        if (groups == IGNORED).any():
+            raise InputError("groups", mapping and mapping.title, "must have a place for every class of the scheme")
+        for scene in _scenes(read_tiles(source, scheme, None)):
+            scaling = scalings(scene, configuration.intensity)
+            for tile in scene:
+                labels = label_tile(tile, scaling[tile.scene], scores, configuration.crop_settings())
+                score_tile(confusion, tile, labels, groups)
+                if shown is None or len(tile) > len(shown[0]):
+                    shown = (tile, groups[labels])
+            progress("scoring", 0.5)
+    return confusion, shown
+
+
+def _scenes(tiles: Iterator[Tile]) -> Iterator[list[Tile]]:
+    """Yield the tiles of one scene after another, which stand together."""
+    scene: list[Tile] = []
+    for tile in tiles:
+        if scene and scene[0].scene != tile.scene:
+            yield scene
+            scene = []
+        scene.append(tile)
+    if scene:
+        yield scene

@@ -1,0 +1,269 @@
+"""Experiments: several trainings that differ in their data, each with several seeds, and one table of all scores.
+
+Example: ``python -m ml.segmentation.experiment real-synthetic-mixed --data real=out/standin --data
+synthetic=out/reference --output out/experiment``. What is trained already isn't trained again.
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+import shutil
+import sys
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any, ClassVar
+
+from pydantic import Field
+
+from headless.cli import progress_bar
+from ml.configuration import load_configuration
+from ml.fitting import chosen_device
+from ml.runs import CHECKPOINT, CONFIGURATION, FREE_WHEN_RESUMING, HISTORY, METRICS, Run
+from synthroads_addon.core.errors import InputError, nearest_name
+from synthroads_addon.core.files import write_file
+from synthroads_addon.core.progress import Progress, silent
+from synthroads_addon.core.scenario import apply_change
+from synthroads_addon.core.schema import Model, canonical_json, read_json, read_yaml
+
+from .evaluation import score, trained_model
+from .metrics import mean_and_deviation
+from .recipes import Data, SegmentationConfiguration
+from .sources import Source
+from .task import train
+from .training import PRETRAINING
+
+SHIPPED = Path(__file__).parents[1] / "configurations" / "experiments"
+
+
+class Variant(Model):
+    """One column of the table."""
+
+    vendor_keys_allowed: ClassVar[bool] = False
+
+    set: dict[str, Any] = Field({}, description="Changes of the configuration, path: value.")
+    of: str | None = Field(None, description="Variant whose trained network is only tested anew, with the changes.")
+
+
+class Experiment(Model):
+    """Trainings to be compared. Paths of data may begin with {NAME}, which the command's --data fills in."""
+
+    vendor_keys_allowed: ClassVar[bool] = False
+
+    title: str = Field(min_length=1, description="Title.")
+    configuration: str = Field("segmentation", description="Configuration that all start from.")
+    set: dict[str, Any] = Field({}, description="Changes of it, path: value.")
+    data: Data = Field(description="Training data and tests of all variants.")
+    variants: dict[str, Variant] = Field(min_length=1, description="What is compared.")
+    seeds: tuple[int, ...] = Field((1, 2, 3, 4, 5), min_length=1, description="Seeds of each variant.")
+
+
+def load_experiment(name_or_file: str) -> Experiment:
+    """Return a shipped experiment or one from a YAML file.
+
+    Raises:
+        MissingFileError: there is no such file.
+        InputError: a field is unknown or wrong.
+    """
+    shipped = sorted(path.stem for path in SHIPPED.glob("*.yaml"))
+    path = SHIPPED / f"{name_or_file}.yaml" if name_or_file in shipped else Path(name_or_file)
+    if path.suffix.lower() not in (".yaml", ".yml", ".json"):
+        hint = nearest_name(name_or_file, shipped)
+        raise InputError("experiment", name_or_file, f"must be a .yaml file or one of {', '.join(shipped)}{hint}")
+    experiment = Experiment.from_dict(read_yaml(path), str(name_or_file))
+    for name, variant in experiment.variants.items():
+        if variant.of is not None and (variant.of not in experiment.variants or experiment.variants[variant.of].of):
+            raise InputError(f"variants.{name}.of", variant.of, "must be a variant that is trained")
+    return experiment
+
+
+def configurations(
+    experiment: Experiment, folders: Mapping[str, str], changes: Sequence[str] = ()
+) -> dict[str, SegmentationConfiguration]:
+    """Return the configuration of each variant, with the first seed.
+
+    Args:
+        experiment: what is compared.
+        folders: what {NAME} in its paths stands for.
+        changes: of all variants, ``path=value``.
+
+    Raises:
+        InputError: a name isn't given, or a change is wrong.
+    """
+    kinds = {"segmentation": SegmentationConfiguration}
+    base = load_configuration(experiment.configuration, kinds).to_dict()
+    base |= {"data": _filled(experiment.data, folders).to_dict(), "seed": experiment.seeds[0]}
+    result = {}
+    for name, variant in experiment.variants.items():
+        data = base
+        for part in (experiment.set, experiment.variants[variant.of].set if variant.of else {}, variant.set):
+            for path, value in part.items():
+                data = apply_change(data, f"{path}={canonical_json(value)}")
+        for change in changes:
+            data = apply_change(data, change)
+        result[name] = SegmentationConfiguration.from_dict(data, f"variants.{name}")
+    return result
+
+
+def _filled(data: Data, folders: Mapping[str, str]) -> Data:
+    """Return sources with their folders in place of names."""
+
+    def filled(source: Source) -> Source:
+        try:
+            return source.model_copy(update={"path": source.path.format(**folders)})
+        except (KeyError, IndexError, ValueError) as missing:
+            name = missing.args[0] if isinstance(missing, KeyError) else source.path
+            raise InputError("--data", name, f"must be given: {name}=FOLDER") from None
+
+    return Data(
+        real=tuple(map(filled, data.real)),
+        synthetic=tuple(map(filled, data.synthetic)),
+        validation=tuple(map(filled, data.validation)),
+        tests={name: tuple(map(filled, sources)) for name, sources in data.tests.items()},
+    )
+
+
+def run_experiment(
+    experiment: Experiment,
+    configured: Mapping[str, SegmentationConfiguration],
+    output: Path,
+    seeds: Sequence[int],
+    progress: Progress = silent,
+) -> dict[str, Any]:
+    """Train and test all variants with all seeds; return the scores and write them after each.
+
+    Args:
+        experiment: what is compared.
+        configured: see `configurations`.
+        output: folder; ``VARIANT/seed-N`` are the runs, ``results.json`` and ``table.md`` the scores.
+        seeds: one after another, each over all variants: a table is there as soon as the first is through.
+        progress: of each training.
+    """
+    results: dict[str, dict[str, Any]] = {name: {} for name in configured}
+    for seed in seeds:
+        for name, variant in experiment.variants.items():
+            configuration = configured[name].model_copy(update={"seed": seed})
+            folder = output / (variant.of or name) / f"seed-{seed}"
+            if variant.of is None:
+                tests = _trained(configuration, folder, output, progress)
+            else:
+                tests = _tested(configuration, folder, output / name / f"seed-{seed}.json", progress)
+            results[name][str(seed)] = tests
+            write_file(output / "results.json", canonical_json(results).encode(), overwrite=True)
+            write_file(output / "table.md", table(experiment.title, results).encode(), overwrite=True)
+    return results
+
+
+def _trained(
+    configuration: SegmentationConfiguration, folder: Path, output: Path, progress: Progress
+) -> dict[str, Any]:
+    """Return the scores of a run, trained unless it is already."""
+    begun = (folder / CONFIGURATION).is_file()
+    run = Run.start(folder, configuration, resume=begun)
+    if not (folder / METRICS).is_file():
+        if configuration.set_up == "fine_tuned":
+            _reuse_pretraining(configuration, folder / PRETRAINING, output)
+        train(run, progress)
+    tests: dict[str, Any] = read_json(folder / METRICS)["tests"]
+    return tests
+
+
+def _reuse_pretraining(configuration: SegmentationConfiguration, target: Path, output: Path) -> None:
+    """Take the first part of fine-tuning from the run that has trained just that, if there is one."""
+    wanted = configuration.model_copy(update={"set_up": "synthetic"}).to_dict()
+    if (target / CONFIGURATION).is_file():
+        return
+    for file in sorted(output.glob(f"*/*/{CONFIGURATION}")):
+        found = read_json(file)
+        same = all(found.get(key) == wanted.get(key) for key in {**found, **wanted} if key not in FREE_WHEN_RESUMING)
+        if same and (file.parent / METRICS).is_file():
+            target.mkdir(parents=True, exist_ok=True)
+            for name in (CONFIGURATION, CHECKPOINT, HISTORY):
+                shutil.copyfile(file.parent / name, target / name)
+            return
+
+
+def _tested(configuration: SegmentationConfiguration, folder: Path, file: Path, progress: Progress) -> dict[str, Any]:
+    """Return the scores of a trained run under another configuration, tested unless it is already."""
+    if file.is_file():
+        kept: dict[str, Any] = read_json(file)
+        return kept
+    run = Run.open(folder, {"segmentation": SegmentationConfiguration})
+    device = chosen_device(configuration)
+    model = trained_model(run, device)
+    tests = {
+        name: score(model, configuration, sources, device, progress)[0].to_dict()
+        for name, sources in configuration.data.tests.items()
+    }
+    write_file(file, canonical_json(tests).encode())
+    return tests
+
+
+def table(title: str, results: Mapping[str, Mapping[str, Any]]) -> str:
+    """Return Markdown: for each test the IoU of each class and variant in percent, mean (standard deviation).
+
+    Args:
+        title: above the tables.
+        results: variant -> seed -> test -> scores as of `Confusion.to_dict`.
+    """
+    done = {name: list(seeds.values()) for name, seeds in results.items() if seeds}
+    lines = [f"# {title}", "", "IoU in %, mean (standard deviation, ddof = 1) over seeds; - where undefined.", ""]
+    first = next(iter(done.values()))[0] if done else {}
+    for test, scores in first.items():
+        lines += [f"## {test}", "", f"| class | points | {' | '.join(done)} |", "|---|--:|" + "--:|" * len(done)]
+        for label, row in scores["classes"].items():
+            cells = [_cell([run[test]["classes"][label]["iou"] for run in runs]) for runs in done.values()]
+            lines.append(f"| {label} | {row['support']:,} | {' | '.join(cells)} |")
+        cells = [_cell([run[test]["mean_iou"] for run in runs]) for runs in done.values()]
+        lines += [f"| mean | {scores['points']:,} | {' | '.join(cells)} |", ""]
+    counts = ", ".join(f"{name} {len(runs)}" for name, runs in done.items())
+    return "\n".join([*lines, f"Seeds: {counts}.", ""])
+
+
+def _cell(values: Sequence[float | None]) -> str:
+    mean, deviation = mean_and_deviation([float("nan") if value is None else 100.0 * value for value in values])
+    if math.isnan(mean):
+        return "-"
+    return f"{mean:.1f}" if math.isnan(deviation) else f"{mean:.1f} ({deviation:.1f})"
+
+
+def parser() -> argparse.ArgumentParser:
+    """Return the parser of the command."""
+    known = ", ".join(sorted(path.stem for path in SHIPPED.glob("*.yaml")))
+    made = argparse.ArgumentParser(prog="python -m ml.segmentation.experiment", description=__doc__)
+    made.add_argument("experiment", metavar="EXPERIMENT", help=f"YAML file, or one of {known}")
+    text = "folder that {NAME} in the experiment's paths stands for (can be repeated)"
+    made.add_argument("--data", action="append", default=[], metavar="NAME=FOLDER", help=text)
+    made.add_argument("--output", type=Path, required=True, metavar="DIR", help="folder for runs and table")
+    made.add_argument("--configuration", metavar="NAME", help="configuration in place of the experiment's")
+    made.add_argument("--seeds", type=int, nargs="+", metavar="N", help="seeds in place of the experiment's")
+    made.add_argument("--set", action="append", default=[], metavar="PATH=VALUE", dest="changes", help="of all runs")
+    made.add_argument("--quiet", action="store_true", help="print nothing but errors")
+    return made
+
+
+def main(argv: list[str] | None = None) -> int:
+    """Run the command; return its exit code."""
+    arguments = parser().parse_args(argv)
+    arguments.json = False
+    try:
+        experiment = load_experiment(arguments.experiment)
+        if arguments.configuration:
+            experiment = experiment.model_copy(update={"configuration": arguments.configuration})
+        folders = dict(text.partition("=")[::2] for text in arguments.data)
+        configured = configurations(experiment, folders, arguments.changes)
+        seeds = arguments.seeds or experiment.seeds
+        results = run_experiment(experiment, configured, arguments.output, seeds, progress_bar(arguments))
+    except InputError as error:
+        print(f"error: {error}", file=sys.stderr)
+        return 2
+    except KeyboardInterrupt:
+        print("interrupted; the same command goes on", file=sys.stderr)
+        return 130
+    if not arguments.quiet:
+        print(table(experiment.title, results))
+    return 0
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())

@@ -1,0 +1,116 @@
+"""Batches for training and for the norms' statistics: tiles read, crops drawn, neighbours found in the workers."""
+
+from __future__ import annotations
+
+import math
+import zlib
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import torch
+from torch.utils.data import DataLoader
+
+from synthroads_addon.core.random_streams import stream
+
+from .adaptation import laid_over
+from .crops import CropDataset, Item, Seeds, collate
+from .network import on_device, plan_of, prepared
+from .recipes import SegmentationConfiguration, mapped_intensities, plan
+from .sources import Source, read_tiles
+from .tiles import Scaling, Tile, scalings
+
+
+def read_domains(configuration: SegmentationConfiguration) -> dict[str, list[Tile]]:
+    """Return the training tiles by domain, thinned out; intensities mapped where the set-up says so.
+
+    Raises:
+        InputError: there are none, or they don't fit the configuration.
+    """
+    domains: dict[str, list[Tile]] = {}
+    for domain, sources in configuration.needed().items():
+        # Scenes of two domains may have one name: their intensities are scaled apart.
+        tiles = [tile for source in sources for tile in thinned(source, configuration)]
+        domains[domain] = [replace(tile, scene=f"{domain}/{tile.scene}") for tile in tiles if len(tile)]
+    if configuration.set_up == "mixed_mapped":
+        domains["synthetic"] = mapped_intensities(domains["synthetic"], domains["real"])
+    return domains
+
+
+def thinned(source: Source, configuration: SegmentationConfiguration) -> Iterator[Tile]:
+    """Yield a source's tiles with one point per training voxel."""
+    return read_tiles(source, configuration.scheme(), configuration.voxel)
+
+
+def epoch_batches(
+    configuration: SegmentationConfiguration,
+    tiles: Sequence[Tile],
+    domains: Sequence[int],
+    scaling: dict[str, Scaling],
+    seeds: Seeds,
+    device: torch.device,
+    epoch: int,
+) -> Iterator[Item]:
+    """Yield the batches of an epoch, which depend on seed and epoch alone."""
+    draws = plan(domains, configuration.crops_per_tile, configuration.synthetic_share, configuration.seed, epoch)
+    dataset = CropDataset(
+        tiles,
+        scaling,
+        configuration.crop_settings(),
+        draws,
+        seeds,
+        effects=configuration.effects,
+        seed=configuration.seed,
+        epoch=epoch,
+    )
+    yield from _loaded(dataset, configuration, device, epoch, configuration.adaptation.mix3d)
+
+
+def _loaded(
+    dataset: CropDataset, configuration: SegmentationConfiguration, device: torch.device, epoch: int, mix3d: float
+) -> Iterator[Item]:
+    loader: DataLoader[Item] = DataLoader(
+        dataset,
+        batch_size=configuration.batch,
+        num_workers=configuration.workers,
+        collate_fn=Collate(configuration, epoch, mix3d),
+        pin_memory=device.type == "cuda",
+    )
+    for batch in loader:
+        yield on_device(batch, device)
+
+
+@dataclass(frozen=True)
+class Collate:
+    """Makes a batch of items in the worker: laid over one another where the recipe says so, neighbours found."""
+
+    configuration: SegmentationConfiguration
+    epoch: int
+    mix3d: float
+
+    def __call__(self, items: Sequence[Item]) -> Item:
+        """Return the batch."""
+        batch = collate(items)
+        if self.mix3d and self._chance(items[0]) < self.mix3d:
+            batch = laid_over(batch)
+        return prepared(batch, plan_of(self.configuration).neighbourhood)
+
+    def _chance(self, first: Item) -> float:
+        """Return a number from 0 to 1 that follows from the batch itself: workers don't know how many came before."""
+        content = zlib.crc32(first["coord"].numpy().tobytes())
+        return float(stream(self.configuration.seed, "mix3d", self.epoch, content).random())
+
+
+def adaptation_batches(tiles: list[Tile], configuration: SegmentationConfiguration) -> Iterator[Item]:
+    """Yield batches of a test's points without effects, from which the norms' statistics are taken."""
+    if not tiles:
+        return
+    per_tile = math.ceil(configuration.adaptation.adabn_crops / len(tiles))
+    dataset = CropDataset(
+        tiles,
+        scalings(tiles, configuration.intensity),
+        configuration.crop_settings(),
+        plan([len(tiles)], per_tile, None, configuration.seed, 0)[: configuration.adaptation.adabn_crops],
+        Seeds(tiles, 0, balanced=False),
+        seed=configuration.seed,
+    )
+    yield from _loaded(dataset, configuration, torch.device("cpu"), 0, 0.0)

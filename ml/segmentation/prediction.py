@@ -1,0 +1,292 @@
+"""Classes for a LAS or LAZ file of any size: read twice, labelled tile by tile between, written with all it held.
+
+First pass: points go into square tiles on disk. Then each tile is labelled, seeing what lies around it. Second pass:
+the file is copied record by record, with the class as one more attribute. Memory holds a tile and its surroundings.
+"""
+
+from __future__ import annotations
+
+import tempfile
+import time
+from collections.abc import Iterator
+from contextlib import suppress
+from copy import deepcopy
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import laspy
+import numpy as np
+from numpy.typing import NDArray
+
+from synthroads_addon.core.cloud.labels import ClassScheme
+from synthroads_addon.core.cloud.quantiles import LEVELS
+from synthroads_addon.core.cloud.reading import damaged, open_cloud
+from synthroads_addon.core.errors import InputError, OutputError
+from synthroads_addon.core.progress import Progress, silent
+
+from .crops import CropSettings
+from .metrics import IGNORED
+from .scoring import Classifier, label_tile
+from .sources import FULL
+from .tiles import Scaling, Tile
+
+PREDICTED = "predicted_class"
+"""Attribute that the classes are written to."""
+BLOCK = 500_000
+TILE = 48.0
+"""Edge of the tiles, m."""
+MARGIN = 6.0
+"""What a tile sees of the tiles around it, m: at least that of the pieces within."""
+_RECORD = np.dtype([("place", "<f4", 3), ("rgb", "u1", 3), ("intensity", "<u2"), ("index", "<i8")])
+
+
+@dataclass(frozen=True)
+class Labelling:
+    """What labels points.
+
+    Attributes:
+        classifier: scores of a batch.
+        settings: voxel and features.
+        scheme: classes.
+        intensity: ``share`` or ``robust``, as in training.
+    """
+
+    classifier: Classifier
+    settings: CropSettings
+    scheme: ClassScheme
+    intensity: str
+
+
+def predict_file(
+    source: Path,
+    target: Path,
+    labelling: Labelling,
+    *,
+    classification: bool = False,
+    overwrite: bool = False,
+    progress: Progress = silent,
+) -> dict[str, Any]:
+    """Write a copy of a LAS or LAZ file with a class for every point; return counts, points/s and memory.
+
+    Every attribute, record and header entry stays as it is. The class's id of the scheme is written to the attribute
+    ``predicted_class``, which is added unless the file has it from an earlier run.
+
+    Args:
+        source, target: ending in .las or .laz; the target appears when it is whole.
+        labelling: what labels the points.
+        classification: write the classes' LAS codes to the standard field ``classification`` too.
+        overwrite: whether the target may be replaced.
+        progress: told stage and share.
+
+    Raises:
+        MissingFileError: there is no such file.
+        InputError: it is no LAS file, damaged or empty.
+        OutputError: the target is there already or can't be written.
+    """
+    _check(source, target, overwrite)
+    begin = time.perf_counter()
+    with tempfile.TemporaryDirectory(prefix=".predict-", dir=target.parent) as name:
+        store = TileStore(Path(name))
+        count = store.fill(source, progress)
+        labels = np.memmap(Path(name) / "labels", dtype=np.uint8, mode="w+", shape=(max(count, 1),))
+        scaling = store.scaling(labelling.intensity)
+        done = 0
+        for tile, core, index in store.tiles():
+            labels[index] = label_tile(tile, scaling, labelling.classifier, labelling.settings, core)
+            done += len(index)
+            progress("labelling", done / count)
+        ids = np.array([row.id for row in labelling.scheme.rows], dtype=np.uint8)
+        counts = write_copy(source, target, labels, ids, labelling.scheme if classification else None, progress)
+        del labels
+    seconds = time.perf_counter() - begin
+    names = [row.name for row in labelling.scheme.rows]
+    return {
+        "points": count,
+        "seconds": round(seconds, 3),
+        "points_per_second": round(count / seconds),
+        "classes": dict(zip(names, counts.tolist(), strict=True)),
+    }
+
+
+def _check(source: Path, target: Path, overwrite: bool) -> None:
+    for path, what in ((source, "cloud"), (target, "--output")):
+        if path.suffix.lower() not in (".las", ".laz"):
+            raise InputError(what, str(path), "must end in .las or .laz")
+    with open_cloud(source) as cloud:
+        if cloud.header.count == 0:
+            raise InputError(str(source), None, "has no points")
+    if target.exists() and not overwrite:
+        raise OutputError("--output", str(target), "is there already; --overwrite replaces it")
+    try:
+        target.parent.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise OutputError("--output", str(target), f"cannot be written ({error.strerror})") from None
+
+
+class TileStore:
+    """A cloud sorted into square tiles on disk.
+
+    Args:
+        folder: for the tiles' files.
+        edge: of a tile, m.
+    """
+
+    def __init__(self, folder: Path, edge: float = TILE) -> None:
+        self._folder, self._edge = folder / "tiles", edge
+        self._folder.mkdir()
+        self._known: set[tuple[int, int]] = set()
+        self._histogram = np.zeros(LEVELS, dtype=np.int64)
+        self._has_color = False
+
+    def fill(self, source: Path, progress: Progress) -> int:
+        """Read a cloud into tiles; return its number of points."""
+        done = 0
+        with open_cloud(source) as cloud:
+            self._origin = np.floor(np.asarray(cloud.header.offset, dtype=np.float64))
+            scale = cloud.header.intensity_scale or 1.0
+            for block in cloud.blocks(BLOCK):
+                if done == 0:
+                    self._origin = np.floor(block.xyz.min(axis=0))
+                record = np.empty(len(block), dtype=_RECORD)
+                tile = np.floor((block.xyz[:, :2] - self._origin[:2]) / self._edge).astype(np.int64)
+                record["place"] = block.xyz - self._corner(tile)
+                record["rgb"] = np.rint(block.rgb / 257.0)
+                record["intensity"] = np.clip(np.rint(block.intensity * scale), 0, LEVELS - 1)
+                record["index"] = np.arange(done, done + len(block))
+                self._histogram += np.bincount(record["intensity"], minlength=LEVELS)
+                self._has_color |= bool(block.rgb.any())
+                self._append(tile, record)
+                done += len(block)
+                progress("reading", done / cloud.header.count)
+        return done
+
+    def scaling(self, kind: str) -> Scaling:
+        """Return the scaling of the whole cloud's intensities; see `tiles.scalings`."""
+        if kind == "share" or not self._histogram[1:].any():
+            return Scaling()
+        share = np.cumsum(self._histogram) / self._histogram.sum()
+        low, middle, high = (int(np.searchsorted(share, at)) / FULL for at in (0.1, 0.5, 0.9))
+        return Scaling(middle, high - low if high > low else 1.0)
+
+    def tiles(self) -> Iterator[tuple[Tile, NDArray[np.bool_], NDArray[np.int64]]]:
+        """Yield each tile with what lies around it, which points are its own, and where those stand in the file."""
+        for row, column in sorted(self._known):
+            parts, cores = [], []
+            for north in (-1, 0, 1):
+                for east in (-1, 0, 1):
+                    record = self._near(row + north, column + east, north, east)
+                    parts.append(record)
+                    cores.append(np.full(len(record), north == 0 and east == 0))
+            record, core = np.concatenate(parts), np.concatenate(cores)
+            strength = (record["intensity"] / np.float32(FULL)).astype(np.float32)
+            tile = Tile(
+                "",
+                self._corner(np.array([[column, row]]))[0],
+                np.ascontiguousarray(record["place"]),
+                np.ascontiguousarray(record["rgb"]) if self._has_color else None,
+                strength if self._histogram[1:].any() else None,
+                np.full(len(record), IGNORED, dtype=np.int16),
+            )
+            yield tile, core, record["index"][core]
+
+    def _near(self, row: int, column: int, north: int, east: int) -> NDArray[Any]:
+        """Return a tile's points that the tile which it lies ``north`` and ``east`` of sees, relative to that one."""
+        if (row, column) not in self._known:
+            return np.empty(0, dtype=_RECORD)
+        record = np.fromfile(self._folder / f"{row}_{column}", dtype=_RECORD)
+        record["place"][:, 0] += np.float32(east * self._edge)
+        record["place"][:, 1] += np.float32(north * self._edge)
+        plan = record["place"][:, :2]
+        if north == 0 and east == 0:
+            return record
+        inside: NDArray[Any] = record[np.all((plan >= -MARGIN) & (plan < self._edge + MARGIN), axis=1)]
+        return inside
+
+    def _corner(self, tile: NDArray[np.int64]) -> NDArray[np.float64]:
+        """Return the map coordinates (N, 3) of the corners of tiles (N, 2): column and row."""
+        plan = self._origin[:2] + tile * self._edge
+        return np.concatenate([plan, np.full((len(tile), 1), self._origin[2])], axis=1)
+
+    def _append(self, tile: NDArray[np.int64], record: NDArray[Any]) -> None:
+        order = np.lexsort(tile.T)
+        tile, record = tile[order], record[order]
+        starts = np.flatnonzero(np.r_[True, np.any(tile[1:] != tile[:-1], axis=1)])
+        for first, last in zip(starts, np.r_[starts[1:], len(tile)], strict=True):
+            column, row = int(tile[first, 0]), int(tile[first, 1])
+            self._known.add((row, column))
+            with (self._folder / f"{row}_{column}").open("ab") as file:
+                file.write(record[first:last].tobytes())
+
+
+def write_copy(
+    source: Path,
+    target: Path,
+    labels: NDArray[np.uint8],
+    ids: NDArray[np.uint8],
+    codes: ClassScheme | None,
+    progress: Progress,
+) -> NDArray[np.int64]:
+    """Copy a LAS file with one more attribute; return the number of points of each class (C,).
+
+    Args:
+        source, target: files.
+        labels: (N,) places of the classes, in the file's order.
+        ids: (C,) ids of the classes.
+        codes: whose LAS codes are written to ``classification`` too; None for none.
+        progress: told the share that is written.
+    """
+    counts = np.zeros(len(ids), dtype=np.int64)
+    temporary = target.with_name(f".{target.name}.partial")
+    try:
+        with laspy.open(source, laz_backend=laspy.LazBackend.LazrsParallel) as reader:
+            header = extended_header(reader.header, codes is not None)
+            compress = target.suffix.lower() == ".laz"
+            with laspy.open(temporary, "w", header=header, do_compress=compress) as writer:
+                done = 0
+                for old in reader.chunk_iterator(BLOCK):
+                    found = np.asarray(labels[done : done + len(old)])
+                    writer.write_points(extended_record(old, header, ids[found], codes))
+                    counts += np.bincount(found, minlength=len(ids))
+                    done += len(old)
+                    progress("writing", done / reader.header.point_count)
+                if done != len(labels):
+                    raise damaged(source, done, len(labels))
+                if reader.evlrs:
+                    writer.write_evlrs(reader.evlrs)
+        temporary.replace(target)
+    except OSError as error:
+        raise OutputError("--output", str(target), f"cannot be written ({error.strerror})") from None
+    finally:
+        with suppress(OSError):
+            temporary.unlink(missing_ok=True)
+    return counts
+
+
+def extended_header(old: laspy.LasHeader, needs_codes: bool) -> laspy.LasHeader:
+    """Return a copy of a header with the attribute for the classes.
+
+    Raises:
+        InputError: LAS codes are wanted, and the file's point format holds those up to 31 only.
+    """
+    header = deepcopy(old)
+    if needs_codes and header.point_format.id < 6:
+        raise InputError(
+            "--classification", header.point_format.id, "needs a point format of 6 or more: older ones end at code 31"
+        )
+    if PREDICTED not in header.point_format.dimension_names:
+        header.add_extra_dim(laspy.ExtraBytesParams(PREDICTED, "uint8", "predicted class"))
+    return header
+
+
+def extended_record(
+    old: Any, header: laspy.LasHeader, ids: NDArray[np.uint8], codes: ClassScheme | None
+) -> laspy.ScaleAwarePointRecord:
+    """Return a copy of points with their classes; all other attributes bit by bit as they are."""
+    record = laspy.ScaleAwarePointRecord.zeros(len(old), header=header)
+    for name in old.array.dtype.names:
+        record.array[name] = old.array[name]
+    record.array[PREDICTED] = ids
+    if codes is not None:
+        record.array["classification"] = codes.las_codes()[ids]
+    return record

@@ -1,0 +1,196 @@
+"""Recipes: which data are mixed how, and with which settings a network learns them; all of it configuration."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field, field_validator, model_validator
+
+from ml.configuration import Configuration, Part, Schedule
+from synthroads_addon.core.cloud.labels import ClassScheme, class_scheme
+from synthroads_addon.core.cloud.quantiles import LEVELS, QuantileMap
+from synthroads_addon.core.errors import InputError
+from synthroads_addon.core.random_streams import stream
+from synthroads_addon.core.schema import quantity
+
+from .crops import FEATURES, CropSettings, Draw, Feature
+from .effects import Effects
+from .sources import FULL, Source
+from .tiles import Tile
+
+SetUp = Literal["real", "synthetic", "mixed", "mixed_mapped", "fine_tuned"]
+
+
+class Network(Part):
+    """PointNeXt in one of its sizes."""
+
+    preset: Literal["S", "B", "L", "XL"] = Field("B", description="Size.")
+    width: int | None = quantity(None, ge=4, le=512, unit="1", description="Channels of the first stage; the size's.")
+    radius: float = quantity(0.3, gt=0, le=100, unit="m", description="Radius of the first neighbourhoods.")
+    neighbours: int = quantity(32, ge=2, le=128, unit="1", description="Neighbours that are looked at.")
+    dropout: float = quantity(0.5, ge=0, lt=1, unit="1", description="Dropout of the head.")
+    sampling: Literal["grid", "farthest"] = Field("grid", description="How each stage's points are chosen.")
+
+
+class Adaptation(Part):
+    """What brings domains nearer to each other."""
+
+    adabn: bool = Field(False, description="Before a test, take the norms' statistics from its points (no labels).")
+    adabn_crops: int = quantity(40, ge=1, le=100_000, unit="1", description="Crops that they are taken from.")
+    mix3d: float = quantity(0.0, ge=0, le=1, unit="1", description="Share of batches whose crops are laid over others.")
+
+
+class Data(Part):
+    """Where points come from."""
+
+    real: tuple[Source, ...] = Field((), description="Real training data, or what stands in for it.")
+    synthetic: tuple[Source, ...] = Field((), description="Synthetic training data.")
+    validation: tuple[Source, ...] = Field((), description="Scored after each epoch; never trained on.")
+    tests: dict[str, tuple[Source, ...]] = Field({}, description="Scored at the end, each by itself.")
+
+
+class SegmentationConfiguration(Configuration):
+    """One training of a segmentation. The defaults are the full recipe."""
+
+    task: Literal["segmentation"] = Field("segmentation", description="What is learned.")
+    classes: str = Field("5", min_length=1, description="5, 17, or a JSON file of classes.")
+    network: Network = Field(Network(), description="The network.")
+    features: tuple[Feature, ...] = Field(FEATURES, min_length=1, description="What the network sees of each point.")
+    intensity: Literal["share", "robust"] = Field(
+        "share", description="Share of 16 bits as it stands, or scaled scene by scene to median 0 and span 1."
+    )
+    voxel: float = quantity(0.1, ge=0.02, le=5, unit="m", description="Grid of which one point per cell is kept.")
+    crop_points: int = quantity(24_000, ge=64, le=2_000_000, unit="1", description="Points of a crop.")
+    crops_per_tile: int = quantity(30, ge=1, le=100_000, unit="1", description="Crops of each tile and epoch.")
+    batch: int = quantity(16, ge=1, le=1024, unit="1", description="Crops of a batch.")
+    workers: int = quantity(0, ge=0, le=256, unit="1", description="Processes that prepare batches; 0: this one.")
+    set_up: SetUp = Field("synthetic", description="Which data are trained on, and how.")
+    synthetic_share: float | None = quantity(
+        None,
+        gt=0,
+        lt=1,
+        unit="1",
+        description="Synthetic share of the crops when mixed; as the tiles are if not given.",
+    )
+    balanced: bool = Field(False, description="Cut crops around points of each class as often.")
+    effects: Effects = Field(Effects(), description="What happens to crops.")
+    adaptation: Adaptation = Field(Adaptation(), description="What brings domains nearer.")
+    label_smoothing: float = quantity(0.2, ge=0, lt=1, unit="1", description="Share of the loss for all classes.")
+    class_weights: bool = Field(True, description="Weigh classes by 1 / (f + 0.02), f their share of the points.")
+    fine_tuning: Schedule = Field(Schedule(epochs=30, learning_rate=0.001), description="Second part of fine_tuned.")
+    data: Data = Field(Data(), description="Where points come from.")
+
+    @field_validator("features")
+    @classmethod
+    def _distinct(cls, features: tuple[Feature, ...]) -> tuple[Feature, ...]:
+        if len(set(features)) < len(features):
+            raise ValueError("features must differ")
+        return features
+
+    @model_validator(mode="after")
+    def _data_fit_the_set_up(self) -> SegmentationConfiguration:
+        if self.synthetic_share is not None and not self.set_up.startswith("mixed"):
+            raise ValueError(f"synthetic_share is for mixed set-ups, not for {self.set_up}")
+        return self
+
+    def scheme(self) -> ClassScheme:
+        """Return the scheme of the classes; raise `InputError` if there is no such scheme."""
+        return class_scheme(self.classes)
+
+    def crop_settings(self) -> CropSettings:
+        """Return how items are made."""
+        return CropSettings(self.crop_points, self.voxel, self.features)
+
+    def needed(self) -> dict[str, tuple[Source, ...]]:
+        """Return the training sources of the set-up by domain.
+
+        Raises:
+            InputError: the set-up needs data of a kind and none are named.
+        """
+        wanted = {"real": ("real",), "synthetic": ("synthetic",)}.get(self.set_up, ("synthetic", "real"))
+        found = {"real": self.data.real, "synthetic": self.data.synthetic}
+        for domain in wanted:
+            if not found[domain]:
+                raise InputError(f"data.{domain}", [], f"must name training data, which the set-up {self.set_up} needs")
+        return {domain: found[domain] for domain in wanted}
+
+
+def class_shares(tiles: Sequence[Tile], classes: int) -> NDArray[np.float64]:
+    """Return the share of the labelled points that each class has (C,).
+
+    Raises:
+        InputError: no point has a label.
+    """
+    counts = np.sum([tile.class_counts(classes) for tile in tiles], axis=0) if tiles else np.zeros(classes)
+    if not counts.sum():
+        raise InputError("training data", 0, "hold no labelled point")
+    return np.asarray(counts / counts.sum(), dtype=np.float64)
+
+
+def class_weights(shares: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the weights of the loss (C,): 1 / (f + 0.02), scaled to the mean 1."""
+    weights = 1.0 / (shares + 0.02)
+    return np.asarray(weights / weights.mean(), dtype=np.float64)
+
+
+def mapped_intensities(synthetic: Sequence[Tile], real: Sequence[Tile]) -> list[Tile]:
+    """Return synthetic tiles whose intensities are distributed as those of the real ones, quantile on quantile.
+
+    Both are training data: nothing of a test is looked at.
+
+    Raises:
+        InputError: one of them has no intensities.
+    """
+    from dataclasses import replace
+
+    have, want = _histogram(synthetic, "data.synthetic"), _histogram(real, "data.real")
+    mapping = QuantileMap(have, want)
+    return [
+        replace(tile, strength=(mapping.map(_levels(tile)) / FULL).astype(np.float32))
+        if tile.strength is not None
+        else tile
+        for tile in synthetic
+    ]
+
+
+def _levels(tile: Tile) -> NDArray[np.intp]:
+    assert tile.strength is not None
+    return np.rint(np.clip(tile.strength, 0.0, 1.0) * FULL).astype(np.intp)
+
+
+def _histogram(tiles: Sequence[Tile], where: str) -> NDArray[np.int64]:
+    counts = np.zeros(LEVELS, dtype=np.int64)
+    for tile in tiles:
+        if tile.strength is not None:
+            counts += np.bincount(_levels(tile), minlength=LEVELS)
+    if not counts.sum():
+        raise InputError(where, 0, "has no intensities, which a mapping of intensities needs")
+    return counts
+
+
+def plan(domains: Sequence[int], per_tile: int, synthetic_share: float | None, seed: int, epoch: int) -> list[Draw]:
+    """Return the crops of an epoch, shuffled.
+
+    Args:
+        domains: number of tiles of each domain, the synthetic one first where there are two.
+        per_tile: crops of a tile; all tiles' together are the epoch's.
+        synthetic_share: share of the first domain's crops; None for ``per_tile`` crops of every tile.
+        seed, epoch: of the order, and of which tiles have one crop more where the share leaves a rest.
+    """
+    total = per_tile * sum(domains)
+    random = stream(seed, "plan", epoch)
+    if synthetic_share is None or len(domains) < 2:
+        counts = [per_tile * tiles for tiles in domains]
+    else:
+        first = min(max(round(total * synthetic_share), 1), total - 1)
+        counts = [first, total - first]
+    draws: list[Draw] = []
+    begin = 0
+    for tiles, count in zip(domains, counts, strict=True):
+        order = random.permutation(tiles)
+        draws += [Draw(begin + int(order[k % tiles]), k // tiles) for k in range(count)]
+        begin += tiles
+    return [draws[place] for place in random.permutation(len(draws))]

@@ -1,0 +1,116 @@
+"""Segmentation as one of the learning tasks: train, evaluate, predict."""
+
+from __future__ import annotations
+
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+from ml.configuration import Configuration
+from ml.fitting import chosen_device
+from ml.runs import Run
+from ml.tasks import Evaluation, Prediction
+from synthroads_addon.core.cloud.reading import open_cloud
+from synthroads_addon.core.cloud.writing import ENDINGS
+from synthroads_addon.core.errors import InputError
+from synthroads_addon.core.files import write_file
+from synthroads_addon.core.progress import Progress, peak_memory_mb, silent
+
+from .evaluation import classifier, score, trained_model
+from .pictures import comparison
+from .prediction import Labelling, predict_file
+from .recipes import SegmentationConfiguration
+from .sources import Source
+from .training import trained
+
+_ONE_TILE = 5_000_000
+"""Points of a cloud up to which it is scored as one tile."""
+SegmentationRun = Run[SegmentationConfiguration]
+
+
+def configuration_kind() -> type[Configuration]:
+    """Return the class of the configurations."""
+    return SegmentationConfiguration
+
+
+def train(run: SegmentationRun, progress: Progress = silent) -> dict[str, Any]:
+    """Train a run, score it on its configuration's tests and return the metrics.
+
+    Raises:
+        InputError: data are missing, or don't fit the configuration.
+    """
+    configuration = run.configuration
+    model, domains = trained(run, progress)
+    device = next(model.parameters()).device
+    tests = {
+        name: score(model, configuration, sources, device, progress)[0].to_dict()
+        for name, sources in configuration.data.tests.items()
+    }
+    metrics = {
+        **{f"{name}_mean_iou": result["mean_iou"] for name, result in tests.items()},
+        "parameters": sum(weight.numel() for weight in model.parameters()),
+        "training_points": {name: sum(map(len, tiles)) for name, tiles in domains.items()},
+        "training_tiles": {name: len(tiles) for name, tiles in domains.items()},
+        "device": str(device),
+        "peak_memory_mb": peak_memory_mb(),
+        "tests": tests,
+    }
+    run.write_metrics(metrics)
+    return metrics
+
+
+def evaluate(run: SegmentationRun, evaluation: Evaluation, progress: Progress = silent) -> dict[str, Any]:
+    """Score a trained run on labelled data, each by itself; write tables and pictures.
+
+    Raises:
+        InputError: a cloud has no labels and there is no mapping, or its classes don't fit.
+        OutputError: the folder can't be written.
+    """
+    configuration = run.configuration
+    device = chosen_device(configuration)
+    model = trained_model(run, device)
+    results: dict[str, Any] = {}
+    for path in evaluation.data:
+        source = _test_source(path, evaluation)
+        confusion, shown = score(model, configuration, [source], device, progress)
+        name = path.stem if path.is_file() else f"{path.name}-{evaluation.split}"
+        write_file(evaluation.output / f"{name}.txt", (confusion.to_text() + "\n").encode(), overwrite=True)
+        if shown is not None:
+            tile, labels = shown
+            names = source.targets(configuration.scheme())
+            write_file(evaluation.output / f"{name}.png", comparison(tile, labels, names), overwrite=True)
+        results[name] = confusion.to_dict()
+    means = {f"{name}_mean_iou": result["mean_iou"] for name, result in results.items()}
+    return {**means, "tests": results}
+
+
+def _test_source(path: Path, evaluation: Evaluation) -> Source:
+    """Return a test's source; a cloud that memory holds with ease is one tile, as tiles' edges see less around them."""
+    if path.is_dir():
+        return Source(path=str(path), split=evaluation.split, mapping=evaluation.mapping)
+    tile = 60.0
+    if path.suffix.lower() in ENDINGS and path.is_file():
+        with suppress(InputError), open_cloud(path) as cloud:  # a packed file is no cloud
+            tile = 1000.0 if cloud.header.count <= _ONE_TILE else tile
+    return Source(path=str(path), mapping=evaluation.mapping, tile=tile)
+
+
+def predict(run: SegmentationRun, prediction: Prediction, progress: Progress = silent) -> dict[str, Any]:
+    """Label the points of a LAS or LAZ file; see `prediction.predict_file`."""
+    configuration = run.configuration
+    device = chosen_device(configuration)
+    labelling = Labelling(
+        classifier(trained_model(run, device), configuration, device),
+        configuration.crop_settings(),
+        configuration.scheme(),
+        configuration.intensity,
+    )
+    result = predict_file(
+        prediction.cloud,
+        prediction.output,
+        labelling,
+        classification=prediction.classification,
+        overwrite=prediction.overwrite,
+        progress=progress,
+    )
+    return {**result, "peak_memory_mb": peak_memory_mb()}

@@ -1,0 +1,147 @@
+"""How a network is trained: what it sees, what is minimised, and the two parts of fine-tuning."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+import torch
+from torch import Tensor, nn
+from torch.nn import functional
+
+from ml.fitting import Figures, chosen_device, fit
+from ml.runs import Run
+from synthroads_addon.core.errors import InputError, OutputError
+from synthroads_addon.core.progress import Progress, silent
+
+from .classes import class_names
+from .crops import Item, Seeds
+from .evaluation import classifier
+from .loading import epoch_batches, read_domains, thinned
+from .metrics import IGNORED, Confusion, mean
+from .network import build, scores_of
+from .recipes import SegmentationConfiguration, class_shares, class_weights
+from .scoring import label_tile
+from .tiles import Tile, scalings
+
+PRETRAINING = "pretraining"
+"""Folder, within that of a fine-tuned run, of what it began with."""
+
+Domains = dict[str, list[Tile]]
+
+
+def trained(run: Run[SegmentationConfiguration], progress: Progress = silent) -> tuple[nn.Module, Domains]:
+    """Train a run; return the network with its last weights, and what it was trained on.
+
+    Raises:
+        InputError: data are missing, or don't fit the configuration.
+    """
+    configuration = run.configuration
+    device = chosen_device(configuration)
+    domains = read_domains(configuration)
+    validation = [tile for source in configuration.data.validation for tile in thinned(source, configuration)]
+    torch.manual_seed(configuration.seed)
+    model = build(configuration).to(device)
+    if configuration.set_up == "fine_tuned":
+        _fit(model, _pretraining(run), {"synthetic": domains["synthetic"]}, validation, progress)
+        second = configuration.model_copy(update={"schedule": configuration.fine_tuning})
+        _fit(model, replace(run, configuration=second), {"real": domains["real"]}, validation, progress)
+    else:
+        _fit(model, run, domains, validation, progress)
+    return model.eval(), domains
+
+
+def _pretraining(run: Run[SegmentationConfiguration]) -> Run[SegmentationConfiguration]:
+    """Return the run of the first part of fine-tuning, begun or to be gone on with."""
+    configuration = run.configuration.model_copy(update={"set_up": "synthetic"})
+    folder = run.folder / PRETRAINING
+    try:
+        return Run.start(folder, configuration, resume=True)
+    except OutputError:
+        raise
+    except InputError:  # of an earlier run with other settings, which was to be overwritten
+        return Run.start(folder, configuration, overwrite=True)
+
+
+def _fit(
+    model: nn.Module,
+    run: Run[SegmentationConfiguration],
+    domains: Domains,
+    validation: list[Tile],
+    progress: Progress,
+) -> None:
+    """Train on given domains by the run's schedule; afterwards the model has the run's last weights."""
+    configuration = run.configuration
+    tiles = [tile for found in domains.values() for tile in found]
+    device = next(model.parameters()).device
+    classes = len(class_names(configuration.scheme()))
+    shares = class_shares(tiles, classes)
+    weights = class_weights(shares) if configuration.class_weights else np.ones_like(shares)
+    batches = partial(
+        epoch_batches,
+        configuration,
+        tiles,
+        [len(found) for found in domains.values()],
+        scalings(tiles, configuration.intensity),
+        Seeds(tiles, classes, configuration.balanced),
+        device,
+    )
+    fit(
+        model,
+        run,
+        batches,
+        math.ceil(configuration.crops_per_tile * len(tiles) / configuration.batch),
+        _loss(configuration, torch.from_numpy(weights.astype(np.float32)).to(device)),
+        validate=_validation(configuration, validation, device) if validation else None,
+        progress=progress,
+    )
+
+
+def smoothed_loss(scores: Tensor, truth: Tensor, weights: Tensor, smoothing: float) -> Tensor:
+    """Return the cross-entropy with smoothed labels, a mean weighed by each point's own class; 0 without any label.
+
+    The share ``smoothing`` of a label goes to all classes alike. (PyTorch's own weights weigh these shares too: with
+    weights as far apart as a road's, the best answer to a point of a frequent class would then be a rare one.)
+
+    Args:
+        scores: (N, C).
+        truth: (N,) int64 classes, or `IGNORED`.
+        weights: (C,).
+        smoothing: from 0 to below 1.
+    """
+    known = truth != IGNORED
+    losses = functional.cross_entropy(scores[known], truth[known], reduction="none", label_smoothing=smoothing)
+    weight = weights[truth[known]]
+    return (losses * weight).sum() / weight.sum().clamp_min(1e-12)
+
+
+def _loss(
+    configuration: SegmentationConfiguration, weights: Tensor
+) -> Callable[[nn.Module, Item], tuple[Tensor, Figures]]:
+    def loss(model: nn.Module, batch: Item) -> tuple[Tensor, Figures]:
+        scores, truth = scores_of(model, batch), batch["segment"]
+        value = smoothed_loss(scores, truth, weights, configuration.label_smoothing)
+        known = truth != IGNORED
+        right = (scores.detach().argmax(dim=1) == truth) & known
+        return value, {"accuracy": float(right.sum() / known.sum().clamp_min(1))}
+
+    return loss
+
+
+def _validation(
+    configuration: SegmentationConfiguration, tiles: list[Tile], device: torch.device
+) -> Callable[[nn.Module, int], Figures]:
+    scaling = scalings(tiles, configuration.intensity)
+
+    def validate(model: nn.Module, epoch: int) -> Figures:
+        confusion = Confusion(class_names(configuration.scheme()))
+        scores = classifier(model, configuration, device)
+        for tile in tiles:
+            labels = label_tile(tile, scaling[tile.scene], scores, configuration.crop_settings())
+            confusion.add(tile.segment, labels)
+        return {"validation_mean_iou": mean(confusion.iou)}
+
+    return validate

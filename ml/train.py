@@ -1,0 +1,46 @@
+"""Train a model: PointNeXt for segmentation, or one of the centreline models, as a configuration says."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+
+if __name__ == "__main__":
+    sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
+from headless.cli import Outcome, add_common_arguments, entry, progress_bar
+from ml.configuration import load_configuration, shipped_names
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments of `synthroads train`."""
+    known = ", ".join(shipped_names())
+    parser.add_argument("configuration", metavar="CONFIGURATION", help=f"YAML file, or one of {known}")
+    parser.add_argument("--output", required=True, type=Path, metavar="DIR", help="folder for the run")
+    parser.add_argument("--resume", action="store_true", help="go on with an interrupted training")
+    parser.add_argument("--overwrite", action="store_true", help="begin anew in a folder that holds a run")
+    text = "change one field of the configuration, e.g. seed=2 (can be repeated)"
+    parser.add_argument("--set", action="append", default=[], metavar="PATH=VALUE", dest="changes", help=text)
+    add_common_arguments(parser)
+
+
+def run(arguments: argparse.Namespace) -> Outcome:
+    """Run `synthroads train`."""
+    from ml.runs import Run
+    from ml.tasks import kinds, task
+
+    configuration = load_configuration(arguments.configuration, kinds(), arguments.changes)
+    begun = Run.start(arguments.output, configuration, resume=arguments.resume, overwrite=arguments.overwrite)
+    metrics = task(configuration.task).train(begun, progress_bar(arguments))
+    return 0, metrics, f"trained {arguments.output}: {summary(metrics)}"
+
+
+def summary(metrics: dict[str, object]) -> str:
+    """Return the plain numbers of some metrics as one line of text."""
+    numbers = {name: value for name, value in metrics.items() if isinstance(value, (int, float))}
+    return ", ".join(f"{name} {value:.4g}" for name, value in numbers.items())
+
+
+if __name__ == "__main__":
+    entry("train")

@@ -1,0 +1,302 @@
+"""Effects on sequences of slices: what they do, and that the truth goes along."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from ml.centerline.corridor import CORRIDOR
+from ml.centerline.effects import (
+    Crop,
+    Effects,
+    Stretch,
+    crop_sides,
+    drop,
+    leave_out,
+    mirror,
+    move,
+    relight,
+    transform,
+    turn_round,
+)
+from ml.centerline.frames import along, displaced
+from ml.centerline.slices import SliceSettings, stretch
+from synthroads_addon.core.errors import InputError
+from tests.ml.analytic_roads import roads
+
+NONE = Effects(
+    mirror=0.0,
+    turn_round=0.0,
+    crop=Crop(probability=0.0),
+    **dict.fromkeys(("dropout", "hidden", "empty", "jitter", "tilt", "contrast", "paint"), 0.0),
+    gamma=(1.0, 1.0),
+    **dict.fromkeys(("falloff", "speckle", "patches", "colorless", "tint"), 0.0),
+)
+SETTINGS = SliceSettings(points_per_slice=100_000, half_width=18.0)
+
+
+def rng(seed: int = 0) -> np.random.Generator:
+    return np.random.default_rng(seed)
+
+
+def cut(kind: str = "road", seed: int = 4) -> Stretch:
+    road = roads(kind)[0]  # type: ignore[arg-type]
+    assert road.truth is not None
+    frames = displaced(along(road.truth.axis), rng(seed), 12.0, 2.0, 100.0).select(slice(40, 50))
+    return stretch(road, frames, SETTINGS)
+
+
+def contents(one: Stretch) -> dict[str, np.ndarray]:
+    names = ("xyz", "number", "intensity", "rgb", "center", "corridor", "lines", "room")
+    return {name: getattr(one, name).copy() for name in names}
+
+
+def same(one: dict[str, np.ndarray], other: dict[str, np.ndarray]) -> None:
+    for name, values in one.items():
+        np.testing.assert_allclose(values, other[name], atol=1e-9, err_msg=name)
+
+
+def test_effects_of_no_strength_change_nothing() -> None:
+    one = cut()
+    before = contents(one)
+    leave_out(one, NONE, rng(), False)
+    transform(one, NONE, rng())
+    # A power of 1 is left, and intensities as a share of the largest.
+    after = contents(one)
+    np.testing.assert_allclose(after["intensity"] * np.max(before["intensity"]), before["intensity"], rtol=1e-9)
+    del before["intensity"], after["intensity"]
+    same(before, after)
+
+
+@pytest.mark.parametrize("effect", [mirror, turn_round])
+def test_mirror_and_turn_are_their_own_inverse(effect: object) -> None:
+    one = cut("carriageway")
+    before, direction = contents(one), one.frames.direction.copy()
+    effect(one)  # type: ignore[operator]
+    assert not np.allclose(one.center, before["center"])
+    effect(one)  # type: ignore[operator]
+    after = contents(one)
+    np.testing.assert_allclose(np.cos(one.frames.direction - direction), 1.0)
+    for name in ("center", "corridor", "lines", "room"):
+        np.testing.assert_allclose(after[name], before[name], atol=1e-9)
+    order = [np.lexsort((values["xyz"][:, 1], values["number"])) for values in (before, after)]
+    np.testing.assert_allclose(after["xyz"][order[1]], before["xyz"][order[0]], atol=1e-9)
+
+
+def test_edges_stay_left_and_right() -> None:
+    left, right = CORRIDOR.index("left_edge"), CORRIDOR.index("right_edge")
+    for effect in (mirror, turn_round):
+        one = cut()
+        width = one.corridor[:, left] - one.corridor[:, right]
+        effect(one)
+        turned = one.corridor[:, left] - one.corridor[:, right]
+        np.testing.assert_allclose(np.sort(turned), np.sort(width), atol=1e-9)
+        paved = one.xyz[one.paved, 1]
+        number = one.number[one.paved]
+        assert (paved <= one.corridor[number, left] + 0.15).all()
+        assert (paved >= one.corridor[number, right] - 0.15).all()
+
+
+def extents(one: Stretch) -> tuple[np.ndarray, np.ndarray]:
+    y = one.xyz[:, 1] - one.center[one.number]
+    left, right = np.zeros(10), np.zeros(10)
+    np.maximum.at(left, one.number, y)
+    np.maximum.at(right, one.number, -y)
+    return left, right
+
+
+def test_cropped_sides_lie_in_their_limits_about_the_truth() -> None:
+    crop = Crop(probability=1.0, reach=(6.0, 10.0), share=0.5, steady=0.0)
+    lefts, rights = [], []
+    for seed in range(60):
+        one = cut()
+        crop_sides(one, crop, rng(seed), False)
+        left, right = extents(one)
+        assert max(left.max(), right.max()) <= 10.0
+        assert min(left.min(), right.min()) > 0.5 * 6.0 - 0.6
+        lefts.append(left)
+        rights.append(right)
+    # Sides by themselves: of the strip as of the slice.
+    assert abs(np.corrcoef(np.mean(lefts, axis=1), np.mean(rights, axis=1))[0, 1]) < 0.4
+    assert np.std(lefts, axis=1).min() > 0.5
+    middle = (np.array(lefts) - np.array(rights)).ravel() / 2.0
+    assert middle.std() > 0.8
+
+
+def test_steady_cuts_are_the_same_in_all_slices() -> None:
+    one = cut()
+    crop_sides(one, Crop(probability=1.0, reach=(6.0, 10.0), share=0.5, steady=1.0), rng(1), False)
+    left, right = extents(one)
+    assert np.ptp(left) < 0.8
+    assert np.ptp(right) < 0.8
+
+
+def test_a_carriageway_is_cut_outside_its_edge_lines() -> None:
+    for share, least in ((0.0, 3.4), (0.75, 0.5)):
+        one = cut("carriageway")
+        assert np.isfinite(one.lines).all()
+        crop_sides(one, Crop(probability=1.0, beyond=(0.0, 3.0), share=share), rng(2), True)
+        for side, reach in enumerate(extents(one)):
+            assert reach.max() <= min(one.lines[0, side] + 3.0, one.room[:, side].max()) + 1e-9
+            assert reach.min() > least
+    narrow = cut("carriageway")
+    narrow.room[:] = 1.5
+    crop_sides(narrow, Crop(probability=0.0), rng(2), True)
+    assert max(reach.max() for reach in extents(narrow)) <= 1.5
+    untouched = cut("carriageway")
+    crop_sides(untouched, Crop(probability=0.0, beyond=(1.0, 1.0)), rng(2), True)
+    assert extents(untouched)[0].max() <= untouched.lines[0, 0] + 1.0
+
+
+def test_a_slice_without_truth_is_cropped_all_the_same() -> None:
+    one = cut()
+    one.center[3] = np.nan
+    crop_sides(one, Crop(probability=1.0, reach=(5.0, 5.0), share=0.0), rng(), False)
+    assert np.abs(one.xyz[one.number == 3, 1]).max() <= 5.0
+    assert (one.number == 3).sum() > 20
+
+
+def test_dropout_holes_and_empty_slices() -> None:
+    whole = len(cut().number)
+    left = []
+    for seed in range(40):
+        one = cut()
+        drop(one, NONE.model_copy(update={"dropout": 0.5}), rng(seed))
+        left.append(len(one.number) / whole)
+        assert (np.diff(one.number) >= 0).all()
+    assert min(left) > 0.45
+    assert max(left) > 0.9
+    one = cut()
+    drop(one, NONE.model_copy(update={"empty": 1.0}), rng())
+    assert len(one.number) == 0
+    one = cut()
+    drop(one, NONE.model_copy(update={"hidden": 1.0}), rng(3))
+    assert 0.5 * whole < len(one.number) < whole - 20
+
+
+def test_tilt_carries_the_height_along() -> None:
+    one = cut()
+    height = CORRIDOR.index("height")
+    before = one.corridor[:, height].copy()
+    z = one.xyz[:, 2].copy()
+    move(one, NONE.model_copy(update={"tilt": 0.1}), rng(1))
+    # The plane that was added, found from the points, says what the centreline's height must be.
+    along_road = one.xyz[:, 0] + one.number
+    design = np.column_stack([along_road, one.xyz[:, 1], np.ones(len(z))])
+    grade, cross, zero = np.linalg.lstsq(design, one.xyz[:, 2] - z, rcond=None)[0]
+    assert abs(grade) > 0.001
+    assert abs(cross) > 0.001
+    np.testing.assert_allclose(one.corridor[:, height] - before, grade * np.arange(10) + cross * one.center + zero)
+
+
+def test_jitter() -> None:
+    one = cut()
+    before = one.xyz.copy()
+    move(one, NONE.model_copy(update={"jitter": 0.05}), rng(1))
+    assert 0.001 < (one.xyz - before).std() < 0.05
+
+
+def relit(name: str, strength: object, seed: int) -> tuple[Stretch, np.ndarray]:
+    """Return a sequence after one effect on its intensities, and the logarithm of the factors on them."""
+    one = cut()
+    plain = one.intensity.copy()
+    relight(one, NONE.model_copy(update={name: strength}), rng(seed))
+    assert (one.intensity > 0.0).all()
+    return one, np.log(one.intensity / plain)
+
+
+def test_a_power_keeps_the_order_of_intensities() -> None:
+    spreads = []
+    for seed in range(8):
+        one, _ = relit("gamma", (0.2, 2.0), seed)
+        assert (np.diff(one.intensity[np.argsort(cut().intensity)]) >= -1e-12).all()
+        spreads.append(np.ptp(np.log(one.intensity)) / np.ptp(np.log(cut().intensity)))
+    assert min(spreads) < 0.7
+    assert max(spreads) > 1.4
+
+
+def test_intensities_fall_off_to_the_sides() -> None:
+    falls = []
+    for seed in range(8):
+        one, logs = relit("falloff", 4.0, seed)
+        far, near = np.abs(one.xyz[:, 1]) > 14.0, np.abs(one.xyz[:, 1]) < 3.0
+        falls.append(logs[far].mean() - logs[near].mean())
+    assert max(falls) < 0.0
+    assert min(falls) < -0.25
+
+
+def test_contrast_of_the_pavement_to_what_lies_beside_it() -> None:
+    steps = []
+    for seed in range(8):
+        one, logs = relit("contrast", 1.0, seed)
+        assert np.ptp(logs[one.paved]) < 1e-9
+        assert np.ptp(logs[~one.paved]) < 1e-9
+        steps.append(logs[~one.paved][0] - logs[one.paved][0])
+    assert min(steps) < -0.2
+    assert max(steps) > 0.2
+
+
+def test_worn_markings_are_darker_but_never_than_the_pavement() -> None:
+    ratios = []
+    for seed in range(8):
+        one, _ = relit("paint", 1.0, seed)
+        assert one.marked.sum() > 20
+        bare = np.median(one.intensity[one.paved & ~one.marked])
+        ratios.append(np.median(one.intensity[one.marked]) / bare)
+    assert min(ratios) >= 1.0
+    assert min(ratios) < 4.0
+    assert max(ratios) > 7.0
+
+
+@pytest.mark.parametrize("name", ["speckle", "patches"])
+def test_patches_are_smooth_and_speckle_is_not(name: str) -> None:
+    one, logs = max((relit(name, 0.5, seed) for seed in range(8)), key=lambda found: found[1].std())
+    assert 0.1 < logs.std() < 0.8
+    third = one.number == 3
+    steps = np.abs(np.diff(logs[third][np.argsort(one.xyz[third, 1])])).mean()
+    assert steps < 0.7 * logs.std() if name == "patches" else steps > 0.9 * logs.std()
+
+
+def test_colours() -> None:
+    one = cut()
+    relight(one, NONE.model_copy(update={"colorless": 1.0}), rng())
+    assert not one.has_color
+    one = cut()
+    before = one.rgb.copy()
+    relight(one, NONE.model_copy(update={"tint": 0.5}), rng(2))
+    assert one.has_color
+    assert one.rgb.min() >= 0.0
+    assert one.rgb.max() <= 1.0
+    factor = (one.rgb / before)[one.rgb.max(axis=1) < 1.0]
+    np.testing.assert_allclose(factor.std(axis=0), 0.0, atol=1e-9)
+    assert factor.mean(axis=0).std() > 0.01
+
+
+def test_points_without_intensity_stay_without() -> None:
+    one = cut()
+    one.intensity[:] = 0.0
+    relight(one, Effects(), rng())
+    assert (one.intensity == 0.0).all()
+
+
+def test_a_sequence_without_points_passes_through() -> None:
+    one = cut()
+    one.keep(np.zeros(len(one.number), dtype=bool))
+    for seed in range(5):
+        copy = replace(one)
+        leave_out(copy, Effects(hidden=1.0), rng(seed), False)
+        transform(copy, Effects(), rng(seed))
+        assert len(copy.xyz) == 0
+
+
+def test_wrong_limits_are_refused() -> None:
+    with pytest.raises(InputError, match="reach must be two ascending numbers"):
+        Effects.from_dict({"crop": {"reach": [9.0, 4.0]}}, "effects")
+    with pytest.raises(InputError, match="gamma must be two ascending"):
+        Effects.from_dict({"gamma": [1.0, 0.0]}, "effects")
+    with pytest.raises(InputError, match="dropout"):
+        Effects.from_dict({"dropout": 1.0}, "effects")
+    with pytest.raises(InputError, match="mirrored"):
+        Effects.from_dict({"mirrored": 1.0}, "effects")

@@ -1,0 +1,148 @@
+"""Configurations, runs and the training loop."""
+
+import json
+import math
+from collections.abc import Iterator
+from itertools import pairwise
+from pathlib import Path
+
+import pytest
+import torch
+from torch import Tensor, nn
+
+from ml.configuration import Configuration, Schedule, load_configuration
+from ml.fitting import fit, learning_rate
+from ml.runs import CHECKPOINT, CURVES, METRICS, Run, torch_stream
+from synthroads_addon.core.errors import InputError, MissingFileError, OutputError
+
+STEPS = 5
+
+
+def configuration(epochs: int = 6, seed: int = 3) -> Configuration:
+    return Configuration(task="toy", seed=seed, threads=1, schedule=Schedule(epochs=epochs, learning_rate=0.05))
+
+
+def network() -> nn.Module:
+    torch.manual_seed(0)
+    return nn.Sequential(nn.Linear(3, 8), nn.Dropout(0.3), nn.ReLU(), nn.Linear(8, 1))
+
+
+def batches(epoch: int) -> Iterator[Tensor]:
+    generator = torch_stream(7, "toy", epoch)
+    for _ in range(STEPS):
+        yield torch.randn(16, 3, generator=generator)
+
+
+def loss(model: nn.Module, batch: Tensor) -> tuple[Tensor, dict[str, float]]:
+    error = model(batch)[:, 0] - batch.sum(dim=1)
+    return (error**2).mean(), {"mae": float(error.detach().abs().mean())}
+
+
+def train(folder: Path, *, stop_after: int | None = None, resume: bool = False, seed: int = 3) -> nn.Module:
+    """Train the toy; ``stop_after`` epochs an interrupt comes in the middle of the next."""
+    model = network()
+    run = Run.start(folder, configuration(seed=seed), resume=resume)
+
+    def interrupted(epoch: int) -> Iterator[Tensor]:
+        for step, batch in enumerate(batches(epoch)):
+            if stop_after is not None and epoch == stop_after and step == 2:
+                raise KeyboardInterrupt
+            yield batch
+
+    fit(model, run, interrupted, STEPS, loss)
+    run.write_metrics({"done": 1, "undefined": math.nan})
+    return model
+
+
+def weights(model: nn.Module) -> Tensor:
+    return torch.cat([weight.detach().ravel() for weight in model.parameters()])
+
+
+def test_training_learns_and_writes_its_files(tmp_path: Path) -> None:
+    train(tmp_path / "run")
+    history = json.loads((tmp_path / "run/history.json").read_text())
+    assert [epoch["epoch"] for epoch in history] == list(range(1, 7))
+    assert history[-1]["loss"] < 0.7 * history[0]["loss"]
+    assert history[-1]["learning_rate"] == pytest.approx(1e-5)
+    assert json.loads((tmp_path / "run" / METRICS).read_text()) == {"done": 1, "undefined": None}
+    assert (tmp_path / "run" / CURVES).read_bytes().startswith(b"\x89PNG")
+
+
+def test_interrupted_training_ends_with_the_same_weights(tmp_path: Path) -> None:
+    whole = weights(train(tmp_path / "whole"))
+    assert torch.equal(whole, weights(train(tmp_path / "again")))
+    assert not torch.equal(whole, weights(train(tmp_path / "other", seed=4)))
+    with pytest.raises(KeyboardInterrupt):
+        train(tmp_path / "parts", stop_after=3)
+    assert torch.equal(whole, weights(train(tmp_path / "parts", resume=True)))
+    first, second = (json.loads((tmp_path / name / "history.json").read_text()) for name in ("whole", "parts"))
+    for epoch in (*first, *second):
+        del epoch["seconds"]
+    assert first == second
+
+
+def test_a_run_is_not_lost_by_mistake(tmp_path: Path) -> None:
+    train(tmp_path)
+    with pytest.raises(OutputError, match="holds a run already"):
+        Run.start(tmp_path, configuration())
+    with pytest.raises(InputError, match="seed"):
+        Run.start(tmp_path, configuration(seed=9), resume=True)
+    Run.start(tmp_path, configuration().model_copy(update={"threads": 2}), resume=True)
+    assert (tmp_path / CHECKPOINT).exists()
+    Run.start(tmp_path, configuration(seed=9), overwrite=True)
+    assert not (tmp_path / CHECKPOINT).exists()
+
+
+def test_a_finished_run_opens(tmp_path: Path) -> None:
+    train(tmp_path)
+    run = Run.open(tmp_path, {"toy": Configuration})
+    assert run.configuration == configuration()
+    assert len(run.history) == 6
+    with pytest.raises(MissingFileError, match="holds no trained run"):
+        Run.open(tmp_path / "nowhere", {"toy": Configuration})
+    (tmp_path / CHECKPOINT).write_bytes(b"PK\x03\x04 torn")
+    with pytest.raises(InputError, match="damaged"):
+        run.saved()
+
+
+def test_a_loss_that_is_not_finite_ends_the_training(tmp_path: Path) -> None:
+    run = Run.start(tmp_path, configuration())
+    with pytest.raises(InputError, match=r"schedule\.learning_rate"):
+        fit(network(), run, batches, STEPS, lambda model, batch: (loss(model, batch)[0] * math.nan, {}))
+    assert not (tmp_path / CHECKPOINT).exists()
+
+
+def test_the_rate_rises_then_falls() -> None:
+    schedule = Schedule(learning_rate=1.0, final_learning_rate=0.1, warmup=0.25)
+    rates = [learning_rate(schedule, step, 100) for step in range(100)]
+    assert rates[0] == pytest.approx(1 / 26)
+    assert max(rates) == pytest.approx(1.0) == rates[25]
+    assert rates[-1] == pytest.approx(0.1)
+    assert all(before > after for before, after in pairwise(rates[25:]))
+
+
+@pytest.mark.parametrize(
+    ("text", "complaint"),
+    [
+        ("task: toi", "must be one of toy"),
+        ("- 1", "must be one of toy"),
+        ("{task: toy, sede: 3}", r"unknown key 'sede' \(did you mean 'seed'"),
+        ("{task: toy, schedule: {epochs: 0}}", r"schedule\.epochs is 0"),
+        ("{task: toy, schedule: {learning_rate: 1e-9}}", "final_learning_rate must not exceed"),
+        ("task: [", "must be valid YAML"),
+    ],
+)
+def test_wrong_configurations_are_refused(tmp_path: Path, text: str, complaint: str) -> None:
+    path = tmp_path / "wrong.yaml"
+    path.write_text(text)
+    with pytest.raises(InputError, match=complaint):
+        load_configuration(str(path), {"toy": Configuration})
+
+
+def test_changes_reach_the_configuration(tmp_path: Path) -> None:
+    path = tmp_path / "mine.yaml"
+    path.write_text("{task: toy, schedule: {epochs: 4}}")
+    loaded = load_configuration(str(path), {"toy": Configuration}, ["schedule.learning_rate=0.5", "seed=8"])
+    assert (loaded.schedule.epochs, loaded.schedule.learning_rate, loaded.seed) == (4, 0.5, 8)
+    with pytest.raises(InputError, match="one of"):
+        load_configuration("no-such", {"toy": Configuration})

@@ -1,0 +1,106 @@
+"""Scores against explicit counting, and against scikit-learn where it is installed."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+from ml.segmentation.metrics import IGNORED, Confusion, mean, mean_and_deviation
+from synthroads_addon.core.errors import InputError
+
+NAMES = tuple("abcdef")
+
+
+def random_labels(seed: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return truth without class 4 and predictions without class 3; class 5 occurs in neither; some are ignored."""
+    random = np.random.default_rng(seed)
+    truth = random.choice([0, 1, 2, 3, IGNORED], 3000, p=[0.5, 0.2, 0.1, 0.1, 0.1])
+    return truth, random.choice([0, 1, 2, 4], 3000)
+
+
+def counted(truth: np.ndarray, predicted: np.ndarray, label: int) -> tuple[float, float, float]:
+    """Return precision, recall and IoU of one class by counting sets of points."""
+    known = truth != IGNORED
+    true = set(np.flatnonzero(known & (truth == label)))
+    found = set(np.flatnonzero(known & (predicted == label)))
+
+    def share(whole: int) -> float:
+        return len(true & found) / whole if whole else float("nan")
+
+    return share(len(found)), share(len(true)), share(len(true | found))
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_scores_are_those_of_counting(seed: int) -> None:
+    truth, predicted = random_labels(seed)
+    confusion = Confusion(NAMES)
+    for part in np.array_split(np.arange(len(truth)), 7):  # one matrix, summed over parts
+        confusion.add(truth[part], predicted[part])
+    want = np.array([counted(truth, predicted, label) for label in range(len(NAMES))])
+    found = np.stack([confusion.precision, confusion.recall, confusion.iou], axis=1)
+    np.testing.assert_allclose(found, want, rtol=1e-12)
+    assert confusion.support.tolist() == [int((truth == label).sum()) for label in range(len(NAMES))]
+    assert confusion.ignored == int((truth == IGNORED).sum())
+
+
+def test_undefined_scores_are_nan_and_left_out_of_means() -> None:
+    truth, predicted = random_labels(4)
+    confusion = Confusion(NAMES)
+    confusion.add(truth, predicted)
+    assert np.isnan(confusion.precision).tolist() == [False, False, False, True, False, True]  # 3, 5 never predicted
+    assert np.isnan(confusion.recall).tolist() == [False, False, False, False, True, True]  # 4, 5 don't occur
+    assert np.isnan(confusion.iou).tolist() == [False, False, False, False, False, True]  # 5 neither
+    assert confusion.iou[3] == 0.0
+    assert confusion.iou[4] == 0.0
+    assert confusion.to_dict()["mean_iou"] == pytest.approx(np.mean(confusion.iou[:5]))
+    assert "-" in confusion.to_text().splitlines()[6]
+
+
+def test_no_points_give_no_scores() -> None:
+    confusion = Confusion(("a", "b"))
+    confusion.add(np.array([IGNORED]), np.array([1]))
+    result = confusion.to_dict()
+    assert np.isnan(confusion.accuracy)
+    assert result["mean_iou"] is result["accuracy"] is result["classes"]["a"]["iou"] is None
+    json.dumps(result, allow_nan=False)
+    assert result["points"] == 0
+
+
+def test_wrong_labels_are_refused() -> None:
+    confusion = Confusion(("a", "b"))
+    with pytest.raises(InputError, match="0 to 1"):
+        confusion.add(np.array([2]), np.array([0]))
+    with pytest.raises(InputError, match="predicted is -1"):
+        confusion.add(np.array([0]), np.array([-1]))
+    with pytest.raises(InputError, match="shape"):
+        confusion.add(np.array([0]), np.array([0, 1]))
+
+
+def test_deviation_over_seeds_is_that_of_a_sample() -> None:
+    found = mean_and_deviation([1.0, 2.0, float("nan"), 4.0])
+    assert found == pytest.approx((7 / 3, np.std([1, 2, 4], ddof=1)))
+    assert np.isnan(mean_and_deviation([1.0])[1])
+    assert np.isnan(mean(np.array([np.nan])))
+
+
+@pytest.mark.parametrize("seed", [5, 6])
+def test_scores_are_those_of_scikit_learn(seed: int) -> None:
+    metrics = pytest.importorskip("sklearn.metrics")
+    truth, predicted = random_labels(seed)
+    known = truth != IGNORED
+    confusion = Confusion(NAMES)
+    confusion.add(truth, predicted)
+    labels = list(range(len(NAMES)))
+    matrix = metrics.confusion_matrix(truth[known], predicted[known], labels=labels)
+    assert (confusion.counts == matrix).all()
+    precision, recall, _, support = metrics.precision_recall_fscore_support(
+        truth[known], predicted[known], labels=labels, zero_division=np.nan
+    )
+    np.testing.assert_allclose(confusion.precision, precision)
+    np.testing.assert_allclose(confusion.recall, recall)
+    assert (confusion.support == support).all()
+    defined = ~np.isnan(confusion.iou)  # scikit-learn's IoU has no NaN for classes that occur nowhere
+    iou = metrics.jaccard_score(truth[known], predicted[known], labels=labels, average=None, zero_division=0)
+    np.testing.assert_allclose(confusion.iou[defined], iou[defined])

@@ -1,0 +1,328 @@
+"""Training, testing and predicting from end to end, on toy roads and with a narrow network."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import laspy
+import numpy as np
+import pytest
+import torch
+
+from ml import evaluate as evaluate_command
+from ml import predict as predict_command
+from ml import train as train_command
+from ml.configuration import load_configuration
+from ml.runs import Run
+from ml.segmentation import experiment as experiments
+from ml.segmentation import task
+from ml.segmentation.crops import Item, Seeds
+from ml.segmentation.experiment import configurations, load_experiment, table
+from ml.segmentation.loading import epoch_batches, read_domains
+from ml.segmentation.metrics import IGNORED
+from ml.segmentation.network import build
+from ml.segmentation.recipes import SegmentationConfiguration
+from ml.segmentation.tiles import scalings
+from ml.segmentation.training import PRETRAINING, smoothed_loss
+from ml.tasks import kinds
+from synthroads_addon.core.errors import InputError
+from tests.ml.segmentation_data import road_block, road_tile, write_cloud, write_pointcept
+
+torch.set_num_threads(1)
+
+
+@pytest.fixture(autouse=True)
+def _only_this_task(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Leave the other tasks' packages out of what is imported here."""
+    monkeypatch.setattr("ml.tasks.TASKS", {"segmentation": "ml.segmentation.task"})
+
+
+@pytest.fixture(scope="module")
+def data(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return a folder with two data sets of two tiles each, `synthetic` with darker intensities than `real`."""
+    folder = tmp_path_factory.mktemp("data")
+    for name, gain in (("real", 1.0), ("synthetic", 0.3)):
+        for split, seed in (("train", 1), ("test", 3)):
+            tiles = [road_tile(3000, seed + k, f"{name}{k}", gain) for k in range(2)]
+            write_pointcept(folder / name, split, tiles)
+    return folder
+
+
+def toy(data: Path, **changes: Any) -> SegmentationConfiguration:
+    """Return a configuration that is trained within a second or two."""
+    sources = {name: [{"path": str(data / name), "split": "train"}] for name in ("real", "synthetic")}
+    tests = {"unseen": [{"path": str(data / "real"), "split": "test"}]}
+    base = {
+        "task": "segmentation",
+        "threads": 1,
+        "device": "cpu",
+        "voxel": 0.3,
+        "crop_points": 800,
+        "crops_per_tile": 4,
+        "batch": 4,
+        "set_up": "real",
+        "network": {"preset": "S", "width": 8, "radius": 0.9, "neighbours": 8, "dropout": 0.1},
+        "schedule": {"epochs": 2},
+        "data": {**sources, "tests": tests},
+    }
+    return SegmentationConfiguration.from_dict({**base, **changes})
+
+
+def weights(folder: Path) -> dict[str, torch.Tensor]:
+    """Return the weights of a run."""
+    state: dict[str, torch.Tensor] = torch.load(folder / "checkpoint.pt", weights_only=True)["model"]
+    return state
+
+
+def same(one: dict[str, torch.Tensor], other: dict[str, torch.Tensor]) -> bool:
+    """Return whether all weights are the same to the bit."""
+    return all(torch.equal(one[name], other[name]) for name in one)
+
+
+def test_smoothed_loss_is_cross_entropy_weighed_by_the_points_own_classes() -> None:
+    random = torch.Generator().manual_seed(1)
+    scores = torch.randn(50, 3, generator=random)
+    truth = torch.randint(0, 3, (50,), generator=random)
+    truth[::7] = IGNORED
+    weight = torch.tensor([0.1, 0.5, 2.4])
+    plain = torch.nn.functional.cross_entropy(scores, truth, weight, ignore_index=IGNORED)
+    assert smoothed_loss(scores, truth, weight, 0.0) == pytest.approx(plain.item())
+    logs = scores.log_softmax(dim=1)
+    wanted, total = 0.0, 0.0
+    for row, label in zip(logs, truth.tolist(), strict=True):
+        if label != IGNORED:
+            wanted += weight[label].item() * (0.8 * -row[label].item() + 0.2 * -row.mean().item())
+            total += weight[label].item()
+    assert smoothed_loss(scores, truth, weight, 0.2).item() == pytest.approx(wanted / total, rel=1e-5)
+    nothing = smoothed_loss(scores.requires_grad_(), torch.full((50,), IGNORED), weight, 0.2)
+    assert nothing.item() == 0.0
+    nothing.backward()  # a batch without labels does no harm
+
+
+def test_best_answer_to_a_smoothed_label_is_the_label_however_rare_others_are() -> None:
+    truth, weight = torch.zeros(1, dtype=torch.int64), torch.tensor([0.1, 0.3, 2.4, 1.0, 1.2])
+    scores = torch.zeros(1, 5, requires_grad=True)
+    descent = torch.optim.SGD([scores], lr=5.0)
+    for _ in range(200):
+        descent.zero_grad()
+        smoothed_loss(scores, truth, weight, 0.2).backward()
+        descent.step()
+    assert scores.softmax(dim=1)[0].tolist() == pytest.approx([0.84, 0.04, 0.04, 0.04, 0.04], abs=0.01)
+
+
+@pytest.mark.parametrize("set_up", ["real", "mixed_mapped"])
+def test_two_trainings_with_one_seed_are_the_same(data: Path, tmp_path: Path, set_up: str) -> None:
+    for name in ("one", "two"):
+        task.train(Run.start(tmp_path / name, toy(data, set_up=set_up)))
+    task.train(Run.start(tmp_path / "three", toy(data, set_up=set_up, seed=2)))
+    one, two, three = (weights(tmp_path / name) for name in ("one", "two", "three"))
+    assert same(one, two)
+    assert not same(one, three)
+    figures = [json.loads((tmp_path / name / "metrics.json").read_text())["tests"] for name in ("one", "two")]
+    assert figures[0] == figures[1]
+
+
+@pytest.mark.parametrize(("set_up", "stop_at"), [("real", 1), ("fine_tuned", 1), ("fine_tuned", 3)])
+def test_an_interrupted_training_ends_as_an_undisturbed_one(
+    data: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, set_up: str, stop_at: int
+) -> None:
+    changes = {"set_up": set_up, "fine_tuning": {"epochs": 2, "learning_rate": 0.001}}
+    task.train(Run.start(tmp_path / "whole", toy(data, **changes)))
+    with monkeypatch.context() as patch:
+        saved, original = [], Run.save
+
+        def save(self: Run[Any], state: Any) -> None:
+            original(self, state)
+            saved.append(1)
+            if len(saved) == stop_at:
+                raise KeyboardInterrupt
+
+        patch.setattr(Run, "save", save)
+        with pytest.raises(KeyboardInterrupt):
+            task.train(Run.start(tmp_path / "cut", toy(data, **changes)))
+    task.train(Run.start(tmp_path / "cut", toy(data, **changes), resume=True))
+    assert same(weights(tmp_path / "whole"), weights(tmp_path / "cut"))
+    assert (tmp_path / "cut" / PRETRAINING).exists() == (set_up == "fine_tuned")
+    histories = [json.loads((tmp_path / name / "history.json").read_text()) for name in ("whole", "cut")]
+    assert [len(history) for history in histories] == [2, 2]
+
+
+def test_fine_tuning_begins_with_what_synthetic_data_taught(data: Path, tmp_path: Path) -> None:
+    task.train(Run.start(tmp_path / "synthetic", toy(data, set_up="synthetic")))
+    nothing = {"epochs": 1, "learning_rate": 1e-12, "final_learning_rate": 0.0}
+    task.train(Run.start(tmp_path / "tuned", toy(data, set_up="fine_tuned", fine_tuning=nothing)))
+    first, tuned = weights(tmp_path / "synthetic"), weights(tmp_path / "tuned")
+    assert same(first, weights(tmp_path / "tuned" / PRETRAINING))
+    learned = [name for name in first if "running" not in name and "num_batches" not in name]
+    assert all(torch.allclose(first[name], tuned[name], atol=1e-6) for name in learned)
+    changed = toy(data, set_up="fine_tuned", fine_tuning=nothing, seed=5)
+    task.train(Run.start(tmp_path / "tuned", changed, overwrite=True))  # nor with what another seed did
+    assert not same(first, weights(tmp_path / "tuned" / PRETRAINING))
+
+
+def test_every_set_up_and_option_trains(data: Path, tmp_path: Path) -> None:
+    short = {"schedule": {"epochs": 1}, "crops_per_tile": 2}
+    cases: list[dict[str, Any]] = [
+        {"set_up": "synthetic", "intensity": "robust", "balanced": True, "adaptation": {"adabn": True, "mix3d": 0.5}},
+        {"set_up": "mixed", "synthetic_share": 0.7, "features": ["z", "intensity"]},
+        {"set_up": "mixed", "effects": {"mirror": True, "dropout": 0.3, "intensity_gain": 0.2}, "class_weights": False},
+    ]
+    for number, case in enumerate(cases):
+        metrics = task.train(Run.start(tmp_path / str(number), toy(data, **short, **case)))
+        assert 0.0 <= metrics["unseen_mean_iou"] <= 1.0
+        assert metrics["tests"]["unseen"]["points"] == 6000
+    assert set(metrics["training_points"]) == {"real", "synthetic"}
+
+
+def test_clouds_are_laid_over_as_often_as_asked(data: Path) -> None:
+    for share, wanted in ((0.0, [4]), (1.0, [2]), (0.5, [2, 4])):
+        configuration = toy(data, adaptation={"mix3d": share}, crops_per_tile=24)
+        tiles = read_domains(configuration)["real"]
+        seeds, scaling = Seeds(tiles, 5, False), scalings(tiles, "share")
+
+        def batches(epoch: int) -> list[Item]:
+            run = (configuration, tiles, [len(tiles)], scaling, seeds, torch.device("cpu"), epoch)  # noqa: B023
+            return list(epoch_batches(*run))
+
+        sizes = [len(batch["offset"]) for batch in batches(1)]
+        assert sorted(set(sizes)) == wanted
+        assert sizes == [len(batch["offset"]) for batch in batches(1)]
+
+
+def test_commands_train_evaluate_and_predict(data: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    from headless import cli
+
+    (tmp_path / "toy.yaml").write_text(json.dumps(toy(data).to_dict()))
+
+    def command(module: Any, *arguments: object) -> dict[str, Any]:
+        import argparse
+
+        parser = argparse.ArgumentParser()
+        module.add_arguments(parser)
+        code = cli.run(module.run, parser.parse_args([*map(str, arguments), "--json"]))
+        out = capsys.readouterr()
+        assert code == 0, out.err
+        result: dict[str, Any] = json.loads(out.out)
+        return result
+
+    trained = command(train_command, tmp_path / "toy.yaml", "--output", tmp_path / "run")
+    for name in ("configuration.json", "metrics.json", "history.json", "checkpoint.pt", "curves.png"):
+        assert (tmp_path / "run" / name).stat().st_size > 0
+    again = command(evaluate_command, tmp_path / "run", data / "real", "--output", tmp_path / "scores")
+    assert again["tests"]["real-test"] == trained["tests"]["unseen"]
+    assert (tmp_path / "scores" / "real-test.png").read_bytes()[:4] == b"\x89PNG"
+    assert "road_marking" in (tmp_path / "scores" / "real-test.txt").read_text()
+    cloud = write_cloud(tmp_path / "cloud.laz", road_block(4000, 9))
+    told = command(predict_command, tmp_path / "run", cloud, "--output", tmp_path / "labelled.laz", "--classification")
+    assert told["points"] == 4000
+    found = np.asarray(laspy.read(tmp_path / "labelled.laz")["predicted_class"])
+    assert np.bincount(found, minlength=5).tolist() == list(told["classes"].values())
+
+
+def test_a_checkpoint_of_another_network_is_refused(data: Path, tmp_path: Path) -> None:
+    run = Run.start(tmp_path / "run", toy(data))
+    other = build(toy(data, features=["x", "y", "z"]))
+    run.save({"model": other.state_dict(), "epoch": 1})
+    with pytest.raises(InputError, match="another network"):
+        task.trained_model(run, torch.device("cpu"))
+
+
+def test_evaluation_with_a_mapping_scores_groups(data: Path, tmp_path: Path) -> None:
+    task.train(Run.start(tmp_path / "run", toy(data)))
+    run = Run.open(tmp_path / "run", kinds())
+    las = laspy.LasData(laspy.LasHeader(point_format=6, version="1.4"))
+    block = road_block(3000, 4)
+    las.header.scales, las.header.offsets = np.full(3, 0.001), np.array([4e5, 5.6e6, 100.0])
+    las.x, las.y, las.z = block.xyz.T
+    las.intensity = np.rint(block.intensity * 65535)
+    las.classification = np.array([2, 2, 2, 5, 1])[block.class_id]
+    las.write(tmp_path / "street.laz")
+    from ml.tasks import Evaluation
+
+    found = task.evaluate(run, Evaluation([tmp_path / "street.laz"], "test", tmp_path / "out", mapping="ign"))
+    classes = found["tests"]["street"]["classes"]
+    assert list(classes) == ["ground", "vegetation", "other"]
+    assert classes["other"]["support"] == 0
+    assert found["tests"]["street"]["ignored"] == int((block.class_id == 4).sum())
+
+
+def test_shipped_configurations_and_experiments_are_whole() -> None:
+    known = ml_segmentation_configurations()
+    assert "segmentation" in known
+    for name in known:
+        assert load_configuration(name, kinds()).task == "segmentation"
+    for path in experiments.SHIPPED.glob("*.yaml"):
+        found = load_experiment(path.stem)
+        made = configurations(found, {"real": "a", "synthetic": "b"})
+        assert list(made) == list(found.variants)
+        for configuration in made.values():
+            configuration.scheme()
+            configuration.needed()
+            assert configuration.data.tests
+        with pytest.raises(InputError, match="real=FOLDER"):
+            configurations(found, {"synthetic": "b"})
+
+
+def ml_segmentation_configurations() -> list[str]:
+    """Return the names of the shipped configurations of this task."""
+    from ml.configuration import SHIPPED, shipped_names
+    from synthroads_addon.core.schema import read_yaml
+
+    return [name for name in shipped_names() if read_yaml(SHIPPED / f"{name}.yaml")["task"] == "segmentation"]
+
+
+def test_an_experiment_makes_a_table_and_goes_on_where_it_stopped(data: Path, tmp_path: Path) -> None:
+    own = {
+        "title": "Toy",
+        "configuration": str(tmp_path / "toy.yaml"),
+        "data": {
+            "real": [{"path": "{real}", "split": "train"}],
+            "synthetic": [{"path": "{synthetic}", "split": "train"}],
+            "tests": {"unseen": [{"path": "{real}", "split": "test"}]},
+        },
+        "variants": {
+            "synthetic": {"set": {"set_up": "synthetic"}},
+            "tuned": {"set": {"set_up": "fine_tuned", "fine_tuning.epochs": 1}},
+            "adapted": {"of": "synthetic", "set": {"adaptation.adabn": True, "adaptation.adabn_crops": 5}},
+        },
+        "seeds": [1, 2],
+    }
+    (tmp_path / "toy.yaml").write_text(json.dumps(toy(data, schedule={"epochs": 1}).to_dict()))
+    (tmp_path / "own.yaml").write_text(json.dumps(own))
+    folders = [f"--data={name}={data / name}" for name in ("real", "synthetic")]
+    arguments = [str(tmp_path / "own.yaml"), *folders, "--output", str(tmp_path / "out"), "--quiet"]
+    assert experiments.main([*arguments, "--seeds", "1"]) == 0
+    before = (tmp_path / "out" / "synthetic" / "seed-1" / "checkpoint.pt").stat().st_mtime_ns
+    assert same(
+        weights(tmp_path / "out" / "synthetic" / "seed-1"), weights(tmp_path / "out" / "tuned" / "seed-1" / PRETRAINING)
+    )
+    assert experiments.main(arguments) == 0
+    assert (tmp_path / "out" / "synthetic" / "seed-1" / "checkpoint.pt").stat().st_mtime_ns == before
+    results = json.loads((tmp_path / "out" / "results.json").read_text())
+    assert {name: sorted(seeds) for name, seeds in results.items()} == {name: ["1", "2"] for name in own["variants"]}
+    text = (tmp_path / "out" / "table.md").read_text()
+    assert "| class | points | synthetic | tuned | adapted |" in text
+    values = [100 * results["tuned"][seed]["unseen"]["mean_iou"] for seed in "12"]
+    assert f"{np.mean(values):.1f} ({np.std(values, ddof=1):.1f})" in text
+
+
+def test_table_shows_undefined_scores_as_such() -> None:
+    scores = {
+        "classes": {"a": {"iou": 0.5, "support": 9}, "b": {"iou": None, "support": 0}},
+        "mean_iou": 0.5,
+        "points": 9,
+    }
+    text = table("T", {"one": {"1": {"unseen": scores}}, "two": {}})
+    assert "| a | 9 | 50.0 |" in text
+    assert "| b | 0 | - |" in text
+
+
+def test_an_experiments_faults_are_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    wrong = {"title": "T", "data": {}, "variants": {"a": {"of": "b"}}}
+    (tmp_path / "wrong.yaml").write_text(json.dumps(wrong))
+    assert experiments.main([str(tmp_path / "wrong.yaml"), "--output", str(tmp_path / "out")]) == 2
+    assert "must be a variant that is trained" in capsys.readouterr().err
+    with pytest.raises(InputError, match="gantries"):
+        load_experiment("gantrys")

@@ -1,0 +1,330 @@
+"""Measure centreline models and baselines; write the tables and pictures of docs/centerline.md.
+
+    python tools/figures_centerline.py --in-domain out/centerline-uav:validation --other out/centerline-mobile:test \
+        --real REAL_FOLDER --run "transformer=out/runs/transformer-1" --run "transformer=out/runs/transformer-2" \
+        --output out/centerline --document docs/centerline.md --pictures docs/pictures
+
+Runs of one name are one model trained with several seeds. A run is measured on the roads whose truth is of the kind
+that it learned. What isn't given is left out, and its tables in the document stay as they are. Tables as JSON and
+Markdown, and all settings that the baseline's grid search tried, are written to the output folder.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+ROOT = Path(__file__).resolve().parents[1]
+sys.path.insert(0, str(ROOT))
+
+from ml.centerline import pictures, tables  # noqa: E402
+from ml.centerline.corridor import TRUTH_KINDS, TruthKind  # noqa: E402
+from ml.centerline.evaluation import (  # noqa: E402
+    Case,
+    Cropping,
+    GridSearch,
+    Predictor,
+    case,
+    grid_search,
+    measure,
+    skeleton_predictor,
+    trivial_predictors,
+)
+from ml.centerline.metrics import Spread, over_seeds  # noqa: E402
+from ml.centerline.roads import Road, read_measured, read_scene, scene_folders  # noqa: E402
+from ml.centerline.skeleton import SkeletonSettings  # noqa: E402
+from ml.centerline.slices import SliceSettings  # noqa: E402
+from ml.runs import Run  # noqa: E402
+from ml.tasks import kinds  # noqa: E402
+from synthroads_addon.core.errors import SynthRoadsError  # noqa: E402
+from synthroads_addon.core.files import write_file  # noqa: E402
+
+Measured = dict[str, dict[str, dict[str, Spread]]]
+
+REAL_ROADS: dict[str, tuple[str, TruthKind]] = {
+    "als_rural2lane_t211-278": ("rural, 767 m", "carriageway"),
+    "als_rural2lane_t000-075": ("rural, 1081 m", "carriageway"),
+    "als_dual4lane_t338-369": ("dual, 315 m", "road"),
+    "als_dual6lane_t370-473": ("dual, 1106 m", "road"),
+}
+TUNED_ON = "als_rural2lane_t000-075"
+"""The real road that the baseline's grid search is run on."""
+CROPPINGS: dict[str, Cropping | None] = {
+    "real-slices": Cropping(),
+    "real-stretches": Cropping(length=50.0),
+    "real-whole": None,
+}
+"""Tables of the real roads, and how their slices are cropped."""
+REFERENCE = SkeletonSettings()
+TARGETS_SHOWN = {
+    "center": ("centre (m)", 1.0),
+    "left_edge": ("left edge (m)", 1.0),
+    "right_edge": ("right edge (m)", 1.0),
+    "lanes": ("lanes", 1.0),
+    "lane_width": ("lane width (m)", 1.0),
+    "heading": ("heading (mrad)", 1000.0),
+    "height": ("height (m)", 1.0),
+}
+"""Targets of the corridor: title and factor."""
+CORRIDOR_COLUMNS = (
+    tables.Column("mae", "mean error"),
+    tables.Column("right", "right when rounded (%)", 100.0, 1),
+    tables.Column("coverage_68", "in 68 % (%)", 100.0, 1),
+    tables.Column("coverage_95", "in 95 % (%)", 100.0, 1),
+)
+
+
+@dataclass(frozen=True)
+class Model:
+    """A model of some name, trained once per seed.
+
+    Attributes:
+        kind: of the truth that it learned.
+        versions: one predictor per seed.
+    """
+
+    kind: TruthKind
+    versions: list[Predictor]
+
+
+def models(runs: Sequence[str]) -> dict[str, list[Model]]:
+    """Return the trained models by name, given as NAME=FOLDER; those of one name and kind of truth are one."""
+    found: dict[str, dict[TruthKind, list[Predictor]]] = {}
+    for text in runs:
+        name, _, folder = text.partition("=")
+        run = Run.open(Path(folder), kinds())
+        predictor = import_module("ml.centerline.task").predictor(run)
+        found.setdefault(name, {}).setdefault(kind_of(run), []).append(predictor)
+    return {name: [Model(kind, versions) for kind, versions in by_kind.items()] for name, by_kind in found.items()}
+
+
+def kind_of(run: Run[Any]) -> TruthKind:
+    """Return the kind of truth that a run learned."""
+    parts = (getattr(run.configuration, name) for name in type(run.configuration).model_fields)
+    return next(part.truth for part in parts if isinstance(part, SliceSettings))
+
+
+def of_kind(trained: Mapping[str, Sequence[Model]], kind: TruthKind, seeds: int) -> dict[str, list[Predictor]]:
+    """Return the models that learned one kind of truth: one version, or as many as there are seeds."""
+    found = {name: model.versions for name, several in trained.items() for model in several if model.kind == kind}
+    for name, versions in found.items():
+        if len(versions) not in (1, seeds):
+            raise SystemExit(f"--run {name}: {len(versions)} runs for {seeds} seeds; give one run or one per seed")
+    return found
+
+
+def baselines(search: GridSearch) -> dict[str, list[Predictor]]:
+    """Return the skeleton with the best settings and with the reference system's, and what learns nothing."""
+    best = search.best
+    reference = replace(REFERENCE, mask=best.mask)
+    tuned, plain = (f"skeleton, {one.raster:g} m, {one.branch:g} m, {one.bin:g} m" for one in (best, reference))
+    tuned = f"{tuned} (tuned)"
+    return {tuned: [skeleton_predictor(best)], plain: [skeleton_predictor(reference)], **trivial_predictors()}
+
+
+def synthetic_roads(text: str) -> list[Road]:
+    """Return the roads of a data set's split, given as FOLDER or FOLDER:SPLIT."""
+    folder, _, split = text.partition(":")
+    return [road for scene in scene_folders(Path(folder), split or "test") for road in read_scene(scene, "road")]
+
+
+def searched(shown: Sequence[Case], masks: Sequence[str], file: Path) -> GridSearch:
+    """Run the baseline's grid search and write down what it tried."""
+    search = grid_search(shown, masks)
+    rows = [{"raster": s.raster, "branch": s.branch, "mask": s.mask, "bin": s.bin, **row} for s, row in search.rows]
+    text = json.dumps({"best": vars(search.best), "road": shown[0].road.name, "tried": rows}, indent=1)
+    write_file(file, text.encode(), overwrite=True)
+    return search
+
+
+def shown_by(roads: Sequence[Road], cropping: Cropping | None, estimated: bool) -> Callable[[int], list[Case]]:
+    """Return what shows the roads as a seed has them."""
+    return lambda seed: [case(road, seed, cropping=cropping, estimated=estimated) for road in roads]
+
+
+def synthetic(arguments: argparse.Namespace, trained: Mapping[str, Sequence[Model]]) -> dict[str, str]:
+    """Measure on the synthetic data sets, the baseline tuned on each one's first road; return the document's tables."""
+    sets = {"in-domain": arguments.in_domain, "other-scanner": arguments.other}
+    result = {}
+    for name, text in sets.items():
+        if text is None:
+            continue
+        roads = synthetic_roads(text)
+        cases = shown_by(roads, None, estimated=False)
+        search = searched(cases(arguments.seeds[0])[:1], ["classes"], arguments.output / f"skeleton-{name}.json")
+        predictors = of_kind(trained, "road", len(arguments.seeds)) | baselines(search)
+        measured = measure(predictors, cases, arguments.seeds)
+        tables.write_tables(arguments.output, name, measured)
+        result[name] = tables.table(measured)
+        learned = of_kind(trained, "road", len(arguments.seeds))
+        if learned:
+            corridor = measure_corridor(learned, cases, arguments.seeds)
+            tables.write_tables(arguments.output, f"corridor-{name}", corridor)
+            result[f"corridor-{name}"] = tables.table(corridor, columns=CORRIDOR_COLUMNS)
+        draw_synthetic(arguments, roads[-1], trained, search)
+    return result
+
+
+def measure_corridor(
+    learned: Mapping[str, Sequence[Predictor]], cases: Callable[[int], Sequence[Case]], seeds: Sequence[int]
+) -> Measured:
+    """Return mean errors and coverage of everything that the models say of the corridor, by model and target."""
+    corridor_figures = import_module("ml.centerline.measuring").corridor_figures
+    rows: dict[str, list[dict[str, float]]] = {}
+    for index, seed in enumerate(seeds):
+        shown = cases(seed)
+        for name, versions in learned.items():
+            found = corridor_figures(versions[min(index, len(versions) - 1)], shown)
+            for target, figures in found.items():
+                known = {figure: np.nan if value is None else value for figure, value in figures.items()}
+                known["mae"] *= TARGETS_SHOWN[target][1]
+                rows.setdefault(f"{name}: {TARGETS_SHOWN[target][0]}", []).append(known)
+    return {name: {"all": over_seeds(values)} for name, values in rows.items()}
+
+
+def real(arguments: argparse.Namespace, trained: Mapping[str, Sequence[Model]]) -> dict[str, str]:
+    """Measure on the real roads, cropped in several ways; return the document's tables."""
+    if arguments.real is None:
+        return {}
+    roads = {
+        name: read_measured(arguments.real / f"{name}.laz", arguments.real / f"{name}_axis.csv", kind)
+        for name, (_, kind) in REAL_ROADS.items()
+    }
+    titles = {name: title for name, (title, _) in REAL_ROADS.items()}
+    result = {}
+    for table, cropping in CROPPINGS.items():
+        shown = case(roads[TUNED_ON], arguments.seeds[0], cropping=cropping, estimated=True)
+        search = searched([shown], ["ground", "dark"], arguments.output / f"skeleton-{table}.json")
+        measured = measure_real(arguments.seeds, roads, cropping, trained, search)
+        tables.write_tables(arguments.output, table, measured)
+        result[table] = tables.road_table(measured, titles)
+        if table == "real-slices":
+            draw_real(arguments, roads[TUNED_ON], trained, search)
+    return result
+
+
+def measure_real(
+    seeds: Sequence[int],
+    roads: Mapping[str, Road],
+    cropping: Cropping | None,
+    trained: Mapping[str, Sequence[Model]],
+    search: GridSearch,
+) -> Measured:
+    """Return the figures of all predictors on the roads whose kind of truth they know."""
+    merged: Measured = {name: {} for name in (*trained, *baselines(search))}
+    for kind in TRUTH_KINDS:
+        own = [roads[name] for name, (_, its) in REAL_ROADS.items() if its == kind]
+        predictors = of_kind(trained, kind, len(seeds)) | baselines(search)
+        measured = measure(predictors, shown_by(own, cropping, estimated=True), seeds)
+        for name, rows in measured.items():
+            merged[name].update({road if road != "all" else f"all {kind}": row for road, row in rows.items()})
+    return {name: rows for name, rows in merged.items() if rows}
+
+
+def draw_synthetic(
+    arguments: argparse.Namespace, road: Road, trained: Mapping[str, Sequence[Model]], search: GridSearch
+) -> None:
+    """Draw centrelines and a corridor over a synthetic road."""
+    shown = case(road, arguments.seeds[0], cropping=None, estimated=False)
+    learned = {name: several[0] for name, several in of_kind(trained, "road", len(arguments.seeds)).items()}
+    view = middle(road, 160.0)
+    draw_lines(arguments.pictures / "centerline-lines.png", shown, learned, search, view, f"synthetic road {road.name}")
+    if learned:
+        name = arguments.corridor or list(learned)[-1]
+        prediction = learned[name](shown.road, shown.frames)
+        picture = pictures.corridor_picture(shown, prediction, view, f"{name}: corridor of the road {road.name}", 24.0)
+        write_file(arguments.pictures / "centerline-corridor.png", picture, overwrite=True)
+
+
+def draw_real(
+    arguments: argparse.Namespace, road: Road, trained: Mapping[str, Sequence[Model]], search: GridSearch
+) -> None:
+    """Draw centrelines over a real road with cropped slices."""
+    kind = REAL_ROADS[road.name][1]
+    shown = case(road, arguments.seeds[0], cropping=CROPPINGS["real-slices"], estimated=True)
+    learned = {name: several[0] for name, several in of_kind(trained, kind, len(arguments.seeds)).items()}
+    title = f"real road, {REAL_ROADS[road.name][0]}, both sides of every slice cropped"
+    path = arguments.pictures / "centerline-real.png"
+    draw_lines(path, shown, learned, search, middle(road, 160.0), title)
+
+
+def draw_lines(
+    path: Path,
+    shown: Case,
+    learned: Mapping[str, Predictor],
+    search: GridSearch,
+    view: pictures.View,
+    title: str,
+) -> None:
+    """Draw the learned lines, the tuned baseline and the best known trivial one."""
+    tuned, _, *_ = baselines(search).items()
+    trivial = ("middle of the extent", trivial_predictors()["middle of the extent"])
+    lines = {name: predictor(shown.road, shown.frames)[:, 0] for name, predictor in learned.items()}
+    for name, several in (tuned, trivial):
+        lines[name] = several[0](shown.road, shown.frames)[:, 0]
+    height = 24.0 if shown.road.truth is not None and shown.road.truth.left is not None else 6.0
+    write_file(path, pictures.lines_picture(shown, lines, view, title, height), overwrite=True)
+
+
+def middle(road: Road, length: float) -> pictures.View:
+    """Return the view of some metres in the middle of a road."""
+    whole = road.reference.length
+    return pictures.View(max(0.0, (whole - length) / 2.0), min(whole, (whole + length) / 2.0))
+
+
+def arguments_of(words: Sequence[str] | None) -> argparse.Namespace:
+    """Return the command line's arguments."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--run", action="append", default=[], metavar="NAME=FOLDER", help="a trained run (repeatable)")
+    parser.add_argument("--in-domain", metavar="FOLDER[:SPLIT]", help="data set of the scanner that was trained on")
+    parser.add_argument("--other", metavar="FOLDER[:SPLIT]", help="data set of another scanner")
+    parser.add_argument(
+        "--tune-on", metavar="FOLDER[:SPLIT]", help="data set on whose first road the baseline is tuned"
+    )
+    parser.add_argument("--real", type=Path, metavar="FOLDER", help="real scans with their axes")
+    parser.add_argument("--corridor", metavar="NAME", help="the model whose corridor is drawn (the last)")
+    parser.add_argument("--seeds", type=int, nargs="+", default=[1, 2, 3, 4, 5], help="of paths, cuts and runs")
+    parser.add_argument("--output", type=Path, required=True, metavar="DIR", help="folder for the tables as JSON")
+    parser.add_argument("--pictures", type=Path, metavar="DIR", help="folder for the pictures (--output)")
+    parser.add_argument("--document", type=Path, metavar="FILE", help="Markdown whose tables are replaced")
+    arguments = parser.parse_args(words)
+    arguments.pictures = arguments.pictures or arguments.output
+    return arguments
+
+
+def expected(arguments: argparse.Namespace) -> list[str]:
+    """Return the names of the tables that will be made."""
+    given = {"in-domain": arguments.in_domain, "other-scanner": arguments.other}
+    names = [name for name, text in given.items() if text]
+    names += [f"corridor-{name}" for name in names if arguments.run]
+    return names + (list(CROPPINGS) if arguments.real else [])
+
+
+def main(words: Sequence[str] | None = None) -> None:
+    """Command line."""
+    arguments = arguments_of(words)
+    try:
+        if arguments.document:
+            # Before hours of work: whether there is room for the tables.
+            tables.replaced(arguments.document.read_text(encoding="utf-8"), dict.fromkeys(expected(arguments), ""))
+        trained = models(arguments.run)
+        found = synthetic(arguments, trained) | real(arguments, trained)
+        if arguments.document:
+            text = tables.replaced(arguments.document.read_text(encoding="utf-8"), found)
+            write_file(arguments.document, text.encode(), overwrite=True)
+    except SynthRoadsError as error:
+        raise SystemExit(str(error)) from None
+    for name, text in found.items():
+        print(f"{name}\n\n{text}")
+
+
+if __name__ == "__main__":
+    main()
