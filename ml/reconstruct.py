@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import sys
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -19,6 +20,7 @@ from synthroads_addon.core.twin import check_formats, twin_file_names, write_twi
 if TYPE_CHECKING:
     from ml.reconstruction.cloud import RoadCloud
     from ml.reconstruction.pipeline import Options, Reconstruction
+    from synthroads_addon.core.parameters.model import RoadParameters
 
 PARAMETERS, REPORT, CENTRELINE, PICTURE = (
     "parameters.json",
@@ -43,7 +45,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--tolerance", type=float, default=0.03, metavar="M", help=text)
     text = "take the widths of the standard cross-section that all measured ones are near to (the measured ones)"
     parser.add_argument("--snap", action="store_true", help=text)
-    text = "true parameters to compare with afterwards; they change nothing"
+    text = "true parameters (.json) or axis (CSV, GeoJSON) to compare with afterwards; they change nothing"
     parser.add_argument("--truth", type=Path, metavar="FILE", help=text)
     parser.add_argument("--no-picture", action="store_true", help=f"don't draw {PICTURE}")
     add_twin_argument(parser)
@@ -58,21 +60,35 @@ def run(arguments: argparse.Namespace) -> Outcome:
     check_formats(arguments.twin)
     from ml.reconstruction.cloud import read_road_cloud
     from ml.reconstruction.pipeline import reconstruct
-    from synthroads_addon.core.parameters.model import read_parameters
 
-    truth = read_parameters(arguments.truth) if arguments.truth else None
+    compared = _comparison(arguments.truth)
     names = [PARAMETERS, REPORT, CENTRELINE, *([] if arguments.no_picture else [PICTURE])]
     with output_folder(arguments.output, [*names, *twin_file_names(arguments.twin)], arguments.overwrite) as folder:
         cloud = read_road_cloud(arguments.cloud)
         found = reconstruct(cloud, _options(arguments, cloud, folder), progress_bar(arguments))
         result = _write(found, cloud, folder, arguments.no_picture)
-        if truth is not None:
-            from ml.reconstruction.comparison import compare
-
-            result["comparison"] = compare(found.parameters, truth)
+        if compared is not None:
+            result["comparison"] = compared(found.parameters)
         (folder / REPORT).write_text(canonical_json(result), encoding="utf-8")
         write_twin(found.parameters, folder, arguments.twin)
     return 0, result, summary(result, arguments.output)
+
+
+def _comparison(truth: Path | None) -> Callable[[RoadParameters], dict[str, Any]] | None:
+    """Return what compares a found road with the truth of a file, read now: before hours of work."""
+    if truth is None:
+        return None
+    from ml.reconstruction.comparison import compare, compare_axis
+
+    if truth.suffix.lower() == ".json":
+        from synthroads_addon.core.parameters.model import read_parameters
+
+        parameters = read_parameters(truth)
+        return lambda found: compare(found, parameters)
+    from synthroads_addon.core.parameters.axis_read import read_axis
+
+    axis = read_axis(truth)
+    return lambda found: compare_axis(found, axis)
 
 
 def _options(arguments: argparse.Namespace, cloud: RoadCloud, folder: Path) -> Options:
@@ -135,7 +151,8 @@ def summary(result: dict[str, Any], output: Path) -> str:
     lines += [f"  note: {note}" for note in result["notes"]]
     if "comparison" in result:
         off = result["comparison"]["centreline"]
-        lines.append(f"  from the truth: centreline {off['mae']:.3f} m on average, {off['largest']:.3f} m at most")
+        apart = f"{off['mae']:.3f} m on average, {off['largest']:.3f} m at most" if off else "nothing in common"
+        lines.append(f"  from the truth: centreline {apart}")
     return "\n".join([*lines, f"written to {output}"])
 
 

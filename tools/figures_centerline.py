@@ -18,7 +18,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from importlib import import_module
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -26,7 +26,8 @@ ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
 
 from ml.centerline import pictures, tables  # noqa: E402
-from ml.centerline.corridor import TRUTH_KINDS, TruthKind  # noqa: E402
+from ml.centerline.corridor import TruthKind  # noqa: E402
+from ml.centerline.data import DataOptions  # noqa: E402
 from ml.centerline.evaluation import (  # noqa: E402
     Case,
     Cropping,
@@ -42,12 +43,14 @@ from ml.centerline.metrics import Spread, over_seeds  # noqa: E402
 from ml.centerline.roads import Road, read_measured, read_scene, scene_folders  # noqa: E402
 from ml.centerline.skeleton import SkeletonSettings  # noqa: E402
 from ml.centerline.slices import SliceSettings  # noqa: E402
+from ml.configuration import Part  # noqa: E402
 from ml.runs import Run  # noqa: E402
 from ml.tasks import kinds  # noqa: E402
 from synthroads_addon.core.errors import SynthRoadsError  # noqa: E402
 from synthroads_addon.core.files import write_file  # noqa: E402
 
 Measured = dict[str, dict[str, dict[str, Spread]]]
+AnyPart = TypeVar("AnyPart", bound=Part)
 
 REAL_ROADS: dict[str, tuple[str, TruthKind]] = {
     "als_rural2lane_t211-278": ("rural, 767 m", "carriageway"),
@@ -89,32 +92,55 @@ class Model:
     Attributes:
         kind: of the truth that it learned.
         versions: one predictor per seed.
+        learned: names of the real roads that it was trained or validated on, which it isn't measured on.
     """
 
     kind: TruthKind
     versions: list[Predictor]
+    learned: frozenset[str] = frozenset()
 
 
 def models(runs: Sequence[str]) -> dict[str, list[Model]]:
-    """Return the trained models by name, given as NAME=FOLDER; those of one name and kind of truth are one."""
-    found: dict[str, dict[TruthKind, list[Predictor]]] = {}
+    """Return the trained models by name, given as NAME=FOLDER; those of one name, truth and real roads are one."""
+    found: dict[str, dict[tuple[TruthKind, frozenset[str]], list[Predictor]]] = {}
     for text in runs:
         name, _, folder = text.partition("=")
         run = Run.open(Path(folder), kinds())
         predictor = import_module("ml.centerline.task").predictor(run)
-        found.setdefault(name, {}).setdefault(kind_of(run), []).append(predictor)
-    return {name: [Model(kind, versions) for kind, versions in by_kind.items()] for name, by_kind in found.items()}
+        found.setdefault(name, {}).setdefault((kind_of(run), learned_by(run)), []).append(predictor)
+    return {
+        name: [Model(kind, versions, learned) for (kind, learned), versions in alike.items()]
+        for name, alike in found.items()
+    }
 
 
 def kind_of(run: Run[Any]) -> TruthKind:
     """Return the kind of truth that a run learned."""
+    return _part(run, SliceSettings).truth
+
+
+def learned_by(run: Run[Any]) -> frozenset[str]:
+    """Return the names of the real roads that a run was trained or validated on."""
+    data = _part(run, DataOptions)
+    return frozenset(Path(road.cloud).stem for road in (*data.measured, *data.measured_validation))
+
+
+def _part(run: Run[Any], kind: type[AnyPart]) -> AnyPart:
     parts = (getattr(run.configuration, name) for name in type(run.configuration).model_fields)
-    return next(part.truth for part in parts if isinstance(part, SliceSettings))
+    return next(part for part in parts if isinstance(part, kind))
 
 
-def of_kind(trained: Mapping[str, Sequence[Model]], kind: TruthKind, seeds: int) -> dict[str, list[Predictor]]:
-    """Return the models that learned one kind of truth: one version, or as many as there are seeds."""
-    found = {name: model.versions for name, several in trained.items() for model in several if model.kind == kind}
+def of_kind(
+    trained: Mapping[str, Sequence[Model]], kind: TruthKind, seeds: int, road: str = ""
+) -> dict[str, list[Predictor]]:
+    """Return the models that learned one kind of truth, but not a real road: one version, or as many as seeds."""
+    found: dict[str, list[Predictor]] = {}
+    for name, several in trained.items():
+        fit = [model.versions for model in several if model.kind == kind and road not in model.learned]
+        if len(fit) > 1:
+            raise SystemExit(f"--run {name}: {len(fit)} models that know other real roads than {road}; name them apart")
+        if fit:
+            found[name] = fit[0]
     for name, versions in found.items():
         if len(versions) not in (1, seeds):
             raise SystemExit(f"--run {name}: {len(versions)} runs for {seeds} seeds; give one run or one per seed")
@@ -218,14 +244,13 @@ def measure_real(
     trained: Mapping[str, Sequence[Model]],
     search: GridSearch,
 ) -> Measured:
-    """Return the figures of all predictors on the roads whose kind of truth they know."""
+    """Return the figures of all predictors on the roads whose kind of truth they know and that they didn't learn."""
     merged: Measured = {name: {} for name in (*trained, *baselines(search))}
-    for kind in TRUTH_KINDS:
-        own = [roads[name] for name, (_, its) in REAL_ROADS.items() if its == kind]
-        predictors = of_kind(trained, kind, len(seeds)) | baselines(search)
-        measured = measure(predictors, shown_by(own, cropping, estimated=True), seeds)
+    for road, (_, kind) in REAL_ROADS.items():
+        predictors = of_kind(trained, kind, len(seeds), road) | baselines(search)
+        measured = measure(predictors, shown_by([roads[road]], cropping, estimated=True), seeds)
         for name, rows in measured.items():
-            merged[name].update({road if road != "all" else f"all {kind}": row for road, row in rows.items()})
+            merged[name][road] = rows[road]
     return {name: rows for name, rows in merged.items() if rows}
 
 
@@ -250,7 +275,8 @@ def draw_real(
     """Draw centrelines over a real road with cropped slices."""
     kind = REAL_ROADS[road.name][1]
     shown = case(road, arguments.seeds[0], cropping=CROPPINGS["real-slices"], estimated=True)
-    learned = {name: several[0] for name, several in of_kind(trained, kind, len(arguments.seeds)).items()}
+    fit = of_kind(trained, kind, len(arguments.seeds), road.name)
+    learned = {name: several[0] for name, several in fit.items()}
     title = f"real road, {REAL_ROADS[road.name][0]}, both sides of every slice cropped"
     path = arguments.pictures / "centerline-real.png"
     draw_lines(path, shown, learned, search, middle(road, 160.0), title)

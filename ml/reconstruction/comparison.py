@@ -59,6 +59,18 @@ def compare(found: RoadParameters, truth: RoadParameters) -> dict[str, Any]:
     }
 
 
+def compare_axis(found: RoadParameters, axis: Float) -> dict[str, Any]:
+    """Return how far a reconstructed road's line passes from a known one's points (N, 3), m in map coordinates.
+
+    As in `compare`: signed offsets of the points that the found road reaches, and their share as ``covered``.
+    Elevations are left aside: lines of road networks often have none.
+    """
+    here = RoadGeometry(found)
+    at, offset = here.alignment.project(axis[:, :2] - np.array(found.transform.translate[:2]))
+    covered = (at > 0.0) & (at < here.length)
+    return {"covered": round(float(covered.mean()), 4), "centreline": _figures(offset[covered])}
+
+
 def _apart(truth: RoadParameters, found: RoadParameters) -> Float:
     """Return what turns local plan coordinates of the true set into those of the found one."""
     return np.array(truth.transform.translate[:2]) - np.array(found.transform.translate[:2])

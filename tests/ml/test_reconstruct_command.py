@@ -4,9 +4,12 @@ import json
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from headless.cli import main
+from ml.reconstruction.comparison import compare_axis
+from synthroads_addon.core.parameters.axis_read import read_axis
 from synthroads_addon.core.parameters.geometry import RoadGeometry
 from synthroads_addon.core.parameters.model import read_parameters
 from tests.ml.road_clouds import cloud_of, road, write
@@ -55,6 +58,20 @@ def test_it_is_a_road_like_any_other(made: tuple[Path, dict[str, Any]]) -> None:
         *("twin.city.json", "twin.xodr"),
     }
     assert (folder / "out/reconstruction.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_a_known_axis_is_compared_with(made: tuple[Path, dict[str, Any]], tmp_path: Path) -> None:
+    """The line alone, as a road network has it: the same offsets as from the parameters, and none from far away."""
+    folder, from_parameters = made
+    found, truth = read_parameters(folder / "out/parameters.json"), read_parameters(folder / "truth.json")
+    geometry = RoadGeometry(truth)
+    line = geometry.alignment.position(np.arange(0.0, geometry.length, 1.0)) + truth.transform.translate[:2]
+    np.savetxt(tmp_path / "axis.csv", line, delimiter=",", header="x,y", comments="")
+    one = compare_axis(found, read_axis(tmp_path / "axis.csv"))
+    assert one["covered"] == from_parameters["covered"]
+    assert one["centreline"]["mae"] == pytest.approx(from_parameters["centreline"]["mae"], abs=2e-4)
+    assert compare_axis(found, read_axis(tmp_path / "axis.csv") + [0.0, 2.0, 0.0])["centreline"]["mae"] > 0.3
+    assert compare_axis(found, np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]])) == {"covered": 0.0, "centreline": {}}
 
 
 def test_wrong_input_is_one_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
