@@ -26,7 +26,7 @@ ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
 
 from ml.centerline import pictures, tables  # noqa: E402
-from ml.centerline.corridor import TruthKind  # noqa: E402
+from ml.centerline.corridor import TRUTH_KINDS, TruthKind  # noqa: E402
 from ml.centerline.data import DataOptions  # noqa: E402
 from ml.centerline.evaluation import (  # noqa: E402
     Case,
@@ -156,10 +156,10 @@ def baselines(search: GridSearch) -> dict[str, list[Predictor]]:
     return {tuned: [skeleton_predictor(best)], plain: [skeleton_predictor(reference)], **trivial_predictors()}
 
 
-def synthetic_roads(text: str) -> list[Road]:
+def synthetic_roads(text: str, kind: TruthKind) -> list[Road]:
     """Return the roads of a data set's split, given as FOLDER or FOLDER:SPLIT."""
     folder, _, split = text.partition(":")
-    return [road for scene in scene_folders(Path(folder), split or "test") for road in read_scene(scene, "road")]
+    return [road for scene in scene_folders(Path(folder), split or "test") for road in read_scene(scene, kind)]
 
 
 def searched(shown: Sequence[Case], masks: Sequence[str], file: Path) -> GridSearch:
@@ -178,25 +178,28 @@ def shown_by(roads: Sequence[Road], cropping: Cropping | None, estimated: bool) 
 
 def synthetic(arguments: argparse.Namespace, trained: Mapping[str, Sequence[Model]]) -> dict[str, str]:
     """Measure on the synthetic data sets, the baseline tuned on each one's first road; return the document's tables."""
-    sets = {"in-domain": arguments.in_domain, "other-scanner": arguments.other}
     result = {}
-    for name, text in sets.items():
-        if text is None:
-            continue
-        roads = synthetic_roads(text)
+    for name, (text, kind) in synthetic_sets(arguments).items():
+        roads = synthetic_roads(text, kind)
         cases = shown_by(roads, None, estimated=False)
         search = searched(cases(arguments.seeds[0])[:1], ["classes"], arguments.output / f"skeleton-{name}.json")
-        predictors = of_kind(trained, "road", len(arguments.seeds)) | baselines(search)
-        measured = measure(predictors, cases, arguments.seeds)
+        learned = of_kind(trained, kind, len(arguments.seeds))
+        measured = measure(learned | baselines(search), cases, arguments.seeds)
         tables.write_tables(arguments.output, name, measured)
         result[name] = tables.table(measured)
-        learned = of_kind(trained, "road", len(arguments.seeds))
         if learned:
             corridor = measure_corridor(learned, cases, arguments.seeds)
             tables.write_tables(arguments.output, f"corridor-{name}", corridor)
             result[f"corridor-{name}"] = tables.table(corridor, columns=CORRIDOR_COLUMNS)
-        draw_synthetic(arguments, roads[-1], trained, search)
+        if kind == arguments.truths[-1]:
+            draw_synthetic(arguments, roads[-1], learned, search)
     return result
+
+
+def synthetic_sets(arguments: argparse.Namespace) -> dict[str, tuple[str, TruthKind]]:
+    """Return the data sets to be measured on and the truths to be found there, by the name of their table."""
+    given = {"in-domain": arguments.in_domain, "other-scanner": arguments.other}
+    return {f"{name}-{kind}": (text, kind) for name, text in given.items() if text for kind in arguments.truths}
 
 
 def measure_corridor(
@@ -255,11 +258,11 @@ def measure_real(
 
 
 def draw_synthetic(
-    arguments: argparse.Namespace, road: Road, trained: Mapping[str, Sequence[Model]], search: GridSearch
+    arguments: argparse.Namespace, road: Road, versions: Mapping[str, Sequence[Predictor]], search: GridSearch
 ) -> None:
     """Draw centrelines and a corridor over a synthetic road."""
     shown = case(road, arguments.seeds[0], cropping=None, estimated=False)
-    learned = {name: several[0] for name, several in of_kind(trained, "road", len(arguments.seeds)).items()}
+    learned = {name: several[0] for name, several in versions.items()}
     view = middle(road, 160.0)
     draw_lines(arguments.pictures / "centerline-lines.png", shown, learned, search, view, f"synthetic road {road.name}")
     if learned:
@@ -312,10 +315,9 @@ def arguments_of(words: Sequence[str] | None) -> argparse.Namespace:
     parser.add_argument("--run", action="append", default=[], metavar="NAME=FOLDER", help="a trained run (repeatable)")
     parser.add_argument("--in-domain", metavar="FOLDER[:SPLIT]", help="data set of the scanner that was trained on")
     parser.add_argument("--other", metavar="FOLDER[:SPLIT]", help="data set of another scanner")
-    parser.add_argument(
-        "--tune-on", metavar="FOLDER[:SPLIT]", help="data set on whose first road the baseline is tuned"
-    )
     parser.add_argument("--real", type=Path, metavar="FOLDER", help="real scans with their axes")
+    text = "what is to be found on synthetic roads (all); corridor and lines are drawn for the last"
+    parser.add_argument("--truths", nargs="+", choices=TRUTH_KINDS, default=["carriageway", "road"], help=text)
     parser.add_argument("--corridor", metavar="NAME", help="the model whose corridor is drawn (the last)")
     parser.add_argument("--seeds", type=int, nargs="+", default=[1, 2, 3, 4, 5], help="of paths, cuts and runs")
     parser.add_argument("--output", type=Path, required=True, metavar="DIR", help="folder for the tables as JSON")
@@ -328,8 +330,7 @@ def arguments_of(words: Sequence[str] | None) -> argparse.Namespace:
 
 def expected(arguments: argparse.Namespace) -> list[str]:
     """Return the names of the tables that will be made."""
-    given = {"in-domain": arguments.in_domain, "other-scanner": arguments.other}
-    names = [name for name, text in given.items() if text]
+    names = list(synthetic_sets(arguments))
     names += [f"corridor-{name}" for name in names if arguments.run]
     return names + (list(CROPPINGS) if arguments.real else [])
 
