@@ -23,6 +23,11 @@ Generator = np.random.Generator
 
 _DARKEST = 1e-5
 """Intensities below this share of the brightest count as it."""
+_NARROWEST = 0.02
+"""A footprint narrower than this is a point, m."""
+_SCANNER_HEIGHTS = (1.5, 60.0)
+_SCANNER_ASIDE = 15.0
+"""Of the scanners from whose range intensities fall off: lowest and highest, and farthest from the path, m."""
 
 LEFT, RIGHT, HEADING, HEIGHT = (CORRIDOR.index(name) for name in ("left_edge", "right_edge", "heading", "height"))
 
@@ -99,11 +104,15 @@ class Effects(Part):
     hidden: float = quantity(0.2, ge=0, le=1, unit="1", description="Probability of a hole as behind a vehicle.")
     empty: float = quantity(0.02, ge=0, le=1, unit="1", description="Probability of a slice without any point.")
     jitter: float = quantity(0.02, ge=0, le=1, unit="m", description="Standard deviation of the points' noise.")
+    footprint: float = quantity(0.8, ge=0, le=5, unit="m", description="Width across which intensities are means.")
     tilt: float = quantity(0.01, ge=0, le=0.2, unit="1", description="Cross slope and grade that are added.")
     contrast: float = quantity(1.5, ge=0, le=3, unit="1", description="Log of the factor on what isn't pavement.")
     paint: float = quantity(0.95, ge=0, le=1, unit="1", description="Share of the markings' brightness worn off.")
     gamma: tuple[float, float] = Field((0.15, 1.5), description="Smallest and largest power of the intensities.")
-    falloff: float = quantity(1.5, ge=0, le=10, unit="1", description="Power of the range fall-off to the sides.")
+    falloff: float = quantity(
+        4.0, ge=0, le=10, unit="1", description="Power of the range fall-off from scanners somewhere above the road."
+    )
+    stripes: float = quantity(0.3, ge=0, le=2, unit="1", description="As speckle, of wheel tracks, joints and lanes.")
     speckle: float = quantity(0.3, ge=0, le=2, unit="1", description="Noise of intensities by their own p90 - p10.")
     patches: float = quantity(0.2, ge=0, le=2, unit="1", description="The same of patches some metres long and wide.")
     colorless: float = quantity(0.3, ge=0, le=1, unit="1", description="Probability of the colours being left out.")
@@ -212,18 +221,20 @@ def move(stretch: Stretch, effects: Effects, rng: Generator) -> None:
 def relight(stretch: Stretch, effects: Effects, rng: Generator) -> None:
     """Change intensities and colours as another scanner, other materials and another camera would have."""
     numbers = rng.uniform(-1.0, 1.0, 6)
-    share = rng.random(5)
+    share = rng.random(7)
     value = np.maximum(stretch.intensity, 0.0)
     if value.any():
         value = _worn(value, stretch, effects.paint * share[0])
         value = np.where(stretch.paved, value, value * np.exp(effects.contrast * numbers[0]))
-        value *= _falloff(stretch.xyz[:, 1], effects.falloff * share[1], height=20.0 + 15.0 * numbers[1])
+        value = _blurred(value, stretch, effects.footprint * share[5])
+        value *= _falloff(stretch.xyz[:, 1], effects.falloff * share[1], rng)
         low, high = np.log(effects.gamma)
         log = np.exp(low + share[4] * (high - low)) * np.log(np.maximum(value / np.max(value), _DARKEST))
         # Noise by the spread, so that a scanner that compresses its intensities isn't drowned in it.
         spread = float(np.subtract(*np.percentile(log, (90.0, 10.0))))
         noise = effects.speckle * share[2] * rng.standard_normal(len(value))
-        stretch.intensity = np.exp(log + spread * (noise + effects.patches * share[3] * _waves(stretch, rng)))
+        pattern = effects.patches * share[3] * _waves(stretch, rng) + effects.stripes * share[6] * _tracks(stretch, rng)
+        stretch.intensity = np.exp(log + spread * (noise + pattern))
     if rng.random() < effects.colorless:
         stretch.has_color = False
     elif stretch.has_color:
@@ -239,9 +250,49 @@ def _worn(value: Float, stretch: Stretch, share: float) -> Float:
     return np.where(stretch.marked, value + share * np.minimum(pavement - value, 0.0), value)
 
 
-def _falloff(y: Float, power: float, height: float) -> Float:
-    """Return factors (K,) of intensities that fall off with the range from a scanner above the frame's origin."""
-    return (1.0 + (y / height) ** 2) ** (-power / 2.0)
+def _blurred(value: Float, stretch: Stretch, width: float) -> Float:
+    """Return the means of intensities (K,) over a beam's footprint: over points of the slice within half a width in y.
+
+    A line seen by a wide beam is wider and fainter than it is.
+    """
+    if not len(value) or width < _NARROWEST:
+        return value
+    y = stretch.xyz[:, 1] - stretch.xyz[:, 1].min()
+    # Slices far apart from each other on one axis, so that one search finds all windows.
+    place = stretch.number * (2.0 * (float(y.max()) + width)) + y
+    order = np.argsort(place)
+    place = place[order]
+    total = np.concatenate([[0.0], np.cumsum(value[order])])
+    first = np.searchsorted(place, place - 0.5 * width, side="left")
+    last = np.searchsorted(place, place + 0.5 * width, side="right")
+    result = np.empty_like(value)
+    result[order] = (total[last] - total[first]) / (last - first)
+    return result
+
+
+def _falloff(y: Float, power: float, rng: Generator) -> Float:
+    """Return factors (K,) of intensities that fall off with the range from one or two scanners above the road.
+
+    Heights go from a vehicle's to an aircraft's, equally in logarithms. Of two passes beside each other a point belongs
+    to either, the likelier the nearer: seen from near it is bright, and from far dark, in the same place.
+    """
+    passes = int(rng.integers(1, 3))
+    height = np.exp(rng.uniform(*np.log(_SCANNER_HEIGHTS)))
+    square = height**2 + (y[:, None] - rng.uniform(-_SCANNER_ASIDE, _SCANNER_ASIDE, passes)) ** 2
+    nearness = np.cumsum(1.0 / square, axis=1)
+    chosen = (rng.random(len(y))[:, None] * nearness[:, -1:] > nearness).sum(axis=1)
+    result: Float = (square[np.arange(len(y)), chosen] / height**2) ** (-power / 2.0)
+    return result
+
+
+def _tracks(stretch: Stretch, rng: Generator) -> Float:
+    """Return a random function (K,) of about unit deviation that only changes across the road: waves of 0.7 to 6 m."""
+    count = 5
+    rate = 2.0 * np.pi / np.exp(rng.uniform(np.log(0.7), np.log(6.0), count))
+    y = stretch.xyz[:, 1] - np.nan_to_num(stretch.center)[stretch.number]
+    angle = y[:, None] * rate + rng.uniform(0.0, 2.0 * np.pi, count)
+    result: Float = np.cos(angle).sum(axis=1) * np.sqrt(2.0 / count)
+    return result
 
 
 def _waves(stretch: Stretch, rng: Generator) -> Float:

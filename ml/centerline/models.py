@@ -60,8 +60,8 @@ class ModelOptions(Part):
     """Which model, and how large."""
 
     name: Literal["single", "sequence", "transformer"] = Field("transformer", description="Which of the models.")
-    features: tuple[Literal["intensity", "red", "green", "blue", "has_color"], ...] = Field(
-        ("intensity",), description="Attributes of a point beside its place."
+    features: tuple[Literal["intensity", "contrast", "red", "green", "blue", "has_color"], ...] = Field(
+        ("intensity", "contrast"), description="Attributes of a point beside its place."
     )
     kernel_points: int = quantity(25, ge=3, le=1000, unit="1", description="Kernel points across a slice.")
     cells: int = quantity(4, ge=1, le=100, unit="1", description="Cells per spacing of the fixed kernel points.")

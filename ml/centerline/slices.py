@@ -3,9 +3,9 @@
 A sample is a dictionary of tensors; S is the number of slices of a sequence, N that of its points.
 
 - ``coord`` (N, 3) float32: x along the frame, y to its left, z up from the slice's origin, m;
-- ``feat`` (N, 5) float32: intensity, red, green, blue, 1 where colours are known and else 0. Of the sequence's
-  intensities i it is (i - median) / (p90 - p10), cut at +-`FEATURE_LIMIT`; colours are 0 to 1. What a cloud hasn't is
-  noise of `MISSING_NOISE`;
+- ``feat`` (N, 6) float32: intensity and contrast, red, green, blue, 1 where colours are known and else 0. The first two
+  are `intensity.level` and `intensity.contrast` of the sequence, cut at +-`FEATURE_LIMIT`; colours are 0 to 1. What a
+  cloud hasn't is noise of `MISSING_NOISE`;
 - ``offset`` (S,) int64: ends of the slices' points in ``coord``;
 - ``center``, ``angle`` (S,) float32, ``corridor`` (S, K) float32: the truth, see `corridor.CORRIDOR`; NaN if unknown;
 - ``frame`` (S, 4) float64: x, y, direction and z origin (the median height of the slice's points) in the cloud's local
@@ -30,6 +30,7 @@ from synthroads_addon.core.errors import InputError
 from synthroads_addon.core.random_streams import stream
 from synthroads_addon.core.schema import quantity
 
+from . import intensity
 from .corridor import CORRIDOR, TruthKind
 from .effects import HEIGHT, Effects, Stretch, leave_out, transform
 from .frames import Frames, displaced, sequences
@@ -38,11 +39,10 @@ from .roads import Road
 Float = NDArray[np.float64]
 Sample = dict[str, Tensor]
 
-FEATURES = ("intensity", "red", "green", "blue", "has_color")
+FEATURES = ("intensity", "contrast", "red", "green", "blue", "has_color")
 """Columns of ``feat``."""
 FEATURE_LIMIT = 5.0
 MISSING_NOISE = 0.01
-_SMALLEST_SPREAD = 1e-6
 
 
 class SliceSettings(Part):
@@ -284,16 +284,16 @@ def _medians(z: Float, ends: NDArray[np.intp]) -> Float:
 
 
 def _features(cut: Stretch, rng: np.random.Generator) -> Float:
-    """Return the features (K, 5), see the module's description."""
+    """Return the features (K, 6), see the module's description."""
     count = len(cut.number)
     if cut.intensity.any():
-        low, middle, high = np.percentile(cut.intensity, (10.0, 50.0, 90.0))
-        scaled = (cut.intensity - middle) / max(high - low, _SMALLEST_SPREAD * max(abs(middle), 1.0))
-        intensity = np.clip(scaled, -FEATURE_LIMIT, FEATURE_LIMIT)
+        logs = intensity.logarithms(cut.intensity)
+        seen = np.column_stack([intensity.level(logs), intensity.contrast(logs, cut.xyz[:, 1])])
+        brightness = np.clip(seen, -FEATURE_LIMIT, FEATURE_LIMIT)
     else:
-        intensity = MISSING_NOISE * rng.standard_normal(count)
+        brightness = MISSING_NOISE * rng.standard_normal((count, 2))
     colors = cut.rgb if cut.has_color else MISSING_NOISE * rng.standard_normal((count, 3))
-    return np.column_stack([intensity, colors, np.full(count, float(cut.has_color))])
+    return np.column_stack([brightness, colors, np.full(count, float(cut.has_color))])
 
 
 __all__ = [

@@ -32,7 +32,7 @@ NONE = Effects(
     crop=Crop(probability=0.0),
     **dict.fromkeys(("dropout", "hidden", "empty", "jitter", "tilt", "contrast", "paint"), 0.0),
     gamma=(1.0, 1.0),
-    **dict.fromkeys(("falloff", "speckle", "patches", "colorless", "tint"), 0.0),
+    **dict.fromkeys(("falloff", "speckle", "patches", "stripes", "footprint", "colorless", "tint"), 0.0),
 )
 SETTINGS = SliceSettings(points_per_slice=100_000, half_width=18.0)
 
@@ -225,6 +225,48 @@ def test_intensities_fall_off_to_the_sides() -> None:
         falls.append(logs[far].mean() - logs[near].mean())
     assert max(falls) < 0.0
     assert min(falls) < -0.25
+
+
+def test_two_passes_beside_each_other_light_a_place_twice() -> None:
+    """Somewhere between two scanners near by, points of one place are bright and dark; from one they are alike."""
+    scatter = []
+    for seed in range(30):
+        one, logs = relit("falloff", 4.0, seed)
+        near = np.abs(one.xyz[:, 1] - one.xyz[0, 1]) < 0.3
+        scatter.append(float(np.ptp(logs[near])))
+    assert sorted(scatter)[10] < 0.3
+    assert max(scatter) > 1.5
+
+
+def test_a_wide_footprint_smears_lines() -> None:
+    """A line gets fainter, and asphalt within half a footprint of it or of the grass brighter."""
+    widest, fainter = 0.0, 0.0
+    for seed in range(8):
+        _, logs = relit("footprint", 2.0, seed)
+        plain = cut()
+        bare = plain.paved & ~plain.marked
+        logs -= np.median(logs[bare])
+        assert logs[plain.marked].max() < 0.3
+        fainter = min(fainter, float(np.median(logs[plain.marked])))
+        brighter = bare & (logs > 0.5)
+        for number in range(10):
+            line = plain.xyz[(plain.marked | ~plain.paved) & (plain.number == number), 1]
+            beside = plain.xyz[brighter & (plain.number == number), 1]
+            apart = np.abs(beside[:, None] - line[None, :]).min(axis=1) if len(beside) and len(line) else np.zeros(1)
+            widest = max(widest, float(apart.max()))
+    assert 0.3 < widest <= 1.0
+    assert fainter < -0.5
+
+
+def test_tracks_run_along_the_road() -> None:
+    one, logs = max((relit("stripes", 1.0, seed) for seed in range(8)), key=lambda found: found[1].std())
+    across = one.xyz[:, 1] - one.center[one.number]
+    cell = np.round(across / 0.1).astype(int) - round(across.min() / 0.1)
+    counts = np.bincount(cell)
+    means = np.bincount(cell, logs) / np.maximum(counts, 1)
+    within = np.sqrt(np.mean((logs - means[cell]) ** 2))
+    assert logs.std() > 0.3
+    assert within < 0.35 * logs.std()
 
 
 def test_contrast_of_the_pavement_to_what_lies_beside_it() -> None:

@@ -1,0 +1,61 @@
+"""Intensities as a model sees them: alike from scanners of any gain, range and compression.
+
+Raw intensities fall with the square of the range, so that a vehicle's scanner sees the lane below it a hundred times as
+bright as the next carriageway; others are delivered corrected, or squeezed by a power. What all have in common is that
+a line is brighter than what lies beside it. So there are two features, both of logarithms, in which a gain is a shift
+and a power a factor: the `level` on the whole, and the `contrast` to what is around.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+Float = NDArray[np.float64]
+
+DARKEST = 0.01
+"""Intensities below this share of the median count as it."""
+_BIN = 0.5
+"""Width across the road over which a median is taken, m."""
+_AROUND = 3
+"""Bins to either side whose medians' median is what is around: wider than any line, narrower than a lane's."""
+_SMALLEST = 1e-3
+"""Logarithms that differ by less are the same."""
+
+
+def logarithms(intensity: Float) -> Float:
+    """Return the natural logarithms (K,) of intensities (K,) >= 0, those next to nothing raised to `DARKEST`."""
+    positive = intensity[intensity > 0.0]
+    floor = DARKEST * float(np.median(positive)) if len(positive) else 1.0
+    result: Float = np.log(np.maximum(intensity, floor))
+    return result
+
+
+def level(logs: Float) -> Float:
+    """Return logarithms (K,) less their median, by the distance of their 10th and 90th percentiles."""
+    low, middle, high = np.percentile(logs, (10.0, 50.0, 90.0))
+    return (logs - middle) / max(float(high - low), _SMALLEST)
+
+
+def contrast(logs: Float, y: Float) -> Float:
+    """Return logarithms (K,) less what is usual around their place across the road, by their root mean square.
+
+    Args:
+        logs: of the intensities of a sequence's points.
+        y: (K,) their places across the road, m.
+    """
+    cell = np.floor(y / _BIN).astype(np.intp)
+    first = int(cell.min())
+    cell -= first
+    order = np.lexsort((logs, cell))
+    counts = np.bincount(cell)
+    starts = np.concatenate([[0], np.cumsum(counts)[:-1]])
+    # The lower median, of the bins that have points.
+    there = counts > 0
+    medians = np.full(len(counts) + 2 * _AROUND, np.nan)
+    medians[_AROUND:-_AROUND][there] = logs[order[starts[there] + (counts[there] - 1) // 2]]
+    windows = np.lib.stride_tricks.sliding_window_view(medians, 2 * _AROUND + 1)[there]
+    around = np.nanmedian(windows, axis=1)
+    usual = np.interp(y, _BIN * (first + np.flatnonzero(there) + 0.5), around)
+    rest = logs - usual
+    return rest / max(float(np.sqrt(np.mean(rest * rest))), _SMALLEST)
