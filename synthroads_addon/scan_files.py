@@ -154,6 +154,7 @@ def make_finish(
         scanned=scan.surfaces,
         setting=scan.setting,
         intensity_from_layers=scenario.colour.intensity_from_layers,
+        range_corrected=scenario.cloud.intensity == "range_corrected",
         relief=micro_relief(scan.target.materials, rows) if scenario.scan.relief > 0.0 else None,
         strength=scenario.scan.relief,
         octaves=scenario.settings().relief_octaves,
@@ -319,7 +320,8 @@ class ScanToFiles:
         self.counts = ScanCounts()
         # 16 bits are full for a white target at a right angle at half the usual range: only what is nearer or a
         # retro-reflector is brighter, and the weakest echoes still have hundreds of steps.
-        usual = 65535.0 * max(1.0, scan.path.typical_range / 2.0) ** 2
+        corrected = scenario.cloud.intensity == "range_corrected"
+        usual = 65535.0 / 4.0 * (1.0 if corrected else max(2.0, scan.path.typical_range) ** 2)
         self.intensity_scale = scenario.cloud.intensity_scale or usual
 
     def run(self) -> Generator[float, None, None]:

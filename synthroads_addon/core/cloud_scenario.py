@@ -12,9 +12,10 @@ from .road_scenario import ScenarioModel
 from .schema import quantity
 
 CloudFormat = Literal["laz", "las", "ply", "e57", "npz"]
+Intensity = Literal["received", "range_corrected"]
 CLOUD_FORMATS: tuple[CloudFormat, ...] = get_args(CloudFormat)
 
-__all__ = ["CLOUD_FORMATS", "CloudFormat", "CloudScenario", "needs"]
+__all__ = ["CLOUD_FORMATS", "CloudFormat", "CloudScenario", "Intensity", "needs"]
 
 
 class CloudScenario(ScenarioModel):
@@ -27,6 +28,9 @@ class CloudScenario(ScenarioModel):
     classes: str = Field("17", min_length=1, description="17, 5, or a JSON file of classes of one's own.")
     point_spacing: float | None = quantity(
         None, ge=0.001, le=10, unit="m", description="Grid of which one point per cell is kept; all if not given."
+    )
+    intensity: Intensity = Field(
+        "received", description="As received, or times the squared range: what instruments call reflectance."
     )
     intensity_scale: float | None = quantity(
         None, gt=0, unit="1", description="16-bit steps per unit of intensity; by the usual range if not given."

@@ -34,8 +34,9 @@ class Striped:
         return values
 
 
-def finish_of(scan: Scan, source: Any, by_layers: bool = True) -> Finish:
-    return Finish(source, frozenset(), scan.surfaces, scan.surfaces, scan.setting, by_layers, None, 0.0, 4, 1, KEPT)
+def finish_of(scan: Scan, source: Any, by_layers: bool = True, corrected: bool = False) -> Finish:
+    of = (scan.surfaces, scan.surfaces, scan.setting)
+    return Finish(source, frozenset(), *of, by_layers, corrected, None, 0.0, 4, 1, KEPT)
 
 
 def finished(scan: Scan, dark: float, bright: float, material: str = "asphalt") -> BlockResult:
@@ -154,3 +155,23 @@ def test_what_beads_send_back_does_not_depend_on_the_layers() -> None:
     middle = np.argmin(plain.incidence_deg)
     expected = (painted + row.retroreflection) / (diffuse + row.retroreflection)
     assert black.intensity[middle] / plain.intensity[middle] == pytest.approx(expected, rel=1e-3)
+
+
+def test_corrected_intensities_do_not_depend_on_the_range() -> None:
+    """A plane from far and from near: as received they differ by the squares, corrected they are the same."""
+    found = {}
+    for height in (20.0, 60.0):
+        scan = flying()
+        pose = scan.path.pose
+        scan.path.pose = lambda strip, time, pose=pose, height=height: (  # type: ignore[method-assign]
+            pose(strip, time)[0] * [1.0, 1.0, height / 60.0],
+            pose(strip, time)[1],
+        )
+        later = replace(scan, targets=True, detects_later=True, wanted=scan.wanted | {"material"})
+        source = Striped("asphalt", 0.2, 0.2)
+        both = [finish_of(later, source, corrected=corrected)(middle_pulses(later, 200)) for corrected in (False, True)]
+        received, corrected = (result.points for result in both)
+        np.testing.assert_allclose(corrected.intensity, received.intensity * received.range**2, rtol=1e-12)
+        found[height] = [float(np.median(points.intensity)) for points in (received, corrected)]
+    assert found[20.0][0] == pytest.approx(9.0 * found[60.0][0], rel=0.01)
+    assert found[20.0][1] == pytest.approx(found[60.0][1], rel=0.01)

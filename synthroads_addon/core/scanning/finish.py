@@ -34,6 +34,7 @@ class Finish:
         scanned: the materials' means that the scan was made with.
         setting: the scanner's, for its detector.
         intensity_from_layers: each point's intensity is that of its own layers; the scan left the detector to this.
+        range_corrected: intensities are multiplied by the squared range, after the detector.
         relief: of the materials; None without.
         strength: of the relief.
         octaves: of the relief.
@@ -47,6 +48,7 @@ class Finish:
     scanned: Surfaces
     setting: ScannerSetting
     intensity_from_layers: bool
+    range_corrected: bool
     relief: MicroRelief | None
     strength: float
     octaves: int
@@ -60,8 +62,10 @@ class Finish:
         points = result.points
         if result.seen is not None and self.relief is not None and self.strength > 0.0:
             points = adjusted(points, result.seen.position, self.relief, self.strength, self.seed, self.octaves)
-        dropped: dict[str, Any] = {name: None for name in OPTIONAL if name not in self.kept}
-        return replace(result, points=replace(points, **dropped), seen=None)
+        changes: dict[str, Any] = {name: None for name in OPTIONAL if name not in self.kept}
+        if self.range_corrected:
+            changes["intensity"] = points.intensity * points.range**2
+        return replace(result, points=replace(points, **changes), seen=None)
 
     def _coloured(self, result: BlockResult, seen: Targets) -> BlockResult:
         layers = self.wanted | (_OF_INTENSITY if self.intensity_from_layers else frozenset())
