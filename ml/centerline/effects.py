@@ -25,6 +25,10 @@ _DARKEST = 1e-5
 """Intensities below this share of the brightest count as it."""
 _NARROWEST = 0.02
 """A footprint narrower than this is a point, m."""
+_LINE_REACH = 0.5
+"""Paint within so far of a line's place is the line's, m."""
+_LINE_WIDTHS = (0.12, 0.6)
+"""Of a solid lane line: one narrow line to a double one with what lies between, m."""
 _SCANNER_HEIGHTS = (1.5, 60.0)
 _SCANNER_ASIDE = 15.0
 """Of the scanners from whose range intensities fall off: lowest and highest, and farthest from the path, m."""
@@ -108,6 +112,14 @@ class Effects(Part):
     tilt: float = quantity(0.01, ge=0, le=0.2, unit="1", description="Cross slope and grade that are added.")
     contrast: float = quantity(1.5, ge=0, le=3, unit="1", description="Log of the factor on what isn't pavement.")
     paint: float = quantity(0.95, ge=0, le=1, unit="1", description="Share of the markings' brightness worn off.")
+    repaint: float = quantity(
+        0.3,
+        ge=0,
+        le=0.5,
+        unit="1",
+        description="Probability that a carriageway's lane line is solid, that it is worn "
+        "off, and that an edge line is.",
+    )
     gamma: tuple[float, float] = Field((0.15, 1.5), description="Smallest and largest power of the intensities.")
     falloff: float = quantity(
         4.0, ge=0, le=10, unit="1", description="Power of the range fall-off from scanners somewhere above the road."
@@ -224,7 +236,8 @@ def relight(stretch: Stretch, effects: Effects, rng: Generator) -> None:
     share = rng.random(7)
     value = np.maximum(stretch.intensity, 0.0)
     if value.any():
-        value = _worn(value, stretch, effects.paint * share[0])
+        value, marked = _repainted(value, stretch, effects.repaint, rng)
+        value = _worn(value, stretch.paved, marked, effects.paint * share[0])
         value = np.where(stretch.paved, value, value * np.exp(effects.contrast * numbers[0]))
         value = _blurred(value, stretch, effects.footprint * share[5])
         value *= _falloff(stretch.xyz[:, 1], effects.falloff * share[1], rng)
@@ -241,13 +254,36 @@ def relight(stretch: Stretch, effects: Effects, rng: Generator) -> None:
         stretch.rgb = np.clip(stretch.rgb * np.exp(effects.tint * (numbers[2] + numbers[3:6])), 0.0, 1.0)
 
 
-def _worn(value: Float, stretch: Stretch, share: float) -> Float:
+def _repainted(value: Float, stretch: Stretch, probability: float, rng: Generator) -> tuple[Float, NDArray[np.bool_]]:
+    """Return intensities and what is marked (K,) where a carriageway's lines are painted otherwise.
+
+    Two lanes are parted by dashes on motorways; on rural roads as well by a solid or a double line, or by none.
+    """
+    lane, left, right, width = rng.random(4)
+    marked, bare = stretch.marked, stretch.paved & ~stretch.marked
+    if not np.isfinite(stretch.room).any() or not marked.any() or not bare.any():
+        return value, marked
+    paint, pavement = float(np.median(value[marked])), float(np.median(value[bare]))
+    y = stretch.xyz[:, 1] - stretch.center[stretch.number]
+    edges = stretch.lines[stretch.number] * [1.0, -1.0]
+    gone = np.zeros(len(value), dtype=bool)
+    for happens, offset in ((left, edges[:, 0]), (right, edges[:, 1]), (1.0 - lane, 0.0)):
+        if happens < probability:
+            gone |= marked & (np.abs(y - offset) < _LINE_REACH)
+    if lane < probability:
+        low, high = _LINE_WIDTHS
+        painted = stretch.paved & (np.abs(y) < 0.5 * (low + (high - low) * width))
+        value, marked = np.where(painted, paint, value), marked | painted
+    return np.where(gone, pavement, value), marked & ~gone
+
+
+def _worn(value: Float, paved: NDArray[np.bool_], marked: NDArray[np.bool_], share: float) -> Float:
     """Return intensities whose markings have lost a share of what they are brighter than the pavement."""
-    bare = stretch.paved & ~stretch.marked
-    if not stretch.marked.any() or not bare.any():
+    bare = paved & ~marked
+    if not marked.any() or not bare.any():
         return value
     pavement = float(np.median(value[bare]))
-    return np.where(stretch.marked, value + share * np.minimum(pavement - value, 0.0), value)
+    return np.where(marked, value + share * np.minimum(pavement - value, 0.0), value)
 
 
 def _blurred(value: Float, stretch: Stretch, width: float) -> Float:

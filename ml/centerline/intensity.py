@@ -19,6 +19,10 @@ _BIN = 0.5
 """Width across the road over which a median is taken, m."""
 _AROUND = 3
 """Bins to either side whose medians' median is what is around: wider than any line, narrower than a lane's."""
+QUIETEST = 0.05
+"""Noise by the distance of the logarithms' 10th and 90th percentiles: less is taken for this."""
+_SPREAD_20_80 = 1.683
+"""Distance of a Gaussian's 20th and 80th percentiles, in deviations."""
 _SMALLEST = 1e-3
 """Logarithms that differ by less are the same."""
 
@@ -33,12 +37,19 @@ def logarithms(intensity: Float) -> Float:
 
 def level(logs: Float) -> Float:
     """Return logarithms (K,) less their median, by the distance of their 10th and 90th percentiles."""
-    low, middle, high = np.percentile(logs, (10.0, 50.0, 90.0))
-    return (logs - middle) / max(float(high - low), _SMALLEST)
+    return (logs - float(np.median(logs))) / max(_spread(logs), _SMALLEST)
+
+
+def _spread(logs: Float) -> float:
+    low, high = np.percentile(logs, (10.0, 90.0))
+    return float(high - low)
 
 
 def contrast(logs: Float, y: Float) -> Float:
-    """Return logarithms (K,) less what is usual around their place across the road, by their root mean square.
+    """Return logarithms (K,) less what is usual around their place across the road, by their usual noise.
+
+    The noise is that of a Gaussian with the same 20th and 80th percentiles: lines are too few to matter. It counts as
+    `QUIETEST` where there is less.
 
     Args:
         logs: of the intensities of a sequence's points.
@@ -58,4 +69,5 @@ def contrast(logs: Float, y: Float) -> Float:
     around = np.nanmedian(windows, axis=1)
     usual = np.interp(y, _BIN * (first + np.flatnonzero(there) + 0.5), around)
     rest = logs - usual
-    return rest / max(float(np.sqrt(np.mean(rest * rest))), _SMALLEST)
+    low, high = np.percentile(rest, (20.0, 80.0))
+    return rest / max(float(high - low) / _SPREAD_20_80, QUIETEST * max(_spread(logs), _SMALLEST))
