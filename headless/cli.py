@@ -6,6 +6,7 @@ Exit codes: 0 done; 1 a defect of ours; 2 bad input; 3 violations found, or scen
 from __future__ import annotations
 
 import argparse
+import io
 import os
 import sys
 from collections.abc import Callable, Iterator, Sequence
@@ -138,8 +139,13 @@ def run(action: Callable[[argparse.Namespace], Outcome], arguments: argparse.Nam
         os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
         return 130
     except KeyboardInterrupt:
-        print("interrupted; nothing was left half-written", file=sys.stderr)
-        return 130
+        return interrupted()
+
+
+def interrupted() -> int:
+    """Say that the user stopped the work; return the exit code."""
+    print("interrupted; nothing was left half-written", file=sys.stderr)
+    return 130
 
 
 def entry(name: str) -> None:
@@ -160,8 +166,13 @@ def console() -> None:
 
 def leave(action: Callable[[], int]) -> None:
     """Run an action and end the process with its exit code, without Blender's teardown."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):  # names of files may hold what the terminal's encoding doesn't
+            stream.reconfigure(errors="backslashreplace")
     try:
         code = action()
+    except KeyboardInterrupt:  # before the command's own work began, or at its very end
+        code = interrupted()
     except SystemExit as error:
         code = error.code if isinstance(error.code, int) else 0 if error.code is None else 1
     except BaseException:

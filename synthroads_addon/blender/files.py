@@ -18,3 +18,10 @@ def empty_file() -> None:
 def save_scene(path: Path, compress: bool = True) -> None:
     """Save a copy of the open file, compressed if not told otherwise; the open file keeps its own name and state."""
     bpy.ops.wm.save_as_mainfile(filepath=str(path), copy=True, compress=compress, check_existing=False)
+
+
+def complaint(error: Exception) -> str:
+    """Return what Blender complains of in one line, without its prefix; of a traceback the last line."""
+    lines = [line.strip() for line in str(error).splitlines() if line.strip()]
+    text = lines[-1] if any("Traceback" in line for line in lines) else " ".join(lines)
+    return text.removeprefix("Error:").strip() or type(error).__name__

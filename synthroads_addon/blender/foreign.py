@@ -8,7 +8,7 @@ from typing import Any, Literal
 import bpy
 
 from ..core.errors import InputError, MissingFileError
-from .files import empty_file
+from .files import complaint, empty_file
 
 UpAxis = Literal["y", "z"]
 
@@ -73,7 +73,7 @@ def open_scene(path: Path, up: UpAxis | None = None) -> None:
         options: dict[str, Any] = dict(_AXES[up]) if up else {}
         getattr(getattr(bpy.ops, module), name)(filepath=place, **options)
     except (AttributeError, RuntimeError) as error:
-        raise InputError("SCENE", str(path), f"can't be read by Blender: {_one_line(error)}") from None
+        raise InputError("SCENE", str(path), f"can't be read by Blender: {complaint(error)}") from None
 
 
 def open_scene_warnings() -> list[str]:
@@ -88,10 +88,3 @@ def open_scene_warnings() -> list[str]:
     if units.system != "NONE" and abs(scale - 1.0) > 1e-6:
         found.append(f"the scene's unit scale is {scale:g}: it is scanned as if a unit were 1 m")
     return found
-
-
-def _one_line(error: Exception) -> str:
-    """Return Blender's complaint without its prefix; of a traceback the last line."""
-    lines = [line.strip() for line in str(error).splitlines() if line.strip()]
-    text = lines[-1] if any(line.startswith("Traceback") for line in lines) else " ".join(lines)
-    return text.removeprefix("Error:").strip() or type(error).__name__

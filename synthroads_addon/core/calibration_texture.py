@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from PIL import Image, UnidentifiedImageError
+from PIL import Image
 
 from .errors import InputError, MissingFileError
 from .materials import Material
@@ -67,7 +67,7 @@ def read_texture(path: Path, width: float, material: Material) -> Texture:
             stored = np.asarray(image.convert("RGB"), dtype=np.float64) / 255.0
     except FileNotFoundError:
         raise MissingFileError(str(path), None, "no such file") from None
-    except (UnidentifiedImageError, OSError, Image.DecompressionBombError):
+    except Exception:  # each of PIL's formats has errors of its own for what is damaged
         raise InputError(str(path), None, "is no image that can be read") from None
     return texture_of(linear_of(stored), width, material)
 

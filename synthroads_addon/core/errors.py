@@ -27,8 +27,8 @@ class InputError(SynthRoadsError):
         self.field = field
         self.value = value
         self.allowed = allowed
-        shown = "" if value is None else f" is {_short(value)}"
-        super().__init__(f"{field}{shown}: {allowed}")
+        shown = "" if value is None else f" is {_short(repr(value), _LONGEST_VALUE)}"
+        super().__init__(f"{_short(field, _LONGEST_FIELD)}{shown}: {_short(allowed, _LONGEST_ALLOWED)}")
 
 
 class MissingFileError(InputError):
@@ -49,8 +49,15 @@ def nearest_name(name: str, known: Iterable[str]) -> str:
     return f" (did you mean '{close[0]}'?)" if close else ""
 
 
-def _short(value: object, limit: int = 160) -> str:
-    """Return a value as one line of text; a long one loses its middle, as the end of a path says most."""
-    text = " ".join(repr(value).split())
+_LONGEST_FIELD, _LONGEST_VALUE, _LONGEST_ALLOWED = 300, 160, 1000
+"""Characters that are shown of a message's parts: all three may hold what a file said, of any length."""
+
+
+def _short(text: str, limit: int) -> str:
+    """Return a text as one printable line; a long one loses its middle, as the end of a path says most."""
+    if len(text) > 4 * limit:  # what is left out need not be looked at
+        text = f"{text[: 2 * limit]}{text[-2 * limit :]}"
+    text = " ".join(text.split())
+    text = "".join(sign if sign.isprintable() else repr(sign)[1:-1] for sign in text)
     half = limit // 2 - 2
     return text if len(text) <= limit else f"{text[:half]}...{text[-half:]}"

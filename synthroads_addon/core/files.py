@@ -1,15 +1,56 @@
-"""Writing a job's files so that nothing half-written ever stands under its final name."""
+"""Reading text files, and writing a job's files so that nothing half-written ever stands under its final name."""
 
 from __future__ import annotations
 
 import errno
+import os
 import shutil
 import tempfile
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from .errors import OutputError
+from .errors import InputError, MissingFileError, OutputError
+
+
+def read_text(path: str | os.PathLike[str], kind: str, wanted: str = "", encoding: str = "utf-8") -> str:
+    """Return the content of a text file.
+
+    Args:
+        path: of the file.
+        kind: what is said where it is no text, e.g. ``must be JSON in UTF-8``.
+        wanted: what is said before the system's own words where it can't be read, e.g. ``an axis file is needed here``.
+        encoding: ``utf-8-sig`` takes a byte order mark as well.
+
+    Raises:
+        MissingFileError: the file doesn't exist or cannot be read.
+        InputError: it is no text.
+    """
+    name = os.fspath(path)
+    try:
+        return Path(name).read_text(encoding=encoding)
+    except OSError as error:
+        if isinstance(error, FileNotFoundError) and not wanted:
+            raise MissingFileError(name, None, "no such file") from None
+        reason = os.strerror(error.errno or 0)
+    except UnicodeDecodeError:
+        raise InputError(name, None, kind) from None
+    except ValueError as error:  # no name of a file: it holds a null byte
+        reason = str(error)
+    raise MissingFileError(name, None, f"{wanted or 'cannot be read'} ({reason})")
+
+
+def stamp(path: str, wanted: str) -> tuple[int, int]:
+    """Return when a file was last changed (ns) and its size (bytes), by which one that was read is known again.
+
+    Raises:
+        MissingFileError: it doesn't exist; ``wanted`` is said before the system's own words.
+    """
+    try:
+        found = Path(path).stat()
+    except (OSError, ValueError) as error:  # ValueError: its name holds a null byte
+        raise MissingFileError(path, None, f"{wanted} ({getattr(error, 'strerror', None) or error})") from None
+    return found.st_mtime_ns, found.st_size
 
 
 @contextmanager

@@ -7,6 +7,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Discriminator, Field, Tag, model_validator
 
 from .parameters.limits import SECTIONS_OF_CLASS, STANDARD_CROSS_SECTIONS
+from .parameters.model_section import SHORTEST_DASH
 from .parameters.model_surroundings import GRASSES, SHRUBS, TREES
 from .schema import Model, quantity
 
@@ -108,8 +109,12 @@ class PavementLimits(ScenarioModel):
 class MarkingLimits(ScenarioModel):
     """Line markings; what isn't given follows the RMS."""
 
-    lane_dash: float | None = quantity(None, gt=0, le=100, unit="m", description="Dash of lane lines; 6 m by the RMS.")
-    lane_gap: float | None = quantity(None, gt=0, le=100, unit="m", description="Gap of lane lines; 12 m by the RMS.")
+    lane_dash: float | None = quantity(
+        None, ge=SHORTEST_DASH, le=100, unit="m", description="Dash of lane lines; 6 m by the RMS."
+    )
+    lane_gap: float | None = quantity(
+        None, ge=SHORTEST_DASH, le=100, unit="m", description="Gap of lane lines; 12 m by the RMS."
+    )
     film_thickness: Interval = interval(0.0015, 0.004, "m", "Thickness of the film.")
 
 

@@ -22,6 +22,8 @@ SCENARIOS = Path(__file__).parents[1] / "presets" / "scenarios"
 
 Output = Literal["parameters", "cloud", "centerline", "scene", "previews"]
 OUTPUTS: tuple[Output, ...] = get_args(Output)
+_DEEPEST = 20
+"""Dots in the path of a change: more fields don't lie in each other."""
 
 
 class Scenario(ScenarioModel):
@@ -135,11 +137,11 @@ def apply_change(data: Any, change: str) -> Any:
 def parsed_change(change: str) -> tuple[str, Any]:
     """Return path and value of ``path=value``; raise `InputError` if it has another form."""
     path, equals, text = change.partition("=")
-    if not equals or not path:
+    if not equals or not path or path.count(".") > _DEEPEST:
         raise InputError("--set", change, "must be path=value, e.g. road.length=800")
     try:
         return path, json.loads(text)
-    except ValueError:
+    except (ValueError, RecursionError):
         return path, text
 
 

@@ -7,7 +7,6 @@ declarations, and its limits, units and descriptions can be read back by the pan
 from __future__ import annotations
 
 import json
-import os
 import re
 from collections.abc import Sequence
 from functools import cache
@@ -17,7 +16,8 @@ from typing import Any, ClassVar, TypeVar, get_args
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 from pydantic.fields import FieldInfo
 
-from .errors import InputError, MissingFileError, nearest_name
+from .errors import InputError, nearest_name
+from .files import read_text
 
 VENDOR_PREFIX = "+"
 """Keys that begin with this are a vendor's own: read, kept, written back, never interpreted (CityJSON's habit)."""
@@ -155,22 +155,17 @@ def rounded(value: float, digits: int = 9) -> float:
 
 
 def read_json(path: Path | str) -> Any:
-    """Read a JSON file; NaN and infinity are refused, as JSON has none.
+    """Read a JSON file; NaN and infinity are refused, as JSON has none, and so is a key that an object has twice.
 
     Raises:
         MissingFileError: there is no such file, or it can't be read.
         InputError: it isn't JSON; the message names line and column.
     """
+    text = read_text(path, "must be JSON in UTF-8")
     try:
-        text = Path(path).read_text(encoding="utf-8")
-    except FileNotFoundError:
-        raise MissingFileError(str(path), None, "no such file") from None
-    except UnicodeDecodeError:
-        raise InputError(str(path), None, "must be JSON in UTF-8") from None
-    except OSError as error:
-        raise MissingFileError(str(path), None, f"cannot be read ({os.strerror(error.errno or 0)})") from None
-    try:
-        data = json.loads(text, parse_constant=_refuse_constant, parse_float=_finite)
+        data = json.loads(
+            text, parse_constant=_refuse_constant, parse_float=_finite, object_pairs_hook=_refuse_key_twice
+        )
         if "\\u" in text:
             json.dumps(data, ensure_ascii=False).encode()  # refuses half a surrogate pair, which no file could hold
         return data
@@ -187,18 +182,18 @@ def read_yaml(path: Path) -> Any:
     """
     import yaml
 
+    from .yaml_loader import Loader
+
+    text = read_text(path, "must be YAML in UTF-8")
     try:
-        # YAML 1.1 takes 1e-3 for text, since it lacks a point; people who write it mean the number.
-        loader: Any = type("Loader", (yaml.SafeLoader,), {})
-        loader.add_implicit_resolver("tag:yaml.org,2002:float", _EXPONENT, list("-+0123456789"))
-        data = yaml.load(path.read_text(encoding="utf-8"), Loader=loader)
-        return json.loads(json.dumps(data, allow_nan=False))
-    except FileNotFoundError:
-        raise MissingFileError(str(path), None, "no such file") from None
-    except OSError as error:
-        raise MissingFileError(str(path), None, f"cannot be read ({error.strerror})") from None
-    except (yaml.YAMLError, UnicodeDecodeError, ValueError, TypeError, RecursionError) as error:
-        raise InputError(str(path), None, f"must be valid YAML ({' '.join(str(error).split())})") from None
+        data = json.loads(json.dumps(yaml.load(text, Loader=Loader), allow_nan=False))
+        if "\\" in text:
+            json.dumps(data, ensure_ascii=False).encode()  # refuses half a surrogate pair, which no file could hold
+        return data
+    except (yaml.YAMLError, ValueError, TypeError, RecursionError) as error:
+        raise InputError(str(path), None, f"must be valid YAML ({error})") from None
+    except (LookupError, AttributeError):  # PyYAML's own, of a tag such as !!int before what isn't one
+        raise InputError(str(path), None, "must be valid YAML (a value is not what its tag says)") from None
 
 
 def unit_of(field: FieldInfo) -> str:
@@ -218,7 +213,15 @@ def _finite(text: str) -> float:
     return value
 
 
-_EXPONENT = re.compile(r"[-+]?\d+[eE][-+]?\d+$")
+def _refuse_key_twice(members: list[tuple[str, Any]]) -> dict[str, Any]:
+    """Return an object; the usual reading keeps the last of two like keys and drops the other without a word."""
+    data = dict(members)
+    if len(data) < len(members):
+        keys = [key for key, _ in members]
+        raise ValueError(f"an object has the key {next(key for key in keys if keys.count(key) > 1)!r} twice")
+    return data
+
+
 _WORDING = {
     "missing": "is required",
     "model_type": "must be a JSON object",

@@ -132,10 +132,16 @@ def _element(data: dict[str, Any]) -> dict[str, Any]:
     }[data["kind"]]
 
 
+def _axis(data: dict[str, Any]) -> dict[str, Any]:
+    share = min(1.0, 9e5 / sum(element["length"] for element in data["horizontal"]))
+    return {"horizontal": [{**element, "length": element["length"] * share} for element in data["horizontal"]]}
+
+
 def _line(data: dict[str, Any]) -> dict[str, Any]:
     solid = data["dash_length"] == 0 or data["gap_length"] == 0
     turnout = data["kind"] in ("turnout_edge", "gore_edge")
-    return ({"dash_length": 0.0, "gap_length": 0.0} if solid else {}) | {"turnout": "exit" if turnout else None}
+    longer = {name: max(data[name], 0.05) for name in ("dash_length", "gap_length")}
+    return ({"dash_length": 0.0, "gap_length": 0.0} if solid else longer) | {"turnout": "exit" if turnout else None}
 
 
 def _turnout(data: dict[str, Any]) -> dict[str, Any]:
@@ -162,6 +168,7 @@ def _gantry(data: dict[str, Any]) -> dict[str, Any]:
 
 
 _RULES = {
+    "AlignmentObject": _axis,
     "HorizontalElement": _element,
     "LineMarking": _line,
     "Turnout": _turnout,
@@ -245,6 +252,7 @@ LIBRARY_ONLY = {
     "ids name objects that are there": "must name (a Carriageway|an exit or entry)",
     "lanes and lane boundaries are there": "must name a lane boundary|must be less than the number of lanes",
     "stations of a width's points increase": "must be greater than the one before",
+    "the alignment is at most 1000 km long": "must be at most 1e\\+06 m long together",
     "an arc's curvatures are equal, a clothoid's differ": "kind '(arc|clothoid)' contradicts",
     "a vegetation's band and heights end after they begin": "must not be less than band_start and height_min",
     "a gantry's left end lies left of its right end": "left_offset must be greater than right_offset",

@@ -207,6 +207,10 @@ BROKEN = {
     "ids name objects that are there": _object("line", carriageway="rail"),
     "lanes and lane boundaries are there": _object("line", boundary=3),
     "stations of a width's points increase": _object("road", side="left", verge_width=POINTS[::-1]),
+    "the alignment is at most 1000 km long": {
+        "alignment": SMALL_ROAD["objects"]["alignment"]
+        | {"horizontal": [{"kind": "line", "length": 6e5, "curvature_start": 0.0, "curvature_end": 0.0}] * 2}
+    },
     "an arc's curvatures are equal, a clothoid's differ": {
         "alignment": SMALL_ROAD["objects"]["alignment"]
         | {"horizontal": [{"kind": "arc", "length": 1.0, "curvature_start": 0.0, "curvature_end": 0.0}]}

@@ -15,6 +15,7 @@ from ...core.parameters.assets import LibraryAsset, library_file, read_asset_lib
 from ...core.parameters.model import Asset
 from ...core.parameters.surface import surface_elevation
 from ...core.turns import by_caller
+from ..files import complaint
 from ..meshes import on_plan
 from ..model_builder import ModelBuilder
 from ..scene_labels import CLASS_PROPERTY, INSTANCE_PROPERTY
@@ -60,7 +61,7 @@ def _collection(path: Path, asset: LibraryAsset) -> bpy.types.Collection:
     try:
         objects = by_caller(lambda: read(path, asset.object))  # importers need Blender's main thread
     except (OSError, RuntimeError) as error:
-        raise InputError(str(path), None, f"cannot be read as an asset ({str(error).splitlines()[0]})") from None
+        raise InputError(str(path), None, f"cannot be read as an asset ({complaint(error)})") from None
     if not objects:
         raise InputError(str(path), asset.object, "holds no such object" if asset.object else "holds no objects")
     collection = bpy.data.collections.new(f"SR Asset {path.stem}")

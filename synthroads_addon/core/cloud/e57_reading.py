@@ -14,7 +14,7 @@ from ..errors import InputError
 from .attributes import COLUMNS, columns, gather
 from .e57 import EXTENSION, e57_name, library
 from .points import PointBlock
-from .reading import BLOCK, CloudHeader, CloudReader, damaged, header_from_notes
+from .reading import BLOCK, CloudHeader, CloudReader, damaged, finite_coordinates, header_from_notes
 
 _STANDARD = {
     *("cartesianX", "cartesianY", "cartesianZ", "intensity", "colorRed", "colorGreen", "colorBlue", "timeStamp"),
@@ -85,7 +85,9 @@ class E57Reader(CloudReader):
                     raise damaged(self.header.path, done, self.header.count)
                 block = self._block({name: array[:got] for name, array in arrays.items()}, got, _pose(scan))
                 invalid = arrays["cartesianInvalidState"][:got] if "cartesianInvalidState" in arrays else None
-                yield block if invalid is None else block.select(invalid == 0)
+                block = block if invalid is None else block.select(invalid == 0)
+                finite_coordinates(self.header.path, done, block.xyz)
+                yield block
                 done, left = done + got, left - got
             if reader:
                 reader.close()

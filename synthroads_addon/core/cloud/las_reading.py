@@ -16,11 +16,16 @@ from numpy.typing import NDArray
 from ..errors import InputError
 from .attributes import attributes_of, columns, gather
 from .labels import asprs_scheme, class_scheme, stored_scheme
+from .laz_chunks import check_chunks
 from .las import SCAN_ANGLE_STEP
 from .points import PointBlock
-from .reading import BLOCK, CloudHeader, CloudReader, damaged, epsg_of
+from .reading import BLOCK, CloudHeader, CloudReader, damaged, epsg_of, intensity_scale
 
-_FAULTS = (laspy.errors.LaspyException, lazrs.LazrsError, ValueError, struct.error, OSError, EOFError, MemoryError)
+_FAULTS = (
+    *(laspy.errors.LaspyException, lazrs.LazrsError, ValueError, struct.error, OSError, EOFError, MemoryError),
+    *(LookupError, ArithmeticError, TypeError, RecursionError),
+)
+"""What laspy and lazrs raise where bytes aren't what they should be."""
 _READ = {
     *("X", "Y", "Z", "intensity", "red", "green", "blue", "classification", "return_number", "number_of_returns"),
     *("gps_time", "scan_angle", "scan_angle_rank", "point_source_id", "class_id", "instance_id"),
@@ -55,7 +60,7 @@ class LasReader(CloudReader):
         except InputError:
             self._file.close()
             raise
-        except (*_FAULTS, IndexError, OverflowError, UnicodeDecodeError) as problem:
+        except _FAULTS as problem:
             self._file.close()
             raise InputError(str(path), None, f"is not a LAS file that can be read ({problem})") from None
 
@@ -84,7 +89,7 @@ class LasReader(CloudReader):
         self._file.close()
 
     def _check_size(self, path: Path) -> None:
-        """Refuse a file that ends before its points (LAS) or the table of its chunks (LAZ) do, before any work."""
+        """Refuse a file that ends before its points do (LAS), or whose chunks don't fill it (LAZ), before any work."""
         header, size = self._reader.header, path.stat().st_size
         start = header.offset_to_point_data
         if not header.are_points_compressed:
@@ -92,11 +97,7 @@ class LasReader(CloudReader):
             if there < header.point_count:
                 raise damaged(path, there, header.point_count)
         elif header.point_count:
-            with path.open("rb") as file:
-                file.seek(start)
-                table = int.from_bytes(file.read(8), "little", signed=True)
-            if size < start + 8 or table > size - 8:
-                raise InputError(str(path), None, f"is truncated: {size:,} bytes are left of more than {table:,}")
+            check_chunks(path, start, header.vlrs.get("LasZipVlr")[0].record_data)
 
     def _block(self, record: Any) -> PointBlock:
         header, count = self._reader.header, len(record)
@@ -145,6 +146,11 @@ def _header(path: Path, las: laspy.LasHeader) -> CloudHeader:
     names = set(las.point_format.dimension_names)
     notes = next((v.record_data_bytes() for v in las.vlrs if v.user_id == "SynthRoads" and v.record_id == 1), None)
     told = json.loads(notes) if notes else {}
+    if not isinstance(told, dict):
+        raise InputError(str(path), None, "its notes on intensity scale and classes are damaged")
+    if not (np.isfinite(las.offsets).all() and np.isfinite(las.scales).all() and np.all(las.scales != 0.0)):
+        scales = [*las.scales.tolist(), *las.offsets.tolist()]
+        raise InputError(f"{path}: scales and offsets", scales, "must be finite numbers, the scales not 0")
     labelled = bool(told) and "class_id" in names
     attributes = attributes_of(names) if told else ()
     read = _READ | _FLAGS | {column.name for column in columns(attributes)}
@@ -162,7 +168,7 @@ def _header(path: Path, las: laspy.LasHeader) -> CloudHeader:
         np.array(las.offsets, dtype=np.float64),
         crs_text=text,
         epsg=epsg_of(text) or _geotiff_epsg(las),
-        intensity_scale=float(told["intensity_scale"]) if told else None,
+        intensity_scale=intensity_scale(path, told) if told else None,
         scheme=scheme,
         labelled=labelled,
         attributes=attributes,

@@ -7,6 +7,7 @@ The arrays are gathered in a file each and put together at the end, so that no m
 from __future__ import annotations
 
 import json
+import math
 import shutil
 import struct
 import tokenize
@@ -25,7 +26,7 @@ from numpy.typing import NDArray
 from ..errors import InputError
 from .attributes import COLUMNS, columns, gather
 from .points import PointBlock
-from .reading import BLOCK, CloudHeader, CloudReader, damaged, header_from_notes
+from .reading import BLOCK, CloudHeader, CloudReader, damaged, finite_coordinates, header_from_notes
 from .writing import CloudWriter
 
 _ALWAYS = {
@@ -58,6 +59,7 @@ _FAULTS = (
     *(zipfile.BadZipFile, zlib.error, struct.error, tokenize.TokenError),
 )
 """What reading a damaged archive may raise: encrypted or unknown members, broken headers, lengths of any size."""
+_LONGEST_NOTES = 1 << 26
 _TIME = (1980, 1, 1, 0, 0, 0)
 """No wall clock in files."""
 
@@ -151,6 +153,7 @@ class NpzReader(CloudReader):
                     arrays = {name: self._rows(members[name], name, wanted) for name in members}
                 except _FAULTS:
                     raise damaged(self.header.path, done, self.header.count) from None
+                finite_coordinates(self.header.path, done, arrays["xyz"])
                 yield self._block(arrays, wanted)
         finally:
             for member in members.values():
@@ -201,6 +204,11 @@ class NpzReader(CloudReader):
     def _read_notes(self) -> Any:
         if "notes.npy" not in self._archive.namelist():
             return None
+        if self._archive.getinfo("notes.npy").file_size > _LONGEST_NOTES:
+            raise ValueError("its notes are too long")
+        with self._archive.open("notes.npy") as member:
+            if math.prod(_npy_header(member)[0]) != 1:
+                raise ValueError("its notes are no text")
         with self._archive.open("notes.npy") as member:
             return json.loads(str(npy.read_array(member, allow_pickle=False)))
 

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from ..errors import InputError
 from .attributes import COLUMNS, Column, columns, gather
 from .points import PointBlock
-from .reading import BLOCK, CloudHeader, CloudReader, damaged, header_from_notes
+from .reading import BLOCK, CloudHeader, CloudReader, damaged, finite_coordinates, header_from_notes
 from .writing import CloudWriter
 
 _NAMES = {"NormalX": "nx", "NormalY": "ny", "NormalZ": "nz"}
@@ -45,6 +45,7 @@ _CLASS_NAMES = ("classification", "class", "label", "scalar_Classification", "sc
 """Where others keep classes."""
 _PIECE = 160
 _LONGEST_LINE = 1 << 16
+_MOST_DIGITS = 18
 
 
 def ply_name(column: Column) -> str:
@@ -157,13 +158,13 @@ class PlyReader(CloudReader):
             data = self._file.read(wanted * self._type.itemsize)
             if len(data) != wanted * self._type.itemsize:
                 raise damaged(self.header.path, done, self.header.count)
-            yield self._block(np.frombuffer(data, dtype=self._type))
+            yield self._block(np.frombuffer(data, dtype=self._type), done)
 
     def close(self) -> None:
         """Close the file."""
         self._file.close()
 
-    def _block(self, record: NDArray[Any]) -> PointBlock:
+    def _block(self, record: NDArray[Any], done: int) -> PointBlock:
         count = len(record)
 
         def values(name: str, kind: Any) -> NDArray[Any]:
@@ -179,7 +180,9 @@ class PlyReader(CloudReader):
             found["class_id"] = values(name, np.uint8)
         arrays = gather(found, self.header.attributes, count)
         return PointBlock(
-            xyz=np.stack([values(name, np.float64) for name in "xyz"], axis=1),
+            xyz=finite_coordinates(
+                self.header.path, done, np.stack([values(name, np.float64) for name in "xyz"], axis=1)
+            ),
             intensity=values("intensity", np.float64),
             rgb=np.stack([channel(name) for name in ("red", "green", "blue")], axis=1),
             return_number=values("return_number", np.uint8),
@@ -236,7 +239,7 @@ def _header_lines(path: Path, file: BinaryIO) -> Iterator[str]:
 def _number_of_points(path: Path, words: list[str]) -> int:
     if words[1] != "vertex":
         raise InputError(str(path), words[1], "must begin with the element vertex")
-    if not words[2].isdecimal():
+    if not words[2].isdecimal() or len(words[2]) > _MOST_DIGITS:
         raise InputError(str(path), words[2], "must be a number of points")
     return int(words[2])
 
@@ -244,5 +247,5 @@ def _number_of_points(path: Path, words: list[str]) -> int:
 def _notes(path: Path, text: str) -> Any:
     try:
         return json.loads(text) if text else None
-    except ValueError:
+    except (ValueError, RecursionError):
         raise InputError(str(path), None, "its comments synthroads are damaged") from None

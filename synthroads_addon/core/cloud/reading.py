@@ -21,6 +21,7 @@ from .writing import check_ending
 
 BLOCK = 500_000
 """Points that are read at a time."""
+_LARGEST_SCALE = 1e300
 
 
 @dataclass(frozen=True)
@@ -143,24 +144,55 @@ def header_from_notes(path: Path, kind: str, count: int, names: set[str], notes:
     """
     if not isinstance(notes, dict):
         return CloudHeader(path, kind, count, np.zeros(3), attributes=attributes_of(names))
+    text = notes.get("crs")
     try:
         offset = np.array(notes["offset"], dtype=np.float64).reshape(3)
-        scale = float(notes["intensity_scale"])
-    except (KeyError, TypeError, ValueError):
-        raise InputError(str(path), None, "its notes on offset and intensity scale are damaged") from None
+    except (KeyError, TypeError, ValueError, OverflowError):
+        offset = np.full(3, np.nan)
+    if not np.isfinite(offset).all() or not isinstance(text, str | None):
+        raise InputError(str(path), None, "its notes on offset and coordinate system are damaged")
     return CloudHeader(
         path,
         kind,
         count,
         offset,
-        crs_text=notes.get("crs"),
-        epsg=epsg_of(notes.get("crs")),
-        intensity_scale=scale,
+        crs_text=text,
+        epsg=epsg_of(text),
+        intensity_scale=intensity_scale(path, notes),
         scheme=stored_scheme(notes.get("classes"), str(path)),
         labelled=True,
         attributes=attributes_of(names),
         has_color=True,
     )
+
+
+def intensity_scale(path: Path, notes: dict[str, Any]) -> float:
+    """Return the 16-bit steps per unit of intensity that a file's notes tell.
+
+    Raises:
+        InputError: they tell none, or it is no finite number above 0.
+    """
+    scale = notes.get("intensity_scale")
+    if not isinstance(scale, int | float) or not 0.0 < scale <= _LARGEST_SCALE:
+        raise InputError(f"{path}: intensity_scale", scale, "must be a finite number above 0")
+    return float(scale)
+
+
+def finite_coordinates(path: Path, done: int, xyz: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the coordinates (N, 3) of a block as they are.
+
+    Args:
+        path: the file.
+        done: points before them.
+        xyz: the coordinates, m.
+
+    Raises:
+        InputError: one is NaN or infinite; the message names the point.
+    """
+    if not np.isfinite(xyz).all():
+        point, axis = np.argwhere(~np.isfinite(xyz))[0]
+        raise InputError(f"{path}: {'xyz'[axis]} of point {done + point:,}", xyz[point, axis], "must be finite")
+    return xyz
 
 
 def damaged(path: Path, at: int, count: int) -> InputError:

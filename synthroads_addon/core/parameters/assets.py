@@ -14,6 +14,7 @@ from pydantic import Field, field_validator, model_validator
 
 from ..cloud.labels import classes
 from ..errors import InputError, MissingFileError, nearest_name
+from ..files import stamp
 from ..road_scenario import Interval, ScenarioModel, interval
 from ..schema import quantity, read_json, rounded
 from .model_furniture import Asset
@@ -127,11 +128,7 @@ def read_asset_library(name_or_file: str | os.PathLike[str]) -> AssetLibrary:
         InputError: a field is unknown or wrong.
     """
     name = str(library_file(os.fspath(name_or_file)))
-    try:
-        found = Path(name).stat()
-    except OSError as error:
-        raise MissingFileError(name, None, f"an asset library (JSON) is needed here ({error.strerror})") from None
-    library = _read(name, (found.st_mtime_ns, found.st_size))
+    library = _read(name, stamp(name, "an asset library (JSON) is needed here"))
     for key, asset in library.assets.items():
         _check_file(Path(name).parent / asset.file, f"{name}: assets.{key}.file", asset.file)
     return library
@@ -146,8 +143,9 @@ def _check_file(path: Path, field: str, shown: str) -> None:
     try:
         with path.open("rb") as file:
             empty = not file.read(1)
-    except OSError as error:
-        raise MissingFileError(field, shown, f"cannot be read ({error.strerror})") from None
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or error
+        raise MissingFileError(field, shown, f"cannot be read ({reason})") from None
     if empty:
         raise InputError(field, shown, "the file is empty")
 

@@ -7,14 +7,16 @@ import json
 import math
 import os
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from ..errors import InputError, MissingFileError
+from ..errors import InputError
+from ..files import read_text
 from .alignment import FloatArray
 
+FARTHEST = 1e8
+"""Largest coordinate of a map, m: the reach of `RoadScenario.map_origin`."""
 _TWO = "at least two distinct points are needed"
 
 
@@ -31,12 +33,8 @@ def read_axis(path: str | os.PathLike[str]) -> FloatArray:
         InputError: anything in it is not as above, or there are fewer than two distinct points.
     """
     name = os.fspath(path)
-    try:
-        text = Path(name).read_text(encoding="utf-8-sig")
-    except OSError as error:
-        raise MissingFileError(name, None, f"an axis file is needed here ({error.strerror})") from None
-    except UnicodeDecodeError:
-        raise InputError(name, None, "this is no text: CSV with columns x, y, z or GeoJSON is needed") from None
+    kind = "this is no text: CSV with columns x, y, z or GeoJSON is needed"
+    text = read_text(name, kind, "an axis file is needed here", encoding="utf-8-sig")
     rows = _read_json(name, text) if text.lstrip().startswith(("{", "[")) else _read_csv(name, text)
     points = np.array(rows, dtype=np.float64).reshape(-1, 3)
     if len(np.unique(points[:, :2], axis=0)) < 2:
@@ -50,7 +48,7 @@ def _read_csv(name: str, text: str) -> list[tuple[float, float, float]]:
     if not lines:
         raise InputError(name, None, f"the file is empty: {_TWO}")
     separator = next((mark for mark in (";", ",", "\t") if mark in lines[0][1]), " ")
-    head = _fields(lines[0][1], separator)
+    head = fields_of(lines[0][1], separator, f"{name}:{lines[0][0]}")
     columns, body = [0, 1, 2], lines
     if not all(_is_number(entry) for entry in head):
         columns, body = _columns(f"{name}:{lines[0][0]}", head), lines[1:]
@@ -58,13 +56,27 @@ def _read_csv(name: str, text: str) -> list[tuple[float, float, float]]:
         raise InputError(f"{name}:{lines[0][0]}", lines[0][1], "x, y and, optionally, z are needed")
     elif len(head) == 2:
         columns = [0, 1]
-    return [_row(f"{name}:{number}", _fields(line, separator), columns) for number, line in body]
+    places = ((f"{name}:{number}", line) for number, line in body)
+    return [_row(place, fields_of(line, separator, place), columns) for place, line in places]
 
 
-def _fields(line: str, separator: str) -> list[str]:
+def fields_of(line: str, separator: str, place: str) -> list[str]:
+    """Return the entries of a line of CSV.
+
+    Args:
+        line: the line; a record of several lines isn't known here.
+        separator: between entries; a space stands for any number of them.
+        place: file and number of the line, for messages.
+
+    Raises:
+        InputError: an entry is longer than any number or name.
+    """
     if separator == " ":
         return line.split()
-    return [entry.strip() for entry in next(csv.reader([line], delimiter=separator))]
+    try:
+        return [entry.strip() for entry in next(csv.reader([line], delimiter=separator))]
+    except csv.Error as error:
+        raise InputError(place, line, f"a line of CSV is needed ({error})") from None
 
 
 def _is_number(entry: str) -> bool:
@@ -99,10 +111,10 @@ def _point(place: str, entries: list[object]) -> tuple[float, float, float]:
     for axis, entry in zip("xyz", entries, strict=False):
         try:
             value = math.nan if isinstance(entry, bool) else float(entry)  # type: ignore[arg-type]
-        except (TypeError, ValueError):
+        except (TypeError, ValueError, OverflowError):
             value = math.nan
-        if not math.isfinite(value):
-            raise InputError(f"{place} {axis}", entry, "a finite number is needed")
+        if not abs(value) <= FARTHEST:
+            raise InputError(f"{place} {axis}", entry, f"a finite number of at most {FARTHEST:g} m is needed")
         values.append(value)
     return values[0], values[1], values[2] if len(values) > 2 else 0.0
 
@@ -112,6 +124,8 @@ def _read_json(name: str, text: str) -> list[tuple[float, float, float]]:
         document = json.loads(text)
     except json.JSONDecodeError as error:
         raise InputError(f"{name}:{error.lineno}", None, f"valid JSON is needed ({error.msg})") from None
+    except (ValueError, RecursionError) as error:  # numbers of thousands of digits, brackets within brackets
+        raise InputError(name, None, f"valid JSON is needed ({error})") from None
     lines = list(_line_strings(name, document))
     if len(lines) != 1:
         raise InputError(name, len(lines), "exactly one LineString is needed")

@@ -37,6 +37,13 @@ HOLE_REACH = 5
 
 _TILE = 256
 _MOST_TILES = 2048  # 1 GiB
+_MOST_CELLS = 2**42
+"""Cells of a raster, read or not: a table of its tiles is held."""
+_MOST_CELLS_OF_A_BLOCK = 2**26
+"""Cells that a raster may store in one piece, as they must be unpacked together."""
+_CELLS = (0.01, 10_000.0)
+"""Shortest and longest side of a cell, m."""
+_FARTHEST = 1e8
 _METRES = ("", "m", "metre", "metres", "meter", "meters")
 _AROUND = np.array([(row, column) for row in (-1, 0, 1) for column in (-1, 0, 1) if (row, column) != (0, 0)]).T
 _BESIDE = np.array([(-1, 1, 0, 0), (0, 0, -1, 1)])
@@ -181,8 +188,7 @@ class ElevationModel:
             wanted[tuple(cells // _TILE)] = True
         tiles = np.argwhere(wanted)
         if len(tiles) > _MOST_TILES:
-            most = _MOST_TILES * _TILE**2 / 1e6
-            raise InputError(f"{self.path}: size", None, f"at most {most:.0f} million cells; a coarser model is needed")
+            raise _too_fine(self.path)
         scale, offset = dataset.scales[0], dataset.offsets[0]
         self._tiles = np.full((len(tiles) + 1, _TILE, _TILE), np.nan)
         self._number[wanted] = np.arange(1, len(tiles) + 1)
@@ -219,8 +225,9 @@ def read_elevation_model(path: str | os.PathLike[str], epsg: int, corridor: Corr
     try:
         with Path(name).open("rb"):
             pass
-    except OSError as error:
-        raise MissingFileError(name, None, f"an elevation model is needed here ({error.strerror})") from None
+    except (OSError, ValueError) as error:  # ValueError: a null byte is in the name
+        reason = getattr(error, "strerror", None) or error
+        raise MissingFileError(name, None, f"an elevation model is needed here ({reason})") from None
     try:
         import rasterio
         from rasterio.errors import CRSError, RasterioError
@@ -316,13 +323,27 @@ def _grid(name: str, dataset: DatasetReader) -> Grid:
         raise InputError(f"{name}: rotation", turned, "rows must run along the east axis, columns along the north axis")
     if min(dataset.width, dataset.height) < 2:
         raise InputError(f"{name}: size", (dataset.width, dataset.height), "at least 2 by 2 cells are needed")
+    sides = (abs(transform.a), abs(transform.e))
+    if not (min(sides) >= _CELLS[0] and max(sides) <= _CELLS[1]):
+        raise InputError(f"{name}: sides of a cell", sides, f"from {_CELLS[0]:g} to {_CELLS[1]:g} m are needed")
+    if dataset.width * dataset.height > _MOST_CELLS:
+        size = (dataset.width, dataset.height)
+        raise InputError(f"{name}: size", size, f"at most {_MOST_CELLS / 1e12:.1f} million million cells are possible")
+    if math.prod(dataset.block_shapes[0]) > _MOST_CELLS_OF_A_BLOCK:
+        allowed = f"at most {_MOST_CELLS_OF_A_BLOCK / 1e6:.0f} million cells; store the raster in tiles"
+        raise InputError(f"{name}: size of its blocks", dataset.block_shapes[0], allowed)
     east, north = transform.c + transform.a / 2.0, transform.f + transform.e / 2.0
+    if not max(abs(east), abs(north)) <= _FARTHEST:
+        raise InputError(f"{name}: place", (east, north), f"must lie within {_FARTHEST:g} m of the map's origin")
     return Grid(east, north, transform.a, transform.e, dataset.width, dataset.height)
 
 
 def _cells_needed(model: ElevationModel, corridor: Corridor) -> Cells:
     """Return the cells (2, N) that the corridor's heights are interpolated from; InputError if some aren't there."""
     grid, missing = model.grid, False
+    area = 2.0 * corridor.reach * (corridor.alignment.length + 2.0 * corridor.reach)
+    if area / abs(grid.step_east * grid.step_north) > _MOST_TILES * _TILE**2:
+        raise _too_fine(model.path)
     low, high = np.full(2, np.inf), np.full(2, -np.inf)
     numbers = []
     for points in corridor.points(grid.cell):
@@ -335,6 +356,11 @@ def _cells_needed(model: ElevationModel, corridor: Corridor) -> Cells:
         have = _area(*grid.bounds())
         raise InputError(f"{model.path}: area", None, f"{have} are covered; the road needs {_area(low, high)}")
     return np.stack(np.divmod(np.unique(np.concatenate(numbers)), grid.columns))
+
+
+def _too_fine(path: str) -> InputError:
+    most = _MOST_TILES * _TILE**2 / 1e6
+    return InputError(f"{path}: size", None, f"at most {most:.0f} million cells; a coarser model is needed")
 
 
 def _four_around(first: Cells) -> Cells:

@@ -105,6 +105,8 @@ __all__ = [
 
 SCHEMA_VERSION: Literal["1.0"] = "1.0"
 EPSG_URI = "https://www.opengis.net/def/crs/EPSG/0/{}"
+LONGEST_ROAD = 1e6
+"""Longest alignment, m: its tables grow with its length, so that a slip in a number would fill the memory."""
 DESIGN_CLASSES = ("EKA1A", "EKA1B", "EKA2", "EKA3")
 
 
@@ -140,7 +142,7 @@ class HorizontalElement(Model):
 
     conditions = (when({"kind": {"const": "line"}}, {"curvature_start": {"const": 0}, "curvature_end": {"const": 0}}),)
     kind: Literal["line", "arc", "clothoid"] = Field(description="What the two curvatures make it.")
-    length: float = quantity(gt=0, unit="m", description="Length along the centreline.")
+    length: float = quantity(gt=0, le=LONGEST_ROAD, unit="m", description="Length along the centreline.")
     curvature_start: float = quantity(ge=-0.1, le=0.1, unit="1/m", description="Positive to the left.")
     curvature_end: float = quantity(ge=-0.1, le=0.1, unit="1/m", description="Positive to the left.")
 
@@ -179,6 +181,12 @@ class AlignmentObject(RoadObject):
     )
     horizontal: tuple[HorizontalElement, ...] = Field(min_length=1, description="Elements in order.")
     vertical: tuple[VerticalPoint, ...] = Field(min_length=1, description="Intersection points in order.")
+
+    @model_validator(mode="after")
+    def _no_longer_than_any_road(self) -> AlignmentObject:
+        if self.length > LONGEST_ROAD:
+            raise ValueError(f"horizontal elements must be at most {LONGEST_ROAD:g} m long together")
+        return self
 
     @property
     def length(self) -> float:

@@ -184,6 +184,10 @@ class Marking(Model):
     )
 
 
+SHORTEST_DASH = 0.05
+"""Shortest dash and gap, m: a road has a row of faces for each."""
+
+
 class LineMarking(Marking, RoadObject):
     """A marking that follows a boundary. It lies on the pavement with the thickness of its film.
 
@@ -196,7 +200,7 @@ class LineMarking(Marking, RoadObject):
         when(
             {"dash_length": {"const": 0}},
             {"gap_length": {"const": 0}},
-            otherwise={"gap_length": {"exclusiveMinimum": 0}},
+            otherwise={"dash_length": {"minimum": SHORTEST_DASH}, "gap_length": {"minimum": SHORTEST_DASH}},
         ),
         when(
             {"kind": {"enum": ["turnout_edge", "gore_edge"]}},
@@ -228,6 +232,8 @@ class LineMarking(Marking, RoadObject):
     def _dashes_fit(self) -> LineMarking:
         if (self.dash_length == 0) != (self.gap_length == 0):
             raise ValueError("dash_length and gap_length must both be 0 (solid) or both be positive")
+        if 0 < min(self.dash_length, self.gap_length) < SHORTEST_DASH:
+            raise ValueError(f"dash_length and gap_length must be 0 (solid) or at least {SHORTEST_DASH:g} m")
         if (self.turnout is not None) != (self.kind in ("turnout_edge", "gore_edge")):
             raise ValueError("turnout must be given for turnout_edge and gore_edge, and only there")
         return self

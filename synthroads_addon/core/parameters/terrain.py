@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from functools import lru_cache
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import MissingFileError
+from ..files import stamp
 from ..random_streams import stream
 from ..road_scenario import RoadScenario
 from ..schema import rounded
@@ -83,11 +82,8 @@ def road_elevation_model(
     Raises:
         InputError: as `read_elevation_model`.
     """
-    try:
-        found = Path(path).stat()
-    except OSError as error:
-        raise MissingFileError(path, None, f"an elevation model is needed here ({error.strerror})") from None
-    return _read(path, (found.st_mtime_ns, found.st_size), epsg, axis, origin, half_width + GROUND_MARGIN)
+    found = stamp(path, "an elevation model is needed here")
+    return _read(path, found, epsg, axis, origin, half_width + GROUND_MARGIN)
 
 
 @lru_cache(maxsize=2)

@@ -2,21 +2,23 @@
 
 from __future__ import annotations
 
-import csv
 import math
 import os
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import InputError, MissingFileError, nearest_name
+from ..errors import InputError, nearest_name
+from ..files import read_text
+from ..parameters.axis_read import FARTHEST, fields_of
 
 Float = NDArray[np.float64]
 
 COLUMNS = ("time", "x", "y", "z", "roll", "pitch", "heading")
 """Names in the header; in any order and case, beside any others."""
+_LARGEST = 1e10
+"""Largest time (s: GPS time counts thousands of millions) and angle (deg)."""
 
 
 @dataclass(frozen=True)
@@ -60,10 +62,12 @@ def read_trajectory(path: str | os.PathLike[str]) -> Trajectory:
     if not lines:
         raise InputError(name, None, f"the file is empty: a header with {', '.join(COLUMNS)} is needed")
     separator = next((mark for mark in (";", ",", "\t") if mark in lines[0][1]), " ")
-    places = _columns(f"{name}:{lines[0][0]}", _fields(lines[0][1], separator))
+    head = f"{name}:{lines[0][0]}"
+    places = _columns(head, fields_of(lines[0][1], separator, head))
     if len(lines) < 3:
         raise InputError(name, None, f"at least two rows below the header are needed, the file has {len(lines) - 1}")
-    rows = np.array([_row(f"{name}:{n}", _fields(line, separator), places) for n, line in lines[1:]])
+    below = ((f"{name}:{number}", line) for number, line in lines[1:])
+    rows = np.array([_row(place, fields_of(line, separator, place), places) for place, line in below])
     numbers = np.array([number for number, _ in lines[1:]])
     late = np.flatnonzero(np.diff(rows[:, 0]) <= 0.0)
     if len(late):
@@ -74,18 +78,8 @@ def read_trajectory(path: str | os.PathLike[str]) -> Trajectory:
 
 
 def _text(name: str) -> str:
-    try:
-        return Path(name).read_text(encoding="utf-8-sig")
-    except OSError as error:
-        raise MissingFileError(name, None, f"a trajectory file is needed here ({error.strerror})") from None
-    except UnicodeDecodeError:
-        raise InputError(name, None, f"this is no text: CSV with columns {', '.join(COLUMNS)} is needed") from None
-
-
-def _fields(line: str, separator: str) -> list[str]:
-    if separator == " ":
-        return line.split()
-    return [entry.strip() for entry in next(csv.reader([line], delimiter=separator))]
+    kind = f"this is no text: CSV with columns {', '.join(COLUMNS)} is needed"
+    return read_text(name, kind, "a trajectory file is needed here", encoding="utf-8-sig")
 
 
 def _columns(place: str, head: list[str]) -> list[int]:
@@ -109,8 +103,9 @@ def _row(place: str, entries: list[str], places: list[int]) -> list[float]:
             value = float(entries[at])
         except ValueError:
             value = math.nan
-        if not math.isfinite(value):
-            raise InputError(f"{place} {column}", entries[at], "a finite number is needed")
+        largest = FARTHEST if column in "xyz" else _LARGEST
+        if not abs(value) <= largest:
+            raise InputError(f"{place} {column}", entries[at], f"a finite number is needed, at most {largest:g}")
         if column == "pitch" and abs(value) > 90.0:
             raise InputError(f"{place} {column}", value, "from -90 to 90 deg")
         values.append(value)

@@ -1,0 +1,241 @@
+"""Clouds and elevation models that are cut or flipped: points or one line; no crash, no memory beyond the file's size."""
+
+from __future__ import annotations
+
+import resource
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import laspy
+import numpy as np
+import pytest
+
+from synthroads_addon.core.calibration_texture import read_texture
+from synthroads_addon.core.cloud.attributes import DEFAULT_ATTRIBUTES
+from synthroads_addon.core.cloud.points import PointBlock
+from synthroads_addon.core.cloud.reading import open_cloud
+from synthroads_addon.core.cloud.writing import open_writer
+from synthroads_addon.core.errors import InputError
+from synthroads_addon.core.materials import materials
+from synthroads_addon.core.parameters.elevation_model import read_elevation_model
+from tests.core.conftest import make_points
+from tests.core.mutations import TOKENS, accepted, cases, damaged, for_all
+from tests.core.test_elevation_model import EPSG, ascii_grid, centres, corridor, geotiff, plane
+
+ORIGIN = np.array([294_000.0, 5_628_000.0, 180.0])
+SHORT = [token for token in TOKENS if len(token) < 100]
+PEAK_MB = 400
+"""What reading a file of a few hundred kilobytes may take at most."""
+
+
+def cloud(path: Path, count: int = 3000) -> Path:
+    with open_writer(path, 25832, ORIGIN, 65535 * 900.0, DEFAULT_ATTRIBUTES) as writer:
+        writer.write(make_points(count))
+    return path
+
+
+def foreign(path: Path, version: str, point_format: int) -> Path:
+    """Write a cloud as others do: without notes of ours, and of an older version."""
+    header = laspy.LasHeader(point_format=point_format, version=version)
+    header.offsets, header.scales = ORIGIN, np.full(3, 0.001)
+    las = laspy.LasData(header)
+    rng = np.random.default_rng(1)
+    las.x, las.y, las.z = (ORIGIN[axis] + rng.uniform(0.0, 50.0, 3000) for axis in range(3))
+    las.intensity = rng.integers(0, 65536, 3000)
+    las.write(path)
+    return path
+
+
+def use_cloud(path: Path) -> None:
+    with open_cloud(path) as file:
+        for block in file.blocks():
+            assert np.isfinite(block.xyz).all()
+
+
+def every_cloud(folder: Path, ending: str) -> list[bytes]:
+    """Return sound clouds of a kind."""
+    files = [cloud(folder / f"own{ending}").read_bytes()]
+    if ending in (".las", ".laz"):
+        files += [foreign(folder / f"{kind}{ending}", *kind).read_bytes() for kind in (("1.2", 3), ("1.4", 6))]
+    return files
+
+
+@cases(12, 800)
+@pytest.mark.parametrize("ending", [".las", ".laz", ".ply", ".e57", ".npz"])
+def test_clouds(tmp_path: Path, ending: str, count: int) -> None:
+    path = tmp_path / f"cloud{ending}"
+
+    def body(content: bytes) -> None:
+        path.write_bytes(content)
+        accepted(lambda: use_cloud(path))
+
+    before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e3
+    for_all(damaged(every_cloud(tmp_path, ending), SHORT, head=900), count, body)
+    assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e3 < before + PEAK_MB
+
+
+def rasters(folder: Path) -> dict[str, list[bytes]]:
+    heights = plane(*centres(300, 260)).astype(np.float32)
+    tiled = {"tiled": True, "blockxsize": 64, "blockysize": 64}
+    files = [
+        geotiff(folder / "plain.tif", heights),
+        geotiff(folder / "deflate.tif", heights, compress="deflate", predictor=3, **tiled),
+        geotiff(folder / "lzw.tif", heights.astype(np.int16), compress="lzw", BIGTIFF="YES"),
+    ]
+    return {
+        ".tif": [file.read_bytes() for file in files],
+        ".asc": [ascii_grid(folder / "plain.asc", heights[:60, :60]).read_bytes()],
+    }
+
+
+@cases(15, 800)
+@pytest.mark.parametrize("ending", [".tif", ".asc"])
+def test_elevation_models(tmp_path: Path, ending: str, count: int) -> None:
+    path = tmp_path / f"dem{ending}"
+    near = corridor(20.0, 60.0, -100.0) if ending == ".tif" else corridor(5.0, 20.0, -30.0)
+
+    def body(content: bytes) -> None:
+        path.write_bytes(content)
+        accepted(lambda: read_elevation_model(path, EPSG, near))
+        accepted(lambda: read_elevation_model(path, EPSG))
+
+    before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e3
+    for_all(damaged(rasters(tmp_path)[ending], SHORT), count, body)
+    assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e3 < before + PEAK_MB
+
+
+@cases(10, 400)
+@pytest.mark.parametrize("ending", [".png", ".jpg", ".tif"])
+def test_pictures_of_materials(tmp_path: Path, ending: str, count: int) -> None:
+    from PIL import Image
+
+    Image.fromarray(np.random.default_rng(1).integers(0, 256, (40, 60, 3), np.uint8)).save(tmp_path / f"sound{ending}")
+    path, asphalt = tmp_path / f"picture{ending}", materials()["asphalt"]
+
+    def body(content: bytes) -> None:
+        path.write_bytes(content)
+        accepted(lambda: read_texture(path, 1.0, asphalt))
+
+    for_all(damaged([(tmp_path / f"sound{ending}").read_bytes()], SHORT), count, body)
+
+
+# --- what headers claim ---------------------------------------------------------------------------------------------
+
+
+def changed(path: Path, at: int, number: int, size: int) -> Path:
+    data = bytearray(path.read_bytes())
+    data[at : at + size] = number.to_bytes(size, "little")
+    path.write_bytes(bytes(data))
+    return path
+
+
+@pytest.mark.parametrize("ending", [".las", ".laz"])
+def test_a_number_of_points_beyond_the_file(tmp_path: Path, ending: str) -> None:
+    path = changed(cloud(tmp_path / f"cloud{ending}"), 247, 10**12, 8)  # LAS 1.4: number of point records
+    with pytest.raises(InputError, match=r"truncated|points"):
+        use_cloud(path)
+
+
+def chunk_table(path: Path) -> int:
+    """Return where the table of chunks of a LAZ file begins."""
+    data = path.read_bytes()
+    start = int.from_bytes(data[96:100], "little")
+    return int.from_bytes(data[start : start + 8], "little")
+
+
+def test_a_number_of_chunks_beyond_the_file(tmp_path: Path) -> None:
+    """The decompressor would make room for all of them first, and end the process where there is none."""
+    path = cloud(tmp_path / "cloud.laz")
+    path = changed(path, chunk_table(path) + 4, 2**32 - 1, 4)
+    with pytest.raises(InputError, match="table of its chunks"):
+        open_cloud(path)
+
+
+def test_an_elevation_model_larger_than_any_map(tmp_path: Path) -> None:
+    """Its header alone would ask for a table of tiles of hundreds of terabytes."""
+    path = ascii_grid(tmp_path / "dem.asc", np.ones((4, 4), np.float32))
+    text = path.read_text()
+    path.write_text(text.replace("ncols 4", "ncols 2000000000").replace("nrows 4", "nrows 2000000000"))
+    with pytest.raises(InputError, match=r"dem\.asc"):
+        read_elevation_model(path, EPSG)
+    with pytest.raises(InputError, match="sides of a cell"):
+        read_elevation_model(ascii_grid(tmp_path / "fine.asc", np.ones((4, 4), np.float32), cell=1e-9), EPSG)
+
+
+def test_an_elevation_model_much_finer_than_needed_is_refused_at_once(tmp_path: Path) -> None:
+    """Before each of its cells along the road is looked for."""
+    path = geotiff(tmp_path / "dem.tif", np.ones((300, 300), np.float32), transform=_centimetres())
+    with pytest.raises(InputError, match="size: at most 134 million cells"):
+        read_elevation_model(path, EPSG, corridor(200.0))
+
+
+def _centimetres() -> object:
+    from rasterio.transform import Affine
+
+    return Affine(0.01, 0.0, 294_000.0, 0.0, -0.01, 5_628_400.0)
+
+
+# --- numbers that are none ------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf])
+@pytest.mark.parametrize("ending", [".ply", ".npz"])
+def test_points_that_are_not_finite_are_refused_by_name(tmp_path: Path, ending: str, value: float, monkeypatch) -> None:
+    points = make_points(100)
+    points = replace(points, xyz=np.where(np.arange(300).reshape(100, 3) == 31, value, points.xyz))
+    from synthroads_addon.core.cloud import writing
+
+    monkeypatch.setattr(writing.CloudWriter, "finite", lambda self, values, name: values)
+    path = tmp_path / f"cloud{ending}"
+    with open_writer(path, None, ORIGIN, 1.0, ()) as writer:
+        writer.write(points)
+    with pytest.raises(InputError, match=rf"cloud{ending}: y of point 10 is (nan|inf): must be finite"):
+        use_cloud(path)
+
+
+def test_points_of_e57_that_are_not_finite_are_refused_by_name(tmp_path: Path) -> None:
+    pye57 = pytest.importorskip("pye57")
+    file = pye57.E57(str(tmp_path / "cloud.e57"), mode="w")
+    places = {f"cartesian{axis}": np.arange(20.0) for axis in "XYZ"}
+    places["cartesianZ"][7] = np.nan
+    file.write_scan_raw(places)
+    file.close()
+    with pytest.raises(InputError, match=r"cloud\.e57: z of point 7 is nan: must be finite"):
+        use_cloud(tmp_path / "cloud.e57")
+
+
+@pytest.mark.parametrize("at", [131, 155])
+@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
+def test_scales_and_offsets_of_las_that_are_no_numbers_are_refused(tmp_path: Path, at: int, value: float) -> None:
+    path = cloud(tmp_path / "cloud.las")
+    changed(path, at, int.from_bytes(np.float64(value).tobytes(), "little"), 8)
+    with pytest.raises(InputError, match=r"cloud\.las: scales and offsets is \[.*must be finite numbers, the scales not 0"):
+        open_cloud(path)
+
+
+Notes = Callable[[dict], object]
+
+
+@pytest.mark.parametrize(
+    "notes", [[1], {"intensity_scale": None}, {"intensity_scale": 0.0}, {"intensity_scale": 10**400}, "x", {}]
+)
+@pytest.mark.parametrize("ending", [".laz", ".ply", ".npz"])
+def test_notes_that_are_none_of_ours(tmp_path: Path, ending: str, notes: object, monkeypatch) -> None:
+    from synthroads_addon.core.cloud import writing
+
+    path = tmp_path / f"cloud{ending}"
+    writer = open_writer(path, None, ORIGIN, 1.0, ())
+    monkeypatch.setattr(type(writer), "notes", lambda self: notes)
+    monkeypatch.setattr(writing.CloudWriter, "notes", lambda self: notes)
+    try:
+        with writer:
+            writer.write(make_points(10))
+    except TypeError:
+        pytest.skip("this format's writer merges its notes with others")
+    accepted(lambda: use_cloud(path))
+
+
+def block_of(path: Path) -> PointBlock:
+    with open_cloud(path) as file:
+        return next(iter(file.blocks()))
