@@ -95,6 +95,8 @@ class Run(Generic[C]):
             state: dict[str, Any] = torch.load(path, map_location=device, weights_only=True)
         except Exception as problem:  # pickle, zip and torch each have errors of their own
             raise InputError(str(path), None, f"is no checkpoint, or damaged ({type(problem).__name__})") from None
+        if not isinstance(state, dict) or not {"model", "epoch"} <= set(state):
+            raise InputError(str(path), None, "is no checkpoint of a training of ours")
         return state
 
     def record(self, figures: Mapping[str, float]) -> None:
@@ -109,6 +111,8 @@ class Run(Generic[C]):
             write_file(self.folder / CURVES, _curves(self.history), overwrite=True)
 
     def _resume(self, before: Any) -> None:
+        if not isinstance(before, dict):
+            raise InputError(str(self.folder / CONFIGURATION), None, "must be a JSON object")
         now = self.configuration.to_dict()
         different = [
             name for name in {**before, **now} if name not in FREE_WHEN_RESUMING and before.get(name) != now.get(name)

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 from pathlib import Path
 from typing import Any, Literal
 
 import bpy
 
 from ..core.errors import InputError, MissingFileError
+from ..core.mesh_files import check_mesh_file
 from .files import complaint, empty_file
 
 UpAxis = Literal["y", "z"]
@@ -27,6 +30,9 @@ _IMPORTERS: dict[str, tuple[str, str]] = {
 _AXES = {"y": {"up_axis": "Y", "forward_axis": "NEGATIVE_Z"}, "z": {"up_axis": "Z", "forward_axis": "Y"}}
 _WITH_AXES = (".obj", ".ply", ".stl")
 """Kinds of files that don't say which axis points up."""
+
+_CRASHING = (".usd", ".usda", ".usdc", ".usdz")
+"""Kinds of files whose importer, USD's library, ends the process where they are damaged."""
 
 SUFFIXES = (".blend", *_IMPORTERS)
 """Endings of the files that can be opened."""
@@ -68,12 +74,30 @@ def open_scene(path: Path, up: UpAxis | None = None) -> None:
         if suffix == ".blend":
             bpy.ops.wm.open_mainfile(filepath=place, load_ui=False, use_scripts=False)
             return
-        empty_file()
+        check_mesh_file(path)
         module, name = _IMPORTERS[suffix]
+        if suffix in _CRASHING:
+            _try_in_a_process(path, f"{module}.{name}")
+        empty_file()
         options: dict[str, Any] = dict(_AXES[up]) if up else {}
         getattr(getattr(bpy.ops, module), name)(filepath=place, **options)
     except (AttributeError, RuntimeError) as error:
         raise InputError("SCENE", str(path), f"can't be read by Blender: {complaint(error)}") from None
+
+
+def _try_in_a_process(path: Path, importer: str) -> None:
+    """Import a file in a process of its own first; InputError if that crashes.
+
+    Args:
+        path: the file.
+        importer: name of Blender's operator.
+    """
+    code = f"import bpy; bpy.ops.{importer}(filepath={str(path.resolve())!r})"
+    blender = bpy.app.binary_path  # none where Blender is a Python package
+    alone = [blender, "--background", "--factory-startup", "--python-expr", code] if blender else [sys.executable, "-c", code]
+    done = subprocess.run(alone, stdin=subprocess.DEVNULL, capture_output=True, check=False)
+    if not 0 <= done.returncode < 256:  # what went wrong in an orderly way is told when it does so here
+        raise InputError("SCENE", str(path), "can't be read by Blender: it is damaged so that its importer crashes")
 
 
 def open_scene_warnings() -> list[str]:

@@ -109,7 +109,8 @@ def for_all(strategy: st.SearchStrategy[Any], count: int, body: Callable[[Any], 
 
 def wrong_values(documents: Sequence[Any]) -> st.SearchStrategy[Any]:
     """Return JSON data that differ from one of some documents in one to three places."""
-    return st.builds(_changed, st.sampled_from(documents), st.lists(_CHANGES, min_size=1, max_size=3))
+    few = st.lists(_CHANGES, min_size=1, max_size=1)  # with more of them the first that is seen hides the others
+    return st.builds(_changed, st.sampled_from(documents), few | few | st.lists(_CHANGES, min_size=2, max_size=3))
 
 
 def _changed(document: Any, changes: list[tuple[int, Callable[..., None], Any]]) -> Any:
@@ -221,7 +222,7 @@ def json_files(documents: Sequence[Any]) -> st.SearchStrategy[bytes]:
     texts = [json.dumps(document).encode() for document in documents]
     with_values = wrong_values(documents).map(lambda data: json.dumps(data).encode())
     twice = st.builds(_key_twice, st.sampled_from(documents), st.integers(0, 2**31))
-    return st.one_of(with_values, with_values, damaged(texts, TOKENS), twice)
+    return st.one_of(with_values, with_values, with_values, damaged(texts, TOKENS), twice)
 
 
 def yaml_files(documents: Sequence[Any]) -> st.SearchStrategy[bytes]:
@@ -230,7 +231,7 @@ def yaml_files(documents: Sequence[Any]) -> st.SearchStrategy[bytes]:
 
     texts = [yaml.safe_dump(document, sort_keys=False).encode() for document in documents]
     with_values = wrong_values(documents).map(lambda data: json.dumps(data).encode())  # YAML holds JSON
-    return st.one_of(with_values, with_values, damaged(texts, TOKENS + YAML_TOKENS))
+    return st.one_of(with_values, with_values, with_values, damaged(texts, TOKENS + YAML_TOKENS))
 
 
 def damaged(files: Sequence[bytes], tokens: Sequence[bytes] = TOKENS, head: int = 400) -> st.SearchStrategy[bytes]:

@@ -235,4 +235,4 @@ def test_the_table_of_extremes_names_tests_that_exist() -> None:
             source = (ROOT / file).read_text(encoding="utf-8")
             for part in names.split("::")[1:]:
                 assert re.search(rf"^\s*(def|class) {part}\b", source, re.MULTILINE), f"{file} has no {part}"
-    assert text.count("tests/") == sum(len(_TEST.findall(row)) for row in rows), "a test is not named as FILE::NAME"
+        assert row.count("tests/") == len(named), f"a test is not named as FILE::NAME: {row}"

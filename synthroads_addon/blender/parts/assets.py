@@ -11,6 +11,7 @@ import numpy as np
 from mathutils import Vector
 
 from ...core.errors import InputError
+from ...core.mesh_files import check_mesh_file
 from ...core.parameters.assets import LibraryAsset, library_file, read_asset_library
 from ...core.parameters.model import Asset
 from ...core.parameters.surface import surface_elevation
@@ -57,6 +58,7 @@ def _collection(path: Path, asset: LibraryAsset) -> bpy.types.Collection:
     for existing in bpy.data.collections:
         if existing.get(KEY) == key:
             return existing
+    check_mesh_file(path)
     read = {".blend": _read_blend, ".glb": _read_glb, ".obj": _read_obj}[path.suffix.lower()]
     try:
         objects = by_caller(lambda: read(path, asset.object))  # importers need Blender's main thread

@@ -17,6 +17,9 @@ from .alignment import FloatArray
 
 FARTHEST = 1e8
 """Largest coordinate of a map, m: the reach of `RoadScenario.map_origin`."""
+_LONGEST_STEP = 20_000.0
+_LONG_STEP, _SHARPEST = 500.0, -0.5
+"""Points (m) so far apart don't lie in a bend, least of all one by more than 120 degrees (its cosine)."""
 _TWO = "at least two distinct points are needed"
 
 
@@ -39,7 +42,26 @@ def read_axis(path: str | os.PathLike[str]) -> FloatArray:
     points = np.array(rows, dtype=np.float64).reshape(-1, 3)
     if len(np.unique(points[:, :2], axis=0)) < 2:
         raise InputError(name, None, f"{_TWO}, the file has {len(points)} points in all")
+    _refuse_slips(name, points)
     return points
+
+
+def _refuse_slips(name: str, points: FloatArray) -> None:
+    """Refuse a point (of N, 3) far from its neighbours: a digit is missing, and the fit would search for a road there."""
+    steps = np.diff(points[:, :2], axis=0)
+    length = np.hypot(*steps.T)
+    if length.max() > _LONGEST_STEP:
+        place = int(length.argmax())
+        allowed = f"is {length[place] / 1000.0:.0f} km from the point before, at most {_LONGEST_STEP / 1000.0:g} km"
+        raise InputError(f"{name}: point {place + 2}", points[place + 1].tolist(), allowed)
+    moved = np.flatnonzero(length > 0.0)
+    before, after = steps[moved[:-1]], steps[moved[1:]]
+    cosine = (before * after).sum(axis=1) / (length[moved[:-1]] * length[moved[1:]])
+    back = (cosine < _SHARPEST) & (np.maximum(length[moved[:-1]], length[moved[1:]]) > _LONG_STEP)
+    if back.any():
+        place = int(moved[1:][back.argmax()])
+        allowed = f"the axis turns back after a step of more than {_LONG_STEP:g} m: is a digit of a point missing?"
+        raise InputError(f"{name}: point {place + 1}", points[place].tolist(), allowed)
 
 
 def _read_csv(name: str, text: str) -> list[tuple[float, float, float]]:
