@@ -143,15 +143,23 @@ class DatasetRun:
             OutputError: the folder holds something else, or can't be written, or another run is at work in it.
             InputError: what is there was made from another recipe.
         """
-        with self._locked():
-            self._open()
-            self._write_manifest()
-            missing = [job for job in self.jobs if not self._is_done(job)]
-            for outcome in submit([self._write_task(job) for job in missing]):
-                self._take(outcome)
-                self.progress("scenes", len(self.entries) / len(self.jobs))
-            self._close()
+        try:
+            with self._locked():
+                self._open()
+                self._make(submit)
+                self._close()
+        except OSError as error:
+            again = "; what is done stays, --resume continues" if self.entries else ""
+            raise OutputError("--output", str(self.folder), f"cannot be written ({error.strerror}){again}") from None
         return read_manifest(self.folder)
+
+    def _make(self, submit: Submit) -> None:
+        """Make the scenes that aren't there yet."""
+        self._write_manifest()
+        missing = [job for job in self.jobs if not self._is_done(job)]
+        for outcome in submit([self._write_task(job) for job in missing]):
+            self._take(outcome)
+            self.progress("scenes", len(self.entries) / len(self.jobs))
 
     @contextmanager
     def _locked(self) -> Iterator[None]:

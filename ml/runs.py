@@ -57,8 +57,11 @@ class Run(Generic[C]):
         elif there and not overwrite:
             raise OutputError("--output", str(folder), "holds a run already; --resume goes on, --overwrite begins anew")
         else:
-            for name in (CHECKPOINT, HISTORY, METRICS, CURVES):
-                (folder / name).unlink(missing_ok=True)
+            try:
+                for name in (CHECKPOINT, HISTORY, METRICS, CURVES):
+                    (folder / name).unlink(missing_ok=True)
+            except OSError as error:
+                raise OutputError("--output", str(folder), f"cannot be written ({error.strerror})") from None
         write_file(folder / CONFIGURATION, canonical_json(configuration.to_dict()).encode(), overwrite=True)
         return run
 

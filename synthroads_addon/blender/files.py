@@ -6,6 +6,8 @@ from pathlib import Path
 
 import bpy
 
+from ..core.errors import OutputError
+
 
 def empty_file() -> None:
     """Begin a new file with nothing in it; what was open is lost.
@@ -16,8 +18,15 @@ def empty_file() -> None:
 
 
 def save_scene(path: Path, compress: bool = True) -> None:
-    """Save a copy of the open file, compressed if not told otherwise; the open file keeps its own name and state."""
-    bpy.ops.wm.save_as_mainfile(filepath=str(path), copy=True, compress=compress, check_existing=False)
+    """Save a copy of the open file, compressed if not told otherwise; the open file keeps its own name and state.
+
+    Raises:
+        OutputError: it can't be written.
+    """
+    try:
+        bpy.ops.wm.save_as_mainfile(filepath=str(path), copy=True, compress=compress, check_existing=False)
+    except RuntimeError as error:
+        raise OutputError(str(path), None, f"cannot be written ({complaint(error)})") from None
 
 
 def complaint(error: Exception) -> str:
