@@ -29,6 +29,7 @@ from .core.scenario import Scenario
 from .core.schema import canonical_json
 from .core.twin import check_formats, twin_file_names, write_twin
 from .scan_files import available_cores, colour_job, make_scan, road_path, scan_to_files, top_view
+from .section_scan import check_by_section, scan_by_section
 
 FILES = {
     "parameters": ("parameters.json",),
@@ -82,6 +83,7 @@ def generate(job: Job, progress: Progress = silent) -> dict[str, Any]:
         with timer.stage("parameters"):
             parameters, axis_report = road_parameters(job)
             geometry = RoadGeometry(parameters)
+            check_by_section(job.scenario, geometry.length)
             report |= axis_report
             write_texts(folder, wanted, parameters, geometry, job.scenario)
         if job.scenario.twin:
@@ -147,6 +149,8 @@ def _scene_outputs(job: Job, folder: Path, parameters: RoadParameters, timer: St
     counts: dict[str, Any] = {}
     if job.new_file:
         empty_file()
+    if job.scenario.by_section(parameters.alignment.length):
+        return scan_by_section(job.scenario, parameters, folder, timer)
     with timer.stage("model"):
         model = build_road(parameters, settings.tolerance, settings.vegetation_detail)
         if job.scenario.materials_table:

@@ -5,20 +5,16 @@ from __future__ import annotations
 from collections.abc import Callable, Generator, Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import ExitStack, contextmanager
-from dataclasses import asdict, dataclass, field
 from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .core.cloud.grid import GridSubsampler
-from .core.cloud.labels import classes
-from .core.cloud.points import PointBlock
+from .cloud_files import CloudFiles, ScanCounts
 from .core.cloud.previews import TopView
 from .core.cloud.roughness import micro_relief
-from .core.cloud.writing import CloudWriter, open_writer
-from .core.colour import LayerSource, shares_by_source
+from .core.colour import LayerSource
 from .core.material_variation import varied
 from .core.materials import Material
 from .core.parameters.geometry import RoadGeometry
@@ -38,31 +34,6 @@ from .core.scenario import Scenario
 
 if TYPE_CHECKING:
     from .blender.cameras import ColourJob
-
-
-@dataclass
-class ScanCounts:
-    """What was counted while scanning."""
-
-    pulses: int = 0
-    rays: int = 0
-    points: int = 0
-    below_threshold: int = 0
-    saturated: int = 0
-    intensity_clipped: int = 0
-    by_class: np.ndarray = field(default_factory=lambda: np.zeros(256, dtype=np.int64))
-    by_source: np.ndarray = field(default_factory=lambda: np.zeros(256, dtype=np.int64))
-
-    def add(self, result: BlockResult) -> None:
-        """Add one block."""
-        self.pulses += result.pulses
-        self.rays += result.rays
-        self.below_threshold += result.below_threshold
-        self.saturated += result.saturated
-        self.points += len(result.points)
-        self.by_class += np.bincount(result.points.class_id, minlength=256)
-        if result.sources is not None:
-            self.by_source += result.sources
 
 
 def make_scan(
@@ -160,6 +131,7 @@ def make_finish(
         octaves=scenario.settings().relief_octaves,
         seed=scenario.seed,
         kept=kept_arrays(scenario),
+        frame=scan.frame,
     )
 
 
@@ -221,6 +193,7 @@ def scan_blocks(scan: Scan, threads: int = 0, finish: Finish | None = None) -> I
         return
     for result in _in_batches(results):
         yield finish(result)
+
 
 RETURNS_AT_ONCE = 400_000
 """Points that are rendered together: each rendering takes a tenth of a second whatever their number."""
@@ -300,9 +273,6 @@ class ScanToFiles:
         epsg: map coordinate system; None if unknown.
         view: raster for the previews; None without.
         rows: the materials' means, see `make_scan`.
-
-    Attributes:
-        counts: what was counted so far.
     """
 
     def __init__(
@@ -315,71 +285,37 @@ class ScanToFiles:
         view: TopView | None = None,
         rows: Sequence[Material] | None = None,
     ) -> None:
-        self.scenario, self.scan, self.folder, self.epsg, self.view = scenario, scan, folder, epsg, view
+        self.scan, self._threads = scan, scenario.scan.threads
         self.finish = make_finish(scenario, scan, source, rows)
-        self.counts = ScanCounts()
-        # 16 bits are full for a white target at a right angle at half the usual range: only what is nearer or a
-        # retro-reflector is brighter, and the weakest echoes still have hundreds of steps.
-        corrected = scenario.cloud.intensity == "range_corrected"
-        usual = 65535.0 / 4.0 * (1.0 if corrected else max(2.0, scan.path.typical_range) ** 2)
-        self.intensity_scale = scenario.cloud.intensity_scale or usual
+        self.files = CloudFiles(scenario, folder, scan.target.origin, scan.path.typical_range, epsg, view)
+
+    @property
+    def counts(self) -> ScanCounts:
+        """Return what was counted so far."""
+        return self.files.counts
 
     def run(self) -> Generator[float, None, None]:
         """Scan; yield the share that is done after each block. The files are complete when the iteration ends."""
-        total = len(self.scan.blocks())
-        with ExitStack() as stack:
-            writers, grid = self._writers(stack), self._grid(stack)
-            results = scan_blocks(self.scan, self.scenario.scan.threads, self.finish)
-            done = 0
-            for result in results:
-                done += result.blocks
-                self.counts.add(result)
-                if grid:
-                    grid.add(result.points)
-                else:
-                    self._keep(result.points, writers)
+        total, done = len(self.scan.blocks()), 0
+        with self.files.opened():
+            for blocks in self.files.take(scan_blocks(self.scan, self._threads, self.finish)):
+                done += blocks
                 yield done / total
-            for block in grid.blocks() if grid else ():
-                self._keep(block, writers)
-        self.counts.points = writers[0].count if writers else self.counts.points
-        self.counts.intensity_clipped = writers[0].clipped if writers else 0
-        if self.view:
-            self.view.save(self.folder, self.epsg)
-
-    def _keep(self, points: PointBlock, writers: list[CloudWriter]) -> None:
-        for writer in writers:
-            writer.write(points)
-        if self.view:
-            self.view.add(points)
-
-    def _writers(self, stack: ExitStack) -> list[CloudWriter]:
-        """Return the cloud's writers; they are closed with the stack."""
-        if "cloud" not in self.scenario.outputs:
-            return []
-        cloud, origin = self.scenario.cloud, self.scan.target.origin
-        options = (self.epsg, origin, self.intensity_scale, cloud.attributes, cloud.scheme())
-        return [stack.enter_context(open_writer(self.folder / name, *options)) for name in cloud.file_names()]
-
-    def _grid(self, stack: ExitStack) -> GridSubsampler | None:
-        spacing = self.scenario.cloud.point_spacing
-        return stack.enter_context(GridSubsampler(spacing, self.folder)) if spacing else None
 
     def summary(self) -> dict[str, Any]:
         """Return the counts as JSON data."""
-        names = {row.id: row.name for row in classes()} | {255: "unlabelled"}
-        by_class = {names.get(i, str(i)): int(n) for i, n in enumerate(self.counts.by_class) if n}
-        target = self.scan.target
-        return {
-            "triangles": target.triangles,
-            "vertices": target.vertices,
-            "caster": target.caster.name,
-            **{name: value for name, value in asdict(self.counts).items() if not name.startswith("by_")},
-            "attenuation": self.scan.attenuation,
-            "intensity_scale": self.intensity_scale,
-            "points_by_class": by_class,
-            "points_by_colour_source": shares_by_source(self.counts.by_source),
-            "rendered": self.finish.source.report,
-        }
+        return of_scan(self.scan) | self.files.summary() | {"rendered": self.finish.source.report}
+
+
+def of_scan(scan: Scan) -> dict[str, Any]:
+    """Return what is counted of a scan before it begins, as JSON data."""
+    target = scan.target
+    return {
+        "triangles": target.triangles,
+        "vertices": target.vertices,
+        "caster": target.caster.name,
+        "attenuation": scan.attenuation,
+    }
 
 
 def road_path(scenario: Scenario, geometry: RoadGeometry) -> ScanPath:

@@ -81,7 +81,7 @@ def measured(scan: Scan, repeat: int) -> tuple[float, float]:
     timed = TimedCaster(part.caster)
     object.__setattr__(part, "caster", timed)
     strip = scan.path.strips[0]
-    blocks = np.linspace(0, scan.pulses(strip) // scan.pulses_per_block - 1, BLOCKS).astype(int)
+    blocks = np.linspace(0, scan.pulses(strip) // scan.cut.size - 1, BLOCKS).astype(int)
     rays, whole, casting = 0, 0.0, 0.0
     for block in blocks:
         runs = []

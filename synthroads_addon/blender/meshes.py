@@ -18,11 +18,18 @@ from .nodes.road_layout import varying_widths
 
 Float = NDArray[np.float64]
 
-def backbone_mesh(geometry: RoadGeometry, station: Float, origin: Float) -> bpy.types.Mesh:
-    """Return a polyline with one vertex per station (N,) and the attributes that `nodes.backbone` lists."""
+def backbone_mesh(geometry: RoadGeometry, station: Float, origin: Float, zero: float = 0.0) -> bpy.types.Mesh:
+    """Return a polyline with one vertex per station (N,) and the attributes that `nodes.backbone` lists.
+
+    Args:
+        geometry: the road.
+        station: (N,) m.
+        origin: (3,) local coordinates of the scene's origin, m.
+        zero: station (m) that the nodes count theirs from: as float32 they are exact near it only.
+    """
     position, heading, curvature = geometry.alignment.frame(station)
     elevation = geometry.profile.elevation(station)
-    values = {"station": station, "curvature": curvature}
+    values = {"station": station - zero, "curvature": curvature}
     for side in ("left", "right"):
         carriageway = geometry.parameters.carriageway(side)
         values[f"crossfall_{side}"] = (
@@ -56,12 +63,12 @@ def _ground_grid(
     bend = terrain.undulation * (2.0 * np.pi / terrain.wavelength) ** 2
     spacing = float(np.clip(np.sqrt(8.0 * tolerance / max(bend, 1e-9)), 1.5, 4.0))
 
-    def steps(low: float, high: float) -> Float:
-        return np.linspace(low, high, int(np.ceil((high - low) / spacing)) + 1)
-
-    station = steps(stretch[0] - GROUND_MARGIN, stretch[1] + GROUND_MARGIN)
+    # Whole multiples of the spacing, so that a stretch of the road has the whole road's ground.
+    first, last = (stretch[0] - GROUND_MARGIN) // spacing, -((-stretch[1] - GROUND_MARGIN) // spacing)
+    ends = -GROUND_MARGIN, geometry.length + GROUND_MARGIN
+    station = np.clip(np.arange(first, last + 1) * spacing, *ends)
     reach = terrain.half_width + GROUND_MARGIN
-    offset = steps(-reach, reach)
+    offset = np.linspace(-reach, reach, int(np.ceil(2.0 * reach / spacing)) + 1)
     position, heading, curvature = geometry.alignment.frame(station)
     offsets = clip_offset(offset[None, :], curvature[:, None])
     left = np.stack([-np.sin(heading), np.cos(heading)], axis=-1)

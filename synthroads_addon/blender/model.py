@@ -10,6 +10,7 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
+from ..core.parameters.geometry import RoadGeometry
 from ..core.parameters.model import RoadParameters
 from ..core.turns import Turns
 from .materials import vary
@@ -50,6 +51,7 @@ def build_road(
     vegetation_detail: float = 1.0,
     parts: Collection[str] | None = None,
     stretch: tuple[float, float] | None = None,
+    geometry: RoadGeometry | None = None,
 ) -> RoadModel:
     """Build the road in the current scene; a road built before is replaced, other objects stay as they are.
 
@@ -60,13 +62,15 @@ def build_road(
         tolerance: largest chord error of the road's surface, m.
         vegetation_detail: share of the vegetation's triangles, 0 to 1; 0 builds none.
         parts: which of `PARTS` are wanted; all if None. What they need from others is built hidden.
-        stretch: stations between which it is built, with an origin of its own; the whole road if None.
+        stretch: stations between which it is built, with an origin of its own (see `core.parameters.stretch`), from
+            and to the nearest rows of the whole road's surface; the whole road if None.
+        geometry: of the parameters, if there is one already.
 
     Raises:
         ValueError: a part that there is none of.
         InputError: an asset of the set can't be read.
     """
-    work = _Build(parameters, tolerance, vegetation_detail, parts, stretch)
+    work = _Build(parameters, tolerance, vegetation_detail, parts, stretch, geometry)
     try:
         with work.made.noted():
             work.build()
@@ -128,6 +132,7 @@ class _Build:
         detail: float,
         parts: Collection[str] | None,
         stretch: tuple[float, float] | None,
+        geometry: RoadGeometry | None = None,
     ) -> None:
         self._wanted = set(PARTS if parts is None else parts)
         if self._wanted - set(PARTS):
@@ -138,10 +143,11 @@ class _Build:
         self.share = 0.0
         with self.made.noted():
             self._collection = new_staging(bpy.context.scene)
-        self._builder = ModelBuilder(parameters, self._collection, tolerance, detail, stretch)
+        self._builder = ModelBuilder(parameters, self._collection, tolerance, detail, stretch, geometry)
 
     def build(self) -> None:
         """Make the objects; see `core.turns` for how this is done in steps."""
+        self._builder.lay_out()
         there = needed(self._wanted)
         for number, (name, build) in enumerate(PARTS.items()):
             if name in there:

@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 
 from ..core.parameters.geometry import RoadGeometry
 from ..core.parameters.model import PointObject, RoadParameters
-from ..core.parameters.stretch import cut
-from ..core.turns import pause, rest
+from ..core.parameters.stretch import cut, frame_of
+from ..core.parameters.tessellation import sample_stations
+from ..core.turns import aside, pause, rest
 from .compat import set_modifier_input
 from .meshes import points_mesh, signed
 
@@ -22,6 +23,8 @@ ROLE = "synthroads_role"
 SUPPORT = "synthroads_support"
 """Custom property of objects that only other objects need: they are hidden and never scanned."""
 
+_ROOM = 5.0
+
 
 class ModelBuilder:
     """Makes a model's objects one by one.
@@ -29,8 +32,10 @@ class ModelBuilder:
     Attributes:
         parameters: the road, with only those objects that stand on the stretch.
         geometry: the whole road's analytic geometry.
-        stretch: stations between which it is built.
+        stretch: stations between which it is built, two of those that the whole road's surface has.
+        stations: (N,) m, of the rows of the surface.
         origin: (3,) local coordinates of the scene's origin: near the stretch, as the scene has float32.
+        zero: station (m) that the nodes count theirs from, for the same reason; a whole number.
         tolerance: largest chord error of the road's surface, m.
         detail: share of the vegetation's triangles, 0 to 1.
         hidden: what is added now is only needed by other parts.
@@ -45,11 +50,15 @@ class ModelBuilder:
         tolerance: float,
         detail: float,
         stretch: tuple[float, float] | None = None,
+        geometry: RoadGeometry | None = None,
     ) -> None:
-        self.geometry = RoadGeometry(parameters)
-        self.stretch = stretch or (0.0, self.geometry.length)
-        self.parameters = cut(parameters, *stretch) if stretch else parameters
-        self.origin = self._middle() if stretch else np.zeros(3)
+        self.geometry = geometry or RoadGeometry(parameters)
+        self._given = stretch or (0.0, self.geometry.length)
+        self.stations: NDArray[np.float64] = np.zeros(0)
+        self.stretch = self._given
+        self._whole = stretch is None
+        self.parameters = parameters
+        self.origin, self.zero = np.zeros(3), 0
         self.tolerance = tolerance
         self.detail = detail
         self.hidden = False
@@ -58,22 +67,40 @@ class ModelBuilder:
         self._unseen = 0
         self._collection = collection
 
+    def lay_out(self) -> None:
+        """Find the rows of the surface, and with them what stands on the stretch; comes before everything else."""
+        self.stations = aside(lambda: sample_stations(self.geometry, self.tolerance, *self._given))
+        if not self._whole:
+            self.stretch = (float(self.stations[0]), float(self.stations[-1]))
+            self.parameters = cut(self.parameters, *self.stretch)
+            self.origin, self.zero = frame_of(self.geometry, *self.stretch)
+
     @cached_property
     def step(self) -> float:
-        """Longest straight piece (m) of what follows the road, so that it keeps the tolerance in the curves."""
-        bend = np.abs(self.geometry.alignment.curvature(np.linspace(*self.stretch, 200))).max()
-        return float(np.clip(np.sqrt(8.0 * self.tolerance / max(bend, 1e-9)), 0.5, 4.0))
+        """Longest straight piece (m) of what follows the road, so that it keeps the tolerance in the curves.
+
+        It is that of the whole road, 4 m halved as often as need be: pieces of a stretch are the whole road's.
+        """
+        bends = [max(abs(e.curvature_start), abs(e.curvature_end)) for e in self.geometry.alignment.elements]
+        wanted = np.sqrt(8.0 * self.tolerance / max(*bends, 1e-9))
+        return float(2.0 ** np.floor(np.log2(np.clip(wanted, 0.5, 4.0))))
+
+    @cached_property
+    def widest(self) -> float:
+        """A distance from the axis (m) that the whole road's verges don't reach, wider ones by hand included."""
+        sections, length = self.geometry.sections.values(), self.geometry.length
+        edges = [section.road_edge([0.0, *section.kinks(), length]).max() for section in sections]
+        return float(np.ceil(max(edges)) + _ROOM)
+
+    def along(self, station: float) -> float:
+        """Return a station as the nodes count it."""
+        return station - self.zero
 
     def points(
         self, name: str, items: Sequence[PointObject], attributes: Mapping[str, NDArray[Any]]
     ) -> bpy.types.Mesh:
         """Return a mesh with one vertex per point object, see `meshes.points_mesh`."""
         return points_mesh(name, self.geometry, items, attributes, self.origin)
-
-    def _middle(self) -> NDArray[np.float64]:
-        """Return the axis's local place in the middle of the stretch, in whole metres."""
-        station = np.array([sum(self.stretch) / 2.0])
-        return np.round([*self.geometry.alignment.position(station)[0], *self.geometry.profile.elevation(station)])
 
     def surfaces(self, *more: str) -> dict[str, bpy.types.Object]:
         """Return what objects stand on (inputs ``Road`` and ``Terrain``), and further objects by role."""

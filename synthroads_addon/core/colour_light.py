@@ -86,8 +86,10 @@ class CloudShadows:
     environment's cloud cover.
     """
 
-    def __init__(self, environment: Environment, seed: int) -> None:
+    def __init__(self, environment: Environment, seed: int, frame: ArrayLike = (0.0, 0.0, 0.0)) -> None:
+        """Take where (3,) the local frame begins, m: that of a section of a road in the whole road's."""
         self.environment = environment
+        self._frame = np.asarray(frame, dtype=np.float64)
         self._cell = environment.cloud_size * _CELL
         heading = np.deg2rad(environment.cloud_direction_deg)
         self.drift: Float = environment.cloud_speed * np.array([np.sin(heading), np.cos(heading)])
@@ -98,6 +100,7 @@ class CloudShadows:
 
     def transmission(self, position: Float, time: ArrayLike) -> NDArray[np.float32]:
         """Return the share (N,) of the direct sun at local positions (N, 3), m, and times (N,) or one time, s."""
+        position = position + self._frame
         plan = position[:, :2] - position[:, 2:3] * self._slope
         plan = plan - np.asarray(time, np.float64).reshape(-1, 1) * self.drift
         scaled = plan / self._cell

@@ -33,11 +33,13 @@ class StageTimer:
 
     @contextmanager
     def stage(self, name: str) -> Iterator[None]:
-        """Measure what happens inside."""
+        """Measure what happens inside; a stage that comes again, its seconds together."""
         self.progress(name, 0.0)
         start = time.perf_counter()
         yield
         seconds = time.perf_counter() - start
+        if name in self.stages:  # of a section before
+            seconds += self.stages[name]["seconds"] or 0.0
         self.stages[name] = {"seconds": round(seconds, 3), "peak_memory_mb": peak_memory_mb()}
         self.progress(name, 1.0)
 

@@ -61,6 +61,10 @@ class Scenario(ScenarioModel):
         """
         return read_material_table(material_table_path(self.materials_table)) if self.materials_table else {}
 
+    def by_section(self, length: float) -> bool:
+        """Return whether a road of a length (m) is built and scanned section by section: if it is to be scanned."""
+        return bool(set(self.outputs) & {"cloud", "previews"}) and length > 2.0 * self.scan.section_length
+
     def settings(self) -> Settings:
         """Return the numbers that the fidelity stands for, after the scenario's own."""
         preset = FIDELITIES[self.fidelity]

@@ -17,6 +17,7 @@ from synthroads_addon.blender.scene import scanned_scene, scene_mesh
 from synthroads_addon.core.cloud.labels import class_id
 from synthroads_addon.core.cloud.points import PointBlock, concatenate
 from synthroads_addon.core.errors import InputError
+from synthroads_addon.core.parameters import stretch
 from synthroads_addon.core.parameters.chassis import CHASSIS
 from synthroads_addon.core.parameters.geometry import RoadGeometry
 from synthroads_addon.core.parameters.model import RoadParameters, Vehicle
@@ -154,7 +155,8 @@ class TestWhatMoves:
         assert geometry.parameters.objects["b"].instance in scene.static.instance_id
         assert np.array_equal(scanned_scene().static.vertices, whole.vertices)
 
-    def test_on_a_stretch_with_an_origin_of_its_own(self) -> None:
+    def test_on_a_stretch_with_an_origin_of_its_own(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        monkeypatch.setattr(stretch, "FRAME", 50.0)
         parameters = RoadParameters.from_dict(road_data(VEHICLES))
         build_road(parameters, 0.005, 0.0, {"road", "vehicles"}, stretch=(100.0, 200.0))
         geometry = RoadGeometry(parameters)

@@ -21,6 +21,7 @@ from synthroads_addon.blender.parts.sign_faces import FaceStyle, face_inputs
 from synthroads_addon.blender.scene import scene_mesh
 from synthroads_addon.core.cloud.labels import class_id
 from synthroads_addon.core.materials import materials
+from synthroads_addon.core.parameters import stretch
 from synthroads_addon.core.parameters.body_shapes import SIGN_RAIL
 from synthroads_addon.core.parameters.model import TrafficSign
 from synthroads_addon.core.parameters.signs import Pictogram, sign_catalogue
@@ -261,7 +262,8 @@ class TestEdits:
         assert raised[:, 2].max() == pytest.approx(3.0 + 1.5, abs=MEASURE)
 
 
-def test_a_sign_stands_in_its_place_on_a_stretch_too() -> None:
+def test_a_sign_stands_in_its_place_on_a_stretch_too(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(stretch, "FRAME", 50.0)
     road = FurnishedRoad(SIGNS, {"signs"}, stretch=(195.0, 245.0))
     assert np.abs(road.origin).max() > 50.0
     sign = sign_of(road, "turned")

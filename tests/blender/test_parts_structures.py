@@ -12,6 +12,7 @@ from synthroads_addon.blender.nodes.gantry import gantry_group
 from synthroads_addon.blender.nodes.overpass import overpass_group
 from synthroads_addon.blender.scene import scene_mesh
 from synthroads_addon.core.cloud.labels import class_id
+from synthroads_addon.core.parameters import stretch
 from synthroads_addon.core.scene_mesh import SceneMesh
 from tests.blender.furnished_road import (
     MEASURE,
@@ -407,7 +408,8 @@ def pieces_low(road: FurnishedRoad, name: str) -> float:
     return float(max(found, key=lambda p: np.ptp(p[..., :2].reshape(-1, 2), axis=0).max())[..., 2].min())
 
 
-def test_structures_of_a_stretch_stand_where_they_do_on_the_whole_road() -> None:
+def test_structures_of_a_stretch_stand_where_they_do_on_the_whole_road(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(stretch, "FRAME", 50.0)
     objects = {"boards": GANTRIES["boards"], "skewed": bridge(150.0, **BRIDGES["skewed"])}
     whole = FurnishedRoad(objects, ("gantries", "overpasses"))
     wanted = {name: whole.mesh(name).vertices + whole.origin for name in objects}

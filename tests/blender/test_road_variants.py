@@ -20,7 +20,7 @@ from synthroads_addon.core.parameters.geometry import RoadGeometry
 from synthroads_addon.core.parameters.limits import SECTIONS_OF_CLASS
 from synthroads_addon.core.parameters.model import Carriageway, Guardrail, LineMarking, RoadParameters, Turnout
 from synthroads_addon.core.parameters.sampler import sample_road
-from synthroads_addon.core.parameters.stretch import stretches
+from synthroads_addon.core.parameters.stretch import FRAME, stretches
 from synthroads_addon.core.parameters.turnout_shape import STEP
 from synthroads_addon.core.road_scenario import RoadScenario
 from synthroads_addon.core.scene_mesh import SceneMesh
@@ -229,7 +229,7 @@ class TestStretches:
         for stretch in stretches(900.0, 300.0):
             build_road(parameters, 0.005, 0.3, parts, stretch)
             mesh = scene_mesh()
-            assert np.abs(mesh.vertices).max() < 400.0
+            assert np.abs(mesh.vertices).max() < FRAME
             for number in np.unique(mesh.instance_id):
                 area[number] = area.get(number, 0.0) + float(mesh.areas()[mesh.instance_id == number].sum())
         for number in np.unique(whole.instance_id):

@@ -50,6 +50,7 @@ class ColourJob:
         path: the scanner's.
         field_of_view: the scanner's, rad.
         seed: of the clouds.
+        frame: where (3,) the scene's local frame begins in that of the clouds, m.
     """
 
     scenario: ColourScenario
@@ -60,6 +61,7 @@ class ColourJob:
     path: Poses
     field_of_view: float
     seed: int = 0
+    frame: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
 
 def check_colour(scenario: ColourScenario) -> None:
@@ -108,7 +110,7 @@ def layer_source(
             day = stack.enter_context(daylight(job.environment, job.scenario.lighting == "direct"))
             light, exposure, lamps = day.light, day.exposure, (day.sun,)
             world = day.world if passes.sky else None
-        fallback = material_layers(job.scenario, constants, lit, job.environment, job.seed, light)
+        fallback = material_layers(job.scenario, constants, lit, job.environment, job.seed, light, job.frame)
         if job.scenario.source == "material" or not passes.channels:
             yield fallback
             return
@@ -139,6 +141,7 @@ def material_layers(
     environment: Environment,
     seed: int,
     light: SunAndSky | None = None,
+    frame: tuple[float, float, float] = (0.0, 0.0, 0.0),
 ) -> MaterialLayers:
     """Return the materials' own values: all of it where nothing is rendered, else for what no image shows.
 
@@ -151,8 +154,9 @@ def material_layers(
         environment: its clouds drift over the scene.
         seed: of the clouds.
         light: that of the images; the usual one if None.
+        frame: see `ColourJob`.
     """
-    clouds = CloudShadows(environment, seed) if lit and environment.cloud_cover > 0.0 else None
+    clouds = CloudShadows(environment, seed, frame) if lit and environment.cloud_cover > 0.0 else None
     return MaterialLayers(constants, Shading(scenario.mode, light or SunAndSky(), clouds))
 
 

@@ -90,16 +90,19 @@ def _build(tree: Tree) -> None:
 
 
 def _rows(tree: Tree, barrier: _Barrier, begin: Value, end: Value, ramp: Value) -> Value:
-    """Return points with their station, evenly spaced but for the two at the ends of the ramps."""
-    count = op.rounded_up(op.maximum(end - begin, 0.01) / barrier.step - 1e-4) + 1
+    """Return points with their station, evenly spaced from its start on but for the two at the ends of the ramps.
+
+    Those beyond the backbone's ends collapse there.
+    """
+    first, last = barrier.first, barrier.last
+    count = op.rounded_up(op.maximum(last - first, 0.01) / barrier.step - 1e-4) + 1
     line = tree.node("GeometryNodeMeshLine", count=count).value
-    spacing = (end - begin) / (count - 1.0)
-    station = begin + op.index(tree) * spacing
-    for kink in (barrier.first + ramp, barrier.last - ramp):
-        near = op.unary("ABSOLUTE", station - kink) < spacing * 0.499
+    station = op.minimum(first + op.index(tree) * barrier.step, last)
+    for kink in (first + ramp, last - ramp):
+        near = op.unary("ABSOLUTE", station - kink) < barrier.step * 0.499
         inside = (op.index(tree) > 0) & (op.index(tree) < count - 1)
         station = op.switch(near & inside, station, kink)
-    return op.store(line, "station", station)
+    return op.store(line, "station", op.minimum(op.maximum(station, begin), end))
 
 
 def _swept(tree: Tree, line: Value, barrier: _Barrier) -> Value:

@@ -7,7 +7,7 @@ import bpy
 from ...core.cloud.labels import class_id
 from . import operations as op
 from .builder import Tree, Value, node_group
-from .plants import declare_stand, one_high, planted, points_in_band
+from .plants import declare_stand, one_high, planted, points_in_band, points_on
 
 _VARIANTS = 4
 _GOLDEN_ANGLE = 2.4
@@ -26,6 +26,7 @@ def _build(tree: Tree) -> None:
     """Tufts of grass in a band beside the road, and shorter ones on its verges and median."""
     stand = declare_stand(tree, 1.0, (0.1, 0.45), (0.0, 60.0))
     beside = tree.number("Roadside Density", 1.0, (0.0, 50.0), description="Tufts per area of verge and median (1/m2)")
+    near = tree.number("Roadside Reach", 30.0, (1.0, 100.0), unit="m", description="Farthest verge from the axis")
     about = "Height there, as a share of the height elsewhere"
     short = tree.number("Roadside Height", 0.5, (0.0, 1.0), unit="share", description=about)
     material = tree.input("Material", "Material", description="Material of the blades")
@@ -33,18 +34,12 @@ def _build(tree: Tree) -> None:
         shape = _declare_tuft(tree)
 
     with tree.frame("Places on the terrain"):
-        points = points_in_band(tree, stand, op.object_geometry(stand.terrain), stand.density * stand.detail)
+        points = points_in_band(tree, stand, stand.density * stand.detail)
         points = op.store(points, "share", 1.0)
     with tree.frame("Places on verges and median"):
         roadside = op.named(tree, "class_id", "INT").equals(class_id("roadside"))
         faces = op.separate(op.object_geometry(stand.road), roadside, "FACE")
-        mown = tree.node(
-            "GeometryNodeDistributePointsOnFaces",
-            faces,
-            distribute_method="RANDOM",
-            density=beside * stand.detail,
-            seed=stand.seed + 7,
-        )["Points"]
+        mown = points_on(tree, stand, faces, beside * stand.detail, near, stand.seed + 7)
         points = op.join(points, op.store(mown, "share", short))
     with tree.frame("Kinds of tufts"):
         variants = [tree.call(tuft_group(), **shape, seed=100 * n).value for n in range(_VARIANTS)]

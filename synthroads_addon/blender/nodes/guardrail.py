@@ -143,19 +143,25 @@ def _post_rows(tree: Tree, rail: Rail) -> Value:
 
 
 def _rows(tree: Tree, rail: Rail, ramp: Value) -> Value:
-    """Return points with their station: no piece is longer than the step, and the ramps end at a point."""
-    first, last, step = rail.first, rail.last, rail.step
-    outer = op.rounded_up(ramp / step - 1e-4)
-    middle = op.maximum(op.rounded_up((last - first - ramp * 2.0) / step - 1e-4), 0)
+    """Return points with their station: no piece is longer than the step, and the ramps end at a point.
+
+    Between the ramps the rows are whole parts of the post spacing from the start on, as the posts are.
+    """
+    first, last = rail.first, rail.last
+    step = rail.spacing / op.rounded_up(rail.spacing / rail.step - 1e-4)
+    outer = op.rounded_up(ramp / rail.step - 1e-4)
+    skipped = op.rounded_up(ramp / step - 1e-4)
+    middle = op.maximum(op.rounded_up((last - first - ramp) / step - 1e-4) - skipped, 0)
     middle = tree.node("FunctionNodeFloatToInt", middle, rounding_mode="ROUND").value
-    line = tree.node("GeometryNodeMeshLine", count=outer * 2 + middle + 1).value
+    # A row more where the ramp begins that goes down: it need not be a whole number of pieces away.
+    line = tree.node("GeometryNodeMeshLine", count=outer * 2 + middle + 2).value
     number = op.index(tree)
-    into = op.minimum(number / op.maximum(outer, 1), 1.0)
-    along = op.minimum(op.maximum((number - outer) / op.maximum(middle, 1), 0.0), 1.0)
-    out_of = op.maximum((number - outer - middle) / op.maximum(outer, 1), 0.0)
-    # Without a ramp `into` is 0 in row 0 and 1 after it, and the ramp's length is 0: both are the start.
-    station = first + ramp * (into + out_of) + (last - first - ramp * 2.0) * along
-    return op.store(line, "station", op.minimum(station, last))
+    into = first + ramp * (number / op.maximum(outer, 1))
+    within = first + (number - outer + skipped - 1) * step
+    out_of = last - ramp + ramp * ((number - outer - middle - 1) / op.maximum(outer, 1))
+    within = op.minimum(op.maximum(within, first + ramp), last - ramp)
+    station = op.switch(number > outer, into, op.switch(number > outer + middle, within, out_of))
+    return op.store(line, "station", op.maximum(op.minimum(station, last), first))
 
 
 def _beam(tree: Tree, line: Value, side: float, spacer: Value) -> Value:

@@ -105,8 +105,13 @@ def attribute_name(side: str, strip: str) -> str:
     return f"{side}_{strip}".lower().replace(" ", "_")
 
 
-def road_inputs(parameters: RoadParameters) -> dict[str, float | int | bool]:
-    """Return the values of the group's inputs, without objects and materials."""
+def road_inputs(parameters: RoadParameters, zero: float = 0.0) -> dict[str, float | int | bool]:
+    """Return the values of the group's inputs, without objects and materials.
+
+    Args:
+        parameters: the road, or what of it is on a stretch.
+        zero: station that the nodes count theirs from, m.
+    """
     inputs: dict[str, float | int | bool] = {}
     for carriageway in parameters.of_type(Carriageway).values():
         side = carriageway.side.title()
@@ -121,20 +126,20 @@ def road_inputs(parameters: RoadParameters) -> dict[str, float | int | bool]:
         for shape in section.turnouts:
             name = next(key for key, item in parameters.objects.items() if item is shape.turnout)
             low, high = shape.range()
-            inputs |= {f"{name} Start Station": low, f"{name} End Station": high}
+            inputs |= {f"{name} Start Station": low - zero, f"{name} End Station": high - zero}
             inputs[f"{name} Instance"] = shape.turnout.instance
     for name, line in parameters.of_type(LineMarking).items():
-        inputs |= _marking_inputs(name, line)
+        inputs |= _marking_inputs(name, line, zero)
     return inputs
 
 
-def _marking_inputs(name: str, line: LineMarking) -> dict[str, float | int | bool]:
+def _marking_inputs(name: str, line: LineMarking, zero: float) -> dict[str, float | int | bool]:
     inputs: dict[str, float | int | bool] = {
         f"{name} Width": line.width,
         f"{name} Dash": line.dash_length,
         f"{name} Gap": line.gap_length,
-        f"{name} Start Station": line.start_station,
-        f"{name} End Station": line.end_station,
+        f"{name} Start Station": line.start_station - zero,
+        f"{name} End Station": line.end_station - zero,
         f"{name} Film Thickness": line.film_thickness,
         f"{name} Instance": line.instance,
     }

@@ -31,7 +31,7 @@ def _build(tree: Tree) -> None:
     with tree.panel("Materials"):
         materials = declare_materials(tree)
     with tree.frame("Places"):
-        points = points_in_band(tree, stand, op.object_geometry(stand.terrain), stand.density)
+        points = points_in_band(tree, stand, stand.density)
     with tree.frame("Kinds of trees"):
         kinds = [_kind(tree, {**shape, **materials, "detail": stand.detail}, *kind) for kind in _KINDS]
     with tree.frame("Trees"):

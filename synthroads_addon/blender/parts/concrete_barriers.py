@@ -15,8 +15,8 @@ def build_concrete_barriers(builder: ModelBuilder) -> None:
     for name, barrier in builder.parameters.of_type(ConcreteBarrier).items():
         inputs = {
             **builder.surfaces("Backbone"),
-            "Start Station": barrier.start_station,
-            "End Station": min(barrier.end_station, builder.geometry.length),
+            "Start Station": builder.along(barrier.start_station),
+            "End Station": builder.along(min(barrier.end_station, builder.geometry.length)),
             "Offset": barrier.offset,
             "New Jersey": barrier.profile == "new_jersey",
             "Height": barrier.height,

@@ -16,8 +16,8 @@ def build_guardrails(builder: ModelBuilder) -> None:
     for name, rail in builder.parameters.of_type(Guardrail).items():
         inputs = {
             **builder.surfaces("Backbone"),
-            "Start Station": rail.start_station,
-            "End Station": min(rail.end_station, builder.geometry.length),
+            "Start Station": builder.along(rail.start_station),
+            "End Station": builder.along(min(rail.end_station, builder.geometry.length)),
             "Offset": rail.offset,
             "Left Beam": rail.faces in ("left", "both"),
             "Right Beam": rail.faces in ("right", "both"),

@@ -25,8 +25,8 @@ def build_noise_barriers(builder: ModelBuilder) -> None:
         face, frame = _MATERIALS[wall.panel]
         inputs = {
             **builder.surfaces("Backbone"),
-            "Start Station": wall.start_station,
-            "End Station": min(wall.end_station, builder.geometry.length),
+            "Start Station": builder.along(wall.start_station),
+            "End Station": builder.along(min(wall.end_station, builder.geometry.length)),
             "Offset": wall.offset,
             "Height": wall.height,
             "Panel": KINDS.index(wall.panel),

@@ -29,7 +29,7 @@ def build_painted_areas(builder: ModelBuilder) -> None:
     sizes = [len(polygon) for polygon in polygons]
     mesh = bpy.data.meshes.new("SR Painted Areas")
     corners = np.concatenate(polygons)
-    fill_polygons(mesh, np.column_stack([corners, np.zeros(len(corners))]), sizes)
+    fill_polygons(mesh, np.column_stack([corners - [builder.zero, 0.0], np.zeros(len(corners))]), sizes)
     items = [item for _, item in outlines]
     attribute(mesh, "film", np.repeat([item.film_thickness for item in items], sizes))
     attribute(mesh, "yellow", np.repeat([float(item.color == "yellow") for item in items], sizes))
@@ -55,7 +55,10 @@ def _outlines(builder: ModelBuilder) -> Iterator[tuple[NDArray[np.float64], Hatc
 
 
 def _pieces(outline: NDArray[np.float64], start: float, end: float) -> Iterator[NDArray[np.float64]]:
-    """Cut a convex outline (K, 2) across the road into pieces between two stations that are short along it."""
-    low, high = max(outline[:, 0].min(), start), min(outline[:, 0].max(), end)
-    if low < high:
-        yield from pieces(outline, np.linspace(low, high, int(np.ceil((high - low) / _LONGEST)) + 1))
+    """Cut a convex outline (K, 2) into pieces that are short along the road; yield what of them is on a stretch."""
+    low, high = outline[:, 0].min(), outline[:, 0].max()
+    if low < high and low < end and high > start:
+        borders = np.linspace(low, high, int(np.ceil((high - low) / _LONGEST)) + 1)
+        # Its two ends are borders as well: all other pieces are those of the whole outline.
+        inside = borders[(borders > start) & (borders < end)]
+        yield from pieces(outline, np.array([max(low, start), *inside, min(high, end)]))

@@ -7,7 +7,6 @@ from typing import Any
 import bpy
 import numpy as np
 
-from ...core.parameters.tessellation import sample_stations
 from ...core.turns import aside
 from ..materials import material
 from ..meshes import attribute, backbone_mesh, fill
@@ -20,8 +19,9 @@ _MATERIALS = {"Marking": "paint_white", "Yellow Marking": "paint_yellow", "Verge
 
 def build_surface(builder: ModelBuilder) -> None:
     """Make the backbone and the road's surface."""
-    station = aside(lambda: sample_stations(builder.geometry, builder.tolerance, *builder.stretch))
-    builder.add("Backbone", backbone_mesh(builder.geometry, station, builder.origin), support=True)
+    station = builder.stations
+    backbone = backbone_mesh(builder.geometry, station, builder.origin, builder.zero)
+    builder.add("Backbone", backbone, support=True)
     inputs: dict[str, Any] = {"Backbone": builder.objects["Backbone"]}
     inputs |= {f"{name} Material": material(entry) for name, entry in _MATERIALS.items()}
     for side, section in builder.geometry.sections.items():
@@ -35,5 +35,5 @@ def build_surface(builder: ModelBuilder) -> None:
         role = f"{name} Detail"
         builder.add(role, mesh, support=True)
         inputs[role] = builder.objects[role]
-    inputs |= road_inputs(builder.parameters)
+    inputs |= road_inputs(builder.parameters, builder.zero)
     builder.add("Road", bpy.data.meshes.new("SR Road"), road_group(road_layout(builder.parameters)), inputs)

@@ -17,8 +17,8 @@ def build_temporary_barriers(builder: ModelBuilder) -> None:
         plastic = barrier.segment_length <= LONGEST_PLASTIC
         inputs = {
             **builder.surfaces("Backbone"),
-            "Start Station": barrier.start_station,
-            "End Station": barrier.end_station,
+            "Start Station": builder.along(barrier.start_station),
+            "End Station": builder.along(barrier.end_station),
             "Offset": barrier.offset,
             "End Offset": barrier.end_offset,
             "Height": barrier.height,

@@ -21,17 +21,20 @@ root sum of squares stays below the whole."""
 def sample_stations(
     geometry: RoadGeometry, tolerance: float, start: float = 0.0, end: float = np.inf
 ) -> NDArray[np.float64]:
-    """Return the (N,) increasing stations at which the road is sampled, from start to end within its length.
+    """Return the (N,) increasing stations at which the road is sampled.
 
     Every kink (element, rounding, crossfall point, end of a dash) is a station of its own. Between two kinks the
     spacing is even and keeps the chord's sagitta ds^2 k / 8 and the twist of the widest strip within the tolerance.
+    A stretch has the whole road's stations, from the last one that is not after its start to the last one that is not
+    after its end: stretches that follow one another join, and a road doesn't depend on how it is cut.
 
     Args:
         geometry: the analytic road.
         tolerance: largest distance (m) between the mesh and the analytic surface, > 0.
         start, end: stations (m) of the stretch that is wanted.
     """
-    kinks = _kinks(geometry, tolerance, start, min(end, geometry.length))
+    end = min(end, geometry.length)
+    kinks = _around(_kinks(geometry, tolerance), start, end)
     spacing = np.minimum(_chord_spacing(geometry, kinks, tolerance), _twist_spacing(geometry, kinks, tolerance))
     # Between the two ends of a step there is nothing to follow.
     spacing = np.where(np.diff(kinks) <= 2.0 * STEP, np.inf, np.minimum(spacing, MAXIMUM_SPACING))
@@ -39,17 +42,20 @@ def sample_stations(
     first = np.repeat(kinks[:-1], counts)
     step = np.repeat(np.diff(kinks) / counts, counts)
     within = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
-    return np.append(first + within * step, kinks[-1])
+    stations = np.append(first + within * step, kinks[-1])
+    low, high = (np.searchsorted(stations, place, side="right") - 1 for place in (start, end))
+    low = max(low, 0)
+    return stations[low : max(high, low + 1) + 1]
 
 
-def _kinks(geometry: RoadGeometry, tolerance: float, start: float, end: float) -> NDArray[np.float64]:
-    parameters = geometry.parameters
-    stations = [geometry.alignment.element_starts, np.asarray(geometry.profile.breakpoints), [start, end]]
+def _kinks(geometry: RoadGeometry, tolerance: float) -> NDArray[np.float64]:
+    parameters, end = geometry.parameters, geometry.length
+    stations = [geometry.alignment.element_starts, np.asarray(geometry.profile.breakpoints), [0.0, end]]
     for section in geometry.sections.values():
         stations.append([point.station for point in section.carriageway.crossfall])
         stations += [section.kinks(), damage_rows(section, tolerance)]
     stations += [geometry.dashes(line).ravel() for line in parameters.of_type(LineMarking).values()]
-    inside = np.clip(np.concatenate([np.asarray(s, dtype=np.float64) for s in stations]), start, end)
+    inside = np.clip(np.concatenate([np.asarray(s, dtype=np.float64) for s in stations]), 0.0, end)
     kinks = np.unique(inside)
     # Kinks closer than a tenth of a millimetre are one: they would only make faces without area.
     keep = np.append(np.diff(kinks) > 1e-4, True)
@@ -57,10 +63,19 @@ def _kinks(geometry: RoadGeometry, tolerance: float, start: float, end: float) -
     return kinks[keep] if len(kinks) > 2 else kinks
 
 
+def _around(kinks: NDArray[np.float64], start: float, end: float) -> NDArray[np.float64]:
+    """Return those of the sorted kinks that the spacing between two stations depends on: at least two."""
+    low = np.searchsorted(kinks, start, side="right") - 1
+    high = np.searchsorted(kinks, end, side="left")
+    low = int(np.clip(low, 0, len(kinks) - 2))
+    return kinks[low : max(int(high), low + 1) + 1]
+
+
 def _chord_spacing(geometry: RoadGeometry, kinks: NDArray[np.float64], tolerance: float) -> NDArray[np.float64]:
     """Return the largest spacing (K,) whose horizontal and vertical sagitta keep their share of the tolerance."""
     samples = np.linspace(kinks[:-1] + 1e-6, kinks[1:] - 1e-6, 5)
-    reach = np.abs(geometry.offsets(kinks)).max()
+    widest = np.abs(geometry.offsets(kinks)).max(axis=1)
+    reach = np.maximum(widest[:-1], widest[1:])
     bend = np.abs(geometry.alignment.curvature(samples)).max(axis=0)
     for section in geometry.sections.values():
         bend = bend + section.bend(samples.ravel()).reshape(samples.shape).max(axis=0)

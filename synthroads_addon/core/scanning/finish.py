@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -39,6 +39,7 @@ class Finish:
         strength: of the relief.
         octaves: of the relief.
         seed: of the relief.
+        frame: (3,) m, of the relief; see `Scan`.
         kept: `PointBlock`'s optional arrays that stay; the others were needed on the way.
     """
 
@@ -54,6 +55,7 @@ class Finish:
     octaves: int
     seed: int
     kept: frozenset[str]
+    frame: NDArray[np.float64] = field(default_factory=lambda: np.zeros(3))
 
     def __call__(self, result: BlockResult) -> BlockResult:
         """Return a block, or several joined, with its points finished."""
@@ -61,7 +63,8 @@ class Finish:
             result = self._coloured(result, result.seen)
         points = result.points
         if result.seen is not None and self.relief is not None and self.strength > 0.0:
-            points = adjusted(points, result.seen.position, self.relief, self.strength, self.seed, self.octaves)
+            place = result.seen.position + self.frame
+            points = adjusted(points, place, self.relief, self.strength, self.seed, self.octaves)
         changes: dict[str, Any] = {name: None for name in OPTIONAL if name not in self.kept}
         if self.range_corrected:
             changes["intensity"] = points.intensity * points.range**2

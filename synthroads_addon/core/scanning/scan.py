@@ -13,9 +13,9 @@ from ..cloud.points import PointBlock, concatenate
 from ..colour import Targets, joined_targets
 from ..scan_scenario import Noise
 from .beam import BeamPattern, beam_pattern, conical, cylindrical_offsets
+from .blocks import Block, Blocks
 from .devices import ScannerSetting
 from .path import Path, Strip
-from .pattern import shot_count, shots
 from .pulses import Errors, Poses, Pulses, make_pulses, reaching_scene
 from .radiometry import received, saturated
 from .returns import Echoes, Marks, chosen_echoes, group_returns, number_returns
@@ -28,8 +28,6 @@ from .track import Track
 Float = NDArray[np.float64]
 Index = NDArray[np.intp]
 
-RAYS_PER_BLOCK = 2**18
-"""Rays of one block at most; what keeps memory bounded. Fixed, as blocks carry their own random streams."""
 RAYS_PER_CHUNK = 2**16
 """Rays that are worked on at once: fewer are slow by the number of calls, more by memory. No result depends on it."""
 LENIENT = 0.25
@@ -51,6 +49,9 @@ class Scan:
         targets: whether to say where each point was seen, for colours and relief: `BlockResult.seen`.
         detects_later: intensities are yet to change, see `finish`: every echo that may pass the detector is kept, and
             nothing saturates.
+        frame: (3,) where the scene's local frame begins, in the coordinates of the surfaces' random fields, m: those of
+            the whole road where only a section of it is scanned.
+        only: blocks that are scanned, in their order; all if None.
     """
 
     target: Target
@@ -65,6 +66,8 @@ class Scan:
     wanted: frozenset[str] = frozenset()
     targets: bool = False
     detects_later: bool = False
+    frame: Float = field(default_factory=lambda: np.zeros(3))
+    only: tuple[Block, ...] | None = None
     pattern: BeamPattern = field(init=False)
 
     def __post_init__(self) -> None:
@@ -81,18 +84,17 @@ class Scan:
         return self.setting.device.maximum_returns * (_SPARE if self.detects_later else 1)
 
     @property
-    def pulses_per_block(self) -> int:
-        """Return the fixed number of pulses of a block."""
-        return max(1, RAYS_PER_BLOCK // self.rays_per_pulse)
+    def cut(self) -> Blocks:
+        """Return how the pulses are cut into blocks."""
+        return Blocks(self.setting, self.path, self.rays_per_pulse)
 
     def pulses(self, strip: Strip) -> int:
         """Return how many pulses a strip has."""
-        return shot_count(self.setting, strip.duration)
+        return self.cut.pulses(strip)
 
-    def blocks(self) -> list[tuple[Strip, int]]:
-        """Return (strip, number) of every block, in the order of time."""
-        size = self.pulses_per_block
-        return [(strip, block) for strip in self.path.strips for block in range(-(-self.pulses(strip) // size))]
+    def blocks(self) -> list[Block]:
+        """Return (strip, number) of every block that is scanned, in the order of time."""
+        return self.cut.all() if self.only is None else list(self.only)
 
 
 @dataclass(frozen=True)
@@ -138,25 +140,19 @@ def joined_results(results: list[BlockResult]) -> BlockResult:
 
 def scan_block(scan: Scan, strip: Strip, block: int) -> BlockResult:
     """Scan one block; blocks can be computed in any order and by any worker."""
-    first = block * scan.pulses_per_block
-    count = min(scan.pulses_per_block, scan.pulses(strip) - first)
-    return scan_pulses(scan, strip, first, count, block)
+    return scan_pulses(scan, strip, *scan.cut.pulses_of(strip, block), block)
 
 
 def scan_pulses(scan: Scan, strip: Strip, first: int, count: int, key: int = 0) -> BlockResult:
     """Scan pulses ``first`` to ``first + count`` of a strip; ``key`` is that of their random numbers."""
     errors = Errors.drawn(scan, strip, count, key)
-    poses = Poses.between(scan, strip, *(_time(scan, strip, i) for i in (first, first + count - 1)))
+    poses = Poses.between(scan, strip, *(scan.cut.time(strip, i) for i in (first, first + count - 1)))
     size = max(1, RAYS_PER_CHUNK // scan.rays_per_pulse)
     parts = [
         _scan_chunk(scan, strip, poses, errors, first + start, start, min(size, count - start))
         for start in range(0, count, size)
     ]
     return replace(joined_results(parts), blocks=1)
-
-
-def _time(scan: Scan, strip: Strip, pulse: int) -> float:
-    return strip.start_time + float(shots(scan.setting, pulse, 1, False).time[0])
 
 
 def _scan_chunk(
@@ -240,7 +236,7 @@ def _uneven(scan: Scan, traced: Traced, echoes: Echoes, motions: list[Track]) ->
     if scan.target.moving:
         (position,) = scan.target.at_start(face, position, traced.rays.time[ray % len(traced.rays.time)], motions)
     intensity = echoes.intensity.copy()
-    intensity[own] *= spread_factors(scan.surfaces, material[own], position.T, scan.seed)
+    intensity[own] *= spread_factors(scan.surfaces, material[own], position.T + scan.frame, scan.seed)
     return replace(echoes, intensity=intensity)
 
 
