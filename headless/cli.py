@@ -53,6 +53,7 @@ COMMANDS = {
     "calibrate": "compare intensities of materials with a real cloud, and fit them",
     "gallery": "render pictures of scenes, objects and materials",
     "tradeoff": "measure error against time for each knob",
+    "benchmark": "measure the speed of each stage against its floor and the limits",
     "train": "train a segmentation or centreline model",
     "evaluate": "measure a trained model",
     "predict": "label a cloud, or find its road, with a trained model",

@@ -32,6 +32,7 @@ from synthroads_addon.core.progress import peak_memory_mb
 from synthroads_addon.core.random_streams import stream
 from synthroads_addon.core.scanning.caster import Caster
 from synthroads_addon.core.scene_mesh import SceneMesh
+from synthroads_addon.waves import waves
 from tools.raycast_nodes import RaycastNodesCaster
 
 CASTERS: dict[str, Callable[[SceneMesh], Caster]] = {
@@ -74,12 +75,7 @@ def demo_scene() -> tuple[SceneMesh, Flight]:
 
 def waves_scene() -> tuple[SceneMesh, Flight]:
     """Return 2 million triangles over 100 m x 100 m, z = 0.2 sin x cos y, and the flight over them."""
-    x = np.linspace(-50.0, 50.0, 1001)
-    grid = np.stack(np.meshgrid(x, x), axis=-1).reshape(-1, 2)
-    vertices = np.column_stack([grid, 0.2 * np.sin(grid[:, 0]) * np.cos(grid[:, 1])]).astype(np.float32)
-    corner = (np.arange(1000)[:, None] * 1001 + np.arange(1000)).ravel()
-    first, second = (corner, corner + 1, corner + 1002), (corner, corner + 1002, corner + 1001)
-    triangles = np.stack([*first, *second], axis=-1).reshape(-1, 3).astype(np.int32)
+    vertices, triangles = waves()
     mesh = bare_mesh(vertices, triangles)
     station = np.arange(-40.0, 40.0, LINE_SPACING)
     # Askew to the grid: rays that run along its lines would tell nothing but which face owns an edge.

@@ -27,21 +27,12 @@ from synthroads_addon.blender.foreign import open_scene
 from synthroads_addon.blender.scene import scanned_scene
 from synthroads_addon.core.progress import peak_memory_mb
 from synthroads_addon.core.scanning.caster import FacePlanes
-from tools.benchmark_casters import waves_scene
+from synthroads_addon.waves import write_waves
 
 
 def held_mb() -> float:
     """Return the resident memory of this process, MB (Linux)."""
     return int(Path("/proc/self/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE") / 1e6
-
-
-def write_obj(path: Path) -> int:
-    """Write the waves with z up; return the number of triangles."""
-    mesh, _ = waves_scene()
-    with path.open("w", encoding="ascii") as file:
-        np.savetxt(file, mesh.vertices, fmt="v %.6f %.6f %.6f")
-        np.savetxt(file, mesh.triangles + 1, fmt="f %d %d %d")
-    return len(mesh)
 
 
 def measure(path: Path, triangles: int) -> None:
@@ -73,7 +64,7 @@ def measure(path: Path, triangles: int) -> None:
 def main() -> None:
     """Write the scene in a process of its own, whose memory is then given back, and measure."""
     if len(sys.argv) > 1:
-        print(write_obj(Path(sys.argv[1])), flush=True)
+        print(write_waves(Path(sys.argv[1])), flush=True)
         os._exit(0)  # Blender's own way out can crash
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "waves.obj"

@@ -78,7 +78,7 @@ def points_on(
     surface: Value,
     density: Operand,
     reach: Value,
-    seed: Operand,
+    seed: Value,
     band: tuple[Value, Value] | None = None,
 ) -> Value:
     """Return points spread at random over a surface, as many per area of it everywhere.

@@ -13,6 +13,7 @@ from ...core.parameters.geometry import RoadGeometry, sections_of
 from ...core.parameters.model import Carriageway, LineMarking, Median, RoadParameters, Turnout
 from ...core.parameters.model_base import AnyWidth, nominal_width, width_at
 from ...core.parameters.section import CarriagewaySection
+from ...core.parameters.stretch import BEYOND
 from ...core.parameters.turnout_shape import TURNOUT_STRIPS
 
 Float = NDArray[np.float64]
@@ -198,7 +199,9 @@ def detail_points(geometry: RoadGeometry, station: Float, tolerance: float) -> d
         carriageway = section.carriageway
         names, distances = strip_names(section), section.distances(station)
         for strip in damaged_strips(section):
-            outwards = damage_columns(section, strip, tolerance)[:, None]
+            # That of a long road far away would cut all of the rest into slivers.
+            near = float(station[0]) - BEYOND, float(station[-1]) + BEYOND
+            outwards = damage_columns(section, strip, tolerance, *near)[:, None]
             distance = distances[:, strip] * (1.0 - outwards) + distances[:, strip + 1] * outwards
             offset = float(carriageway.sign) * distance
             depth = damage_depth(section, np.tile(station, len(outwards)), offset.ravel()).reshape(offset.shape)

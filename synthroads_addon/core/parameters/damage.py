@@ -71,16 +71,29 @@ def damage_rows(section: CarriagewaySection, tolerance: float) -> list[float]:
     return rows
 
 
-def damage_columns(section: CarriagewaySection, strip: int, tolerance: float) -> Float:
-    """Return the (K,) shares of a strip's width, from 0 at its inner to 1 at its outer edge, that a mesh needs."""
+def damage_columns(
+    section: CarriagewaySection, strip: int, tolerance: float, start: float = -np.inf, end: float = np.inf
+) -> Float:
+    """Return the (K,) shares of a strip's width, from 0 at its inner to 1 at its outer edge, that a mesh needs.
+
+    Args:
+        section: of a carriageway.
+        strip: index into ``section.kinds``.
+        tolerance: largest distance from the surface, m.
+        start, end: stations (m) between which damage counts.
+    """
     shares = [np.array([0.0, 1.0])]
     for rut in section.carriageway.pavement.ruts:
+        if rut.start_station > end or rut.end_station < start:
+            continue
         at = (rut.start_station + rut.end_station) / 2.0
         middle = section.lane_boundaries(at)[0, rut.lane : rut.lane + 2].mean() if _has_lane(section, rut) else 0.0
         across = np.linspace(-0.5, 0.5, 1 + 2 * _cells_of_cosine(rut.depth, tolerance)) * rut.width
         for track in (-rut.track / 2.0, rut.track / 2.0):
             shares.append(_shares(section, strip, at, middle + track + across))
     for pothole in section.carriageway.pavement.potholes:
+        if not start <= pothole.station <= end:
+            continue
         low, high = _across(section, pothole)
         cells = _cells_of_bowl(pothole.depth, tolerance)
         shares.append(_shares(section, strip, pothole.station, np.linspace(low, high, cells + 1)))

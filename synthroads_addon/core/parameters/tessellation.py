@@ -43,7 +43,7 @@ def sample_stations(
     step = np.repeat(np.diff(kinks) / counts, counts)
     within = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
     stations = np.append(first + within * step, kinks[-1])
-    low, high = (np.searchsorted(stations, place, side="right") - 1 for place in (start, end))
+    low, high = (int(np.searchsorted(stations, place, side="right")) - 1 for place in (start, end))
     low = max(low, 0)
     return stations[low : max(high, low + 1) + 1]
 
@@ -65,10 +65,9 @@ def _kinks(geometry: RoadGeometry, tolerance: float) -> NDArray[np.float64]:
 
 def _around(kinks: NDArray[np.float64], start: float, end: float) -> NDArray[np.float64]:
     """Return those of the sorted kinks that the spacing between two stations depends on: at least two."""
-    low = np.searchsorted(kinks, start, side="right") - 1
-    high = np.searchsorted(kinks, end, side="left")
-    low = int(np.clip(low, 0, len(kinks) - 2))
-    return kinks[low : max(int(high), low + 1) + 1]
+    low = int(np.clip(np.searchsorted(kinks, start, side="right") - 1, 0, len(kinks) - 2))
+    high = int(np.searchsorted(kinks, end, side="left"))
+    return kinks[low : max(high, low + 1) + 1]
 
 
 def _chord_spacing(geometry: RoadGeometry, kinks: NDArray[np.float64], tolerance: float) -> NDArray[np.float64]:

@@ -156,9 +156,9 @@ def _skew(geometry: RoadGeometry) -> float:
 def _corridor(geometry: RoadGeometry) -> float:
     """Return the largest offset at which there is anything, m."""
     parameters = geometry.parameters
-    edges = [np.max(section.road_edge([0.0, *section.kinks()])) for section in geometry.sections.values()]
+    edges = [float(section.road_edge([0.0, *section.kinks()]).max()) for section in geometry.sections.values()]
     reach = [*edges, parameters.terrain.half_width if parameters.terrain else 0.0]
-    return float(max(reach)) + (_BRIDGE_SIDE if parameters.of_type(Overpass) else 0.0)
+    return max(reach) + (_BRIDGE_SIDE if parameters.of_type(Overpass) else 0.0)
 
 
 def _heights(geometry: RoadGeometry, start: float, end: float) -> tuple[float, float]:

@@ -1,0 +1,186 @@
+"""Measure each stage of the demo job beside its floor, and hold the job against what it must reach."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import platform
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+if __name__ == "__main__":
+    sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
+from headless.cli import Outcome, add_changes_argument, add_common_arguments, entry, progress_bar
+from synthroads_addon.core.benchmark import DEMO, QUICK, filled, judged, machine, markdown
+from synthroads_addon.core.errors import InputError
+from synthroads_addon.core.scenario import Scenario, load_scenario
+from synthroads_addon.core.schema import canonical_json
+from synthroads_addon.waves import CELLS, write_waves
+
+_FILES = ["benchmark.json", "benchmark.md"]
+_PART = "--part"
+_WAVES = (
+    "scan.device=generic-polygon", "scan.platform.height=80", "scan.platform.speed=10", "scan.relief=0",
+    "colour.source=material", 'cloud.formats=["las"]', 'outputs=["cloud"]',
+)  # fmt: skip
+_QUICK_CELLS = 60
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments of `synthroads benchmark`."""
+    available = _available()
+    cores = sorted({1, min(2, available)})
+    parser.add_argument("--output", type=Path, metavar="DIR", help=f"folder for {' and '.join(_FILES)}")
+    parser.add_argument("--fill", type=Path, metavar="FILE", help="document between whose marks the tables are put")
+    usual = " ".join(map(str, cores))
+    parser.add_argument("--cores", nargs="+", type=int, default=cores, metavar="N", help=f"numbers of cores ({usual})")
+    parser.add_argument("--scenario", default="rq31-600m", metavar="NAME_OR_FILE", help="scene to measure on")
+    add_changes_argument(parser)
+    parser.add_argument("--quick", action="store_true", help="a small scene: to see that all works, in seconds")
+    parser.add_argument("--overwrite", action="store_true", help="replace files that are already there")
+    parser.add_argument(_PART, metavar="JSON", help=argparse.SUPPRESS)
+    add_common_arguments(parser)
+
+
+def run(arguments: argparse.Namespace) -> Outcome:
+    """Run `synthroads benchmark`; each part is measured in a process of its own, so that its memory is its own."""
+    if arguments.part:
+        result = _measured(json.loads(arguments.part))
+        return 0, result, canonical_json(result)
+    _scenario(arguments.scenario, arguments.changes, arguments.quick)
+    for cores in arguments.cores:
+        if not 1 <= cores <= _available():
+            raise InputError("--cores", cores, f"must be 1 to {_available()}, the cores that are there")
+    if arguments.fill and not arguments.fill.is_file():
+        raise InputError("--fill", str(arguments.fill), "is no file")
+    result = _all(arguments)
+    table = markdown(result)
+    if arguments.output:
+        from synthroads_addon.core.files import output_folder
+
+        with output_folder(arguments.output, _FILES, arguments.overwrite) as folder:
+            (folder / _FILES[0]).write_text(canonical_json(result), encoding="utf-8")
+            (folder / _FILES[1]).write_text(table, encoding="utf-8")
+    if arguments.fill:
+        _fill(arguments.fill, table)
+    return 0, result, table + _verdict(result)
+
+
+def _all(arguments: argparse.Namespace) -> dict[str, Any]:
+    """Measure every number of cores; return what `core.benchmark` makes tables of."""
+    with tempfile.TemporaryDirectory(prefix="synthroads-") as folder:
+        scene = Path(folder) / "waves.obj"
+        triangles = write_waves(scene, _QUICK_CELLS if arguments.quick else CELLS)
+        return _runs(arguments, {"scene": str(scene), "triangles": triangles})
+
+
+def _runs(arguments: argparse.Namespace, waves: dict[str, Any]) -> dict[str, Any]:
+    progress, runs = progress_bar(arguments), []
+    about = {"quick": arguments.quick, "scenario": arguments.scenario, "changes": arguments.changes, **waves}
+    parts = ["demo", "waves_1", "waves_19"]
+    for number, cores in enumerate(arguments.cores):
+        measured: dict[str, Any] = {"lines": {}}
+        for step, part in enumerate(parts):
+            progress(f"{part}, {cores}", (number * len(parts) + step) / (len(parts) * len(arguments.cores)))
+            found = _in_own_process({**about, "part": part}, cores)
+            measured |= found | {"lines": measured["lines"] | found["lines"]}
+        runs.append(measured | {"cores": cores})
+    versions = {"Blender": runs[0]["blender"], "Python": platform.python_version()}
+    return {"machine": machine(_cpu(), _available(), versions), "quick": arguments.quick, "runs": runs}
+
+
+def _in_own_process(part: dict[str, Any], cores: int) -> dict[str, Any]:
+    """Measure a part in a process that may use so many cores."""
+    command = [sys.executable, str(Path(__file__).resolve()), _PART, json.dumps(part), "--json"]
+    before = os.sched_getaffinity(0) if hasattr(os, "sched_getaffinity") else None
+    if before is not None:
+        os.sched_setaffinity(0, sorted(before)[:cores])  # the child inherits it
+    try:
+        done = subprocess.run(command, capture_output=True, text=True, check=False)
+    finally:
+        if before is not None:
+            os.sched_setaffinity(0, before)
+    if done.returncode:
+        raise RuntimeError(f"{part['part']} failed: {done.stderr.strip()}")
+    result: dict[str, Any] = json.loads(done.stdout)
+    return result
+
+
+def _measured(part: dict[str, Any]) -> dict[str, Any]:
+    """Measure a part in this process."""
+    if part["part"] == "demo":
+        from synthroads_addon.benchmarking import measure_demo
+
+        found = measure_demo(_scenario(part["scenario"], part["changes"], part["quick"]))
+    else:
+        rays = int(part["part"].removeprefix("waves_"))
+        found = {"lines": _waves(rays, Path(part["scene"]), part["triangles"])}
+    return found | {"blender": sys.modules["bpy"].app.version_string}
+
+
+def _waves(rays: int, scene: Path, triangles: int) -> dict[str, float]:
+    """Return the lines of the scene that other simulators are compared on."""
+    from synthroads_addon.core.progress import peak_memory_mb
+    from synthroads_addon.core.scenario import apply_change
+    from synthroads_addon.scene_scan import SceneScan, scan_scene
+
+    data: Any = Scenario().to_dict()
+    for change in (*_WAVES, f"scan.rays_per_pulse={rays}"):
+        data = apply_change(data, change)
+    with tempfile.TemporaryDirectory(prefix="synthroads-") as text:
+        output = Path(text) / "out"
+        before = peak_memory_mb() or 0.0
+        report = scan_scene(SceneScan(Scenario.from_dict(data), output, scene, up="z"))
+    stages, counts = report["stages"], report["counts"]
+    seconds = stages["scan"]["seconds"]
+    if rays > 1:
+        return {"waves_rays": counts["rays"] / seconds / 1e6}
+    opening = sum(stages[name]["seconds"] for name in ("scene", "scene mesh", "caster"))
+    memory = 1e6 * ((stages["caster"]["peak_memory_mb"] or 0.0) - before) / triangles
+    return {"waves_pulses": counts["pulses"] / seconds / 1e6, "waves_memory": memory, "waves_opening": opening}
+
+
+def _scenario(name: str, changes: list[str], quick: bool) -> Scenario:
+    return load_scenario(name, [*DEMO, *(QUICK if quick else ()), *changes])
+
+
+def _fill(path: Path, table: str) -> None:
+    try:
+        text = filled(path.read_text(encoding="utf-8"), table)
+    except ValueError as problem:
+        raise InputError("--fill", str(path), str(problem)) from None
+    path.write_text(text, encoding="utf-8")
+
+
+def _verdict(result: dict[str, Any]) -> str:
+    if result["quick"]:
+        return ""
+    missed = [name for name, _, kept in judged(result) if not kept]
+    return f"\nmissed: {', '.join(missed)}" if missed else "\nall limits that were measured are kept"
+
+
+def _available() -> int:
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def _cpu() -> str:
+    """Return the processor's name."""
+    for line in _lines_of(Path("/proc/cpuinfo")):
+        if line.startswith("model name"):
+            return line.partition(":")[2].strip()
+    return platform.processor() or platform.machine()
+
+
+def _lines_of(path: Path) -> Iterator[str]:
+    if path.is_file():
+        yield from path.read_text(encoding="utf-8", errors="replace").splitlines()
+
+
+if __name__ == "__main__":
+    entry("benchmark")

@@ -1,0 +1,186 @@
+"""The demo job, each stage beside its floor: bare Embree, laspy and Cycles on the same rays, points and images.
+
+A process measures one number of cores: those that it may use.
+"""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Iterable, Iterator
+from contextlib import ExitStack
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import laspy
+import numpy as np
+from numpy.typing import NDArray
+
+from .blender.benchmark import REPEATS, RenderClock, panel_edit, rendering, seconds_of
+from .blender.cameras import layer_source
+from .blender.casters.measure import bare_rate
+from .blender.files import empty_file
+from .blender.model import build_road
+from .blender.scene import scanned_scene
+from .core.colour import LayerSource
+from .core.colour_views import scene_sample, views_along
+from .core.parameters.geometry import RoadGeometry
+from .core.parameters.sampler import sample_road
+from .core.progress import StageTimer, peak_memory_mb
+from .core.scanning.beam import RINGS
+from .core.scanning.caster import Caster
+from .core.scanning.scan import Scan, scan_block
+from .core.scenario import Scenario
+from .pipeline import write_texts
+from .scan_files import ScanToFiles, available_cores, colour_job, make_scan, road_path, scan_blocks
+
+_BLOCKS = 8
+"""Blocks, spread over the scan, on which stages are measured beside their floors."""
+_RAYS = (1, 7, 19, 61)
+_VIEWS = 4
+"""Images that are rendered bare."""
+
+Rate = dict[str, Any]
+
+
+def measure_demo(scenario: Scenario) -> dict[str, Any]:
+    """Do the demo job and measure its stages and their floors; the open file is lost.
+
+    Returns:
+        ``cores``; ``stages`` with seconds and peak memory; ``lines`` by the names of `core.benchmark.LIMITS`;
+        ``floors``: name, unit, ours and floor.
+    """
+    timer, settings = StageTimer(), scenario.settings()
+    empty_file()
+    with tempfile.TemporaryDirectory(prefix="synthroads-") as text:
+        folder = Path(text)
+        with timer.stage("parameters"):
+            parameters = sample_road(scenario.road, scenario.seed, scenario.title)
+            geometry = RoadGeometry(parameters)
+            write_texts(folder, scenario.outputs, parameters, geometry, scenario)
+        with timer.stage("model"):
+            model = build_road(parameters, settings.tolerance, settings.vegetation_detail)
+        with timer.stage("scene mesh"):
+            scene = scanned_scene(geometry=geometry, speed_factor=scenario.scan.traffic_speed_factor)
+        with timer.stage("caster"):
+            path = road_path(scenario, geometry)
+            scan = make_scan(scenario, scene, path, parameters.environment, variation=parameters.materials)
+        job = colour_job(scenario, scan, scene, parameters.environment)
+        clock = RenderClock()
+        with ExitStack() as stack:
+            stack.enter_context(clock)
+            with timer.stage("images"):
+                source = stack.enter_context(layer_source(job))
+            with timer.stage("scan and files"):
+                task = ScanToFiles(scenario, scan, source, folder, parameters.metadata.epsg)
+                for _ in task.run():
+                    pass
+            seconds, memory = timer.seconds, peak_memory_mb()
+            floors = [*_casting(scan), _writing(scan, source, task, folder)]
+        settings_of_images = job.scenario.settings(job.fidelity, path.typical_range)
+        views = views_along(path, scene_sample(scene.static), settings_of_images, job.field_of_view, 4096)
+        if clock.pixels:
+            floors.append(rendering(clock, views[:: max(1, len(views) // _VIEWS)], parameters))
+    own = next(row for row in floors if row["rays"] == scan.rays_per_pulse)
+    writing = next(row for row in floors if row["name"].startswith("writing"))
+    lines = {
+        "points": task.counts.points / 1e6,
+        "seconds": seconds,
+        "memory_mb": memory,
+        "parameters": timer.stages["parameters"]["seconds"],
+        "model": timer.stages["model"]["seconds"],
+        "panel_edit": panel_edit(model, parameters),
+        "casting": 100.0 * own["ours"] / own["floor"],
+        "writing": writing["ours"],
+    }
+    for row in floors:
+        row.pop("rays", None)
+    return {"cores": available_cores(), "stages": timer.stages, "lines": lines, "floors": floors}
+
+
+def _spread(scan: Scan) -> list[Any]:
+    """Return some whole blocks, spread over a scan."""
+    blocks = scan.blocks()
+    return [blocks[i] for i in np.unique(np.linspace(0, len(blocks) - 1, _BLOCKS + 2).astype(int)[1:-1])]
+
+
+class _KeptRays:
+    """A caster that keeps the rays that it is given."""
+
+    main_thread_only = False
+
+    def __init__(self, caster: Caster) -> None:
+        self._caster, self.name = caster, caster.name
+        self.origins: list[NDArray[np.float32]] = []
+        self.directions: list[NDArray[np.float32]] = []
+
+    def cast(
+        self, origins: NDArray[np.float32], directions: NDArray[np.float32], maximum_range: float
+    ) -> NDArray[np.int32]:
+        """Cast, and keep the rays."""
+        self.origins.append(origins.copy())
+        self.directions.append(directions.copy())
+        return self._caster.cast(origins, directions, maximum_range)
+
+
+def _casting(scan: Scan) -> Iterator[Rate]:
+    """Yield casting and radiometry beside the bare caster on the same rays, for several numbers of rays per pulse."""
+    for rays in _RAYS:
+        # The scene, its caster and the materials are the same.
+        yield _cast_beside(replace(scan, rings=RINGS[rays], targets=False, wanted=frozenset()))
+
+
+def _cast_beside(scan: Scan) -> Rate:
+    threads, blocks = available_cores(), _spread(scan)
+    part = scan.target._parts[0]
+    caster, kept = part.caster, _KeptRays(part.caster)
+    object.__setattr__(part, "caster", kept)
+    try:
+        for block in blocks:
+            scan_block(scan, *block)
+    finally:
+        object.__setattr__(part, "caster", caster)
+    origins, directions = np.concatenate(kept.origins), np.concatenate(kept.directions)
+    few = replace(scan, only=tuple(blocks))
+    seconds = min(seconds_of(lambda: _exhaust(scan_blocks(few, threads))) for _ in range(REPEATS))
+    floor = bare_rate(caster, origins, directions, scan.setting.maximum_range, threads, repeats=REPEATS)
+    return {
+        "name": f"casting and radiometry, {scan.rays_per_pulse} rays per pulse; Embree",
+        "unit": "million rays/s",
+        "ours": len(origins) / seconds / 1e6,
+        "floor": floor.rays_per_second / 1e6,
+        "rays": scan.rays_per_pulse,
+    }
+
+
+def _writing(scan: Scan, source: LayerSource, task: ScanToFiles, folder: Path) -> Rate:
+    """Return the writing of LAZ beside that of the same records by bare laspy and lazrs."""
+    from .core.cloud.writing import open_writer
+
+    few = replace(scan, only=tuple(_spread(scan)))
+    blocks = [result.points for result in scan_blocks(few, 0, task.finish)]
+    count = sum(len(block) for block in blocks)
+    scenario = task.files.scenario
+    options = (None, scan.target.origin, task.files.intensity_scale, scenario.cloud.attributes, scenario.cloud.scheme())
+
+    def ours() -> None:
+        with open_writer(folder / "ours.laz", *options) as writer:
+            for block in blocks:
+                writer.write(block)
+
+    seconds = min(seconds_of(ours) for _ in range(REPEATS))
+    written = laspy.read(folder / "ours.laz")
+
+    def floor() -> None:
+        backend = laspy.LazBackend.LazrsParallel
+        with laspy.open(folder / "bare.laz", "w", header=written.header, laz_backend=backend) as writer:
+            writer.write_points(written.points)
+
+    bare = min(seconds_of(floor) for _ in range(REPEATS))
+    rates = {"ours": count / seconds / 1e6, "floor": count / bare / 1e6}
+    return {"name": "writing LAZ; laspy with lazrs", "unit": "million points/s", **rates, "rays": 0}
+
+
+def _exhaust(items: Iterable[object]) -> None:
+    for _ in items:
+        pass

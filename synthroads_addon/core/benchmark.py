@@ -1,0 +1,143 @@
+"""What `synthroads benchmark` measures, the limits that it is held against, and its tables."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+MARK = ("<!-- benchmark: begin -->", "<!-- benchmark: end -->")
+"""Lines of a document between which the tables are put."""
+CORES = 2
+"""Cores that the limits are for."""
+
+DEMO = (
+    "scan.platform.speed=4.4",
+    'cloud.attributes=["range","incidence","normal","roughness","metallic","specular"]',
+    'outputs=["parameters","cloud"]',
+)
+"""Changes of the demo's scenario: more than 15 million points, with everything that a point can have."""
+QUICK = (
+    "road.length=60",
+    "fidelity=draft",
+    "scan.platform.speed=8",
+    "colour.ground_sampling_distance=0.5",
+)
+"""Further changes, with which it takes seconds: to see that all works, not how fast."""
+
+
+@dataclass(frozen=True)
+class Limit:
+    """A line of what must be reached.
+
+    Attributes:
+        title: what is measured.
+        unit: of the limit and the value.
+        limit: that it must keep.
+        most: whether the value must not be larger; else it must not be smaller.
+        digits: of the value as it is shown.
+    """
+
+    title: str
+    unit: str
+    limit: float
+    most: bool
+    digits: int = 2
+
+    def kept(self, value: float) -> bool:
+        """Return whether a value keeps the limit."""
+        return value <= self.limit if self.most else value >= self.limit
+
+
+LIMITS = {
+    "points": Limit("points of the demo job", "million", 15.0, False, 1),
+    "seconds": Limit("demo job in all", "s", 120.0, True, 1),
+    "memory_mb": Limit("demo job, memory", "MB", 3000.0, True, 0),
+    "parameters": Limit("parameters", "s", 1.0, True),
+    "model": Limit("model", "s", 8.0, True),
+    "panel_edit": Limit("panel edit to updated view", "s", 0.2, True, 3),
+    "casting": Limit("casting and radiometry, of the bare caster's rate", "%", 60.0, False, 0),
+    "writing": Limit("writing LAZ", "million points/s", 3.0, False),
+    "waves_pulses": Limit("waves, 1 ray per pulse: 5 times HELIOS++", "million pulses/s", 1.6, False),
+    "waves_rays": Limit("waves, 19 rays per pulse: 3 times HELIOS++", "million rays/s", 2.55, False),
+    "waves_memory": Limit("waves, memory: a quarter of HELIOS++", "B/triangle", 500.0, True, 0),
+    "waves_opening": Limit("waves, opening: a fifth of HELIOS++", "s", 4.2, True),
+}
+"""Lines by name. HELIOS++ did 0.32 million pulses/s, 0.85 million rays/s, 2 kB per triangle and 21 s on two cores."""
+
+
+def machine(cpu: str, available: int, versions: dict[str, str]) -> str:
+    """Return the machine in words."""
+    return f"{cpu}, {available} cores; " + ", ".join(f"{name} {version}" for name, version in versions.items())
+
+
+def markdown(result: dict[str, Any]) -> str:
+    """Return the tables of a result as `headless.benchmark` gathers it."""
+    lines = [f"Machine: {result['machine']}", ""]
+    if result["quick"]:
+        lines += ["A quick run on a small scene: it shows that all works, and nothing of the speed.", ""]
+    return "\n".join([*lines, *_limits(result), "", *_stages(result), "", *_floors(result)]) + "\n"
+
+
+def judged(result: dict[str, Any]) -> Iterator[tuple[str, float, bool]]:
+    """Yield (name, value, kept) of every line that was measured on as many cores as the limits are for."""
+    run = next((run for run in result["runs"] if run["cores"] == CORES), None)
+    for name, limit in LIMITS.items():
+        value = (run or {}).get("lines", {}).get(name)
+        if value is not None:
+            yield name, value, limit.kept(value)
+
+
+def filled(text: str, table: str) -> str:
+    """Return a document with a table between its marks.
+
+    Raises:
+        ValueError: it has no such marks.
+    """
+    before, begin, rest = text.partition(MARK[0])
+    _, end, after = rest.partition(MARK[1])
+    if not begin or not end:
+        raise ValueError(f"has no lines {MARK[0]} and {MARK[1]}")
+    return f"{before}{begin}\n\n{table.strip()}\n\n{end}{after}"
+
+
+def _limits(result: dict[str, Any]) -> Iterator[str]:
+    runs = result["runs"]
+    titles = ["", *(f"{run['cores']} core{'s' * (run['cores'] > 1)}" for run in runs), "limit", f"on {CORES} cores"]
+    yield from _head(titles)
+    kept = {} if result["quick"] else {name: good for name, _, good in judged(result)}
+    for name, limit in LIMITS.items():
+        values = [_number(run["lines"].get(name), limit.digits) for run in runs]
+        bound = f"{'at most' if limit.most else 'at least'} {limit.limit:g} {limit.unit}"
+        verdict = {True: "kept", False: "**missed**", None: "–"}[kept.get(name)]
+        yield _row([limit.title, *values, bound, verdict])
+
+
+def _stages(result: dict[str, Any]) -> Iterator[str]:
+    runs = result["runs"]
+    yield from _head(["stage of the demo job (s)", *(str(run["cores"]) for run in runs), "peak memory (MB)"])
+    for name in runs[0]["stages"]:
+        seconds = [_number(run["stages"][name]["seconds"], 2) for run in runs]
+        yield _row([name, *seconds, _number(runs[-1]["stages"][name]["peak_memory_mb"], 0)])
+
+
+def _floors(result: dict[str, Any]) -> Iterator[str]:
+    yield from _head(["beside its floor", "cores", "unit", "ours", "floor", "ours of the floor (%)"])
+    for run in result["runs"]:
+        for floor in run["floors"]:
+            share = 100.0 * floor["ours"] / floor["floor"]
+            values = [_number(floor[side], 2) for side in ("ours", "floor")]
+            yield _row([floor["name"], str(run["cores"]), floor["unit"], *values, f"{share:.0f}"])
+
+
+def _number(value: float | None, digits: int) -> str:
+    return "–" if value is None else f"{value:,.{digits}f}"
+
+
+def _head(titles: Sequence[str]) -> Iterator[str]:
+    yield _row(titles)
+    yield "|" + "---|" * len(titles)
+
+
+def _row(cells: Sequence[str]) -> str:
+    return "| " + " | ".join(cells) + " |"

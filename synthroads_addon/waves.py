@@ -1,0 +1,31 @@
+"""The scene that other simulators are compared on: waves over 100 m x 100 m, as a mesh and as an .obj file."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+CELLS = 1000
+"""Cells along either side: two million triangles."""
+
+
+def waves(cells: int = CELLS) -> tuple[NDArray[np.float32], NDArray[np.int32]]:
+    """Return vertices (V, 3) of z = 0.2 sin x cos y, and triangles (2 cells^2, 3)."""
+    x = np.linspace(-50.0, 50.0, cells + 1)
+    grid = np.stack(np.meshgrid(x, x), axis=-1).reshape(-1, 2)
+    vertices = np.column_stack([grid, 0.2 * np.sin(grid[:, 0]) * np.cos(grid[:, 1])]).astype(np.float32)
+    row = cells + 1
+    corner = (np.arange(cells)[:, None] * row + np.arange(cells)).ravel()
+    first, second = (corner, corner + 1, corner + row + 1), (corner, corner + row + 1, corner + row)
+    return vertices, np.stack([*first, *second], axis=-1).reshape(-1, 3).astype(np.int32)
+
+
+def write_waves(path: Path, cells: int = CELLS) -> int:
+    """Write the waves as .obj with z up; return the number of triangles."""
+    vertices, triangles = waves(cells)
+    with path.open("w", encoding="ascii") as file:
+        np.savetxt(file, vertices, fmt="v %.6f %.6f %.6f")
+        np.savetxt(file, triangles + 1, fmt="f %d %d %d")
+    return len(triangles)
