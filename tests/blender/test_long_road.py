@@ -63,20 +63,20 @@ def exact_triangles(geometry: RoadGeometry, low: float, high: float, scan: Scan,
 
     They are the model's; only where its corners lie is worked out anew, from the road's rows and boundaries.
     """
-    station = sample_stations(geometry, TOLERANCE, low, high)
-    plan, heading, _ = geometry.alignment.frame(station)
-    left = np.stack([-np.sin(heading), np.cos(heading)], axis=1)
-    offset = geometry.offsets(station)
-    height = geometry.boundary_elevations(station)
-    exact = np.concatenate([plan[:, None] + offset[..., None] * left[:, None], height[..., None]], axis=2)
+    rows = sample_stations(geometry, TOLERANCE, low, high)
     mesh = MESH[id(scan)]
     chosen = mesh.triangles[mesh.class_id == class_id("road")]
     used, corner = np.unique(chosen, return_inverse=True)
-    from scipy.spatial import cKDTree
-
-    away, nearest = cKDTree(exact.reshape(-1, 3)).query(mesh.vertices[used].astype(np.float64) + frame)
+    given = mesh.vertices[used].astype(np.float64) + frame
+    station, offset = geometry.alignment.project(given[:, :2])
+    nearest = np.clip(np.searchsorted(rows, station), 1, len(rows) - 1)
+    nearest -= np.abs(rows[nearest - 1] - station) < np.abs(rows[nearest] - station)
+    plan, heading, _ = geometry.alignment.frame(rows[nearest])
+    left = np.stack([-np.sin(heading), np.cos(heading)], axis=1)
+    exact = np.column_stack([plan + offset[:, None] * left, geometry.elevation(rows[nearest], offset)])
+    away = np.linalg.norm(exact - given, axis=1)
     assert away.max() < 0.001, f"a corner of the model lies {away.max() * 1000:.2f} mm off"
-    return exact.reshape(-1, 3)[nearest][corner.reshape(-1, 3)]
+    return exact[corner.reshape(-1, 3)]
 
 
 MESH: dict[int, Any] = {}
