@@ -149,7 +149,7 @@ def _scene_outputs(job: Job, folder: Path, parameters: RoadParameters, timer: St
     counts: dict[str, Any] = {}
     if job.new_file:
         empty_file()
-    if job.scenario.by_section(parameters.alignment.length):
+    if job.scenario.section_length(parameters.alignment.length) is not None:
         return scan_by_section(job.scenario, parameters, folder, timer)
     with timer.stage("model"):
         model = build_road(parameters, settings.tolerance, settings.vegetation_detail)

@@ -41,12 +41,12 @@ _AROUND = 60.0
 
 def check_by_section(scenario: Scenario, length: float) -> None:
     """Refuse outputs that need the whole model of a road of a length (m) that is built by section."""
-    if scenario.by_section(length) and "scene" in scenario.outputs:
-        longest = 2.0 * scenario.scan.section_length
+    section = scenario.section_length(length)
+    if section is not None and "scene" in scenario.outputs:
         raise InputError(
             "outputs",
             list(scenario.outputs),
-            f"can't have scene: a road of {length:g} m is built by section, as it is longer than {longest:g} m; leave "
+            f"can't have scene: a road of {length:g} m is built by sections of {section:g} m; leave "
             f"scene out, or set scan.section_length to {length / 2.0:g} or more",
         )
 
@@ -106,7 +106,8 @@ class SectionScan:
     def sections(self) -> Iterator[Section]:
         """Yield the sections from the road's start to its end."""
         shadows = shadow_length(self.geometry) if may_render(self.scenario) else 0.0
-        return sections(self.cut, self.geometry, self.scenario.scan.section_length, shadows)
+        length = self.geometry.length
+        return sections(self.cut, self.geometry, self.scenario.section_length(length) or length, shadows)
 
     @contextmanager
     def prepared(self, section: Section, timer: StageTimer) -> Iterator[tuple[Scan, Any]]:

@@ -127,12 +127,13 @@ class ScanScenario(ScenarioModel):
     traffic_speed_factor: float = quantity(
         1.0, ge=0, le=10, unit="1", description="Factor on the vehicles' speeds; 0 stops the traffic."
     )
-    section_length: float = quantity(
-        500.0,
+    section_length: float | None = quantity(
+        None,
         ge=20,
         le=1e6,
         unit="m",
-        description="Length of a section: roads longer than two are built and scanned section by section.",
+        description="Roads longer than two of these are built and scanned section by section; if not given, roads of "
+        "more than 5 km by sections of 500 m.",
     )
     caster: Literal["auto", "embree", "bvhtree"] = Field("auto", description="How rays are cast.")
     threads: int = quantity(0, ge=0, le=1024, unit="1", description="Threads; 0 uses every core.")

@@ -24,6 +24,8 @@ Output = Literal["parameters", "cloud", "centerline", "scene", "previews"]
 OUTPUTS: tuple[Output, ...] = get_args(Output)
 _DEEPEST = 20
 """Dots in the path of a change: more fields don't lie in each other."""
+LONGEST_WHOLE, SECTION_LENGTH = 5000.0, 500.0
+"""A longer road is built and scanned by sections of this length unless the scenario says otherwise, m."""
 
 
 class Scenario(ScenarioModel):
@@ -61,9 +63,13 @@ class Scenario(ScenarioModel):
         """
         return read_material_table(material_table_path(self.materials_table)) if self.materials_table else {}
 
-    def by_section(self, length: float) -> bool:
-        """Return whether a road of a length (m) is built and scanned section by section: if it is to be scanned."""
-        return bool(set(self.outputs) & {"cloud", "previews"}) and length > 2.0 * self.scan.section_length
+    def section_length(self, length: float) -> float | None:
+        """Return the length (m) of the sections by which a road of a length (m) is built and scanned; None: whole."""
+        if not set(self.outputs) & {"cloud", "previews"}:
+            return None
+        own = self.scan.section_length
+        section, longest = (SECTION_LENGTH, LONGEST_WHOLE) if own is None else (own, 2.0 * own)
+        return section if length > longest else None
 
     def settings(self) -> Settings:
         """Return the numbers that the fidelity stands for, after the scenario's own."""
