@@ -192,8 +192,6 @@ RELEVANT: dict[str, Callable[[Any], bool]] = {
     "scan.platform.station_spacing": _on("tripod"),
     "scan.platform.turn_seconds": _on("tripod"),
     "scan.platform.file": _on("trajectory"),
-    # The road in the open file is there as a whole.
-    "scan.section_length": lambda settings: False,
     "scan.weather.rate_mm_h": lambda settings: settings.scan.weather.condition in ("rain", "snow"),
     "colour.engine": _rendered,
     "colour.mode": lambda settings: settings.colour.rgb,

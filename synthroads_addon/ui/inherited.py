@@ -166,6 +166,7 @@ _WORDS = {
     "scan.platform.stations": "By the spacing",
     "scan.beam_rings": "By the rays",
     "scan.attenuation": "The weather's",
+    "scan.section_length": "500 m beyond 5 km",
     "scan.weather": "The road's",
     "scan.weather.rate_mm_h": "By the visibility",
     "cloud.point_spacing": "All points",
