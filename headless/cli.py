@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import argparse
 import io
+import json
 import os
 import sys
 from collections.abc import Callable, Iterator, Sequence
@@ -34,6 +35,7 @@ def _missing(error: ModuleNotFoundError) -> str:
 
 try:
     from synthroads_addon.core.schema import canonical_json
+    from synthroads_addon.core.tolerance import KINDS, TIMES, parse_tolerance, shown, with_unit
     from synthroads_addon.core.twin import TWIN_FORMATS
 except ModuleNotFoundError as error:  # Blender itself has none of the packages that the extension brings
     print(_missing(error), file=sys.stderr)
@@ -98,6 +100,45 @@ def add_changes_argument(parser: argparse.ArgumentParser) -> None:
     """Add ``--set PATH=VALUE``, gathered in ``changes``."""
     text = "change one field of the scenario, e.g. road.length=800 (can be repeated)"
     parser.add_argument("--set", action="append", default=[], metavar="PATH=VALUE", dest="changes", help=text)
+
+
+def add_choice_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add ``--tolerance`` and ``--time-budget``, by which settings are chosen."""
+    kinds = ", ".join(KINDS)
+    parser.add_argument(
+        "--tolerance",
+        metavar="KIND=VALUE,...",
+        help=f"choose the cheapest settings whose errors keep this, e.g. height=5mm,intensity=5%%; kinds: {kinds}",
+    )
+    parser.add_argument(
+        "--time-budget", metavar="TIME", help="choose the best settings that fit this time, e.g. 60s or 2min"
+    )
+
+
+def choice_changes(arguments: argparse.Namespace) -> list[str]:
+    """Return the changes of the scenario that ``--tolerance`` and ``--time-budget`` stand for."""
+    changes = []
+    if arguments.tolerance is not None:
+        changes.append(f"tolerance={json.dumps(parse_tolerance(arguments.tolerance))}")
+    if arguments.time_budget is not None:
+        changes.append(f"time_budget={with_unit('--time-budget', arguments.time_budget, TIMES)}")
+    if changes and arguments.fidelity:
+        raise InputError("--fidelity", arguments.fidelity, "can't be given with a choice of the settings it stands for")
+    return changes
+
+
+def choice_summary(report: dict[str, Any]) -> list[str]:
+    """Return what was chosen, and what is expected of it, for people; nothing where nothing was."""
+    if "choice" not in report:
+        return []
+    choice = report["choice"]
+    chosen = ", ".join(f"{path}={value}" for path, value in choice["chosen"].items())
+    errors = ", ".join(f"{name} {shown(name, value)}" for name, value in choice["expected"]["errors"].items())
+    at_most = ", ".join(f"{name} {shown(name, value)}" for name, value in choice["expected"]["at_most"].items())
+    lines = [f"chosen: {chosen or 'nothing, as all is given'} ({choice['by']})", f"  expected errors: {errors}"]
+    lines += [f"  at most, with a confidence of 95 %: {at_most}"] if at_most else []
+    seconds = choice["expected"]["seconds"]
+    return lines + ([f"  expected time: {seconds:.0f} s in all"] if seconds is not None else [])
 
 
 def add_twin_argument(parser: argparse.ArgumentParser, default: Sequence[str] = ()) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import json
 import sys
+import time
 from pathlib import Path
 from typing import Any
 
@@ -14,8 +15,11 @@ if __name__ == "__main__":
 from headless.cli import (
     Outcome,
     add_changes_argument,
+    add_choice_arguments,
     add_common_arguments,
     add_twin_argument,
+    choice_changes,
+    choice_summary,
     entry,
     progress_bar,
 )
@@ -31,6 +35,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--fidelity", choices=("draft", "standard", "high"), help="point on the trade-off")
     parser.add_argument("--parameters", type=Path, metavar="FILE", help="take this road instead of sampling one")
     parser.add_argument("--axis", type=Path, metavar="FILE", help="centreline, CSV (x, y, z in order) or GeoJSON")
+    add_choice_arguments(parser)
     add_twin_argument(parser)
     add_changes_argument(parser)
     parser.add_argument("--overwrite", action="store_true", help="replace files that are already there")
@@ -39,7 +44,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> Outcome:
     """Run `synthroads generate`."""
-    changes = list(arguments.changes)
+    begun = time.perf_counter()
+    changes = [*choice_changes(arguments), *arguments.changes]
     if arguments.seed is not None:
         changes.append(f"seed={arguments.seed}")
     if arguments.fidelity:
@@ -49,7 +55,15 @@ def run(arguments: argparse.Namespace) -> Outcome:
     scenario = load_scenario(arguments.scenario, changes)
     from synthroads_addon.pipeline import Job, generate
 
-    job = Job(scenario, arguments.output, arguments.parameters, arguments.axis, arguments.overwrite, new_file=True)
+    job = Job(
+        scenario,
+        arguments.output,
+        arguments.parameters,
+        arguments.axis,
+        arguments.overwrite,
+        new_file=True,
+        begun=begun,
+    )
     report = generate(job, progress_bar(arguments))
     return 0, report, summary(report, arguments.output)
 
@@ -57,7 +71,7 @@ def run(arguments: argparse.Namespace) -> Outcome:
 def summary(report: dict[str, Any], output: Path) -> str:
     """Return the report for people: what was made, how long each stage took, where it lies."""
     counts = report.get("counts", {})
-    lines = []
+    lines = choice_summary(report)
     if "axis" in report:
         fit = report["axis"]["horizontal"]
         lines.append(

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import json
 import sys
+import time
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +13,15 @@ if __name__ == "__main__":
     sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from headless import generate
-from headless.cli import Outcome, add_changes_argument, add_common_arguments, entry, progress_bar
+from headless.cli import (
+    Outcome,
+    add_changes_argument,
+    add_choice_arguments,
+    add_common_arguments,
+    choice_changes,
+    entry,
+    progress_bar,
+)
 from synthroads_addon.core.errors import InputError
 from synthroads_addon.core.scenario import Scenario, apply_change, load_scenario, scenario_names
 
@@ -52,6 +61,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_changes_argument(parser)
     parser.add_argument("--seed", type=int, metavar="N", help="seed of the noise (1)")
     parser.add_argument("--fidelity", choices=("draft", "standard", "high"), help="point on the trade-off")
+    add_choice_arguments(parser)
     parser.add_argument("--epsg", type=int, metavar="N", help="coordinate system of the map")
     parser.add_argument("--origin", type=_origin, metavar="X,Y,Z", help="map coordinates of the scene's origin (0,0,0)")
     parser.add_argument("--up", choices=("y", "z"), help="what points up in .obj (y), .ply and .stl (z)")
@@ -61,6 +71,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> Outcome:
     """Run `synthroads scan`."""
+    begun = time.perf_counter()
     scenario = scenario_of(arguments)
     from synthroads_addon.scene_scan import SceneScan, scan_scene
 
@@ -75,6 +86,7 @@ def run(arguments: argparse.Namespace) -> Outcome:
         origin=arguments.origin,
         up=arguments.up,
         overwrite=arguments.overwrite,
+        begun=begun,
     )
     report = scan_scene(job, progress_bar(arguments))
     return 0, report, summary(report, arguments.output)
@@ -83,7 +95,7 @@ def run(arguments: argparse.Namespace) -> Outcome:
 def scenario_of(arguments: argparse.Namespace) -> Scenario:
     """Return the scenario that the arguments stand for."""
     given = {name: getattr(arguments, name) for name in _FIELDS if getattr(arguments, name) is not None}
-    changes = list(arguments.changes)
+    changes = [*choice_changes(arguments), *arguments.changes]
     changes += [f"{_FIELDS[name]}={json.dumps(value)}" for name, value in given.items()]
     if arguments.trajectory:
         for name in ("height", "speed"):

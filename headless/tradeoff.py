@@ -1,11 +1,13 @@
-"""Measure error against time for each knob that trades one for the other."""
+"""Measure error against time for each knob that trades one for the other, on scenes that differ."""
 
 from __future__ import annotations
 
 import argparse
+import hashlib
 import json
 import subprocess
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -13,115 +15,153 @@ if __name__ == "__main__":
     sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from headless.cli import Outcome, add_common_arguments, entry, progress_bar
-from synthroads_addon.core.errors import InputError
+from headless.tradeoff_plot import plot
+from synthroads_addon.core.errors import InputError, OutputError, nearest_name
+from synthroads_addon.core.files import write_file
+from synthroads_addon.core.generator import generator
+from synthroads_addon.core.marked import replaced
+from synthroads_addon.core.progress import Progress
 from synthroads_addon.core.scenario import load_scenario
-from synthroads_addon.core.schema import canonical_json
-from synthroads_addon.core.tradeoff import KNOBS, ROW_TITLES, markdown, rows
+from synthroads_addon.core.schema import canonical_json, read_json
+from synthroads_addon.core.tradeoff import KNOBS, SCENES, markdown, row_scenario, rows
 
 _ROW = "--row"
+_ROWS = "rows"
+"""Folder, within the output's, of what is measured already."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments of `synthroads tradeoff`."""
-    parser.add_argument("--scenario", default="rq31-600m", metavar="NAME_OR_FILE", help="scene to measure on")
-    parser.add_argument("--output", required=True, type=Path, metavar="DIR", help="folder for table, JSON and plot")
+    scenes = ", ".join(SCENES)
+    parser.add_argument(
+        "--scenario",
+        action="append",
+        metavar="NAME_OR_FILE",
+        help=f"scene to measure on; can be repeated ({scenes})",
+    )
+    parser.add_argument("--output", required=True, type=Path, metavar="DIR", help="folder for tables, JSON and plots")
     parser.add_argument("--knobs", nargs="+", default=list(KNOBS), metavar="KNOB", help=f"any of {', '.join(KNOBS)}")
-    parser.add_argument("--overwrite", action="store_true", help="replace files that are already there")
+    parser.add_argument(
+        "--resume", action="store_true", help="keep the rows that the folder holds already; measure the others"
+    )
+    parser.add_argument("--overwrite", action="store_true", help="measure again what the folder holds already")
+    parser.add_argument("--document", type=Path, metavar="FILE", help="fill the tables of this Markdown file as well")
+    parser.add_argument("--pictures", type=Path, metavar="DIR", help="put the plots here as well")
     parser.add_argument(_ROW, metavar="JSON", help=argparse.SUPPRESS)
     add_common_arguments(parser)
 
 
 def run(arguments: argparse.Namespace) -> Outcome:
     """Run `synthroads tradeoff`; each row is measured in a process of its own, so that its memory is its own."""
-    load_scenario(arguments.scenario)
     if arguments.row:
         from synthroads_addon.measuring import measure_row
 
         row = json.loads(arguments.row)
-        result = measure_row(arguments.scenario, row["knob"], row["value"])
+        result = measure_row(row["scenario"], row["knob"], row["value"])
         return 0, result, json.dumps(result)
+    scenes = list(dict.fromkeys(arguments.scenario or SCENES))
+    titles = _checked(arguments, scenes)
+    progress = progress_bar(arguments)
+    results, tables = {}, {}
+    for number, scene in enumerate(scenes):
+        title = titles[scene]
+        found = _measure_all(arguments, scene, title, _part(progress, number, len(scenes)))
+        results[title], tables[f"tradeoff {title}"] = found, markdown(found, scene)
+        _write(arguments, title, found, tables[f"tradeoff {title}"])
+    if arguments.document:
+        text = replaced(arguments.document.read_text(encoding="utf-8"), tables)
+        write_file(arguments.document, text.encode(), "--document", overwrite=True)
+    return 0, {"scenes": results}, "\n".join([*tables.values(), f"written to {arguments.output}"])
+
+
+def _checked(arguments: argparse.Namespace, scenes: Sequence[str]) -> dict[str, str]:
+    """Refuse what can't be done before hours of work; return what the files of each scene are called."""
+    titles = {scene: Path(scene).stem for scene in scenes}
+    for scene in scenes:
+        load_scenario(scene)
+        if list(titles.values()).count(titles[scene]) > 1:
+            raise InputError("--scenario", scene, "another one has the same name, which its files would have as well")
     for knob in arguments.knobs:
         if knob not in KNOBS:
-            raise InputError("--knobs", knob, f"must be any of {', '.join(KNOBS)}")
-    from synthroads_addon.core.files import output_folder
+            raise InputError("--knobs", knob, f"must be any of {', '.join(KNOBS)}{nearest_name(knob, KNOBS)}")
+    if arguments.resume and arguments.overwrite:
+        raise InputError("--resume", None, "can't be given with --overwrite, which keeps nothing")
+    if arguments.document:
+        tables = {f"tradeoff {title}": "" for title in titles.values()}
+        try:
+            replaced(arguments.document.read_text(encoding="utf-8"), tables)
+        except OSError as error:
+            raise InputError("--document", str(arguments.document), f"cannot be read ({error.strerror})") from None
+    there = [name for title in titles.values() for name in (_ROWS + "/" + title, f"{title}.json")]
+    present = next((name for name in there if (arguments.output / name).exists()), None)
+    if present and not arguments.overwrite and not arguments.resume:
+        target = str(arguments.output)
+        raise OutputError("--output", target, f"already holds {present}; --resume keeps it, --overwrite replaces it")
+    return titles
 
-    names = ["tradeoff.json", "tradeoff.md", "tradeoff.png"]
-    with output_folder(arguments.output, names, arguments.overwrite) as folder:
-        results = _measure_all(arguments)
-        table = markdown(results, arguments.scenario)
-        (folder / "tradeoff.json").write_text(canonical_json({"rows": results}), encoding="utf-8")
-        (folder / "tradeoff.md").write_text(table, encoding="utf-8")
-        _plot(results, folder / "tradeoff.png")
-    return 0, {"rows": results}, table + f"\nwritten to {arguments.output}"
+
+def _part(progress: Progress, number: int, count: int) -> Progress:
+    def show(stage: str, share: float) -> None:
+        progress(stage, (number + share) / count)
+
+    return show
 
 
-def _measure_all(arguments: argparse.Namespace) -> list[dict[str, Any]]:
-    progress = progress_bar(arguments)
-    wanted = list(rows(arguments.knobs))
+def _measure_all(
+    arguments: argparse.Namespace, scene: str, title: str, progress: Progress
+) -> list[dict[str, Any]]:
+    """Return the rows of the wanted knobs and those that were measured before, in the order of `KNOBS`."""
+    wanted = set(rows(arguments.knobs))
     results = []
-    for number, (knob, value) in enumerate(wanted):
-        progress(f"{knob} {value}", number / len(wanted))
-        request = json.dumps({"knob": knob, "value": value})
-        line = [sys.executable, str(Path(__file__).resolve()), "--scenario", arguments.scenario, "--output", "."]
-        done = subprocess.run([*line, _ROW, request, "--json"], capture_output=True, text=True, check=False)
-        if done.returncode:
-            raise RuntimeError(f"{knob} = {value} failed: {done.stderr.strip()}")
-        results.append(json.loads(done.stdout))
+    for number, (knob, value) in enumerate(rows(KNOBS)):
+        progress(f"{title} {knob} {value}", number / len(list(rows(KNOBS))))
+        path = arguments.output / _ROWS / title / f"{knob}-{_file_name(value)}.json"
+        job = _fingerprint(scene, knob, value)
+        result = _kept(path, job) if arguments.resume else None
+        if result is None and (knob, value) in wanted:
+            result = _measured(scene, knob, value)
+            write_file(path, canonical_json({"job": job, "row": result}).encode(), overwrite=True)
+        if result is not None:
+            results.append(result)
     return results
 
 
-def _plot(results: list[dict[str, Any]], path: Path) -> None:
-    """Draw error against time, one panel per kind of error; the rows of one knob are joined."""
-    try:
-        import matplotlib as mpl
-    except ImportError:
-        raise InputError("tradeoff", None, "needs matplotlib for its plot: pip install matplotlib") from None
-    mpl.use("Agg")
-    from matplotlib import pyplot
-
-    measured = [row for row in results if "left_out" not in row]
-    panels = [name for name in ROW_TITLES if any(_varies(measured, knob, name) for knob in _knobs(measured))]
-    columns = min(3, max(1, len(panels)))
-    lines = -(-max(1, len(panels)) // columns)
-    figure, axes = pyplot.subplots(lines, columns, figsize=(5.2 * columns, 4.2 * lines), squeeze=False)
-    for axis in axes.flat[len(panels) :]:
-        axis.set_visible(False)
-    for axis, name in zip(axes.flat, panels, strict=False):
-        for knob in _knobs(measured):
-            if _varies(measured, knob, name):
-                _draw_knob(axis, [row for row in measured if row["knob"] == knob], knob, name)
-        axis.set(xlabel="processor time of the whole job (s)", ylabel=ROW_TITLES[name], xscale="log")
-        axis.xaxis.set_major_formatter("{x:g}")
-        axis.xaxis.set_minor_formatter("{x:g}")
-        axis.tick_params(axis="x", which="both", labelsize=7, rotation=45)
-        axis.set_ylim(0, 1.15 * axis.get_ylim()[1])
-        axis.grid(alpha=0.3)
-        axis.legend(fontsize=8)
-    figure.tight_layout()
-    figure.savefig(path, dpi=110, metadata={"Software": None})
+def _file_name(value: Any) -> str:
+    return str(value).replace(", ", "-").replace("=", "-")
 
 
-def _knobs(measured: list[dict[str, Any]]) -> list[str]:
-    return list(dict.fromkeys(row["knob"] for row in measured))
+def _fingerprint(scene: str, knob: str, value: Any) -> str:
+    """Return what a row was measured of and with: one of another job is not kept."""
+    changed = row_scenario(scene, knob, value).to_json()
+    return hashlib.sha256(f"{generator()} {changed}".encode()).hexdigest()
 
 
-def _varies(measured: list[dict[str, Any]], knob: str, name: str) -> bool:
-    """Return whether a knob changes a kind of error at all: a flat line says nothing."""
-    errors = [row["errors"][name] for row in measured if row["knob"] == knob and name in row["errors"]]
-    largest = max(abs(row["errors"].get(name, 0.0)) for row in measured)
-    if not errors or (knob != "fidelity" and max(map(abs, errors)) < 0.05 * largest):
-        return False
-    return knob == "fidelity" or max(errors) - min(errors) > 0.5 * max(map(abs, errors))
+def _kept(path: Path, job: str) -> dict[str, Any] | None:
+    """Return the row of this job that was measured before, if there is one."""
+    if not path.exists():
+        return None
+    data = read_json(path)
+    return data["row"] if isinstance(data, dict) and data.get("job") == job else None
 
 
-def _draw_knob(axis: Any, rows_of_knob: list[dict[str, Any]], knob: str, name: str) -> None:
-    preset = knob == "fidelity"
-    x, y = [row["seconds"] for row in rows_of_knob], [row["errors"][name] for row in rows_of_knob]
-    axis.plot(x, y, "*" if preset else "o-", label=knob.replace("_", " "), markersize=14 if preset else 6)
-    for row, a, b in zip(rows_of_knob, x, y, strict=True):
-        axis.annotate(
-            str(row["value"]), (a, b), textcoords="offset points", xytext=(8, -14 if preset else 5), fontsize=8
-        )
+def _measured(scene: str, knob: str, value: Any) -> dict[str, Any]:
+    request = json.dumps({"scenario": scene, "knob": knob, "value": value})
+    line = [sys.executable, str(Path(__file__).resolve()), "--output", ".", _ROW, request, "--json"]
+    done = subprocess.run(line, capture_output=True, text=True, check=False)
+    if done.returncode:
+        raise RuntimeError(f"{scene}: {knob} = {value} failed: {done.stderr.strip()}")
+    result: dict[str, Any] = json.loads(done.stdout)
+    return result
+
+
+def _write(arguments: argparse.Namespace, title: str, results: Sequence[dict[str, Any]], table: str) -> None:
+    folder: Path = arguments.output
+    write_file(folder / f"{title}.json", canonical_json({"rows": results}).encode(), overwrite=True)
+    write_file(folder / f"{title}.md", table.encode(), overwrite=True)
+    drawn = folder / f"{title}.png"
+    plot(results, drawn)
+    if arguments.pictures:
+        write_file(arguments.pictures / f"tradeoff-{title}.png", drawn.read_bytes(), "--pictures", overwrite=True)
 
 
 if __name__ == "__main__":

@@ -16,12 +16,13 @@ from .core.parameters.geometry import RoadGeometry
 from .core.parameters.model import RoadParameters
 from .core.parameters.sampler import sample_road
 from .core.progress import peak_memory_mb
+from .core.scanning.beam import RINGS
 from .core.scanning.motion import ScannedScene
 from .core.scanning.scan import BlockResult, Scan, joined_results, scan_block
 from .core.scanning.stretches import spread
 from .core.scenario import Scenario, load_scenario
-from .core.tradeoff import KNOBS
-from .measuring_errors import LAYERS, Sample, errors_of
+from .core.tradeoff import KNOBS, row_scenario
+from .measuring_errors import CONVERGED, LAYERS, Sample, errors_of, fast_target
 from .scan_files import ScanToFiles, colour_job, make_scan, road_path
 
 _STRETCHES, _SECONDS = 16, 0.08
@@ -38,7 +39,7 @@ def measure_row(scenario_name: str, knob: str, value: Any) -> dict[str, Any]:
     caster's tree, rendering the images, and the rest of the job - scan, colours, relief, thinning out and the file -
     projected from stretches of the path. Errors: see `measuring_errors`.
     """
-    scenario = load_scenario(scenario_name, [*_QUIET, *KNOBS[knob].rows[value]])
+    scenario = row_scenario(scenario_name, knob, value, _QUIET)
     if scenario.colour.source == "returns" and not HAS_RETURN_CAMERA:
         return {"knob": knob, "value": value, "left_out": "a pixel per return needs Blender 5.0 or newer"}
     parameters = sample_road(scenario.road, scenario.seed)
@@ -50,7 +51,8 @@ def measure_row(scenario_name: str, knob: str, value: Any) -> dict[str, Any]:
     built = time.process_time()
     scan = make_scan(scenario, scene, road_path(scenario, geometry), parameters.environment)
     ready = time.process_time()
-    cost, errors = _run(scenario, knob, parameters, scene, scan)
+    whole = load_scenario(scenario_name).vegetation_detail or 1.0
+    cost, errors = _run(scenario, knob, parameters, scene, scan, whole)
     return {
         "knob": knob,
         "value": value,
@@ -90,9 +92,13 @@ class _Cost:
 
 
 def _run(
-    scenario: Scenario, knob: str, parameters: RoadParameters, scene: ScannedScene, scan: Scan
+    scenario: Scenario, knob: str, parameters: RoadParameters, scene: ScannedScene, scan: Scan, plants: float
 ) -> tuple[_Cost, dict[str, Any]]:
-    """Do the job on stretches of the path; return what it costs and the errors."""
+    """Do the job on stretches of the path; return what it costs and the errors.
+
+    Args:
+        plants: share of the plants that the truth has.
+    """
     coloured = "colour" in KNOBS[knob].errors
     job = colour_job(scenario, scan, scene, parameters.environment)
     if coloured:
@@ -118,8 +124,30 @@ def _run(
         rendered=rendered,
         shares=shares_by_source(task.counts.by_source),
     )
-    sample = Sample(scenario, scene, part, result, values, task.counts.points)
+
+    def truth() -> Scan | None:
+        return _truth(scenario, parameters, scene, part, plants)
+
+    sample = Sample(scenario, scene, part, result, values, task.counts.points, truth)
     return cost, errors_of(KNOBS[knob], sample, parameters, job)
+
+
+def _truth(
+    scenario: Scenario, parameters: RoadParameters, scene: ScannedScene, part: Scan, plants: float
+) -> Scan | None:
+    """Return the scan that counts as true, see `Sample.truth`; builds the road anew if it lacks plants."""
+    settings = scenario.settings()
+    if settings.vegetation_detail == plants:
+        if part.rays_per_pulse == CONVERGED:
+            return None
+        return replace(part, rings=RINGS[CONVERGED], target=fast_target(part, scene), targets=False)
+    build_road(parameters, settings.tolerance, plants)
+    geometry = RoadGeometry(parameters)
+    scene = scanned_scene(geometry=geometry, speed_factor=scenario.scan.traffic_speed_factor)
+    data = scenario.to_dict()
+    data["scan"] |= {"caster": "auto"}
+    scan = make_scan(Scenario.from_dict(data), scene, part.path, parameters.environment)
+    return replace(scan, rings=RINGS[CONVERGED], targets=False)
 
 
 def _measured(part: Scan) -> BlockResult:

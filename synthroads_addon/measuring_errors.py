@@ -1,14 +1,15 @@
 """Errors of a job's points against the analytic road, the converged footprint, and colours rendered as well as can be.
 
 - *height*: largest vertical distance of 100,000 random points of the road's mesh from the analytic surface;
-- *beam*: position and intensity of first returns against those of the same pulses with 61 rays, 95th percentile; share
-  of the first returns whose class is another; and how many points fewer there are in the file;
+- *beam*: position and intensity of first returns against those of the same pulses with 61 rays among all plants, 95th
+  percentile; share of the first returns whose class is another; and how many points fewer there are in the file;
 - *relief*: distance of the shifted points from those that all octaves shift with full strength, 95th percentile;
 - *colour*: CIEDE2000 from the true colours, and the largest root mean square error of a material layer.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -20,6 +21,7 @@ from .core.cloud.points import PointBlock
 from .core.cloud.roughness import adjusted, micro_relief
 from .core.colour import FROM_MATERIAL, MATERIAL_LAYERS, NEARBY, LayerValues, source_name
 from .core.colour_difference import ciede2000, lab
+from .core.colour_scenario import image_scale
 from .core.measure import mesh_height_errors
 from .core.parameters.geometry import RoadGeometry
 from .core.parameters.model import RoadParameters
@@ -53,6 +55,8 @@ class Sample:
         result: its points as measured, with normals and materials, and where they were seen.
         values: their colours and layers; None without.
         written: points in the file.
+        truth: returns the scan of the same stretches with the converged footprint among all plants, or None if `scan`
+            is that itself. It may build that scene in place of the one scanned.
     """
 
     scenario: Scenario
@@ -61,6 +65,7 @@ class Sample:
     result: BlockResult
     values: LayerValues | None
     written: int
+    truth: Callable[[], Scan | None]
 
 
 def errors_of(knob: Knob, sample: Sample, parameters: RoadParameters, job: ColourJob) -> dict[str, Any]:
@@ -73,14 +78,14 @@ def errors_of(knob: Knob, sample: Sample, parameters: RoadParameters, job: Colou
     if "height" in knob.errors:
         heights = mesh_height_errors(sample.scene.static, RoadGeometry(parameters))
         errors["height_mm"] = 1e3 * float(np.abs(heights).max())
-    if "beam" in knob.errors:
-        errors |= _beam_errors(sample)
     if "relief" in knob.errors:
         errors["relief_mm"] = _relief_error(sample)
     if "colour" in knob.errors:
         truth, more["colour_truth"], chosen = _true_colours(knob, sample, job)
         of_all, more["errors_by_source"] = _compared(sample.values, truth, chosen)
         errors |= of_all
+    if "beam" in knob.errors:  # last, as its truth may be another scene
+        errors |= _beam_errors(sample)
     return {"errors": {name: round(error, 6) for name, error in errors.items()}, **more}
 
 
@@ -90,28 +95,28 @@ def _scanned(scan: Scan) -> BlockResult:
 
 def _beam_errors(sample: Sample) -> dict[str, float]:
     """Compare first returns with those of the converged footprint, pulse by pulse (told by their time)."""
-    scan, mine = sample.scan, sample.result.points
-    if scan.rays_per_pulse == CONVERGED:
-        truth = mine
-    else:
-        converged = replace(scan, rings=RINGS[CONVERGED], target=_fast(scan, sample.scene), targets=False)
-        truth = _scanned(converged).points
-    a, b = (_firsts(points) for points in (mine, truth))
+    mine, converged = sample.result.points, sample.truth()
+    truth = mine if converged is None else _scanned(converged).points
+    return beam_errors(*paired(mine, truth)) | {"density_percent": 100.0 * (1.0 - sample.written / len(truth))}
+
+
+def paired(mine: PointBlock, truth: PointBlock) -> tuple[PointBlock, PointBlock]:
+    """Return the first returns of the pulses that both have, in one order."""
+    a, b = (points.select(points.return_number == 1) for points in (mine, truth))
     _times, first, second = np.intersect1d(a.gps_time, b.gps_time, return_indices=True)
-    a, b = a.select(first), b.select(second)
+    return a.select(first), b.select(second)
+
+
+def beam_errors(mine: PointBlock, truth: PointBlock) -> dict[str, float]:
+    """Return the errors of first returns against those of the same pulses, see `paired`; by name of the table."""
     return {
-        "position_mm": 1e3 * float(np.quantile(np.linalg.norm(a.xyz - b.xyz, axis=1), 0.95)),
-        "intensity_percent": 100.0 * float(np.quantile(np.abs(a.intensity / b.intensity - 1.0), 0.95)),
-        "labels_percent": 100.0 * float(np.mean(a.class_id != b.class_id)),
-        "density_percent": 100.0 * (1.0 - sample.written / len(truth)),
+        "position_mm": 1e3 * float(np.quantile(np.linalg.norm(mine.xyz - truth.xyz, axis=1), 0.95)),
+        "intensity_percent": 100.0 * float(np.quantile(np.abs(mine.intensity / truth.intensity - 1.0), 0.95)),
+        "labels_percent": 100.0 * float(np.mean(mine.class_id != truth.class_id)),
     }
 
 
-def _firsts(points: PointBlock) -> PointBlock:
-    return points.select(points.return_number == 1)
-
-
-def _fast(scan: Scan, scene: ScannedScene) -> Target:
+def fast_target(scan: Scan, scene: ScannedScene) -> Target:
     """Return a fast target for the truth."""
     from .blender.casters import make_caster
 
@@ -147,12 +152,14 @@ def _true_colours(
         colour |= {"lighting": "path", "samples": TRUE_SAMPLES}
         chosen, name = chosen[::_TENTH], f"a pixel per return with {TRUE_SAMPLES} samples of whole light paths"
     elif not HAS_RETURN_CAMERA:
-        spacing, distance = (float(change.partition("=")[2]) for change in DENSEST)
-        colour |= {"source": "images", "image_spacing": spacing, "ground_sampling_distance": distance}
+        scale = image_scale(job.path.typical_range)
+        densest = {name: scale * length for name, length in DENSEST.items()}
+        colour |= {"source": "images"} | densest
         part = middle(job.path, _MIDDLE)  # type: ignore[arg-type]
         job = replace(job, path=part)
         within = [(strip.start_time, strip.start_time + strip.duration) for strip in part.strips]
         chosen = np.flatnonzero(np.any([(low <= seen.time) & (seen.time <= high) for low, high in within], axis=0))
+        distance, spacing = densest["ground_sampling_distance"], densest["image_spacing"]
         name = f"images of {distance:g} m pixels every {spacing:g} m, of the points that these show"
     with layer_source(replace(job, scenario=job.scenario.from_dict(colour), wanted=LAYERS)) as source:
         of = seen.select(chosen)

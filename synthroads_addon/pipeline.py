@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import platform as machine
 import sys
+import time
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import laspy
 import numpy as np
@@ -31,6 +32,9 @@ from .core.twin import check_formats, twin_file_names, write_twin
 from .scan_files import available_cores, colour_job, make_scan, road_path, scan_to_files, top_view
 from .section_scan import check_by_section, scan_by_section
 
+if TYPE_CHECKING:
+    from .blender.model import RoadModel
+
 FILES = {
     "parameters": ("parameters.json",),
     "cloud": ("cloud.laz",),
@@ -47,6 +51,14 @@ def file_names(scenario: Scenario, outputs: Sequence[str]) -> list[str]:
     return [name for output in outputs for name in files[output]] + ["report.json"]
 
 
+@dataclass(frozen=True)
+class Built:
+    """A model that stands in the open file already, and what is scanned of it."""
+
+    model: RoadModel
+    scene: ScannedScene
+
+
 @dataclass
 class Job:
     """What `generate` is asked for.
@@ -58,6 +70,7 @@ class Job:
         axis: sample a road along this centreline (CSV or GeoJSON).
         overwrite: replace files that are already there.
         new_file: build in a new, empty Blender file instead of the open one, which is lost.
+        begun: when the job began, by `time.perf_counter`, for a time budget; when `generate` is called if None.
     """
 
     scenario: Scenario
@@ -66,6 +79,7 @@ class Job:
     axis: Path | None = None
     overwrite: bool = False
     new_file: bool = False
+    begun: float | None = None
 
 
 def generate(job: Job, progress: Progress = silent) -> dict[str, Any]:
@@ -74,6 +88,7 @@ def generate(job: Job, progress: Progress = silent) -> dict[str, Any]:
     Raises:
         InputError: an input is wrong or the output can't be written; nothing is left half-written.
     """
+    begun = time.perf_counter() if job.begun is None else job.begun
     check(job)
     wanted = job.scenario.outputs
     names = [*file_names(job.scenario, wanted), *twin_file_names(job.scenario.twin)]
@@ -85,19 +100,45 @@ def generate(job: Job, progress: Progress = silent) -> dict[str, Any]:
             geometry = RoadGeometry(parameters)
             check_by_section(job.scenario, geometry.length)
             report |= axis_report
-            write_texts(folder, wanted, parameters, geometry, job.scenario)
+            if not job.scenario.chooses:
+                write_texts(folder, wanted, parameters, geometry, job.scenario)
+        built = None
+        if job.scenario.chooses:
+            with timer.stage("choice"):
+                job, built, report["choice"] = _chosen(job, parameters, begun)
+                write_texts(folder, wanted, parameters, geometry, job.scenario)
         if job.scenario.twin:
             with timer.stage("twin"):
                 write_twin(parameters, folder, job.scenario.twin, job.scenario.settings().tolerance)
         if set(wanted) & {"scene", "cloud", "previews"}:
-            report["counts"] = _scene_outputs(job, folder, parameters, timer)
+            report["counts"] = _scene_outputs(job, folder, parameters, timer, built)
         report |= closing(job.scenario, timer)
         (folder / "report.json").write_text(canonical_json(report), encoding="utf-8")
     return report
 
 
+def _chosen(job: Job, parameters: RoadParameters, begun: float) -> tuple[Job, Built | None, dict[str, Any]]:
+    """Return the job with the settings chosen that its scenario leaves open, what of it stands, and the report."""
+    from .blender.files import empty_file
+    from .choosing import decide
+    from .choosing_sites import RoadSite
+
+    if job.new_file:
+        empty_file()
+    site = RoadSite(job.scenario, parameters)
+    decision = decide(job.scenario, site, begun)
+    job = replace(job, scenario=decision.scenario, new_file=False)
+    if decision.scene is None or site.model is None:
+        return job, None, decision.report
+    return job, Built(site.model, decision.scene), decision.report
+
+
 def check(job: Job) -> None:
     """Refuse a job that can't be done before any work starts."""
+    if job.scenario.chooses:
+        from . import choosing
+
+        choosing.check(job.scenario)
     scanner_setting(job.scenario.scan)
     job.scenario.cloud.scheme()
     job.scenario.own_materials()
@@ -138,8 +179,10 @@ def write_texts(
         (folder / "centerline.geojson").write_text(text, encoding="utf-8")
 
 
-def _scene_outputs(job: Job, folder: Path, parameters: RoadParameters, timer: StageTimer) -> dict[str, Any]:
-    """Build the model and write what needs it."""
+def _scene_outputs(
+    job: Job, folder: Path, parameters: RoadParameters, timer: StageTimer, built: Built | None
+) -> dict[str, Any]:
+    """Build the model, unless it stands already, and write what needs it."""
     from .blender.files import empty_file, save_scene
     from .blender.kept_road import remember
     from .blender.materials import vary
@@ -152,12 +195,12 @@ def _scene_outputs(job: Job, folder: Path, parameters: RoadParameters, timer: St
     if job.scenario.section_length(parameters.alignment.length) is not None:
         return scan_by_section(job.scenario, parameters, folder, timer)
     with timer.stage("model"):
-        model = build_road(parameters, settings.tolerance, settings.vegetation_detail)
+        model = built.model if built else build_road(parameters, settings.tolerance, settings.vegetation_detail)
         if job.scenario.materials_table:
             vary(parameters.materials, parameters.environment, job.scenario.own_materials())
         remember(model.collection, parameters, job.scenario, "")
     if set(wanted) & {"cloud", "previews"}:
-        counts = scan_open_road(job.scenario, parameters, folder, timer)
+        counts = scan_open_road(job.scenario, parameters, folder, timer, built.scene if built else None)
     if "scene" in wanted:
         with timer.stage("scene file"):
             save_scene(folder / "scene.blend")
@@ -165,9 +208,16 @@ def _scene_outputs(job: Job, folder: Path, parameters: RoadParameters, timer: St
 
 
 def scan_open_road(
-    scenario: Scenario, parameters: RoadParameters, folder: Path, timer: StageTimer
+    scenario: Scenario,
+    parameters: RoadParameters,
+    folder: Path,
+    timer: StageTimer,
+    scene: ScannedScene | None = None,
 ) -> dict[str, Any]:
     """Scan the open scene, which shows a road, and write the cloud and the previews; must run in the main thread.
+
+    Args:
+        scene: what is scanned, where that was read already.
 
     Returns:
         the counts, as JSON data.
@@ -179,7 +229,8 @@ def scan_open_road(
 
     geometry, environment = RoadGeometry(parameters), parameters.environment
     with timer.stage("scene mesh"):
-        scene = scanned_scene(geometry=geometry, speed_factor=scenario.scan.traffic_speed_factor)
+        if scene is None:
+            scene = scanned_scene(geometry=geometry, speed_factor=scenario.scan.traffic_speed_factor)
     check_not_empty(scene)
     with timer.stage("caster"):
         scan = make_scan(

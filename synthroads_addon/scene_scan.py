@@ -5,6 +5,7 @@ The scene is only read: nothing is added to it, and its file isn't written.
 
 from __future__ import annotations
 
+import time
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -56,6 +57,7 @@ class SceneScan:
         origin: map coordinates of the scene's own origin, m; those of the scene's road, or 0, if None.
         up: see `blender.foreign.open_scene`.
         overwrite: replace files that are already there.
+        begun: when the job began, by `time.perf_counter`, for a time budget; when `scan_scene` is called if None.
     """
 
     scenario: Scenario
@@ -68,6 +70,7 @@ class SceneScan:
     origin: tuple[float, float, float] | None = None
     up: UpAxis | None = None
     overwrite: bool = False
+    begun: float | None = None
 
 
 @dataclass(frozen=True)
@@ -85,6 +88,11 @@ def scan_scene(job: SceneScan, progress: Progress = silent) -> dict[str, Any]:
     Raises:
         InputError: an input is wrong or the output can't be written; nothing is left half-written.
     """
+    from .choosing import decide
+    from .choosing_sites import SceneSite
+    from .pilot import Air
+
+    begun = time.perf_counter()
     mapping = check_scene_scan(job)
     scenario = job.scenario
     wanted = tuple(name for name in OUTPUTS if name in scenario.outputs)
@@ -98,9 +106,14 @@ def scan_scene(job: SceneScan, progress: Progress = silent) -> dict[str, Any]:
             found = _read(job, mapping)
         static = found.scene.static
         geometry = RoadGeometry(found.road) if found.road else None
+        path = scene_path(job, static, geometry)
+        air, variation = (found.road.environment, found.road.materials) if found.road else (None, None)
+        if scenario.chooses:
+            with timer.stage("choice"):
+                site = SceneSite(found.scene, path, Air(air, variation))
+                decision = decide(scenario, site, job.begun or begun)
+                scenario, report["choice"] = decision.scenario, decision.report
         with timer.stage("caster"):
-            path = scene_path(job, static, geometry)
-            air, variation = (found.road.environment, found.road.materials) if found.road else (None, None)
             scan = make_scan(scenario, found.scene, path, air, variation=variation)
         epsg = found.road.metadata.epsg if found.road and job.epsg is None else job.epsg
         view = None if "previews" not in wanted else top_view(geometry) if geometry else scene_view(static)
@@ -116,8 +129,10 @@ def scan_scene(job: SceneScan, progress: Progress = silent) -> dict[str, Any]:
 
 def check_scene_scan(job: SceneScan) -> ClassMapping | None:
     """Refuse a job that can't be done before any work starts; return the classes by name."""
+    from . import choosing
     from .blender.foreign import check_scene_file
 
+    choosing.check(job.scenario, foreign=True)
     platform = job.scenario.scan.platform
     if job.scene is not None:
         check_scene_file(job.scene, job.up)

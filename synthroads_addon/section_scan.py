@@ -40,8 +40,16 @@ _AROUND = 60.0
 
 
 def check_by_section(scenario: Scenario, length: float) -> None:
-    """Refuse outputs that need the whole model of a road of a length (m) that is built by section."""
+    """Refuse what needs the whole model of a road of a length (m) that is built by section."""
     section = scenario.section_length(length)
+    if section is not None and scenario.chooses:
+        name = "time_budget" if scenario.tolerance is None else "tolerance"
+        raise InputError(
+            name,
+            getattr(scenario, name),
+            f"can't be kept on a road of {length:g} m, which is built by sections of {section:g} m: choose on a shorter "
+            "road, and set what was chosen",
+        )
     if section is not None and "scene" in scenario.outputs:
         raise InputError(
             "outputs",

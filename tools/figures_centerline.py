@@ -48,6 +48,7 @@ from ml.runs import Run  # noqa: E402
 from ml.tasks import kinds  # noqa: E402
 from synthroads_addon.core.errors import SynthRoadsError  # noqa: E402
 from synthroads_addon.core.files import write_file  # noqa: E402
+from synthroads_addon.core.marked import replaced  # noqa: E402
 
 Measured = dict[str, dict[str, dict[str, Spread]]]
 AnyPart = TypeVar("AnyPart", bound=Part)
@@ -341,11 +342,11 @@ def main(words: Sequence[str] | None = None) -> None:
     try:
         if arguments.document:
             # Before hours of work: whether there is room for the tables.
-            tables.replaced(arguments.document.read_text(encoding="utf-8"), dict.fromkeys(expected(arguments), ""))
+            replaced(arguments.document.read_text(encoding="utf-8"), dict.fromkeys(expected(arguments), ""))
         trained = models(arguments.run)
         found = synthetic(arguments, trained) | real(arguments, trained)
         if arguments.document:
-            text = tables.replaced(arguments.document.read_text(encoding="utf-8"), found)
+            text = replaced(arguments.document.read_text(encoding="utf-8"), found)
             write_file(arguments.document, text.encode(), overwrite=True)
     except SynthRoadsError as error:
         raise SystemExit(str(error)) from None

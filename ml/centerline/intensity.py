@@ -19,7 +19,7 @@ _BIN = 0.5
 """Width across the road over which a median is taken, m."""
 _AROUND = 3
 """Bins to either side whose medians' median is what is around: wider than any line, narrower than a lane's."""
-QUIETEST = 0.05
+QUIETEST = 0.15
 """Noise by the distance of the logarithms' 10th and 90th percentiles: less is taken for this."""
 _SPREAD_20_80 = 1.683
 """Distance of a Gaussian's 20th and 80th percentiles, in deviations."""

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from synthroads_addon.core.errors import InputError
 from synthroads_addon.core.files import write_file
 from synthroads_addon.core.schema import canonical_json
 
@@ -16,7 +15,6 @@ from .metrics import Spread
 
 Measured = Mapping[str, Mapping[str, Mapping[str, Spread]]]
 """Figures by predictor, road (or `all`) and name, as `evaluation.measure` returns them."""
-BEGIN, END = "<!-- table: {} -->", "<!-- end of table -->"
 
 
 @dataclass(frozen=True)
@@ -119,21 +117,6 @@ def write_tables(folder: Path, name: str, measured: Measured) -> None:
     parts = [f"## {road}\n\n{table(measured, road)}" for road in sorted(roads, key=lambda road: road != "all")]
     text = f"# {name}\n\nMean (standard deviation over seeds, ddof 1).\n\n" + "\n".join(parts)
     write_file(folder / f"{name}.md", text.encode(), overwrite=True)
-
-
-def replaced(document: str, tables: Mapping[str, str]) -> str:
-    """Return a document with new text between the markers of the named tables; all else stays.
-
-    Raises:
-        InputError: a table has no markers in it, or more than one pair.
-    """
-    for name, text in tables.items():
-        begin = BEGIN.format(name)
-        if document.count(begin) != 1 or END not in document.partition(begin)[2]:
-            raise InputError("document", begin, f"must stand in it once, followed by {END}")
-        before, _, rest = document.partition(begin)
-        document = f"{before}{begin}\n{text.rstrip()}\n{END}{rest.partition(END)[2]}"
-    return document
 
 
 def _markdown(head: Sequence[str], body: Sequence[Sequence[str]]) -> str:

@@ -21,6 +21,11 @@ USUAL_RANGE = 60.0
 _LEAST_SCALE = 0.5
 
 
+def image_scale(typical_range: float) -> float:
+    """Return how many times as far apart and as coarse images are as from `USUAL_RANGE`, seen from a range (m)."""
+    return max(typical_range / USUAL_RANGE, _LEAST_SCALE)
+
+
 class ColourScenario(ScenarioModel):
     """Colours and material layers of the points. What isn't given is the fidelity's own value."""
 
@@ -66,7 +71,7 @@ class ColourScenario(ScenarioModel):
             typical_range: the platform's usual range, m: images from farther away are farther apart and coarser.
         """
         preset = COLOUR_FIDELITIES[fidelity]
-        scale = max(typical_range / USUAL_RANGE, _LEAST_SCALE)
+        scale = image_scale(typical_range)
 
         def pick(own: Any, otherwise: Any) -> Any:
             return otherwise if own is None else own

@@ -84,6 +84,19 @@ class View:
         ray = np.stack([right, up, -np.ones_like(right)], axis=-1) @ self.rotation.T
         return np.asarray(self.position + depth.astype(np.float64)[..., None] * ray)
 
+    def around(self, points: Float, margin: int) -> View | None:
+        """Return the part of the image that shows points (N, 3), with a margin, px; None if it shows none of them."""
+        x, y, depth = self.project(points)
+        shown = (depth > 0.0) & (x >= 0.0) & (x <= self.size[0]) & (y >= 0.0) & (y <= self.size[1])
+        if not shown.any():
+            return None
+        left, top = (max(0, int(values[shown].min()) - margin) for values in (x, y))
+        right, bottom = (
+            min(size, int(values[shown].max()) + 1 + margin) for values, size in zip((x, y), self.size, strict=True)
+        )
+        centre = (self.centre[0] - left, self.centre[1] - top)
+        return View(self.position, self.rotation, self.focal, centre, (right - left, bottom - top), self.time)
+
     @property
     def pixels(self) -> int:
         """Return the number of pixels."""

@@ -110,6 +110,9 @@ class ScanScenario(ScenarioModel):
     relief: float = quantity(
         1.0, ge=0, le=100, unit="1", description="Strength of the surfaces' micro-relief in the cloud; 0 is none."
     )
+    relief_octaves: int | None = quantity(
+        None, ge=1, le=8, unit="1", description="Octaves of the micro-relief; the fidelity's if not given."
+    )
     reflection: Literal["lambert", "oren_nayar"] = Field("lambert", description="How rough surfaces reflect.")
     attenuation: float | None = quantity(
         None, ge=0, le=1, unit="1/m", description="Attenuation per metre of range (there and back); else the weather's."

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal, get_args
 
-from pydantic import Field
+from pydantic import Field, field_validator
 
 from .cloud_scenario import CloudScenario
 from .colour_scenario import ColourScenario
@@ -16,6 +17,7 @@ from .materials import Material, material_table_path, read_material_table
 from .road_scenario import RoadScenario, ScenarioModel
 from .scan_scenario import ScanScenario
 from .schema import quantity, read_json
+from .tolerance import TIMES, Tolerance, with_unit
 from .twin import TwinFormat
 
 SCENARIOS = Path(__file__).parents[1] / "presets" / "scenarios"
@@ -42,6 +44,12 @@ class Scenario(ScenarioModel):
     vegetation_detail: float | None = quantity(
         None, ge=0, le=1, unit="1", description="Share of the vegetation built; the fidelity's if not given."
     )
+    tolerance: Tolerance | None = Field(
+        None, description="Largest errors; the cheapest settings that keep them are chosen, but for knobs given here."
+    )
+    time_budget: float | None = quantity(
+        None, gt=0, le=1e7, unit="s", description="Time for the whole job; the best settings that fit it are chosen."
+    )
     materials_table: str | None = Field(
         None, description="JSON file, or shipped table, of materials in place of the usual ones of the same names."
     )
@@ -54,6 +62,21 @@ class Scenario(ScenarioModel):
     )
 
     twin: tuple[TwinFormat, ...] = Field((), description="Formats of the geometric-semantic model that are wanted.")
+
+    @field_validator("time_budget", mode="before")
+    @classmethod
+    def _with_unit(cls, value: Any) -> Any:
+        if not isinstance(value, str):
+            return value
+        try:
+            return with_unit("time_budget", value, TIMES)
+        except InputError as error:
+            raise ValueError(error.allowed) from None
+
+    @property
+    def chooses(self) -> bool:
+        """Return whether settings are to be chosen before the work begins."""
+        return self.tolerance is not None or self.time_budget is not None
 
     def own_materials(self) -> dict[str, Material]:
         """Return the materials of the scenario's own table by name; none if it has none.
@@ -82,7 +105,7 @@ class Scenario(ScenarioModel):
             tolerance=pick(self.geometric_tolerance, preset.tolerance),
             vegetation_detail=pick(self.vegetation_detail, preset.vegetation_detail),
             rays_per_pulse=pick(self.scan.rays_per_pulse, preset.rays_per_pulse),
-            relief_octaves=preset.relief_octaves,
+            relief_octaves=pick(self.scan.relief_octaves, preset.relief_octaves),
         )
 
 
@@ -142,6 +165,13 @@ def apply_change(data: Any, change: str) -> Any:
     """Return the scenario's JSON data with one ``path=value`` applied; the value is JSON, or else plain text."""
     path, value = parsed_change(change)
     return _with_value(data, path, value)
+
+
+def apply_values(data: Any, values: Mapping[str, Any]) -> Any:
+    """Return the scenario's JSON data with values set by their dotted paths."""
+    for path, value in values.items():
+        data = _with_value(data, path, value)
+    return data
 
 
 def parsed_change(change: str) -> tuple[str, Any]:

@@ -2,18 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+import json
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from .colour_scenario import USUAL_RANGE, image_scale
+from .scan_scenario import Platform
+from .scanning.path import USUAL
+from .scenario import Scenario, load_scenario
+
+SCENES = ("rq31-600m", "mobile-mapping-300m", "airborne-1000m")
+"""Built-in scenarios that the trade-off is measured on: 60 m above the road, on it, and 700 m above it."""
 BARE = ("colour.rgb=false", "scan.relief=0")
 """Changes that leave out what the knobs of the model and the beam don't touch."""
 IMAGES = ("scan.relief=0", "colour.source=images")
 WHOLE_PATHS = ("scan.relief=0", "colour.source=returns", "colour.lighting=path")
 TRUE_SAMPLES = 256
 """Samples per pixel of the light that counts as true beside whole light paths."""
-DENSEST = ("colour.image_spacing=15", "colour.ground_sampling_distance=0.06")
-"""Changes that give the images that count as true where Blender has no pixel per return."""
+DENSEST = {"image_spacing": 15.0, "ground_sampling_distance": 0.06}
+"""Images that count as true where Blender has no pixel per return: for a range of 60 m."""
+_LENGTHS_OF_IMAGES = tuple(f"colour.{name}" for name in DENSEST)
 
 
 @dataclass(frozen=True)
@@ -38,10 +47,30 @@ def _field(path: str, values: Iterable[Any], common: tuple[str, ...]) -> dict[An
     return {value: (*common, f"{path}={value}") for value in values}
 
 
+_ALL_ERRORS = ("height", "beam", "relief", "colour")
+_BETWEEN: dict[Any, tuple[str, ...]] = {
+    f"{preset}, {title}": (f"fidelity={preset}", change)
+    for preset, others in {
+        "draft": ("geometric_tolerance=0.005", "vegetation_detail=1", "scan.rays_per_pulse=7"),
+        "standard": (
+            "geometric_tolerance=0.02",
+            "geometric_tolerance=0.001",
+            "vegetation_detail=0.3",
+            "scan.rays_per_pulse=1",
+            "scan.rays_per_pulse=19",
+        ),
+        "high": ("geometric_tolerance=0.005", "scan.rays_per_pulse=7", "scan.rays_per_pulse=37"),
+    }.items()
+    for change in others
+    for title in [change.rpartition(".")[2] if change.startswith("scan.") else change]
+}
+"""Presets of which one knob is that of another: title -> changes."""
+
 KNOBS: dict[str, Knob] = {
     "geometric_tolerance": Knob(
         "model and beam", _field("geometric_tolerance", (0.02, 0.01, 0.005, 0.002, 0.001), BARE), ("height", "beam")
     ),
+    "vegetation_detail": Knob("model and beam", _field("vegetation_detail", (0, 0.3, 1), BARE), ("height", "beam")),
     "caster": Knob("model and beam", _field("scan.caster", ("bvhtree", "embree"), BARE), ("height", "beam")),
     "rays_per_pulse": Knob(
         "model and beam", _field("scan.rays_per_pulse", (1, 7, 19, 37, 61), BARE), ("height", "beam")
@@ -68,10 +97,12 @@ KNOBS: dict[str, Knob] = {
     "fidelity": Knob(
         "presets",
         _field("fidelity", ("draft", "standard", "high"), ()),
-        ("height", "beam", "relief", "colour"),
+        _ALL_ERRORS,
     ),
+    "between": Knob("presets", _BETWEEN, _ALL_ERRORS),
 }
-"""Knobs by name. ``fidelity`` are the presets: points that set several knobs at once."""
+"""Knobs by name. ``fidelity`` are the presets: points that set several knobs at once; ``between`` are presets with one
+knob of another, which a preset must not be worse than."""
 
 ROW_TITLES = {
     "height_mm": "road height, largest error (mm)",
@@ -115,22 +146,106 @@ def rows(knobs: Iterable[str]) -> Iterator[tuple[str, Any]]:
             yield knob, value
 
 
-def markdown(results: list[dict[str, Any]], scenario: str) -> str:
+def row_scenario(scenario: str, knob: str, value: Any, changes: Iterable[str] = ()) -> Scenario:
+    """Return the job that a row is about: the scenario with the knob's changes, and others before them.
+
+    Spacings and pixels of images are those for a range of 60 m, and farther apart and coarser from farther away.
+    """
+    scale = image_scale(_seen_from(load_scenario(scenario).scan.platform))
+    return load_scenario(scenario, [*changes, *(_scaled(change, scale) for change in KNOBS[knob].rows[value])])
+
+
+def _seen_from(platform: Platform) -> float:
+    usual = USUAL.get(platform.kind)
+    return usual.seen_from(platform.height or usual.height) if usual else USUAL_RANGE
+
+
+def _scaled(change: str, scale: float) -> str:
+    path, _, value = change.partition("=")
+    return f"{path}={float(value) * scale:g}" if path in _LENGTHS_OF_IMAGES else change
+
+
+def measured_of(results: Iterable[Mapping[str, Any]]) -> list[Mapping[str, Any]]:
+    """Return the rows that this Blender could measure."""
+    return [row for row in results if "left_out" not in row]
+
+
+def effective(scenario: Scenario) -> str:
+    """Return a job's settings as text, equal for scenarios that say the same in different words."""
+    data, settings = scenario.to_dict(), scenario.settings()
+    data |= {"geometric_tolerance": settings.tolerance, "vegetation_detail": settings.vegetation_detail}
+    caster = "embree" if scenario.scan.caster == "auto" else scenario.scan.caster
+    data["scan"] |= {"rays_per_pulse": settings.rays_per_pulse, "caster": caster}
+    return json.dumps(data, sort_keys=True)
+
+
+def time_noise(results: Iterable[Mapping[str, Any]], scenario: str) -> float | None:
+    """Return the measured noise of the times: how far rows of the same settings are apart, as a share of their mean.
+
+    The largest such spread of any settings that several knobs' rows share; None if no two rows do.
+    """
+    same: dict[str, list[float]] = {}
+    for row in measured_of(results):
+        own = row_scenario(scenario, row["knob"], row["value"])
+        same.setdefault(f"{KNOBS[row['knob']].errors} {effective(own)}", []).append(float(row["seconds"]))
+    spreads = [(max(times) - min(times)) * len(times) / sum(times) for times in same.values() if len(times) > 1]
+    return max(spreads, default=None)
+
+
+def better_row(
+    row: Mapping[str, Any], others: Iterable[Mapping[str, Any]], noise: float
+) -> Mapping[str, Any] | None:
+    """Return a row that is faster than `row`, beyond the noise of time, and at least as accurate in all errors.
+
+    The fastest such row; None if there is none, so that `row` lies on the front.
+    """
+
+    def as_accurate(other: Mapping[str, Any]) -> bool:
+        return all(abs(other["errors"][name]) <= abs(error) for name, error in row["errors"].items())
+
+    faster = [other for other in others if other["seconds"] < row["seconds"] * (1.0 - noise) and as_accurate(other)]
+    return min(faster, key=lambda other: other["seconds"], default=None)
+
+
+def front_lines(results: Sequence[Mapping[str, Any]], scenario: str) -> list[str]:
+    """Return a table of the presets that says of each whether it lies on the front; nothing without presets."""
+    job = [row for row in measured_of(results) if KNOBS[row["knob"]].table == "presets"]
+    presets = [row for row in job if row["knob"] == "fidelity"]
+    if not presets:
+        return []
+    noise = time_noise(results, scenario)
+    lines = ["| preset | on the front | faster, and as accurate in all errors |", "|---|---|---|"]
+    for row in presets:
+        other = better_row(row, [one for one in job if one is not row], noise or 0.0)
+        shown = "-" if other is None else f"{other['value']}: {other['seconds']:.1f} s for {row['seconds']:.1f} s"
+        lines.append(f"| {row['value']} | {'yes' if other is None else 'no'} | {shown} |")
+    text = "times of the same settings weren't measured twice, so every difference of time counts"
+    if noise is not None:
+        text = f"times of the same settings differ by up to {100.0 * noise:.0f} %: only what is faster by more counts"
+    return [*lines, "", f"Each is compared with {len(job) - 1} others of the same job; {text}."]
+
+
+def markdown(results: Sequence[Mapping[str, Any]], scenario: str) -> str:
     """Return the tables of rows as `measuring.measure_row` gives them, and what was left out of them and why."""
     lines = [f"Scene `{scenario}`: `synthroads tradeoff --scenario {scenario} --output DIR`", ""]
     for table, costs in TABLES.items():
         own = [row for row in results if KNOBS[row["knob"]].table == table]
-        measured = [row for row in own if "left_out" not in row]
+        measured = measured_of(own)
         if measured:
             lines += [f"{table.capitalize()}:", "", *_table(measured, costs), ""]
         left_out = [f"- {row['knob']} {row['value']}: {row['left_out']}" for row in own if "left_out" in row]
         lines += [*left_out, ""] if left_out else []
+    front = front_lines(results, scenario)
+    lines += [*front, ""] if front else []
+    scale = image_scale(_seen_from(load_scenario(scenario).scan.platform))
+    if scale != 1.0 and any(KNOBS[row["knob"]].table == "colours" for row in results):
+        lines += [f"Spacings and pixels of images are for a range of 60 m; here they are {scale:.3g} times as large."]
     truths = dict.fromkeys(row["colour_truth"] for row in results if "colour_truth" in row)
     lines += [f"True colours are those of {truth}." for truth in truths]
     return "\n".join(lines).rstrip("\n") + "\n"
 
 
-def _table(measured: list[dict[str, Any]], costs: tuple[str, ...]) -> list[str]:
+def _table(measured: Sequence[Mapping[str, Any]], costs: tuple[str, ...]) -> list[str]:
     """Return a table's lines; it has a column for each of its costs, and for each error that one of its rows has."""
     errors = [name for name in ROW_TITLES if any(name in row["errors"] for row in measured)]
     shares = [name for name in costs if name in _SHARES and any(name in row["shares"] for row in measured)]

@@ -109,6 +109,10 @@ class NamedOrByHandField(Field):
         return self.by_hand.classes()
 
 
+NOT_HERE = ("tolerance", "time_budget")
+"""Fields that the panel doesn't have: its road is built before it is scanned, with knobs that are seen and set."""
+
+
 def make_fields(model: type[BaseModel], default: dict[str, Any], path: str, hooks: Hooks) -> dict[str, Field]:
     """Return the fields of a model by name, except those that can have one value only."""
     made = (
@@ -119,7 +123,9 @@ def make_fields(model: type[BaseModel], default: dict[str, Any], path: str, hook
 
 
 def make_field(path: str, info: FieldInfo, default: Any, hooks: Hooks) -> Field | None:
-    """Return a field as the panel keeps it, chosen by its type; None for a constant."""
+    """Return a field as the panel keeps it, chosen by its type; None for a constant, or if the panel lacks it."""
+    if path in NOT_HERE:
+        return None
     kind, optional = _without_none(info.annotation)
     if get_origin(kind) is Union or isinstance(kind, types.UnionType):
         models = [part for part in map(_bare, get_args(kind)) if _is_model(part)]

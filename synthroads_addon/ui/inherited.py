@@ -116,7 +116,7 @@ def _of_images(name: str) -> Callable[[Any], Value]:
         platform = settings.scan.platform
         usual = USUAL.get(platform.kind)
         height = platform.height if platform.own_height else usual.height if usual else USUAL_RANGE
-        seen_from = height if usual is None or usual.typical_range is None else max(usual.typical_range, height)
+        seen_from = usual.seen_from(height) if usual else height
         colour = ColourScenario(lighting=settings.colour.lighting)
         return getattr(colour.settings(settings.fidelity, seen_from), name)
 
@@ -136,6 +136,7 @@ _VALUES: dict[str, Callable[[Any], Value]] = {
     "geometric_tolerance": _of_fidelity("tolerance"),
     "vegetation_detail": _of_fidelity("vegetation_detail"),
     "scan.rays_per_pulse": _of_fidelity("rays_per_pulse"),
+    "scan.relief_octaves": _of_fidelity("relief_octaves"),
     "road.lanes": _of_section(lambda section: len(section.lanes)),
     "road.lane_width": _of_section(lambda section: section.lanes[0]),
     "road.median_width": _of_section(lambda section: section.median),

@@ -13,7 +13,7 @@ import bpy
 
 from ..core.errors import InputError
 from ..core.scenario import Scenario, load_scenario
-from .field_groups import leaves, make_fields, read_fields, shown, write_fields
+from .field_groups import NOT_HERE, leaves, make_fields, read_fields, shown, write_fields
 from .fields import SYNTHROADS_PG_file
 from .hooks import HOOKS
 from .preferences import preferences
@@ -66,8 +66,12 @@ class SYNTHROADS_PG_settings(_Generated, bpy.types.PropertyGroup):
         return int(FIELDS["seed"].read(self, self._base()["seed"]))
 
     def take(self, scenario: Scenario) -> None:
-        """Show a scenario, to the last digit."""
+        """Show a scenario, to the last digit; raise `InputError` if it has what the panel lacks."""
         data = scenario.to_dict()
+        for name in NOT_HERE:
+            if name in data:
+                text = "only synthroads generate chooses by it; take it out of the scenario, and set the knobs here"
+                raise InputError(name, data[name], text)
         write_fields(FIELDS, self, data)
         self.loaded = json.dumps(data)
 

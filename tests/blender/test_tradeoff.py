@@ -13,7 +13,7 @@ import pytest
 from synthroads_addon.blender.cameras import HAS_RETURN_CAMERA
 from synthroads_addon.core.scenario import load_scenario
 from synthroads_addon.core.schema import canonical_json
-from synthroads_addon.core.tradeoff import KNOBS, ROW_TITLES
+from synthroads_addon.core.tradeoff import KNOBS, ROW_TITLES, SCENES, row_scenario, rows
 from synthroads_addon.measuring import measure_row
 
 ROOT = Path(__file__).parents[2]
@@ -32,14 +32,22 @@ def row(folder: Path, knob: str, value: Any) -> dict[str, Any]:
     return measure_row(str(small_scenario(folder)), knob, value)
 
 
+def command(*words: str) -> subprocess.CompletedProcess[str]:
+    line = [sys.executable, "-m", "headless.tradeoff", *words]
+    return subprocess.run(line, cwd=ROOT, capture_output=True, text=True, timeout=900, check=False)
+
+
 def test_a_knob_is_measured(tmp_path: Path) -> None:
-    line = [sys.executable, "-m", "headless.tradeoff", "--scenario", str(small_scenario(tmp_path)), "--knobs", "caster"]
-    done = subprocess.run(
-        [*line, "--output", str(tmp_path / "out")], cwd=ROOT, capture_output=True, text=True, timeout=300, check=False
-    )
+    document = tmp_path / "page.md"
+    document.write_text("<!-- table: tradeoff small -->\n<!-- end of table -->\n")
+    words = ["--scenario", str(small_scenario(tmp_path)), "--output", str(tmp_path / "out"), "--knobs", "caster"]
+    done = command(*words, "--document", str(document), "--pictures", str(tmp_path / "pictures"))
     assert done.returncode == 0, done.stderr
-    assert sorted(p.name for p in (tmp_path / "out").iterdir()) == ["tradeoff.json", "tradeoff.md", "tradeoff.png"]
-    slow, fast = json.loads((tmp_path / "out" / "tradeoff.json").read_text())["rows"]
+    out = tmp_path / "out"
+    assert sorted(p.name for p in out.iterdir()) == ["rows", "small.json", "small.md", "small.png"]
+    assert (tmp_path / "pictures" / "tradeoff-small.png").exists()
+    assert (out / "small.md").read_text().rstrip() in document.read_text()
+    slow, fast = json.loads((out / "small.json").read_text())["rows"]
     assert (slow["value"], fast["value"]) == ("bvhtree", "embree")
     assert fast["rays_per_second"] > slow["rays_per_second"]
     for result in (slow, fast):
@@ -50,12 +58,38 @@ def test_a_knob_is_measured(tmp_path: Path) -> None:
     # Both casters see the same scene.
     assert abs(slow["errors"]["position_mm"] - fast["errors"]["position_mm"]) < 0.05 * fast["errors"]["position_mm"]
 
+    # What is there already is refused, or kept: also a row of which we only pretend that it was measured.
+    assert command(*words).returncode == 2
+    file = out / "rows" / "small" / "caster-embree.json"
+    data = json.loads(file.read_text())
+    file.write_text(json.dumps(data | {"row": fast | {"seconds": 4711.0}}))
+    assert command(*words, "--resume").returncode == 0
+    assert json.loads((out / "small.json").read_text())["rows"] == [slow, fast | {"seconds": 4711.0}]
+    # A row of another job is measured again.
+    file.write_text(json.dumps(data | {"job": "another", "row": fast | {"seconds": 4711.0}}))
+    assert command(*words, "--resume").returncode == 0
+    assert json.loads((out / "small.json").read_text())["rows"][1]["seconds"] < 4711.0
 
-def test_unknown_knob_is_refused(tmp_path: Path) -> None:
-    line = [sys.executable, "-m", "headless.tradeoff", "--knobs", "speed", "--output", str(tmp_path / "out")]
-    done = subprocess.run(line, cwd=ROOT, capture_output=True, text=True, timeout=300, check=False)
+
+def test_plants_that_are_left_out_are_an_error(tmp_path: Path) -> None:
+    few, all_of_them = (row(tmp_path, "vegetation_detail", value)["errors"] for value in (0, 1))
+    assert few["labels_percent"] > all_of_them["labels_percent"] + 1.0
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["--knobs", "castor"], "--knobs is 'castor': must be any of"),
+        (["--resume", "--overwrite"], "--resume: can't be given with --overwrite"),
+        (["--scenario", "rq31-60m"], "did you mean 'rq31-600m'"),
+        (["--document", "nowhere.md"], "--document is 'nowhere.md': cannot be read"),
+    ],
+)
+def test_bad_input_is_refused_before_anything_is_measured(tmp_path: Path, words: list[str], said: str) -> None:
+    done = command("--output", str(tmp_path / "out"), *words)
     assert done.returncode == 2
-    assert "--knobs is 'speed'" in done.stderr
+    assert said in done.stderr
+    assert not (tmp_path / "out").exists()
 
 
 def test_colours_of_images_are_nearer_to_the_truth_than_the_materials(tmp_path: Path) -> None:
@@ -96,6 +130,6 @@ def test_relief_and_spacing_leave_their_errors(tmp_path: Path) -> None:
 
 
 def test_every_row_is_a_scenario() -> None:
-    for knob in KNOBS.values():
-        for changes in knob.rows.values():
-            load_scenario("rq31-600m", list(changes))
+    for scene in SCENES:
+        for knob, value in rows(KNOBS):
+            row_scenario(scene, knob, value)

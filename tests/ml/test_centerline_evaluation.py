@@ -29,7 +29,7 @@ from ml.centerline.metrics import Spread
 from ml.centerline.pictures import View, corridor_picture, lines_picture
 from ml.centerline.roads import Road, read_measured
 from ml.centerline.skeleton import SkeletonSettings
-from ml.centerline.tables import COLUMNS, as_data, cell, from_data, replaced, road_table, table, write_tables
+from ml.centerline.tables import COLUMNS, as_data, cell, from_data, road_table, table, write_tables
 from synthroads_addon.core.errors import InputError
 from tests.ml.centerline_roads import REAL, strip_road
 
@@ -193,16 +193,6 @@ def test_tables_say_mean_and_deviation(tmp_path: Path) -> None:
     assert data["baseline"]["all"]["mae"] == {"mean": 0.9, "std": None, "seeds": 1}
     assert as_data(from_data(data)) == data
 
-
-def test_only_what_stands_between_markers_is_replaced() -> None:
-    document = (
-        "before\n<!-- table: a -->\nold\n<!-- end of table -->\nbetween\n<!-- table: b -->\n<!-- end of table -->\n"
-    )
-    new = replaced(document, {"b": "| new |\n"})
-    assert new == document.replace("<!-- table: b -->\n", "<!-- table: b -->\n| new |\n")
-    assert replaced(new, {"b": "| new |\n"}) == new
-    with pytest.raises(InputError, match="table: c"):
-        replaced(document, {"c": ""})
 
 
 def test_pictures_are_drawn_with_and_without_uncertainty(road: Road) -> None:

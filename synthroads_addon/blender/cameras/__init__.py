@@ -11,7 +11,7 @@ import bpy
 from ...core.colour import LayerSource, MaterialLayers, Shading, SurfaceConstants, needed_layers
 from ...core.colour_light import CloudShadows, SunAndSky
 from ...core.colour_scenario import ColourScenario
-from ...core.colour_views import Poses, scene_sample, views_along
+from ...core.colour_views import Poses, View, scene_sample, views_along
 from ...core.errors import InputError
 from ...core.parameters.model_surroundings import Environment
 from ...core.scene_mesh import SceneMesh
@@ -28,6 +28,7 @@ __all__ = [
     "RenderedLayers",
     "ReturnCamera",
     "check_colour",
+    "image_views",
     "layer_source",
     "material_layers",
     "takes_returns",
@@ -51,6 +52,7 @@ class ColourJob:
         field_of_view: the scanner's, rad.
         seed: of the clouds.
         frame: where (3,) the scene's local frame begins in that of the clouds, m.
+        pick: which of the images along the path are rendered, and what of them; None for all.
     """
 
     scenario: ColourScenario
@@ -62,6 +64,7 @@ class ColourJob:
     field_of_view: float
     seed: int = 0
     frame: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    pick: Callable[[list[View]], list[View]] | None = None
 
 
 def check_colour(scenario: ColourScenario) -> None:
@@ -120,10 +123,7 @@ def layer_source(
         if passes.position:
             yield ReturnCamera(set_up, fallback, exposure)
             return
-        settings = job.scenario.settings(job.fidelity, job.path.typical_range)
-        views = views_along(
-            job.path, scene_sample(job.mesh), settings, job.field_of_view, job.scenario.max_resolution
-        )
+        views = image_views(job)
         images = RenderedLayers(set_up, views, fallback, exposure)
         try:
             images.render(progress)
@@ -132,6 +132,13 @@ def layer_source(
             yield images
         finally:
             images.close()
+
+
+def image_views(job: ColourJob) -> list[View]:
+    """Return the cameras of a job's images."""
+    settings = job.scenario.settings(job.fidelity, job.path.typical_range)
+    views = views_along(job.path, scene_sample(job.mesh), settings, job.field_of_view, job.scenario.max_resolution)
+    return views if job.pick is None else job.pick(views)
 
 
 def material_layers(

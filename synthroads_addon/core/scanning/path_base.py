@@ -99,6 +99,10 @@ class Usual:
     lateral_offsets: tuple[float, ...] | None
     typical_range: float | None = None
 
+    def seen_from(self, height: float) -> float:
+        """Return the distance to what is scanned from a height, m."""
+        return height if self.typical_range is None else max(self.typical_range, height)
+
 
 USUAL: dict[PlatformKind, Usual] = {
     "uav": Usual(60.0, 8.0, (10.0, -10.0)),

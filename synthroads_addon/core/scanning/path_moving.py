@@ -8,7 +8,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..scan_scenario import Platform
-from .path_base import KNOT_RANGE, USUAL, Strip, Usual, knots_for, mounting, strips_of
+from .path_base import KNOT_RANGE, USUAL, Strip, knots_for, mounting, strips_of
 from .path_guides import Float, Guide, SmoothedGuide
 from .path_track import Eased, Sway, Track
 from .rotations import rotation_matrix
@@ -54,7 +54,7 @@ class MovingPath:
         self._speed = usual.speed if platform.speed is None else platform.speed
         self._mounting = mounting(platform)
         self._named = platform.lateral_offsets is not None
-        self.typical_range = _typical_range(usual, self._height)
+        self.typical_range = usual.seen_from(self._height)
         self._strip_track = lru_cache(_TRACKS_KEPT)(self._make_track)
         lengths, spacings = [], []
         for index in range(len(self._offsets)):
@@ -144,7 +144,3 @@ def _form(platform: Platform, guide: Guide) -> tuple[Guide, Sway | None, float]:
         allowed = f"at least the amplitude, {platform.zigzag_amplitude:g} m, is needed: a shorter sway runs across"
         raise InputError("scan.platform.zigzag_wavelength", platform.zigzag_wavelength, allowed)
     return guide, Sway(platform.zigzag_amplitude, platform.zigzag_wavelength), platform.zigzag_amplitude
-
-
-def _typical_range(usual: Usual, height: float) -> float:
-    return height if usual.typical_range is None else max(usual.typical_range, height)

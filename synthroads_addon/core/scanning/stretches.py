@@ -76,3 +76,26 @@ def middle(path: Path, share: float) -> Stretches:
             for strip in path.strips
         ),
     )
+
+
+def scattered(path: Path, count: int, duration: float, phase: float = 0.5, most: float = 0.25) -> Stretches:
+    """Return stretches of a duration (s) scattered evenly over all strips together, however many there are.
+
+    Args:
+        path: of one strip or more.
+        count: of stretches.
+        duration: of each; less where they would be more than `most` of the path, or longer than a strip.
+        phase: where each lies in its share of the path, 0 to 1: other phases give other stretches.
+        most: largest share of the path that they take together.
+    """
+    ends = np.cumsum([strip.duration for strip in path.strips])
+    duration = min(duration, most * float(ends[-1]) / count)
+    strips: list[Strip] = []
+    for place in (np.arange(count) + phase) / count * ends[-1]:
+        number = min(int(np.searchsorted(ends, place, side="right")), len(ends) - 1)
+        strip = path.strips[number]
+        length = min(duration, strip.duration)
+        into = float(place - (ends[number] - strip.duration))
+        start = strip.start_time + min(max(into - length / 2.0, 0.0), strip.duration - length)
+        strips.append(Strip(strip.index, start, length))
+    return Stretches(path, tuple(strips))

@@ -1,0 +1,119 @@
+"""Measure what settings cost and how large their errors are, on one scene per platform: the shipped table.
+
+    python tools/make_tradeoff_prior.py [PLATFORM ...]
+
+writes `synthroads_addon/presets/tradeoff_prior.json`, which choices by time fall back on (see docs/tradeoff.md); of the
+platforms that aren't named it keeps what it holds. Seconds are those of processors: the whole job's on two cores, if
+these share the scan and the images evenly. Blender 4.5 has no pixel per return: what a point costs there is kept.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+import tempfile
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+ROOT = Path(__file__).resolve().parents[1]
+sys.path.insert(0, str(ROOT))
+
+from synthroads_addon.blender.files import empty_file, save_scene  # noqa: E402
+from synthroads_addon.choosing_sites import RoadSite  # noqa: E402
+from synthroads_addon.core.knobs import colour_choices  # noqa: E402
+from synthroads_addon.core.parameters.sampler import sample_road  # noqa: E402
+from synthroads_addon.core.prior import FILE  # noqa: E402
+from synthroads_addon.core.scanning.beam import RINGS  # noqa: E402
+from synthroads_addon.core.scenario import load_scenario  # noqa: E402
+from synthroads_addon.core.schema import canonical_json, read_json  # noqa: E402
+from synthroads_addon.pilot import Pilot, beam_errors  # noqa: E402
+from synthroads_addon.pilot_colour import colour_errors, image_seconds  # noqa: E402
+
+SCENES: dict[str, tuple[str, Sequence[str]]] = {
+    "uav": ("rq31-600m", ["road.length=300"]),
+    "vehicle": ("mobile-mapping-300m", []),
+    "tripod": ("tripod-200m", []),
+    "airborne": ("airborne-1000m", []),
+}
+"""Platform -> scenario and changes."""
+CORES = 2
+OCTAVES = (2, 4, 6)
+WANTED = frozenset({"rgb", "roughness", "metallic", "specular"})
+SAMPLE = {"images": 0.7, "returns": 3.7}
+"""Microseconds per point that takes its colour from images, and that is rendered by itself (`synthroads tradeoff`)."""
+PREVIEWS = 0.1
+"""Microseconds per point of the previews."""
+
+
+def _short(value: float) -> float:
+    return float(f"{value:.3g}")
+
+
+def _expected(errors: Mapping[str, tuple[float, float]]) -> dict[str, float]:
+    return {name: _short(pair[0]) for name, pair in errors.items()}
+
+
+def measured(platform: str) -> dict[str, Any]:
+    """Return a platform's row."""
+    name, changes = SCENES[platform]
+    scenario = load_scenario(name, [*changes, "cloud.point_spacing=null"])
+    empty_file()
+    site = RoadSite(scenario, sample_road(scenario.road, scenario.seed))
+    builds, few = [], None
+    pilot = None
+    for model in site.models({}):
+        begin = time.process_time()
+        pilot = Pilot.on(scenario, site.scene(model), site.path, site.air)
+        pilot = replace(pilot, clock=time.process_time)
+        builds.append(1e6 * (time.process_time() - begin) / site.area)
+        if few is None:
+            few = [one.points for one in pilot.results(RINGS[1], pilot.stretches())]
+    assert pilot is not None
+    assert few is not None
+    truth = pilot.truth()
+    seconds, _points = pilot.scan_seconds(dict(RINGS))
+    pulses = sum(pilot.scan.pulses(strip) for strip in site.path.strips)
+    colours = colour_choices(scenario, site.path.typical_range, returns=False)
+    sources = {key: _expected(pair) for key, pair in colour_errors(pilot, colours, WANTED).items()}
+    relief = pilot.relief_errors(OCTAVES)
+    first, each, pixel = image_seconds(pilot, colours["standard"], WANTED)
+    return {
+        "beam": {str(rays): _expected(pilot.beam_errors(rings, truth)) for rays, rings in RINGS.items()},
+        "few_plants": _expected(beam_errors(few, truth)),
+        "relief": {str(number): _short(errors["relief"][0]) for number, (errors, _) in relief.items()},
+        "colour": sources | {"returns": {"colour": 0.0, "layers": 0.0}},
+        "pulse": {str(rays): _short(1e6 * value / pulses / CORES) for rays, value in seconds.items()},
+        "model": [_short(value) for value in builds],
+        "octave": {str(number): _short(value) for number, (_, value) in relief.items()},
+        "image": [_short(first), _short(each / CORES), _short(pixel / CORES)],
+        "sample": SAMPLE,
+        "scene_file": _short(_saving(site.area)),
+        "previews": PREVIEWS,
+    }
+
+
+def _saving(area: float) -> float:
+    """Return microseconds per square metre of saving the open file."""
+    with tempfile.TemporaryDirectory() as folder:
+        begin = time.process_time()
+        save_scene(Path(folder) / "scene.blend")
+        return 1e6 * (time.process_time() - begin) / area
+
+
+def main(platforms: Sequence[str]) -> None:
+    """Command line."""
+    found = read_json(FILE)["platforms"] if FILE.exists() else {}
+    for platform in platforms or SCENES:
+        found[platform] = measured(platform)
+        data = {"command": "python tools/make_tradeoff_prior.py", "cores": CORES, "platforms": found}
+        FILE.write_text(canonical_json(data), encoding="utf-8")
+        print(platform, round(time.process_time(), 1), "s")
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])
+    sys.stdout.flush()
+    os._exit(0)
