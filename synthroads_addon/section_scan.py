@@ -47,8 +47,8 @@ def check_by_section(scenario: Scenario, length: float) -> None:
         raise InputError(
             name,
             getattr(scenario, name),
-            f"can't be kept on a road of {length:g} m, which is built by sections of {section:g} m: choose on a shorter "
-            "road, and set what was chosen",
+            f"can't be kept on a road of {length:g} m, which is built by sections of {section:g} m: choose on a "
+            "shorter road, and set what was chosen",
         )
     if section is not None and "scene" in scenario.outputs:
         raise InputError(

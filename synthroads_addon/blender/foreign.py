@@ -94,7 +94,8 @@ def _try_in_a_process(path: Path, importer: str) -> None:
     """
     code = f"import bpy; bpy.ops.{importer}(filepath={str(path.resolve())!r})"
     blender = bpy.app.binary_path  # none where Blender is a Python package
-    alone = [blender, "--background", "--factory-startup", "--python-expr", code] if blender else [sys.executable, "-c", code]
+    inside = [blender, "--background", "--factory-startup", "--python-expr", code]
+    alone = inside if blender else [sys.executable, "-c", code]
     done = subprocess.run(alone, stdin=subprocess.DEVNULL, capture_output=True, check=False)
     if not 0 <= done.returncode < 256:  # what went wrong in an orderly way is told when it does so here
         raise InputError("SCENE", str(path), "can't be read by Blender: it is damaged so that its importer crashes")

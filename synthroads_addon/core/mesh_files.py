@@ -33,6 +33,8 @@ _COMPONENTS = {5120: 1, 5121: 1, 5122: 2, 5123: 2, 5125: 4, 5126: 4}
 _WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT2": 4, "MAT3": 9, "MAT4": 16}
 _LONGEST_HEADER = 1 << 20
 _FEW = 16
+_FAULTS = (ValueError, LookupError, TypeError, ArithmeticError, AttributeError, RecursionError, struct.error)
+"""What looking into a file raises whose content isn't what it should be."""
 _MOST_VALUES = 1 << 24
 """Values of a glTF accessor without a buffer, which are all zero."""
 
@@ -52,7 +54,7 @@ def check_mesh_file(path: Path) -> None:
     look: dict[str, Callable[[Path], None]] = {".ply": _check_ply, ".stl": _check_stl, ".glb": _check_glb}
     try:
         look.get(path.suffix.lower(), lambda _: None)(path)
-    except (ValueError, LookupError, TypeError, ArithmeticError, AttributeError, RecursionError, struct.error) as problem:
+    except _FAULTS as problem:
         raise InputError(str(path), None, f"is damaged ({problem})") from None
 
 
@@ -126,7 +128,9 @@ def _ply_bytes(
         if not lists:
             at += count * sum(np.dtype(kind).itemsize for _, kind, _ in properties)
         else:
-            for numbers, at in _ply_lists(data, at, count, [(l and order + l, order + k, n) for l, k, n in properties]):
+            ordered = [(length and order + length, order + kind, name) for length, kind, name in properties]
+            for numbers, end in _ply_lists(data, at, count, ordered):
+                at = end
                 if name == "face":
                     yield numbers
         if at > len(data):
@@ -193,7 +197,7 @@ def _check_views(content: dict[str, Any]) -> None:
             view = views[accessor["bufferView"]]
             step = max(view.get("byteStride", 0), width)
             last = accessor.get("byteOffset", 0) + step * (accessor["count"] - 1) + width
-            fits = 0 < accessor["count"] and last <= view["byteLength"]
+            fits = accessor["count"] > 0 and last <= view["byteLength"]
         if not fits:
             raise ValueError(f"an accessor claims {accessor['count']:,} values")
 

@@ -29,7 +29,7 @@ class Loader(yaml.SafeLoader):
         event = self.peek_event()
         before = self._nodes
         if isinstance(event, yaml.AliasEvent):
-            self._nodes += self._sizes.get(event.anchor, 0)
+            self._nodes += self._sizes.get(event.anchor or "", 0)
         self._nodes += 1
         node = super().compose_node(parent, index)
         if self._nodes > MOST_NODES:
@@ -52,6 +52,4 @@ class Loader(yaml.SafeLoader):
 
 
 # YAML 1.1 takes 1e-3 for text, since it lacks a point; people who write it mean the number.
-Loader.add_implicit_resolver(
-    "tag:yaml.org,2002:float", re.compile(r"[-+]?\d+[eE][-+]?\d+$"), list("-+0123456789")
-)
+Loader.add_implicit_resolver("tag:yaml.org,2002:float", re.compile(r"[-+]?\d+[eE][-+]?\d+$"), list("-+0123456789"))

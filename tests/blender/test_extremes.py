@@ -11,15 +11,15 @@ import pytest
 from synthroads_addon.blender.casters import make_caster
 from synthroads_addon.blender.model import build_road
 from synthroads_addon.blender.nodes.builder import Tree, node_group
-from synthroads_addon.blender.scene import scene_mesh, scanned_scene
+from synthroads_addon.blender.scene import scanned_scene, scene_mesh
 from synthroads_addon.blender.scene_reading import Part, Places, Whole, placed
 from synthroads_addon.core.cloud.labels import class_id
 from synthroads_addon.core.errors import InputError
 from synthroads_addon.core.parameters.geometry import RoadGeometry
 from synthroads_addon.core.parameters.sampler import sample_road
 from synthroads_addon.core.road_scenario import RoadScenario
-from synthroads_addon.core.scenario import Scenario
 from synthroads_addon.core.scanning.scan import scan_block
+from synthroads_addon.core.scenario import Scenario
 from synthroads_addon.scan_files import make_scan, road_path
 from tools.benchmark_casters import bare_mesh
 

@@ -1,4 +1,4 @@
-"""What goes wrong from outside: a full disk, no place to write, Ctrl-C, a killed process. Nothing half-written, no traceback."""
+"""Faults from outside: a full disk, no place to write, Ctrl-C, a killed process. Nothing half-written, no traceback."""
 
 from __future__ import annotations
 

@@ -34,7 +34,23 @@ HOSTILE: tuple[Any, ...] = (
 TOKENS: tuple[bytes, ...] = (
     *(b"\0", b"\xff", b"\xfe\xff", b"\xef\xbb\xbf", b"\xc3", b"\xed\xa0\x80", b"\r", b"\n", b"\r\n", b"\x1a", b"\x85"),
     *(b"NaN", b"Infinity", b"-Infinity", b"1e999", b"-0", b"00", b"9" * 5000, b"1e-999", b"0x10", b"1_000", b"nan"),
-    *(b'"', b"'", b"\\", b"\\u0000", b"\\ud800", b",", b",,", b":", b"{", b"}", b"[", b"]", b"[" * 200_000, b"//", b"#"),
+    *(
+        b'"',
+        b"'",
+        b"\\",
+        b"\\u0000",
+        b"\\ud800",
+        b",",
+        b",,",
+        b":",
+        b"{",
+        b"}",
+        b"[",
+        b"]",
+        b"[" * 200_000,
+        b"//",
+        b"#",
+    ),
     *(b'{"a":' * 20_000, b"null", b"true", b";", b"\t", b" ", b"x" * 200_000, b'"' + b"y" * 200_000, b"\xe2\x80\xa8"),
 )
 """What is put into the middle of a text."""

@@ -1,4 +1,4 @@
-"""Clouds and elevation models that are cut or flipped: points or one line; no crash, no memory beyond the file's size."""
+"""Clouds, rasters, pictures and meshes that are cut or flipped: content or one line; no crash, no unbounded memory."""
 
 from __future__ import annotations
 
@@ -210,7 +210,9 @@ def test_points_of_e57_that_are_not_finite_are_refused_by_name(tmp_path: Path, m
 def test_scales_and_offsets_of_las_that_are_no_numbers_are_refused(tmp_path: Path, at: int, value: float) -> None:
     path = cloud(tmp_path / "cloud.las")
     changed(path, at, int.from_bytes(np.float64(value).tobytes(), "little"), 8)
-    with pytest.raises(InputError, match=r"cloud\.las: scales and offsets is \[.*must be finite numbers, the scales not 0"):
+    with pytest.raises(
+        InputError, match=r"cloud\.las: scales and offsets is \[.*must be finite numbers, the scales not 0"
+    ):
         open_cloud(path)
 
 
@@ -245,7 +247,8 @@ def mesh_file(path: Path) -> Path:
         triangle["numbers"][:, 3:] = CORNERS[[[0, 1, 2], [0, 2, 3]]].reshape(2, 9)
         path.write_bytes(bytes(80) + (2).to_bytes(4, "little") + triangle.tobytes())
     elif path.suffix == ".ply":
-        head = "ply\nformat binary_little_endian 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\n"
+        head = "ply\nformat binary_little_endian 1.0\nelement vertex 4\n"
+        head += "".join(f"property float {axis}\n" for axis in "xyz")
         head += "element face 2\nproperty list uchar uint vertex_indices\nend_header\n"
         faces = b"\x03" + np.array([0, 1, 2], "<u4").tobytes() + b"\x04" + np.array([0, 1, 2, 3], "<u4").tobytes()
         path.write_bytes(head.encode() + CORNERS.tobytes() + faces)
@@ -326,7 +329,10 @@ def test_a_face_that_names_no_vertex(tmp_path: Path, text: bool) -> None:
     path = mesh_file(tmp_path / "mesh.ply")
     data = path.read_bytes()
     if text:
-        head, rows = data.split(b"end_header\n")[0].replace(b"binary_little_endian", b"ascii"), "0 0 0\n1 0 0\n1 1 0\n0 1 0\n"
+        head, rows = (
+            data.split(b"end_header\n")[0].replace(b"binary_little_endian", b"ascii"),
+            "0 0 0\n1 0 0\n1 1 0\n0 1 0\n",
+        )
         path.write_bytes(head + b"end_header\n" + f"{rows}3 0 1 2\n4 0 1 2 3\n".encode())
         check_mesh_file(path)
         path.write_bytes(head + b"end_header\n" + f"{rows}3 0 1 2\n4 0 1 2 4\n".encode())

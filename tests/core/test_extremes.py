@@ -194,7 +194,9 @@ def kind_of(data: Any, path: tuple[Any, ...]) -> tuple[Any, ...]:
     return tuple(kinds)
 
 
-@pytest.mark.parametrize(("name", "data", "kind"), list(documents()), ids=lambda value: value if isinstance(value, str) else "")
+@pytest.mark.parametrize(
+    ("name", "data", "kind"), list(documents()), ids=lambda value: value if isinstance(value, str) else ""
+)
 def test_nan_and_infinity_are_refused_by_name_in_every_number(name: str, data: Any, kind: type[Model]) -> None:
     kind.from_dict(data)
     seen: set[tuple[Any, ...]] = set()

@@ -21,7 +21,21 @@ LONGEST = 60.0
 """Seconds by the clock, for the machine may be busy: most of a command's second is what Python takes to begin."""
 ROAD = sample_road(RoadScenario(length=60.0), 1).to_dict()
 RECIPE = {"title": "t", "groups": [{"name": "a", "scenes": 2, "set": {"fidelity": "draft"}}]}
-ARGUMENTS = ("0", "-1", "nan", "inf", "1e400", "", "x", "99999999999999999999", "\udcff", "a\nb", "[", "{}", "road.length=[")
+ARGUMENTS = (
+    "0",
+    "-1",
+    "nan",
+    "inf",
+    "1e400",
+    "",
+    "x",
+    "99999999999999999999",
+    "\udcff",
+    "a\nb",
+    "[",
+    "{}",
+    "road.length=[",
+)
 
 
 def answers(module: str, *arguments: str) -> None:
@@ -42,11 +56,19 @@ def commands(folder: Path) -> st.SearchStrategy[tuple[str, bytes, tuple[str, ...
     return st.one_of(
         st.tuples(st.just("road.json"), json_files([ROAD, full()]), st.just(("headless.check", "FILE"))),
         st.tuples(
-            st.just("road.json"), json_files([ROAD]), st.just(("headless.twin", "FILE", "--output", "OUT", "--twin", "geojson"))
+            st.just("road.json"),
+            json_files([ROAD]),
+            st.just(("headless.twin", "FILE", "--output", "OUT", "--twin", "geojson")),
         ),
         st.tuples(st.just("cloud.laz"), damaged([laz], texts, 900), st.just(("headless.cloud", "info", "FILE"))),
-        st.tuples(st.just("manifest.json"), json_files([MANIFEST]), st.just(("headless.dataset", "x", "--output", "IN", "--verify"))),
-        st.tuples(st.just("recipe.yaml"), yaml_files([RECIPE]), st.just(("headless.dataset", "FILE", "--output", "FILE/x"))),
+        st.tuples(
+            st.just("manifest.json"),
+            json_files([MANIFEST]),
+            st.just(("headless.dataset", "x", "--output", "IN", "--verify")),
+        ),
+        st.tuples(
+            st.just("recipe.yaml"), yaml_files([RECIPE]), st.just(("headless.dataset", "FILE", "--output", "FILE/x"))
+        ),
         st.tuples(
             st.just("line.geojson"),
             json_files(LINES),
@@ -55,7 +77,9 @@ def commands(folder: Path) -> st.SearchStrategy[tuple[str, bytes, tuple[str, ...
         st.tuples(
             st.just("x"), st.just(b""), st.sampled_from(ARGUMENTS).map(lambda a: ("headless.parameters", "--length", a))
         ),
-        st.tuples(st.just("x"), st.just(b""), st.sampled_from(ARGUMENTS).map(lambda a: ("headless.parameters", "--set", a))),
+        st.tuples(
+            st.just("x"), st.just(b""), st.sampled_from(ARGUMENTS).map(lambda a: ("headless.parameters", "--set", a))
+        ),
         st.tuples(st.just("x"), st.just(b""), st.sampled_from(ARGUMENTS).map(lambda a: ("headless.check", a))),
     )
 

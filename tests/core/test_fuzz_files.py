@@ -1,4 +1,4 @@
-"""Files made wrong by chance: every reader takes them or refuses them in one line; nothing hangs, nothing else comes out.
+"""Files made wrong by chance: each reader takes or refuses them in one line; nothing hangs, nothing else comes out.
 
 Few cases run with the fast tests, thousands with the slow ones. What was found once stands at the end as a test of its
 own.
@@ -32,10 +32,10 @@ from synthroads_addon.core.parameters.sampler import sample_road
 from synthroads_addon.core.parameters.signs import SignCatalogue
 from synthroads_addon.core.road_scenario import RoadScenario
 from synthroads_addon.core.scan_scenario import Platform
-from synthroads_addon.core.scanning.devices import DEVICES, load_device, setting_of
+from synthroads_addon.core.scanning.devices import load_device, setting_of
 from synthroads_addon.core.scanning.path import make_path
 from synthroads_addon.core.scanning.path_polyline import PolylineGuide
-from synthroads_addon.core.scenario import SCENARIOS, Scenario, apply_change, load_scenario, parsed_change
+from synthroads_addon.core.scenario import Scenario, apply_change, load_scenario, parsed_change
 from synthroads_addon.core.schema import read_json, read_yaml
 from tests.core.checker_full_road import full
 from tests.core.mutations import accepted, cases, damaged, for_all, json_files, wrong_values, yaml_files
@@ -56,7 +56,8 @@ TRAJECTORY = "time,x,y,z,roll,pitch,heading\n" + "".join(
 MANIFEST = {
     "title": "t", "generator": "g", "recipe_sha256": "0" * 64, "complete": True,
     "scenes": [
-        {"name": "a-01", "split": "train", "seed": 1, "status": "done", "points": 9, "length": 40.0, "classes": {"road": 9},
+        {"name": "a-01", "split": "train", "seed": 1, "status": "done", "points": 9, "length": 40.0,
+         "classes": {"road": 9},
          "files": {"scenes/a-01/cloud.laz": {"bytes": 10, "sha256": "0" * 64}}, "folders": ["scenes/a-01"]}
     ],
 }  # fmt: skip
@@ -119,7 +120,9 @@ def test_scenarios(put: Put, count: int) -> None:
 @cases(10, 1000)
 def test_roads_sampled_from_scenarios(count: int) -> None:
     """What passes the checks is sampled, or refused because limits contradict each other."""
-    documents = [{"length": 150.0, **scenario.get("road", {}), "elevation_model": None} for scenario in every("scenarios/*.json")]
+    documents = [
+        {"length": 150.0, **scenario.get("road", {}), "elevation_model": None} for scenario in every("scenarios/*.json")
+    ]
     documents = [{**document, "length": min(document["length"], 300.0)} for document in documents]
 
     def body(data: Any) -> None:
@@ -147,7 +150,9 @@ def test_devices(put: Put, count: int) -> None:
 @cases(20, 3000)
 def test_recipes(put: Put, count: int) -> None:
     small = {"title": "t", "set": {"fidelity": "draft", "road.length": 40}, "layouts": ["pointcept"], "tile": 30.0}
-    small["groups"] = [{"name": "a", "scenes": 3, "split": {"train": 2, "val": 1}, "variants": [{"seed": 1}, {"seed": 2}]}]
+    small["groups"] = [
+        {"name": "a", "scenes": 3, "split": {"train": 2, "val": 1}, "variants": [{"seed": 1}, {"seed": 2}]}
+    ]
     documents = [small, read_yaml(RECIPES / "small-roads.yaml")]
     for_all(yaml_files(documents), count, put("recipe.yaml", lambda path: scene_jobs(load_recipe(str(path)))))
 
@@ -208,7 +213,9 @@ def test_tables_of_classes(put: Put, count: int) -> None:
 @cases(10, 500)
 def test_catalogues_of_signs(put: Put, count: int) -> None:
     documents = [read_json(PRESETS / "signs.json")]
-    for_all(json_files(documents), count, put("signs.json", lambda path: SignCatalogue.from_dict(read_json(path), "signs")))
+    for_all(
+        json_files(documents), count, put("signs.json", lambda path: SignCatalogue.from_dict(read_json(path), "signs"))
+    )
 
 
 @cases(10, 1000)
@@ -272,6 +279,17 @@ def test_points_of_an_axis_that_lost_a_digit(tmp_path: Path, row: int, x: float,
     refused(lambda: read_axis(tmp_path / "axis.csv"), said)
 
 
+def test_points_that_no_road_runs_through(tmp_path: Path) -> None:
+    """The elevations of a file whose columns are another's were told by a traceback."""
+    points = np.array(LINE)
+    points[:, 2] += np.linspace(0.0, 40_000.0, len(points))
+    np.savetxt(tmp_path / "axis.csv", points, delimiter=",", header="x,y,z", comments="")
+    refused(
+        lambda: fitted_axis(tmp_path / "axis.csv", RoadScenario()),
+        "axis: elevation is .*no road runs through its points",
+    )
+
+
 def test_entries_of_csv_that_are_too_long(tmp_path: Path) -> None:
     (tmp_path / "axis.csv").write_text("x,y\n1," + "2" * 200_000 + "\n")
     refused(lambda: read_axis(tmp_path / "axis.csv"), r"axis\.csv:2 is '1,22.*: a line of CSV is needed")
@@ -332,7 +350,10 @@ def test_alignments_longer_than_any_road_are_refused(tmp_path: Path) -> None:
     data = full()
     element = {"kind": "arc", "length": 1e9, "curvature_start": 0.1, "curvature_end": 0.1}
     data["objects"]["axis"]["horizontal"] = [element]
-    refused(lambda: RoadParameters.from_dict(data), r"horizontal\.0\.length is 1000000000\.0: .* less than or equal to 1000000")
+    refused(
+        lambda: RoadParameters.from_dict(data),
+        r"horizontal\.0\.length is 1000000000\.0: .* less than or equal to 1000000",
+    )
     data["objects"]["axis"]["horizontal"] = [{**element, "length": 9e5}] * 2
     refused(lambda: RoadParameters.from_dict(data), r"must be at most 1e\+06 m long together")
 

@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 from ..errors import InputError
 from .attributes import attributes_of, columns, gather
 from .labels import asprs_scheme, class_scheme, stored_scheme
-from .laz_chunks import check_chunks
 from .las import SCAN_ANGLE_STEP
+from .laz_chunks import check_chunks
 from .points import PointBlock
 from .reading import BLOCK, CloudHeader, CloudReader, damaged, epsg_of, intensity_scale
 

@@ -6,7 +6,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from pydantic import ValidationError
 
+from ..errors import InputError
 from ..road_scenario import RoadScenario
 from ..schema import rounded
 from .axis_fit import AxisFit, fit_axis, read_axis
@@ -18,7 +20,20 @@ _PLAY = 1e-5  # of a radius: roundings that touch must not overlap once stations
 
 
 def alignment_object(fit: AxisFit) -> AlignmentObject:
-    """Return a fitted axis as the alignment of a parameter set, with the instance number 1."""
+    """Return a fitted axis as the alignment of a parameter set, with the instance number 1.
+
+    Raises:
+        InputError: what was fitted is no road: its bends, lengths or elevations are beyond all limits.
+    """
+    try:
+        return _alignment_object(fit)
+    except ValidationError as error:
+        fault = error.errors(include_url=False)[0]
+        field, wrong = fault["loc"][0] if fault["loc"] else "axis", str(fault["msg"]).lower()
+        raise InputError(f"axis: {field}", fault.get("input"), f"no road runs through its points ({wrong})") from None
+
+
+def _alignment_object(fit: AxisFit) -> AlignmentObject:
     start, heading, _ = fit.alignment.frame(0.0)
     return AlignmentObject(
         instance=1,

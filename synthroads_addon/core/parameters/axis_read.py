@@ -47,7 +47,7 @@ def read_axis(path: str | os.PathLike[str]) -> FloatArray:
 
 
 def _refuse_slips(name: str, points: FloatArray) -> None:
-    """Refuse a point (of N, 3) far from its neighbours: a digit is missing, and the fit would search for a road there."""
+    """Refuse a point (of N, 3) far from its neighbours: it lacks a digit, and the fit would look for a road there."""
     steps = np.diff(points[:, :2], axis=0)
     length = np.hypot(*steps.T)
     if length.max() > _LONGEST_STEP:
