@@ -110,6 +110,7 @@ class Effects(Part):
     jitter: float = quantity(0.02, ge=0, le=1, unit="m", description="Standard deviation of the points' noise.")
     footprint: float = quantity(0.8, ge=0, le=5, unit="m", description="Width across which intensities are means.")
     tilt: float = quantity(0.01, ge=0, le=0.2, unit="1", description="Cross slope and grade that are added.")
+    plain: float = quantity(0.15, ge=0, le=1, unit="1", description="Probability of intensities as they are.")
     contrast: float = quantity(1.5, ge=0, le=3, unit="1", description="Log of the factor on what isn't pavement.")
     paint: float = quantity(0.95, ge=0, le=1, unit="1", description="Share of the markings' brightness worn off.")
     repaint: float = quantity(
@@ -232,26 +233,29 @@ def move(stretch: Stretch, effects: Effects, rng: Generator) -> None:
 
 def relight(stretch: Stretch, effects: Effects, rng: Generator) -> None:
     """Change intensities and colours as another scanner, other materials and another camera would have."""
-    numbers = rng.uniform(-1.0, 1.0, 6)
-    share = rng.random(7)
-    value = np.maximum(stretch.intensity, 0.0)
-    if value.any():
-        value, marked = _repainted(value, stretch, effects.repaint, rng)
-        value = _worn(value, stretch.paved, marked, effects.paint * share[0])
-        value = np.where(stretch.paved, value, value * np.exp(effects.contrast * numbers[0]))
-        value = _blurred(value, stretch, effects.footprint * share[5])
-        value *= _falloff(stretch.xyz[:, 1], effects.falloff * share[1], rng)
-        low, high = np.log(effects.gamma)
-        log = np.exp(low + share[4] * (high - low)) * np.log(np.maximum(value / np.max(value), _DARKEST))
-        # Noise by the spread, so that a scanner that compresses its intensities isn't drowned in it.
-        spread = float(np.subtract(*np.percentile(log, (90.0, 10.0))))
-        noise = effects.speckle * share[2] * rng.standard_normal(len(value))
-        pattern = effects.patches * share[3] * _waves(stretch, rng) + effects.stripes * share[6] * _tracks(stretch, rng)
-        stretch.intensity = np.exp(log + spread * (noise + pattern))
+    if rng.random() >= effects.plain and stretch.intensity.any():
+        _relight_intensities(stretch, effects, rng)
     if rng.random() < effects.colorless:
         stretch.has_color = False
     elif stretch.has_color:
-        stretch.rgb = np.clip(stretch.rgb * np.exp(effects.tint * (numbers[2] + numbers[3:6])), 0.0, 1.0)
+        factors = np.exp(effects.tint * (rng.uniform(-1.0, 1.0) + rng.uniform(-1.0, 1.0, 3)))
+        stretch.rgb = np.clip(stretch.rgb * factors, 0.0, 1.0)
+
+
+def _relight_intensities(stretch: Stretch, effects: Effects, rng: Generator) -> None:
+    share = rng.random(7)
+    value, marked = _repainted(np.maximum(stretch.intensity, 0.0), stretch, effects.repaint, rng)
+    value = _worn(value, stretch.paved, marked, effects.paint * share[0])
+    value = np.where(stretch.paved, value, value * np.exp(effects.contrast * rng.uniform(-1.0, 1.0)))
+    value = _blurred(value, stretch, effects.footprint * share[5])
+    value *= _falloff(stretch.xyz[:, 1], effects.falloff * share[1], rng)
+    low, high = np.log(effects.gamma)
+    log = np.exp(low + share[4] * (high - low)) * np.log(np.maximum(value / np.max(value), _DARKEST))
+    # Noise by the spread, so that a scanner that compresses its intensities isn't drowned in it.
+    spread = float(np.subtract(*np.percentile(log, (90.0, 10.0))))
+    noise = effects.speckle * share[2] * rng.standard_normal(len(value))
+    pattern = effects.patches * share[3] * _waves(stretch, rng) + effects.stripes * share[6] * _tracks(stretch, rng)
+    stretch.intensity = np.exp(log + spread * (noise + pattern))
 
 
 def _repainted(value: Float, stretch: Stretch, probability: float, rng: Generator) -> tuple[Float, NDArray[np.bool_]]:

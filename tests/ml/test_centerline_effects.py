@@ -30,7 +30,7 @@ NONE = Effects(
     mirror=0.0,
     turn_round=0.0,
     crop=Crop(probability=0.0),
-    **dict.fromkeys(("dropout", "hidden", "empty", "jitter", "tilt", "contrast", "paint", "repaint"), 0.0),
+    **dict.fromkeys(("dropout", "hidden", "empty", "jitter", "tilt", "plain", "contrast", "paint", "repaint"), 0.0),
     gamma=(1.0, 1.0),
     **dict.fromkeys(("falloff", "speckle", "patches", "stripes", "footprint", "colorless", "tint"), 0.0),
 )
@@ -225,7 +225,7 @@ def test_intensities_fall_off_to_the_sides() -> None:
         falls.append(logs[far].mean() - logs[near].mean())
     # The scanner isn't always above the road: seen from beside it, one side may be as near as its middle.
     assert sum(fall < 0.0 for fall in falls) >= 6
-    assert np.mean(falls) < -0.3
+    assert np.mean(falls) < -0.2
 
 
 def test_two_passes_beside_each_other_light_a_place_twice() -> None:
@@ -340,6 +340,17 @@ def test_colours() -> None:
     factor = (one.rgb / before)[one.rgb.max(axis=1) < 1.0]
     np.testing.assert_allclose(factor.std(axis=0), 0.0, atol=1e-9)
     assert factor.mean(axis=0).std() > 0.01
+
+
+def test_some_intensities_stay_as_they_are() -> None:
+    """What a noiseless simulation delivers is among what is learned."""
+    plain = cut().intensity
+    same_as_before = 0
+    for seed in range(40):
+        one = cut()
+        relight(one, Effects(plain=0.5), rng(seed))
+        same_as_before += int(np.array_equal(one.intensity, plain))
+    assert 10 < same_as_before < 30
 
 
 def test_points_without_intensity_stay_without() -> None:
