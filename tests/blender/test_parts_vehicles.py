@@ -16,6 +16,7 @@ from synthroads_addon.core.cloud.labels import class_id
 from synthroads_addon.core.materials import materials
 from synthroads_addon.core.parameters.chassis import CHASSIS
 from synthroads_addon.core.parameters.model import Carriageway, Vehicle
+from synthroads_addon.core.parameters.tessellation import sample_stations
 from synthroads_addon.core.parameters.vehicles import COLORS, VEHICLE_TYPES
 from synthroads_addon.core.scene_mesh import SceneMesh
 from tests.blender.furnished_road import (
@@ -184,7 +185,9 @@ def test_it_is_pitched_and_rolled_where_crossfall_and_grade_change() -> None:
 
 def test_beyond_the_end_of_a_stretch_it_goes_on_at_its_grade() -> None:
     """Half of a vehicle may stand beyond the road that is built."""
-    near = {"right-bus": vehicle("bus", "right", 0, 99.0, (0.5, 0.5, 0.5))}
+    # A stretch ends where the road's surface has a row.
+    end = float(sample_stations(FurnishedRoad({}, ()).geometry, 0.005, 0.0, 100.0)[-1])
+    near = {"right-bus": vehicle("bus", "right", 0, end - 1.0, (0.5, 0.5, 0.5))}
     whole = FurnishedRoad(near, ("vehicles",))
     corners = whole.mesh("right-bus").vertices + whole.origin
     cut = FurnishedRoad(near, ("vehicles",), stretch=(0.0, 100.0))

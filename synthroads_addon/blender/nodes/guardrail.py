@@ -150,10 +150,10 @@ def _rows(tree: Tree, rail: Rail, ramp: Value) -> Value:
     first, last = rail.first, rail.last
     step = rail.spacing / op.rounded_up(rail.spacing / rail.step - 1e-4)
     outer = op.rounded_up(ramp / rail.step - 1e-4)
-    skipped = op.rounded_up(ramp / step - 1e-4)
+    skipped = op.rounded_up(ramp / step + 1e-4)
     middle = op.maximum(op.rounded_up((last - first - ramp) / step - 1e-4) - skipped, 0)
     middle = tree.node("FunctionNodeFloatToInt", middle, rounding_mode="ROUND").value
-    # A row more where the ramp begins that goes down: it need not be a whole number of pieces away.
+    # Those that lie on a ramp are left out; where it ends there is a row of its own.
     line = tree.node("GeometryNodeMeshLine", count=outer * 2 + middle + 2).value
     number = op.index(tree)
     into = first + ramp * (number / op.maximum(outer, 1))
