@@ -119,7 +119,7 @@ def test_a_shifted_domain_is_recognised_again() -> None:
     torch.manual_seed(1)
     model = PointNeXt(PLAN)
     optimizer = torch.optim.AdamW(model.parameters(), lr=0.01)
-    for step in range(60):
+    for step in range(100):
         feat, neighbours, label = domain(step, 1.0, 0.0)
         optimizer.zero_grad()
         F.cross_entropy(model.train()(feat, neighbours), label).backward()

@@ -11,7 +11,7 @@ import pytest
 
 from ml.centerline import evaluation
 from ml.centerline.evaluation import truth_of
-from ml.centerline.tables import BEGIN
+from synthroads_addon.core.marked import BEGIN
 from tests.ml.centerline_roads import strip_road
 from tools import figures_centerline
 
