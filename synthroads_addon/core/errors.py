@@ -27,7 +27,7 @@ class InputError(SynthRoadsError):
         self.field = field
         self.value = value
         self.allowed = allowed
-        shown = "" if value is None else f" is {_short(repr(value), _LONGEST_VALUE)}"
+        shown = "" if value is None else f" is {_short(repr(_plain(value)), _LONGEST_VALUE)}"
         super().__init__(f"{_short(field, _LONGEST_FIELD)}{shown}: {_short(allowed, _LONGEST_ALLOWED)}")
 
 
@@ -41,6 +41,12 @@ class OutputError(InputError):
 
 class Cancelled(SynthRoadsError):
     """The user stopped the work (Esc or Ctrl-C); nothing is left half-written."""
+
+
+def _plain(value: object) -> object:
+    """Return a number of NumPy's as Python's own, as version 2 shows 1.5 as np.float64(1.5)."""
+    item = getattr(value, "item", None)
+    return item() if type(value).__module__ == "numpy" and item and not hasattr(value, "__len__") else value
 
 
 def nearest_name(name: str, known: Iterable[str]) -> str:

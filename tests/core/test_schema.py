@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import jsonschema
+import numpy as np
 import pytest
 from hypothesis import HealthCheck, Phase, given, settings
 from hypothesis import strategies as st
@@ -321,3 +322,10 @@ def test_every_choice_of_types_says_which_it_takes() -> None:
         return found + [union for part in inner for union in unions(part)]
 
     assert unions(RoadParameters.__pydantic_core_schema__) + unions(Scenario.__pydantic_core_schema__) == []
+
+
+def test_numbers_of_numpy_are_shown_as_numbers() -> None:
+    """NumPy 2 calls them np.float64(1.5)."""
+    assert str(InputError("x", np.float64(1.5), "must be less")) == "x is 1.5: must be less"
+    assert str(InputError("x", np.int32(7), "must be less")) == "x is 7: must be less"
+    assert str(InputError("x", [1, 2], "must be less")) == "x is [1, 2]: must be less"
