@@ -38,8 +38,10 @@ from ml.centerline.evaluation import (  # noqa: E402
     measure,
     skeleton_predictor,
     trivial_predictors,
+    truth_of,
 )
 from ml.centerline.metrics import Spread, over_seeds  # noqa: E402
+from ml.centerline.paint import with_painted_line  # noqa: E402
 from ml.centerline.roads import Road, read_measured, read_scene, scene_folders  # noqa: E402
 from ml.centerline.skeleton import SkeletonSettings  # noqa: E402
 from ml.centerline.slices import SliceSettings  # noqa: E402
@@ -61,6 +63,8 @@ REAL_ROADS: dict[str, tuple[str, TruthKind]] = {
 }
 TUNED_ON = "als_rural2lane_t000-075"
 """The real road that the baseline's grid search is run on."""
+PAINTED = "als_rural2lane_t211-278"
+"""The real road that has a painted line beside nearly all of its axis."""
 CROPPINGS: dict[str, Cropping | None] = {
     "real-slices": Cropping(),
     "real-stretches": Cropping(length=50.0),
@@ -238,7 +242,37 @@ def real(arguments: argparse.Namespace, trained: Mapping[str, Sequence[Model]]) 
         result[table] = tables.road_table(measured, titles)
         if table == "real-slices":
             draw_real(arguments, roads[TUNED_ON], trained, search)
+            painted = measure_painted(arguments.seeds, roads[PAINTED], cropping, trained, search)
+            tables.write_tables(arguments.output, "real-painted", painted)
+            result["real-painted"] = tables.table(painted)
     return result
+
+
+def measure_painted(
+    seeds: Sequence[int],
+    road: Road,
+    cropping: Cropping | None,
+    trained: Mapping[str, Sequence[Model]],
+    search: GridSearch,
+) -> Measured:
+    """Return the figures of all predictors, and of the measured axis, against the line that is painted beside it."""
+    line = with_painted_line(road)
+    predictors = of_kind(trained, REAL_ROADS[road.name][1], len(seeds), road.name) | baselines(search)
+    predictors["the measured axis"] = [axis_predictor(road)]
+    return measure(
+        predictors,
+        # The same points and frames as against the axis.
+        lambda seed: [
+            Case(replace(shown.road, truth=line.truth), shown.frames)
+            for shown in shown_by([road], cropping, estimated=True)(seed)
+        ],
+        seeds,
+    )
+
+
+def axis_predictor(known: Road) -> Predictor:
+    """Return what predicts a road's measured axis."""
+    return lambda road, frames: truth_of(known).axis.crossing(frames.position, frames.direction)[0][:, None]
 
 
 def measure_real(
@@ -333,7 +367,7 @@ def expected(arguments: argparse.Namespace) -> list[str]:
     """Return the names of the tables that will be made."""
     names = list(synthetic_sets(arguments))
     names += [f"corridor-{name}" for name in names if arguments.run]
-    return names + (list(CROPPINGS) if arguments.real else [])
+    return names + ([*CROPPINGS, "real-painted"] if arguments.real else [])
 
 
 def main(words: Sequence[str] | None = None) -> None:

@@ -78,12 +78,11 @@ class Crop(Part):
     A strip reaches to a distance R from the true centre to either side, two numbers drawn for the whole sequence: a
     road's from ``reach``, a carriageway's from its edge line out to ``beyond`` farther, but at most to the middle of
     the median. In it every slice, and each of its sides by itself, is cut to a distance between (1 - ``share``) R and
-    R; with the probability ``steady`` the same in all slices, since cuts of their own average out over a sequence.
+    R; with the probability ``steady`` the same in all slices, since cuts of their own average out over a sequence. What
+    isn't cut is seen as far as slices reach, as in scans of whole landscapes.
     """
 
-    probability: float = quantity(
-        0.5, ge=0, le=1, unit="1", description="Of a road's sequence; a carriageway's always."
-    )
+    probability: float = quantity(0.7, ge=0, le=1, unit="1", description="Of a sequence.")
     reach: tuple[float, float] = Field((4.0, 30.0), description="Smallest and largest R of a road's strip, m.")
     beyond: tuple[float, float] = Field((0.0, 4.0), description="R of a carriageway's strip beyond its edge line, m.")
     share: float = quantity(0.75, ge=0, le=0.95, unit="1", description="Largest part of R that is cut off.")
@@ -108,13 +107,13 @@ class Effects(Part):
     hidden: float = quantity(0.2, ge=0, le=1, unit="1", description="Probability of a hole as behind a vehicle.")
     empty: float = quantity(0.02, ge=0, le=1, unit="1", description="Probability of a slice without any point.")
     jitter: float = quantity(0.02, ge=0, le=1, unit="m", description="Standard deviation of the points' noise.")
-    footprint: float = quantity(0.8, ge=0, le=5, unit="m", description="Width across which intensities are means.")
+    footprint: float = quantity(1.2, ge=0, le=5, unit="m", description="Width across which intensities are means.")
     tilt: float = quantity(0.01, ge=0, le=0.2, unit="1", description="Cross slope and grade that are added.")
-    plain: float = quantity(0.15, ge=0, le=1, unit="1", description="Probability of intensities as they are.")
+    plain: float = quantity(0.25, ge=0, le=1, unit="1", description="Probability of intensities as they are.")
     contrast: float = quantity(1.5, ge=0, le=3, unit="1", description="Log of the factor on what isn't pavement.")
     paint: float = quantity(0.95, ge=0, le=1, unit="1", description="Share of the markings' brightness worn off.")
     repaint: float = quantity(
-        0.3,
+        0.2,
         ge=0,
         le=0.5,
         unit="1",
@@ -164,8 +163,10 @@ def crop_sides(stretch: Stretch, crop: Crop, rng: Generator, carriageway: bool) 
     """Cut off both sides of every slice; slices without a known centre are cut as if it lay at the frame's origin."""
     count = len(stretch.center)
     center = np.nan_to_num(stretch.center)
-    happens = rng.random() < crop.probability
+    if rng.random() >= crop.probability:
+        return
     if carriageway:
+        # Points beyond the middle of the median aren't there in the first place.
         strip = np.nan_to_num(stretch.lines, nan=3.5) + rng.uniform(*crop.beyond, 2)
         strip = np.minimum(strip, np.nan_to_num(stretch.room, nan=np.inf))
     else:
@@ -173,8 +174,6 @@ def crop_sides(stretch: Stretch, crop: Crop, rng: Generator, carriageway: bool) 
         low, high = np.log(crop.reach)
         strip = np.tile(np.exp(rng.uniform(low, high, 2)), (count, 1))
     reach = strip * (1.0 - rng.uniform(0.0, crop.share, (1 if rng.random() < crop.steady else count, 2)))
-    if not happens:
-        reach = strip if carriageway else np.full((count, 2), np.inf)
     y = stretch.xyz[:, 1] - center[stretch.number]
     stretch.keep((y <= reach[stretch.number, 0]) & (-y <= reach[stretch.number, 1]))
 

@@ -30,7 +30,7 @@ from synthroads_addon.core.random_streams import stream
 
 from . import skeleton, trivial
 from .corridor import CORRIDOR, Truth
-from .frames import Frames, along, displaced, estimated_path
+from .frames import Frames, along, displaced, estimated_path, stretches
 from .metrics import Spread, figures, over_roads, over_seeds
 from .roads import Road, cropped
 from .slices import SliceSettings
@@ -182,7 +182,29 @@ def path_itself(road: Road, frames: Frames) -> Float:
 def trivial_predictors() -> dict[str, list[Predictor]]:
     """Return all predictors that learn nothing, by name, for `measure`."""
     found: dict[str, list[Predictor]] = {"the displaced path": [path_itself]}
-    return found | {name: [trivial_predictor(name)] for name in trivial.RULES}
+    found |= {name: [trivial_predictor(name)] for name in trivial.RULES}
+    for name in trivial.SPANNED:
+        found[f"{name}, parabola of {trivial.SPAN:.0f} m"] = [along_parabolas(trivial_predictor(name), trivial.SPAN)]
+    return found
+
+
+def along_parabolas(predictor: Predictor, length: float) -> Predictor:
+    """Return what predicts, of each frame, the parabola through a predictor's centres that far along the path, m."""
+
+    def predict(road: Road, frames: Frames) -> Float:
+        y = predictor(road, frames)[:, 0]
+        place, result = frames.at(y), np.full(len(y), np.nan)
+        for part in stretches(frames):
+            known = part[np.isfinite(y[part])]
+            for own in part:
+                near = known[np.abs(frames.station[known] - frames.station[own]) <= 0.5 * length]
+                if len(near) >= trivial.FEWEST:
+                    cos, sin = np.cos(frames.direction[own]), np.sin(frames.direction[own])
+                    x, aside = ((place[near] - frames.position[own]) @ np.array([[cos, -sin], [sin, cos]])).T
+                    result[own] = np.polyfit(x, aside, 2)[2]
+        return result[:, None]
+
+    return predict
 
 
 @dataclass(frozen=True)

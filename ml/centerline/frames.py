@@ -111,27 +111,42 @@ def wander(station: Float, rng: np.random.Generator, length: float) -> tuple[Flo
 
 
 def sequences(frames: Frames, length: int, step: int | None = None, spacing: float = SPACING) -> NDArray[np.intp]:
-    """Return indices (K, length) of runs of consecutive frames that together cover all frames.
+    """Return indices (K, length) of runs of frames at equal spacing that together cover all frames.
 
     A run never crosses a gap. The last of a stretch overlaps the one before; a shorter stretch repeats its last frame.
+    Where frames lie closer together than the spacing, runs are interleaved: each takes every n-th frame.
 
     Args:
         frames: M frames in the order of their stations.
         length: frames per run.
-        step: frames from one run's start to the next one's; ``length`` if not given.
-        spacing: of the frames, m.
+        step: frames of a run from its start to that of the next one; ``length`` if not given.
+        spacing: of a run's frames, m; to the nearest multiple of the frames' own.
     """
     step = step or length
-    breaks = np.flatnonzero(np.abs(np.diff(frames.station)) > 1.5 * spacing) + 1
+    every = interleaved(frames, spacing)
     runs = []
-    for stretch in np.split(np.arange(len(frames)), breaks):
-        if not len(stretch):
-            continue
-        starts = np.arange(0, max(1, len(stretch) - length + 1), step)
-        if starts[-1] + length < len(stretch):
-            starts = np.append(starts, len(stretch) - length)
-        runs.append(stretch[np.minimum(starts[:, None] + np.arange(length), len(stretch) - 1)])
+    for stretch in stretches(frames, spacing):
+        for some in (stretch[first::every] for first in range(min(every, len(stretch)))):
+            starts = np.arange(0, max(1, len(some) - length + 1), step)
+            if starts[-1] + length < len(some):
+                starts = np.append(starts, len(some) - length)
+            runs.append(some[np.minimum(starts[:, None] + np.arange(length), len(some) - 1)])
     return np.concatenate(runs) if runs else np.empty((0, length), dtype=np.intp)
+
+
+def interleaved(frames: Frames, spacing: float) -> int:
+    """Return how many of the frames there are to each of a spacing, m."""
+    return max(1, round(spacing / _own_spacing(frames, spacing)))
+
+
+def stretches(frames: Frames, spacing: float = SPACING) -> list[NDArray[np.intp]]:
+    """Return the indices of the frames of every stretch without a gap; of equal spacing, at most the given one, m."""
+    gaps = np.abs(np.diff(frames.station)) > 1.5 * _own_spacing(frames, spacing)
+    return [part for part in np.split(np.arange(len(frames)), np.flatnonzero(gaps) + 1) if len(part)]
+
+
+def _own_spacing(frames: Frames, most: float) -> float:
+    return min(float(np.median(np.abs(np.diff(frames.station)))), most) if len(frames) > 1 else most
 
 
 def read_path(file: Path, origin: ArrayLike = (0.0, 0.0, 0.0), tolerance: float = 0.3) -> Axis:

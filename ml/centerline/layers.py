@@ -169,13 +169,15 @@ class GridConvolution(nn.Module):
     Args:
         width: features.
         along: slices that it spans, odd.
-        across: kernel points that it spans, odd.
+        across: kernel points that it looks at, odd.
+        apart: how far these lie apart; 1: next to each other.
     """
 
-    def __init__(self, width: int, along: int, across: int) -> None:
+    def __init__(self, width: int, along: int, across: int, apart: int = 1) -> None:
         super().__init__()
         self.norm = nn.LayerNorm(width)
-        self.convolution = nn.Conv2d(width, width, (along, across), padding=(along // 2, across // 2))
+        padding = (along // 2, apart * (across // 2))
+        self.convolution = nn.Conv2d(width, width, (along, across), padding=padding, dilation=(1, apart))
         self.mix = nn.Linear(width, width)
 
     def forward(self, grid: Tensor) -> Tensor:

@@ -32,6 +32,7 @@ class LossOptions(Part):
     )
     rough: float = quantity(0.3, ge=0, le=100, unit="1", description="Weight of the first look's centre.")
     places: float = quantity(0.1, ge=0, le=100, unit="1", description="Weight of the soft-argmax's cross-entropy.")
+    fine: float = quantity(0.2, ge=0, le=100, unit="1", description="Weight of that of the second look.")
     edges: float = quantity(0.3, ge=0, le=100, unit="1", description="Share of it that an edge counts for.")
 
 
@@ -105,6 +106,9 @@ def centerline_loss(options: LossOptions, half_width: float) -> Callable[[nn.Mod
             entropy = cross_entropy(output["logits"], places, true[..., lines], known[..., lines])
             share = found.new_tensor([1.0] + [options.edges] * (len(LINES) - 1))
             value = value + options.places * (share * entropy).sum()
+        if options.fine:
+            logits, places = output["fine_logits"][..., None], output["fine_places"]
+            value = value + options.fine * cross_entropy(logits, places, true[..., :1], known[..., :1]).sum()
         seen = known[..., 0]
         mae = float((error[..., 0].detach().abs() * seen).sum() / seen.sum().clamp_min(1))
         return value, {"center_mae": mae}

@@ -11,7 +11,8 @@ and ``frame``, and return a dictionary:
 - ``center``, ``center_std`` (B, S), m; ``corridor``, ``corridor_std`` (B, S, K), columns `CORRIDOR`;
 - ``rough`` (B, S): the centre at first look, m;
 - ``log_std`` (B, S, 1 + K): logarithms of the deviations divided by `SCALE`, of the centre and the corridor;
-- ``logits`` (B, S, 25, 3): what the soft-argmax of centre, left and right edge is taken of; ``places`` (B, S, 25), m.
+- ``logits`` (B, S, 25, 3): what the soft-argmax of centre, left and right edge is taken of; ``places`` (B, S, 25), m;
+- ``fine_logits``, ``fine_places`` (B, S, 64): the same of the second look's centre.
 
 No model knows where it is but by kernel points, all of which have the same weights: a road moved by a kernel point's
 spacing is the same road moved. Frames are only used relative to each other.
@@ -69,7 +70,7 @@ class ModelOptions(Part):
     width: int = quantity(48, ge=2, le=1024, unit="1", description="Features of a token.")
     context: int = quantity(96, ge=2, le=4096, unit="1", description="Features of a slice.")
     fine_cells: int = quantity(64, ge=2, le=1000, unit="1", description="Cells of the second look.")
-    fine_reach: float = quantity(8.0, gt=0, le=45, unit="m", description="How far it reaches to either side.")
+    fine_reach: float = quantity(6.4, gt=0, le=45, unit="m", description="How far it reaches to either side.")
     fine_width: int = quantity(24, ge=1, le=1024, unit="1", description="Features of its cells.")
     layers: int = quantity(3, ge=0, le=50, unit="1", description="Layers over the tokens.")
     heads: int = quantity(4, ge=1, le=64, unit="1", description="Heads of each attention.")
@@ -139,8 +140,11 @@ class CenterlineModel(nn.Module):
         # Where to look again is no way for the second look's errors to reach the first.
         guess, heading = self.line(found["center"].detach(), found, context, batch["frame"])
         guess, heading = guess.detach(), heading.detach()
-        step, log_std = self.again(batch["coord"], batch["mask"], features.unflatten(0, shape), guess, heading, context)
+        step, log_std, found["fine_logits"] = self.again(
+            batch["coord"], batch["mask"], features.unflatten(0, shape), guess, heading, context
+        )
         found["rough"], found["center"] = found["center"], guess + step
+        found["fine_places"] = guess[..., None] + self.again.places
         found["log_std"] = _bounded(torch.cat([log_std[..., None], found["log_std"]], dim=-1))
         _, heading = self.line(found["center"].detach(), found, context, batch["frame"])
         place = CORRIDOR.index("heading")

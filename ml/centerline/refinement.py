@@ -11,15 +11,18 @@ from torch import Tensor, nn
 
 from .layers import GridConvolution, RelativeAttention, cell_features, cell_sums
 
-_NARROW = 6
-"""Features of a cell when all cells of a slice are put side by side."""
+_APART = (1, 3, 6)
+"""How far the cells lie apart that each convolution looks at; five of them."""
 _PARABOLA_UNIT = 5.0
 """Half the length of a sequence, m: parabolas are fitted in this unit."""
 _FIRST_LOG_STD = -1.5
 
 
 class Refinement(nn.Module):
-    """How far a road's centre lies from where it was first found, from fine cells around that.
+    """How far a road's centre lies from where it was first found, by soft-argmax over fine cells around that.
+
+    All cells have the same weights and see twice the sum of `_APART` cells to either side: a line between two lanes is
+    found in the same way wherever the first look left it, or, where none is painted, by the lines on either side.
 
     Args:
         inputs: features of a point.
@@ -31,23 +34,27 @@ class Refinement(nn.Module):
         heads: of the attention.
     """
 
+    places: Tensor
+
     def __init__(
         self, inputs: int, width: int, context: int, slices: int, reach: float, cells: int, heads: int
     ) -> None:
         super().__init__()
-        self.reach, self.cells = reach, cells
+        self.reach, self.cells, self.spacing = reach, cells, 2.0 * reach / cells
+        self.register_buffer("places", self.spacing * (torch.arange(cells) + 0.5) - reach, persistent=False)
         self.first = nn.Linear(inputs + 2, width)
         along = 5 if slices > 1 else 1
-        self.grid = nn.ModuleList(GridConvolution(width, along, 5) for _ in range(2))
-        self.narrow = nn.Linear(width, _NARROW)
-        self.wide = nn.Linear(cells * _NARROW, context)
-        self.context = nn.Linear(context, context)
+        self.grid = nn.ModuleList(GridConvolution(width, along, 5, apart) for apart in _APART)
+        self.local = nn.Linear(width, width)
+        self.context = nn.Linear(context, width)
+        self.where = nn.Sequential(nn.GELU(), nn.Linear(width, 2))
+        self.seen = nn.Linear(width, context)
         self.along = RelativeAttention(slices, context, heads, 0.0) if slices > 1 else None
-        self.out = nn.Sequential(nn.LayerNorm(context), nn.Linear(context, 2))
+        self.spread = nn.Sequential(nn.LayerNorm(context), nn.Linear(context, 1))
 
     def forward(
         self, coord: Tensor, mask: Tensor, features: Tensor, guess: Tensor, heading: Tensor, context: Tensor
-    ) -> tuple[Tensor, Tensor]:
+    ) -> tuple[Tensor, Tensor, Tensor]:
         """Look again.
 
         Args:
@@ -59,7 +66,8 @@ class Refinement(nn.Module):
             context: (B, S, D) of the slices.
 
         Returns:
-            (B, S) how much farther to the left the centre lies, m, and the logarithm of that's deviation.
+            (B, S) how much farther to the left the centre lies, m, the logarithm of that's deviation, and (B, S, cells)
+            what the soft-argmax is taken of.
         """
         aside = guess[..., None] + coord[..., 0] * torch.tan(heading)[..., None]
         straight = coord - torch.stack([torch.zeros_like(aside), aside, torch.zeros_like(aside)], dim=-1)
@@ -67,11 +75,13 @@ class Refinement(nn.Module):
         grid = self.first(cell_features(sums)).unflatten(0, guess.shape)
         for layer in self.grid:
             grid = layer(grid)
-        seen = self.wide(self.narrow(grid).flatten(2)) + self.context(context)
+        logits, residual = self.where(self.local(grid) + self.context(context)[..., None, :]).unbind(-1)
+        share = logits.softmax(-1)
+        step = (share * (self.places + self.spacing * residual)).sum(-1)
+        seen = self.seen((share[..., None] * grid).sum(-2)) + context
         if self.along is not None:
             seen = self.along(nn.functional.gelu(seen))
-        residual, log_std = self.out(nn.functional.gelu(seen)).unbind(-1)
-        return residual, log_std + _FIRST_LOG_STD
+        return step, self.spread(nn.functional.gelu(seen))[..., 0] + _FIRST_LOG_STD, logits
 
 
 def parabola(frame: Tensor, center: Tensor, weight: Tensor, stiffness: Tensor) -> tuple[Tensor, Tensor]:

@@ -33,7 +33,7 @@ from synthroads_addon.core.schema import quantity
 from . import intensity
 from .corridor import CORRIDOR, TruthKind
 from .effects import HEIGHT, Effects, Stretch, leave_out, transform
-from .frames import Frames, displaced, sequences
+from .frames import SPACING, Frames, displaced, sequences
 from .roads import Road
 
 Float = NDArray[np.float64]
@@ -50,13 +50,18 @@ class SliceSettings(Part):
 
     truth: TruthKind = Field("road", description="road: the middle of all; carriageway: between its two lanes.")
     slices: int = quantity(10, ge=1, le=1000, unit="1", description="Slices of a sequence.")
-    spacing: float = quantity(1.0, gt=0, le=100, unit="m", description="Distance of two slices along the path.")
+    spacing: float = quantity(1.0, gt=0, le=100, unit="m", description="Of a sequence's slices along the path.")
     thickness: float = quantity(1.0, gt=0, le=100, unit="m", description="Of a slice, along the path.")
     half_width: float = quantity(30.0, gt=0, le=45, unit="m", description="What a slice sees to either side.")
     points_per_slice: int = quantity(256, ge=1, le=1_000_000, unit="1", description="At most; others are left out.")
     window: float = quantity(12.0, ge=0, le=100, unit="m", description="The path strays up to half of it to each side.")
     direction_deg: float = quantity(2.0, ge=0, le=45, unit="deg", description="Error of its direction, deviation.")
     wander_length: float = quantity(100.0, ge=5, le=10_000, unit="m", description="Length over which it strays.")
+
+    @property
+    def frame_spacing(self) -> float:
+        """Distance of the frames along a path in use, m: sequences of slices farther apart are interleaved."""
+        return min(SPACING, self.spacing)
 
 
 @dataclass(frozen=True)

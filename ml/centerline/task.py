@@ -111,7 +111,7 @@ def predict(run: Run[CenterlineConfiguration], prediction: Prediction, progress:
     ready = predictor(run)
     found = find_road(ready, prediction.cloud, prediction.path, progress)
     name = prediction.cloud.stem
-    text = canonical_json(geojson(found, name, ready.settings.spacing))
+    text = canonical_json(geojson(found, name, ready.settings.frame_spacing))
     calibration = {name: one.to_dict() for name, one in ready.calibration.items()}
     table = canonical_json(_plain(corridor_json(found, calibration)))
     write_file(lines, text.encode(), overwrite=prediction.overwrite)

@@ -1,7 +1,8 @@
 """Predictors that learn nothing: a model counts only where it beats them.
 
-Each looks at the points of one slice, or of `SEQUENCE` metres about it: as much as the models see that take ten slices
-at once. Where a slice has fewer than `FEWEST` points there is no prediction.
+Each looks at the points of one slice, or of `SEQUENCE` metres about it: as many as the models see that take ten slices
+at once. As these lie apart, `SPANNED` ones are also taken from every slice of `SPAN` metres, by a parabola through what
+each says. Where a slice has fewer than `FEWEST` points there is no prediction.
 
 - `centroid`: the mean of the points;
 - `middle of the extent`: between the outermost points;
@@ -25,6 +26,8 @@ Rule = Callable[[Float, Float], float]
 
 SEQUENCE = 10.0
 """m."""
+SPAN = 37.0
+"""What ten slices of 1 m span that are 4 m apart, m."""
 FEWEST = 5
 STRIP = 0.25
 """m."""
@@ -74,6 +77,8 @@ RULES: dict[str, tuple[Rule, float]] = {
     "between the brightest, 10 m": (between_brightest, SEQUENCE),
 }
 """Predictors by name: rule and length of the slice along the frame, m."""
+SPANNED = ("middle of the extent", "middle of the bright")
+"""Those that are also taken over `SPAN`."""
 
 
 def centers(rule: Rule, number: Index, y: Float, intensity: Float, count: int) -> Float:

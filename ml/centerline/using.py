@@ -36,7 +36,7 @@ def find_road(
     line = None if path is None else read_path(path)
     ground = find_ground(cloud, progress)
     line = line or path_through(ground)
-    frames = along(line, predictor.settings.spacing)
+    frames = along(line, predictor.settings.frame_spacing)
     shape = (len(frames), len(TARGETS))
     value, std, widths = np.full(shape, np.nan), np.full(shape, np.nan), np.full((*shape, 2), np.nan)
     for road, local, own in strips(cloud, ground, line, frames, progress):

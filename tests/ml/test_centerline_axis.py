@@ -181,6 +181,17 @@ def test_sequences_cover_all_frames_and_cross_no_gap() -> None:
     assert len(sequences(frames, 10, step=5)) == 3 + 1 + 1 + 1
 
 
+@pytest.mark.parametrize("count", [3, 40, 100])
+def test_sequences_of_slices_farther_apart_than_the_frames_are_interleaved(count: int) -> None:
+    station = np.concatenate([np.arange(count), 200.0 + np.arange(count)]).astype(float)
+    runs = sequences(Frames(np.zeros((len(station), 2)), np.zeros(len(station)), station), 10, step=5, spacing=4.0)
+    assert set(runs.ravel()) == set(range(len(station)))
+    steps = np.diff(station[runs], axis=1)
+    # Steps of 0 repeat a stretch's last frame.
+    assert set(steps.ravel()) <= {0.0, 4.0}
+    assert count < 40 or (steps == 4.0).all()
+
+
 @pytest.mark.parametrize(("radius", "length"), [(300.0, 700.0), (60.0, 150.0), (5000.0, 300.0)])
 def test_a_path_is_found_in_a_strip_of_points(radius: float, length: float) -> None:
     rng = np.random.default_rng(0)

@@ -14,6 +14,7 @@ from ml.centerline.axis import Axis
 from ml.centerline.evaluation import (
     Case,
     Cropping,
+    along_parabolas,
     belonging,
     case,
     evaluate,
@@ -194,7 +195,6 @@ def test_tables_say_mean_and_deviation(tmp_path: Path) -> None:
     assert as_data(from_data(data)) == data
 
 
-
 def test_pictures_are_drawn_with_and_without_uncertainty(road: Road) -> None:
     shown = case(road, 1, cropping=Cropping(), estimated=True)
     lines = {MIDDLE: trivial_predictor(MIDDLE)(road, shown.frames)[:, 0], "none": np.full(len(shown.frames), np.nan)}
@@ -223,3 +223,22 @@ def test_real_roads_give_their_axis_away_only_where_they_are_not_cropped() -> No
     assert figures["found"] > 0.99
     assert evaluate(trivial_predictor(MIDDLE), cut)["mae"] > 0.4
     assert set(trivial_predictors()) >= {"centroid", MIDDLE}
+
+
+def test_parabolas_average_cuts_out_and_follow_a_bend() -> None:
+    road = strip_road("bend", radius=300.0)
+    shown = case(road, 2, cropping=None, estimated=False)
+    known = along_parabolas(
+        lambda _, frames: truth_of(road).axis.crossing(frames.position, frames.direction)[0][:, None], 37.0
+    )
+    assert evaluate(known, shown)["distance_95"] < 0.01
+    cut = case(road, 2, cropping=Cropping(), estimated=False)
+    alone, together = (
+        evaluate(predictor, cut)["mae"]
+        for predictor in (trivial_predictor(MIDDLE), trivial_predictors()[f"{MIDDLE}, parabola of 37 m"][0])
+    )
+    assert together < 0.4 * alone
+    gap = along_parabolas(lambda _, frames: np.where(frames.station < 100.0, np.nan, 0.0)[:, None], 37.0)
+    found = gap(road, shown.frames)[:, 0]
+    assert np.isnan(found[shown.frames.station < 100.0 - 18.5]).all()
+    assert np.isfinite(found[shown.frames.station > 100.0]).all()

@@ -16,7 +16,7 @@ from ml.centerline.calibration import Calibration
 from ml.centerline.corridor import CORRIDOR
 from ml.centerline.frames import Frames, along, displaced
 from ml.centerline.models import TARGETS
-from ml.centerline.predictor import CenterlinePredictor, Regression, UseOptions, errors
+from ml.centerline.predictor import CenterlinePredictor, Regression, UseOptions, errors, joined
 from ml.centerline.roads import Road
 from ml.centerline.using import find_road
 from ml.centerline.writing import Found, corridor_json, geojson
@@ -220,3 +220,32 @@ def test_corridor_is_json_with_all_columns():
     assert slices["x"][0] == 500000.0
     assert data["units"]["lanes"] == "1"
     assert len({len(column) for column in slices.values()}) == 1
+
+
+def test_lines_of_interleaved_sequences_are_joined():
+    """Frames on a circle of 280 m that stray and turn, and every fourth of them off to one side."""
+    station = np.concatenate([np.arange(60.0), 90.0 + np.arange(30.0)])
+    angle = station / 280.0
+    rng = np.random.default_rng(3)
+    turn, away = rng.uniform(-0.03, 0.03, len(station)), np.sin(station / 9.0)
+    out = np.column_stack([np.sin(angle), -np.cos(angle)])
+    places = Frames((280.0 - away)[:, None] * out, angle + turn, station)
+    known = Axis(280.0 * np.column_stack([np.sin(np.linspace(-0.1, 0.6, 2000)), -np.cos(np.linspace(-0.1, 0.6, 2000))]))
+    true, _ = known.crossing(places.position, places.direction)
+    std = np.full(len(station), 0.1)
+    np.testing.assert_allclose(joined(places, true, std, 1), true, atol=1e-12)
+    np.testing.assert_allclose(joined(places, true, std, 4), true, atol=0.006)
+    jagged = true + 0.2 * (station % 4 == 0) - 0.05
+    inner = np.r_[4:56, 64:86]
+    assert np.abs(joined(places, jagged, std, 4) - true)[inner].max() < 0.01
+    # Who isn't sure counts for little.
+    std[station % 4 == 0] = 1.0
+    assert np.abs(joined(places, jagged, std, 4) - true + 0.05)[inner].max() < 0.01
+    jagged[20] = np.nan
+    again = joined(places, jagged, std, 4)
+    assert np.isnan(again[20])
+    assert np.isfinite(np.delete(again, 20)).all()
+    # Nothing crosses the gap.
+    other = jagged.copy()
+    other[60:] += 5.0
+    np.testing.assert_array_equal(joined(places, other, std, 4)[:60], again[:60])

@@ -31,6 +31,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     np.savetxt(tmp_path / "one_axis.csv", axis, delimiter=",", header="x,y,z", comments="")
     monkeypatch.setattr(figures_centerline, "REAL_ROADS", {"one": ("one, 200 m", "road")})
     monkeypatch.setattr(figures_centerline, "TUNED_ON", "one")
+    monkeypatch.setattr(figures_centerline, "PAINTED", "one")
     monkeypatch.setattr(evaluation, "RASTERS", (1.0,))
     monkeypatch.setattr(evaluation, "BRANCHES", (15.0,))
     monkeypatch.setattr(evaluation, "BINS", (5.0,))
