@@ -1,6 +1,6 @@
 """Measure centreline models and baselines; write the tables and pictures of docs/centerline.md.
 
-    python tools/figures_centerline.py --in-domain out/centerline-uav:validation --other out/centerline-mobile:test \
+    python tools/figures_centerline.py --in-domain out/centerline-airborne:test --other out/centerline-mobile:test \
         --real REAL_FOLDER --run "transformer=out/runs/transformer-1" --run "transformer=out/runs/transformer-2" \
         --output out/centerline --document docs/centerline.md --pictures docs/pictures
 

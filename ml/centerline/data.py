@@ -73,7 +73,6 @@ class BatchOptions(Part):
     validation: int = quantity(
         128, ge=1, le=1_000_000, unit="1", description="Sequences that an epoch is validated on."
     )
-    calibration: int = quantity(512, ge=1, le=1_000_000, unit="1", description="Sequences that deviations are made of.")
 
     @model_validator(mode="after")
     def _whole(self) -> BatchOptions:

@@ -23,9 +23,10 @@ from synthroads_addon.core.schema import canonical_json, read_json
 from .calibration import DEVIATIONS, Calibration, all_calibrated
 from .data import Batches, BatchOptions, DataOptions, Roads, fixed_batches, quiet, read_roads
 from .effects import Effects
+from .evaluation import case, truth_of
 from .losses import LossOptions, centerline_loss
-from .models import TARGETS, Batch, CenterlineModel, ModelOptions, both_ways, build
-from .predictor import CenterlinePredictor, UseOptions
+from .models import TARGETS, Batch, CenterlineModel, ModelOptions, build
+from .predictor import CenterlinePredictor, UseOptions, errors
 from .slices import SliceSettings
 
 CALIBRATION = "calibration.json"
@@ -76,7 +77,7 @@ def train(run: Run[CenterlineConfiguration], progress: Progress = silent) -> dic
         progress=progress,
     )
     progress("calibrating", 0.0)
-    metrics = _calibrate(run, model, roads, device)
+    metrics = calibrate(run, model, roads)
     run.write_metrics(metrics)
     return metrics
 
@@ -190,16 +191,20 @@ def _validation(configuration: CenterlineConfiguration, roads: Roads, device: to
     return validate
 
 
-def _calibrate(
-    run: Run[CenterlineConfiguration], model: CenterlineModel, roads: Roads, device: torch.device
-) -> dict[str, Any]:
-    """Find the calibration, write it to the run's folder, and return the metrics of the validation roads."""
+def calibrate(run: Run[CenterlineConfiguration], model: CenterlineModel, roads: Roads) -> dict[str, Any]:
+    """Find the calibration, write it to the run's folder, and return the metrics of the validation roads.
+
+    These are gone along from end to end, as in use: joined lines are better than those of single sequences.
+    """
     configuration = run.configuration
-    crop = quiet(configuration.effects.crop)
-    count, seed = configuration.batches.calibration, configuration.seed + 1
-    batches = fixed_batches(roads.validation, configuration.slices, crop, count, seed)
-    error, std = _residuals(model, batches, device, mirror=configuration.use.mirror)
-    found = all_calibrated(TARGETS, error, std)
+    ready = CenterlinePredictor(model, configuration.slices, configuration.use)
+    shown = [
+        case(road, configuration.seed, cropping=None, estimated=False, settings=configuration.slices)
+        for road in roads.validation
+    ]
+    passes = [(ready.regress(one.road, one.frames), truth_of(one.road)) for one in shown]
+    error = np.concatenate([errors(one, truth) for one, truth in passes])
+    found = all_calibrated(TARGETS, error, np.concatenate([one.raw_std for one, _ in passes]))
     data = _plain({name: one.to_dict() for name, one in found.items()})
     write_file(run.folder / CALIBRATION, canonical_json(data).encode(), overwrite=True)
     center = found["center"]
@@ -214,20 +219,18 @@ def _calibrate(
     }
 
 
-def _residuals(
-    model: nn.Module, batches: Sequence[Batch], device: torch.device, mirror: bool = False
-) -> tuple[Any, Any]:
+def _residuals(model: nn.Module, batches: Sequence[Batch], device: torch.device) -> tuple[Any, Any]:
     """Return errors and deviations (N, T) of all slices of some batches; errors are NaN where the truth is."""
     model.eval()
-    pairs = list(_pairs(model, batches, device, mirror))
+    pairs = list(_pairs(model, batches, device))
     return tuple(np.concatenate([pair[side] for pair in pairs]).astype(np.float64) for side in (0, 1))
 
 
-def _pairs(model: nn.Module, batches: Sequence[Batch], device: torch.device, mirror: bool) -> Iterator[tuple[Any, Any]]:
+def _pairs(model: nn.Module, batches: Sequence[Batch], device: torch.device) -> Iterator[tuple[Any, Any]]:
     for batch in batches:
         moved = _moved(batch, device)
         with torch.no_grad():
-            output = both_ways(model, moved) if mirror else model(moved)
+            output = model(moved)
         value = torch.cat([output["center"][..., None], output["corridor"]], dim=-1)
         std = torch.cat([output["center_std"][..., None], output["corridor_std"]], dim=-1)
         true = torch.cat([moved["center"][..., None], moved["corridor"]], dim=-1)

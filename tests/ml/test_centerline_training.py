@@ -38,7 +38,7 @@ def configuration(folder: Path, name: str = "transformer", **changes: Any) -> ta
         "data": {"data_sets": [str(folder)], "cache": str(folder / "cache")},
         "slices": {"half_width": 20.0, "points_per_slice": 96},
         "model": SMALL | {"name": name, "dropout": 0.1},
-        "batches": {"size": 4, "steps": 4, "passes": 2, "validation": 8, "calibration": 8},
+        "batches": {"size": 4, "steps": 4, "passes": 2, "validation": 8},
         "schedule": {"epochs": 3, "learning_rate": 0.003, "warmup": 0.2},
     }
     return from_data(plain | changes, KINDS, "test")
@@ -106,7 +106,7 @@ def test_what_a_run_writes(data: Path, tmp_path: Path):
         "metrics.json",
     }
     assert {"validation_mae", "coverage_68", "coverage_95", "corridor_mae", "calibration"} <= set(metrics)
-    assert json.loads((run.folder / "metrics.json").read_text())["calibration"]["center"]["count"] == 80
+    assert json.loads((run.folder / "metrics.json").read_text())["calibration"]["center"]["count"] == 160  # Every metre of the road.
     assert {"loss", "center_mae", "validation_mae", "validation_68", "validation_95"} <= set(run.history[0])
     opened = Run.open(run.folder, KINDS)
     ready = task.predictor(opened)
@@ -160,7 +160,7 @@ def test_beginning_with_another_run(data: Path, tmp_path: Path):
 
 def test_batches_hang_on_seed_and_epoch_alone():
     roads = Roads(analytic_roads.roads(), [], analytic_roads.roads())
-    options = BatchOptions(size=3, steps=4, passes=2, validation=1, calibration=1)
+    options = BatchOptions(size=3, steps=4, passes=2, validation=1)
 
     def drawn(seed: int, epoch: int) -> list[Any]:
         return list(Batches(roads, SETTINGS, Effects(), options, seed, 0.5)(epoch))
@@ -180,7 +180,7 @@ def test_batches_hang_on_seed_and_epoch_alone():
 
 def test_synthetic_and_measured_roads_are_mixed():
     synthetic, real = analytic_roads.roads(), analytic_roads.roads(seed=6)
-    options = BatchOptions(size=50, steps=1, passes=1, validation=1, calibration=1)
+    options = BatchOptions(size=50, steps=1, passes=1, validation=1)
     for share, expected in ((0.0, 0), (0.3, 15), (1.0, 50)):
         batches = Batches(Roads(synthetic, real, real), SETTINGS, Effects(), options, 1, share)
         kinds = batches.kinds(0)
@@ -250,7 +250,7 @@ def _trained(data: Path, folder: Path, name: str) -> dict[str, Any]:
         name,
         slices={"half_width": 20.0, "points_per_slice": 192},
         model={"name": name, "cells": 6, "width": 32, "context": 32, "layers": 2},
-        batches={"size": 16, "steps": 50, "passes": 2, "validation": 32, "calibration": 64},
+        batches={"size": 16, "steps": 50, "passes": 2, "validation": 32},
         schedule={"epochs": 6, "learning_rate": 0.004, "warmup": 0.1, "weight_decay": 0.001},
         # What other scanners and roads look like takes thousands of steps to learn.
         effects=dict.fromkeys(("falloff", "footprint", "stripes", "repaint"), 0.0),
