@@ -85,8 +85,8 @@ TARGETS_SHOWN = {
 CORRIDOR_COLUMNS = (
     tables.Column("mae", "mean error"),
     tables.Column("right", "right when rounded (%)", 100.0, 1),
-    tables.Column("coverage_68", "in 68 % (%)", 100.0, 1),
-    tables.Column("coverage_95", "in 95 % (%)", 100.0, 1),
+    tables.Column("interval_68", "in 68 % (%)", 100.0, 1),
+    tables.Column("interval_95", "in 95 % (%)", 100.0, 1),
 )
 
 

@@ -117,8 +117,8 @@ class Effects(Part):
         ge=0,
         le=0.5,
         unit="1",
-        description="Probability that a carriageway's lane line is solid, that it is worn "
-        "off, and that an edge line is.",
+        description="Probability that a carriageway's lane line is solid, that it is worn off, that both edge lines are, "
+        "and that one of them is.",
     )
     gamma: tuple[float, float] = Field((0.15, 1.5), description="Smallest and largest power of the intensities.")
     falloff: float = quantity(
@@ -260,9 +260,10 @@ def _relight_intensities(stretch: Stretch, effects: Effects, rng: Generator) -> 
 def _repainted(value: Float, stretch: Stretch, probability: float, rng: Generator) -> tuple[Float, NDArray[np.bool_]]:
     """Return intensities and what is marked (K,) where a carriageway's lines are painted otherwise.
 
-    Two lanes are parted by dashes on motorways; on rural roads as well by a solid or a double line, or by none.
+    Two lanes are parted by dashes on motorways; on rural roads as well by a solid or a double line, or by none; and many
+    of them have no edge lines.
     """
-    lane, left, right, width = rng.random(4)
+    lane, edge, side, width = rng.random(4)
     marked, bare = stretch.marked, stretch.paved & ~stretch.marked
     if not np.isfinite(stretch.room).any() or not marked.any() or not bare.any():
         return value, marked
@@ -270,8 +271,10 @@ def _repainted(value: Float, stretch: Stretch, probability: float, rng: Generato
     y = stretch.xyz[:, 1] - stretch.center[stretch.number]
     edges = stretch.lines[stretch.number] * [1.0, -1.0]
     gone = np.zeros(len(value), dtype=bool)
-    for happens, offset in ((left, edges[:, 0]), (right, edges[:, 1]), (1.0 - lane, 0.0)):
-        if happens < probability:
+    both, one = edge < probability, probability <= edge < 2.0 * probability
+    worn = (both or (one and side < 0.5), both or (one and side >= 0.5), lane >= 1.0 - probability)
+    for happens, offset in zip(worn, (edges[:, 0], edges[:, 1], 0.0), strict=True):
+        if happens:
             gone |= marked & (np.abs(y - offset) < _LINE_REACH)
     if lane < probability:
         low, high = _LINE_WIDTHS

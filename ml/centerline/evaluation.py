@@ -38,8 +38,9 @@ from .slices import SliceSettings
 Float = NDArray[np.float64]
 Predictor = Callable[[Road, Frames], Float]
 
-CORRIDOR_COLUMNS = ("center", "center_std", *CORRIDOR, *(f"{name}_std" for name in CORRIDOR))
-"""Columns of a prediction; only the first is needed, those after the second are for pictures."""
+CORRIDOR_COLUMNS = ("center", "center_std", *CORRIDOR, *(f"{name}_std" for name in CORRIDOR), "center_68", "center_95")
+"""Columns of a prediction; only the first is needed. Those of the corridor are for pictures. The last two are the
+half-widths of the centre's intervals of 68 % and 95 %, m: by the standard deviation where they aren't given."""
 HALF_WIDTH = SliceSettings().half_width
 """Trivial predictors see points up to this far beside a frame, m, as the models do."""
 
@@ -106,7 +107,8 @@ def evaluate(predictor: Predictor, shown: Case) -> dict[str, float]:
     predicted = predictor(shown.road, frames)
     true, _ = truth_of(shown.road).axis.crossing(frames.position, frames.direction)
     std = predicted[:, 1] if predicted.shape[1] > 1 else None
-    return figures(frames.at(predicted[:, 0]), frames.at(true), frames.station, std)
+    intervals = predicted[:, -2:] if predicted.shape[1] == len(CORRIDOR_COLUMNS) else None
+    return figures(frames.at(predicted[:, 0]), frames.at(true), frames.station, std, intervals)
 
 
 def measure(
@@ -122,6 +124,8 @@ def measure(
     rows: dict[str, dict[str, list[dict[str, float]]]] = {name: {} for name in predictors}
     for index, seed in enumerate(seeds):
         shown = cases(seed)
+        if len({one.road.name for one in shown}) < len(shown):
+            raise ValueError("roads must differ in their names")
         for name, versions in predictors.items():
             if len(versions) not in (1, len(seeds)):
                 raise ValueError(f"{name}: {len(versions)} predictors for {len(seeds)} seeds")

@@ -70,7 +70,9 @@ class Spread:
     count: int
 
 
-def figures(predicted: Float, true: Float, station: Float, std: Float | None = None) -> dict[str, float]:
+def figures(
+    predicted: Float, true: Float, station: Float, std: Float | None = None, intervals: Float | None = None
+) -> dict[str, float]:
     """Return all figures of one road by name, in metres unless said.
 
     Args:
@@ -78,6 +80,7 @@ def figures(predicted: Float, true: Float, station: Float, std: Float | None = N
         true: (M, 2) true centres, one on each slice's orthogonal, NaN in the truth's gaps.
         station: (M,) of the slices along their path, m, growing.
         std: (M,) predicted standard deviation, m; None if there is none.
+        intervals: (M, 2) half-widths of the intervals of `LEVELS`, m; None: a Gaussian's of the standard deviation.
 
     Returns:
         ``slices`` with a known truth, ``found`` (share of them with a prediction), ``mae`` (mean distance in the
@@ -104,8 +107,11 @@ def figures(predicted: Float, true: Float, station: Float, std: Float | None = N
         "chamfer_windows": float(apart.windows),
     }
     if std is not None:
-        for level in LEVELS:
-            result[f"coverage_{level:.0%}".rstrip("%")] = coverage(distance, std[both], level)
+        for place, level in enumerate(LEVELS):
+            inside = coverage(distance, std[both], level)
+            if intervals is not None:
+                inside = _mean((distance <= intervals[both, place]).astype(np.float64))
+            result[f"coverage_{level:.0%}".rstrip("%")] = inside
         result["std"] = _mean(std[both][np.isfinite(std[both])])
     return result
 

@@ -69,7 +69,7 @@ def corridor_picture(shown: Case, prediction: Float, view: View, title: str, hei
 
     Args:
         shown: road and frames.
-        prediction: (M, 2 to 2 + 2 K) columns `CORRIDOR_COLUMNS`; panels of what isn't there stay away.
+        prediction: (M, 2 to 4 + 2 K) columns `CORRIDOR_COLUMNS`; panels of what isn't there stay away.
         view: what of the road.
         title: of the picture.
         height: of the upper panel to either side of the axis, m.

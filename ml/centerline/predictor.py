@@ -84,9 +84,10 @@ class CenterlinePredictor:
         self.calibration = {name: found.get(name, Calibration()) for name in TARGETS}
 
     def __call__(self, road: Road, frames: Frames) -> Float:
-        """Return (M, 2 + 2 K): centre, its deviation, the corridor, its deviations; the height is an elevation."""
+        """Return (M, 4 + 2 K), `evaluation.CORRIDOR_COLUMNS`; the height is an elevation."""
         found = self.regress(road, frames)
-        return np.column_stack([found.value[:, :1], found.std[:, :1], found.value[:, 1:], found.std[:, 1:]])
+        center, corridor = (found.value[:, :1], found.std[:, :1]), (found.value[:, 1:], found.std[:, 1:])
+        return np.column_stack([*center, *corridor, self.widths(found)[:, 0]])
 
     def regress(self, road: Road, frames: Frames) -> Regression:
         """Return what the model finds.

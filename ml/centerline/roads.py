@@ -173,7 +173,7 @@ def read_scene(folder: Path, kind: TruthKind, cache: Path | None = None) -> list
     Args:
         folder: with ``cloud.laz`` and ``parameters.json``.
         kind: of the truth. A road with carriageways of two lanes gives a `Road` for each of them with the kind
-            ``carriageway``, perhaps none.
+            ``carriageway``, perhaps none; names of several end with their number.
         cache: folder in which the sorted points are kept, to be mapped into memory the next time; None: nowhere.
 
     Raises:
@@ -190,7 +190,9 @@ def read_scene(folder: Path, kind: TruthKind, cache: Path | None = None) -> list
         whole = Road.of_points(folder.name, points, reference)
         if cache:
             _keep(whole, folder, cache)
-    return [replace(whole, truth=truth) for truth in truths(parameters, kind, whole.origin)]
+    found = truths(parameters, kind, whole.origin)
+    names = [folder.name] if len(found) == 1 else [f"{folder.name}-{number + 1}" for number in range(len(found))]
+    return [replace(whole, name=name, truth=truth) for name, truth in zip(names, found, strict=True)]
 
 
 def read_measured(cloud: Path, axis: Path, kind: TruthKind, gap: float | None = None) -> Road:

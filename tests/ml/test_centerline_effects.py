@@ -294,8 +294,9 @@ def test_worn_markings_are_darker_but_never_than_the_pavement() -> None:
 
 
 def test_a_carriageways_lines_are_painted_otherwise() -> None:
-    """The lane line comes solid and wide, and goes; edge lines go one by one; a road's lines stay."""
+    """The lane line comes solid and wide, and goes; edge lines go one by one or both; a road's lines stay."""
     solid, gone, kept = set(), set(), 0
+    edges = {0: 0, 1: 0, 2: 0}
     for seed in range(60):
         one, plain = cut("carriageway"), cut("carriageway")
         relight(one, NONE.model_copy(update={"repaint": 0.4}), rng(seed))
@@ -306,14 +307,19 @@ def test_a_carriageways_lines_are_painted_otherwise() -> None:
         middle = plain.paved & (np.abs(y) < 0.06)
         solid.add(bool(bright[middle].all()))
         places = {"lane": 0.0 * y, "left": plain.lines[plain.number, 0], "right": -plain.lines[plain.number, 1]}
+        missing = set()
         for name, place in places.items():
             line = plain.marked & (np.abs(y - place) < 0.3)
             if line.any() and not bright[line].any():
-                gone.add(name)
+                missing.add(name)
             kept += int(bright[line].any())
+        gone |= missing
+        edges[len(missing & {"left", "right"})] += 1
     assert solid == {True, False}
     assert gone == {"lane", "left", "right"}
     assert kept > 40
+    assert min(edges[1], edges[2]) > 10
+    assert edges[0] > 3
     _, logs = relit("repaint", 0.5, 3)
     assert np.ptp(logs) < 1e-9
 

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from ml.centerline.axis import Axis
 from ml.centerline.evaluation import (
+    CORRIDOR_COLUMNS,
     Case,
     Cropping,
     along_parabolas,
@@ -242,3 +243,17 @@ def test_parabolas_average_cuts_out_and_follow_a_bend() -> None:
     found = gap(road, shown.frames)[:, 0]
     assert np.isnan(found[shown.frames.station < 100.0 - 18.5]).all()
     assert np.isfinite(found[shown.frames.station > 100.0]).all()
+
+
+def test_intervals_count_where_they_are_given(road: Road) -> None:
+    shown = case(road, 1, cropping=None, estimated=False)
+
+    def predict(road: Road, frames: Frames) -> Float:
+        found = np.zeros((len(frames), len(CORRIDOR_COLUMNS)))
+        found[:, :2] = told(0.1)(road, frames)
+        found[:, -2:] = [0.05, 0.2]
+        return found
+
+    figures = evaluate(predict, shown)
+    assert (figures["coverage_68"], figures["coverage_95"]) == (0.0, 1.0)
+    assert evaluate(told(0.1, std=1.0), shown)["coverage_68"] == 1.0

@@ -70,7 +70,7 @@ def test_every_frame_is_predicted_from_overlapping_sequences():
 def test_few_frames_and_none():
     few = frames().select(slice(0, 4))
     assert np.isfinite(predictor().regress(road(), few).value).all()
-    assert predictor()(road(), few.select(slice(0, 0))).shape == (0, 2 + 2 * len(CORRIDOR))
+    assert predictor()(road(), few.select(slice(0, 0))).shape == (0, 4 + 2 * len(CORRIDOR))
 
 
 def test_nothing_is_predicted_where_there_are_no_points():

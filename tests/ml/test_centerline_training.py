@@ -106,7 +106,7 @@ def test_what_a_run_writes(data: Path, tmp_path: Path):
         "metrics.json",
     }
     assert {"validation_mae", "coverage_68", "coverage_95", "corridor_mae", "calibration"} <= set(metrics)
-    assert json.loads((run.folder / "metrics.json").read_text())["calibration"]["center"]["count"] == 160  # Every metre of the road.
+    assert json.loads((run.folder / "metrics.json").read_text())["calibration"]["center"]["count"] == 160
     assert {"loss", "center_mae", "validation_mae", "validation_68", "validation_95"} <= set(run.history[0])
     opened = Run.open(run.folder, KINDS)
     ready = task.predictor(opened)
