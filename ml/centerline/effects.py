@@ -117,8 +117,8 @@ class Effects(Part):
         ge=0,
         le=0.5,
         unit="1",
-        description="Probability that a carriageway's lane line is solid, that it is worn off, that both edge lines are, "
-        "and that one of them is.",
+        description="Probability that a carriageway's lane line is solid, that it is worn off, "
+        "that both edge lines are, and that one of them is.",
     )
     gamma: tuple[float, float] = Field((0.15, 1.5), description="Smallest and largest power of the intensities.")
     falloff: float = quantity(
@@ -260,8 +260,8 @@ def _relight_intensities(stretch: Stretch, effects: Effects, rng: Generator) -> 
 def _repainted(value: Float, stretch: Stretch, probability: float, rng: Generator) -> tuple[Float, NDArray[np.bool_]]:
     """Return intensities and what is marked (K,) where a carriageway's lines are painted otherwise.
 
-    Two lanes are parted by dashes on motorways; on rural roads as well by a solid or a double line, or by none; and many
-    of them have no edge lines.
+    Two lanes are parted by dashes on motorways; on rural roads as well by a solid or a double line, or by none; and
+    many of them have no edge lines.
     """
     lane, edge, side, width = rng.random(4)
     marked, bare = stretch.marked, stretch.paved & ~stretch.marked
