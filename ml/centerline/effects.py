@@ -27,6 +27,8 @@ _NARROWEST = 0.02
 """A footprint narrower than this is a point, m."""
 _LINE_REACH = 0.5
 """Paint within so far of a line's place is the line's, m."""
+_NO_SHOULDER = 1.2
+"""Pavement beyond an edge line that is no shoulder yet, m."""
 _LINE_WIDTHS = (0.12, 0.6)
 """Of a solid lane line: one narrow line to a double one with what lies between, m."""
 _SCANNER_HEIGHTS = (1.5, 60.0)
@@ -113,11 +115,11 @@ class Effects(Part):
     contrast: float = quantity(1.5, ge=0, le=3, unit="1", description="Log of the factor on what isn't pavement.")
     paint: float = quantity(0.95, ge=0, le=1, unit="1", description="Share of the markings' brightness worn off.")
     repaint: float = quantity(
-        0.2,
+        0.3,
         ge=0,
         le=0.5,
         unit="1",
-        description="Probability that a carriageway's lane line is solid, that it is worn off, "
+        description="Probability that the lane line of a carriageway without shoulders is solid, that it is worn off, "
         "that both edge lines are, and that one of them is.",
     )
     gamma: tuple[float, float] = Field((0.15, 1.5), description="Smallest and largest power of the intensities.")
@@ -258,14 +260,15 @@ def _relight_intensities(stretch: Stretch, effects: Effects, rng: Generator) -> 
 
 
 def _repainted(value: Float, stretch: Stretch, probability: float, rng: Generator) -> tuple[Float, NDArray[np.bool_]]:
-    """Return intensities and what is marked (K,) where a carriageway's lines are painted otherwise.
+    """Return intensities and what is marked (K,) where the lines of a carriageway without shoulders are others.
 
     Two lanes are parted by dashes on motorways; on rural roads as well by a solid or a double line, or by none; and
-    many of them have no edge lines.
+    many of them have no edge lines. On a motorway that would lead astray: beside a ramp it is by its dashes that the
+    line between the lanes is known.
     """
     lane, edge, side, width = rng.random(4)
     marked, bare = stretch.marked, stretch.paved & ~stretch.marked
-    if not np.isfinite(stretch.room).any() or not marked.any() or not bare.any():
+    if not _without_shoulders(stretch) or not marked.any() or not bare.any():
         return value, marked
     paint, pavement = float(np.median(value[marked])), float(np.median(value[bare]))
     y = stretch.xyz[:, 1] - stretch.center[stretch.number]
@@ -281,6 +284,15 @@ def _repainted(value: Float, stretch: Stretch, probability: float, rng: Generato
         painted = stretch.paved & (np.abs(y) < 0.5 * (low + (high - low) * width))
         value, marked = np.where(painted, paint, value), marked | painted
     return np.where(gone, pavement, value), marked & ~gone
+
+
+def _without_shoulders(stretch: Stretch) -> bool:
+    """Return whether the pavement ends near the edge lines on both sides of a carriageway, as on rural roads."""
+    if not np.isfinite(stretch.room).any():
+        return False
+    edges = np.column_stack([stretch.corridor[:, LEFT] - stretch.center, stretch.center - stretch.corridor[:, RIGHT]])
+    beyond = (edges - stretch.lines)[np.isfinite(edges) & np.isfinite(stretch.lines)]
+    return bool(len(beyond)) and float(beyond.max()) <= _NO_SHOULDER
 
 
 def _worn(value: Float, paved: NDArray[np.bool_], marked: NDArray[np.bool_], share: float) -> Float:

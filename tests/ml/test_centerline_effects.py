@@ -9,6 +9,8 @@ import pytest
 
 from ml.centerline.corridor import CORRIDOR
 from ml.centerline.effects import (
+    LEFT,
+    RIGHT,
     Crop,
     Effects,
     Stretch,
@@ -293,12 +295,20 @@ def test_worn_markings_are_darker_but_never_than_the_pavement() -> None:
     assert max(ratios) > 7.0
 
 
+def without_shoulders(one: Stretch) -> Stretch:
+    """Return a stretch of which it is said that its pavement ends 0.5 m beyond the edge lines."""
+    one.corridor = one.corridor.copy()
+    one.corridor[:, LEFT] = one.center + one.lines[:, 0] + 0.5
+    one.corridor[:, RIGHT] = one.center - one.lines[:, 1] - 0.5
+    return one
+
+
 def test_a_carriageways_lines_are_painted_otherwise() -> None:
     """The lane line comes solid and wide, and goes; edge lines go one by one or both; a road's lines stay."""
     solid, gone, kept = set(), set(), 0
     edges = {0: 0, 1: 0, 2: 0}
     for seed in range(60):
-        one, plain = cut("carriageway"), cut("carriageway")
+        one, plain = without_shoulders(cut("carriageway")), cut("carriageway")
         relight(one, NONE.model_copy(update={"repaint": 0.4}), rng(seed))
         assert (one.intensity > 0.0).all()
         y = plain.xyz[:, 1] - plain.center[plain.number]
@@ -322,6 +332,10 @@ def test_a_carriageways_lines_are_painted_otherwise() -> None:
     assert edges[0] > 3
     _, logs = relit("repaint", 0.5, 3)
     assert np.ptp(logs) < 1e-9
+    with_shoulders, plain = cut("carriageway"), cut("carriageway")
+    relight(with_shoulders, NONE.model_copy(update={"repaint": 0.5}), rng(3))
+    ratio = with_shoulders.intensity / plain.intensity
+    assert np.ptp(ratio) < 1e-9 * ratio.max()
 
 
 @pytest.mark.parametrize("name", ["speckle", "patches"])
