@@ -22,7 +22,7 @@ CHECKPOINT = "checkpoint.pt"
 HISTORY = "history.json"
 METRICS = "metrics.json"
 CURVES = "curves.png"
-FREE_WHEN_RESUMING = ("threads", "device")
+FREE_WHEN_RESUMING = ("threads", "device", "workers")
 """Fields that may change between the parts of one training: they say where it runs, not what it learns."""
 
 C = TypeVar("C", bound=Configuration)

@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import hashlib
 import json
+import shutil
+import tempfile
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -13,7 +16,7 @@ from numpy.typing import NDArray
 
 from ml.points import GROUND_CLASSES, ROAD_CLASSES, Points, read_ground, read_points
 from synthroads_addon.core.dataset.manifest import checksum, read_manifest
-from synthroads_addon.core.errors import InputError, MissingFileError
+from synthroads_addon.core.errors import InputError, MissingFileError, OutputError
 from synthroads_addon.core.parameters.model import read_parameters
 from synthroads_addon.core.random_streams import stream
 
@@ -28,7 +31,14 @@ REACH = 45.0
 CLOUD, PARAMETERS = "cloud.laz", "parameters.json"
 _MARGIN = 2.0
 """Stretch of stations before and behind a slice that may hold points of it, beyond what its corners say, m."""
-_CACHED = ("xyz", "intensity", "rgb", "class_id", "station")
+_CACHED = {
+    "xyz": ("f4", (3,)),
+    "intensity": ("f4", ()),
+    "rgb": ("u1", (3,)),
+    "class_id": ("u1", ()),
+    "station": ("f4", ()),
+}
+"""Arrays of a `Road`, with the type and the shape of a point's entry."""
 _CACHE_VERSION = 1
 
 
@@ -273,26 +283,45 @@ def _cache_folder(folder: Path, cache: Path) -> Path:
 
 
 def _keep(road: Road, folder: Path, cache: Path) -> None:
-    """Write a road's arrays; the notes come last, so that what was written in part isn't read."""
+    """Write a road's arrays, in place of damaged ones; they appear when all of them are whole.
+
+    Raises:
+        OutputError: the cache can't be written.
+    """
     place = _cache_folder(folder, cache)
-    place.mkdir(parents=True, exist_ok=True)
-    for name in _CACHED:
-        np.save(place / f"{name}.npy", getattr(road, name))
-    np.save(place / "reference.npy", road.reference.points)
     notes = {"origin": road.origin.tolist(), "classes": road.class_names, "has_color": road.has_color}
-    (place / "notes.json").write_text(json.dumps(notes), encoding="utf-8")
+    try:
+        cache.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryDirectory(prefix=".partial-", dir=cache, ignore_cleanup_errors=True) as name:
+            made = Path(name) / place.name
+            made.mkdir()
+            for array in _CACHED:
+                np.save(made / f"{array}.npy", getattr(road, array))
+            np.save(made / "reference.npy", road.reference.points)
+            (made / "notes.json").write_text(json.dumps(notes), encoding="utf-8")
+            shutil.rmtree(place, ignore_errors=True)
+            with suppress(OSError):  # another training has just kept the same
+                made.rename(place)
+    except OSError as error:
+        raise OutputError("data.cache", str(cache), f"cannot be written ({error.strerror})") from None
 
 
 def _cached(folder: Path, cache: Path) -> Road | None:
+    """Return a road as it was kept; None if it wasn't, or is damaged."""
     place = _cache_folder(folder, cache)
-    if not (place / "notes.json").is_file():
+    try:
+        notes = json.loads((place / "notes.json").read_text(encoding="utf-8"))
+        arrays = {name: np.load(place / f"{name}.npy", mmap_mode="r") for name in _CACHED}
+        count = len(arrays["xyz"])
+        if any(arrays[name].dtype != of[0] or arrays[name].shape != (count, *of[1]) for name, of in _CACHED.items()):
+            return None
+        return Road(
+            name=folder.name,
+            origin=np.array(notes["origin"], dtype=np.float64).reshape(3),
+            class_names={int(number): str(name) for number, name in notes["classes"].items()},
+            has_color=bool(notes["has_color"]),
+            reference=Axis(np.load(place / "reference.npy")),
+            **arrays,
+        )
+    except (OSError, ValueError, TypeError, AttributeError, LookupError, EOFError, InputError):
         return None
-    notes = json.loads((place / "notes.json").read_text(encoding="utf-8"))
-    return Road(
-        name=folder.name,
-        origin=np.array(notes["origin"]),
-        class_names={int(number): name for number, name in notes["classes"].items()},
-        has_color=notes["has_color"],
-        reference=Axis(np.load(place / "reference.npy")),
-        **{name: np.load(place / f"{name}.npy", mmap_mode="r") for name in _CACHED},
-    )

@@ -15,7 +15,7 @@ from synthroads_addon.core.progress import Progress, silent
 
 from .classes import class_names
 from .crops import Item
-from .loading import adaptation_batches, thinned
+from .loading import adaptation_batches, thinned, watched_workers
 from .metrics import IGNORED, Confusion
 from .network import adapted, build, on_device, plan_of, prepared, scores_of
 from .recipes import SegmentationConfiguration
@@ -73,7 +73,8 @@ def score(
     confusion = Confusion(names.pop())
     if configuration.adaptation.adabn:
         tiles = [tile for source in sources for tile in thinned(source, configuration)]
-        model = adapted(model, adaptation_batches(tiles, configuration), device)
+        with watched_workers(configuration):
+            model = adapted(model, adaptation_batches(tiles, configuration), device)
     scores = classifier(model, configuration, device)
     shown = None
     for source in sources:

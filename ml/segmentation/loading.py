@@ -5,11 +5,13 @@ from __future__ import annotations
 import math
 import zlib
 from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 
 import torch
 from torch.utils.data import DataLoader
 
+from synthroads_addon.core.errors import InputError
 from synthroads_addon.core.random_streams import stream
 
 from .adaptation import laid_over
@@ -63,6 +65,23 @@ def epoch_batches(
         epoch=epoch,
     )
     yield from _loaded(dataset, configuration, device, epoch, configuration.adaptation.mix3d)
+
+
+@contextmanager
+def watched_workers(configuration: SegmentationConfiguration) -> Iterator[None]:
+    """Tell in one line that a worker was lost; PyTorch raises it wherever the main thread happens to be.
+
+    Raises:
+        InputError: a worker was lost.
+    """
+    try:
+        yield
+    except RuntimeError as error:
+        if not str(error).startswith("DataLoader worker (pid"):
+            raise
+        said = " ".join(str(error).partition(". ")[0].split())
+        allowed = f"one of these processes was lost ({said}): is memory short? --resume goes on, with fewer too"
+        raise InputError("workers", configuration.workers, allowed) from None
 
 
 def _loaded(

@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from synthroads_addon.core.cloud.labels import ClassScheme
+from synthroads_addon.core.cloud.las_reading import open_to_copy
 from synthroads_addon.core.cloud.quantiles import LEVELS
 from synthroads_addon.core.cloud.reading import damaged, open_cloud
 from synthroads_addon.core.errors import InputError, OutputError
@@ -239,7 +240,7 @@ def write_copy(
     counts = np.zeros(len(ids), dtype=np.int64)
     temporary = target.with_name(f".{target.name}.partial")
     try:
-        with laspy.open(source, laz_backend=laspy.LazBackend.LazrsParallel) as reader:
+        with open_to_copy(source) as reader:
             header = extended_header(reader.header, codes is not None)
             compress = target.suffix.lower() == ".laz"
             with laspy.open(temporary, "w", header=header, do_compress=compress) as writer:

@@ -230,7 +230,7 @@ def _numbers(cloud: CloudReader, field: str) -> Iterator[NDArray[Any]]:
     path = cloud.header.path
     if not cloud.header.kind.startswith("LAS"):
         raise InputError(str(path), None, "a mapping of classes is for LAS and LAZ files")
-    with laspy.open(path) as file:
+    with laspy.open(path, read_evlrs=False) as file:
         names = list(file.header.point_format.dimension_names)
         if field not in names:
             raise InputError(f"{path}: mapping.field", field, f"must be one of {', '.join(names)}")

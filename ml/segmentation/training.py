@@ -20,7 +20,7 @@ from synthroads_addon.core.progress import Progress, silent
 from .classes import class_names
 from .crops import Item, Seeds
 from .evaluation import classifier
-from .loading import epoch_batches, read_domains, thinned
+from .loading import epoch_batches, read_domains, thinned, watched_workers
 from .metrics import IGNORED, Confusion, mean
 from .network import build, scores_of
 from .recipes import SegmentationConfiguration, class_shares, class_weights
@@ -89,15 +89,16 @@ def _fit(
         Seeds(tiles, classes, configuration.balanced),
         device,
     )
-    fit(
-        model,
-        run,
-        batches,
-        math.ceil(configuration.crops_per_tile * len(tiles) / configuration.batch),
-        _loss(configuration, torch.from_numpy(weights.astype(np.float32)).to(device)),
-        validate=_validation(configuration, validation, device) if validation else None,
-        progress=progress,
-    )
+    with watched_workers(configuration):
+        fit(
+            model,
+            run,
+            batches,
+            math.ceil(configuration.crops_per_tile * len(tiles) / configuration.batch),
+            _loss(configuration, torch.from_numpy(weights.astype(np.float32)).to(device)),
+            validate=_validation(configuration, validation, device) if validation else None,
+            progress=progress,
+        )
 
 
 def smoothed_loss(scores: Tensor, truth: Tensor, weights: Tensor, smoothing: float) -> Tensor:

@@ -93,11 +93,11 @@ def _attribute(path: Path, name: str) -> NDArray[np.int64]:
     """Return an extra attribute (N,) of a LAS file."""
     if path.suffix.lower() not in (".las", ".laz"):
         raise InputError("--class-field", name, f"needs a LAS or LAZ file, not {path.name}")
-    with laspy.open(path) as file:
+    with laspy.open(path, read_evlrs=False) as file:
         names = list(file.header.point_format.dimension_names)
         if name not in names:
             raise InputError("--class-field", name, f"must be one of {', '.join(names)}{nearest_name(name, names)}")
-        return np.asarray(file.read()[name]).astype(np.int64)
+        return np.asarray(file.read_points(file.header.point_count)[name]).astype(np.int64)
 
 
 def by_label(cloud: RealCloud, code: str) -> RealClass:

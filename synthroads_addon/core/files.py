@@ -113,6 +113,7 @@ def write_file(path: Path, content: bytes, field: str = "--output", overwrite: b
         temporary.chmod(0o644)
         temporary.replace(path)
     except OSError as error:
+        raise OutputError(field, str(path), f"cannot be written ({error.strerror})") from None
+    finally:  # also where the user stops the work meanwhile
         if temporary is not None:
             temporary.unlink(missing_ok=True)
-        raise OutputError(field, str(path), f"cannot be written ({error.strerror})") from None

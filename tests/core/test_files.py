@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from synthroads_addon.core.errors import OutputError
-from synthroads_addon.core.files import output_folder
+from synthroads_addon.core.files import output_folder, write_file
 
 
 def test_files_appear_at_the_end(tmp_path: Path) -> None:
@@ -49,3 +49,18 @@ def test_full_disk_is_one_clear_line(tmp_path: Path) -> None:
     with pytest.raises(OutputError, match="No space left"), output_folder(tmp_path / "out", [], False):
         raise OSError(errno.ENOSPC, "No space left on device")
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("fault", [KeyboardInterrupt, OSError])
+def test_a_file_whose_writing_is_stopped_leaves_nothing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, fault: type[BaseException]
+) -> None:
+    def stopped(self: Path, mode: int) -> None:
+        raise fault
+
+    (tmp_path / "a.txt").write_text("old")
+    monkeypatch.setattr(Path, "chmod", stopped)
+    with pytest.raises((KeyboardInterrupt, OutputError)):
+        write_file(tmp_path / "a.txt", b"new", overwrite=True)
+    assert [path.name for path in tmp_path.iterdir()] == ["a.txt"]
+    assert (tmp_path / "a.txt").read_text() == "old"

@@ -125,6 +125,36 @@ class LasReader(CloudReader):
         )
 
 
+def open_to_copy(path: Path) -> laspy.LasReader:
+    """Open a file that `LasReader` takes with laspy itself, the records behind its points included.
+
+    Raises:
+        InputError: these records are damaged.
+    """
+    reader = laspy.open(path, read_evlrs=False, laz_backend=laspy.LazBackend.LazrsParallel)
+    try:
+        _check_records_behind(path, reader.header)
+        reader.read_evlrs()
+    except InputError:
+        reader.close()
+        raise
+    except _FAULTS as problem:
+        reader.close()
+        raise InputError(str(path), None, f"the records behind its points are damaged ({problem})") from None
+    return reader
+
+
+def _check_records_behind(path: Path, header: laspy.LasHeader) -> None:
+    """Refuse extended records that reach beyond the file: laspy would make as many, and as much room, as they claim."""
+    at, size = header.start_of_first_evlr or 0, path.stat().st_size
+    with path.open("rb") as file:
+        for _ in range(header.number_of_evlrs or 0):
+            file.seek(min(at + 20, size))
+            at += 60 + int.from_bytes(file.read(8), "little")
+            if at > size:
+                raise InputError(str(path), None, "is truncated: the records behind its points reach beyond its end")
+
+
 def _check_start(path: Path, file: BinaryIO) -> None:
     """Refuse a header whose records can't all lie before the points: laspy would look for them one by one."""
     start = file.read(104)
