@@ -334,6 +334,19 @@ def test_the_finest_angle_step_is_exact() -> None:
     assert max(abs(Fraction(t) - e) for t, e in zip(shot.time.tolist(), exact, strict=True)) < Fraction(1, 10**10)
 
 
+@pytest.mark.parametrize("step", [0.001, 0.01, 0.02])
+def test_a_step_that_divides_the_field_of_view_loses_no_pulse(step: float) -> None:
+    """In floating point 30 deg hold 29,999.999999999993 steps of 0.001 deg."""
+    s = custom(
+        {"type": "rotating_mirror"},
+        {"angle_step_deg": step},
+        modes=[mode(100.0, 30.0)],
+        lines_per_second=[0.01, 9000.0],
+        finest_angle_deg=0.0005,
+    )
+    assert s.pulses_per_line == round(30.0 / step)
+
+
 @pytest.mark.parametrize("pulse", [0, 10**6, 10**9 + 7, 10**11 + 3])
 def test_no_drift_after_billions_of_pulses(pulse: int) -> None:
     """Times and angles of late pulses against exact fractions."""

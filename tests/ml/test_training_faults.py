@@ -116,7 +116,10 @@ def wait_until(true: Callable[[], object], seconds: float = 120.0) -> None:
 def training(kind: str, data: Path, folder: Path, **changes: Any) -> Training:
     """Write a training's configuration; nothing but that is there of it."""
     folder.mkdir()
-    (folder / "toy.yaml").write_text(json.dumps(configuration(kind, data, **changes)))
+    content = configuration(kind, data, **changes)
+    if kind == "centerline":
+        content["data"]["cache"] = str(folder / "cache")
+    (folder / "toy.yaml").write_text(json.dumps(content))
     return Training(folder / "toy.yaml", folder / "run")
 
 
