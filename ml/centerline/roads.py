@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ml.points import GROUND_CLASSES, ROAD_CLASSES, Points, read_ground, read_points
+from synthroads_addon.core.cloud.npz import ARCHIVE_FAULTS
 from synthroads_addon.core.dataset.manifest import checksum, read_manifest
 from synthroads_addon.core.errors import InputError, MissingFileError, OutputError
 from synthroads_addon.core.parameters.model import read_parameters
@@ -323,5 +324,5 @@ def _cached(folder: Path, cache: Path) -> Road | None:
             reference=Axis(np.load(place / "reference.npy")),
             **arrays,
         )
-    except (OSError, ValueError, TypeError, AttributeError, LookupError, EOFError, InputError):
+    except (*ARCHIVE_FAULTS, TypeError, AttributeError, InputError):
         return None

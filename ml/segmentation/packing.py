@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from synthroads_addon.core.cloud.labels import ClassScheme, stored_scheme
+from synthroads_addon.core.cloud.npz import ARCHIVE_FAULTS
 from synthroads_addon.core.errors import InputError, MissingFileError
 from synthroads_addon.core.files import write_file
 
@@ -33,7 +34,6 @@ CUBE = 1024
 _NO_CLASS = 31
 _TIME = (1980, 1, 1, 0, 0, 0)
 """No wall clock in files."""
-_FAULTS = (OSError, zipfile.BadZipFile, zlib.error, KeyError, ValueError, EOFError)
 
 
 @dataclass(frozen=True)
@@ -174,7 +174,7 @@ class PackReader:
             self.voxel = float(data["voxel"])
             self.notes: list[dict[str, Any]] = data["tiles"]
             self.scheme = stored_scheme(data["scheme"], str(path))
-        except _FAULTS:
+        except (*ARCHIVE_FAULTS, TypeError):
             raise InputError(str(path), None, "is no file of packed training data, or damaged") from None
 
     def __len__(self) -> int:
@@ -184,5 +184,5 @@ class PackReader:
         """Return one tile; raise `InputError` if the file is damaged there."""
         try:
             return unpack_tile(Packed(self.notes[place], self._archive.read(f"{place:06d}")))
-        except (*_FAULTS, TypeError):
+        except (*ARCHIVE_FAULTS, TypeError):
             raise InputError(str(self.path), None, f"is damaged at tile {place}") from None

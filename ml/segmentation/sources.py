@@ -15,6 +15,7 @@ from pydantic import Field
 
 from ml.configuration import Part
 from synthroads_addon.core.cloud.labels import UNLABELLED, ClassScheme
+from synthroads_addon.core.cloud.npz import ARCHIVE_FAULTS
 from synthroads_addon.core.cloud.points import PointBlock
 from synthroads_addon.core.cloud.quantiles import levels, steps_per_unit
 from synthroads_addon.core.cloud.reading import BLOCK, CloudReader, open_cloud
@@ -72,12 +73,19 @@ def read_tiles(source: Source, scheme: ClassScheme, voxel: float | None) -> Iter
     else:
         raise MissingFileError(str(path), None, "no such file or folder of labelled points")
     for tile in tiles:
-        yield tile if voxel is None else tile.select(thin(tile.coord, voxel))
+        try:
+            kept = None if voxel is None else thin(tile.coord, voxel)
+        except ValueError:
+            raise InputError(str(path), None, f"a tile of {tile.scene} is too large for cells of {voxel:g} m") from None
+        yield tile if kept is None else tile.select(kept)
 
 
 def _is_pack(path: Path) -> bool:
-    with path.open("rb") as file:
-        return zipfile.is_zipfile(file) and "notes.json" in zipfile.ZipFile(file).namelist()
+    try:
+        with zipfile.ZipFile(path) as archive:
+            return "notes.json" in archive.namelist()
+    except ARCHIVE_FAULTS:
+        return False
 
 
 def _packed_tiles(path: Path, scheme: ClassScheme) -> Iterator[Tile]:
@@ -138,31 +146,41 @@ def pointcept_tiles(root: Path, scheme: ClassScheme, split: str | None) -> Itera
 
 
 def _pointcept_tile(folder: Path, table: NDArray[np.int16]) -> Tile:
-    def load(name: str, width: int) -> NDArray[Any]:
-        try:
-            array: NDArray[Any] = np.load(folder / f"{name}.npy", allow_pickle=False)
-        except (OSError, ValueError, EOFError):
-            raise InputError(str(folder / f"{name}.npy"), None, "is missing, or no array") from None
-        return array.reshape(-1, width) if width > 1 else array.reshape(-1)
-
-    coord, segment = load("coord", 3), load("segment", 1)
-    color = load("color", 3) if (folder / "color.npy").exists() else None
-    strength = load("strength", 1) if (folder / "strength.npy").exists() else None
+    coord, segment = _array(folder, "coord", (3,), "f4"), _array(folder, "segment", (), "i8")
+    color = _array(folder, "color", (3,), "u1") if (folder / "color.npy").exists() else None
+    strength = _array(folder, "strength", (), "f4") if (folder / "strength.npy").exists() else None
     for name, array in (("segment", segment), ("color", color), ("strength", strength)):
         if array is not None and len(array) != len(coord):
             raise InputError(
                 str(folder / f"{name}.npy"), len(array), f"must hold {len(coord)} points, as coord.npy does"
             )
     notes = read_json(folder / "tile.json") if (folder / "tile.json").is_file() else {}
+    try:
+        origin = np.array(notes.get("origin", [0.0, 0.0, 0.0]), dtype=np.float64).reshape(3)
+    except (AttributeError, TypeError, ValueError):
+        raise InputError(str(folder / "tile.json"), None, "must be an object whose origin is three numbers") from None
     known = (segment >= 0) & (segment < UNLABELLED)
     return Tile(
         str(notes.get("scene", folder.name)),
-        np.array(notes.get("origin", [0.0, 0.0, 0.0]), dtype=np.float64),
-        coord.astype(np.float32),
-        color.astype(np.uint8) if color is not None and color.any() else None,
-        strength.astype(np.float32) if strength is not None and strength.any() else None,
+        origin,
+        coord,
+        color if color is not None and color.any() else None,
+        strength if strength is not None and strength.any() else None,
         np.where(known, table[np.where(known, segment, 0)], IGNORED).astype(np.int16),
     )
+
+
+def _array(folder: Path, name: str, entry: tuple[int, ...], kind: str) -> NDArray[Any]:
+    """Return an array (N, *entry) of a folder; what its header claims is held against the file's size."""
+    path = folder / f"{name}.npy"
+    try:
+        with np.errstate(invalid="ignore", over="ignore"):
+            array = np.load(path, mmap_mode="r", allow_pickle=False).reshape(-1, *entry).astype(kind)
+    except (*ARCHIVE_FAULTS, TypeError):
+        raise InputError(str(path), None, "is missing, or no array") from None
+    if not np.isfinite(array).all():
+        raise InputError(str(path), None, "must hold finite numbers")
+    return np.asarray(array)
 
 
 def cloud_tiles(path: Path, scheme: ClassScheme, source: Source) -> Iterator[Tile]:

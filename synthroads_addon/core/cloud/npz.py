@@ -54,7 +54,7 @@ _ON_REQUEST = {
     "specular": ("<f4", 1),
     "color_source": ("|u1", 1),
 }
-_FAULTS = (
+ARCHIVE_FAULTS = (
     *(KeyError, ValueError, EOFError, OSError, RuntimeError, MemoryError, SyntaxError, OverflowError),
     *(zipfile.BadZipFile, zlib.error, struct.error, tokenize.TokenError),
 )
@@ -122,12 +122,12 @@ class NpzReader(CloudReader):
     def __init__(self, path: Path) -> None:
         try:
             self._archive = zipfile.ZipFile(path)
-        except _FAULTS:
+        except ARCHIVE_FAULTS:
             raise InputError(str(path), None, "is not an NPZ file, or truncated") from None
         try:
             self._kinds = self._read_kinds(path)
             notes = self._read_notes()
-        except _FAULTS as problem:
+        except ARCHIVE_FAULTS as problem:
             self.close()
             raise InputError(str(path), None, f"is not an NPZ file that can be read ({problem})") from None
         except InputError:
@@ -151,7 +151,7 @@ class NpzReader(CloudReader):
                 wanted = min(size, self.header.count - done)
                 try:
                     arrays = {name: self._rows(members[name], name, wanted) for name in members}
-                except _FAULTS:
+                except ARCHIVE_FAULTS:
                     raise damaged(self.header.path, done, self.header.count) from None
                 finite_coordinates(self.header.path, done, arrays["xyz"])
                 yield self._block(arrays, wanted)
