@@ -78,8 +78,7 @@ def output_folder(target: Path, names: Iterable[str], overwrite: bool) -> Iterat
         raise OutputError("--output", str(target), f"cannot be written ({error.strerror})") from None
     try:
         yield temporary
-        for path in sorted(temporary.iterdir()):
-            path.replace(target / path.name)
+        _move_all(temporary, target)
     except OSError as error:
         if error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EACCES, errno.EROFS):
             raise OutputError("--output", str(target), f"cannot be written ({error.strerror})") from None
@@ -88,6 +87,19 @@ def output_folder(target: Path, names: Iterable[str], overwrite: bool) -> Iterat
         shutil.rmtree(temporary, ignore_errors=True)
         if made and target.exists() and not any(target.iterdir()):
             target.rmdir()
+
+
+def _move_all(source: Path, target: Path) -> None:
+    """Move a folder's files; where the user stops the work meanwhile all the same, as a part of them fits nothing."""
+    stopped: KeyboardInterrupt | None = None
+    while paths := sorted(source.iterdir()):
+        try:
+            for path in paths:
+                path.replace(target / path.name)
+        except KeyboardInterrupt as signal:
+            stopped = signal
+    if stopped is not None:
+        raise stopped
 
 
 def write_file(path: Path, content: bytes, field: str = "--output", overwrite: bool = False) -> None:

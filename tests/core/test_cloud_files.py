@@ -161,6 +161,13 @@ def test_empty_cloud(tmp_path: Path, points, ending: str) -> None:
         assert list(cloud.blocks()) == []
 
 
+def test_an_empty_block_needs_none_of_what_is_written_of_points(tmp_path: Path, points, ending: str) -> None:
+    assert points.normal is None
+    write(tmp_path / f"cloud{ending}", points.select(slice(0, 0)), attributes=("normal",))
+    with open_cloud(tmp_path / f"cloud{ending}") as cloud:
+        assert cloud.header.count == 0
+
+
 def test_stopped_writing_leaves_nothing_and_spares_the_old_file(tmp_path: Path, points, ending: str) -> None:
     path = tmp_path / f"cloud{ending}"
     write(path, points, attributes=DEFAULT_ATTRIBUTES)

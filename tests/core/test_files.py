@@ -28,6 +28,25 @@ def test_stopped_work_leaves_nothing(tmp_path: Path) -> None:
     assert list(tmp_path.iterdir()) == []
 
 
+def test_work_that_is_stopped_while_its_files_appear_leaves_all_of_them(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    replace, stops = Path.replace, ["first"]
+
+    def stopped(self: Path, target: Path) -> Path:
+        moved = replace(self, target)
+        if stops:
+            stops.pop()
+            raise KeyboardInterrupt
+        return moved
+
+    monkeypatch.setattr(Path, "replace", stopped)
+    with pytest.raises(KeyboardInterrupt), output_folder(tmp_path / "out", [], False) as folder:
+        for name in ("a.txt", "b.txt", "c.txt"):
+            (folder / name).write_text(name)
+    assert sorted(path.name for path in (tmp_path / "out").iterdir()) == ["a.txt", "b.txt", "c.txt"]
+
+
 def test_present_files_need_overwrite_and_others_stay(tmp_path: Path) -> None:
     (tmp_path / "a.txt").write_text("old")
     (tmp_path / "mine.txt").write_text("mine")

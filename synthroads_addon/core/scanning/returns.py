@@ -98,9 +98,6 @@ def _split_pulses(chosen: Index, first: Marks, behind: Marks, pulse: Index, reso
     hit = np.concatenate([ray * pulses + chosen[column], rays * pulses + np.arange(len(pulse))])
     owner = np.concatenate([chosen[column], pulse])
     reach = np.concatenate([near[ray, column], behind.distance])
-    if not len(hit):
-        nothing = np.empty(0, dtype=np.intp)
-        return Echoes(nothing, nothing, np.empty(0), np.empty(0), np.empty(0))
     # One key for both: ranges of some kilometres keep a micrometre beside the pulses of a chunk.
     order = np.argsort(owner * (2.0 * max(1.0, float(reach.max()))) + reach, kind="stable")
     hit, owner, reach = hit[order], owner[order], reach[order]
