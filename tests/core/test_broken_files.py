@@ -14,6 +14,7 @@ import pytest
 
 from synthroads_addon.core.calibration_texture import read_texture
 from synthroads_addon.core.cloud.attributes import DEFAULT_ATTRIBUTES
+from synthroads_addon.core.cloud.las_reading import open_to_copy
 from synthroads_addon.core.cloud.reading import open_cloud
 from synthroads_addon.core.cloud.writing import open_writer
 from synthroads_addon.core.errors import InputError
@@ -21,7 +22,7 @@ from synthroads_addon.core.materials import materials
 from synthroads_addon.core.mesh_files import check_mesh_file
 from synthroads_addon.core.parameters.elevation_model import read_elevation_model
 from tests.core.conftest import make_points
-from tests.core.mutations import TOKENS, accepted, cases, damaged, for_all
+from tests.core.mutations import TOKENS, accepted, cases, damaged, for_all, limited
 from tests.core.test_elevation_model import EPSG, ascii_grid, centres, corridor, geotiff, plane
 
 ORIGIN = np.array([294_000.0, 5_628_000.0, 180.0])
@@ -136,6 +137,13 @@ def test_a_number_of_points_beyond_the_file(tmp_path: Path, ending: str) -> None
     path = changed(cloud(tmp_path / f"cloud{ending}"), 247, 10**12, 8)  # LAS 1.4: number of point records
     with pytest.raises(InputError, match=r"truncated|points"):
         use_cloud(path)
+
+
+def test_a_number_of_records_behind_the_points_beyond_the_file(tmp_path: Path) -> None:
+    """laspy would make an empty record for each of them."""
+    path = changed(cloud(tmp_path / "cloud.las"), 243, 2**32 - 1, 4)
+    with limited(), pytest.raises(InputError, match="records behind its points reach beyond its end"):
+        open_to_copy(path)
 
 
 def chunk_table(path: Path) -> int:

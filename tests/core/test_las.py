@@ -69,7 +69,9 @@ def test_too_bright_points_are_clipped_and_counted(tmp_path: Path, points) -> No
 
 def test_empty_cloud_is_a_valid_file(tmp_path: Path, points) -> None:
     write(tmp_path / "cloud.laz", points.select(np.zeros(len(points), dtype=bool)))
-    assert len(laspy.read(tmp_path / "cloud.laz")) == 0
+    las = laspy.read(tmp_path / "cloud.laz")
+    assert len(las) == 0
+    assert las.header.mins.tolist() == las.header.maxs.tolist() == [0.0, 0.0, 0.0]  # no bounds
 
 
 def test_overflow_is_refused_and_nothing_is_left(tmp_path: Path, points) -> None:

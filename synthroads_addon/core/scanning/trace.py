@@ -108,7 +108,7 @@ def trace(
     The shares taken along one ray never add up to more than its own.
     """
     met = target.cast(rays.origin, rays.direction, farthest, rays.time, motions)
-    material = np.take(target.material, met.face, mode="clip") if target.triangles else met.face.astype(np.uint16)
+    material = np.take(target.material, met.face, mode="clip")
     if not surfaces.permeable:
         first = Hits(met.face, material, _within(met.distance, nearest, np.inf), met.along, rays.share)
         return _traced(rays, first, [], [])
