@@ -40,10 +40,14 @@ def test_work_that_is_stopped_while_its_files_appear_leaves_all_of_them(
             raise KeyboardInterrupt
         return moved
 
+    def work() -> None:
+        with output_folder(tmp_path / "out", [], False) as folder:
+            for name in ("a.txt", "b.txt", "c.txt"):
+                (folder / name).write_text(name)
+
     monkeypatch.setattr(Path, "replace", stopped)
-    with pytest.raises(KeyboardInterrupt), output_folder(tmp_path / "out", [], False) as folder:
-        for name in ("a.txt", "b.txt", "c.txt"):
-            (folder / name).write_text(name)
+    with pytest.raises(KeyboardInterrupt):
+        work()
     assert sorted(path.name for path in (tmp_path / "out").iterdir()) == ["a.txt", "b.txt", "c.txt"]
 
 

@@ -47,8 +47,8 @@ def configuration(kind: str, data: Path, **changes: Any) -> dict[str, Any]:
             "data": {"data_sets": [str(data / "roads")]},
             "slices": {"half_width": 20.0, "points_per_slice": 96},
             "model": {
-                **{"name": "transformer", "cells": 4, "point_width": 8, "width": 16, "context": 16},
-                **{"layers": 1, "heads": 2, "dropout": 0.1},
+                "name": "transformer", "cells": 4, "point_width": 8, "width": 16, "context": 16,
+                "layers": 1, "heads": 2, "dropout": 0.1,
             },
             "batches": {"size": 4, "steps": 4, "passes": 2, "validation": 8, "calibration": 8},
             "schedule": {"epochs": 12, "learning_rate": 0.003},
@@ -214,7 +214,7 @@ def test_a_lost_worker_is_one_line_and_the_training_goes_on_when_resumed(data: P
     for epoch in (0, 1):
         with disturbed.begun() as process:
             wait_until(lambda: (disturbed.folder / "history.json").exists() or not epoch)  # noqa: B023
-            wait_until(lambda: len(workers_of(process.pid)) == 2)  # noqa: B023
+            wait_until(lambda: len(workers_of(process.pid)) == 2)
             time.sleep(0.3)
             os.kill(workers_of(process.pid)[-1], signal.SIGKILL)
             _, said = process.communicate(timeout=60)

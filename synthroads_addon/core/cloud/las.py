@@ -71,9 +71,8 @@ class LasWriter(CloudWriter):
     def _finish(self) -> None:
         self._flush()
         header, count = self._writer.header, int(self._by_return.sum())
-        if count:
-            header.mins = self._low * header.scales + header.offsets
-            header.maxs = self._high * header.scales + header.offsets
+        header.mins = self._low * header.scales + header.offsets  # laspy writes 0 where there are no points
+        header.maxs = self._high * header.scales + header.offsets
         header.point_count = count
         header.number_of_points_by_return = self._by_return[1:].astype(np.uint64)
         self._writer.close()
