@@ -74,14 +74,19 @@ class _Parser(argparse.ArgumentParser):
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run one sub-command; return its exit code."""
+    arguments = build_parser().parse_args(argv)
+    return run(_module(arguments.command).run, arguments)
+
+
+def build_parser() -> argparse.ArgumentParser:
+    """Return the parser of `synthroads` with all of `COMMANDS`; the documentation's reference is made from it."""
     parser = _Parser(prog="synthroads", description="Synthetic motorways, scanned and labelled.")
     parser.add_argument("--version", action="version", version=generator())
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
     for name, summary in COMMANDS.items():
         module = _module(name)
         module.add_arguments(commands.add_parser(name, help=summary, description=module.__doc__))
-    arguments = parser.parse_args(argv)
-    return run(_module(arguments.command).run, arguments)
+    return parser
 
 
 def _module(name: str) -> Any:

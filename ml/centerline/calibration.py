@@ -1,10 +1,10 @@
 """Standard deviations that mean what they say: one factor per target, found on validation roads.
 
-A model's deviation s of an error e is calibrated if 68 % of all |e| / s lie below 0.994 and 95 % below 1.960, as a
-Gaussian's would. One factor on s can bring one of both shares about; both only if the tails are Gaussian. The factor
+A model's deviation s of an error e is calibrated if 68 % of all ``|e| / s`` lie below 0.994 and 95 % below 1.960, as
+a Gaussian's would. One factor on s can bring one of both shares about; both only if the tails are Gaussian. The factor
 here is the one that misses both by as little as possible, measured in `TOLERANCES`. Beside it stand the factors that
-each share would need by itself (split conformal prediction: quantiles of |e| / s): intervals made with them cover what
-they say on roads like the validation's whatever the tails are.
+each share would need by itself (split conformal prediction: quantiles of ``|e| / s``): intervals made with them cover
+what they say on roads like the validation's whatever the tails are.
 """
 
 from __future__ import annotations

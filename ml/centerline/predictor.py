@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import torch
 from numpy.typing import NDArray
+from pydantic import Field
 from torch import Tensor
 
 from ml.configuration import Part
@@ -31,8 +32,7 @@ _HEIGHT = TARGETS.index("height")
 class UseOptions(Part):
     """How a trained model is used."""
 
-    mirror: bool = True
-    """Average what the model says of the slices and of their mirror image."""
+    mirror: bool = Field(True, description="Average what the model says of the slices and of their mirror image.")
     step: int = quantity(5, ge=1, le=1000, unit="1", description="Slices from one sequence's start to the next one's.")
     batch: int = quantity(32, ge=1, le=10_000, unit="1", description="Sequences at a time.")
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import model_validator
+from pydantic import Field, model_validator
 
 from ml.configuration import Part
 from synthroads_addon.core.schema import quantity
@@ -48,12 +48,12 @@ class Crop:
 class Effects(Part):
     """What happens to crops. All of it off leaves them as they are; the defaults are the recipe's."""
 
-    rotation: bool = True
-    """Turn about the vertical by any angle."""
+    rotation: bool = Field(True, description="Turn about the vertical by any angle.")
     smallest_scale: float = quantity(0.9, gt=0, le=1, unit="1", description="Smallest factor on the coordinates.")
     largest_scale: float = quantity(1.1, ge=1, le=10, unit="1", description="Largest factor on the coordinates.")
-    mirror: bool = False
-    """Mirror every second crop, so that right-hand traffic becomes left-hand traffic."""
+    mirror: bool = Field(
+        False, description="Mirror every second crop, so that right-hand traffic becomes left-hand traffic."
+    )
     jitter: float = quantity(0.005, ge=0, le=1, unit="m", description="Noise of each coordinate, one sigma.")
     jitter_limit: float = quantity(0.02, ge=0, le=5, unit="m", description="Largest noise of a coordinate.")
     color_drop: float = quantity(0.2, ge=0, le=1, unit="1", description="Share of crops that lose their colours.")

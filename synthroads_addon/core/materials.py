@@ -84,7 +84,7 @@ class Material(Model):
 class MaterialTable(Model):
     """The file's content."""
 
-    materials: dict[str, Material]
+    materials: dict[str, Material] = Field(description="Materials by name.")
 
 
 @cache

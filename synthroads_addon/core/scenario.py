@@ -35,7 +35,7 @@ class Scenario(ScenarioModel):
 
     type: Literal["Scenario"] = "Scenario"
     version: Literal["1.0"] = "1.0"
-    title: str = ""
+    title: str = Field("", description="Title for people.")
     seed: int = quantity(1, ge=0, le=2**63 - 1, unit="1", description="Seed of everything random.")
     fidelity: Literal["draft", "standard", "high"] = Field("standard", description="Point on the trade-off.")
     geometric_tolerance: float | None = quantity(

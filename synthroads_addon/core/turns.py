@@ -2,7 +2,7 @@
 
 Building a road calls functions that call functions, sixty node groups deep, and all of it must happen in Blender's main
 thread or while that waits. A generator would have to be threaded through every one of them. So the work has a Python
-thread of its own, but only ever runs while its caller waits for it in `Turns.take`, or while it computes `aside`:
+thread of its own, but only ever runs while its caller waits for it in `Turns.take`, or while it computes `aside`::
 
     def work():
         path = aside(lambda: heavy_numpy())     # both run meanwhile

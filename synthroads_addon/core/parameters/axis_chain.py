@@ -298,7 +298,7 @@ def stepped(data: Data, chain: Chain, step: FloatArray) -> Chain:
 
 
 def least_squares(matrix: FloatArray, wanted: FloatArray) -> FloatArray:
-    """Return the x of full rank with the least |matrix x - wanted|; by QR, since chains are ill-conditioned."""
+    """Return the x of full rank with the least ``|matrix x - wanted|``; by QR, since chains are ill-conditioned."""
     q, r = np.linalg.qr(matrix)
     return np.linalg.solve(r, q.T @ wanted)
 

@@ -1,7 +1,7 @@
 """Vertical profile: constant grades between points of vertical intersection, rounded by parabolas.
 
-With the grades g1 before and g2 after a point and the rounding's radius H, the parabola reaches T = H |g2 - g1| / 2 to
-either side and has the constant curvature d2z/ds2 = sign(g2 - g1) / H: a sag is positive, a crest
+With the grades g1 before and g2 after a point and the rounding's radius H, the parabola reaches T = ``H |g2 - g1| / 2``
+to either side and has the constant curvature d2z/ds2 = sign(g2 - g1) / H: a sag is positive, a crest
 negative. Stations are those of the horizontal alignment, so lengths are horizontal.
 """
 

@@ -3,12 +3,10 @@
 Absorption by gases is left out (905, 1064 and 1550 nm lie in windows of the atmosphere), and so is the light that
 droplets scatter back into the receiver.
 
-| condition | by visibility | by rate |
-|---|---|---|
-| clear | Kim | |
-| haze, dust | Kruse: made for small particles of haze and dust | |
-| fog | the same at every wavelength: its droplets are larger than the wavelength (Pierce; Kim below 500 m) | |
-| rain, snow | the same at every wavelength, for the same reason | Carbonneau and Wisely; wet snow |
+- clear: by visibility, Kim.
+- haze, dust: by visibility, Kruse: made for small particles of haze and dust.
+- fog: by visibility, the same at every wavelength: its droplets are larger than that (Pierce; Kim below 500 m).
+- rain, snow: by visibility, the same at every wavelength for the same reason; by rate, Carbonneau and Wisely, wet snow.
 
 Sources: Kruse, McGlauchlin, McQuistan: Elements of Infrared Technology (1962); Kim, McArthur, Korevaar: Comparison of
 laser beam propagation at 785 nm and 1550 nm in fog and haze, Proc. SPIE 4214 (2001); Pierce, Ramaprasad, Eisenberg:

@@ -1,0 +1,61 @@
+"""How Sphinx makes the site that `make docs` builds in build/site: pages from docs/, the reference from the code."""
+
+from __future__ import annotations
+
+import sys
+import tomllib
+from pathlib import Path
+from typing import Any
+
+from sphinx.ext.autodoc.mock import mock
+
+ROOT = Path(__file__).resolve().parents[1]
+sys.path.insert(0, str(ROOT))
+
+from tools.reference_pages import filled  # noqa: E402
+
+project = "SynthRoads"
+copyright = "SynthRoads developers; GPL-3.0-or-later"  # noqa: A001 (Sphinx's name for it)
+release = tomllib.loads((ROOT / "blender_manifest.toml").read_text(encoding="utf-8"))["version"]
+extensions = ["myst_parser", "sphinx.ext.napoleon", "autoapi.extension"]
+
+html_theme = "furo"  # brings its own styles and uses the reader's fonts: nothing is fetched when a page is viewed
+html_static_path = ["site.css"]
+html_css_files = ["site.css"]
+html_title = f"SynthRoads {release}"
+html_show_sphinx = False
+html_copy_source = False
+html_theme_options = {"navigation_with_keys": True}
+highlight_language = "none"
+napoleon_use_ivar = True  # attributes as a list: their types stand in the class's signature
+default_role = "py:obj"  # docstrings name things of this project in single ticks
+myst_heading_anchors = 4  # links such as page.md#a-heading, as they work where the repository is read
+
+# The library's public part, read and never imported: neither Blender nor PyTorch is needed.
+PACKAGE = ROOT / "synthroads_addon"
+PUBLIC = {"__init__.py", "core", "pipeline.py"}
+autoapi_dirs = [str(PACKAGE), str(ROOT / "ml")]
+autoapi_ignore = [f"{path}*" for path in PACKAGE.iterdir() if path.name not in PUBLIC]
+autoapi_root = "reference/api"
+autoapi_options = ["members", "show-inheritance", "show-module-summary"]
+autoapi_member_order = "bysource"
+autoapi_add_toctree_entry = False
+autoapi_keep_files = False
+suppress_warnings = [
+    # It misses what is assigned several at a time (A, B = ...) and what `PUBLIC` leaves out; mypy looks after imports.
+    "autoapi.python_import_resolution",
+    # A bare name in a docstring that several classes have: the link leads to the first of them.
+    "ref.python",
+]
+
+
+def fill(app: Any, docname: str, content: list[str]) -> None:
+    """Put generated text in the place of a page's marks; PyTorch, which configurations' modules import, is mocked."""
+    with mock(["matplotlib", "scipy", "skimage", "torch"]):
+        content[0] = filled(content[0])
+
+
+def setup(app: Any) -> dict[str, bool]:
+    """Connect to Sphinx; pages can be read side by side."""
+    app.connect("source-read", fill)
+    return {"parallel_read_safe": True}

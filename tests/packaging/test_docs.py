@@ -1,0 +1,175 @@
+"""The documentation holds together: every page is found, every link leads somewhere, every command is understood.
+
+The site itself is built by `make docs`, which fails on whatever its generator complains of.
+"""
+
+from __future__ import annotations
+
+import argparse
+import ast
+import re
+from collections import Counter
+from functools import cache
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from headless.cli import COMMANDS, build_parser
+from synthroads_addon.core.dataset.recipe import Recipe, scene_jobs
+from synthroads_addon.core.scenario import load_scenario, scenario_names
+from tests.packaging.docs_pages import DOCS, MADE_BY_THE_BUILD, PAGES, ROOT, anchors, commands, entries, fences, links
+from tools.reference_pages import FILES, GENERATED, MARK, filled, generated
+
+README = ROOT / "README.md"
+WITH_PYTORCH = {f"fields-{name}" for name, classes in FILES.items() if any(c.startswith("ml.") for c in classes)}
+
+
+def name_of(page: Path) -> str:
+    return page.relative_to(ROOT).as_posix()
+
+
+every_page = pytest.mark.parametrize("page", [README, *PAGES], ids=name_of)
+
+
+def test_every_page_is_in_the_navigation_once() -> None:
+    named = Counter(entry for page in PAGES for entry in entries(page))
+    pages = {page.relative_to(DOCS).with_suffix("").as_posix() for page in PAGES} - {"index"}
+    assert named == Counter(pages | MADE_BY_THE_BUILD)
+
+
+@every_page
+def test_links_lead_somewhere(page: Path) -> None:
+    text = page.read_text(encoding="utf-8")
+    for target in links(text):
+        file, _, anchor = target.partition("#")
+        path = (page.parent / file).resolve() if file else page
+        assert path.is_file(), target
+        if anchor:
+            assert anchor in anchors(path.read_text(encoding="utf-8")), target
+
+
+@cache
+def parser() -> argparse.ArgumentParser:
+    return build_parser()
+
+
+def parsed(words: list[str]) -> Any:
+    """Parse a command's words after `synthroads`; fail where the parser complains. `--help` has nothing to parse."""
+    if words == ["--help"]:
+        return None
+    try:
+        return parser().parse_args(words)
+    except SystemExit:
+        pytest.fail(f"synthroads {' '.join(words)}")
+
+
+def command_lines(text: str) -> list[list[str]]:
+    """Return the words after `synthroads` of all commands, however they are called."""
+    lines = [words[1:] for words in commands(text, "synthroads")]
+    for words in commands(text, "python"):
+        if words[1:2] == ["-m"] and (match := re.fullmatch(r"(?:headless|ml)\.(\w+)", words[2])):
+            lines.append([match[1], *words[3:]])
+    for words in commands(text, "blender"):
+        script = next((Path(word) for word in words if word.startswith("headless/")), None)
+        if script:
+            lines.append([script.stem, *words[words.index("--") + 1 :]])
+    return [words for words in lines if "..." not in words]
+
+
+@every_page
+def test_commands_are_understood(page: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    for words in command_lines(page.read_text(encoding="utf-8")):
+        arguments = parsed(words)
+        changes = getattr(arguments, "changes", [])
+        if words[0] == "generate" and arguments.scenario in scenario_names():
+            load_scenario(arguments.scenario, changes)  # refuses fields that aren't there and values out of limits
+
+
+def test_commands_are_found() -> None:
+    found = {words[0] for page in [README, *PAGES] for words in command_lines(page.read_text(encoding="utf-8"))}
+    assert set(COMMANDS) <= found, "each command is shown somewhere"
+
+
+@every_page
+def test_modules_and_targets_that_are_run_are_there(page: Path) -> None:
+    text = page.read_text(encoding="utf-8")
+    makefile = (ROOT / "Makefile").read_text(encoding="utf-8")
+    for words in commands(text, "python"):
+        if words[1] == "-m" and words[2].split(".")[0] in ("headless", "ml"):
+            assert find_spec(words[2].rpartition(".")[0]), words
+            assert (ROOT / f"{words[2].replace('.', '/')}.py").is_file(), words
+        elif words[1].endswith(".py") and not words[1].startswith("my"):
+            assert (ROOT / words[1]).is_file(), words
+    for words in commands(text, "make"):
+        for word in words[1:]:
+            variable, equals, _ = word.partition("=")
+            assert re.search(rf"(?m)^{variable} \?=" if equals else rf"(?m)^{word}:", makefile), words
+
+
+@every_page
+def test_python_compiles_and_imports_what_is_there(page: Path) -> None:
+    for block in fences(page.read_text(encoding="utf-8"), "python"):
+        for node in ast.walk(ast.parse(block)):
+            if isinstance(node, ast.ImportFrom) and node.module.split(".")[0] in ("synthroads_addon", "ml", "headless"):
+                assert {alias.name for alias in node.names} <= defined(node.module), node.module
+
+
+def defined(module: str) -> set[str]:
+    """Return the names that a module of ours defines or imports, read from its source: no PyTorch, no Blender."""
+    path = ROOT / module.replace(".", "/")
+    source = path / "__init__.py" if path.is_dir() else path.with_suffix(".py")
+    names: set[str] = set()
+    for node in ast.parse(source.read_text(encoding="utf-8")).body:
+        if isinstance(node, (ast.FunctionDef, ast.ClassDef)):
+            names.add(node.name)
+        elif isinstance(node, (ast.Assign, ast.AnnAssign)):
+            targets = node.targets if isinstance(node, ast.Assign) else [node.target]
+            names |= {target.id for target in targets if isinstance(target, ast.Name)}
+        elif isinstance(node, (ast.Import, ast.ImportFrom)):
+            names |= {alias.asname or alias.name for alias in node.names}
+    return names
+
+
+def test_recipes_are_recipes() -> None:
+    yaml = pytest.importorskip("yaml")
+    blocks = [block for page in PAGES for block in fences(page.read_text(encoding="utf-8"), "yaml")]
+    recipes = [data for block in blocks if (data := yaml.safe_load(block)).get("type") == "Recipe"]
+    assert len(recipes) >= 2
+    for data in recipes:
+        recipe = Recipe.from_dict(data)
+        assert len(scene_jobs(recipe)) == sum(group.scenes for group in recipe.groups)
+
+
+def test_every_generated_part_has_its_place() -> None:
+    marks = Counter(mark for page in PAGES for mark in MARK.findall(page.read_text(encoding="utf-8")))
+    assert marks == Counter(list(GENERATED))
+
+
+@pytest.mark.parametrize("name", GENERATED)
+def test_generated_parts_say_what_everything_is(name: str) -> None:
+    if name in WITH_PYTORCH:
+        pytest.importorskip("torch")
+    text = generated(name)
+    assert not MARK.search(text)
+    rows = re.findall(r"(?m)^\| (.*) \|$", text)
+    wide = {len(re.split(r"(?<!\\)\|", row)) for row in rows}
+    assert len(wide) == 1, "all tables of a part have the same columns"
+    assert [row for row in rows if row.startswith(("`", "[`"))], "it names something"
+    unsaid = [row for row in rows if row.endswith("| ") and row.split("`")[1] not in ("type", "version")]
+    assert unsaid == []
+    assert all(f"](#{target})" not in text or target in anchors(text) for target in re.findall(r"\]\(#([^)]+)\)", text))
+
+
+def test_the_reference_of_commands_has_all_of_them() -> None:
+    assert set(COMMANDS) <= {heading.strip() for heading in re.findall(r"(?m)^# (.*)$", generated("commands"))}
+
+
+def test_headings_of_generated_parts_lie_below_the_one_before() -> None:
+    page = "# Page\n\n## Recipes\n\n<!-- generated: fields-recipe -->\n"
+    assert [line for line in filled(page).splitlines() if line.startswith("#")][:3] == [
+        "# Page",
+        "## Recipes",
+        "### Recipe",
+    ]

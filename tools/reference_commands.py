@@ -1,0 +1,79 @@
+"""The reference of the command line, made from the parsers themselves when the documentation is built."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Iterator
+
+from headless.cli import build_parser
+
+_WIDTH = 82
+
+
+def commands() -> str:
+    """Return every sub-command with its usage and arguments, as Markdown."""
+    _, (_, parsers) = _split(build_parser())
+    return "\n\n".join(text for name, parser in parsers.items() for text in _command(name, parser, "#"))
+
+
+Choices = tuple[dict[str, str], dict[str, argparse.ArgumentParser]]
+
+
+def _split(parser: argparse.ArgumentParser) -> tuple[list[argparse.Action], Choices]:
+    """Return a parser's own arguments, and of its sub-commands (none: empty) the summaries and parsers by name."""
+    own: list[argparse.Action] = []
+    summaries: dict[str, str] = {}
+    parsers: dict[str, argparse.ArgumentParser] = {}
+    for action in parser._actions:
+        if isinstance(action, argparse._SubParsersAction):
+            parsers = dict(action.choices)
+            summaries = {choice.dest: choice.help or "" for choice in action._choices_actions}
+        elif not isinstance(action, argparse._HelpAction):
+            own.append(action)
+    return own, (summaries, parsers)
+
+
+def _command(name: str, parser: argparse.ArgumentParser, level: str, summary: str = "") -> Iterator[str]:
+    """Yield the parts of a command's text, and of its own sub-commands'."""
+    arguments, (summaries, parsers) = _split(parser)
+    yield f"{level} {name}"
+    yield _escaped(parser.description or f"{summary[:1].upper()}{summary[1:]}.")
+    yield f"```text\n{_usage(parser)}\n```"
+    if arguments:
+        rows = [f"| {_names(action)} | {_meaning(action, parser)} |" for action in arguments]
+        yield "\n".join(["| argument | meaning |", "|---|---|", *rows])
+    for tool, its_parser in parsers.items():
+        yield from _command(f"{name} {tool}", its_parser, f"{level}#", summaries[tool])
+
+
+def _usage(parser: argparse.ArgumentParser) -> str:
+    formatter = argparse.HelpFormatter(parser.prog, width=_WIDTH)
+    formatter.add_usage(parser.usage, parser._actions, parser._mutually_exclusive_groups, prefix="")
+    return formatter.format_help().strip()
+
+
+def _names(action: argparse.Action) -> str:
+    value = "" if action.nargs == 0 else f" {_metavar(action)}"
+    shown = [f"{name}{value}" for name in action.option_strings] or [_metavar(action)]
+    return ", ".join(f"`{text}`" for text in shown).replace("|", "\\|")
+
+
+def _metavar(action: argparse.Action) -> str:
+    if isinstance(action.metavar, tuple):
+        return " ".join(action.metavar)
+    if action.metavar is None and action.choices is not None:
+        return "{" + ",".join(map(str, action.choices)) + "}"
+    return action.metavar or action.dest.upper()
+
+
+def _meaning(action: argparse.Action, parser: argparse.ArgumentParser) -> str:
+    """Return an argument's help with whether it must be given, as ``--help`` would show it."""
+    text = parser._get_formatter()._expand_help(action) if action.help else ""
+    return _escaped(text + (" **(required)**" if action.required and action.option_strings else ""))
+
+
+def _escaped(text: str) -> str:
+    """Return help text so that Markdown shows it as it stands."""
+    for sign in "\\|<[_":
+        text = text.replace(sign, f"\\{sign}")
+    return text.replace("``", "`")
