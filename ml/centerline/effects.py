@@ -6,8 +6,6 @@ whatever worker makes it.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
@@ -15,63 +13,15 @@ from pydantic import Field, model_validator
 from ml.configuration import Part
 from synthroads_addon.core.schema import quantity
 
-from .corridor import CORRIDOR
 from .frames import Frames
+from .lighting import relight
+from .stretch import HEADING, HEIGHT, LEFT, RIGHT, Stretch
 
 Float = NDArray[np.float64]
 Generator = np.random.Generator
 
-_DARKEST = 1e-5
-"""Intensities below this share of the brightest count as it."""
-_NARROWEST = 0.02
-"""A footprint narrower than this is a point, m."""
-_LINE_REACH = 0.5
-"""Paint within so far of a line's place is the line's, m."""
-_NO_SHOULDER = 1.2
-"""Pavement beyond an edge line that is no shoulder yet, m."""
-_LINE_WIDTHS = (0.12, 0.6)
-"""Of a solid lane line: one narrow line to a double one with what lies between, m."""
-_SCANNER_HEIGHTS = (1.5, 60.0)
-_SCANNER_ASIDE = 15.0
-"""Of the scanners from whose range intensities fall off: lowest and highest, and farthest from the path, m."""
-
-LEFT, RIGHT, HEADING, HEIGHT = (CORRIDOR.index(name) for name in ("left_edge", "right_edge", "heading", "height"))
-
-
-@dataclass
-class Stretch:
-    """A sequence of S slices with K points; effects change it in place.
-
-    Attributes:
-        xyz: (K, 3) float64 in the slices' frames, m; z still that of the cloud.
-        number: (K,) slice of each point, ascending.
-        intensity: (K,) float64, 0 where there is none.
-        rgb: (K, 3) float64 from 0 to 1.
-        paved, marked: (K,) whether a point is known to lie on the pavement (markings included), or on a marking.
-        has_color: whether the colours mean something.
-        frames: the S frames.
-        center: (S,) y of the true centreline, m, or NaN.
-        corridor: (S, len(CORRIDOR)); height is above the cloud's zero.
-        lines, room: (S, 2) see `Crossings`.
-    """
-
-    xyz: Float
-    number: NDArray[np.intp]
-    intensity: Float
-    rgb: Float
-    paved: NDArray[np.bool_]
-    marked: NDArray[np.bool_]
-    has_color: bool
-    frames: Frames
-    center: Float
-    corridor: Float
-    lines: Float
-    room: Float
-
-    def keep(self, points: NDArray[np.bool_] | NDArray[np.intp]) -> None:
-        """Leave out all points but those of a mask or of ascending indices."""
-        for name in ("xyz", "number", "intensity", "rgb", "paved", "marked"):
-            setattr(self, name, getattr(self, name)[points])
+_RIM = 0.7
+"""Width of the pavement's edge whose height is taken, m."""
 
 
 class Crop(Part):
@@ -105,6 +55,13 @@ class Effects(Part):
     mirror: float = quantity(0.5, ge=0, le=1, unit="1", description="Probability of left and right being swapped.")
     turn_round: float = quantity(0.5, ge=0, le=1, unit="1", description="Probability of running against the path.")
     crop: Crop = Field(default=Crop(), description="Sides cut off.")
+    alone: float = quantity(
+        0.5,
+        ge=0,
+        le=1,
+        unit="1",
+        description="Probability that a carriageway without shoulders has no other beside it: ground on both sides.",
+    )
     dropout: float = quantity(0.3, ge=0, lt=1, unit="1", description="Share of the points that are left out.")
     hidden: float = quantity(0.2, ge=0, le=1, unit="1", description="Probability of a hole as behind a vehicle.")
     empty: float = quantity(0.02, ge=0, le=1, unit="1", description="Probability of a slice without any point.")
@@ -139,16 +96,17 @@ class Effects(Part):
         return self
 
 
-def leave_out(stretch: Stretch, effects: Effects, rng: Generator, carriageway: bool) -> None:
-    """Draw the effects that leave points out.
+def leave_out(stretch: Stretch, effects: Effects, rng: Generator) -> None:
+    """Draw the effects that leave points out, or put others in their place.
 
     Args:
         stretch: is changed in place.
         effects: their strengths.
         rng: the sample's own stream.
-        carriageway: whether the truth is a carriageway's, beside which the other one must not be seen.
     """
-    crop_sides(stretch, effects.crop, rng, carriageway)
+    if rng.random() < effects.alone and stretch.without_shoulders():
+        stand_alone(stretch)
+    crop_sides(stretch, effects.crop, rng)
     drop(stretch, effects, rng)
 
 
@@ -161,13 +119,43 @@ def transform(stretch: Stretch, effects: Effects, rng: Generator) -> None:
     relight(stretch, effects, rng)
 
 
-def crop_sides(stretch: Stretch, crop: Crop, rng: Generator, carriageway: bool) -> None:
+def stand_alone(stretch: Stretch) -> None:
+    """Put what lies beyond the pavement on the outer side of a carriageway on the median's side as well, mirrored.
+
+    So a motorway's carriageway becomes a rural road. Heights go on from the pavement's own edge.
+    """
+    edges = stretch.paved_sides()
+    inwards, outwards = (0, 1) if np.isfinite(stretch.room[:, 0]).any() else (1, 0)
+    sign = 1.0 if outwards == 0 else -1.0
+    # How far beyond the pavement's outer and inner edge each point lies.
+    away = sign * (stretch.xyz[:, 1] - stretch.center[stretch.number])
+    beyond_outer, beyond_inner = away - edges[stretch.number, outwards], -away - edges[stretch.number, inwards]
+    rise = stretch.xyz[:, 2] - stretch.corridor[stretch.number, HEIGHT]
+    rims = [rise[(beyond <= 0.0) & (beyond >= -_RIM)] for beyond in (beyond_inner, beyond_outer)]
+    if not len(rims[0]) or not len(rims[1]):
+        return
+    copied = np.flatnonzero(beyond_outer > 0.0)
+    kept = np.flatnonzero(~(beyond_inner > 0.0))
+    number = stretch.number[copied]
+    place = stretch.center[number] - sign * (edges[number, inwards] + beyond_outer[copied])
+    mirrored = stretch.xyz[copied].copy()
+    mirrored[:, 1] = place
+    mirrored[:, 2] += float(np.median(rims[0]) - np.median(rims[1]))
+    both = np.concatenate([kept, copied])
+    xyz = np.concatenate([stretch.xyz[kept], mirrored])
+    order = np.argsort(stretch.number[both], kind="stable")
+    stretch.keep(both[order])
+    stretch.xyz = xyz[order]
+    stretch.room = np.full_like(stretch.room, np.inf)
+
+
+def crop_sides(stretch: Stretch, crop: Crop, rng: Generator) -> None:
     """Cut off both sides of every slice; slices without a known centre are cut as if it lay at the frame's origin."""
     count = len(stretch.center)
     center = np.nan_to_num(stretch.center)
     if rng.random() >= crop.probability:
         return
-    if carriageway:
+    if stretch.carriageway:
         # Points beyond the middle of the median aren't there in the first place.
         strip = np.nan_to_num(stretch.lines, nan=3.5) + rng.uniform(*crop.beyond, 2)
         strip = np.minimum(strip, np.nan_to_num(stretch.room, nan=np.inf))
@@ -230,131 +218,3 @@ def move(stretch: Stretch, effects: Effects, rng: Generator) -> None:
     stretch.xyz[:, 2] += grade * x + cross * y
     stretch.corridor = stretch.corridor.copy()
     stretch.corridor[:, HEIGHT] += grade * (np.arange(len(stretch.center)) - middle) + cross * stretch.center
-
-
-def relight(stretch: Stretch, effects: Effects, rng: Generator) -> None:
-    """Change intensities and colours as another scanner, other materials and another camera would have."""
-    if rng.random() >= effects.plain and stretch.intensity.any():
-        _relight_intensities(stretch, effects, rng)
-    if rng.random() < effects.colorless:
-        stretch.has_color = False
-    elif stretch.has_color:
-        factors = np.exp(effects.tint * (rng.uniform(-1.0, 1.0) + rng.uniform(-1.0, 1.0, 3)))
-        stretch.rgb = np.clip(stretch.rgb * factors, 0.0, 1.0)
-
-
-def _relight_intensities(stretch: Stretch, effects: Effects, rng: Generator) -> None:
-    share = rng.random(7)
-    value, marked = _repainted(np.maximum(stretch.intensity, 0.0), stretch, effects.repaint, rng)
-    value = _worn(value, stretch.paved, marked, effects.paint * share[0])
-    value = np.where(stretch.paved, value, value * np.exp(effects.contrast * rng.uniform(-1.0, 1.0)))
-    value = _blurred(value, stretch, effects.footprint * share[5])
-    value *= _falloff(stretch.xyz[:, 1], effects.falloff * share[1], rng)
-    low, high = np.log(effects.gamma)
-    log = np.exp(low + share[4] * (high - low)) * np.log(np.maximum(value / np.max(value), _DARKEST))
-    # Noise by the spread, so that a scanner that compresses its intensities isn't drowned in it.
-    spread = float(np.subtract(*np.percentile(log, (90.0, 10.0))))
-    noise = effects.speckle * share[2] * rng.standard_normal(len(value))
-    pattern = effects.patches * share[3] * _waves(stretch, rng) + effects.stripes * share[6] * _tracks(stretch, rng)
-    stretch.intensity = np.exp(log + spread * (noise + pattern))
-
-
-def _repainted(value: Float, stretch: Stretch, probability: float, rng: Generator) -> tuple[Float, NDArray[np.bool_]]:
-    """Return intensities and what is marked (K,) where the lines of a carriageway without shoulders are others.
-
-    Two lanes are parted by dashes on motorways; on rural roads as well by a solid or a double line, or by none; and
-    many of them have no edge lines. On a motorway that would lead astray: beside a ramp it is by its dashes that the
-    line between the lanes is known.
-    """
-    lane, edge, side, width = rng.random(4)
-    marked, bare = stretch.marked, stretch.paved & ~stretch.marked
-    if not _without_shoulders(stretch) or not marked.any() or not bare.any():
-        return value, marked
-    paint, pavement = float(np.median(value[marked])), float(np.median(value[bare]))
-    y = stretch.xyz[:, 1] - stretch.center[stretch.number]
-    edges = stretch.lines[stretch.number] * [1.0, -1.0]
-    gone = np.zeros(len(value), dtype=bool)
-    both, one = edge < probability, probability <= edge < 2.0 * probability
-    worn = (both or (one and side < 0.5), both or (one and side >= 0.5), lane >= 1.0 - probability)
-    for happens, offset in zip(worn, (edges[:, 0], edges[:, 1], 0.0), strict=True):
-        if happens:
-            gone |= marked & (np.abs(y - offset) < _LINE_REACH)
-    if lane < probability:
-        low, high = _LINE_WIDTHS
-        painted = stretch.paved & (np.abs(y) < 0.5 * (low + (high - low) * width))
-        value, marked = np.where(painted, paint, value), marked | painted
-    return np.where(gone, pavement, value), marked & ~gone
-
-
-def _without_shoulders(stretch: Stretch) -> bool:
-    """Return whether the pavement ends near the edge lines on both sides of a carriageway, as on rural roads."""
-    if not np.isfinite(stretch.room).any():
-        return False
-    edges = np.column_stack([stretch.corridor[:, LEFT] - stretch.center, stretch.center - stretch.corridor[:, RIGHT]])
-    beyond = (edges - stretch.lines)[np.isfinite(edges) & np.isfinite(stretch.lines)]
-    return bool(len(beyond)) and float(beyond.max()) <= _NO_SHOULDER
-
-
-def _worn(value: Float, paved: NDArray[np.bool_], marked: NDArray[np.bool_], share: float) -> Float:
-    """Return intensities whose markings have lost a share of what they are brighter than the pavement."""
-    bare = paved & ~marked
-    if not marked.any() or not bare.any():
-        return value
-    pavement = float(np.median(value[bare]))
-    return np.where(marked, value + share * np.minimum(pavement - value, 0.0), value)
-
-
-def _blurred(value: Float, stretch: Stretch, width: float) -> Float:
-    """Return the means of intensities (K,) over a beam's footprint: over points of the slice within half a width in y.
-
-    A line seen by a wide beam is wider and fainter than it is.
-    """
-    if not len(value) or width < _NARROWEST:
-        return value
-    y = stretch.xyz[:, 1] - stretch.xyz[:, 1].min()
-    # Slices far apart from each other on one axis, so that one search finds all windows.
-    place = stretch.number * (2.0 * (float(y.max()) + width)) + y
-    order = np.argsort(place)
-    place = place[order]
-    total = np.concatenate([[0.0], np.cumsum(value[order])])
-    first = np.searchsorted(place, place - 0.5 * width, side="left")
-    last = np.searchsorted(place, place + 0.5 * width, side="right")
-    result = np.empty_like(value)
-    result[order] = (total[last] - total[first]) / (last - first)
-    return result
-
-
-def _falloff(y: Float, power: float, rng: Generator) -> Float:
-    """Return factors (K,) of intensities that fall off with the range from one or two scanners above the road.
-
-    Heights go from a vehicle's to an aircraft's, equally in logarithms. Of two passes beside each other a point belongs
-    to either, the likelier the nearer: seen from near it is bright, and from far dark, in the same place.
-    """
-    passes = int(rng.integers(1, 3))
-    height = np.exp(rng.uniform(*np.log(_SCANNER_HEIGHTS)))
-    square = height**2 + (y[:, None] - rng.uniform(-_SCANNER_ASIDE, _SCANNER_ASIDE, passes)) ** 2
-    nearness = np.cumsum(1.0 / square, axis=1)
-    chosen = (rng.random(len(y))[:, None] * nearness[:, -1:] > nearness).sum(axis=1)
-    result: Float = (square[np.arange(len(y)), chosen] / height**2) ** (-power / 2.0)
-    return result
-
-
-def _tracks(stretch: Stretch, rng: Generator) -> Float:
-    """Return a random function (K,) of about unit deviation that only changes across the road: waves of 0.7 to 6 m."""
-    count = 5
-    rate = 2.0 * np.pi / np.exp(rng.uniform(np.log(0.7), np.log(6.0), count))
-    y = stretch.xyz[:, 1] - np.nan_to_num(stretch.center)[stretch.number]
-    angle = y[:, None] * rate + rng.uniform(0.0, 2.0 * np.pi, count)
-    result: Float = np.cos(angle).sum(axis=1) * np.sqrt(2.0 / count)
-    return result
-
-
-def _waves(stretch: Stretch, rng: Generator) -> Float:
-    """Return a smooth random function of the place (K,) of about unit deviation: waves of 2 to 20 m any way."""
-    count = 6
-    rate = 2.0 * np.pi / np.exp(rng.uniform(np.log(2.0), np.log(20.0), count))
-    way, phase = rng.uniform(0.0, 2.0 * np.pi, (2, count))
-    x, y = stretch.xyz[:, 0] + stretch.number, stretch.xyz[:, 1]
-    angle = x[:, None] * (rate * np.cos(way)) + y[:, None] * (rate * np.sin(way)) + phase
-    result: Float = np.cos(angle).sum(axis=1) * np.sqrt(2.0 / count)
-    return result

@@ -32,9 +32,10 @@ from synthroads_addon.core.schema import quantity
 
 from . import intensity
 from .corridor import CORRIDOR, TruthKind
-from .effects import HEIGHT, Effects, Stretch, leave_out, transform
+from .effects import Effects, leave_out, transform
 from .frames import SPACING, Frames, displaced, sequences
 from .roads import Road
+from .stretch import HEIGHT, Stretch
 
 Float = NDArray[np.float64]
 Sample = dict[str, Tensor]
@@ -129,7 +130,7 @@ class SliceDataset(Dataset[Sample]):
         path = displaced(exact, rng, settings.window, settings.direction_deg, settings.wander_length)
         cut = stretch(road, path, settings)
         if self.effects is not None:
-            leave_out(cut, self.effects, rng, settings.truth == "carriageway")
+            leave_out(cut, self.effects, rng)
             thin(cut, settings.points_per_slice, rng)
             transform(cut, self.effects, rng)
         return sample(cut, settings, rng, start.road, np.arange(settings.slices))
@@ -205,6 +206,7 @@ def stretch(road: Road, frames: Frames, settings: SliceSettings) -> Stretch:
         corridor=corridor,
         lines=lines,
         room=room,
+        carriageway=settings.truth == "carriageway",
     )
     if np.isfinite(room).any():
         y = cut.xyz[:, 1] - center[cut.number]

@@ -20,6 +20,7 @@ from ml.centerline.effects import (
     mirror,
     move,
     relight,
+    stand_alone,
     transform,
     turn_round,
 )
@@ -32,7 +33,8 @@ NONE = Effects(
     mirror=0.0,
     turn_round=0.0,
     crop=Crop(probability=0.0),
-    **dict.fromkeys(("dropout", "hidden", "empty", "jitter", "tilt", "plain", "contrast", "paint", "repaint"), 0.0),
+    **dict.fromkeys(("alone", "dropout", "hidden", "empty", "jitter", "tilt"), 0.0),
+    **dict.fromkeys(("plain", "contrast", "paint", "repaint"), 0.0),
     gamma=(1.0, 1.0),
     **dict.fromkeys(("falloff", "speckle", "patches", "stripes", "footprint", "colorless", "tint"), 0.0),
 )
@@ -43,11 +45,11 @@ def rng(seed: int = 0) -> np.random.Generator:
     return np.random.default_rng(seed)
 
 
-def cut(kind: str = "road", seed: int = 4) -> Stretch:
-    road = roads(kind)[0]  # type: ignore[arg-type]
+def cut(kind: str = "road", which: int = 0, seed: int = 4) -> Stretch:
+    road = roads(kind)[which]  # type: ignore[arg-type]
     assert road.truth is not None
     frames = displaced(along(road.truth.axis), rng(seed), 12.0, 2.0, 100.0).select(slice(40, 50))
-    return stretch(road, frames, SETTINGS)
+    return stretch(road, frames, SETTINGS.model_copy(update={"truth": kind}))
 
 
 def contents(one: Stretch) -> dict[str, np.ndarray]:
@@ -63,7 +65,7 @@ def same(one: dict[str, np.ndarray], other: dict[str, np.ndarray]) -> None:
 def test_effects_of_no_strength_change_nothing() -> None:
     one = cut()
     before = contents(one)
-    leave_out(one, NONE, rng(), False)
+    leave_out(one, NONE, rng())
     transform(one, NONE, rng())
     # A power of 1 is left, and intensities as a share of the largest.
     after = contents(one)
@@ -114,7 +116,7 @@ def test_cropped_sides_lie_in_their_limits_about_the_truth() -> None:
     lefts, rights = [], []
     for seed in range(60):
         one = cut()
-        crop_sides(one, crop, rng(seed), False)
+        crop_sides(one, crop, rng(seed))
         left, right = extents(one)
         assert max(left.max(), right.max()) <= 10.0
         assert min(left.min(), right.min()) > 0.5 * 6.0 - 0.6
@@ -129,7 +131,7 @@ def test_cropped_sides_lie_in_their_limits_about_the_truth() -> None:
 
 def test_steady_cuts_are_the_same_in_all_slices() -> None:
     one = cut()
-    crop_sides(one, Crop(probability=1.0, reach=(6.0, 10.0), share=0.5, steady=1.0), rng(1), False)
+    crop_sides(one, Crop(probability=1.0, reach=(6.0, 10.0), share=0.5, steady=1.0), rng(1))
     left, right = extents(one)
     assert np.ptp(left) < 0.8
     assert np.ptp(right) < 0.8
@@ -139,23 +141,52 @@ def test_a_carriageway_is_cut_outside_its_edge_lines() -> None:
     for share, least in ((0.0, 3.4), (0.75, 0.5)):
         one = cut("carriageway")
         assert np.isfinite(one.lines).all()
-        crop_sides(one, Crop(probability=1.0, beyond=(0.0, 3.0), share=share), rng(2), True)
+        crop_sides(one, Crop(probability=1.0, beyond=(0.0, 3.0), share=share), rng(2))
         for side, reach in enumerate(extents(one)):
             assert reach.max() <= min(one.lines[0, side] + 3.0, one.room[:, side].max()) + 1e-9
             assert reach.min() > least
     narrow = cut("carriageway")
     narrow.room[:] = 1.5
-    crop_sides(narrow, Crop(probability=1.0), rng(2), True)
+    crop_sides(narrow, Crop(probability=1.0), rng(2))
     assert max(reach.max() for reach in extents(narrow)) <= 1.5
     untouched = cut("carriageway")
-    crop_sides(untouched, Crop(probability=0.0), rng(2), True)
+    crop_sides(untouched, Crop(probability=0.0), rng(2))
     assert len(untouched.number) == len(cut("carriageway").number)
+
+
+@pytest.mark.parametrize("number", [0, 1])
+def test_a_carriageway_stands_alone(number: int) -> None:
+    """Beside its inner edge lies what lies beside the outer one, and at the edges' height."""
+    one, plain = cut("carriageway", number), cut("carriageway", number)
+    stand_alone(one)
+    edges = plain.paved_sides()
+    inner = int(np.isfinite(plain.room).all(axis=0).argmax())
+    sign = 1.0 if inner == 0 else -1.0
+
+    def beyond(stretch: Stretch, side: float, column: int) -> np.ndarray:
+        y = stretch.xyz[:, 1] - stretch.center[stretch.number]
+        return side * y - edges[stretch.number, column]
+
+    assert (np.diff(one.number) >= 0).all()
+    assert np.isinf(one.room).all()
+    outer = beyond(plain, -sign, 1 - inner)
+    kept = beyond(plain, sign, inner) <= 0.0
+    assert len(one.number) == kept.sum() + (outer > 0.0).sum()
+    np.testing.assert_allclose(
+        np.sort(beyond(one, sign, inner)[beyond(one, sign, inner) > 0.0]), np.sort(outer[outer > 0.0]), atol=1e-9
+    )
+    near = [
+        one.xyz[(beyond(one, *side) > low) & (beyond(one, *side) <= low + 0.5), 2]
+        for side, low in (((sign, inner), -0.5), ((sign, inner), 0.0))
+    ]
+    assert abs(np.median(near[0]) - np.median(near[1])) < 0.1
+    np.testing.assert_array_equal(one.center, plain.center)
 
 
 def test_a_slice_without_truth_is_cropped_all_the_same() -> None:
     one = cut()
     one.center[3] = np.nan
-    crop_sides(one, Crop(probability=1.0, reach=(5.0, 5.0), share=0.0), rng(), False)
+    crop_sides(one, Crop(probability=1.0, reach=(5.0, 5.0), share=0.0), rng())
     assert np.abs(one.xyz[one.number == 3, 1]).max() <= 5.0
     assert (one.number == 3).sum() > 20
 
@@ -385,7 +416,7 @@ def test_a_sequence_without_points_passes_through() -> None:
     one.keep(np.zeros(len(one.number), dtype=bool))
     for seed in range(5):
         copy = replace(one)
-        leave_out(copy, Effects(hidden=1.0), rng(seed), False)
+        leave_out(copy, Effects(hidden=1.0), rng(seed))
         transform(copy, Effects(), rng(seed))
         assert len(copy.xyz) == 0
 
