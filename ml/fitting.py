@@ -66,7 +66,7 @@ def fit(
     """
     configuration = run.configuration
     schedule: Schedule = configuration.schedule
-    optimizer = torch.optim.AdamW(_groups(model, schedule), lr=schedule.learning_rate)
+    optimizer = optimizer_of(model, schedule)
     state = run.saved(next(model.parameters()).device)
     first = 0
     if state is not None:
@@ -80,7 +80,7 @@ def fit(
         figures: list[Figures] = []
         for step, batch in enumerate(batches(epoch), start=epoch * steps_per_epoch):
             rate = learning_rate(schedule, step, schedule.epochs * steps_per_epoch)
-            figures.append(_step(model, optimizer, rate, schedule.clip, loss, batch))
+            figures.append(train_step(model, optimizer, rate, schedule.clip, loss, batch))
             progress("training", step / (schedule.epochs * steps_per_epoch))
         summary = {"epoch": epoch + 1, **_means(figures), "learning_rate": optimizer.param_groups[0]["lr"]}
         if validate is not None:
@@ -100,17 +100,25 @@ def learning_rate(schedule: Schedule, step: int, steps: int) -> float:
     return schedule.final_learning_rate + 0.5 * span * (1 + math.cos(math.pi * min(share, 1.0)))
 
 
-def _groups(model: nn.Module, schedule: Schedule) -> list[dict[str, Any]]:
-    """Return the parameters to decay and those not to: biases and the scales of norms are left as they are."""
+def optimizer_of(model: nn.Module, schedule: Schedule) -> torch.optim.AdamW:
+    """Return the optimiser of all weights; biases and the scales of norms don't decay."""
     matrices = [weight for weight in model.parameters() if weight.ndim > 1]
     vectors = [weight for weight in model.parameters() if weight.ndim <= 1]
-    return [
+    groups = [
         {"params": matrices, "weight_decay": schedule.weight_decay},
         {"params": vectors, "weight_decay": 0.0},
     ]
+    return torch.optim.AdamW(groups, lr=schedule.learning_rate)
 
 
-def _step(model: M, optimizer: torch.optim.Optimizer, rate: float, clip: float, loss: Loss[M], batch: Any) -> Figures:
+def train_step(
+    model: M, optimizer: torch.optim.Optimizer, rate: float, clip: float, loss: Loss[M], batch: Any
+) -> Figures:
+    """Change the weights by one batch; return the loss and its further figures.
+
+    Raises:
+        InputError: the loss is no longer finite.
+    """
     for group in optimizer.param_groups:
         group["lr"] = rate
     optimizer.zero_grad(set_to_none=True)

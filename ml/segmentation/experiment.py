@@ -7,7 +7,6 @@ synthetic=out/reference --output out/experiment``. What is trained already isn't
 from __future__ import annotations
 
 import argparse
-import math
 import shutil
 import sys
 from collections.abc import Mapping, Sequence
@@ -27,13 +26,15 @@ from synthroads_addon.core.scenario import apply_change
 from synthroads_addon.core.schema import Model, canonical_json, read_json, read_yaml
 
 from .evaluation import score, trained_model
-from .metrics import mean_and_deviation
 from .recipes import Data, SegmentationConfiguration
 from .sources import Source
+from .tables import by_test
 from .task import train
 from .training import PRETRAINING
 
 SHIPPED = Path(__file__).parents[1] / "configurations" / "experiments"
+RESULTS = "results.json"
+"""File with the scores of all variants, seeds and tests, in an experiment's folder."""
 
 
 class Variant(Model):
@@ -149,7 +150,7 @@ def run_experiment(
             else:
                 tests = _tested(configuration, folder, output / name / f"seed-{seed}.json", progress)
             results[name][str(seed)] = tests
-            write_file(output / "results.json", canonical_json(results).encode(), overwrite=True)
+            write_file(output / RESULTS, canonical_json(results).encode(), overwrite=True)
             write_file(output / "table.md", table(experiment.title, results).encode(), overwrite=True)
     return results
 
@@ -206,25 +207,7 @@ def table(title: str, results: Mapping[str, Mapping[str, Any]]) -> str:
         title: above the tables.
         results: variant -> seed -> test -> scores as of `Confusion.to_dict`.
     """
-    done = {name: list(seeds.values()) for name, seeds in results.items() if seeds}
-    lines = [f"# {title}", "", "IoU in %, mean (standard deviation, ddof = 1) over seeds; - where undefined.", ""]
-    first = next(iter(done.values()))[0] if done else {}
-    for test, scores in first.items():
-        lines += [f"## {test}", "", f"| class | points | {' | '.join(done)} |", "|---|--:|" + "--:|" * len(done)]
-        for label, row in scores["classes"].items():
-            cells = [_cell([run[test]["classes"][label]["iou"] for run in runs]) for runs in done.values()]
-            lines.append(f"| {label} | {row['support']:,} | {' | '.join(cells)} |")
-        cells = [_cell([run[test]["mean_iou"] for run in runs]) for runs in done.values()]
-        lines += [f"| mean | {scores['points']:,} | {' | '.join(cells)} |", ""]
-    counts = ", ".join(f"{name} {len(runs)}" for name, runs in done.items())
-    return "\n".join([*lines, f"Seeds: {counts}.", ""])
-
-
-def _cell(values: Sequence[float | None]) -> str:
-    mean, deviation = mean_and_deviation([float("nan") if value is None else 100.0 * value for value in values])
-    if math.isnan(mean):
-        return "-"
-    return f"{mean:.1f}" if math.isnan(deviation) else f"{mean:.1f} ({deviation:.1f})"
+    return f"# {title}\n\n{by_test(results)}\n"
 
 
 def parser() -> argparse.ArgumentParser:

@@ -21,18 +21,30 @@ from .recipes import SegmentationConfiguration, mapped_intensities, plan
 from .sources import Source, read_tiles
 from .tiles import Scaling, Tile, scalings
 
+SMALLEST_SHARE = 0.25
+"""Of a crop's points: tiles with fewer are left out of training, unless all have."""
+
 
 def read_domains(configuration: SegmentationConfiguration) -> dict[str, list[Tile]]:
     """Return the training tiles by domain, thinned out; intensities mapped where the set-up says so.
+
+    A grid of tiles cuts slivers off at a road's ends. As every tile has as many crops, they would take up half of a
+    training on short roads.
 
     Raises:
         InputError: there are none, or they don't fit the configuration.
     """
     domains: dict[str, list[Tile]] = {}
     for domain, sources in configuration.needed().items():
-        # Scenes of two domains may have one name: their intensities are scaled apart.
-        tiles = [tile for source in sources for tile in thinned(source, configuration)]
-        domains[domain] = [replace(tile, scene=f"{domain}/{tile.scene}") for tile in tiles if len(tile)]
+        # Scenes of two sources may have one name: their intensities are scaled apart.
+        tiles = [
+            replace(tile, scene=f"{domain}/{place}/{tile.scene}")
+            for place, source in enumerate(sources)
+            for tile in thinned(source, configuration)
+        ]
+        least = SMALLEST_SHARE * configuration.crop_points
+        enough = [tile for tile in tiles if len(tile) >= least]
+        domains[domain] = enough or [tile for tile in tiles if len(tile)]
     if configuration.set_up == "mixed_mapped":
         domains["synthetic"] = mapped_intensities(domains["synthetic"], domains["real"])
     return domains

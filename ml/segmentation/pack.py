@@ -8,7 +8,7 @@ from __future__ import annotations
 import argparse
 import json
 import sys
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -151,13 +151,18 @@ def within(tiles: Iterable[Packed], limit: int, seed: int) -> list[Packed]:
     return [given[place] for place in sorted(chosen)]
 
 
-def summary(tiles: list[Packed], size: int) -> dict[str, Any]:
-    """Return what a packed file holds, as JSON data."""
-    points = sum(int(tile.notes["points"]) for tile in tiles)
+def summary(notes: Sequence[Mapping[str, Any]], size: int) -> dict[str, Any]:
+    """Return what a packed file holds, as JSON data; ``crops`` is how many of the recipe's its points make up.
+
+    Args:
+        notes: of each tile.
+        size: of the file, bytes.
+    """
+    points = sum(int(tile["points"]) for tile in notes)
     return {
         "bytes": size,
-        "tiles": len(tiles),
-        "scenes": len({tile.notes["scene"] for tile in tiles}),
+        "tiles": len(notes),
+        "scenes": len({tile["scene"] for tile in notes}),
         "points": points,
         "bytes_per_point": round(size / max(points, 1), 3),
         "crops": points // CROP,
@@ -199,7 +204,7 @@ def main(argv: list[str] | None = None) -> int:
     except InputError as error:
         print(f"error: {error}", file=sys.stderr)
         return 2
-    print(json.dumps(summary(tiles, size), indent=1))
+    print(json.dumps(summary([tile.notes for tile in tiles], size), indent=1))
     return 0
 
 

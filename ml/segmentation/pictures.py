@@ -4,17 +4,22 @@ from __future__ import annotations
 
 import io
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from PIL import Image
 
 from synthroads_addon.core.cloud.labels import class_scheme
 
 from .metrics import IGNORED
 from .tiles import Tile
 
-_PIXELS = 700
-_UNKNOWN = (1.0, 1.0, 1.0)
+_PIXELS = 490
+"""Of a view's longer side: as many as it has in the picture, so that none is lost."""
+_UNKNOWN = (0.07, 0.07, 0.09)
+"""Dark, as road markings are drawn white."""
+_WRONG = np.array([[0.75, 0.75, 0.75], [0.9, 0.1, 0.1]])
 
 
 def comparison(tile: Tile, predicted: NDArray[np.int16], names: Sequence[str]) -> bytes:
@@ -29,18 +34,25 @@ def comparison(tile: Tile, predicted: NDArray[np.int16], names: Sequence[str]) -
     from matplotlib.patches import Patch
 
     colors = class_colors(names)
-    figure = Figure(figsize=(15, 5.6), layout="constrained")
-    axes = figure.subplots(1, 3)
     wrong = np.where(tile.segment == IGNORED, IGNORED, (predicted != tile.segment).astype(np.int16))
-    shown = ((tile.segment, colors, "truth"), (predicted, colors, "predicted"))
-    for place, (labels, table, title) in enumerate((*shown, (wrong, np.array([[0.8] * 3, [0.85, 0.1, 0.1]]), "wrong"))):
-        axes[place].imshow(top_view(tile.coord, labels, table), origin="lower", interpolation="nearest")
-        axes[place].set(title=title, xticks=[], yticks=[])
-    patches = [Patch(color=color, label=name) for name, color in zip(names, colors, strict=True)]
+    shown = ((tile.segment, colors, "truth"), (predicted, colors, "predicted"), (wrong, _WRONG, "wrong"))
+    views = [top_view(tile.coord, labels, table) for labels, table, _ in shown]
+    figure = Figure(figsize=(15, 0.8 + 4.9 * views[0].shape[0] / _PIXELS), dpi=100, layout="constrained")
+    for axes, view, (_, _, title) in zip(figure.subplots(1, 3), views, shown, strict=True):
+        axes.imshow(view, origin="lower", interpolation="nearest")
+        axes.set(title=title, xticks=[], yticks=[])
+    patches = [Patch(facecolor=color, edgecolor="0.5", label=name) for name, color in zip(names, colors, strict=True)]
     figure.legend(handles=patches, loc="outside lower center", ncols=min(len(patches), 9), frameon=False)
+    return _small_png(figure)
+
+
+def _small_png(figure: Any) -> bytes:
+    """Return a figure as a PNG of at most 256 colours."""
     content = io.BytesIO()
-    figure.savefig(content, format="png", dpi=100)
-    return content.getvalue()
+    figure.savefig(content, format="png")
+    reduced = io.BytesIO()
+    Image.open(content).convert("RGB").quantize(256, dither=Image.Dither.NONE).save(reduced, "PNG", optimize=True)
+    return reduced.getvalue()
 
 
 def class_colors(names: Sequence[str]) -> NDArray[np.float64]:

@@ -101,7 +101,7 @@ def _relabelled(tile: Tile, table: NDArray[np.int16]) -> Tile:
 
 
 def _folder_tiles(path: Path, scheme: ClassScheme, source: Source) -> Iterator[Tile]:
-    root = _pointcept_root(path)
+    root = pointcept_root(path)
     if root is not None:
         yield from pointcept_tiles(root, scheme, source.split)
         return
@@ -110,10 +110,10 @@ def _folder_tiles(path: Path, scheme: ClassScheme, source: Source) -> Iterator[T
     if not clouds:
         raise MissingFileError(str(folder), None, "holds neither tiles of a data set nor clouds")
     for cloud in clouds:
-        yield from cloud_tiles(cloud, scheme, source)
+        yield from cloud_tiles(cloud, scheme, source, cloud.relative_to(folder).with_suffix("").as_posix())
 
 
-def _pointcept_root(path: Path) -> Path | None:
+def pointcept_root(path: Path) -> Path | None:
     """Return the folder with ``classes.json``: this one, or the only one of a data set."""
     if (path / "classes.json").is_file():
         return path
@@ -137,12 +137,21 @@ def pointcept_tiles(root: Path, scheme: ClassScheme, split: str | None) -> Itera
     except (KeyError, TypeError, ValueError):
         raise InputError(str(root / "classes.json"), None, "must hold lists of classes and their ids") from None
     table = table_between(names, scheme, str(root))
+    for folder in pointcept_folders(root, split):
+        yield _pointcept_tile(folder, table)
+
+
+def pointcept_folders(root: Path, split: str | None) -> list[Path]:
+    """Return the folders of the tiles of a split, or of all, by name.
+
+    Raises:
+        MissingFileError: there is no such split, or it is empty.
+    """
     folders = sorted(file.parent for file in root.glob(f"{split or '*'}/*/coord.npy"))
     if not folders:
         splits = ", ".join(sorted(path.name for path in root.iterdir() if path.is_dir())) or "none"
         raise MissingFileError(f"{root}: split", split, f"holds no tiles; there are the splits {splits}")
-    for folder in folders:
-        yield _pointcept_tile(folder, table)
+    return folders
 
 
 def _pointcept_tile(folder: Path, table: NDArray[np.int16]) -> Tile:
@@ -183,10 +192,16 @@ def _array(folder: Path, name: str, entry: tuple[int, ...], kind: str) -> NDArra
     return np.asarray(array)
 
 
-def cloud_tiles(path: Path, scheme: ClassScheme, source: Source) -> Iterator[Tile]:
+def cloud_tiles(path: Path, scheme: ClassScheme, source: Source, scene: str | None = None) -> Iterator[Tile]:
     """Yield the square tiles of one cloud; memory holds one of them.
 
     The classes are those of the project's own clouds, or of another's attribute by the source's mapping.
+
+    Args:
+        path: the cloud.
+        scheme: classes that are learned.
+        source: mapping, and edge of the tiles.
+        scene: name that tells the cloud from the source's others; the file's if not given.
 
     Raises:
         InputError: the cloud has no labels of its own and there is no mapping, or it is damaged.
@@ -198,7 +213,7 @@ def cloud_tiles(path: Path, scheme: ClassScheme, source: Source) -> Iterator[Til
         with TileSorter(source.tile, origin, Path(folder)) as sorter:
             sorter.add(labelled_blocks(cloud, scheme, source))
             for part in sorter.tiles():
-                yield tile_of(part.points, path.stem, part.corner, scale)
+                yield tile_of(part.points, scene or path.stem, part.corner, scale)
 
 
 def tile_of(points: PointBlock, scene: str, origin: NDArray[np.float64], scale: float) -> Tile:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
 
@@ -78,8 +78,6 @@ def _fit(
     tiles = [tile for found in domains.values() for tile in found]
     device = next(model.parameters()).device
     classes = len(class_names(configuration.scheme()))
-    shares = class_shares(tiles, classes)
-    weights = class_weights(shares) if configuration.class_weights else np.ones_like(shares)
     batches = partial(
         epoch_batches,
         configuration,
@@ -95,7 +93,7 @@ def _fit(
             run,
             batches,
             math.ceil(configuration.crops_per_tile * len(tiles) / configuration.batch),
-            _loss(configuration, torch.from_numpy(weights.astype(np.float32)).to(device)),
+            objective(configuration, tiles, device),
             validate=_validation(configuration, validation, device) if validation else None,
             progress=progress,
         )
@@ -119,9 +117,18 @@ def smoothed_loss(scores: Tensor, truth: Tensor, weights: Tensor, smoothing: flo
     return (losses * weight).sum() / weight.sum().clamp_min(1e-12)
 
 
-def _loss(
-    configuration: SegmentationConfiguration, weights: Tensor
+def objective(
+    configuration: SegmentationConfiguration, tiles: Sequence[Tile], device: torch.device
 ) -> Callable[[nn.Module, Item], tuple[Tensor, Figures]]:
+    """Return what is minimised, its classes weighed by their shares of the training tiles.
+
+    Raises:
+        InputError: no point has a label.
+    """
+    shares = class_shares(tiles, len(class_names(configuration.scheme())))
+    shares = class_weights(shares) if configuration.class_weights else np.ones_like(shares)
+    weights = torch.from_numpy(shares.astype(np.float32)).to(device)
+
     def loss(model: nn.Module, batch: Item) -> tuple[Tensor, Figures]:
         scores, truth = scores_of(model, batch), batch["segment"]
         value = smoothed_loss(scores, truth, weights, configuration.label_smoothing)

@@ -27,6 +27,8 @@ from synthroads_addon.core.dataset.manifest import (
 from synthroads_addon.core.dataset.recipe import Recipe, load_recipe, recipe_names, scene_jobs
 from synthroads_addon.core.errors import InputError, MissingFileError
 from synthroads_addon.core.materials import materials
+from synthroads_addon.core.parameters.model_furniture import Gantry
+from synthroads_addon.core.parameters.sampler import sample_road
 from tests.core.conftest import make_points
 
 ORIGIN = np.array([294_000.0, 5_628_000.0, 180.0])
@@ -68,6 +70,21 @@ def test_stand_in_set_is_of_another_domain_and_trains_without_gantries() -> None
     devices = {split: {scenario.scan.device for scenario in scenarios} for split, scenarios in splits.items()}
     assert devices["train"] == devices["test"] != devices["test_tripod"]
     assert set(jobs[0].scenario.own_materials()) <= set(materials())
+
+
+def test_every_road_of_the_small_sets_for_gantries_has_some() -> None:
+    changes = [("fidelity", "draft"), ("road.length", 240), ("road.half_width", 35)]  # as docs/segmentation.md has it
+    small = load_recipe("standin")
+    groups = [group.model_copy(update={"set": {**group.set, **dict(changes)}}) for group in small.groups]
+    jobs = scene_jobs(load_recipe("small-gantries")) + scene_jobs(small.model_copy(update={"groups": tuple(groups)}))
+    kinds: dict[str, set[str]] = {}
+    for job in jobs:
+        road = sample_road(job.scenario.road, job.scenario.seed)
+        found = [item.kind for item in road.objects.values() if isinstance(item, Gantry)]
+        assert bool(found) == (job.name.startswith("gantries")), job.name
+        kinds.setdefault(job.split, set()).update(found)
+    assert kinds["train"] == {"one_sided", "two_sided", "cantilever"}, "what is to be learned"
+    assert kinds["test_gantries"] == kinds["train"]
 
 
 def test_a_scene_does_not_depend_on_the_others() -> None:

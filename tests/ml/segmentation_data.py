@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
+from ml.segmentation.recipes import SegmentationConfiguration
 from ml.segmentation.tiles import Tile
 from synthroads_addon.core.cloud.labels import class_scheme
 from synthroads_addon.core.cloud.points import PointBlock
@@ -83,3 +85,23 @@ def write_cloud(path: Path, block: PointBlock) -> Path:
     with open_writer(path, 25832, block.xyz[0], 65535.0, scheme=scheme) as writer:
         writer.write(block)
     return path
+
+
+def toy(data: Path, **changes: Any) -> SegmentationConfiguration:
+    """Return a configuration that is trained within a second or two."""
+    sources = {name: [{"path": str(data / name), "split": "train"}] for name in ("real", "synthetic")}
+    tests = {"unseen": [{"path": str(data / "real"), "split": "test"}]}
+    base = {
+        "task": "segmentation",
+        "threads": 1,
+        "device": "cpu",
+        "voxel": 0.3,
+        "crop_points": 800,
+        "crops_per_tile": 4,
+        "batch": 4,
+        "set_up": "real",
+        "network": {"preset": "S", "width": 8, "radius": 0.9, "neighbours": 8, "dropout": 0.1},
+        "schedule": {"epochs": 2},
+        "data": {**sources, "tests": tests},
+    }
+    return SegmentationConfiguration.from_dict({**base, **changes})

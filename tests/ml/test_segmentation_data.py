@@ -166,6 +166,21 @@ def test_data_set_and_clouds_give_the_same_points(tmp_path: Path) -> None:
         next(read_tiles(Source(path=str(tmp_path / "nowhere")), class_scheme("5"), None))
 
 
+def test_clouds_of_one_name_are_scenes_of_their_own(tmp_path: Path) -> None:
+    """The scenes of a data set all hold a ``cloud.laz``; each has its own scanner, perhaps, and its own scaling."""
+    for name, gain in (("a", 1.0), ("b", 0.1)):
+        (tmp_path / name).mkdir()
+        block = road_block(3000, 1)
+        write_cloud(tmp_path / name / "cloud.laz", replace(block, intensity=gain * block.intensity))
+    scheme = class_scheme("5")
+    tiles = list(read_tiles(Source(path=str(tmp_path)), scheme, None))
+    found = scalings(tiles, "robust")
+    assert list(found) == ["a/cloud", "b/cloud"]
+    assert found["a/cloud"].span == pytest.approx(10.0 * found["b/cloud"].span, rel=0.01)
+    alone = read_tiles(Source(path=str(tmp_path / "a" / "cloud.laz")), scheme, None)
+    assert {tile.scene for tile in alone} == {"cloud"}
+
+
 def test_clouds_of_others_need_a_mapping(tmp_path: Path) -> None:
     header = laspy.LasHeader(point_format=6, version="1.4")
     header.scales = np.full(3, 0.001)

@@ -23,12 +23,13 @@ from ml.segmentation.experiment import configurations, load_experiment, table
 from ml.segmentation.loading import epoch_batches, read_domains
 from ml.segmentation.metrics import IGNORED
 from ml.segmentation.network import build
-from ml.segmentation.recipes import SegmentationConfiguration
+from ml.segmentation.recipes import Data
+from ml.segmentation.sources import Source
 from ml.segmentation.tiles import scalings
 from ml.segmentation.training import PRETRAINING, smoothed_loss
 from ml.tasks import kinds
 from synthroads_addon.core.errors import InputError
-from tests.ml.segmentation_data import road_block, road_tile, write_cloud, write_pointcept
+from tests.ml.segmentation_data import road_block, road_tile, toy, write_cloud, write_pointcept
 
 torch.set_num_threads(1)
 
@@ -48,26 +49,6 @@ def data(tmp_path_factory: pytest.TempPathFactory) -> Path:
             tiles = [road_tile(3000, seed + k, f"{name}{k}", gain) for k in range(2)]
             write_pointcept(folder / name, split, tiles)
     return folder
-
-
-def toy(data: Path, **changes: Any) -> SegmentationConfiguration:
-    """Return a configuration that is trained within a second or two."""
-    sources = {name: [{"path": str(data / name), "split": "train"}] for name in ("real", "synthetic")}
-    tests = {"unseen": [{"path": str(data / "real"), "split": "test"}]}
-    base = {
-        "task": "segmentation",
-        "threads": 1,
-        "device": "cpu",
-        "voxel": 0.3,
-        "crop_points": 800,
-        "crops_per_tile": 4,
-        "batch": 4,
-        "set_up": "real",
-        "network": {"preset": "S", "width": 8, "radius": 0.9, "neighbours": 8, "dropout": 0.1},
-        "schedule": {"epochs": 2},
-        "data": {**sources, "tests": tests},
-    }
-    return SegmentationConfiguration.from_dict({**base, **changes})
 
 
 def weights(folder: Path) -> dict[str, torch.Tensor]:
@@ -174,6 +155,37 @@ def test_every_set_up_and_option_trains(data: Path, tmp_path: Path) -> None:
         assert 0.0 <= metrics["unseen_mean_iou"] <= 1.0
         assert metrics["tests"]["unseen"]["points"] == 6000
     assert set(metrics["training_points"]) == {"real", "synthetic"}
+
+
+def test_slivers_are_left_out_of_training_unless_there_is_nothing_else(tmp_path: Path) -> None:
+    write_pointcept(tmp_path / "real", "train", [road_tile(count, 1) for count in (3000, 150, 3000)])
+    assert [len(tile) > 1000 for tile in read_domains(toy(tmp_path))["real"]] == [True, True]
+    assert len(read_domains(toy(tmp_path, crop_points=100_000))["real"]) == 3
+
+
+def test_scenes_of_one_name_in_two_sources_are_scaled_apart(data: Path) -> None:
+    one = Source(path=str(data / "real"), split="train")
+    configuration = toy(data).model_copy(update={"data": Data(real=(one, one))})
+    tiles = read_domains(configuration)["real"]
+    assert len(tiles) == 4
+    assert len(scalings(tiles, "robust")) == 4
+
+
+@pytest.mark.parametrize("name", ["real-synthetic-mixed-small", "gantries-small"])
+def test_small_experiments_run_from_end_to_end(tmp_path: Path, name: str) -> None:
+    for split in ("train", "test", "test_tripod", "test_gantries"):
+        write_pointcept(tmp_path / "real", split, [road_tile(2000, 1, split)], scheme="17")
+    five = name == "real-synthetic-mixed-small"
+    write_pointcept(tmp_path / "synthetic", "train", [road_tile(2000, 2)], scheme="5" if five else "17")
+    words = [name, "--output", str(tmp_path / "out"), "--seeds", "1", "2", "--quiet"]
+    words += [f"--data={each}={tmp_path / each}" for each in ("real", "synthetic")]
+    changes = ("threads=1", "network.width=8", "voxel=0.4", "crop_points=300", "schedule.epochs=1")
+    assert experiments.main([*words, *(f"--set={change}" for change in changes), "--set=fine_tuning.epochs=1"]) == 0
+    text = (tmp_path / "out" / "table.md").read_text()
+    variants = load_experiment(name).variants
+    assert f"| class | points | {' | '.join(variants)} |" in text
+    assert text.count("**") // 2 == (2 if five else 1)
+    assert f"Seeds: {', '.join(f'{variant} 2' for variant in variants)}." in text
 
 
 def test_clouds_are_laid_over_as_often_as_asked(data: Path) -> None:

@@ -1,0 +1,153 @@
+"""Project how long a training takes on this machine: seconds per step, measured on a few, times all of its steps.
+
+Example: ``python -m ml.segmentation.projection segmentation --steps 3 --output projection.json``. Tiles in Pointcept's
+layout are counted; only a few are read.
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from statistics import median
+from typing import Any
+
+import torch
+
+from ml.configuration import load_configuration
+from ml.fitting import chosen_device, optimizer_of, train_step
+from synthroads_addon.core.errors import InputError
+from synthroads_addon.core.files import write_file
+from synthroads_addon.core.progress import peak_memory_mb
+from synthroads_addon.core.schema import canonical_json
+
+from .classes import class_names
+from .crops import Item, Seeds
+from .loading import epoch_batches, thinned
+from .network import build
+from .recipes import SegmentationConfiguration
+from .sources import Source, pointcept_folders, pointcept_root
+from .tiles import Tile, scalings
+from .training import objective
+
+_TILES = 8
+"""Tiles that the measured steps' crops are cut from."""
+
+
+def projection(configuration: SegmentationConfiguration, steps: int) -> dict[str, Any]:
+    """Return seconds per step, the number of steps and the hours of a whole training, as JSON data.
+
+    A step is all that a training does for a batch: crops cut out, neighbours found, loss, gradients, weights changed.
+    One more step goes first and isn't counted.
+
+    Raises:
+        InputError: the data are missing, or their tiles have fewer points than a crop.
+    """
+    device = chosen_device(configuration)
+    sources = [source for found in configuration.needed().values() for source in found]
+    count = sum(tile_count(source, configuration) for source in sources)
+    wall, cpu = timed_steps(configuration, _first_tiles(sources, configuration), steps, device)
+    per_epoch = math.ceil(configuration.crops_per_tile * count / configuration.batch)
+    whole = per_epoch * configuration.schedule.epochs
+    return {
+        "title": configuration.title,
+        "device": str(device),
+        "threads": torch.get_num_threads(),
+        "tiles": count,
+        "batch_points": configuration.batch * configuration.crop_points,
+        "steps_measured": steps,
+        "seconds_per_step": round(wall, 4),
+        "cpu_seconds_per_step": round(cpu, 4),
+        "steps_per_epoch": per_epoch,
+        "steps": whole,
+        "hours": round(whole * wall / 3600.0, 2),
+        "peak_memory_mb": peak_memory_mb(),
+    }
+
+
+def tile_count(source: Source, configuration: SegmentationConfiguration) -> int:
+    """Return how many tiles a source has; those in Pointcept's layout are counted without being read."""
+    path = Path(source.path)
+    root = pointcept_root(path) if path.is_dir() else None
+    if root is not None:
+        return len(pointcept_folders(root, source.split))
+    return sum(1 for _ in thinned(source, configuration))
+
+
+def _first_tiles(sources: list[Source], configuration: SegmentationConfiguration) -> list[Tile]:
+    """Return the first tiles with as many points as a crop has."""
+    found: list[Tile] = []
+    for tile in (tile for source in sources for tile in thinned(source, configuration)):
+        if len(tile) >= configuration.crop_points:
+            found.append(tile)
+        if len(found) == _TILES:
+            break
+    if not found:
+        raise InputError("crop_points", configuration.crop_points, "must not exceed the points of every tile")
+    return found
+
+
+def timed_steps(
+    configuration: SegmentationConfiguration, tiles: list[Tile], steps: int, device: torch.device
+) -> tuple[float, float]:
+    """Return the median seconds of a step, and those of the processor."""
+    model = build(configuration).to(device).train()
+    optimizer = optimizer_of(model, configuration.schedule)
+    loss = objective(configuration, tiles, device)
+    wall, cpu = [], []
+    batches = _endless(configuration, tiles, device)
+    for _ in range(steps + 1):
+        begin = time.perf_counter(), time.process_time()
+        batch = next(batches)
+        train_step(model, optimizer, configuration.schedule.learning_rate, configuration.schedule.clip, loss, batch)
+        wall.append(time.perf_counter() - begin[0])
+        cpu.append(time.process_time() - begin[1])
+    return median(wall[1:]), median(cpu[1:])
+
+
+def _endless(configuration: SegmentationConfiguration, tiles: list[Tile], device: torch.device) -> Iterator[Item]:
+    """Yield whole batches, epoch after epoch."""
+    enough = configuration.model_copy(update={"crops_per_tile": configuration.batch})
+    seeds = Seeds(tiles, len(class_names(configuration.scheme())), configuration.balanced)
+    scaling = scalings(tiles, configuration.intensity)
+    epoch = 0
+    while True:
+        yield from epoch_batches(enough, tiles, [len(tiles)], scaling, seeds, device, epoch)
+        epoch += 1
+
+
+def parser() -> argparse.ArgumentParser:
+    """Return the parser of the command."""
+    made = argparse.ArgumentParser(prog="python -m ml.segmentation.projection", description=__doc__)
+    made.add_argument(
+        "configuration", metavar="CONFIGURATION", help="shipped configuration of a segmentation, or a file"
+    )
+    made.add_argument("--steps", type=int, default=3, metavar="N", help="steps that are measured (default: 3)")
+    made.add_argument("--set", action="append", default=[], metavar="PATH=VALUE", dest="changes", help="of a field")
+    made.add_argument("--output", type=Path, metavar="FILE", help="JSON file to write as well")
+    return made
+
+
+def main(argv: list[str] | None = None) -> int:
+    """Run the command; return its exit code."""
+    arguments = parser().parse_args(argv)
+    try:
+        if arguments.steps < 1:
+            raise InputError("--steps", arguments.steps, "must be 1 or more")
+        kinds = {"segmentation": SegmentationConfiguration}
+        configuration = load_configuration(arguments.configuration, kinds, arguments.changes)
+        text = canonical_json(projection(configuration, arguments.steps))
+        if arguments.output:
+            write_file(arguments.output, text.encode(), overwrite=True)
+    except InputError as error:
+        print(f"error: {error}", file=sys.stderr)
+        return 2
+    print(text)
+    return 0
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())

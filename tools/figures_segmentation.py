@@ -1,0 +1,184 @@
+"""Write the tables and pictures of docs/segmentation.md from what was trained and measured.
+
+    python tools/figures_segmentation.py --small out/segmentation --mixing out/mixing-small \\
+        --gantries out/gantries-small --run out/any-scanner-1 --run out/any-scanner-2 --real REAL_FOLDER \\
+        --prediction out/prediction/prediction.json --packed out/train.npz --projection out/projection.json \\
+        --document docs/segmentation.md --pictures docs/pictures
+
+What isn't given is left out, and its tables in the document stay as they are. Runs are one network trained with several
+seeds; they are scored here on the labelled real clouds, and the first one's classes are drawn. Everything else was
+measured by the commands that stand beside the tables.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+ROOT = Path(__file__).resolve().parents[1]
+sys.path.insert(0, str(ROOT))
+
+from ml.fitting import chosen_device  # noqa: E402
+from ml.runs import HISTORY, METRICS, Run  # noqa: E402
+from ml.segmentation.evaluation import score, trained_model  # noqa: E402
+from ml.segmentation.experiment import RESULTS  # noqa: E402
+from ml.segmentation.pack import CROP, summary  # noqa: E402
+from ml.segmentation.packing import PackReader  # noqa: E402
+from ml.segmentation.pictures import comparison  # noqa: E402
+from ml.segmentation.recipes import SegmentationConfiguration  # noqa: E402
+from ml.segmentation.sources import Source  # noqa: E402
+from ml.segmentation.tables import by_class, by_test, cell  # noqa: E402
+from ml.segmentation.training import PRETRAINING  # noqa: E402
+from synthroads_addon.core.errors import InputError, SynthRoadsError  # noqa: E402
+from synthroads_addon.core.files import write_file  # noqa: E402
+from synthroads_addon.core.marked import replaced  # noqa: E402
+from synthroads_addon.core.schema import read_json  # noqa: E402
+
+REAL_CLOUDS = {"semantickitti": "semkitti_seq00_000000.laz", "ign": "ign_lidarhd_street.laz"}
+"""Mapping of classes, which names table and picture, and the file in the folder of real clouds."""
+_WHOLE = 1000.0
+"""Edge of the tiles that real clouds are cut into, m: the largest, so that each is one."""
+
+
+def small(folder: Path) -> str:
+    """Return the scores of a trained run's first test, and what its training took."""
+    metrics = read_json(folder / METRICS)
+    if not metrics["tests"]:
+        raise InputError(str(folder), None, "has no test")
+    name, scores = next(iter(metrics["tests"].items()))
+    seconds = sum(epoch["seconds"] for epoch in read_json(folder / HISTORY))
+    told = f"{metrics['parameters']:,} weights, trained in {seconds:,.0f} s on {metrics['device']}, scored on: {name}."
+    return f"{by_class([scores])}\n\n{told}"
+
+
+def experiment(folder: Path) -> str:
+    """Return the tables of an experiment, one per test, with the seconds that its trainings took."""
+    results: dict[str, dict[str, Any]] = read_json(folder / RESULTS)
+    seconds = {
+        name: [training_seconds(folder / name / f"seed-{seed}") for seed in seeds] for name, seeds in results.items()
+    }
+    cells = " | ".join(cell(values) for values in seconds.values() if values)
+    return by_test(results, [f"| *training, s* |  | {cells} |"])
+
+
+def training_seconds(run: Path) -> float:
+    """Return how long the training of a run took, that of what it began with included; NaN if it wasn't trained."""
+    parts = [path for path in (run / HISTORY, run / PRETRAINING / HISTORY) if path.is_file()]
+    if not parts:
+        return float("nan")
+    return sum(epoch["seconds"] for path in parts for epoch in read_json(path))
+
+
+def real(runs: Sequence[Path], folder: Path, pictures: Path) -> dict[str, str]:
+    """Score the runs on the labelled real clouds; return their tables and draw the first run's classes."""
+    found: dict[str, list[dict[str, Any]]] = {name: [] for name in REAL_CLOUDS}
+    for place, path in enumerate(runs):
+        run = Run.open(path, {"segmentation": SegmentationConfiguration})
+        device = chosen_device(run.configuration)
+        model = trained_model(run, device)
+        for name, file in REAL_CLOUDS.items():
+            source = Source(path=str(folder / file), mapping=name, tile=_WHOLE)
+            confusion, shown = score(model, run.configuration, [source], device)
+            found[name].append(confusion.to_dict())
+            if place == 0 and shown is not None:
+                picture = comparison(*shown, source.targets(run.configuration.scheme()))
+                write_file(pictures / f"segmentation-{name}.png", picture, overwrite=True)
+    note = {
+        name: f"{scores[0]['ignored']:,} points without such a class don't count." for name, scores in found.items()
+    }
+    return {f"real-{name}": f"{by_class(scores)}\n\n{note[name]}" for name, scores in found.items()}
+
+
+def prediction(file: Path) -> str:
+    """Return what `tools/measure_prediction.py` found as a table."""
+    told = read_json(file)
+    changed = ", ".join(told["changed"]) or "none"
+    head = ("points", "LAZ (MB)", "points/s", "seconds", "peak memory (MB)", "attributes", "changed")
+    row = (told["points"], told["bytes"] / 1e6, told["points_per_second"], told["seconds"], told["peak_memory_mb"])
+    return _table(head, [*(f"{value:,.0f}" for value in row), str(told["attributes"]), changed])
+
+
+def packed(file: Path) -> str:
+    """Return what a packed file holds as a table."""
+    told = summary(PackReader(file).notes, file.stat().st_size)
+    head = ("file (MB)", "roads", "tiles", "points", "bytes per point", f"crops of {CROP:,} points")
+    cells = (f"{told['bytes'] / 1e6:.1f}", *(f"{told[name]:,}" for name in ("scenes", "tiles", "points")))
+    return _table(head, [*cells, f"{told['bytes_per_point']:.2f}", f"{told['crops']:,}"])
+
+
+def projection(file: Path) -> str:
+    """Return what `ml.segmentation.projection` found as a table."""
+    told = read_json(file)
+    head = ("tiles", "points of a batch", "s per step", "threads", "steps", "hours in all", "peak memory (MB)")
+    numbers = (told["threads"], told["steps"], told["hours"], told["peak_memory_mb"])
+    cells = [f"{told['tiles']:,}", f"{told['batch_points']:,}", f"{told['seconds_per_step']:.1f}"]
+    return _table(head, [*cells, *(f"{value:,.0f}" for value in numbers)])
+
+
+def _table(head: Sequence[str], row: Sequence[str]) -> str:
+    return f"| {' | '.join(head)} |\n|{'--:|' * len(head)}\n| {' | '.join(row)} |"
+
+
+READERS = {
+    "small": small,
+    "mixing": experiment,
+    "gantries": experiment,
+    "prediction": prediction,
+    "packed": packed,
+    "projection": projection,
+}
+"""What makes a table out of a folder or file; the names are those of the options and of the tables."""
+
+
+def expected(arguments: argparse.Namespace) -> list[str]:
+    """Return the names of the tables that will be made."""
+    names = [name for name in READERS if getattr(arguments, name)]
+    return names + ([f"real-{name}" for name in REAL_CLOUDS] if arguments.real else [])
+
+
+def tables(arguments: argparse.Namespace) -> Mapping[str, str]:
+    """Return the document's tables by name."""
+    found = {name: read(getattr(arguments, name)) for name, read in READERS.items() if getattr(arguments, name)}
+    return found | (real(arguments.run, arguments.real, arguments.pictures) if arguments.real else {})
+
+
+def arguments_of(words: Sequence[str] | None) -> argparse.Namespace:
+    """Return the command line's arguments."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--small", type=Path, metavar="RUN", help="the small training, `segmentation-small`")
+    parser.add_argument("--mixing", type=Path, metavar="DIR", help="the experiment on real, synthetic and mixed data")
+    parser.add_argument("--gantries", type=Path, metavar="DIR", help="the experiment on shield gantries")
+    parser.add_argument("--run", type=Path, action="append", default=[], metavar="RUN", help="a run to be scored")
+    parser.add_argument("--real", type=Path, metavar="DIR", help="labelled real clouds, which the runs are scored on")
+    parser.add_argument("--prediction", type=Path, metavar="FILE", help="result of tools/measure_prediction.py")
+    parser.add_argument("--packed", type=Path, metavar="FILE", help="file of `python -m ml.segmentation.pack`")
+    parser.add_argument("--projection", type=Path, metavar="FILE", help="of `python -m ml.segmentation.projection`")
+    parser.add_argument("--pictures", type=Path, default=Path(), metavar="DIR", help="folder for the pictures")
+    parser.add_argument("--document", type=Path, metavar="FILE", help="Markdown whose tables are replaced")
+    arguments = parser.parse_args(words)
+    if bool(arguments.run) != bool(arguments.real):
+        parser.error("--run and --real need each other")
+    return arguments
+
+
+def main(words: Sequence[str] | None = None) -> None:
+    """Command line."""
+    arguments = arguments_of(words)
+    try:
+        if arguments.document:  # before the work: whether there is room for the tables
+            replaced(arguments.document.read_text(encoding="utf-8"), dict.fromkeys(expected(arguments), ""))
+        found = tables(arguments)
+        if arguments.document:
+            text = replaced(arguments.document.read_text(encoding="utf-8"), found)
+            write_file(arguments.document, text.encode(), overwrite=True)
+    except SynthRoadsError as error:
+        raise SystemExit(str(error)) from None
+    for name, text in found.items():
+        print(f"{name}\n\n{text}\n")
+
+
+if __name__ == "__main__":
+    main()
