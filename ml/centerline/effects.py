@@ -70,6 +70,9 @@ class Effects(Part):
     tilt: float = quantity(0.01, ge=0, le=0.2, unit="1", description="Cross slope and grade that are added.")
     plain: float = quantity(0.25, ge=0, le=1, unit="1", description="Probability of intensities as they are.")
     contrast: float = quantity(1.5, ge=0, le=3, unit="1", description="Log of the factor on what isn't pavement.")
+    verge: float = quantity(
+        2.5, ge=0, le=20, unit="m", description="Width of verges like asphalt beside a carriageway without shoulders."
+    )
     paint: float = quantity(0.95, ge=0, le=1, unit="1", description="Share of the markings' brightness worn off.")
     repaint: float = quantity(
         0.3,

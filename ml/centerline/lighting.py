@@ -23,6 +23,8 @@ _LINE_REACH = 0.5
 """Paint within so far of a line's place is the line's, m."""
 _LINE_WIDTHS = (0.12, 0.6)
 """Of a solid lane line: one narrow line to a double one with what lies between, m."""
+_VERGE_TONE = 0.3
+"""Logarithm of the largest factor by which a verge of crushed stone is brighter or darker than asphalt."""
 _SCANNER_HEIGHTS = (1.5, 60.0)
 _SCANNER_ASIDE = 15.0
 """Of the scanners from whose range intensities fall off: lowest and highest, and farthest from the path, m."""
@@ -43,7 +45,8 @@ def _relight_intensities(stretch: Stretch, effects: Effects, rng: Generator) -> 
     share = rng.random(7)
     value, marked = _repainted(np.maximum(stretch.intensity, 0.0), stretch, effects.repaint, rng)
     value = _worn(value, stretch.paved, marked, effects.paint * share[0])
-    value = np.where(stretch.paved, value, value * np.exp(effects.contrast * rng.uniform(-1.0, 1.0)))
+    value, like_pavement = _verges(value, stretch, marked, effects.verge, rng)
+    value = np.where(like_pavement, value, value * np.exp(effects.contrast * rng.uniform(-1.0, 1.0)))
     value = _blurred(value, stretch, effects.footprint * share[5])
     value *= _falloff(stretch.xyz[:, 1], effects.falloff * share[1], rng)
     low, high = np.log(effects.gamma)
@@ -80,6 +83,26 @@ def _repainted(value: Float, stretch: Stretch, probability: float, rng: Generato
         painted = stretch.paved & (np.abs(y) < 0.5 * (low + (high - low) * width))
         value, marked = np.where(painted, paint, value), marked | painted
     return np.where(gone, pavement, value), marked & ~gone
+
+
+def _verges(
+    value: Float, stretch: Stretch, marked: NDArray[np.bool_], widest: float, rng: Generator
+) -> tuple[Float, NDArray[np.bool_]]:
+    """Return intensities, and which points (K,) look like pavement, where a rural road has verges of crushed stone.
+
+    These are hardly brighter or darker than asphalt: the pavement seems wider than it is.
+    """
+    widths, tone = rng.uniform(0.0, widest, 2), np.exp(_VERGE_TONE * rng.uniform(-1.0, 1.0))
+    bare = stretch.paved & ~marked
+    if not stretch.without_shoulders() or not bare.any():
+        return value, stretch.paved
+    y = stretch.xyz[:, 1] - stretch.center[stretch.number]
+    beyond = np.column_stack([y, -y]) - stretch.paved_sides()[stretch.number]
+    verge = ~stretch.paved & ((beyond > 0.0) & (beyond < widths)).any(axis=1)
+    usual = float(np.median(value[verge])) if verge.any() else 0.0
+    if usual <= 0.0:
+        return value, stretch.paved
+    return np.where(verge, value * (tone * float(np.median(value[bare])) / usual), value), stretch.paved | verge
 
 
 def _worn(value: Float, paved: NDArray[np.bool_], marked: NDArray[np.bool_], share: float) -> Float:

@@ -34,7 +34,7 @@ NONE = Effects(
     turn_round=0.0,
     crop=Crop(probability=0.0),
     **dict.fromkeys(("alone", "dropout", "hidden", "empty", "jitter", "tilt"), 0.0),
-    **dict.fromkeys(("plain", "contrast", "paint", "repaint"), 0.0),
+    **dict.fromkeys(("plain", "contrast", "verge", "paint", "repaint"), 0.0),
     gamma=(1.0, 1.0),
     **dict.fromkeys(("falloff", "speckle", "patches", "stripes", "footprint", "colorless", "tint"), 0.0),
 )
@@ -367,6 +367,25 @@ def test_a_carriageways_lines_are_painted_otherwise() -> None:
     relight(with_shoulders, NONE.model_copy(update={"repaint": 0.5}), rng(3))
     ratio = with_shoulders.intensity / plain.intensity
     assert np.ptp(ratio) < 1e-9 * ratio.max()
+
+
+def test_verges_of_rural_roads_look_like_asphalt() -> None:
+    shares = []
+    for seed in range(20):
+        one = without_shoulders(cut("carriageway"))
+        y = one.xyz[:, 1] - one.center[one.number]
+        one.paved &= (one.paved_sides()[one.number, 0] >= y) & (-y <= one.paved_sides()[one.number, 1])
+        one.intensity = np.where(one.paved, one.intensity, 0.12)
+        beyond = np.maximum(y - one.paved_sides()[one.number, 0], -y - one.paved_sides()[one.number, 1])
+        near, far = ~one.paved & (beyond < 1.5), ~one.paved & (beyond > 2.0)
+        before = one.intensity.copy()
+        relight(one, NONE.model_copy(update={"verge": 2.0}), rng(seed))
+        bare = np.median(one.intensity[one.paved & ~one.marked])
+        scale = bare / np.median(before[one.paved & ~one.marked])
+        np.testing.assert_allclose(one.intensity[far], scale * before[far], rtol=1e-6)
+        shares.append(float(np.mean(one.intensity[near] < 2.0 * bare)))
+    assert min(shares) < 0.6
+    assert max(shares) > 0.9
 
 
 @pytest.mark.parametrize("name", ["speckle", "patches"])
