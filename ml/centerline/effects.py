@@ -86,7 +86,7 @@ class Effects(Part):
     falloff: float = quantity(
         4.0, ge=0, le=10, unit="1", description="Power of the range fall-off from scanners somewhere above the road."
     )
-    stripes: float = quantity(0.3, ge=0, le=2, unit="1", description="As speckle, of wheel tracks, joints and lanes.")
+    stripes: float = quantity(0.15, ge=0, le=2, unit="1", description="As speckle, of wheel tracks, joints and lanes.")
     speckle: float = quantity(0.3, ge=0, le=2, unit="1", description="Noise of intensities by their own p90 - p10.")
     patches: float = quantity(0.2, ge=0, le=2, unit="1", description="The same of patches some metres long and wide.")
     colorless: float = quantity(0.3, ge=0, le=1, unit="1", description="Probability of the colours being left out.")

@@ -150,9 +150,9 @@ def _falloff(y: Float, power: float, rng: Generator) -> Float:
 
 
 def _tracks(stretch: Stretch, rng: Generator) -> Float:
-    """Return a random function (K,) of about unit deviation that only changes across the road: waves of 0.7 to 6 m."""
+    """Return a random function (K,) of about unit deviation that only changes across the road: waves of 1.5 to 6 m."""
     count = 5
-    rate = 2.0 * np.pi / np.exp(rng.uniform(np.log(0.7), np.log(6.0), count))
+    rate = 2.0 * np.pi / np.exp(rng.uniform(np.log(1.5), np.log(6.0), count))
     y = stretch.xyz[:, 1] - np.nan_to_num(stretch.center)[stretch.number]
     angle = y[:, None] * rate + rng.uniform(0.0, 2.0 * np.pi, count)
     result: Float = np.cos(angle).sum(axis=1) * np.sqrt(2.0 / count)

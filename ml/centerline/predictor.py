@@ -166,8 +166,8 @@ def joined(frames: Frames, y: Float, std: Float, reach: int) -> Float:
     for part in stretches(frames):
         total = np.zeros((5, len(part)))
         for by in range(1 - reach, reach):
-            own, other = part[max(0, -by) : len(part) - max(0, by)], part[max(0, by) :]
-            other = other[: len(own)] if by >= 0 else part[: len(own)]
+            own = part[max(0, -by) : max(0, len(part) - max(0, by))]
+            other = own + by
             dx, dy = (place[other] - frames.position[own]).T
             ahead, aside = cos[own] * dx + sin[own] * dy, cos[own] * dy - sin[own] * dx
             weight = np.nan_to_num((reach - abs(by)) / std[other] ** 2) * np.isfinite(aside)
@@ -194,8 +194,8 @@ def errors(found: Regression, truth: Truth) -> Float:
 
 def _flat(center: Tensor, corridor: Tensor) -> Float:
     """Return values (B S, T) of the targets."""
-    joined = torch.cat([center[..., None], corridor], dim=-1).flatten(0, 1)
-    return joined.cpu().numpy().astype(np.float64)
+    both = torch.cat([center[..., None], corridor], dim=-1).flatten(0, 1)
+    return both.cpu().numpy().astype(np.float64)
 
 
 assert TARGETS[1:] == CORRIDOR
