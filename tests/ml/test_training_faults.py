@@ -50,7 +50,7 @@ def configuration(kind: str, data: Path, **changes: Any) -> dict[str, Any]:
                 "name": "transformer", "cells": 4, "point_width": 8, "width": 16, "context": 16,
                 "layers": 1, "heads": 2, "dropout": 0.1,
             },
-            "batches": {"size": 4, "steps": 4, "passes": 2, "validation": 8, "calibration": 8},
+            "batches": {"size": 4, "steps": 4, "passes": 2, "validation": 8},
             "schedule": {"epochs": 12, "learning_rate": 0.003},
         }
     else:
