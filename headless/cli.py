@@ -16,6 +16,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
+from headless import was_stopped
 from synthroads_addon.core.errors import InputError
 from synthroads_addon.core.generator import generator
 from synthroads_addon.core.progress import Progress, silent
@@ -179,6 +180,8 @@ def run(action: Callable[[argparse.Namespace], Outcome], arguments: argparse.Nam
         print(f"error: {error}", file=sys.stderr)
         return 2
     except ModuleNotFoundError as error:
+        if was_stopped():
+            return interrupted()
         print(_missing(error), file=sys.stderr)
         return 2
     except BrokenPipeError:
@@ -223,10 +226,13 @@ def leave(action: Callable[[], int]) -> None:
     except SystemExit as error:
         code = error.code if isinstance(error.code, int) else 0 if error.code is None else 1
     except BaseException:
-        import traceback
+        if was_stopped():
+            code = interrupted()
+        else:
+            import traceback
 
-        traceback.print_exc()
-        code = 1
+            traceback.print_exc()
+            code = 1
     sys.stdout.flush()
     sys.stderr.flush()
     os._exit(code)

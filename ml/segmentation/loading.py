@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import signal
 import zlib
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -106,8 +107,26 @@ def _loaded(
         collate_fn=Collate(configuration, epoch, mix3d),
         pin_memory=device.type == "cuda",
     )
-    for batch in loader:
+    with uninterrupted():
+        batches = iter(loader)
+    for batch in batches:
         yield on_device(batch, device)
+
+
+@contextmanager
+def uninterrupted() -> Iterator[None]:
+    """Put Ctrl-C off while processes are started: Python drops one that comes between a fork and what runs after it.
+
+    The processes go on putting it off; they end when the one that started them does.
+    """
+    if not hasattr(signal, "pthread_sigmask"):
+        yield
+        return
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 @dataclass(frozen=True)

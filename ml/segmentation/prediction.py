@@ -32,6 +32,8 @@ from .scoring import Classifier, label_tile
 from .sources import FULL
 from .tiles import Scaling, Tile
 
+HEADER_TEXTS = range(26, 90)
+"""Bytes of a LAS file that hold the system identifier and the generating software, of 32 each."""
 PREDICTED = "predicted_class"
 """Attribute that the classes are written to."""
 BLOCK = 500_000
@@ -255,7 +257,10 @@ def write_copy(
                     raise damaged(source, done, len(labels))
                 if reader.evlrs:
                     writer.write_evlrs(reader.evlrs)
+        copy_header_texts(source, temporary)
         temporary.replace(target)
+    except UnicodeError:
+        raise InputError(str(source), None, "has records whose names aren't ASCII, which LAS doesn't allow") from None
     except OSError as error:
         raise OutputError("--output", str(target), f"cannot be written ({error.strerror})") from None
     finally:
@@ -264,13 +269,23 @@ def write_copy(
     return counts
 
 
+def copy_header_texts(source: Path, target: Path) -> None:
+    """Copy a LAS file's system identifier and generating software as they are: not all are ASCII, as they should be."""
+    with source.open("rb") as old, target.open("r+b") as new:
+        old.seek(HEADER_TEXTS.start)
+        new.seek(HEADER_TEXTS.start)
+        new.write(old.read(len(HEADER_TEXTS)))
+
+
 def extended_header(old: laspy.LasHeader, needs_codes: bool) -> laspy.LasHeader:
-    """Return a copy of a header with the attribute for the classes.
+    """Return a copy of a header with the attribute for the classes, and without texts: see `copy_header_texts`.
 
     Raises:
         InputError: LAS codes are wanted, and the file's point format holds those up to 31 only.
     """
     header = deepcopy(old)
+    # laspy gives bytes where they aren't ASCII, and doesn't take them back.
+    header.system_identifier = header.generating_software = ""
     if needs_codes and header.point_format.id < 6:
         raise InputError(
             "--classification", header.point_format.id, "needs a point format of 6 or more: older ones end at code 31"

@@ -204,9 +204,11 @@ def cloud_tiles(path: Path, scheme: ClassScheme, source: Source, scene: str | No
         scene: name that tells the cloud from the source's others; the file's if not given.
 
     Raises:
-        InputError: the cloud has no labels of its own and there is no mapping, or it is damaged.
+        InputError: the cloud has no points, or no labels of its own and there is no mapping, or it is damaged.
     """
     with open_cloud(path) as cloud, tempfile.TemporaryDirectory(prefix="synthroads-") as folder:
+        if not cloud.header.count:
+            raise InputError(str(path), 0, "holds no points to learn from")
         scale = steps_per_unit(cloud)
         low = np.min([block.xyz.min(axis=0) for block in cloud.blocks() if len(block)], axis=0)
         origin = np.floor(low)

@@ -233,7 +233,10 @@ def test_killed_at_any_moment_every_file_in_sight_is_whole(
     (tmp_path / "out").mkdir()
     for _ in range(10):
         arguments = [*command(name, inputs, output), "--overwrite"]
-        killed += stopped(arguments, float(rng.uniform(0.2, 1.1) * seconds), signal.SIGKILL)[0] == -signal.SIGKILL
+        code, _ = stopped(arguments, float(rng.uniform(0.2, 1.1) * seconds), signal.SIGKILL)
+        killed += code == -signal.SIGKILL
+        if code == 0:  # the machine has become faster meanwhile
+            seconds *= 0.8
         check_whole(output)
     assert killed >= 4
     assert ran([*command(name, inputs, output), "--overwrite"]).returncode == 0
@@ -250,3 +253,24 @@ def test_a_command_that_is_still_loading_ends_quietly() -> None:
     code = "import sys; sys.argv = ['other']; import headless; raise ValueError('mine')"
     done = ran([sys.executable, "-c", code])
     assert (done.returncode, "ValueError: mine" in done.stderr) == (1, True)
+
+
+@pytest.mark.parametrize("kind", ["RuntimeError", "ModuleNotFoundError"])
+def test_an_interrupt_that_a_library_turns_into_another_error(kind: str) -> None:
+    """As parts written in other languages do while they are loaded."""
+    code = f"""
+import sys; sys.argv = ["-m"]
+import argparse, os, signal, time
+from headless.cli import leave, run
+
+def work(arguments):
+    try:
+        os.kill(os.getpid(), signal.SIGINT)
+        time.sleep(1.0)
+    except KeyboardInterrupt:
+        raise {kind}("not to be seen")
+
+leave(lambda: run(work, argparse.Namespace(json=False, quiet=False)))
+"""
+    done = ran(["env", "--default-signal=INT", sys.executable, "-c", code])
+    assert (done.returncode, done.stderr) == (130, "interrupted; nothing was left half-written\n")

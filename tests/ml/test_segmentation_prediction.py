@@ -124,6 +124,9 @@ def others_cloud(path: Path, count: int = 30_000) -> laspy.LasData:
     las.red, las.green, las.blue = block.rgb.T
     las.evlrs = laspy.vlrs.vlrlist.VLRList([laspy.VLR("someone", 9, "long note", b"kept as well")])
     las.write(path)
+    with path.open("r+b") as file:  # as some write it, though LAS asks for ASCII
+        file.seek(58)
+        file.write("Büro für Vermessung".encode("latin-1"))
     return laspy.read(path)
 
 
@@ -140,7 +143,8 @@ def test_prediction_keeps_everything_and_adds_the_class(tmp_path: Path, labellin
     notes = [vlr.record_data_bytes() for vlr in after.vlrs if vlr.user_id == "someone"]
     assert notes == [b"kept"]
     assert [v.record_data_bytes() for v in after.evlrs] == [b"kept as well"]
-    for field in ("system_identifier", "creation_date", "uuid", "point_count", "global_encoding"):
+    texts = ("system_identifier", "generating_software")
+    for field in (*texts, "creation_date", "uuid", "point_count", "global_encoding"):
         first, second = getattr(before.header, field), getattr(after.header, field)
         assert getattr(first, "value", first) == getattr(second, "value", second), field
     assert (before.header.offsets == after.header.offsets).all()
