@@ -50,7 +50,7 @@ from ml.runs import Run  # noqa: E402
 from ml.tasks import kinds  # noqa: E402
 from synthroads_addon.core.errors import SynthRoadsError  # noqa: E402
 from synthroads_addon.core.files import write_file  # noqa: E402
-from synthroads_addon.core.marked import replaced  # noqa: E402
+from synthroads_addon.core.marked import fill  # noqa: E402
 
 Measured = dict[str, dict[str, dict[str, Spread]]]
 AnyPart = TypeVar("AnyPart", bound=Part)
@@ -370,18 +370,17 @@ def expected(arguments: argparse.Namespace) -> list[str]:
     return names + ([*CROPPINGS, "real-painted"] if arguments.real else [])
 
 
+def measured_tables(arguments: argparse.Namespace) -> dict[str, str]:
+    """Measure everything that is given; return the document's tables."""
+    trained = models(arguments.run)
+    return synthetic(arguments, trained) | real(arguments, trained)
+
+
 def main(words: Sequence[str] | None = None) -> None:
     """Command line."""
     arguments = arguments_of(words)
     try:
-        if arguments.document:
-            # Before hours of work: whether there is room for the tables.
-            replaced(arguments.document.read_text(encoding="utf-8"), dict.fromkeys(expected(arguments), ""))
-        trained = models(arguments.run)
-        found = synthetic(arguments, trained) | real(arguments, trained)
-        if arguments.document:
-            text = replaced(arguments.document.read_text(encoding="utf-8"), found)
-            write_file(arguments.document, text.encode(), overwrite=True)
+        found = fill(arguments.document, expected(arguments), lambda: measured_tables(arguments))
     except SynthRoadsError as error:
         raise SystemExit(str(error)) from None
     for name, text in found.items():

@@ -34,7 +34,7 @@ from ml.segmentation.tables import by_class, by_test, cell  # noqa: E402
 from ml.segmentation.training import PRETRAINING  # noqa: E402
 from synthroads_addon.core.errors import InputError, SynthRoadsError  # noqa: E402
 from synthroads_addon.core.files import write_file  # noqa: E402
-from synthroads_addon.core.marked import replaced  # noqa: E402
+from synthroads_addon.core.marked import fill  # noqa: E402
 from synthroads_addon.core.schema import read_json  # noqa: E402
 
 REAL_CLOUDS = {"semantickitti": "semkitti_seq00_000000.laz", "ign": "ign_lidarhd_street.laz"}
@@ -168,12 +168,7 @@ def main(words: Sequence[str] | None = None) -> None:
     """Command line."""
     arguments = arguments_of(words)
     try:
-        if arguments.document:  # before the work: whether there is room for the tables
-            replaced(arguments.document.read_text(encoding="utf-8"), dict.fromkeys(expected(arguments), ""))
-        found = tables(arguments)
-        if arguments.document:
-            text = replaced(arguments.document.read_text(encoding="utf-8"), found)
-            write_file(arguments.document, text.encode(), overwrite=True)
+        found = fill(arguments.document, expected(arguments), lambda: tables(arguments))
     except SynthRoadsError as error:
         raise SystemExit(str(error)) from None
     for name, text in found.items():

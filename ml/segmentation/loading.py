@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import math
 import signal
+import sys
 import zlib
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from types import TracebackType
 
 import torch
 from torch.utils.data import DataLoader
@@ -106,11 +108,23 @@ def _loaded(
         num_workers=configuration.workers,
         collate_fn=Collate(configuration, epoch, mix3d),
         pin_memory=device.type == "cuda",
+        worker_init_fn=leave_quietly,
     )
     with uninterrupted():
         batches = iter(loader)
     for batch in batches:
         yield on_device(batch, device)
+
+
+def leave_quietly(_worker: int) -> None:
+    """Let a worker whose trainer has left say nothing of the ends of their pipes; its own errors go another way."""
+    said = sys.excepthook
+
+    def hook(kind: type[BaseException], error: BaseException, trace: TracebackType | None) -> None:
+        if not issubclass(kind, (EOFError, ConnectionError)):
+            said(kind, error, trace)
+
+    sys.excepthook = hook
 
 
 @contextmanager

@@ -274,3 +274,29 @@ leave(lambda: run(work, argparse.Namespace(json=False, quiet=False)))
 """
     done = ran(["env", "--default-signal=INT", sys.executable, "-c", code])
     assert (done.returncode, done.stderr) == (130, "interrupted; nothing was left half-written\n")
+
+
+def test_an_interrupt_in_a_callback_of_blender_reaches_the_command() -> None:
+    """Blender's operators print what is raised in Python that they call, and go on."""
+    code = """
+import sys; sys.argv = ["-m"]
+import argparse, os, signal, time
+from headless.cli import leave, run
+
+operators = {}
+text = "def call(action):\\n    try:\\n        action()\\n    except BaseException:\\n        pass\\n"
+exec(compile(text, os.path.join("somewhere", "modules", "bpy", "ops.py"), "exec"), operators)
+
+def callback():
+    os.kill(os.getpid(), signal.SIGINT)
+    time.sleep(0.01)
+
+def work(arguments):
+    operators["call"](callback)
+    time.sleep(5.0)
+    return 0, {}, "swallowed"
+
+leave(lambda: run(work, argparse.Namespace(json=False, quiet=False)))
+"""
+    done = ran(["env", "--default-signal=INT", sys.executable, "-c", code])
+    assert (done.returncode, done.stderr) == (130, "interrupted; nothing was left half-written\n")

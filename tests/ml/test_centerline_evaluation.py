@@ -257,3 +257,10 @@ def test_intervals_count_where_they_are_given(road: Road) -> None:
     figures = evaluate(predict, shown)
     assert (figures["coverage_68"], figures["coverage_95"]) == (0.0, 1.0)
     assert evaluate(told(0.1, std=1.0), shown)["coverage_68"] == 1.0
+
+
+def test_roads_of_one_name_are_refused(road: Road) -> None:
+    """Their figures would be taken for each other's."""
+    shown = case(road, 1, cropping=None, estimated=False)
+    with pytest.raises(ValueError, match="names"):
+        measure({MIDDLE: [trivial_predictor(MIDDLE)]}, lambda seed: [shown, shown], [1])
