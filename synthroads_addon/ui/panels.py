@@ -61,6 +61,8 @@ class RoadPanel(SheetPanel):
         road = find_road(context.scene)
         if road and source_of(road):
             layout.label(text=f"Built from {source_of(road)}", icon="FILE")
+        elif road and not road.get(BUILT_FROM):
+            layout.label(text="Built by a command, not from these settings", icon="FILE")
         elif road and road.get(BUILT_FROM) != settings.road_values():
             layout.label(text="Changed since it was built", icon="INFO")
         if draw_job(layout):

@@ -12,6 +12,8 @@ import pytest
 from pydantic import BaseModel
 
 import synthroads_addon
+from synthroads_addon.blender.kept_road import remember
+from synthroads_addon.blender.model import build_road
 from synthroads_addon.core.parameters.sampler import sample_road
 from synthroads_addon.core.road_scenario import Interval
 from synthroads_addon.core.scanning.devices import DEVICES, device_names
@@ -73,6 +75,21 @@ def test_layout(name: str, library: Path) -> None:
     if os.environ.get(WRITE):
         file.write_text(text, encoding="utf-8")
     assert text == file.read_text(encoding="utf-8"), f"set {WRITE}=1 to write what is drawn now"
+
+
+def test_the_road_panel_says_what_the_road_was_built_from(panel: Any) -> None:
+    scenario = load_scenario("rq31-600m", ["road.length=20"])
+    parameters = sample_road(scenario.road, 1)
+    road = build_road(parameters, 0.02, 0.0).collection
+    for built_from, said in (
+        ("", ["label 'Built by a command, not from these settings' <FILE>"]),
+        ('["file", "mine.json"]', ["label 'Built from mine.json' <FILE>"]),
+        ("{}", ["label 'Changed since it was built' <INFO>"]),
+        (panel.road_values(), []),
+    ):
+        remember(road, parameters, scenario, built_from)
+        lines = layout("road").splitlines()
+        assert [line for line in lines if line.startswith(("label 'Built", "label 'Changed"))] == said
 
 
 def test_panels_stand_in_their_order() -> None:
