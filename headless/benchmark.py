@@ -17,8 +17,9 @@ if __name__ == "__main__":
     sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from headless.cli import Outcome, add_changes_argument, add_common_arguments, entry, progress_bar
-from synthroads_addon.core.benchmark import DEMO, QUICK, filled, judged, machine, markdown
+from synthroads_addon.core.benchmark import DEMO, QUICK, TABLE, judged, machine, markdown
 from synthroads_addon.core.errors import InputError
+from synthroads_addon.core.marked import fill
 from synthroads_addon.core.scenario import Scenario, load_scenario
 from synthroads_addon.core.schema import canonical_json
 from synthroads_addon.waves import CELLS, write_waves
@@ -37,7 +38,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     available = _available()
     cores = sorted({1, min(2, available)})
     parser.add_argument("--output", type=Path, metavar="DIR", help=f"folder for {' and '.join(_FILES)}")
-    parser.add_argument("--fill", type=Path, metavar="FILE", help="document between whose marks the tables are put")
+    parser.add_argument("--document", type=Path, metavar="FILE", help="fill the tables of this Markdown file as well")
     usual = " ".join(map(str, cores))
     parser.add_argument("--cores", nargs="+", type=int, default=cores, metavar="N", help=f"numbers of cores ({usual})")
     parser.add_argument("--scenario", default="rq31-600m", metavar="NAME_OR_FILE", help="scene to measure on")
@@ -57,18 +58,19 @@ def run(arguments: argparse.Namespace) -> Outcome:
     for cores in arguments.cores:
         if not 1 <= cores <= _available():
             raise InputError("--cores", cores, f"must be 1 to {_available()}, the cores that are there")
-    if arguments.fill and not arguments.fill.is_file():
-        raise InputError("--fill", str(arguments.fill), "is no file")
-    result = _all(arguments)
-    table = markdown(result)
+    result: dict[str, Any] = {}
+
+    def measured() -> dict[str, str]:
+        result.update(_all(arguments))
+        return {TABLE: markdown(result)}
+
+    table = fill(arguments.document, [TABLE], measured)[TABLE]
     if arguments.output:
         from synthroads_addon.core.files import output_folder
 
         with output_folder(arguments.output, _FILES, arguments.overwrite) as folder:
             (folder / _FILES[0]).write_text(canonical_json(result), encoding="utf-8")
             (folder / _FILES[1]).write_text(table, encoding="utf-8")
-    if arguments.fill:
-        _fill(arguments.fill, table)
     return 0, result, table + _verdict(result)
 
 
@@ -148,14 +150,6 @@ def _waves(rays: int, scene: Path, triangles: int) -> dict[str, float]:
 
 def _scenario(name: str, changes: list[str], quick: bool) -> Scenario:
     return load_scenario(name, [*DEMO, *(QUICK if quick else ()), *changes])
-
-
-def _fill(path: Path, table: str) -> None:
-    try:
-        text = filled(path.read_text(encoding="utf-8"), table)
-    except ValueError as problem:
-        raise InputError("--fill", str(path), str(problem)) from None
-    path.write_text(text, encoding="utf-8")
 
 
 def _verdict(result: dict[str, Any]) -> str:

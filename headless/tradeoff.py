@@ -19,7 +19,7 @@ from headless.tradeoff_plot import plot
 from synthroads_addon.core.errors import InputError, OutputError, nearest_name
 from synthroads_addon.core.files import write_file
 from synthroads_addon.core.generator import generator
-from synthroads_addon.core.marked import replaced
+from synthroads_addon.core.marked import fill
 from synthroads_addon.core.progress import Progress
 from synthroads_addon.core.scenario import load_scenario
 from synthroads_addon.core.schema import canonical_json, read_json
@@ -28,6 +28,8 @@ from synthroads_addon.core.tradeoff import KNOBS, SCENES, markdown, row_scenario
 _ROW = "--row"
 _ROWS = "rows"
 """Folder, within the output's, of what is measured already."""
+_TABLE = "tradeoff {}"
+"""What a scene's table is called in the document."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -62,15 +64,17 @@ def run(arguments: argparse.Namespace) -> Outcome:
     scenes = list(dict.fromkeys(arguments.scenario or SCENES))
     titles = _checked(arguments, scenes)
     progress = progress_bar(arguments)
-    results, tables = {}, {}
-    for number, scene in enumerate(scenes):
-        title = titles[scene]
-        found = _measure_all(arguments, scene, title, _part(progress, number, len(scenes)))
-        results[title], tables[f"tradeoff {title}"] = found, markdown(found, scene)
-        _write(arguments, title, found, tables[f"tradeoff {title}"])
-    if arguments.document:
-        text = replaced(arguments.document.read_text(encoding="utf-8"), tables)
-        write_file(arguments.document, text.encode(), "--document", overwrite=True)
+    results = {}
+
+    def measured() -> dict[str, str]:
+        tables = {}
+        for number, (scene, title) in enumerate(titles.items()):
+            found = _measure_all(arguments, scene, title, _part(progress, number, len(titles)))
+            results[title], tables[_TABLE.format(title)] = found, markdown(found, scene)
+            _write(arguments, title, found, tables[_TABLE.format(title)])
+        return tables
+
+    tables = fill(arguments.document, map(_TABLE.format, titles.values()), measured)
     return 0, {"scenes": results}, "\n".join([*tables.values(), f"written to {arguments.output}"])
 
 
@@ -86,12 +90,6 @@ def _checked(arguments: argparse.Namespace, scenes: Sequence[str]) -> dict[str, 
             raise InputError("--knobs", knob, f"must be any of {', '.join(KNOBS)}{nearest_name(knob, KNOBS)}")
     if arguments.resume and arguments.overwrite:
         raise InputError("--resume", None, "can't be given with --overwrite, which keeps nothing")
-    if arguments.document:
-        tables = {f"tradeoff {title}": "" for title in titles.values()}
-        try:
-            replaced(arguments.document.read_text(encoding="utf-8"), tables)
-        except OSError as error:
-            raise InputError("--document", str(arguments.document), f"cannot be read ({error.strerror})") from None
     there = [name for title in titles.values() for name in (_ROWS + "/" + title, f"{title}.json")]
     present = next((name for name in there if (arguments.output / name).exists()), None)
     if present and not arguments.overwrite and not arguments.resume:
@@ -107,9 +105,7 @@ def _part(progress: Progress, number: int, count: int) -> Progress:
     return show
 
 
-def _measure_all(
-    arguments: argparse.Namespace, scene: str, title: str, progress: Progress
-) -> list[dict[str, Any]]:
+def _measure_all(arguments: argparse.Namespace, scene: str, title: str, progress: Progress) -> list[dict[str, Any]]:
     """Return the rows of the wanted knobs and those that were measured before, in the order of `KNOBS`."""
     wanted = set(rows(arguments.knobs))
     results = []

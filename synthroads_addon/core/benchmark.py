@@ -6,8 +6,8 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-MARK = ("<!-- benchmark: begin -->", "<!-- benchmark: end -->")
-"""Lines of a document between which the tables are put."""
+TABLE = "benchmark"
+"""What the tables are called in a document."""
 CORES = 2
 """Cores that the limits are for."""
 
@@ -86,19 +86,6 @@ def judged(result: dict[str, Any]) -> Iterator[tuple[str, float, bool]]:
         value = (run or {}).get("lines", {}).get(name)
         if value is not None:
             yield name, value, limit.kept(value)
-
-
-def filled(text: str, table: str) -> str:
-    """Return a document with a table between its marks.
-
-    Raises:
-        ValueError: it has no such marks.
-    """
-    before, begin, rest = text.partition(MARK[0])
-    _, end, after = rest.partition(MARK[1])
-    if not begin or not end:
-        raise ValueError(f"has no lines {MARK[0]} and {MARK[1]}")
-    return f"{before}{begin}\n\n{table.strip()}\n\n{end}{after}"
 
 
 def _limits(result: dict[str, Any]) -> Iterator[str]:

@@ -11,6 +11,10 @@ from .files import write_file
 BEGIN, END = "<!-- table: {} -->", "<!-- end of table -->"
 
 
+FIELD = "--document"
+"""What the commands call the document."""
+
+
 def replaced(document: str, tables: Mapping[str, str]) -> str:
     """Return a document with new text between the markers of the named tables; all else stays.
 
@@ -20,7 +24,7 @@ def replaced(document: str, tables: Mapping[str, str]) -> str:
     for name, text in tables.items():
         begin = BEGIN.format(name)
         if document.count(begin) != 1 or END not in document.partition(begin)[2]:
-            raise InputError("document", begin, f"must stand in it once, followed by {END}")
+            raise InputError(FIELD, begin, f"must stand in it once, followed by {END}")
         before, _, rest = document.partition(begin)
         document = f"{before}{begin}\n{text.rstrip()}\n{END}{rest.partition(END)[2]}"
     return document
@@ -35,13 +39,19 @@ def fill(document: Path | None, names: Iterable[str], make: Callable[[], Mapping
         make: returns their texts by name.
 
     Raises:
-        InputError: see `replaced`.
+        InputError: the document can't be read, or see `replaced`.
         OutputError: the document can't be written.
     """
     if document is None:
         return make()
-    replaced(document.read_text(encoding="utf-8"), dict.fromkeys(names, ""))
+    replaced(_read(document), dict.fromkeys(names, ""))
     tables = make()
-    text = replaced(document.read_text(encoding="utf-8"), tables)
-    write_file(document, text.encode(), overwrite=True)
+    write_file(document, replaced(_read(document), tables).encode(), FIELD, overwrite=True)
     return tables
+
+
+def _read(document: Path) -> str:
+    try:
+        return document.read_text(encoding="utf-8")
+    except OSError as error:
+        raise InputError(FIELD, str(document), f"cannot be read ({error.strerror})") from None

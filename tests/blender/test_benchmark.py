@@ -8,7 +8,8 @@ from pathlib import Path
 import pytest
 
 from headless.cli import main
-from synthroads_addon.core.benchmark import LIMITS, MARK, filled, judged, markdown
+from synthroads_addon.core.benchmark import LIMITS, TABLE, judged, markdown
+from synthroads_addon.core.marked import BEGIN, END
 
 
 def a_result(quick: bool, **lines: float) -> dict[str, object]:
@@ -31,18 +32,11 @@ def test_limits_are_judged_on_two_cores() -> None:
     assert not list(judged(one))
 
 
-def test_tables_go_between_the_marks() -> None:
-    text = f"before\n{MARK[0]}\nold\n{MARK[1]}\nafter\n"
-    assert filled(filled(text, "new"), "newer") == f"before\n{MARK[0]}\n\nnewer\n\n{MARK[1]}\nafter\n"
-    with pytest.raises(ValueError, match="no lines"):
-        filled("before", "new")
-
-
 def test_a_quick_run_measures_every_line(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     page = tmp_path / "page.md"
-    page.write_text("\n".join(MARK), encoding="utf-8")
+    page.write_text(f"{BEGIN.format(TABLE)}\n{END}", encoding="utf-8")
     out = tmp_path / "out"
-    assert main(["benchmark", "--quick", "--cores", "1", "--output", str(out), "--fill", str(page)]) == 0
+    assert main(["benchmark", "--quick", "--cores", "1", "--output", str(out), "--document", str(page)]) == 0
     shown = capfd.readouterr().out
     result = json.loads((out / "benchmark.json").read_text(encoding="utf-8"))
     (run,) = result["runs"]
@@ -65,5 +59,5 @@ def test_a_quick_run_measures_every_line(tmp_path: Path, capfd: pytest.CaptureFi
 def test_wrong_numbers_of_cores_are_refused(capfd: pytest.CaptureFixture[str]) -> None:
     assert main(["benchmark", "--cores", "0"]) == 2
     assert "--cores is 0: must be 1 to" in capfd.readouterr().err
-    assert main(["benchmark", "--fill", "/nowhere/x.md", "--cores", "1"]) == 2
-    assert "--fill" in capfd.readouterr().err
+    assert main(["benchmark", "--document", "/nowhere/x.md", "--cores", "1"]) == 2
+    assert "--document is '/nowhere/x.md': cannot be read" in capfd.readouterr().err

@@ -29,3 +29,5 @@ def test_a_document_is_looked_at_before_the_work_and_filled_after_it(tmp_path: P
     assert fill(None, ["other"], lambda: {"other": "made"}) == {"other": "made"}
     with pytest.raises(InputError):
         fill(document, ["other"], lambda: pytest.fail("worked for nothing"))
+    with pytest.raises(InputError, match=r"--document is .*nowhere.md': cannot be read \(No such file"):
+        fill(tmp_path / "nowhere.md", ["one"], lambda: pytest.fail("worked for nothing"))
