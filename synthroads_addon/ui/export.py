@@ -4,7 +4,7 @@ Annotations are not postponed here: Blender reads the properties from them.
 """
 
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +14,7 @@ from ..blender.kept_road import find_road
 from ..core.cloud.display import BLOCK
 from ..core.cloud.tools import convert, subsample
 from ..core.cloud.writing import ENDINGS
+from ..core.cloud.writing import missing_package as cloud_package
 from ..core.errors import InputError
 from ..core.files import output_folder
 from ..core.parameters.model import RoadParameters
@@ -246,10 +247,23 @@ def _draw_formats(layout: bpy.types.UILayout, context: bpy.types.Context, operat
         row = rows.row()
         row.enabled = name not in missing
         row.prop_enum(operator, "formats", name)
+    _say_what_is_missing(rows, context, {_TWIN_LABELS[name][0]: package for name, package in missing.items()})
+
+
+def draw_missing(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
+    """Say which packages the chosen formats of scans need and don't find."""
+    settings = context.scene.synthroads
+    clouds = {_FORMATS[f".{name}"][0]: cloud_package(f".{name}") for name in sorted(settings.cloud.formats)}
+    twins = {_TWIN_LABELS[name][0]: missing_packages(name) for name in TWIN_FORMATS if name in settings.twin}
+    missing = {name: package for name, package in (clouds | twins).items() if package}
+    _say_what_is_missing(layout, context, missing)
+
+
+def _say_what_is_missing(layout: bpy.types.UILayout, context: bpy.types.Context, missing: Mapping[str, str]) -> None:
     for name, package in missing.items():
-        text = f"{_TWIN_LABELS[name][0]} needs the package {package}: pip install {package}, with Blender's Python"
+        text = f"{name} needs the package {package}: pip install {package}, with Blender's Python"
         for line in wrapped(text, context):
-            rows.label(text=line)
+            layout.label(text=line)
 
 
 CLASSES = (SYNTHROADS_OT_export_cloud, SYNTHROADS_OT_export_twin, SYNTHROADS_PT_export)

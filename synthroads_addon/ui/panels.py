@@ -10,6 +10,7 @@ from ..blender.kept_road import BUILT_FROM, find_road
 from .build import SYNTHROADS_OT_build
 from .common import Sidebar, column, large_button
 from .drawing import draw_field, value_row
+from .export import draw_missing
 from .long_operator import draw_job
 from .panel_scan import draw_folder, draw_scan
 from .presets import (
@@ -100,6 +101,7 @@ class OutputPanel(SheetPanel):
         draw_folder(layout, settings)
         value_row(layout, "").prop(settings, "overwrite")
         self.draw_fields(layout, settings)
+        draw_missing(layout, context)
 
 
 _OWN_PANELS: dict[str, type[SheetPanel]] = {

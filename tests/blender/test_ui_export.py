@@ -14,11 +14,12 @@ from synthroads_addon.blender.compat import set_modifier_input
 from synthroads_addon.blender.kept_road import find_road, objects_of, recall_parameters
 from synthroads_addon.blender.read_back import edited_parameters
 from synthroads_addon.core import twin
+from synthroads_addon.core.cloud import writing
 from synthroads_addon.core.cloud.tools import convert, subsample
 from synthroads_addon.core.cloud.writing import ENDINGS
 from synthroads_addon.core.errors import InputError
 from synthroads_addon.core.twin import TWIN_FORMATS, geojson, twin_file_names, write_twin
-from synthroads_addon.ui import export
+from synthroads_addon.ui import export, panels
 from tests.blender.fake_layout import FakeLayout, drawn
 from tests.blender.test_ui_cloud import write
 from tests.core.conftest import make_points
@@ -178,3 +179,15 @@ def test_formats_that_cannot_be_written_say_what_they_need(monkeypatch: pytest.M
     assert "[ ] 'CityJSON'" in text
     assert "no_such_package" in text
     assert "OpenDRIVE needs" not in text
+
+
+def test_the_output_panel_says_what_chosen_formats_need(settings: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(twin, "_PACKAGES", {"ifc": "no_such_package"})
+    monkeypatch.setattr(writing, "_PACKAGES", {".e57": "nor_this"})
+    settings.twin, settings.cloud.formats = {"cityjson", "ifc"}, {"laz", "e57"}
+    panel = next(one for one in panels.CLASSES if one.bl_idname == "SYNTHROADS_PT_output")
+    said = "\n".join(drawn(panel, bpy.context).lines)
+    assert "E57 needs the package nor_this:" in said
+    assert "IFC needs the package no_such_package:" in said
+    settings.twin, settings.cloud.formats = {"cityjson"}, {"laz"}
+    assert "needs the package" not in "\n".join(drawn(panel, bpy.context).lines)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import importlib.util
 import json
 from abc import ABC, abstractmethod
 from pathlib import Path
@@ -20,6 +21,14 @@ from .points import PointBlock
 
 ENDINGS = (".laz", ".las", ".ply", ".e57", ".npz")
 """Endings of the files that can be written and read."""
+_PACKAGES = {".e57": "pye57"}
+"""What is asked of packages that not every installation has."""
+
+
+def missing_package(ending: str) -> str | None:
+    """Return the package that files of this ending need and that isn't installed; None if there is none."""
+    package = _PACKAGES.get(ending)
+    return package if package and importlib.util.find_spec(package) is None else None
 
 
 class CloudWriter(ABC):
