@@ -6,8 +6,9 @@ import bpy
 import numpy as np
 import pytest
 
-from synthroads_addon.blender.cameras import HAS_RETURN_CAMERA, RenderedLayers, ReturnCamera, layer_source
+from synthroads_addon.blender.cameras import HAS_RETURN_CAMERA, RenderedLayers, ReturnCamera, layer_source, light
 from synthroads_addon.blender.cameras.images import aim
+from synthroads_addon.blender.cameras.light import daylight
 from synthroads_addon.blender.cameras.stage import Passes, stage
 from synthroads_addon.blender.materials import material as table_material
 from synthroads_addon.core.colour import FROM_MATERIAL, FROM_RETURN, MATERIAL_LAYERS, NEARBY
@@ -175,10 +176,10 @@ def test_lit_colours_have_sun_sky_and_shadow(source: str, lighting: str, toleran
     sunny = points_on(mesh, 300, (-9.0, -10.0, 0.0), (9.0, -5.0, 0.0), "Matt")
     wanted = frozenset({"rgb"})
     with layer_source(job(mesh, {"rgb"}, source=source, lighting=lighting, **COARSE, **extra)) as layers:
-        light = layers.material.shading.light
+        day = layers.material.shading.light
         in_shadow, in_sun = layers.sample(**shadow, wanted=wanted), layers.sample(**sunny, wanted=wanted)
     up = np.array([[0.0, 0.0, 1.0]])
-    sky, sun = np.array(GREY) * light.sky(up), np.array(GREY) * light.sunlight(up)
+    sky, sun = np.array(GREY) * day.sky(up), np.array(GREY) * day.sunlight(up)
     assert (in_sun.source != FROM_MATERIAL).all()
     assert (in_shadow.source != FROM_MATERIAL).mean() > 0.9
     rendered = _linear(in_sun.arrays["rgb"]).mean(axis=0)
@@ -190,6 +191,20 @@ def test_lit_colours_have_sun_sky_and_shadow(source: str, lighting: str, toleran
         # The plate hides a part of the sky, and throws red light.
         assert (shaded < (sky + 0.3 * sun)[0]).all()
         assert (shaded > 0.3 * sky[0]).all()
+
+
+def test_each_sky_is_rendered_once_and_gives_the_same_light_again() -> None:
+    def light_of(sun_elevation: float) -> bytes:
+        with daylight(ENVIRONMENT.model_copy(update={"sun_elevation_deg": sun_elevation}), sharp=True) as day:
+            return day.light.sky(np.array([[0.0, 0.0, 1.0]])).tobytes()
+
+    light._sky_radiance.cache_clear()
+    first = light_of(60.0)
+    assert light_of(20.0) != first
+    assert light_of(60.0) == first
+    assert light._sky_radiance.cache_info().misses == 2
+    light._sky_radiance.cache_clear()
+    assert light_of(60.0) == first
 
 
 def test_constant_layers_are_not_rendered() -> None:

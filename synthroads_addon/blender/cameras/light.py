@@ -6,11 +6,12 @@ import math
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
+from functools import lru_cache
+from typing import NamedTuple, Self
 
 import bpy
 import numpy as np
 from mathutils import Vector
-from numpy.typing import NDArray
 
 from ...core.colour_light import SunAndSky, exposed, sun_direction
 from ...core.parameters.model_surroundings import Environment
@@ -21,6 +22,7 @@ _SUN_STRENGTH = 4.2
 _SUN_COLOR = (1.0, 0.93, 0.84)
 _SKY_STRENGTH = 0.16
 _SUN_ANGLE = math.radians(0.53)
+_LOWEST_SUN = 1.0  # degrees: below, the sky's model ends
 _PROBE_SAMPLES = 128
 
 
@@ -49,8 +51,7 @@ def daylight(environment: Environment, sharp: bool) -> Iterator[Daylight]:
         environment: the road's.
         sharp: the sun is a point, so that one sample gives its shadows without noise.
     """
-    towards = sun_direction(environment)
-    elevation = math.radians(environment.sun_elevation_deg)
+    towards, sky = sun_direction(environment), _Sky.of(environment)
     with ExitStack() as stack:
         lamp = bpy.data.lights.new("SR Stage Sun", "SUN")
         stack.callback(lambda: bpy.data.lights.remove(lamp))
@@ -59,30 +60,52 @@ def daylight(environment: Environment, sharp: bool) -> Iterator[Daylight]:
         sun = bpy.data.objects.new("SR Stage Sun", lamp)
         stack.callback(lambda: bpy.data.objects.remove(sun))
         sun.rotation_euler = Vector(towards).to_track_quat("Z", "Y").to_euler()
-        world = bpy.data.worlds.new("SR Stage Sky")
-        stack.callback(lambda: bpy.data.worlds.remove(world))
-        _fill(world, elevation, environment)
+        world = stack.enter_context(_world(sky))
         # A lamp's irradiance falls on a matt surface, which spreads it over pi.
         facing = np.array(_SUN_COLOR) * lamp.energy / math.pi
-        light, exposure = exposed(towards, facing, _sky_radiance(world))
+        light, exposure = exposed(towards, facing, np.array(_sky_radiance(sky)))
         yield Daylight(sun, world, light, exposure)
 
 
-def _fill(world: bpy.types.World, elevation: float, environment: Environment) -> None:
-    if world.node_tree is None:
-        world.use_nodes = True
-    nodes, links = world.node_tree.nodes, world.node_tree.links
-    nodes.clear()
-    sky = sky_texture(nodes, max(elevation, math.radians(1.0)), math.radians(environment.sun_azimuth_deg))
-    background, output = nodes.new("ShaderNodeBackground"), nodes.new("ShaderNodeOutputWorld")
-    background.inputs["Strength"].default_value = _SKY_STRENGTH * (0.4 + 0.6 * environment.sun_strength)
-    links.new(sky.outputs["Color"], background.inputs["Color"])
-    links.new(background.outputs["Background"], output.inputs["Surface"])
+class _Sky(NamedTuple):
+    """What a sky depends on: angles of the sun (degrees), and its strength."""
+
+    elevation: float
+    azimuth: float
+    strength: float
+
+    @classmethod
+    def of(cls, environment: Environment) -> Self:
+        return cls(environment.sun_elevation_deg, environment.sun_azimuth_deg, environment.sun_strength)
 
 
-def _sky_radiance(world: bpy.types.World) -> NDArray[np.float64]:
-    """Return the radiance (3,) of a white matt horizontal surface under a sky, by rendering one."""
+@contextmanager
+def _world(sky: _Sky) -> Iterator[bpy.types.World]:
+    world = bpy.data.worlds.new("SR Stage Sky")
+    try:
+        if world.node_tree is None:
+            world.use_nodes = True
+        nodes, links = world.node_tree.nodes, world.node_tree.links
+        nodes.clear()
+        elevation, azimuth = max(sky.elevation, _LOWEST_SUN), sky.azimuth
+        texture = sky_texture(nodes, math.radians(elevation), math.radians(azimuth))
+        background, output = nodes.new("ShaderNodeBackground"), nodes.new("ShaderNodeOutputWorld")
+        background.inputs["Strength"].default_value = _SKY_STRENGTH * (0.4 + 0.6 * sky.strength)
+        links.new(texture.outputs["Color"], background.inputs["Color"])
+        links.new(background.outputs["Background"], output.inputs["Surface"])
+        yield world
+    finally:
+        bpy.data.worlds.remove(world)
+
+
+@lru_cache(maxsize=64)
+def _sky_radiance(sky: _Sky) -> tuple[float, float, float]:
+    """Return the radiance of a white matt horizontal surface under a sky, by rendering one.
+
+    Most of a small scan's time would go into it, so each sky is rendered once per process.
+    """
     with ExitStack() as stack:
+        world = stack.enter_context(_world(sky))
         mesh = bpy.data.meshes.new("SR Probe")
         stack.callback(lambda: bpy.data.meshes.remove(mesh))
         mesh.from_pydata([(-1.0, -1.0, 0.0), (1.0, -1.0, 0.0), (1.0, 1.0, 0.0), (-1.0, 1.0, 0.0)], [], [(0, 1, 2, 3)])
@@ -98,7 +121,8 @@ def _sky_radiance(world: bpy.types.World) -> NDArray[np.float64]:
         probe = stack.enter_context(stage(scene, (), Passes((), lit=True, samples=_PROBE_SAMPLES), (), world))
         probe.camera.location = (0.0, 0.0, 1.0)
         probe.camera.data.type, probe.camera.data.ortho_scale = "ORTHO", 0.5
-        return probe.render(8, 8).layers[SUN_GROUP].reshape(-1, 3).mean(axis=0).astype(np.float64)
+        red, green, blue = probe.render(8, 8).layers[SUN_GROUP].reshape(-1, 3).mean(axis=0).astype(np.float64)
+        return float(red), float(green), float(blue)
 
 
 def _make_matt(white: bpy.types.Material) -> None:
