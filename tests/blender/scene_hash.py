@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Iterator
+from functools import cache
 from typing import Any
 
 import bpy
@@ -28,63 +29,66 @@ _LEFT_OUT = {
 
 def digest() -> str:
     """Return a digest of all data blocks of the open file: every property, array, node, link and custom property."""
-    result = hashlib.sha256()
-    for line in lines():
-        result.update(line.encode())
-    return result.hexdigest()
+    return hashlib.sha256("".join(lines()).encode()).hexdigest()
 
 
-def lines() -> Iterator[str]:
-    """Yield what the digest is made of, one text per value."""
+def lines() -> list[str]:
+    """Return what the digest is made of, one text per value."""
     bpy.context.view_layer.update()
-    yield f"open scene {bpy.context.scene.name} {bpy.context.view_layer.name}\n"
+    found = [f"open scene {bpy.context.scene.name} {bpy.context.view_layer.name}\n"]
     for item in bpy.context.view_layer.objects:
-        yield f"{item.name} selected {item.select_get()} hidden {item.hide_get()} seen {item.visible_get()}\n"
-    yield f"active {bpy.context.view_layer.objects.active}\n"
+        seen = f"hidden {item.hide_get()} seen {item.visible_get()}"
+        found.append(f"{item.name} selected {item.select_get()} {seen}\n")
+    found.append(f"active {bpy.context.view_layer.objects.active}\n")
     for name in _COLLECTIONS.split():
         for item in getattr(bpy.data, name, ()):
-            yield from _values(item, f"{name}[{item.name}]", {item.as_pointer()})
+            _add_values(found, item, f"{name}[{item.name}]", {item.as_pointer()})
+    return found
 
 
-def _values(item: Any, path: str, seen: set[int]) -> Iterator[str]:
+@cache
+def _properties(kind: type) -> tuple[frozenset[str], tuple[tuple[str, str], ...]]:
+    """Return the names of all properties of a kind of data, and (name, type) of those that are read."""
+    found = [(prop.identifier, prop.type) for prop in kind.bl_rna.properties]  # type: ignore[attr-defined]
+    same_for_all = {name for name, _ in found if name.startswith("bl_")} - {"bl_idname"}
+    return frozenset(name for name, _ in found), tuple(
+        pair for pair in found if pair[0] not in _LEFT_OUT | same_for_all
+    )
+
+
+def _add_values(found: list[str], item: Any, path: str, seen: set[int]) -> None:
     if isinstance(item, bpy.types.Mesh):
-        yield from _arrays(item, path)
+        found.extend(_arrays(item, path))
+    names, properties = _properties(type(item))
     if hasattr(item, "keys") and isinstance(item, bpy.types.bpy_struct):
         try:
-            keys = sorted(set(item.keys()) - set(item.bl_rna.properties.keys()))
+            keys = sorted(set(item.keys()) - names)
         except TypeError:  # this kind has no custom properties
             keys = []
-        yield from (f"{path}[{key!r}] = {_plain(item[key])}\n" for key in keys)
-    for prop in item.bl_rna.properties:
-        if prop.identifier not in _LEFT_OUT:
-            yield from _property(item, prop, f"{path}.{prop.identifier}", seen)
+        found.extend(f"{path}[{key!r}] = {_plain(item[key])}\n" for key in keys)
+    for name, kind in properties:
+        try:
+            value = getattr(item, name)
+        except (AttributeError, RuntimeError, TypeError):
+            continue
+        if kind == "COLLECTION":
+            for number, entry in enumerate(value):
+                _add_pointer(found, entry, f"{path}.{name}[{number}]", seen)
+        elif kind == "POINTER":
+            _add_pointer(found, value, f"{path}.{name}", seen)
+        elif not callable(value):
+            found.append(f"{path}.{name} = {_plain(value)}\n")
 
 
-def _property(item: Any, prop: Any, path: str, seen: set[int]) -> Iterator[str]:
-    try:
-        value = getattr(item, prop.identifier)
-    except (AttributeError, RuntimeError, TypeError):
-        return
-    if prop.type == "COLLECTION":
-        for number, entry in enumerate(value):
-            yield from _pointer(entry, f"{path}[{number}]", seen)
-    elif prop.type == "POINTER":
-        yield from _pointer(value, path, seen)
-    elif callable(value):
-        return
-    else:
-        yield f"{path} = {_plain(value)}\n"
-
-
-def _pointer(value: Any, path: str, seen: set[int]) -> Iterator[str]:
+def _add_pointer(found: list[str], value: Any, path: str, seen: set[int]) -> None:
     if value is None or not isinstance(value, bpy.types.bpy_struct):
-        yield f"{path} = {value}\n"
+        found.append(f"{path} = {value}\n")
     elif isinstance(value, bpy.types.ID) and not value.is_embedded_data:
-        yield f"{path} -> {type(value).__name__} {value.name_full}\n"
+        found.append(f"{path} -> {type(value).__name__} {value.name_full}\n")
     elif isinstance(value, bpy.types.Node | bpy.types.NodeSocket) and ".links" in path:
-        yield f"{path} -> {value.name}\n"
-    elif value.as_pointer() not in seen:
-        yield from _values(value, path, seen | {value.as_pointer()})
+        found.append(f"{path} -> {value.name}\n")
+    elif (pointer := value.as_pointer()) not in seen:
+        _add_values(found, value, path, seen | {pointer})
 
 
 def _arrays(mesh: bpy.types.Mesh, path: str) -> Iterator[str]:
@@ -102,13 +106,15 @@ def _arrays(mesh: bpy.types.Mesh, path: str) -> Iterator[str]:
 
 
 def _plain(value: Any) -> str:
+    if isinstance(value, str | int | float | bool) or value is None:
+        return repr(value)
     if hasattr(value, "to_dict"):
         value = value.to_dict()
     if hasattr(value, "to_list"):
         value = value.to_list()
     if isinstance(value, set | frozenset):
         value = sorted(value)
-    if isinstance(value, str | int | float | bool | dict) or value is None:
+    if isinstance(value, dict):
         return repr(value)
     try:
         return repr([_plain(entry) for entry in value])
