@@ -48,21 +48,60 @@ def _empty_scene() -> None:
     bpy.ops.wm.read_factory_settings(use_empty=True)
 
 
+class _NodeGroups:
+    """The node groups of the road model that the tests of one module have made: a second or two of each new road."""
+
+    MOST = 120
+    """Groups that are kept: taking over more would take as long as making those that a test needs."""
+
+    def __init__(self) -> None:
+        self.file = BLENDER_FOLDER / "groups.blend"
+        self.names: set[str] = set()
+
+    def keep(self) -> None:
+        """Write the groups of the open file, unless they are known."""
+        import bpy
+
+        groups = {group for group in bpy.data.node_groups if group.name.startswith("SR ")}
+        if {group.name for group in groups} - self.names and len(groups) <= self.MOST:
+            bpy.data.libraries.write(str(self.file), groups, fake_user=True)
+            self.names = {group.name for group in groups}
+
+    def take(self) -> None:
+        """Put the groups that were kept into the open file."""
+        import bpy
+
+        if self.names:
+            with bpy.data.libraries.load(str(self.file), link=False) as (kept, mine):
+                mine.node_groups = kept.node_groups
+            bpy.data.libraries.remove(bpy.data.libraries[self.file.name])
+
+
 @pytest.fixture(scope="module", autouse=True)
-def _empty_scene_for_module(request: pytest.FixtureRequest) -> Iterator[None]:
+def _empty_scene_for_module(request: pytest.FixtureRequest) -> Iterator[_NodeGroups | None]:
     """Start each module of tests/blender with an empty scene, and leave none of its data behind."""
     if not _needs_blender(request):
-        yield
+        yield None
         return
     _empty_scene()
-    yield
+    yield _NodeGroups()
     _empty_scene()
 
 
 @pytest.fixture(autouse=True)
-def _empty_scene_for_test(request: pytest.FixtureRequest) -> None:
-    """Start each test of tests/blender with an empty scene, unless it is marked `keep_scene`."""
-    if _needs_blender(request) and request.node.get_closest_marker("keep_scene") is None:
+def _empty_scene_for_test(request: pytest.FixtureRequest, _empty_scene_for_module: _NodeGroups | None) -> None:
+    """Start each test of tests/blender with an empty scene, unless it is marked `keep_scene`.
+
+    Those that are marked `keep_groups` find the node groups of the module's tests before.
+    """
+    groups = _empty_scene_for_module
+    if groups is None or request.node.get_closest_marker("keep_scene"):
+        return
+    if request.node.get_closest_marker("keep_groups"):
+        groups.keep()
+        _empty_scene()
+        groups.take()
+    else:
         _empty_scene()
 
 

@@ -29,6 +29,8 @@ from tests.blender.furnished_road import (
     volume,
 )
 
+pytestmark = pytest.mark.keep_groups
+
 PARTS = ("gantries", "overpasses", "beacons")
 
 

@@ -31,6 +31,8 @@ from tests.blender.furnished_road import (
     volume,
 )
 
+pytestmark = pytest.mark.keep_groups
+
 MODELS = tuple(VEHICLE_TYPES)
 ON_ROAD = 0.01
 """What the wheels may be above or below the road, m."""
