@@ -22,6 +22,7 @@ CHECKPOINT = "checkpoint.pt"
 HISTORY = "history.json"
 METRICS = "metrics.json"
 CURVES = "curves.png"
+CALIBRATION = "calibration.json"
 FREE_WHEN_RESUMING = ("threads", "device", "workers")
 """Fields that may change between the parts of one training: they say where it runs, not what it learns."""
 
@@ -58,7 +59,7 @@ class Run(Generic[C]):
             raise OutputError("--output", str(folder), "holds a run already; --resume goes on, --overwrite begins anew")
         else:
             try:
-                for name in (CHECKPOINT, HISTORY, METRICS, CURVES):
+                for name in (CHECKPOINT, HISTORY, METRICS, CURVES, CALIBRATION):
                     (folder / name).unlink(missing_ok=True)
             except OSError as error:
                 raise OutputError("--output", str(folder), f"cannot be written ({error.strerror})") from None
@@ -127,11 +128,6 @@ class Run(Generic[C]):
         done = 0 if state is None else int(state["epoch"])
         if done:
             self.history = read_json(self.folder / HISTORY)[:done]
-
-
-def torch_stream(seed: int, *purpose: str | int) -> torch.Generator:
-    """Return PyTorch's generator of one purpose, as `core.random_streams.stream` does for NumPy."""
-    return torch.Generator().manual_seed(stream_seed(seed, *purpose))
 
 
 def stream_seed(seed: int, *purpose: str | int) -> int:

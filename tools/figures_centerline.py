@@ -1,7 +1,8 @@
 """Measure centreline models and baselines; write the tables and pictures of docs/centerline.md.
 
-    python tools/figures_centerline.py --in-domain out/centerline-airborne:test --other out/centerline-mobile:test \
-        --real REAL_FOLDER --run "transformer=out/runs/transformer-1" --run "transformer=out/runs/transformer-2" \
+    python tools/figures_centerline.py --in-domain out/centerline-airborne \
+        --other out/centerline-mobile out/centerline-mobile:test_tripod --real REAL_FOLDER \
+        --run "transformer=out/runs/transformer-1" --run "transformer=out/runs/transformer-2" \
         --output out/centerline --document docs/centerline.md --pictures docs/pictures
 
 Runs of one name are one model trained with several seeds. A run is measured on the roads whose truth is of the kind
@@ -125,9 +126,10 @@ def kind_of(run: Run[Any]) -> TruthKind:
 
 
 def learned_by(run: Run[Any]) -> frozenset[str]:
-    """Return the names of the real roads that a run was trained or validated on."""
-    data = _part(run, DataOptions)
-    return frozenset(Path(road.cloud).stem for road in (*data.measured, *data.measured_validation))
+    """Return the names of the real roads that a run, or one that it began with, was trained or validated on."""
+    data, before = _part(run, DataOptions), run.configuration.begin_with
+    own = frozenset(Path(road.cloud).stem for road in (*data.measured, *data.measured_validation))
+    return own | learned_by(Run.open(Path(before), kinds())) if before else own
 
 
 def _part(run: Run[Any], kind: type[AnyPart]) -> AnyPart:
@@ -138,11 +140,14 @@ def _part(run: Run[Any], kind: type[AnyPart]) -> AnyPart:
 def of_kind(
     trained: Mapping[str, Sequence[Model]], kind: TruthKind, seeds: int, road: str = ""
 ) -> dict[str, list[Predictor]]:
-    """Return the models that learned one kind of truth, but not a real road: one version, or as many as seeds."""
+    """Return the models that learned one kind of truth, but not a real road: one version, or as many as seeds.
+
+    Without a road, as for synthetic ones, all versions of a name count, and the first of them are taken.
+    """
     found: dict[str, list[Predictor]] = {}
     for name, several in trained.items():
         fit = [model.versions for model in several if model.kind == kind and road not in model.learned]
-        if len(fit) > 1:
+        if len(fit) > 1 and road:
             raise SystemExit(f"--run {name}: {len(fit)} models that know other real roads than {road}; name them apart")
         if fit:
             found[name] = fit[0]
@@ -161,10 +166,11 @@ def baselines(search: GridSearch) -> dict[str, list[Predictor]]:
     return {tuned: [skeleton_predictor(best)], plain: [skeleton_predictor(reference)], **trivial_predictors()}
 
 
-def synthetic_roads(text: str, kind: TruthKind) -> list[Road]:
-    """Return the roads of a data set's split, given as FOLDER or FOLDER:SPLIT."""
-    folder, _, split = text.partition(":")
-    return [road for scene in scene_folders(Path(folder), split or "test") for road in read_scene(scene, kind)]
+def synthetic_roads(texts: Sequence[str], kind: TruthKind) -> list[Road]:
+    """Return the roads of data sets' splits, given as FOLDER or FOLDER:SPLIT."""
+    parts = [text.partition(":") for text in texts]
+    scenes = [scene for folder, _, split in parts for scene in scene_folders(Path(folder), split or "test")]
+    return [road for scene in scenes for road in read_scene(scene, kind)]
 
 
 def searched(shown: Sequence[Case], masks: Sequence[str], file: Path) -> GridSearch:
@@ -184,8 +190,8 @@ def shown_by(roads: Sequence[Road], cropping: Cropping | None, estimated: bool) 
 def synthetic(arguments: argparse.Namespace, trained: Mapping[str, Sequence[Model]]) -> dict[str, str]:
     """Measure on the synthetic data sets, the baseline tuned on each one's first road; return the document's tables."""
     result = {}
-    for name, (text, kind) in synthetic_sets(arguments).items():
-        roads = synthetic_roads(text, kind)
+    for name, (texts, kind) in synthetic_sets(arguments).items():
+        roads = synthetic_roads(texts, kind)
         cases = shown_by(roads, None, estimated=False)
         search = searched(cases(arguments.seeds[0])[:1], ["classes"], arguments.output / f"skeleton-{name}.json")
         learned = of_kind(trained, kind, len(arguments.seeds))
@@ -201,10 +207,10 @@ def synthetic(arguments: argparse.Namespace, trained: Mapping[str, Sequence[Mode
     return result
 
 
-def synthetic_sets(arguments: argparse.Namespace) -> dict[str, tuple[str, TruthKind]]:
+def synthetic_sets(arguments: argparse.Namespace) -> dict[str, tuple[list[str], TruthKind]]:
     """Return the data sets to be measured on and the truths to be found there, by the name of their table."""
     given = {"in-domain": arguments.in_domain, "other-scanner": arguments.other}
-    return {f"{name}-{kind}": (text, kind) for name, text in given.items() if text for kind in arguments.truths}
+    return {f"{name}-{kind}": (texts, kind) for name, texts in given.items() if texts for kind in arguments.truths}
 
 
 def measure_corridor(
@@ -348,8 +354,10 @@ def arguments_of(words: Sequence[str] | None) -> argparse.Namespace:
     """Return the command line's arguments."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--run", action="append", default=[], metavar="NAME=FOLDER", help="a trained run (repeatable)")
-    parser.add_argument("--in-domain", metavar="FOLDER[:SPLIT]", help="data set of the scanner that was trained on")
-    parser.add_argument("--other", metavar="FOLDER[:SPLIT]", help="data set of another scanner")
+    parser.add_argument(
+        "--in-domain", nargs="+", metavar="FOLDER[:SPLIT]", help="data sets of the scanner that was trained on"
+    )
+    parser.add_argument("--other", nargs="+", metavar="FOLDER[:SPLIT]", help="data sets of other scanners")
     parser.add_argument("--real", type=Path, metavar="FOLDER", help="real scans with their axes")
     text = "what is to be found on synthetic roads (all); corridor and lines are drawn for the last"
     parser.add_argument("--truths", nargs="+", choices=TRUTH_KINDS, default=["carriageway", "road"], help=text)

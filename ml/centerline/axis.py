@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -85,10 +84,6 @@ class Axis:
     def moved(self, by: ArrayLike) -> Axis:
         """Return the line moved by a vector (3,), m."""
         return Axis(self.points + np.asarray(by, dtype=np.float64), self.joined)
-
-    def reversed(self) -> Axis:
-        """Return the line run in the other direction."""
-        return Axis(self.points[::-1], self.joined[::-1])
 
     @cached_property
     def parts(self) -> Float:
@@ -226,8 +221,3 @@ class Axis:
         distance = np.hypot(along - foot, across)
         # Outside a bend the foot of many points is the corner: their offset is the distance, not that from the chord.
         return self.station[segment] + foot, np.copysign(distance, across), distance
-
-    def pieces(self) -> Iterator[Float]:
-        """Yield the vertices (K, 3) of every stretch without a gap."""
-        for first, last in self.parts:
-            yield self.points[(self.station >= first) & (self.station <= last)]

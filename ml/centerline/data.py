@@ -77,17 +77,18 @@ class BatchOptions(Part):
     @model_validator(mode="after")
     def _whole(self) -> BatchOptions:
         if self.steps % self.passes:
-            raise ValueError(f"steps must be a multiple of passes, {self.passes}")
+            raise ValueError(f"steps is {self.steps}: must be a multiple of passes, {self.passes}")
         return self
 
 
 @dataclass(frozen=True)
 class Roads:
-    """Roads to learn from and roads to validate with; the synthetic and the real ones apart."""
+    """Roads to learn from and roads to validate with; of both the synthetic and the real ones apart."""
 
     train: list[Road]
     measured: list[Road]
     validation: list[Road]
+    measured_validation: list[Road]
 
 
 def read_roads(data: DataOptions, truth: TruthKind, progress: Progress = silent) -> Roads:
@@ -100,12 +101,12 @@ def read_roads(data: DataOptions, truth: TruthKind, progress: Progress = silent)
     train = _scenes(data.data_sets, data.train_split, truth, cache, progress)
     validation = _scenes(data.data_sets, data.validation_split, truth, cache, progress)
     measured = [_measured(road, truth) for road in data.measured]
-    validation += [_measured(road, truth) for road in data.measured_validation]
+    measured_validation = [_measured(road, truth) for road in data.measured_validation]
     if not train and not measured:
         raise InputError("data", list(data.data_sets), f"holds no road with a {truth} to learn from")
-    if not validation:
+    if not validation and not measured_validation:
         raise InputError("data", list(data.data_sets), f"holds no road with a {truth} to validate with")
-    return Roads(train, measured, validation)
+    return Roads(train, measured, validation, measured_validation)
 
 
 class Batches:
@@ -174,7 +175,7 @@ def fixed_batches(
         count: of sequences.
         seed: of what is drawn.
     """
-    dataset = SliceDataset(roads, settings, count, seed, effects)
+    dataset = SliceDataset(roads, settings, count, seed, effects, "validation slices")
     samples = [dataset.drawn(number) for number in range(count)]
     return [collate(samples[first : first + 32]) for first in range(0, len(samples), 32)]
 

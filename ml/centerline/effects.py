@@ -45,7 +45,7 @@ class Crop(Part):
         for name, least in (("reach", 0.5), ("beyond", 0.0)):
             low, high = getattr(self, name)
             if not least <= low <= high <= 1000.0:
-                raise ValueError(f"{name} must be two ascending numbers from {least:g} to 1000")
+                raise ValueError(f"{name} is {low:g}, {high:g}: must be two ascending numbers from {least:g} to 1000")
         return self
 
 
@@ -95,7 +95,8 @@ class Effects(Part):
     @model_validator(mode="after")
     def _powers(self) -> Effects:
         if not 0.01 <= self.gamma[0] <= self.gamma[1] <= 10.0:
-            raise ValueError("gamma must be two ascending numbers from 0.01 to 10")
+            low, high = self.gamma
+            raise ValueError(f"gamma is {low:g}, {high:g}: must be two ascending numbers from 0.01 to 10")
         return self
 
 
@@ -178,8 +179,8 @@ def drop(stretch: Stretch, effects: Effects, rng: Generator) -> None:
     keep &= (rng.random(slices) >= effects.empty)[stretch.number]
     if rng.random() < effects.hidden and points:
         at, length, width = rng.integers(points), rng.uniform(2.0, 12.0), rng.uniform(1.5, 3.0)
-        along = np.abs(stretch.number - stretch.number[at]) <= length / 2.0
-        keep &= ~(along & (np.abs(stretch.xyz[:, 1] - stretch.xyz[at, 1]) <= width / 2.0))
+        x, y = stretch.xyz[:, 0] + stretch.along()[stretch.number], stretch.xyz[:, 1]
+        keep &= ~((np.abs(x - x[at]) <= length / 2.0) & (np.abs(y - y[at]) <= width / 2.0))
     stretch.keep(keep)
 
 
@@ -214,10 +215,11 @@ def turn_round(stretch: Stretch) -> None:
 def move(stretch: Stretch, effects: Effects, rng: Generator) -> None:
     """Tilt the ground and add noise to the points. Their slices stay what they are."""
     grade, cross = rng.uniform(-effects.tilt, effects.tilt, 2)
-    middle = (len(stretch.center) - 1) / 2.0
-    x, y = stretch.xyz[:, 0] + stretch.number - middle, stretch.xyz[:, 1]
+    along = stretch.along()
+    along -= 0.5 * along[-1]
+    x, y = stretch.xyz[:, 0] + along[stretch.number], stretch.xyz[:, 1]
     noise = rng.uniform(0.0, effects.jitter) * rng.standard_normal(stretch.xyz.shape)
     stretch.xyz = stretch.xyz + noise
     stretch.xyz[:, 2] += grade * x + cross * y
     stretch.corridor = stretch.corridor.copy()
-    stretch.corridor[:, HEIGHT] += grade * (np.arange(len(stretch.center)) - middle) + cross * stretch.center
+    stretch.corridor[:, HEIGHT] += grade * along + cross * stretch.center

@@ -11,6 +11,8 @@ Every predictor sees the same points in the same frames. Both depend on a seed:
   axis of a synthetic road, which is scanned far to both sides; for a real one it is the path that is estimated from its
   *cropped* points.
 
+Of a synthetic road's carriageways the other one is cut off somewhere beside the middle of the median.
+
 Slices in which the truth's axis has a gap are left out.
 """
 
@@ -32,7 +34,7 @@ from . import skeleton, trivial
 from .corridor import CORRIDOR, Truth
 from .frames import Frames, along, displaced, estimated_path, stretches
 from .metrics import Spread, figures, over_roads, over_seeds
-from .roads import Road, cropped
+from .roads import Road, cropped, cut_beside_median
 from .slices import SliceSettings
 
 Float = NDArray[np.float64]
@@ -84,6 +86,7 @@ def case(
     """
     settings = settings or SliceSettings()
     seen = road if cropping is None else cropped(road, cropping.share, seed, cropping.length)
+    seen = cut_beside_median(seen, settings.median_error, stream(seed, "median", road.name))
     path = estimated_path(seen.xyz.astype(np.float64)) if estimated else truth_of(road).axis
     rng = stream(seed, "frames", road.name)
     strayed = displaced(along(path), rng, settings.window, settings.direction_deg, settings.wander_length)
@@ -120,12 +123,16 @@ def measure(
         predictors: by name; one per seed, as models that were trained with it, or one for all seeds.
         cases: the roads as a seed shows them.
         seeds: of cuts and frames. The n-th predictor is measured with the n-th seed.
+
+    Raises:
+        InputError: two roads have the same name, by which figures are told apart.
     """
     rows: dict[str, dict[str, list[dict[str, float]]]] = {name: {} for name in predictors}
     for index, seed in enumerate(seeds):
         shown = cases(seed)
-        if len({one.road.name for one in shown}) < len(shown):
-            raise ValueError("roads must differ in their names")
+        names = [one.road.name for one in shown]
+        if twice := {name for name in names if names.count(name) > 1}:
+            raise InputError("road", sorted(twice)[0], "is the name of several roads; give data sets of other names")
         for name, versions in predictors.items():
             if len(versions) not in (1, len(seeds)):
                 raise ValueError(f"{name}: {len(versions)} predictors for {len(seeds)} seeds")

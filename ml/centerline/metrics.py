@@ -28,6 +28,8 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 from scipy.special import ndtri
 
+from .calibration import LEVELS
+
 Float = NDArray[np.float64]
 Index = NDArray[np.intp]
 
@@ -36,8 +38,6 @@ GAP = 5.0
 SHORTEST = 20.0
 """m."""
 DEGREE = 3
-LEVELS = (0.68, 0.95)
-"""Shares that an interval is meant to cover."""
 _FEWEST = 2 * (DEGREE + 1)
 """Predicted centres that a window's polynomial needs."""
 _PAST_END = 1.0

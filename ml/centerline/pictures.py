@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import rankdata
 
+from .calibration import DEVIATIONS, LEVELS
 from .corridor import CORRIDOR
 from .evaluation import CORRIDOR_COLUMNS, Case, belonging, truth_of
 from .frames import Frames
@@ -24,8 +25,6 @@ COLORS = ("#d81b60", "#1e88e5", "#ffc107", "#004d40", "#8e24aa", "#6d4c41")
 TRUE = "#00e5a0"
 EDGE = "#ff8f00"
 CENTER = "#1e88e5"
-NINETY_FIVE, SIXTY_EIGHT = 1.959964, 0.994458
-"""Half widths of Gaussian intervals in standard deviations."""
 _MOST_POINTS = 60_000
 _APART = 4.0
 """Predictions farther apart than this, m, are not joined."""
@@ -81,8 +80,7 @@ def corridor_picture(shown: Case, prediction: Float, view: View, title: str, hei
     _true(panels[0], shown, view, edges=True)
     for name, color, label in (("center", CENTER, "centre"), ("left_edge", EDGE, "edges"), ("right_edge", EDGE, None)):
         if name in column:
-            spread = column.get(f"{name}_std", np.zeros(len(prediction)))
-            _band(panels[0], shown, view, column[name], spread, color, label)
+            _band(panels[0], shown, view, column[name], _half_width(column, name, 95), color, label)
     panels[0].legend(loc="upper right", ncols=4, fontsize=8, framealpha=0.9)
     _center_error(panels[1], shown, view, column)
     if with_lanes:
@@ -153,13 +151,20 @@ def _beside(shown: Case, points: Float, view: View) -> tuple[Float, Float]:
     return np.insert(station, breaks, np.nan), np.insert(offset, breaks, np.nan)
 
 
-def _band(axes: Axes, shown: Case, view: View, y: Float, std: Float, color: str, label: str | None) -> None:
-    """Draw a line with its 95 % interval."""
-    center = _beside(shown, shown.frames.at(y), view)
-    known = np.where(np.isfinite(std), std, 0.0)
-    station, offset = center
-    _, low = _across(shown, shown.frames, y - NINETY_FIVE * known, view)
-    at, high = _across(shown, shown.frames, y + NINETY_FIVE * known, view)
+def _half_width(column: Mapping[str, Float], name: str, level: int) -> Float:
+    """Return half-widths (M,) of an interval, m: as the prediction says, else by its standard deviation, else 0."""
+    if f"{name}_{level}" in column:
+        width = column[f"{name}_{level}"]
+    else:
+        width = DEVIATIONS[LEVELS.index(level / 100.0)] * column.get(f"{name}_std", np.zeros(len(column[name])))
+    return np.nan_to_num(width)
+
+
+def _band(axes: Axes, shown: Case, view: View, y: Float, width: Float, color: str, label: str | None) -> None:
+    """Draw a line with an interval of 95 %."""
+    station, offset = _beside(shown, shown.frames.at(y), view)
+    _, low = _across(shown, shown.frames, y - width, view)
+    at, high = _across(shown, shown.frames, y + width, view)
     axes.fill_between(at, low, high, color=color, alpha=0.35, lw=0, label=None if label is None else f"{label}, 95 %")
     axes.plot(station, offset, color=color, lw=1.3, label=label)
 
@@ -177,14 +182,14 @@ def _across(shown: Case, frames: Frames, y: Float, view: View) -> tuple[Float, F
 
 
 def _center_error(axes: Axes, shown: Case, view: View, column: Mapping[str, Float]) -> None:
-    y, std = column["center"], column.get("center_std")
+    y = column["center"]
     station, offset = _across(shown, shown.frames, y, view)
-    if std is not None and np.isfinite(std).any():
-        known = np.where(np.isfinite(std), std, np.nan)
-        for width, alpha, label in ((NINETY_FIVE, 0.2, "95 %"), (SIXTY_EIGHT, 0.35, "68 %")):
-            at, low = _across(shown, shown.frames, y - width * known, view)
-            _, high = _across(shown, shown.frames, y + width * known, view)
-            axes.fill_between(at, low, high, color=CENTER, alpha=alpha, lw=0, label=label)
+    for level, alpha in ((95, 0.2), (68, 0.35)):
+        width = _half_width(column, "center", level)
+        if width.any():
+            at, low = _across(shown, shown.frames, y - width, view)
+            _, high = _across(shown, shown.frames, y + width, view)
+            axes.fill_between(at, low, high, color=CENTER, alpha=alpha, lw=0, label=f"{level} %")
     axes.plot(station, offset, color=CENTER, lw=1.2, label="predicted centre")
     axes.axhline(0.0, color="black", lw=1.0)
     axes.set(ylabel="centre, m")
@@ -198,10 +203,8 @@ def _lanes(axes: Axes, shown: Case, view: View, column: Mapping[str, Float]) -> 
     station = there.station[inside]
     for name, color in (("lanes", CENTER), ("lane_width", EDGE)):
         value, label = column[name][inside], name.replace("_", " ") + (", m" if name == "lane_width" else "")
-        std = column.get(f"{name}_std")
-        if std is not None:
-            spread = NINETY_FIVE * np.nan_to_num(std[inside])
-            axes.fill_between(station, value - spread, value + spread, color=color, alpha=0.25, lw=0)
+        spread = _half_width(column, name, 95)[inside]
+        axes.fill_between(station, value - spread, value + spread, color=color, alpha=0.25, lw=0)
         axes.plot(station, value, color=color, lw=1.2, label=label)
         true = there.corridor[inside, CORRIDOR.index(name)]
         axes.plot(station, true, color="black", lw=1.0, ls="--", label="true" if name == "lanes" else None)

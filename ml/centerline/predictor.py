@@ -12,15 +12,14 @@ from pydantic import Field
 from torch import Tensor
 
 from ml.configuration import Part
-from synthroads_addon.core.random_streams import stream
 from synthroads_addon.core.schema import quantity
 
 from .calibration import Calibration
 from .corridor import CORRIDOR, Truth
-from .frames import Frames, interleaved, sequences, stretches
+from .frames import Frames, interleaved, stretches
 from .models import LINES, TARGETS, CenterlineModel, both_ways
 from .roads import Road
-from .slices import Sample, SliceSettings, collate, sample, stretch
+from .slices import FrameSlices, SliceSettings, collate
 
 Float = NDArray[np.float64]
 
@@ -127,13 +126,12 @@ class CenterlinePredictor:
         self, road: Road, frames: Frames
     ) -> Iterator[tuple[NDArray[np.intp], Float, NDArray[np.bool_], Float, Float]]:
         """Yield of all slices of some sequences: frame, z origin, whether there are points, values and deviations."""
-        settings = self.settings
-        runs = sequences(frames, settings.slices, min(self.use.step, settings.slices), settings.spacing)
+        data = FrameSlices(road, frames, self.settings, self.use.step)
         device = next(self.model.parameters()).device
         self.model.eval()
-        for first in range(0, len(runs), self.use.batch):
-            some = runs[first : first + self.use.batch]
-            samples = [self._sample(road, frames, run) for run in some]
+        for first in range(0, len(data), self.use.batch):
+            some = data.runs[first : first + self.use.batch]
+            samples = [data[number] for number in range(first, first + len(some))]
             batch = {name: values.to(device) for name, values in collate(samples).items()}
             with torch.no_grad():
                 output = both_ways(self.model, batch) if self.use.mirror else self.model(batch)
@@ -141,12 +139,6 @@ class CenterlinePredictor:
             deviations = _flat(output["center_std"], output["corridor_std"])
             filled = batch["mask"].any(-1).flatten().cpu().numpy()
             yield some.flatten(), batch["frame"][..., 3].flatten().cpu().numpy(), filled, values, deviations
-
-    def _sample(self, road: Road, frames: Frames, run: NDArray[np.intp]) -> Sample:
-        chosen = frames.select(run)
-        # Which points are left out hangs on the place alone, so that cutting a road into parts changes nothing.
-        place = int(np.floor(1000.0 * chosen.station[0])) & 0xFFFFFFFF
-        return sample(stretch(road, chosen, self.settings), self.settings, stream(0, "frames", place), 0, run)
 
 
 def joined(frames: Frames, y: Float, std: Float, reach: int) -> Float:

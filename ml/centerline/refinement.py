@@ -14,7 +14,7 @@ from .layers import GridConvolution, RelativeAttention, cell_features, cell_sums
 _APART = (1, 3, 6)
 """How far the cells lie apart that each convolution looks at; five of them."""
 _PARABOLA_UNIT = 5.0
-"""Half the length of a sequence, m: parabolas are fitted in this unit."""
+"""m: in this unit the places along a sequence are numbers of about one, of which parabolas are fitted well."""
 _FIRST_LOG_STD = -1.5
 
 

@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ml.points import GROUND_CLASSES, ROAD_CLASSES, Points, read_ground, read_points
+from ml.points import GROUND_CLASSES, Points, read_ground, read_points
 from synthroads_addon.core.cloud.npz import ARCHIVE_FAULTS
 from synthroads_addon.core.dataset.manifest import checksum, read_manifest
 from synthroads_addon.core.errors import InputError, MissingFileError, OutputError
@@ -23,7 +23,7 @@ from synthroads_addon.core.random_streams import stream
 
 from .axis import Axis
 from .corridor import Truth, TruthKind, truths
-from .frames import Frames, estimated_path
+from .frames import Frames
 
 Float = NDArray[np.float64]
 
@@ -96,19 +96,6 @@ class Road:
             station=station[order].astype(np.float32),
             reference=reference,
             truth=truth,
-        )
-
-    @property
-    def points(self) -> Points:
-        """Return the points as a cloud has them, in the order of their stations."""
-        return Points(
-            origin=self.origin,
-            xyz=self.xyz.astype(np.float64),
-            intensity=np.asarray(self.intensity),
-            rgb=self.rgb.astype(np.float32) / np.float32(255.0),
-            class_id=np.asarray(self.class_id),
-            class_names=self.class_names,
-            has_color=self.has_color,
         )
 
     def select(self, keep: NDArray[np.bool_]) -> Road:
@@ -223,26 +210,6 @@ def read_measured(cloud: Path, axis: Path, kind: TruthKind, gap: float | None = 
     return Road.of_points(cloud.stem, points, line, Truth.measured(line, kind))
 
 
-def read_unknown(cloud: Path, path: Axis | None = None) -> Road:
-    """Read the ground of a cloud of which nothing is known.
-
-    Args:
-        cloud: the cloud.
-        path: line along the road in map coordinates; None: it is found in the points of the road's classes, or where
-            there are none, as the middle of the whole strip of ground.
-
-    Raises:
-        MissingFileError, InputError: a file is missing or damaged, or the cloud has no extent.
-    """
-    points = read_ground(cloud)
-    if path is None:
-        paved = points.of_class(ROAD_CLASSES)
-        line = estimated_path(points.xyz[paved] if paved.any() else points.xyz)
-    else:
-        line = path.moved(-points.origin)
-    return Road.of_points(cloud.stem, points, line)
-
-
 def cropped(road: Road, share: float, seed: int, length: float = 1.0) -> Road:
     """Cut off both sides of every slice of a road with a truth, each at random and by itself.
 
@@ -271,6 +238,20 @@ def cropped(road: Road, share: float, seed: int, length: float = 1.0) -> Road:
         np.maximum.at(reach, number, sign * offset)
         keep &= sign * offset <= (reach * (1.0 - shares[:, side]))[number]
     return road.select(keep)
+
+
+def cut_beside_median(road: Road, error: float, rng: np.random.Generator) -> Road:
+    """Return a road of which the other carriageway is cut off somewhere beside the middle of the median.
+
+    The cut is as far from it everywhere, and nobody knows how far: so it doesn't tell where the carriageway lies.
+
+    Args:
+        road: with a truth; a road that is no carriageway stays as it is.
+        error: how far from the middle of the median it may be at most, m.
+        rng: draws it, uniformly.
+    """
+    aside = rng.uniform(-error, error)
+    return road if road.truth is None else replace(road, truth=replace(road.truth, room=road.truth.room + aside))
 
 
 def _unit(direction: Float) -> Float:

@@ -34,7 +34,7 @@ from . import intensity
 from .corridor import CORRIDOR, TruthKind
 from .effects import Effects, leave_out, transform
 from .frames import SPACING, Frames, displaced, sequences
-from .roads import Road
+from .roads import Road, cut_beside_median
 from .stretch import HEIGHT, Stretch
 
 Float = NDArray[np.float64]
@@ -58,6 +58,9 @@ class SliceSettings(Part):
     window: float = quantity(12.0, ge=0, le=100, unit="m", description="The path strays up to half of it to each side.")
     direction_deg: float = quantity(2.0, ge=0, le=45, unit="deg", description="Error of its direction, deviation.")
     wander_length: float = quantity(100.0, ge=5, le=10_000, unit="m", description="Length over which it strays.")
+    median_error: float = quantity(
+        1.5, ge=0, le=20, unit="m", description="How far beside the median's middle a carriageway may be cut off."
+    )
 
     @property
     def frame_spacing(self) -> float:
@@ -84,20 +87,28 @@ class SliceDataset(Dataset[Sample]):
         settings: how slices are cut.
         samples: sequences per epoch.
         seed: of everything random.
-        effects: None: none, for validation. The path still strays.
+        effects: None: none. The path still strays.
+        purpose: of the samples: those of another purpose are others.
 
     Raises:
         InputError: no road is long enough for a sequence.
     """
 
     def __init__(
-        self, roads: Sequence[Road], settings: SliceSettings, samples: int, seed: int, effects: Effects | None = None
+        self,
+        roads: Sequence[Road],
+        settings: SliceSettings,
+        samples: int,
+        seed: int,
+        effects: Effects | None = None,
+        purpose: str = "slices",
     ) -> None:
         self.roads = list(roads)
         self.settings = settings
         self.samples = samples
         self.seed = seed
         self.effects = effects
+        self.purpose = purpose
         self.epoch = 0
         self._starts = [starts for number, road in enumerate(self.roads) if (starts := _starts(road, number, settings))]
         if not self._starts:
@@ -118,11 +129,12 @@ class SliceDataset(Dataset[Sample]):
 
     def drawn(self, *key: int) -> Sample:
         """Return the sample of some numbers, any of them."""
-        rng = stream(self.seed, "slices", *key)
+        rng = stream(self.seed, self.purpose, *key)
         starts = self._starts[rng.integers(len(self._starts))]
         lengths = np.array([start.high - start.low + 1e-3 for start in starts])
         start = starts[rng.choice(len(starts), p=lengths / lengths.sum())]
-        road, settings = self.roads[start.road], self.settings
+        settings = self.settings
+        road = cut_beside_median(self.roads[start.road], settings.median_error, rng)
         assert road.truth is not None
         station = rng.uniform(start.low, start.high) + settings.spacing * np.arange(settings.slices)
         axis = road.truth.axis
@@ -155,33 +167,37 @@ class IterableSlices(IterableDataset[Sample]):
 class FrameSlices(Dataset[Sample]):
     """All frames of a path along one road, as sequences in order; the last of a stretch overlaps the one before.
 
+    Which points are left out where a slice has too many hangs on the place alone, so that cutting a road into parts
+    changes nothing.
+
     Args:
         road: with or without a truth.
         frames: M frames; ``number`` of a sample says which.
         settings: how slices are cut.
-        seed: of which points are left out where a slice has too many.
+        step: slices from one sequence's start to the next one's; so many as a sequence has if not given.
     """
 
-    def __init__(self, road: Road, frames: Frames, settings: SliceSettings, seed: int = 0) -> None:
+    def __init__(self, road: Road, frames: Frames, settings: SliceSettings, step: int | None = None) -> None:
         self.road = road
         self.frames = frames
         self.settings = settings
-        self.seed = seed
-        self.runs = sequences(frames, settings.slices, spacing=settings.spacing)
+        self.runs = sequences(frames, settings.slices, step and min(step, settings.slices), settings.spacing)
 
     def __len__(self) -> int:
         return len(self.runs)
 
     def __getitem__(self, number: int) -> Sample:
         run = self.runs[number]
-        cut = stretch(self.road, self.frames.select(run), self.settings)
-        return sample(cut, self.settings, stream(self.seed, "frames", number), 0, run)
+        chosen = self.frames.select(run)
+        place = int(np.floor(1000.0 * chosen.station[0])) & 0xFFFFFFFF
+        cut = stretch(self.road, chosen, self.settings)
+        return sample(cut, self.settings, stream(0, "frames", place), 0, run)
 
 
 def stretch(road: Road, frames: Frames, settings: SliceSettings) -> Stretch:
     """Return the points and the truth in the slices of some frames.
 
-    Where the truth is a carriageway's, points beyond the middle of the median are left out.
+    Where the truth is a carriageway's, points beyond the middle of the median are left out, see `Truth.room`.
     """
     found = road.slices(frames, settings.half_width, settings.thickness)
     labels = road.class_id[found.index]

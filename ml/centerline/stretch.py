@@ -54,6 +54,10 @@ class Stretch:
         for name in ("xyz", "number", "intensity", "rgb", "paved", "marked"):
             setattr(self, name, getattr(self, name)[points])
 
+    def along(self) -> Float:
+        """Return how far along the path each slice lies from the first (S,), m."""
+        return np.abs(self.frames.station - self.frames.station[0])
+
     def paved_sides(self) -> Float:
         """Return how far the pavement reaches to the left and to the right of the centre (S, 2), m, or NaN."""
         return np.column_stack([self.corridor[:, LEFT] - self.center, self.center - self.corridor[:, RIGHT]])

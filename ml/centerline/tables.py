@@ -93,19 +93,6 @@ def as_data(measured: Measured) -> dict[str, Any]:
     }
 
 
-def from_data(data: Mapping[str, Any]) -> dict[str, dict[str, dict[str, Spread]]]:
-    """Return figures that `as_data` made plain."""
-    return {
-        name: {
-            road: {
-                figure: Spread(_number(one["mean"]), _number(one["std"]), one["seeds"]) for figure, one in row.items()
-            }
-            for road, row in rows.items()
-        }
-        for name, rows in data.items()
-    }
-
-
 def write_tables(folder: Path, name: str, measured: Measured) -> None:
     """Write ``NAME.json`` and ``NAME.md``, the latter with one table for all roads together and one for each.
 

@@ -13,7 +13,7 @@ from torch import nn
 
 from ml.configuration import Configuration
 from ml.fitting import chosen_device, fit
-from ml.runs import Run, stream_seed
+from ml.runs import CALIBRATION, Run, stream_seed
 from ml.tasks import Evaluation, Prediction
 from synthroads_addon.core.errors import InputError, MissingFileError, OutputError
 from synthroads_addon.core.files import write_file
@@ -23,13 +23,12 @@ from synthroads_addon.core.schema import canonical_json, read_json
 from .calibration import DEVIATIONS, Calibration, all_calibrated
 from .data import Batches, BatchOptions, DataOptions, Roads, fixed_batches, quiet, read_roads
 from .effects import Effects
-from .evaluation import case, truth_of
+from .evaluation import Cropping, case, truth_of
 from .losses import LossOptions, centerline_loss
 from .models import TARGETS, Batch, CenterlineModel, ModelOptions, build
 from .predictor import CenterlinePredictor, UseOptions, errors
 from .slices import SliceSettings
 
-CALIBRATION = "calibration.json"
 _FIRST_WEIGHTS = "first weights"
 
 
@@ -136,7 +135,7 @@ def predictor(run: Run[CenterlineConfiguration]) -> CenterlinePredictor:
     device = chosen_device(configuration)
     path = run.folder / CALIBRATION
     state = run.saved(device)
-    if state is None or not path.is_file():
+    if state is None or int(state["epoch"]) < configuration.schedule.epochs or not path.is_file():
         raise InputError(str(run.folder), None, "its training isn't finished; `synthroads train --resume` goes on")
     model = _empty_model(configuration).to(device)
     model.load_state_dict(state["model"])
@@ -176,7 +175,8 @@ def _validation(configuration: CenterlineConfiguration, roads: Roads, device: to
     """Return what `fit` calls after each epoch: errors and coverage on sequences that stay the same."""
     crop = quiet(configuration.effects.crop)
     count = configuration.batches.validation
-    batches = fixed_batches(roads.validation, configuration.slices, crop, count, configuration.seed)
+    known = [*roads.validation, *roads.measured_validation]
+    batches = fixed_batches(known, configuration.slices, crop, count, configuration.seed)
 
     def validate(model: nn.Module, epoch: int) -> dict[str, float]:
         error, std = _residuals(model, batches, device)
@@ -197,10 +197,12 @@ def calibrate(run: Run[CenterlineConfiguration], model: CenterlineModel, roads: 
     These are gone along from end to end, as in use: joined lines are better than those of single sequences.
     """
     configuration = run.configuration
-    ready = CenterlinePredictor(model, configuration.slices, configuration.use)
-    shown = [
-        case(road, configuration.seed, cropping=None, estimated=False, settings=configuration.slices)
-        for road in roads.validation
+    seed, settings = configuration.seed, configuration.slices
+    ready = CenterlinePredictor(model, settings, configuration.use)
+    shown = [case(road, seed, cropping=None, estimated=False, settings=settings) for road in roads.validation]
+    # Strips that were cut around their axis beforehand: the middle of the strip must not be the answer.
+    shown += [
+        case(road, seed, cropping=Cropping(), estimated=True, settings=settings) for road in roads.measured_validation
     ]
     passes = [(ready.regress(one.road, one.frames), truth_of(one.road)) for one in shown]
     error = np.concatenate([errors(one, truth) for one, truth in passes])
@@ -210,8 +212,8 @@ def calibrate(run: Run[CenterlineConfiguration], model: CenterlineModel, roads: 
     center = found["center"]
     return {
         "validation_mae": float(np.nanmean(np.abs(error[:, 0]))),
-        "coverage_68": center.after[0],
-        "coverage_95": center.after[1],
+        "validation_68": center.after[0],
+        "validation_95": center.after[1],
         "calibration_factor": center.factor,
         "parameters": sum(weights.numel() for weights in model.parameters()),
         "corridor_mae": {name: _mean_size(error[:, index]) for index, name in enumerate(TARGETS)},

@@ -100,12 +100,6 @@ def test_gaps() -> None:
     assert len(frames) == 21 + 31
     assert not np.isnan(frames.position).any()
     assert not np.isnan(frames.direction).any()
-    assert [len(piece) for piece in axis.pieces()] == [21, 31]
-
-
-def test_a_turned_axis_keeps_its_gaps() -> None:
-    back = with_gap().reversed()
-    np.testing.assert_allclose(back.parts, [[0.0, 30.0], [60.0, 80.0]])
 
 
 def test_direction_does_not_follow_jumps_of_single_points() -> None:

@@ -25,6 +25,7 @@ from ml.centerline.effects import (
     turn_round,
 )
 from ml.centerline.frames import along, displaced
+from ml.centerline.lighting import _waves
 from ml.centerline.slices import SliceSettings, stretch
 from synthroads_addon.core.errors import InputError
 from tests.ml.analytic_roads import roads
@@ -45,10 +46,11 @@ def rng(seed: int = 0) -> np.random.Generator:
     return np.random.default_rng(seed)
 
 
-def cut(kind: str = "road", which: int = 0, seed: int = 4) -> Stretch:
+def cut(kind: str = "road", which: int = 0, seed: int = 4, spacing: int = 1) -> Stretch:
     road = roads(kind)[which]  # type: ignore[arg-type]
     assert road.truth is not None
-    frames = displaced(along(road.truth.axis), rng(seed), 12.0, 2.0, 100.0).select(slice(40, 50))
+    frames = displaced(along(road.truth.axis), rng(seed), 12.0, 2.0, 100.0)
+    frames = frames.select(slice(40, 40 + 10 * spacing, spacing))
     return stretch(road, frames, SETTINGS.model_copy(update={"truth": kind}))
 
 
@@ -209,19 +211,46 @@ def test_dropout_holes_and_empty_slices() -> None:
     assert 0.5 * whole < len(one.number) < whole - 20
 
 
-def test_tilt_carries_the_height_along() -> None:
-    one = cut()
+@pytest.mark.parametrize("spacing", [1, 4])
+def test_a_hole_is_as_long_as_a_vehicle(spacing: int) -> None:
+    holes = []
+    for seed in range(40):
+        one = cut(spacing=spacing)
+        x = one.xyz[:, 0] + spacing * one.number
+        places = {tuple(place) for place in np.column_stack([x, one.xyz[:, 1]])}
+        drop(one, NONE.model_copy(update={"hidden": 1.0}), rng(seed))
+        x = one.xyz[:, 0] + spacing * one.number
+        gone = np.array(sorted(places - {tuple(place) for place in np.column_stack([x, one.xyz[:, 1]])}))
+        holes.append(np.ptp(gone, axis=0))
+    along_road, across = np.max(holes, axis=0)
+    assert 8.0 < along_road <= 12.0
+    assert 2.0 < across <= 3.0
+
+
+@pytest.mark.parametrize("spacing", [1, 4])
+def test_patches_go_on_from_slice_to_slice(spacing: int) -> None:
+    ahead, later = cut(spacing=spacing), cut(spacing=spacing)
+    inside = later.number < 9
+    ahead.xyz[:, 0] += spacing
+    later.number = np.minimum(later.number + 1, 9)
+    np.testing.assert_allclose(_waves(ahead, rng(5))[inside], _waves(later, rng(5))[inside], atol=1e-6)
+
+
+@pytest.mark.parametrize("spacing", [1, 4])
+def test_tilt_carries_the_height_along(spacing: int) -> None:
+    one = cut(spacing=spacing)
     height = CORRIDOR.index("height")
     before = one.corridor[:, height].copy()
     z = one.xyz[:, 2].copy()
     move(one, NONE.model_copy(update={"tilt": 0.1}), rng(1))
     # The plane that was added, found from the points, says what the centreline's height must be.
-    along_road = one.xyz[:, 0] + one.number
+    along_road = one.xyz[:, 0] + spacing * one.number
     design = np.column_stack([along_road, one.xyz[:, 1], np.ones(len(z))])
     grade, cross, zero = np.linalg.lstsq(design, one.xyz[:, 2] - z, rcond=None)[0]
     assert abs(grade) > 0.001
     assert abs(cross) > 0.001
-    np.testing.assert_allclose(one.corridor[:, height] - before, grade * np.arange(10) + cross * one.center + zero)
+    added = grade * spacing * np.arange(10) + cross * one.center + zero
+    np.testing.assert_allclose(one.corridor[:, height] - before, added)
 
 
 def test_jitter() -> None:
@@ -441,9 +470,9 @@ def test_a_sequence_without_points_passes_through() -> None:
 
 
 def test_wrong_limits_are_refused() -> None:
-    with pytest.raises(InputError, match="reach must be two ascending numbers"):
+    with pytest.raises(InputError, match=r"reach is .*: must be two ascending numbers"):
         Effects.from_dict({"crop": {"reach": [9.0, 4.0]}}, "effects")
-    with pytest.raises(InputError, match="gamma must be two ascending"):
+    with pytest.raises(InputError, match=r"gamma is .*: must be two ascending"):
         Effects.from_dict({"gamma": [1.0, 0.0]}, "effects")
     with pytest.raises(InputError, match="dropout"):
         Effects.from_dict({"dropout": 1.0}, "effects")

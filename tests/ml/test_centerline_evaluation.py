@@ -31,7 +31,7 @@ from ml.centerline.metrics import Spread
 from ml.centerline.pictures import View, corridor_picture, lines_picture
 from ml.centerline.roads import Road, read_measured
 from ml.centerline.skeleton import SkeletonSettings
-from ml.centerline.tables import COLUMNS, as_data, cell, from_data, road_table, table, write_tables
+from ml.centerline.tables import COLUMNS, as_data, cell, road_table, table, write_tables
 from synthroads_addon.core.errors import InputError
 from tests.ml.centerline_roads import REAL, strip_road
 
@@ -193,7 +193,7 @@ def test_tables_say_mean_and_deviation(tmp_path: Path) -> None:
     assert "## all" in (tmp_path / "roads.md").read_text()
     data = json.loads((tmp_path / "roads.json").read_text())
     assert data["baseline"]["all"]["mae"] == {"mean": 0.9, "std": None, "seeds": 1}
-    assert as_data(from_data(data)) == data
+    assert data == as_data(measured())
 
 
 def test_pictures_are_drawn_with_and_without_uncertainty(road: Road) -> None:
@@ -262,5 +262,5 @@ def test_intervals_count_where_they_are_given(road: Road) -> None:
 def test_roads_of_one_name_are_refused(road: Road) -> None:
     """Their figures would be taken for each other's."""
     shown = case(road, 1, cropping=None, estimated=False)
-    with pytest.raises(ValueError, match="names"):
+    with pytest.raises(InputError, match=f"road is '{road.name}': is the name of several roads"):
         measure({MIDDLE: [trivial_predictor(MIDDLE)]}, lambda seed: [shown, shown], [1])

@@ -148,7 +148,8 @@ def test_coverage_of_gaussian_errors_is_its_level() -> None:
     assert coverage(error, std, 0.68) == pytest.approx(0.68, abs=0.01)
     assert coverage(error, std, 0.95) == pytest.approx(0.95, abs=0.005)
     assert coverage(error, 0.5 * std, 0.95) < 0.7
-    assert coverage(np.array([np.nan, 0.1]), np.array([1.0, np.nan]), 0.95) != coverage(error, std, 0.95)
+    assert np.isnan(coverage(np.array([np.nan, 0.1]), np.array([1.0, np.nan]), 0.95))
+    assert coverage(np.array([np.nan, 0.1, 0.1, 3.0, 0.1]), np.array([1.0, np.nan, 1.0, 1.0, 1.0]), 0.95) == 2.0 / 3.0
 
 
 def test_seeds_are_averaged_with_the_sample_deviation() -> None:

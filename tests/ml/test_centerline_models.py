@@ -8,13 +8,13 @@ import torch
 
 from ml.centerline.axis import Axis
 from ml.centerline.corridor import CORRIDOR
-from ml.centerline.frames import Frames, along, displaced
+from ml.centerline.frames import along, displaced
 from ml.centerline.layers import DeformableKernelPoints, PointFeatures, cell_features, cell_sums
 from ml.centerline.models import TARGETS, ModelOptions, both_ways, build, mirrored
 from ml.centerline.refinement import parabola
 from ml.configuration import from_data
 from synthroads_addon.core.errors import InputError
-from tests.ml.centerline_batches import MODELS, SETTINGS, batch, moved, select, small
+from tests.ml.centerline_batches import MODELS, batch, moved, select, small
 
 
 @pytest.fixture(params=MODELS)
@@ -227,9 +227,3 @@ def test_odd_widths_are_refused():
     data = {"task": "centerline", "data": {"data_sets": ["x"]}, "model": {"width": 30, "heads": 4}}
     with pytest.raises(InputError, match=r"model.*width must be even and a multiple of heads, 4"):
         from_data(data, {"centerline": configuration_kind()}, "test")
-
-
-def test_frames_of_the_batch_are_those_of_the_data():
-    one = batch(1)
-    frames = Frames(one["frame"][0, :, :2].numpy(), one["frame"][0, :, 2].numpy(), one["station"][0].numpy())
-    assert len(frames) == SETTINGS.slices

@@ -63,8 +63,28 @@ def test_every_frame_is_predicted_from_overlapping_sequences():
     assert not np.allclose(alone.center[10:14], overlapping.center[10:14], atol=1e-9)
     # The first slices lie in the first sequence only.
     np.testing.assert_allclose(alone.center[:3], overlapping.center[:3], atol=1e-5)
-    # What the second sequence adds lies between what both say.
-    assert (overlapping.raw_std > 0).all()
+
+
+def test_frames_in_several_sequences_have_the_mean_by_inverse_variances(monkeypatch: pytest.MonkeyPatch):
+    places = frames(20.0, 43.0).select(slice(0, 3))
+    ready = predictor(step=3)
+    said = {0: [(1.0, 0.1)], 1: [(2.0, 0.1), (5.0, 0.2)], 2: [(4.0, 0.3)]}
+
+    def told(road: object, some: Frames) -> object:
+        for turn in range(2):
+            number = np.array([frame for frame, values in said.items() if len(values) > turn])
+            value, std = np.array([said[frame][turn] for frame in number]).T
+            shape = (len(number), len(TARGETS))
+            yield number, np.zeros(len(number)), np.ones(len(number), bool), *(
+                np.broadcast_to(one[:, None], shape).copy() for one in (value, std)
+            )
+
+    monkeypatch.setattr(ready, "_sequences", told)
+    monkeypatch.setattr("ml.centerline.predictor.joined", lambda frames, y, std, reach: y)
+    found = ready.regress(road(), places)
+    # 1 / 0.1^2 = 100 and 1 / 0.2^2 = 25: (100 x 2 + 25 x 5) / 125; the mean of the inverse variances is 62.5.
+    np.testing.assert_allclose(found.center, [1.0, 2.6, 4.0])
+    np.testing.assert_allclose(found.raw_std[:, 0], [0.1, 62.5**-0.5, 0.3])
 
 
 def test_few_frames_and_none():

@@ -11,7 +11,7 @@ import pytest
 import torch
 
 from ml.centerline.effects import Effects
-from ml.centerline.roads import cropped, read_measured, read_scene, read_unknown, scene_folders
+from ml.centerline.roads import cropped, read_measured, read_scene, scene_folders
 from ml.centerline.slices import SliceDataset, SliceSettings, collate
 from ml.points import Points
 from synthroads_addon.core.cloud.labels import class_scheme
@@ -94,13 +94,6 @@ def test_reading_a_scene_with_and_without_cache(tmp_path: Path) -> None:
     one, other = (SliceDataset([road], SliceSettings(), 3, 1)[2] for road in (fresh, mapped_road))
     assert torch.equal(one["coord"], other["coord"])
     assert torch.equal(one["corridor"], other["corridor"])
-    # Without its parameters the road is found in the cloud, by the pavement's points.
-    unknown = read_unknown(scene / "cloud.laz")
-    assert fresh.truth is not None
-    middle = unknown.reference.position(np.arange(5.0, unknown.reference.length - 5.0))
-    assert np.abs(fresh.truth.axis.project(middle)[1]).max() < 0.5
-    given = read_unknown(scene / "cloud.laz", fresh.truth.axis.moved(fresh.origin))
-    np.testing.assert_allclose(given.station, fresh.station, atol=1e-3)
     # Another cloud under the same name isn't taken for it.
     (scene / "cloud.laz").unlink()
     with pytest.raises(MissingFileError):
@@ -132,6 +125,3 @@ def test_a_real_road() -> None:
     assert torch.isnan(batch["corridor"][..., 0]).all()
     assert torch.isfinite(batch["corridor"][..., 5]).all()
     assert batch["mask"].float().mean() > 0.05
-    unknown = read_unknown(cloud)
-    assert unknown.truth is None
-    assert abs(len(unknown) - len(road)) < 10

@@ -28,6 +28,7 @@ from ml.centerline.slices import (
     sample,
     stretch,
 )
+from ml.points import Points
 from synthroads_addon.core.errors import InputError
 from tests.ml.analytic_roads import roads
 
@@ -148,10 +149,18 @@ def mapped(road: Road, turn: np.ndarray, by: np.ndarray) -> Road:
         lines=truth.lines[:, ::-1] if flipped else truth.lines,
         room=truth.room[:, ::-1] if flipped else truth.room,
     )
-    cloud = road.points
+    cloud = Points(
+        origin=road.origin,
+        xyz=road.xyz @ turn.T + by,
+        intensity=road.intensity,
+        rgb=road.rgb.astype(np.float32) / np.float32(255.0),
+        class_id=road.class_id,
+        class_names=road.class_names,
+        has_color=road.has_color,
+    )
     reference = line_mapped(road.reference, turn, by)
     assert reference is not None
-    return Road.of_points(road.name, replace(cloud, xyz=cloud.xyz @ turn.T + by), reference, moved)
+    return Road.of_points(road.name, cloud, reference, moved)
 
 
 @pytest.mark.parametrize("kind", ["road", "carriageway"])

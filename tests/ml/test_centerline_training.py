@@ -14,7 +14,7 @@ from ml.centerline.data import Batches, BatchOptions, MeasuredRoad, Roads, read_
 from ml.centerline.effects import Effects
 from ml.centerline.models import mirrored
 from ml.configuration import from_data, load_configuration
-from ml.runs import Run
+from ml.runs import CALIBRATION, Run
 from ml.tasks import Evaluation, Prediction
 from synthroads_addon.core.errors import Cancelled, InputError, MissingFileError, OutputError
 from synthroads_addon.core.progress import silent
@@ -105,7 +105,7 @@ def test_what_a_run_writes(data: Path, tmp_path: Path):
         "history.json",
         "metrics.json",
     }
-    assert {"validation_mae", "coverage_68", "coverage_95", "corridor_mae", "calibration"} <= set(metrics)
+    assert {"validation_mae", "validation_68", "validation_95", "corridor_mae", "calibration"} <= set(metrics)
     assert json.loads((run.folder / "metrics.json").read_text())["calibration"]["center"]["count"] == 160
     assert {"loss", "center_mae", "validation_mae", "validation_68", "validation_95"} <= set(run.history[0])
     opened = Run.open(run.folder, KINDS)
@@ -146,6 +146,18 @@ def test_unfinished_runs_are_not_used(data: Path, tmp_path: Path):
         task.predictor(run)
 
 
+def test_a_run_that_is_begun_anew_isnt_finished_by_the_one_before(data: Path, tmp_path: Path):
+    task.train(Run.start(tmp_path / "run", configuration(data, schedule={"epochs": 1})))
+    assert (tmp_path / "run" / CALIBRATION).is_file()
+    again = Run.start(tmp_path / "run", configuration(data), overwrite=True)
+    assert not (tmp_path / "run" / CALIBRATION).exists()
+    with pytest.raises(Cancelled):
+        task.train(again, Stop(6))
+    (tmp_path / "run" / CALIBRATION).write_text("{}", encoding="utf-8")
+    with pytest.raises(InputError, match="isn't finished"):
+        task.predictor(again)
+
+
 def test_beginning_with_another_run(data: Path, tmp_path: Path):
     first = Run.start(tmp_path / "first", configuration(data, schedule={"epochs": 1}))
     task.train(first)
@@ -159,7 +171,7 @@ def test_beginning_with_another_run(data: Path, tmp_path: Path):
 
 
 def test_batches_hang_on_seed_and_epoch_alone():
-    roads = Roads(analytic_roads.roads(), [], analytic_roads.roads())
+    roads = Roads(analytic_roads.roads(), [], analytic_roads.roads(), [])
     options = BatchOptions(size=3, steps=4, passes=2, validation=1)
 
     def drawn(seed: int, epoch: int) -> list[Any]:
@@ -182,10 +194,10 @@ def test_synthetic_and_measured_roads_are_mixed():
     synthetic, real = analytic_roads.roads(), analytic_roads.roads(seed=6)
     options = BatchOptions(size=50, steps=1, passes=1, validation=1)
     for share, expected in ((0.0, 0), (0.3, 15), (1.0, 50)):
-        batches = Batches(Roads(synthetic, real, real), SETTINGS, Effects(), options, 1, share)
+        batches = Batches(Roads(synthetic, real, [], real), SETTINGS, Effects(), options, 1, share)
         kinds = batches.kinds(0)
         assert int((kinds == 1).sum()) == pytest.approx(expected, abs=7 if 0 < share < 1 else 0)
-    only = Batches(Roads([], real, real), SETTINGS, Effects(), options, 1, 0.3)
+    only = Batches(Roads([], real, [], real), SETTINGS, Effects(), options, 1, 0.3)
     assert (only.kinds(0) == 0).all()
 
 
@@ -206,7 +218,7 @@ def test_measured_roads_by_stations(data: Path, tmp_path: Path):
     )
     roads = read_roads(options, "road")
     assert not roads.train
-    lengths = [road.truth.axis.length for road in (*roads.measured, *roads.validation) if road.truth]
+    lengths = [road.truth.axis.length for road in (*roads.measured, *roads.measured_validation) if road.truth]
     assert lengths == pytest.approx([100.0, 50.0], abs=1.1)
     beyond = options.model_copy(update={"measured": (MeasuredRoad(cloud=cloud, axis=axis, first=500.0),)})
     with pytest.raises(InputError, match="leaves nothing of an axis"):
@@ -217,7 +229,7 @@ def test_measured_roads_by_stations(data: Path, tmp_path: Path):
     ("message", "changes"),
     [
         ("name data_sets, or measured", {"data": {"data_sets": []}}),
-        ("steps must be a multiple of passes", {"batches": {"steps": 3, "passes": 2}}),
+        ("steps is 3: must be a multiple of passes", {"batches": {"steps": 3, "passes": 2}}),
         ("model.name", {"model": {"name": "lstm"}}),
         ("kernel_point", {"model": {"kernel_point": 25}}),
         (

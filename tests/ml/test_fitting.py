@@ -12,7 +12,7 @@ from torch import Tensor, nn
 
 from ml.configuration import Configuration, Schedule, load_configuration
 from ml.fitting import fit, learning_rate
-from ml.runs import CHECKPOINT, CURVES, METRICS, Run, torch_stream
+from ml.runs import CHECKPOINT, CURVES, METRICS, Run, stream_seed
 from synthroads_addon.core.errors import InputError, MissingFileError, OutputError
 
 STEPS = 5
@@ -28,7 +28,7 @@ def network() -> nn.Module:
 
 
 def batches(epoch: int) -> Iterator[Tensor]:
-    generator = torch_stream(7, "toy", epoch)
+    generator = torch.Generator().manual_seed(stream_seed(7, "toy", epoch))
     for _ in range(STEPS):
         yield torch.randn(16, 3, generator=generator)
 
