@@ -1,7 +1,8 @@
 """Measure centreline models and baselines; write the tables and pictures of docs/centerline.md.
 
     python tools/figures_centerline.py --in-domain out/centerline-airborne \
-        --other out/centerline-mobile out/centerline-mobile:test_tripod --real REAL_FOLDER \
+        --other out/centerline-mobile out/centerline-mobile:test_tripod \
+        --recalibrate out/centerline-mobile:validation --real REAL_FOLDER \
         --run "transformer=out/runs/transformer-1" --run "transformer=out/runs/transformer-2" \
         --output out/centerline --document docs/centerline.md --pictures docs/pictures
 
@@ -30,6 +31,7 @@ from ml.centerline import pictures, tables  # noqa: E402
 from ml.centerline.corridor import TRUTH_KINDS, TruthKind  # noqa: E402
 from ml.centerline.data import DataOptions  # noqa: E402
 from ml.centerline.evaluation import (  # noqa: E402
+    HALF_WIDTH,
     Case,
     Cropping,
     GridSearch,
@@ -73,6 +75,7 @@ CROPPINGS: dict[str, Cropping | None] = {
 }
 """Tables of the real roads, and how their slices are cropped."""
 REFERENCE = SkeletonSettings()
+OTHER = "other-scanner"
 TARGETS_SHOWN = {
     "center": ("centre (m)", 1.0),
     "left_edge": ("left edge (m)", 1.0),
@@ -99,24 +102,27 @@ class Model:
         kind: of the truth that it learned.
         versions: one predictor per seed.
         learned: names of the real roads that it was trained or validated on, which it isn't measured on.
+        half_width: of its slices, m.
     """
 
     kind: TruthKind
     versions: list[Predictor]
     learned: frozenset[str] = frozenset()
+    half_width: float = HALF_WIDTH
 
 
 def models(runs: Sequence[str]) -> dict[str, list[Model]]:
     """Return the trained models by name, given as NAME=FOLDER; those of one name, truth and real roads are one."""
-    found: dict[str, dict[tuple[TruthKind, frozenset[str]], list[Predictor]]] = {}
+    found: dict[str, dict[tuple[TruthKind, frozenset[str], float], list[Predictor]]] = {}
     for text in runs:
         name, _, folder = text.partition("=")
         run = Run.open(Path(folder), kinds())
         predictor = import_module("ml.centerline.task").predictor(run)
-        found.setdefault(name, {}).setdefault((kind_of(run), learned_by(run)), []).append(predictor)
+        alike = (kind_of(run), learned_by(run), _part(run, SliceSettings).half_width)
+        found.setdefault(name, {}).setdefault(alike, []).append(predictor)
     return {
-        name: [Model(kind, versions, learned) for (kind, learned), versions in alike.items()]
-        for name, alike in found.items()
+        name: [Model(kind, versions, learned, width) for (kind, learned, width), versions in several.items()]
+        for name, several in found.items()
     }
 
 
@@ -157,13 +163,19 @@ def of_kind(
     return found
 
 
-def baselines(search: GridSearch) -> dict[str, list[Predictor]]:
+def seen_by(trained: Mapping[str, Sequence[Model]], kind: TruthKind) -> float:
+    """Return how far to either side the models of a kind see, m: what learns nothing sees as far."""
+    widths = [model.half_width for several in trained.values() for model in several if model.kind == kind]
+    return max(widths, default=HALF_WIDTH)
+
+
+def baselines(search: GridSearch, half_width: float = HALF_WIDTH) -> dict[str, list[Predictor]]:
     """Return the skeleton with the best settings and with the reference system's, and what learns nothing."""
     best = search.best
     reference = replace(REFERENCE, mask=best.mask)
     tuned, plain = (f"skeleton, {one.raster:g} m, {one.branch:g} m, {one.bin:g} m" for one in (best, reference))
     tuned = f"{tuned} (tuned)"
-    return {tuned: [skeleton_predictor(best)], plain: [skeleton_predictor(reference)], **trivial_predictors()}
+    return {tuned: [skeleton_predictor(best)], plain: [skeleton_predictor(reference)], **trivial_predictors(half_width)}
 
 
 def synthetic_roads(texts: Sequence[str], kind: TruthKind) -> list[Road]:
@@ -195,7 +207,8 @@ def synthetic(arguments: argparse.Namespace, trained: Mapping[str, Sequence[Mode
         cases = shown_by(roads, None, estimated=False)
         search = searched(cases(arguments.seeds[0])[:1], ["classes"], arguments.output / f"skeleton-{name}.json")
         learned = of_kind(trained, kind, len(arguments.seeds))
-        measured = measure(learned | baselines(search), cases, arguments.seeds)
+        again = recalibrated(arguments, learned, kind) if name.startswith(OTHER) else {}
+        measured = measure(learned | again | baselines(search, seen_by(trained, kind)), cases, arguments.seeds)
         tables.write_tables(arguments.output, name, measured)
         result[name] = tables.table(measured)
         if learned:
@@ -207,9 +220,23 @@ def synthetic(arguments: argparse.Namespace, trained: Mapping[str, Sequence[Mode
     return result
 
 
+def recalibrated(
+    arguments: argparse.Namespace, learned: Mapping[str, Sequence[Predictor]], kind: TruthKind
+) -> dict[str, list[Predictor]]:
+    """Return the models with one factor each on their deviations, found on a few roads of the other scanner."""
+    found: dict[str, list[Predictor]] = {}
+    for name, versions in learned.items() if arguments.recalibrate else ():
+        roads = synthetic_roads([arguments.recalibrate], kind)
+        for seed, version in zip(arguments.seeds, versions, strict=False):
+            shown = [case(road, seed, cropping=None, estimated=False) for road in roads]
+            again, _ = version.calibrated_on((one.road, one.frames) for one in shown)  # type: ignore[attr-defined]
+            found.setdefault(f"{name}, recalibrated", []).append(again)
+    return found
+
+
 def synthetic_sets(arguments: argparse.Namespace) -> dict[str, tuple[list[str], TruthKind]]:
     """Return the data sets to be measured on and the truths to be found there, by the name of their table."""
-    given = {"in-domain": arguments.in_domain, "other-scanner": arguments.other}
+    given = {"in-domain": arguments.in_domain, OTHER: arguments.other}
     return {f"{name}-{kind}": (texts, kind) for name, texts in given.items() if texts for kind in arguments.truths}
 
 
@@ -262,8 +289,8 @@ def measure_painted(
     search: GridSearch,
 ) -> Measured:
     """Return the figures of all predictors, and of the measured axis, against the line that is painted beside it."""
-    line = with_painted_line(road)
-    predictors = of_kind(trained, REAL_ROADS[road.name][1], len(seeds), road.name) | baselines(search)
+    line, kind = with_painted_line(road), REAL_ROADS[road.name][1]
+    predictors = of_kind(trained, kind, len(seeds), road.name) | baselines(search, seen_by(trained, kind))
     predictors["the measured axis"] = [axis_predictor(road)]
     return measure(
         predictors,
@@ -291,7 +318,7 @@ def measure_real(
     """Return the figures of all predictors on the roads whose kind of truth they know and that they didn't learn."""
     merged: Measured = {name: {} for name in (*trained, *baselines(search))}
     for road, (_, kind) in REAL_ROADS.items():
-        predictors = of_kind(trained, kind, len(seeds), road) | baselines(search)
+        predictors = of_kind(trained, kind, len(seeds), road) | baselines(search, seen_by(trained, kind))
         measured = measure(predictors, shown_by([roads[road]], cropping, estimated=True), seeds)
         for name, rows in measured.items():
             merged[name][road] = rows[road]
@@ -358,6 +385,9 @@ def arguments_of(words: Sequence[str] | None) -> argparse.Namespace:
         "--in-domain", nargs="+", metavar="FOLDER[:SPLIT]", help="data sets of the scanner that was trained on"
     )
     parser.add_argument("--other", nargs="+", metavar="FOLDER[:SPLIT]", help="data sets of other scanners")
+    parser.add_argument(
+        "--recalibrate", metavar="FOLDER[:SPLIT]", help="roads of the other scanner to find deviations' factors on"
+    )
     parser.add_argument("--real", type=Path, metavar="FOLDER", help="real scans with their axes")
     text = "what is to be found on synthetic roads (all); corridor and lines are drawn for the last"
     parser.add_argument("--truths", nargs="+", choices=TRUTH_KINDS, default=["carriageway", "road"], help=text)

@@ -44,7 +44,7 @@ CORRIDOR_COLUMNS = ("center", "center_std", *CORRIDOR, *(f"{name}_std" for name 
 """Columns of a prediction; only the first is needed. Those of the corridor are for pictures. The last two are the
 half-widths of the centre's intervals of 68 % and 95 %, m: by the standard deviation where they aren't given."""
 HALF_WIDTH = SliceSettings().half_width
-"""Trivial predictors see points up to this far beside a frame, m, as the models do."""
+"""Trivial predictors see points up to this far beside a frame where nothing else is said, m."""
 
 
 @dataclass(frozen=True)
@@ -144,7 +144,7 @@ def measure(
 
 
 def trivial_predictor(name: str, half_width: float = HALF_WIDTH) -> Predictor:
-    """Return one of `trivial.RULES`."""
+    """Return one of `trivial.RULES`, which sees points up to ``half_width`` beside a frame, m."""
     rule, length = trivial.RULES[name]
 
     def predict(road: Road, frames: Frames) -> Float:
@@ -190,12 +190,13 @@ def path_itself(road: Road, frames: Frames) -> Float:
     return np.zeros((len(frames), 1))
 
 
-def trivial_predictors() -> dict[str, list[Predictor]]:
-    """Return all predictors that learn nothing, by name, for `measure`."""
+def trivial_predictors(half_width: float = HALF_WIDTH) -> dict[str, list[Predictor]]:
+    """Return all predictors that learn nothing, by name, for `measure`; see `trivial_predictor`."""
     found: dict[str, list[Predictor]] = {"the displaced path": [path_itself]}
-    found |= {name: [trivial_predictor(name)] for name in trivial.RULES}
+    found |= {name: [trivial_predictor(name, half_width)] for name in trivial.RULES}
     for name in trivial.SPANNED:
-        found[f"{name}, parabola of {trivial.SPAN:.0f} m"] = [along_parabolas(trivial_predictor(name), trivial.SPAN)]
+        rule = trivial_predictor(name, half_width)
+        found[f"{name}, parabola of {trivial.SPAN:.0f} m"] = [along_parabolas(rule, trivial.SPAN)]
     return found
 
 

@@ -64,8 +64,9 @@ def measure_run(
     """
     shown = read_cases(configuration, evaluation, progress)
     name = f"{configuration.model.name}, seed {configuration.seed}"
+    width = configuration.slices.half_width
     predictors: dict[str, Sequence[Predictor]] = {name: [predictor]}
-    predictors |= {"skeleton": [skeleton_predictor(SkeletonSettings())], **trivial_predictors()}
+    predictors |= {"skeleton": [skeleton_predictor(SkeletonSettings())], **trivial_predictors(width)}
     progress("measuring", 0.0)
     measured = measure(predictors, lambda seed: shown, [configuration.seed])
     corridor = corridor_figures(predictor, shown)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,9 +12,10 @@ from pydantic import Field
 from torch import Tensor
 
 from ml.configuration import Part
+from synthroads_addon.core.errors import InputError
 from synthroads_addon.core.schema import quantity
 
-from .calibration import Calibration
+from .calibration import Calibration, all_calibrated
 from .corridor import CORRIDOR, Truth
 from .frames import Frames, interleaved, stretches
 from .models import LINES, TARGETS, CenterlineModel, both_ways
@@ -116,6 +117,29 @@ class CenterlinePredictor:
             mean[:, column] = joined(frames, mean[:, column], raw[:, column], reach)
         factors = np.array([self.calibration[name].factor for name in TARGETS])
         return Regression(frames, mean, raw, raw * factors)
+
+    def calibrated_on(self, shown: Iterable[tuple[Road, Frames]]) -> tuple[CenterlinePredictor, Float]:
+        """Return the model with the deviations that are right on some roads, and its errors there (N, T).
+
+        Found on a few roads of another scanner, one factor per target makes its deviations right there (see
+        `calibration`); what the model says stays the same.
+
+        Args:
+            shown: roads with a known truth, and frames along each.
+
+        Raises:
+            InputError: the truth of a road isn't known.
+        """
+        error, raw = [], []
+        for road, frames in shown:
+            if road.truth is None:
+                raise InputError("road", road.name, "must have a known centreline for deviations to be found")
+            found = self.regress(road, frames)
+            error.append(errors(found, road.truth))
+            raw.append(found.raw_std)
+        every = np.concatenate(error)
+        calibration = all_calibrated(TARGETS, every, np.concatenate(raw))
+        return CenterlinePredictor(self.model, self.settings, self.use, calibration), every
 
     def widths(self, found: Regression) -> Float:
         """Return half-widths (M, T, 2) of the intervals that cover 68 % and 95 % on roads like the validation's."""

@@ -20,13 +20,13 @@ from synthroads_addon.core.files import write_file
 from synthroads_addon.core.progress import Progress, silent
 from synthroads_addon.core.schema import canonical_json, read_json
 
-from .calibration import DEVIATIONS, Calibration, all_calibrated
+from .calibration import DEVIATIONS, Calibration
 from .data import Batches, BatchOptions, DataOptions, Roads, fixed_batches, quiet, read_roads
 from .effects import Effects
-from .evaluation import Cropping, case, truth_of
+from .evaluation import Cropping, case
 from .losses import LossOptions, centerline_loss
 from .models import TARGETS, Batch, CenterlineModel, ModelOptions, build
-from .predictor import CenterlinePredictor, UseOptions, errors
+from .predictor import CenterlinePredictor, UseOptions
 from .slices import SliceSettings
 
 _FIRST_WEIGHTS = "first weights"
@@ -204,9 +204,8 @@ def calibrate(run: Run[CenterlineConfiguration], model: CenterlineModel, roads: 
     shown += [
         case(road, seed, cropping=Cropping(), estimated=True, settings=settings) for road in roads.measured_validation
     ]
-    passes = [(ready.regress(one.road, one.frames), truth_of(one.road)) for one in shown]
-    error = np.concatenate([errors(one, truth) for one, truth in passes])
-    found = all_calibrated(TARGETS, error, np.concatenate([one.raw_std for one, _ in passes]))
+    calibrated, error = ready.calibrated_on((one.road, one.frames) for one in shown)
+    found = calibrated.calibration
     data = _plain({name: one.to_dict() for name, one in found.items()})
     write_file(run.folder / CALIBRATION, canonical_json(data).encode(), overwrite=True)
     center = found["center"]
