@@ -58,20 +58,20 @@ def run(arguments: argparse.Namespace) -> Outcome:
     for cores in arguments.cores:
         if not 1 <= cores <= _available():
             raise InputError("--cores", cores, f"must be 1 to {_available()}, the cores that are there")
-    result: dict[str, Any] = {}
+    found: dict[str, Any] = {}
 
     def measured() -> dict[str, str]:
-        result.update(_all(arguments))
-        return {TABLE: markdown(result)}
+        found.update(_all(arguments))
+        return {TABLE: markdown(found)}
 
     table = fill(arguments.document, [TABLE], measured)[TABLE]
     if arguments.output:
         from synthroads_addon.core.files import output_folder
 
         with output_folder(arguments.output, _FILES, arguments.overwrite) as folder:
-            (folder / _FILES[0]).write_text(canonical_json(result), encoding="utf-8")
+            (folder / _FILES[0]).write_text(canonical_json(found), encoding="utf-8")
             (folder / _FILES[1]).write_text(table, encoding="utf-8")
-    return 0, result, table + _verdict(result)
+    return 0, found, table + _verdict(found)
 
 
 def _all(arguments: argparse.Namespace) -> dict[str, Any]:

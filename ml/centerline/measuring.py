@@ -16,6 +16,7 @@ from synthroads_addon.core.files import write_file
 from synthroads_addon.core.progress import Progress, silent
 from synthroads_addon.core.schema import canonical_json
 
+from .calibration import LEVELS
 from .corridor import TruthKind
 from .evaluation import (
     Case,
@@ -27,7 +28,7 @@ from .evaluation import (
     trivial_predictors,
     truth_of,
 )
-from .metrics import LEVELS, coverage
+from .metrics import coverage
 from .models import TARGETS
 from .pictures import View, corridor_picture, lines_picture
 from .predictor import CenterlinePredictor, errors
