@@ -106,11 +106,11 @@ class Run(Generic[C]):
     def record(self, figures: Mapping[str, float]) -> None:
         """Add an epoch to the history."""
         self.history.append({name: float(value) for name, value in figures.items()})
-        write_file(self.folder / HISTORY, canonical_json(_plain(self.history)).encode(), overwrite=True)
+        write_file(self.folder / HISTORY, canonical_json(plain(self.history)).encode(), overwrite=True)
 
     def write_metrics(self, metrics: Mapping[str, Any]) -> None:
         """Write the figures that the trained model reached, and the curves of its training as a picture."""
-        write_file(self.folder / METRICS, canonical_json(_plain(dict(metrics))).encode(), overwrite=True)
+        write_file(self.folder / METRICS, canonical_json(plain(dict(metrics))).encode(), overwrite=True)
         if self.history:
             write_file(self.folder / CURVES, _curves(self.history), overwrite=True)
 
@@ -137,13 +137,13 @@ def stream_seed(seed: int, *purpose: str | int) -> int:
     return int(stream(seed, *purpose).integers(2**63))
 
 
-def _plain(value: Any) -> Any:
-    """Return what JSON can hold: NaN becomes None."""
+def plain(value: Any) -> Any:
+    """Return what JSON can hold: numbers that aren't finite become None, tuples lists."""
     if isinstance(value, Mapping):
-        return {str(key): _plain(item) for key, item in value.items()}
+        return {str(key): plain(item) for key, item in value.items()}
     if isinstance(value, (list, tuple)):
-        return [_plain(item) for item in value]
-    return None if isinstance(value, float) and math.isnan(value) else value
+        return [plain(item) for item in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def _curves(history: list[dict[str, float]]) -> bytes:

@@ -1,8 +1,7 @@
 """Measure centreline models and baselines; write the tables and pictures of docs/centerline.md.
 
-    python tools/figures_centerline.py --in-domain out/centerline-airborne \
-        --other out/centerline-mobile out/centerline-mobile:test_tripod \
-        --recalibrate out/centerline-mobile:validation --real REAL_FOLDER \
+    python tools/figures_centerline.py --in-domain out/centerline-airborne --other "vehicle=out/centerline-mobile" \
+        --recalibrate "vehicle=out/centerline-mobile:validation" --real REAL_FOLDER \
         --run "transformer=out/runs/transformer-1" --run "transformer=out/runs/transformer-2" \
         --output out/centerline --document docs/centerline.md --pictures docs/pictures
 
@@ -200,44 +199,91 @@ def shown_by(roads: Sequence[Road], cropping: Cropping | None, estimated: bool) 
 
 
 def synthetic(arguments: argparse.Namespace, trained: Mapping[str, Sequence[Model]]) -> dict[str, str]:
-    """Measure on the synthetic data sets, the baseline tuned on each one's first road; return the document's tables."""
+    """Measure on the synthetic data sets; return the document's tables."""
     result = {}
-    for name, (texts, kind) in synthetic_sets(arguments).items():
-        roads = synthetic_roads(texts, kind)
-        cases = shown_by(roads, None, estimated=False)
-        search = searched(cases(arguments.seeds[0])[:1], ["classes"], arguments.output / f"skeleton-{name}.json")
-        learned = of_kind(trained, kind, len(arguments.seeds))
-        again = recalibrated(arguments, learned, kind) if name.startswith(OTHER) else {}
-        measured = measure(learned | again | baselines(search, seen_by(trained, kind)), cases, arguments.seeds)
-        tables.write_tables(arguments.output, name, measured)
-        result[name] = tables.table(measured)
-        if learned:
-            corridor = measure_corridor(learned, cases, arguments.seeds)
-            tables.write_tables(arguments.output, f"corridor-{name}", corridor)
-            result[f"corridor-{name}"] = tables.table(corridor, columns=CORRIDOR_COLUMNS)
-        if kind == arguments.truths[-1]:
-            draw_synthetic(arguments, roads[-1], learned, search)
+    for kind in arguments.truths:
+        if arguments.in_domain:
+            result |= in_domain(arguments, trained, kind)
+        if arguments.other:
+            result |= other_scanners(arguments, trained, kind)
     return result
 
 
+def in_domain(arguments: argparse.Namespace, trained: Mapping[str, Sequence[Model]], kind: TruthKind) -> dict[str, str]:
+    """Measure on roads of the scanner that was trained on, the baseline tuned on the first of them."""
+    name, roads = f"in-domain-{kind}", synthetic_roads(arguments.in_domain, kind)
+    cases = shown_by(roads, None, estimated=False)
+    search = searched(cases(arguments.seeds[0])[:1], ["classes"], arguments.output / f"skeleton-{name}.json")
+    learned = of_kind(trained, kind, len(arguments.seeds))
+    measured = measure(learned | baselines(search, seen_by(trained, kind)), cases, arguments.seeds)
+    tables.write_tables(arguments.output, name, measured)
+    if kind == arguments.truths[-1]:
+        draw_synthetic(arguments, roads[-1], learned, search)
+    return {name: tables.table(measured)} | corridor_table(arguments, name, learned, cases)
+
+
+def other_scanners(
+    arguments: argparse.Namespace, trained: Mapping[str, Sequence[Model]], kind: TruthKind
+) -> dict[str, str]:
+    """Measure on roads of other scanners, each with columns of its own; the baseline is tuned on the very first."""
+    name, learned = f"{OTHER}-{kind}", of_kind(trained, kind, len(arguments.seeds))
+    again, sets = by_title(arguments.recalibrate), by_title(arguments.other)
+    roads = {title: synthetic_roads(texts, kind) for title, texts in sets.items()}
+    every = shown_by([road for some in roads.values() for road in some], None, estimated=False)
+    search = searched(every(arguments.seeds[0])[:1], ["classes"], arguments.output / f"skeleton-{name}.json")
+    plain = learned | baselines(search, seen_by(trained, kind))
+    merged: Measured = {}
+    for title, some in roads.items():
+        known = recalibrated(arguments.seeds, learned, synthetic_roads(again[title], kind)) if title in again else {}
+        measured = measure(plain | known, shown_by(some, None, estimated=False), arguments.seeds)
+        for predictor, rows in measured.items():
+            merged.setdefault(predictor, {})[title] = rows["all"]
+    tables.write_tables(arguments.output, name, merged)
+    titles = {title: title for title in sets}
+    sure = {predictor: rows for predictor, rows in merged.items() if any("coverage_68" in row for row in rows.values())}
+    distances = {predictor: rows for predictor, rows in merged.items() if predictor in plain}
+    found = {name: tables.road_table(distances, titles)}
+    if sure:
+        found[f"coverage-{name}"] = tables.road_table(sure, titles, tables.COVERAGE_COLUMNS)
+    return found | corridor_table(arguments, name, learned, every)
+
+
+def by_title(texts: Sequence[str]) -> dict[str, list[str]]:
+    """Return data sets, given as TITLE=FOLDER[:SPLIT], by their titles."""
+    found: dict[str, list[str]] = {}
+    for text in texts:
+        title, equals, folder = text.partition("=")
+        if not equals:
+            raise SystemExit(f"{text}: must be TITLE=FOLDER or TITLE=FOLDER:SPLIT")
+        found.setdefault(title, []).append(folder)
+    return found
+
+
 def recalibrated(
-    arguments: argparse.Namespace, learned: Mapping[str, Sequence[Predictor]], kind: TruthKind
+    seeds: Sequence[int], learned: Mapping[str, Sequence[Predictor]], roads: Sequence[Road]
 ) -> dict[str, list[Predictor]]:
-    """Return the models with one factor each on their deviations, found on a few roads of the other scanner."""
+    """Return the models with one factor each on their deviations, found on a few roads of another scanner."""
     found: dict[str, list[Predictor]] = {}
-    for name, versions in learned.items() if arguments.recalibrate else ():
-        roads = synthetic_roads([arguments.recalibrate], kind)
-        for seed, version in zip(arguments.seeds, versions, strict=False):
+    for name, versions in learned.items():
+        for seed, version in zip(seeds, versions, strict=False):
             shown = [case(road, seed, cropping=None, estimated=False) for road in roads]
             again, _ = version.calibrated_on((one.road, one.frames) for one in shown)  # type: ignore[attr-defined]
             found.setdefault(f"{name}, recalibrated", []).append(again)
     return found
 
 
-def synthetic_sets(arguments: argparse.Namespace) -> dict[str, tuple[list[str], TruthKind]]:
-    """Return the data sets to be measured on and the truths to be found there, by the name of their table."""
-    given = {"in-domain": arguments.in_domain, OTHER: arguments.other}
-    return {f"{name}-{kind}": (texts, kind) for name, texts in given.items() if texts for kind in arguments.truths}
+def corridor_table(
+    arguments: argparse.Namespace,
+    name: str,
+    learned: Mapping[str, Sequence[Predictor]],
+    cases: Callable[[int], Sequence[Case]],
+) -> dict[str, str]:
+    """Return the table of what models say of the corridor, if there are any."""
+    if not learned:
+        return {}
+    corridor = measure_corridor(learned, cases, arguments.seeds)
+    tables.write_tables(arguments.output, f"corridor-{name}", corridor)
+    return {f"corridor-{name}": tables.table(corridor, columns=CORRIDOR_COLUMNS)}
 
 
 def measure_corridor(
@@ -384,9 +430,15 @@ def arguments_of(words: Sequence[str] | None) -> argparse.Namespace:
     parser.add_argument(
         "--in-domain", nargs="+", metavar="FOLDER[:SPLIT]", help="data sets of the scanner that was trained on"
     )
-    parser.add_argument("--other", nargs="+", metavar="FOLDER[:SPLIT]", help="data sets of other scanners")
     parser.add_argument(
-        "--recalibrate", metavar="FOLDER[:SPLIT]", help="roads of the other scanner to find deviations' factors on"
+        "--other", action="append", default=[], metavar="TITLE=FOLDER[:SPLIT]", help="data set of another scanner"
+    )
+    parser.add_argument(
+        "--recalibrate",
+        action="append",
+        default=[],
+        metavar="TITLE=FOLDER[:SPLIT]",
+        help="further roads of another scanner, to find factors on deviations",
     )
     parser.add_argument("--real", type=Path, metavar="FOLDER", help="real scans with their axes")
     text = "what is to be found on synthetic roads (all); corridor and lines are drawn for the last"
@@ -403,9 +455,12 @@ def arguments_of(words: Sequence[str] | None) -> argparse.Namespace:
 
 def expected(arguments: argparse.Namespace) -> list[str]:
     """Return the names of the tables that will be made."""
-    names = list(synthetic_sets(arguments))
-    names += [f"corridor-{name}" for name in names if arguments.run]
-    return names + ([*CROPPINGS, "real-painted"] if arguments.real else [])
+    names = [f"in-domain-{kind}" for kind in arguments.truths if arguments.in_domain]
+    others = [f"{OTHER}-{kind}" for kind in arguments.truths if arguments.other]
+    if arguments.run:
+        others += [f"coverage-{name}" for name in others]
+        names += [f"corridor-{name}" for name in (*names, *others) if not name.startswith("coverage")]
+    return names + others + ([*CROPPINGS, "real-painted"] if arguments.real else [])
 
 
 def measured_tables(arguments: argparse.Namespace) -> dict[str, str]:

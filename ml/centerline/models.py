@@ -110,7 +110,6 @@ class Heads(nn.Module):
             "corridor": torch.cat([lines[:, 1:], scalars, height[:, None]], dim=1),
             "log_std": self.spread(context) - 1.0,
             "logits": logits,
-            "places": tokens.places,
         }
 
 
@@ -287,9 +286,8 @@ def mirrored(batch: Batch) -> Batch:
     flip = batch["coord"].new_tensor([1.0, -1.0, 1.0])
     other = dict(batch, coord=batch["coord"] * flip)
     other["frame"] = batch["frame"] * batch["frame"].new_tensor([1.0, -1.0, -1.0, 1.0])
-    for name in ("center", "angle"):
-        if name in batch:
-            other[name] = -batch[name]
+    if "center" in batch:
+        other["center"] = -batch["center"]
     if "corridor" in batch:
         other["corridor"] = _swapped(batch["corridor"]) * _signs(batch["corridor"])
     return other

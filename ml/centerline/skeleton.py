@@ -27,6 +27,8 @@ from skimage.morphology import skeletonize
 
 from synthroads_addon.core.calibration_axis import otsu
 
+from .axis import Axis
+
 Float = NDArray[np.float64]
 Index = NDArray[np.intp]
 Mask = NDArray[np.bool_]
@@ -196,19 +198,7 @@ def crossings(chain: Float, origin: Float, direction: Float, reach: float = REAC
 
     Points farther than ``reach`` (m) apart are not joined; of several crossings the one nearest to the frame counts.
     """
-    result = np.full(len(origin), np.nan)
-    if len(chain) < 2:
-        return result
-    apart = chain[None] - origin[:, None]
-    cos, sin = np.cos(direction)[:, None], np.sin(direction)[:, None]
-    along = cos * apart[..., 0] + sin * apart[..., 1]
-    across = cos * apart[..., 1] - sin * apart[..., 0]
-    joined = np.hypot(*np.diff(chain, axis=0).T) <= reach
-    a, b = along[:, :-1], along[:, 1:]
-    crosses = joined & ((a <= 0.0) != (b <= 0.0))
-    share = np.where(crosses, a / np.where(crosses, a - b, 1.0), 0.0)
-    y = np.where(crosses, across[:, :-1] + share * np.diff(across, axis=1), np.inf)
-    nearest = np.abs(y).argmin(axis=1)
-    found = crosses.any(axis=1)
-    result[found] = y[np.arange(len(origin)), nearest][found]
-    return result
+    apart = np.hypot(*np.diff(chain, axis=0).T)
+    if not (apart > 0.0).any():
+        return np.full(len(origin), np.nan)
+    return Axis(chain, apart <= reach).crossing(origin, direction)[0]

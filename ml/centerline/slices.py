@@ -7,7 +7,7 @@ A sample is a dictionary of tensors; S is the number of slices of a sequence, N 
   are `intensity.level` and `intensity.contrast` of the sequence, cut at +-`FEATURE_LIMIT`; colours are 0 to 1. What a
   cloud hasn't is noise of `MISSING_NOISE`;
 - ``offset`` (S,) int64: ends of the slices' points in ``coord``;
-- ``center``, ``angle`` (S,) float32, ``corridor`` (S, K) float32: the truth, see `corridor.CORRIDOR`; NaN if unknown;
+- ``center`` (S,) float32, ``corridor`` (S, K) float32: the truth, see `corridor.CORRIDOR`; NaN if unknown;
 - ``frame`` (S, 4) float64: x, y, direction and z origin (the median height of the slice's points) in the cloud's local
   metres; ``station`` (S,) float64 along the path; ``number`` (S,) int64 of the frame; ``road`` int64, its number.
 """
@@ -246,7 +246,6 @@ def sample(
         "feat": torch.from_numpy(_features(cut, rng).astype(np.float32)),
         "offset": torch.from_numpy(ends.astype(np.int64)),
         "center": torch.from_numpy(cut.center.astype(np.float32)),
-        "angle": torch.from_numpy(corridor[:, CORRIDOR.index("heading")].astype(np.float32)),
         "corridor": torch.from_numpy(corridor.astype(np.float32)),
         "frame": torch.from_numpy(frame),
         "station": torch.from_numpy(cut.frames.station.copy()),

@@ -38,8 +38,9 @@ COLUMNS = (
     Column("coverage_95", "in 95 % (%)", 100.0, 1),
     Column("found", "found (%)", 100.0, 1),
 )
-ROAD_COLUMNS = (Column("mae", "MAE"), Column("chamfer_full", "Chamfer"))
-"""Columns of each road in a table that has several side by side, m."""
+ROAD_COLUMNS = (Column("mae", "MAE (m)"), Column("chamfer_full", "Chamfer (m)"))
+"""Columns of each road in a table that has several side by side."""
+COVERAGE_COLUMNS = tuple(column for column in COLUMNS if column.figure in ("coverage_68", "coverage_95"))
 
 
 def table(measured: Measured, road: str = "all", columns: Sequence[Column] = COLUMNS) -> str:
@@ -61,7 +62,7 @@ def road_table(measured: Measured, roads: Mapping[str, str], columns: Sequence[C
         roads: title of each road to be shown, by name.
         columns: of each road.
     """
-    head = ["", *(f"{title}: {column.title} (m)" for title in roads.values() for column in columns)]
+    head = ["", *(f"{title}: {column.title}" for title in roads.values() for column in columns)]
     body = [
         [name, *(cell(rows.get(road, {}).get(column.figure), column) for road in roads for column in columns)]
         for name, rows in measured.items()

@@ -13,7 +13,7 @@ from torch import nn
 
 from ml.configuration import Configuration
 from ml.fitting import chosen_device, fit
-from ml.runs import CALIBRATION, Run, stream_seed
+from ml.runs import CALIBRATION, Run, plain, stream_seed
 from ml.tasks import Evaluation, Prediction
 from synthroads_addon.core.errors import InputError, MissingFileError, OutputError
 from synthroads_addon.core.files import write_file
@@ -113,7 +113,7 @@ def predict(run: Run[CenterlineConfiguration], prediction: Prediction, progress:
     name = prediction.cloud.stem
     text = canonical_json(geojson(found, name, ready.settings.frame_spacing))
     calibration = {name: one.to_dict() for name, one in ready.calibration.items()}
-    table = canonical_json(_plain(corridor_json(found, calibration)))
+    table = canonical_json(plain(corridor_json(found, calibration)))
     write_file(lines, text.encode(), overwrite=prediction.overwrite)
     write_file(corridor, table.encode(), overwrite=prediction.overwrite)
     there = np.isfinite(found.value[:, 0])
@@ -206,7 +206,7 @@ def calibrate(run: Run[CenterlineConfiguration], model: CenterlineModel, roads: 
     ]
     calibrated, error = ready.calibrated_on((one.road, one.frames) for one in shown)
     found = calibrated.calibration
-    data = _plain({name: one.to_dict() for name, one in found.items()})
+    data = plain({name: one.to_dict() for name, one in found.items()})
     write_file(run.folder / CALIBRATION, canonical_json(data).encode(), overwrite=True)
     center = found["center"]
     return {
@@ -241,12 +241,3 @@ def _pairs(model: nn.Module, batches: Sequence[Batch], device: torch.device) -> 
 def _mean_size(values: Any) -> float | None:
     known = np.abs(values[np.isfinite(values)])
     return float(known.mean()) if len(known) else None
-
-
-def _plain(value: Any) -> Any:
-    """Return what JSON can hold: NaN becomes None, tuples become lists."""
-    if isinstance(value, dict):
-        return {name: _plain(item) for name, item in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [_plain(item) for item in value]
-    return None if isinstance(value, float) and not np.isfinite(value) else value

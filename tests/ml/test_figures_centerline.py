@@ -3,14 +3,19 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Iterable
 from pathlib import Path
 
 import laspy
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from ml.centerline import evaluation
+from ml.centerline.calibration import DEVIATIONS
 from ml.centerline.evaluation import truth_of
+from ml.centerline.frames import Frames
+from ml.centerline.roads import Road
 from synthroads_addon.core.marked import BEGIN
 from tests.ml.centerline_roads import strip_road
 from tools import figures_centerline
@@ -75,3 +80,40 @@ def test_a_model_needs_a_run_for_each_seed_or_one_for_all() -> None:
     assert figures_centerline.of_kind({"m": [model]}, "carriageway", 3) == {}
     with pytest.raises(SystemExit, match="3 runs for 5 seeds"):
         figures_centerline.of_kind({"m": [model]}, "road", 5)
+
+
+class Sure:
+    """Predicts 0.1 m beside the truth of `strip_road` with some deviation, and finds that it should be 0.1 m."""
+
+    def __init__(self, deviation: float) -> None:
+        self.deviation = deviation
+
+    def __call__(self, road: Road, frames: Frames) -> NDArray[np.float64]:
+        true, _ = truth_of(road).axis.crossing(frames.position, frames.direction)
+        return np.column_stack([true + 0.1, np.full(len(frames), self.deviation)])
+
+    def calibrated_on(self, shown: Iterable[tuple[Road, Frames]]) -> tuple[Sure, None]:
+        assert [road.name for road, _ in shown] == ["further"]
+        return Sure(0.1 * 1.01 / DEVIATIONS[0]), None
+
+
+def test_other_scanners_stand_side_by_side(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(figures_centerline, "synthetic_roads", lambda texts, kind: [strip_road(text) for text in texts])
+    monkeypatch.setattr(figures_centerline, "measure_corridor", lambda *arguments: {})
+    words = ["--other", "air=first", "--other", "car=second", "--other", "car=third", "--recalibrate", "car=further"]
+    arguments = figures_centerline.arguments_of(
+        [*words, "--truths", "road", "--seeds", "1", "--output", str(folder / "o")]
+    )
+    trained = {"m": [figures_centerline.Model("road", [Sure(0.01)])]}
+    found = figures_centerline.other_scanners(arguments, trained, "road")
+    assert list(found) == ["other-scanner-road", "coverage-other-scanner-road", "corridor-other-scanner-road"]
+    rows = [[cell.strip() for cell in line.split("|")[1:-1]] for line in found["other-scanner-road"].splitlines()]
+    assert rows[0] == ["", "air: MAE (m)", "air: Chamfer (m)", "car: MAE (m)", "car: Chamfer (m)"]
+    assert rows[2] == ["m", "0.100", "0.200", "0.100", "0.200"]
+    assert not any("recalibrated" in row[0] for row in rows)
+    rows = [
+        [cell.strip() for cell in line.split("|")[1:-1]] for line in found["coverage-other-scanner-road"].splitlines()
+    ]
+    assert rows[2:] == [["m", "0.0", "0.0", "0.0", "0.0"], ["m, recalibrated", "–", "–", "100.0", "100.0"]]
+    with pytest.raises(SystemExit, match="out/x: must be TITLE=FOLDER"):
+        figures_centerline.by_title(["out/x"])
