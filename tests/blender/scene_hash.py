@@ -32,6 +32,13 @@ def digest() -> str:
     return hashlib.sha256("".join(lines()).encode()).hexdigest()
 
 
+def changes(before: list[str]) -> list[str]:
+    """Return what differs in the open file from what it was: lines that are gone, after "-", and new ones after "+"."""
+    now = lines()
+    was, being = set(before), set(now)
+    return [f"-{line}" for line in before if line not in being] + [f"+{line}" for line in now if line not in was]
+
+
 def lines() -> list[str]:
     """Return what the digest is made of, one text per value."""
     bpy.context.view_layer.update()
