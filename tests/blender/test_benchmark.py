@@ -32,6 +32,7 @@ def test_limits_are_judged_on_two_cores() -> None:
     assert not list(judged(one))
 
 
+@pytest.mark.slow
 def test_a_quick_run_measures_every_line(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     page = tmp_path / "page.md"
     page.write_text(f"{BEGIN.format(TABLE)}\n{END}", encoding="utf-8")

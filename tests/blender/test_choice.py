@@ -81,6 +81,7 @@ def test_what_cannot_be_kept_is_refused_with_the_best(tmp_path: Path) -> None:
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.slow
 def test_much_time_takes_the_best_by_pilots_and_else_by_the_shipped_table(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -160,11 +160,14 @@ def test_wrong_input_is_one_line(undisturbed: tuple[Path, Path], tmp_path: Path)
 
 def test_two_runs_do_not_share_a_folder(undisturbed: tuple[Path, Path], tmp_path: Path) -> None:
     recipe, _ = undisturbed
-    with subprocess.Popen(command(recipe, tmp_path / "set", "--quiet"), cwd=ROOT) as first:
+    hearing = ["env", "--default-signal=INT", *command(recipe, tmp_path / "set", "--quiet")]
+    with subprocess.Popen(hearing, cwd=ROOT) as first:
         wait_until((tmp_path / "set" / ".work").is_dir)
         answer = run(recipe, tmp_path / "set", "--resume")
         assert (answer.returncode, "another run is at work in it" in answer.stderr) == (2, True)
-        assert first.wait() == 0
+        assert first.poll() is None
+        first.send_signal(signal.SIGINT)
+        assert first.wait() == 130
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="looks into /proc")

@@ -197,6 +197,7 @@ class TestGroups:
                     assert item.subtype in ("DISTANCE", "FACTOR"), where
             assert len(set(names)) == len(names), group.name
 
+    @pytest.mark.keep_groups
     def test_nodes_stand_in_named_frames_and_do_not_overlap(self) -> None:
         for group in all_groups():
             nodes = [node for node in group.nodes if node.type not in ("FRAME", "GROUP_OUTPUT")]
@@ -208,6 +209,7 @@ class TestGroups:
                 if link.from_node.parent == link.to_node.parent and link.to_node.parent is not None:
                     assert link.from_node.location_absolute.x < link.to_node.location_absolute.x, group.name
 
+    @pytest.mark.keep_groups
     def test_groups_are_valid(self) -> None:
         for group in all_groups():
             assert all(link.is_valid for link in group.links), group.name
