@@ -41,6 +41,7 @@ def changes(before: list[str]) -> list[str]:
 
 def lines() -> list[str]:
     """Return what the digest is made of, one text per value."""
+    _properties.cache_clear()  # an add-on may have come or gone since, and its properties with it
     bpy.context.view_layer.update()
     found = [f"open scene {bpy.context.scene.name} {bpy.context.view_layer.name}\n"]
     for item in bpy.context.view_layer.objects:
