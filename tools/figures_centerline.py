@@ -200,7 +200,7 @@ def shown_by(roads: Sequence[Road], cropping: Cropping | None, estimated: bool) 
 
 def synthetic(arguments: argparse.Namespace, trained: Mapping[str, Sequence[Model]]) -> dict[str, str]:
     """Measure on the synthetic data sets; return the document's tables."""
-    result = {}
+    result: dict[str, str] = {}
     for kind in arguments.truths:
         if arguments.in_domain:
             result |= in_domain(arguments, trained, kind)
