@@ -25,6 +25,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     where.add_argument("--jobs", type=int, metavar="N", help="scenes made at once on this machine (default: 1)")
     where.add_argument("--scheduler", metavar="ADDRESS", help="Dask scheduler whose workers make them, tcp://HOST:PORT")
     parser.add_argument("--resume", action="store_true", help="continue what was begun in this folder")
+    parser.add_argument(
+        "--splits", nargs="+", metavar="SPLIT", help="make the scenes of these splits only; --resume makes the others"
+    )
     parser.add_argument("--verify", action="store_true", help="make nothing: compare every file with its checksum")
     parser.add_argument("--set", action="append", default=[], metavar="PATH=VALUE", dest="changes", help=_SET)
     add_common_arguments(parser)
@@ -42,7 +45,8 @@ def run(arguments: argparse.Namespace) -> Outcome:
     recipe = _changed(load_recipe(arguments.recipe), arguments.changes)
     from headless.dataset_run import DatasetRun, dask_workers, local_processes
 
-    work = DatasetRun(recipe, arguments.output.absolute(), arguments.resume, progress_bar(arguments))
+    splits = frozenset(arguments.splits) if arguments.splits else None
+    work = DatasetRun(recipe, arguments.output.absolute(), arguments.resume, progress_bar(arguments), splits)
     submit = dask_workers(arguments.scheduler) if arguments.scheduler else local_processes(arguments.jobs or 1)
     manifest = work.run(submit)
     failed = [scene for scene in manifest.scenes if scene.status == "failed"]

@@ -91,9 +91,10 @@ def run_task(folder: str, threads: int, stopping: Event) -> Outcome:
 def _run_process(path: Path, threads: int, stopping: Event) -> int:
     """Run the process of the task in a folder to its end; return its exit code."""
     command = [sys.executable, str(_MODULE), str(path / "task.json"), str(threads)]
-    with (path / "log.txt").open("wb") as log, subprocess.Popen(
-        command, stdin=subprocess.PIPE, stdout=log, stderr=log
-    ) as process:  # at the end of this block its standard input is closed, which ends it
+    with (
+        (path / "log.txt").open("wb") as log,
+        subprocess.Popen(command, stdin=subprocess.PIPE, stdout=log, stderr=log) as process,
+    ):  # at the end of this block its standard input is closed, which ends it
         while process.poll() is None and not stopping.wait(_TICK):
             pass
     return process.returncode
@@ -115,6 +116,7 @@ class DatasetRun:
         folder: where it goes.
         resume: continue what was begun there.
         progress: told how many scenes are done.
+        splits: whose scenes are made; None: those of all.
 
     Attributes:
         jobs: all scenes.
@@ -125,11 +127,15 @@ class DatasetRun:
     folder: Path
     resume: bool = False
     progress: Progress = silent
+    splits: frozenset[str] | None = None
     jobs: list[SceneJob] = field(init=False)
     entries: dict[str, SceneEntry] = field(init=False, default_factory=dict)
 
     def __post_init__(self) -> None:
         self.jobs = scene_jobs(self.recipe)
+        known = sorted({job.split for job in self.jobs})
+        for split in sorted((self.splits or frozenset()) - set(known)):
+            raise InputError("--splits", split, f"must be of the recipe's: {', '.join(known)}")
         self._recipe_text = self.recipe.to_json()
         self._generator = generator()
 
@@ -156,10 +162,11 @@ class DatasetRun:
     def _make(self, submit: Submit) -> None:
         """Make the scenes that aren't there yet."""
         self._write_manifest()
-        missing = [job for job in self.jobs if not self._is_done(job)]
-        for outcome in submit([self._write_task(job) for job in missing]):
+        wanted = [job for job in self.jobs if self.splits is None or job.split in self.splits]
+        missing = [job for job in wanted if not self._is_done(job)]
+        for number, outcome in enumerate(submit([self._write_task(job) for job in missing]), start=1):
             self._take(outcome)
-            self.progress("scenes", len(self.entries) / len(self.jobs))
+            self.progress("scenes", (len(wanted) - len(missing) + number) / len(wanted))
 
     @contextmanager
     def _locked(self) -> Iterator[None]:

@@ -158,6 +158,21 @@ def test_wrong_input_is_one_line(undisturbed: tuple[Path, Path], tmp_path: Path)
         assert words in answer.stderr
 
 
+def test_a_split_alone_is_as_in_the_whole_set(tmp_path: Path) -> None:
+    recipe = recipe_file(tmp_path, groups=[{"name": "a", "scenes": 2, "split": {"train": 1, "test": 1}}])
+    part, whole = tmp_path / "part", tmp_path / "whole"
+    answer = run(recipe, part, "--splits", "test")
+    assert (answer.returncode, "1 of 1 scenes" in answer.stdout) == (0, True), answer.stdout + answer.stderr
+    manifest = read_manifest(part)
+    assert ([scene.split for scene in manifest.scenes], manifest.complete) == (["test"], False)
+    assert run(recipe, part, "--resume").returncode == 0
+    assert run(recipe, whole).returncode == 0
+    assert content(part) == content(whole)
+    answer = run(recipe, tmp_path / "none", "--splits", "tset")
+    assert (answer.returncode, answer.stderr.count("\n")) == (2, 1)
+    assert "--splits is 'tset': must be of the recipe's: test, train" in answer.stderr
+
+
 def test_two_runs_do_not_share_a_folder(undisturbed: tuple[Path, Path], tmp_path: Path) -> None:
     recipe, _ = undisturbed
     hearing = ["env", "--default-signal=INT", *command(recipe, tmp_path / "set", "--quiet")]
