@@ -138,7 +138,7 @@ def stand_alone(stretch: Stretch) -> None:
     rims = [rise[(beyond <= 0.0) & (beyond >= -_RIM)] for beyond in (beyond_inner, beyond_outer)]
     if not len(rims[0]) or not len(rims[1]):
         return
-    copied = np.flatnonzero(beyond_outer > 0.0)
+    copied = np.flatnonzero((beyond_outer > 0.0) & np.isfinite(edges[stretch.number, inwards]))
     kept = np.flatnonzero(~(beyond_inner > 0.0))
     number = stretch.number[copied]
     place = stretch.center[number] - sign * (edges[number, inwards] + beyond_outer[copied])

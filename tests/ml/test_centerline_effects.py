@@ -27,6 +27,7 @@ from ml.centerline.effects import (
 from ml.centerline.frames import along, displaced
 from ml.centerline.lighting import _waves
 from ml.centerline.slices import SliceSettings, stretch
+from ml.centerline.stretch import LEFT, RIGHT
 from synthroads_addon.core.errors import InputError
 from tests.ml.analytic_roads import roads
 
@@ -183,6 +184,15 @@ def test_a_carriageway_stands_alone(number: int) -> None:
     ]
     assert abs(np.median(near[0]) - np.median(near[1])) < 0.1
     np.testing.assert_array_equal(one.center, plain.center)
+
+
+def test_where_the_inner_edge_is_unknown_no_points_are_put_nowhere() -> None:
+    one = cut("carriageway")
+    inner = int(np.isfinite(one.room).all(axis=0).argmax())
+    one.corridor[3, (LEFT, RIGHT)[inner]] = np.nan
+    stand_alone(one)
+    assert np.isfinite(one.xyz).all()
+    assert (one.number == 3).sum() > 20
 
 
 def test_a_slice_without_truth_is_cropped_all_the_same() -> None:
