@@ -27,7 +27,6 @@ from ml.centerline.effects import (
 from ml.centerline.frames import along, displaced
 from ml.centerline.lighting import _waves
 from ml.centerline.slices import SliceSettings, stretch
-from ml.centerline.stretch import LEFT, RIGHT
 from synthroads_addon.core.errors import InputError
 from tests.ml.analytic_roads import roads
 
