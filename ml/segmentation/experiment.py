@@ -236,6 +236,9 @@ def main(argv: list[str] | None = None) -> int:
         folders = dict(text.partition("=")[::2] for text in arguments.data)
         configured = configurations(experiment, folders, arguments.changes)
         seeds = arguments.seeds or experiment.seeds
+        for seed in seeds:
+            if not 0 <= seed < 2**63:
+                raise InputError("--seeds", seed, "must be whole numbers from 0")
         results = run_experiment(experiment, configured, arguments.output, seeds, progress_bar(arguments))
     except InputError as error:
         print(f"error: {error}", file=sys.stderr)

@@ -194,6 +194,8 @@ def main(argv: list[str] | None = None) -> int:
             raise InputError("--output", str(arguments.output), "must end in .npz")
         if arguments.output.exists() and not arguments.overwrite:
             raise OutputError("--output", str(arguments.output), "is there already; --overwrite replaces it")
+        if not 0 <= arguments.seed < 2**63:
+            raise InputError("--seed", arguments.seed, "must be a whole number from 0")
         for name, low, high in (("voxel", 0.02, 10.0), ("corridor", 5.0, 1000.0), ("limit_mb", 0.5, 1e5)):
             if not low <= getattr(arguments, name) <= high:
                 raise InputError(f"--{name.replace('_', '-')}", getattr(arguments, name), f"must be {low} to {high:g}")

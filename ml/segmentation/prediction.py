@@ -30,7 +30,7 @@ from .crops import CropSettings
 from .metrics import IGNORED
 from .scoring import Classifier, label_tile
 from .sources import FULL
-from .tiles import Scaling, Tile
+from .tiles import Scaling, Tile, eight_bits
 
 HEADER_TEXTS = range(26, 90)
 """Bytes of a LAS file that hold the system identifier and the generating software, of 32 each."""
@@ -41,7 +41,10 @@ TILE = 48.0
 """Edge of the tiles, m."""
 MARGIN = 6.0
 """What a tile sees of the tiles around it, m: at least that of the pieces within."""
-_RECORD = np.dtype([("place", "<f4", 3), ("rgb", "u1", 3), ("intensity", "<u2"), ("index", "<i8")])
+_RECORD = np.dtype([("place", "<f4", 3), ("rgb", "<u2", 3), ("intensity", "<u2"), ("index", "<i8")])
+
+_COPC = "copc"
+"""User id of the records of cloud-optimised files."""
 
 
 @dataclass(frozen=True)
@@ -87,7 +90,7 @@ def predict_file(
         InputError: it is no LAS file, damaged or empty.
         OutputError: the target is there already or can't be written.
     """
-    _check(source, target, overwrite)
+    _check(source, target, overwrite, classification)
     begin = time.perf_counter()
     with tempfile.TemporaryDirectory(prefix=".predict-", dir=target.parent) as name:
         store = TileStore(Path(name))
@@ -112,13 +115,16 @@ def predict_file(
     }
 
 
-def _check(source: Path, target: Path, overwrite: bool) -> None:
+def _check(source: Path, target: Path, overwrite: bool, classification: bool) -> None:
+    """Refuse before the work what couldn't be written after it."""
     for path, what in ((source, "cloud"), (target, "--output")):
         if path.suffix.lower() not in (".las", ".laz"):
             raise InputError(what, str(path), "must end in .las or .laz")
     with open_cloud(source) as cloud:
         if cloud.header.count == 0:
             raise InputError(str(source), None, "has no points")
+    with open_to_copy(source) as reader:
+        extended_header(reader.header, classification)
     if target.exists() and not overwrite:
         raise OutputError("--output", str(target), "is there already; --overwrite replaces it")
     try:
@@ -140,7 +146,7 @@ class TileStore:
         self._folder.mkdir()
         self._known: set[tuple[int, int]] = set()
         self._histogram = np.zeros(LEVELS, dtype=np.int64)
-        self._has_color = False
+        self._largest = 0
 
     def fill(self, source: Path, progress: Progress) -> int:
         """Read a cloud into tiles; return its number of points."""
@@ -154,11 +160,11 @@ class TileStore:
                 record = np.empty(len(block), dtype=_RECORD)
                 tile = np.floor((block.xyz[:, :2] - self._origin[:2]) / self._edge).astype(np.int64)
                 record["place"] = block.xyz - self._corner(tile)
-                record["rgb"] = np.rint(block.rgb / 257.0)
+                record["rgb"] = block.rgb
                 record["intensity"] = np.clip(np.rint(block.intensity * scale), 0, LEVELS - 1)
                 record["index"] = np.arange(done, done + len(block))
                 self._histogram += np.bincount(record["intensity"], minlength=LEVELS)
-                self._has_color |= bool(block.rgb.any())
+                self._largest = max(self._largest, int(block.rgb.max(initial=0)))
                 self._append(tile, record)
                 done += len(block)
                 progress("reading", done / cloud.header.count)
@@ -187,7 +193,7 @@ class TileStore:
                 "",
                 self._corner(np.array([[column, row]]))[0],
                 np.ascontiguousarray(record["place"]),
-                np.ascontiguousarray(record["rgb"]) if self._has_color else None,
+                eight_bits(record["rgb"], self._largest) if self._largest else None,
                 strength if self._histogram[1:].any() else None,
                 np.full(len(record), IGNORED, dtype=np.int16),
             )
@@ -255,8 +261,8 @@ def write_copy(
                     progress("writing", done / reader.header.point_count)
                 if done != len(labels):
                     raise damaged(source, done, len(labels))
-                if reader.evlrs:
-                    writer.write_evlrs(reader.evlrs)
+                if kept := [record for record in reader.evlrs or () if record.user_id != _COPC]:
+                    writer.write_evlrs(type(reader.evlrs)(kept))
         copy_header_texts(source, temporary)
         temporary.replace(target)
     except UnicodeError:
@@ -284,6 +290,8 @@ def extended_header(old: laspy.LasHeader, needs_codes: bool) -> laspy.LasHeader:
         InputError: LAS codes are wanted, and the file's point format holds those up to 31 only.
     """
     header = deepcopy(old)
+    # An index of the points as they were ordered and compressed in a COPC file; the copy is a plain LAZ file.
+    header.vlrs = type(header.vlrs)(record for record in header.vlrs if record.user_id != _COPC)
     # laspy gives bytes where they aren't ASCII, and doesn't take them back.
     header.system_identifier = header.generating_software = ""
     if needs_codes and header.point_format.id < 6:

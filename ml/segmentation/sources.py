@@ -27,7 +27,7 @@ from synthroads_addon.core.schema import quantity, read_json
 from .classes import LabelMapping, class_names, load_mapping, table_between
 from .metrics import IGNORED
 from .packing import PackReader
-from .tiles import Tile, thin
+from .tiles import Tile, eight_bits, thin
 
 FULL = 65535.0
 """Largest 16-bit intensity."""
@@ -64,8 +64,10 @@ def read_tiles(source: Source, scheme: ClassScheme, voxel: float | None) -> Iter
         InputError: a file is damaged or has no labels, or its classes don't fit the scheme.
     """
     path = Path(source.path)
+    if source.split and path.is_file():
+        raise InputError("split", source.split, f"{path.name} is a file, which has no splits")
     if path.is_file() and path.suffix.lower() == ".npz" and _is_pack(path):
-        tiles = _packed_tiles(path, scheme)
+        tiles = _packed_tiles(path, scheme, voxel)
     elif path.is_file():
         tiles = cloud_tiles(path, scheme, source)
     elif path.is_dir():
@@ -88,8 +90,10 @@ def _is_pack(path: Path) -> bool:
         return False
 
 
-def _packed_tiles(path: Path, scheme: ClassScheme) -> Iterator[Tile]:
+def _packed_tiles(path: Path, scheme: ClassScheme, voxel: float | None) -> Iterator[Tile]:
     pack = PackReader(path)
+    if voxel is not None and pack.voxel > voxel * (1.0 + 1e-9):
+        raise InputError("voxel", voxel, f"must be at least {pack.voxel:g} m, as the points of {path} were thinned")
     table = table_between(dict(enumerate(class_names(pack.scheme))), scheme, str(path))
     for place in range(len(pack)):
         yield _relabelled(pack.tile(place), table)
@@ -232,7 +236,7 @@ def tile_of(points: PointBlock, scene: str, origin: NDArray[np.float64], scale: 
         scene,
         origin,
         (points.xyz - origin).astype(np.float32),
-        np.rint(points.rgb / 257.0).astype(np.uint8) if points.rgb.any() else None,
+        eight_bits(points.rgb, int(points.rgb.max())) if points.rgb.any() else None,
         strength if strength.any() else None,
         np.where(points.class_id == UNLABELLED, IGNORED, points.class_id).astype(np.int16),
     )

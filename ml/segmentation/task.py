@@ -70,18 +70,32 @@ def evaluate(run: SegmentationRun, evaluation: Evaluation, progress: Progress = 
     device = chosen_device(configuration)
     model = trained_model(run, device)
     results: dict[str, Any] = {}
-    for path in evaluation.data:
+    for path, name in zip(evaluation.data, _names(evaluation), strict=True):
         source = _test_source(path, evaluation)
         confusion, shown = score(model, configuration, [source], device, progress)
-        name = path.stem if path.is_file() else f"{path.name}-{evaluation.split}"
         write_file(evaluation.output / f"{name}.txt", (confusion.to_text() + "\n").encode(), overwrite=True)
         if shown is not None:
             tile, labels = shown
-            names = source.targets(configuration.scheme())
-            write_file(evaluation.output / f"{name}.png", comparison(tile, labels, names), overwrite=True)
+            classes = source.targets(configuration.scheme())
+            write_file(evaluation.output / f"{name}.png", comparison(tile, labels, classes), overwrite=True)
         results[name] = confusion.to_dict()
     means = {f"{name}_mean_iou": result["mean_iou"] for name, result in results.items()}
     return {**means, "tests": results}
+
+
+def _names(evaluation: Evaluation) -> list[str]:
+    """Return a name for the results of each data, with as many of its folders as tell it from the others.
+
+    Raises:
+        InputError: data are given twice.
+    """
+    paths = [path.with_name(f"{path.name}-{evaluation.split}") if path.is_dir() else path for path in evaluation.data]
+    places = [path.absolute() if path.is_dir() else path.absolute().with_suffix("") for path in paths]
+    if twice := sorted({str(path) for path, place in zip(paths, places, strict=True) if places.count(place) > 1}):
+        raise InputError("data", twice[0], "is given twice, or with two endings")
+    longest = max(len(place.parts) for place in places)
+    tried = (["-".join(place.parts[-parts:]) for place in places] for parts in range(1, longest + 1))
+    return next(names for names in tried if len(set(names)) == len(names))
 
 
 def _test_source(path: Path, evaluation: Evaluation) -> Source:

@@ -50,6 +50,16 @@ class Tile:
         return np.bincount(self.segment[self.segment != IGNORED], minlength=classes)
 
 
+def eight_bits(rgb: NDArray[Any], largest: int) -> NDArray[np.uint8]:
+    """Return colours (N, 3) of LAS as 8 bits each.
+
+    Args:
+        rgb: as they are stored.
+        largest: of all values of the cloud: some programs store 8 bits in the fields of 16.
+    """
+    return (np.rint(rgb / 257.0) if largest > 255 else rgb).astype(np.uint8)
+
+
 def thin(coord: NDArray[np.floating[Any]], cell: float) -> NDArray[np.intp]:
     """Return the indices of the points that stay, one per occupied cell of a cubic grid, in order.
 

@@ -167,6 +167,54 @@ def test_tiles_and_blocks_do_not_show(tmp_path: Path, labelling: Labelling, monk
     assert (whole.points.array == blocks.points.array).all()
 
 
+def test_tiles_of_a_file_see_what_lies_around_them(tmp_path: Path) -> None:
+    others_cloud(tmp_path / "in.laz", 40_000)
+    scheme = class_scheme("5")
+    predict_file(tmp_path / "in.laz", tmp_path / "out.las", Labelling(by_view, SETTINGS, scheme, "share"))
+    found = laspy.read(tmp_path / "out.las")
+    plan = np.column_stack([found.x, found.y])
+    inside = np.all((plan - plan.min(axis=0) > 4.0) & (plan.max(axis=0) - plan > 4.0), axis=1)
+    # Tiles of 48 m end within the cloud of 130 m, and no point there may see less than 3 m to any side.
+    assert inside.sum() > 20_000
+    assert (np.asarray(found[PREDICTED])[inside] == scheme.rows[1].id).all()
+    assert (np.asarray(found[PREDICTED]) == scheme.rows[0].id).any()
+
+
+def test_cloud_optimised_files_are_copied_as_plain_ones(tmp_path: Path, labelling: Labelling) -> None:
+    las = others_cloud(tmp_path / "in.laz", 2000)
+    las.header.vlrs.append(laspy.VLR("copc", 1, "COPC info", bytes(160)))
+    las.evlrs.append(laspy.VLR("copc", 1000, "EPT hierarchy", bytes(32)))
+    las.header.system_identifier = las.header.generating_software = ""
+    las.write(tmp_path / "plain.las")
+    predict_file(tmp_path / "plain.las", tmp_path / "out.laz", labelling)
+    found = laspy.read(tmp_path / "out.laz")
+    assert len(found.points) == 2000
+    assert [record.user_id for record in (*found.header.vlrs, *found.evlrs)].count("copc") == 0
+    assert {"someone"} <= {record.user_id for record in found.evlrs}
+
+
+def test_colours_of_eight_bits_are_not_black(tmp_path: Path) -> None:
+    seen = []
+
+    def look(batch: Item) -> torch.Tensor:
+        seen.append(batch["color"].amax(dim=0))
+        return by_brightness(batch)
+
+    for name, factor in (("sixteen", 257), ("eight", 1)):
+        las = others_cloud(tmp_path / f"{name}.las", 2000)
+        random = np.random.default_rng(1)
+        las.red, las.green, las.blue = factor * random.integers(0, 256, (3, 2000))
+        las.header.system_identifier = las.header.generating_software = ""
+        las.write(tmp_path / f"{name}.las")
+        seen.clear()
+        predict_file(
+            tmp_path / f"{name}.las",
+            tmp_path / f"{name}-out.las",
+            Labelling(look, SETTINGS, class_scheme("5"), "share"),
+        )
+        assert float(torch.stack(seen).max()) > 0.9, name
+
+
 def test_a_second_prediction_replaces_the_first_and_codes_follow(tmp_path: Path, labelling: Labelling) -> None:
     write_cloud(tmp_path / "in.laz", road_block(5000, 5))
     predict_file(tmp_path / "in.laz", tmp_path / "once.laz", labelling, classification=True)
@@ -194,8 +242,16 @@ def test_bad_input_is_told_and_leaves_nothing(tmp_path: Path, labelling: Labelli
     old = laspy.LasData(header)
     old.x, old.y, old.z = np.zeros((3, 5))
     old.write(tmp_path / "old.las")
+    started: list[Item] = []
+
+    def noted(batch: Item) -> torch.Tensor:
+        started.append(batch)
+        return by_brightness(batch)
+
+    beforehand = Labelling(noted, SETTINGS, class_scheme("5"), "share")
     with pytest.raises(InputError, match="point format"):
-        predict_file(tmp_path / "old.las", tmp_path / "out.las", labelling, classification=True)
+        predict_file(tmp_path / "old.las", tmp_path / "out.las", beforehand, classification=True)
+    assert not started, "it is told before the work begins"
     predict_file(tmp_path / "old.las", tmp_path / "old-out.las", labelling)
 
     def broken(batch: Item) -> torch.Tensor:

@@ -24,10 +24,11 @@ from ml.segmentation.loading import epoch_batches, read_domains
 from ml.segmentation.metrics import IGNORED
 from ml.segmentation.network import build
 from ml.segmentation.recipes import Data
-from ml.segmentation.sources import Source
+from ml.segmentation.sources import Source, read_tiles
 from ml.segmentation.tiles import scalings
 from ml.segmentation.training import PRETRAINING, smoothed_loss
-from ml.tasks import kinds
+from ml.tasks import Evaluation, kinds
+from synthroads_addon.core.cloud.labels import class_scheme
 from synthroads_addon.core.errors import InputError
 from tests.ml.segmentation_data import road_block, road_tile, toy, write_cloud, write_pointcept
 
@@ -251,8 +252,6 @@ def test_evaluation_with_a_mapping_scores_groups(data: Path, tmp_path: Path) -> 
     las.intensity = np.rint(block.intensity * 65535)
     las.classification = np.array([2, 2, 2, 5, 1])[block.class_id]
     las.write(tmp_path / "street.laz")
-    from ml.tasks import Evaluation
-
     found = task.evaluate(run, Evaluation([tmp_path / "street.laz"], "test", tmp_path / "out", mapping="ign"))
     classes = found["tests"]["street"]["classes"]
     assert list(classes) == ["ground", "vegetation", "other"]
@@ -338,3 +337,31 @@ def test_an_experiments_faults_are_told(tmp_path: Path, capsys: pytest.CaptureFi
     assert "must be a variant that is trained" in capsys.readouterr().err
     with pytest.raises(InputError, match="gantries"):
         load_experiment("gantrys")
+    words = ["--data", "real=a", "--data", "synthetic=b", "--output", str(tmp_path / "out"), "--seeds", "-1"]
+    assert experiments.main(["real-synthetic-mixed-small", *words]) == 2
+    assert "--seeds is -1: must be whole numbers from 0" in capsys.readouterr().err
+
+
+def test_clouds_of_one_name_have_results_of_their_own(data: Path, tmp_path: Path) -> None:
+    task.train(Run.start(tmp_path / "run", toy(data)))
+    run = Run.open(tmp_path / "run", kinds())
+    clouds = [tmp_path / scene / "cloud.laz" for scene in ("one", "two")]
+    for number, cloud in enumerate(clouds):
+        cloud.parent.mkdir()
+        write_cloud(cloud, road_block(2000 + number, 4))
+    found = task.evaluate(run, Evaluation(clouds, "test", tmp_path / "out"))
+    assert list(found["tests"]) == ["one-cloud", "two-cloud"]
+    assert {path.name for path in (tmp_path / "out").glob("*.txt")} == {"one-cloud.txt", "two-cloud.txt"}
+    with pytest.raises(InputError, match="is given twice"):
+        task.evaluate(run, Evaluation([clouds[0], clouds[0]], "test", tmp_path / "out"))
+
+
+def test_files_have_no_splits(tmp_path: Path) -> None:
+    cloud = write_cloud(tmp_path / "cloud.laz", road_block(100, 1))
+    with pytest.raises(InputError, match=r"split is 'train': cloud.laz is a file, which has no splits"):
+        list(read_tiles(Source(path=str(cloud), split="train"), class_scheme("5"), 0.1))
+
+
+def test_a_share_that_a_balanced_draw_would_not_keep_is_refused(data: Path) -> None:
+    with pytest.raises(InputError, match="synthetic_share has no effect where balanced is true"):
+        toy(data, set_up="mixed", synthetic_share=0.5, balanced=True)
