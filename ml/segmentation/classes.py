@@ -30,7 +30,7 @@ class LabelMapping(Model):
     groups: dict[str, tuple[str, ...]] = Field(
         {}, description="Group -> classes that count as one where scores are made; for coarser truths."
     )
-    ignore_zero_intensity: bool = Field(False, description="Leave out points whose intensity is 0: none was measured.")
+    ignore_zero_intensity: bool = Field(False, description="Ignore points whose intensity is 0: none was measured.")
 
     def targets(self, names: tuple[str, ...]) -> tuple[str, ...]:
         """Return what the truth tells apart, in order: the scheme's classes, or the groups.

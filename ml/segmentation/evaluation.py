@@ -7,9 +7,11 @@ from typing import Any
 
 import numpy as np
 import torch
+from numpy.typing import NDArray
 from torch import Tensor, nn
 
 from ml.runs import Run
+from synthroads_addon.core.cloud.labels import ClassScheme
 from synthroads_addon.core.errors import InputError
 from synthroads_addon.core.progress import Progress, silent
 
@@ -21,7 +23,7 @@ from .network import adapted, build, on_device, plan_of, prepared, scores_of
 from .recipes import SegmentationConfiguration
 from .scoring import Classifier, label_tile, score_tile
 from .sources import Source, read_tiles
-from .tiles import Tile, scalings
+from .tiles import Tile, scalings, thin
 
 
 def trained_model(run: Run[SegmentationConfiguration], device: torch.device) -> nn.Module:
@@ -54,6 +56,32 @@ def classifier(model: nn.Module, configuration: SegmentationConfiguration, devic
     return scores
 
 
+def check_tests(configuration: SegmentationConfiguration) -> None:
+    """Look at the data of all tests, as far as can be told without a network: trainings take hours.
+
+    Raises:
+        MissingFileError: there are none.
+        InputError: see `score`, or a source's first tile can't be read.
+    """
+    scheme = configuration.scheme()
+    for sources in configuration.data.tests.values():
+        _targets(sources, scheme)
+        for source in sources:
+            _groups(source, scheme)
+            if next(read_tiles(source, scheme, None), None) is None:
+                raise InputError("data.tests", source.path, "holds no points")
+
+
+def score_all(
+    model: nn.Module, configuration: SegmentationConfiguration, device: torch.device, progress: Progress = silent
+) -> dict[str, Any]:
+    """Return the scores of a configuration's tests by name, see `Confusion.to_dict`."""
+    return {
+        name: score(model, configuration, sources, device, progress)[0].to_dict()
+        for name, sources in configuration.data.tests.items()
+    }
+
+
 def score(
     model: nn.Module,
     configuration: SegmentationConfiguration,
@@ -61,30 +89,25 @@ def score(
     device: torch.device,
     progress: Progress = silent,
 ) -> tuple[Confusion, tuple[Tile, Any] | None]:
-    """Return the confusion over all points of some sources, and the first tile with its classes, to be drawn.
+    """Return the confusion over all points of some sources, and the largest tile with its classes, to be drawn.
 
     Raises:
         InputError: the sources tell different classes apart, or a mapping's groups leave out a class.
     """
     scheme = configuration.scheme()
-    names = {source.targets(scheme) for source in sources}
-    if len(names) != 1:
-        raise InputError("data.tests", len(names), "sources of one test must tell the same classes apart")
-    confusion = Confusion(names.pop())
+    confusion = Confusion(_targets(sources, scheme))
     if configuration.adaptation.adabn:
-        tiles = [tile for source in sources for tile in thinned(source, configuration)]
+        tiles = list(thinned(sources, configuration, "test"))
         with watched_workers(configuration):
             model = adapted(model, adaptation_batches(tiles, configuration), device)
     scores = classifier(model, configuration, device)
     shown = None
     for source in sources:
-        mapping = source.label_mapping()
-        count = len(class_names(scheme))
-        groups = mapping.group_of(class_names(scheme)) if mapping else np.arange(count, dtype=np.int16)
-        if (groups == IGNORED).any():
-            raise InputError("groups", mapping and mapping.title, "must have a place for every class of the scheme")
+        groups = _groups(source, scheme)
         for scene in _scenes(read_tiles(source, scheme, None)):
-            scaling = scalings(scene, configuration.intensity)
+            # As in training: of one point per voxel.
+            few = [tile.select(thin(tile.coord, configuration.voxel)) for tile in scene]
+            scaling = scalings(few, configuration.intensity)
             for tile in scene:
                 labels = label_tile(tile, scaling[tile.scene], scores, configuration.crop_settings())
                 score_tile(confusion, tile, labels, groups)
@@ -92,6 +115,22 @@ def score(
                     shown = (tile, groups[labels])
             progress("scoring", 0.5)
     return confusion, shown
+
+
+def _targets(sources: Sequence[Source], scheme: ClassScheme) -> tuple[str, ...]:
+    names = {source.targets(scheme) for source in sources}
+    if len(names) != 1:
+        raise InputError("data.tests", len(names), "sources of one test must tell the same classes apart")
+    return names.pop()
+
+
+def _groups(source: Source, scheme: ClassScheme) -> NDArray[np.int16]:
+    """Return for each class of the scheme (C,) the place of the target that it counts as."""
+    mapping, names = source.label_mapping(), class_names(scheme)
+    groups = mapping.group_of(names) if mapping else np.arange(len(names), dtype=np.int16)
+    if (groups == IGNORED).any():
+        raise InputError("groups", mapping and mapping.title, "must have a place for every class of the scheme")
+    return groups
 
 
 def _scenes(tiles: Iterator[Tile]) -> Iterator[list[Tile]]:

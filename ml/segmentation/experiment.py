@@ -25,7 +25,7 @@ from synthroads_addon.core.progress import Progress, silent
 from synthroads_addon.core.scenario import apply_change
 from synthroads_addon.core.schema import Model, canonical_json, read_json, read_yaml
 
-from .evaluation import score, trained_model
+from .evaluation import score_all, trained_model
 from .recipes import Data, SegmentationConfiguration
 from .sources import Source
 from .tables import by_test
@@ -192,10 +192,7 @@ def _tested(configuration: SegmentationConfiguration, folder: Path, file: Path, 
     run = Run.open(folder, {"segmentation": SegmentationConfiguration})
     device = chosen_device(configuration)
     model = trained_model(run, device)
-    tests = {
-        name: score(model, configuration, sources, device, progress)[0].to_dict()
-        for name, sources in configuration.data.tests.items()
-    }
+    tests = score_all(model, configuration, device, progress)
     write_file(file, canonical_json(tests).encode())
     return tests
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import signal
 import sys
 import zlib
@@ -11,6 +10,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from types import TracebackType
 
+import numpy as np
 import torch
 from torch.utils.data import DataLoader
 
@@ -18,7 +18,7 @@ from synthroads_addon.core.errors import InputError
 from synthroads_addon.core.random_streams import stream
 
 from .adaptation import laid_over
-from .crops import CropDataset, Item, Seeds, collate
+from .crops import CropDataset, Draw, Item, Seeds, collate
 from .network import on_device, plan_of, prepared
 from .recipes import SegmentationConfiguration, mapped_intensities, plan
 from .sources import Source, read_tiles
@@ -39,12 +39,7 @@ def read_domains(configuration: SegmentationConfiguration) -> dict[str, list[Til
     """
     domains: dict[str, list[Tile]] = {}
     for domain, sources in configuration.needed().items():
-        # Scenes of two sources may have one name: their intensities are scaled apart.
-        tiles = [
-            replace(tile, scene=f"{domain}/{place}/{tile.scene}")
-            for place, source in enumerate(sources)
-            for tile in thinned(source, configuration)
-        ]
+        tiles = list(thinned(sources, configuration, domain))
         least = SMALLEST_SHARE * configuration.crop_points
         enough = [tile for tile in tiles if len(tile) >= least]
         domains[domain] = enough or [tile for tile in tiles if len(tile)]
@@ -53,9 +48,14 @@ def read_domains(configuration: SegmentationConfiguration) -> dict[str, list[Til
     return domains
 
 
-def thinned(source: Source, configuration: SegmentationConfiguration) -> Iterator[Tile]:
-    """Yield a source's tiles with one point per training voxel."""
-    return read_tiles(source, configuration.scheme(), configuration.voxel)
+def thinned(sources: Sequence[Source], configuration: SegmentationConfiguration, title: str) -> Iterator[Tile]:
+    """Yield the tiles of sources with one point per training voxel.
+
+    Scenes of two sources may have one name: here they have others, so that their intensities are scaled apart.
+    """
+    for place, source in enumerate(sources):
+        for tile in read_tiles(source, configuration.scheme(), configuration.voxel):
+            yield replace(tile, scene=f"{title}/{place}/{tile.scene}")
 
 
 def epoch_batches(
@@ -168,12 +168,15 @@ def adaptation_batches(tiles: list[Tile], configuration: SegmentationConfigurati
     """Yield batches of a test's points without effects, from which the norms' statistics are taken."""
     if not tiles:
         return
-    per_tile = math.ceil(configuration.adaptation.adabn_crops / len(tiles))
+    # By their points: a sliver says as much of the scene as it holds of it.
+    shares = np.array([len(tile) for tile in tiles]) / sum(map(len, tiles))
+    random = stream(configuration.seed, "adaptation")
+    chosen = random.choice(len(tiles), configuration.adaptation.adabn_crops, p=shares)
     dataset = CropDataset(
         tiles,
         scalings(tiles, configuration.intensity),
         configuration.crop_settings(),
-        plan([len(tiles)], per_tile, None, configuration.seed, 0)[: configuration.adaptation.adabn_crops],
+        [Draw(int(tile), number) for number, tile in enumerate(chosen)],
         Seeds(tiles, 0, balanced=False),
         seed=configuration.seed,
     )

@@ -30,7 +30,7 @@ from .crops import CropSettings
 from .metrics import IGNORED
 from .scoring import Classifier, label_tile
 from .sources import FULL
-from .tiles import Scaling, Tile, eight_bits
+from .tiles import Scaling, Tile, eight_bits, thin
 
 HEADER_TEXTS = range(26, 90)
 """Bytes of a LAS file that hold the system identifier and the generating software, of 32 each."""
@@ -96,7 +96,7 @@ def predict_file(
         store = TileStore(Path(name))
         count = store.fill(source, progress)
         labels = np.memmap(Path(name) / "labels", dtype=np.uint8, mode="w+", shape=(max(count, 1),))
-        scaling = store.scaling(labelling.intensity)
+        scaling = store.scaling(labelling.intensity, labelling.settings.voxel)
         done = 0
         for tile, core, index in store.tiles():
             labels[index] = label_tile(tile, scaling, labelling.classifier, labelling.settings, core)
@@ -145,7 +145,7 @@ class TileStore:
         self._folder, self._edge = folder / "tiles", edge
         self._folder.mkdir()
         self._known: set[tuple[int, int]] = set()
-        self._histogram = np.zeros(LEVELS, dtype=np.int64)
+        self._has_intensity = False
         self._largest = 0
 
     def fill(self, source: Path, progress: Progress) -> int:
@@ -163,18 +163,22 @@ class TileStore:
                 record["rgb"] = block.rgb
                 record["intensity"] = np.clip(np.rint(block.intensity * scale), 0, LEVELS - 1)
                 record["index"] = np.arange(done, done + len(block))
-                self._histogram += np.bincount(record["intensity"], minlength=LEVELS)
+                self._has_intensity |= bool(record["intensity"].any())
                 self._largest = max(self._largest, int(block.rgb.max(initial=0)))
                 self._append(tile, record)
                 done += len(block)
                 progress("reading", done / cloud.header.count)
         return done
 
-    def scaling(self, kind: str) -> Scaling:
-        """Return the scaling of the whole cloud's intensities; see `tiles.scalings`."""
-        if kind == "share" or not self._histogram[1:].any():
+    def scaling(self, kind: str, voxel: float) -> Scaling:
+        """Return the scaling of the whole cloud's intensities, of one point per voxel (m); see `tiles.scalings`."""
+        if kind == "share" or not self._has_intensity:
             return Scaling()
-        share = np.cumsum(self._histogram) / self._histogram.sum()
+        histogram = np.zeros(LEVELS, dtype=np.int64)
+        for row, column in self._known:
+            record = np.fromfile(self._folder / f"{row}_{column}", dtype=_RECORD)
+            histogram += np.bincount(record["intensity"][thin(record["place"], voxel)], minlength=LEVELS)
+        share = np.cumsum(histogram) / histogram.sum()
         low, middle, high = (int(np.searchsorted(share, at)) / FULL for at in (0.1, 0.5, 0.9))
         return Scaling(middle, high - low if high > low else 1.0)
 
@@ -194,7 +198,7 @@ class TileStore:
                 self._corner(np.array([[column, row]]))[0],
                 np.ascontiguousarray(record["place"]),
                 eight_bits(record["rgb"], self._largest) if self._largest else None,
-                strength if self._histogram[1:].any() else None,
+                strength if self._has_intensity else None,
                 np.full(len(record), IGNORED, dtype=np.int16),
             )
             yield tile, core, record["index"][core]

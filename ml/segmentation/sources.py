@@ -254,8 +254,10 @@ def labelled_blocks(cloud: CloudReader, scheme: ClassScheme, source: Source) -> 
             yield _with_places(block, table[block.class_id])
         return
     for block, numbers in zip(cloud.blocks(), _numbers(cloud, mapping.field), strict=True):
-        labelled = _with_places(block, mapping.label(numbers, names))
-        yield labelled.select(block.intensity > 0) if mapping.ignore_zero_intensity else labelled
+        places = mapping.label(numbers, names)
+        if mapping.ignore_zero_intensity:
+            places = np.where(block.intensity > 0, places, IGNORED).astype(np.int16)
+        yield _with_places(block, places)
 
 
 def _with_places(block: PointBlock, places: NDArray[np.int16]) -> PointBlock:

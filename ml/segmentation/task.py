@@ -16,7 +16,7 @@ from synthroads_addon.core.errors import InputError
 from synthroads_addon.core.files import write_file
 from synthroads_addon.core.progress import Progress, peak_memory_mb, silent
 
-from .evaluation import classifier, score, trained_model
+from .evaluation import check_tests, classifier, score, score_all, trained_model
 from .pictures import comparison
 from .prediction import Labelling, predict_file
 from .recipes import SegmentationConfiguration
@@ -40,12 +40,10 @@ def train(run: SegmentationRun, progress: Progress = silent) -> dict[str, Any]:
         InputError: data are missing, or don't fit the configuration.
     """
     configuration = run.configuration
+    check_tests(configuration)
     model, domains = trained(run, progress)
     device = next(model.parameters()).device
-    tests = {
-        name: score(model, configuration, sources, device, progress)[0].to_dict()
-        for name, sources in configuration.data.tests.items()
-    }
+    tests = score_all(model, configuration, device, progress)
     metrics = {
         **{f"{name}_mean_iou": result["mean_iou"] for name, result in tests.items()},
         "parameters": sum(weight.numel() for weight in model.parameters()),

@@ -42,7 +42,7 @@ def trained(run: Run[SegmentationConfiguration], progress: Progress = silent) ->
     configuration = run.configuration
     device = chosen_device(configuration)
     domains = read_domains(configuration)
-    validation = [tile for source in configuration.data.validation for tile in thinned(source, configuration)]
+    validation = list(thinned(configuration.data.validation, configuration, "validation"))
     torch.manual_seed(configuration.seed)
     model = build(configuration).to(device)
     if configuration.set_up == "fine_tuned":

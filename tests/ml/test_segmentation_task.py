@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +21,7 @@ from ml.segmentation import experiment as experiments
 from ml.segmentation import task
 from ml.segmentation.crops import Item, Seeds
 from ml.segmentation.experiment import configurations, load_experiment, table
-from ml.segmentation.loading import epoch_batches, read_domains
+from ml.segmentation.loading import adaptation_batches, epoch_batches, read_domains
 from ml.segmentation.metrics import IGNORED
 from ml.segmentation.network import build
 from ml.segmentation.recipes import Data
@@ -29,7 +30,7 @@ from ml.segmentation.tiles import scalings
 from ml.segmentation.training import PRETRAINING, smoothed_loss
 from ml.tasks import Evaluation, kinds
 from synthroads_addon.core.cloud.labels import class_scheme
-from synthroads_addon.core.errors import InputError
+from synthroads_addon.core.errors import InputError, MissingFileError
 from tests.ml.segmentation_data import road_block, road_tile, toy, write_cloud, write_pointcept
 
 torch.set_num_threads(1)
@@ -354,6 +355,26 @@ def test_clouds_of_one_name_have_results_of_their_own(data: Path, tmp_path: Path
     assert {path.name for path in (tmp_path / "out").glob("*.txt")} == {"one-cloud.txt", "two-cloud.txt"}
     with pytest.raises(InputError, match="is given twice"):
         task.evaluate(run, Evaluation([clouds[0], clouds[0]], "test", tmp_path / "out"))
+
+
+def test_tests_are_looked_at_before_the_training(data: Path, tmp_path: Path) -> None:
+    run = Run.start(tmp_path / "run", toy(data))
+    wrong = {"late": [{"path": str(data / "real"), "split": "tset"}]}
+    run.configuration = run.configuration.model_copy(
+        update={"data": run.configuration.data.model_copy(update={"tests": Data(tests=wrong).tests})}
+    )
+    with pytest.raises(MissingFileError, match="tset"):
+        task.train(run)
+    assert not (tmp_path / "run" / "checkpoint.pt").exists()
+
+
+def test_norms_are_adapted_by_points_and_not_by_tiles(data: Path) -> None:
+    large, sliver = road_tile(19_000, 1, "large"), road_tile(1000, 2, "sliver")
+    configuration = toy(data, adaptation={"adabn": True, "adabn_crops": 200}, batch=1, crop_points=500)
+    dark = replace(sliver, strength=np.zeros_like(sliver.strength))
+    of_sliver = [not bool(batch["strength"].any()) for batch in adaptation_batches([large, dark], configuration)]
+    assert len(of_sliver) == 200
+    assert 0.01 < np.mean(of_sliver) < 0.12  # 5 % of the points
 
 
 def test_files_have_no_splits(tmp_path: Path) -> None:
