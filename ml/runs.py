@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import math
+import shutil
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -23,6 +24,8 @@ HISTORY = "history.json"
 METRICS = "metrics.json"
 CURVES = "curves.png"
 CALIBRATION = "calibration.json"
+PRETRAINING = "pretraining"
+"""Folder, within that of a fine-tuned run, of what it began with."""
 FREE_WHEN_RESUMING = ("threads", "device", "workers")
 """Fields that may change between the parts of one training: they say where it runs, not what it learns."""
 
@@ -61,6 +64,8 @@ class Run(Generic[C]):
             try:
                 for name in (CHECKPOINT, HISTORY, METRICS, CURVES, CALIBRATION):
                     (folder / name).unlink(missing_ok=True)
+                if (folder / PRETRAINING).is_dir():
+                    shutil.rmtree(folder / PRETRAINING)
             except OSError as error:
                 raise OutputError("--output", str(folder), f"cannot be written ({error.strerror})") from None
         write_file(folder / CONFIGURATION, canonical_json(configuration.to_dict()).encode(), overwrite=True)

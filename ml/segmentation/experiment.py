@@ -18,7 +18,7 @@ from pydantic import Field
 from headless.cli import progress_bar
 from ml.configuration import load_configuration
 from ml.fitting import chosen_device
-from ml.runs import CHECKPOINT, CONFIGURATION, FREE_WHEN_RESUMING, HISTORY, METRICS, Run
+from ml.runs import CHECKPOINT, CONFIGURATION, FREE_WHEN_RESUMING, HISTORY, METRICS, PRETRAINING, Run
 from synthroads_addon.core.errors import InputError, nearest_name
 from synthroads_addon.core.files import write_file
 from synthroads_addon.core.progress import Progress, silent
@@ -30,7 +30,6 @@ from .recipes import Data, SegmentationConfiguration
 from .sources import Source
 from .tables import by_test
 from .task import train
-from .training import PRETRAINING
 
 SHIPPED = Path(__file__).parents[1] / "configurations" / "experiments"
 RESULTS = "results.json"

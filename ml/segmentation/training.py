@@ -13,8 +13,7 @@ from torch import Tensor, nn
 from torch.nn import functional
 
 from ml.fitting import Figures, chosen_device, fit
-from ml.runs import Run
-from synthroads_addon.core.errors import InputError, OutputError
+from ml.runs import PRETRAINING, Run
 from synthroads_addon.core.progress import Progress, silent
 
 from .classes import class_names
@@ -26,9 +25,6 @@ from .network import build, scores_of
 from .recipes import SegmentationConfiguration, class_shares, class_weights
 from .scoring import label_tile
 from .tiles import Tile, scalings
-
-PRETRAINING = "pretraining"
-"""Folder, within that of a fine-tuned run, of what it began with."""
 
 Domains = dict[str, list[Tile]]
 
@@ -57,13 +53,7 @@ def trained(run: Run[SegmentationConfiguration], progress: Progress = silent) ->
 def _pretraining(run: Run[SegmentationConfiguration]) -> Run[SegmentationConfiguration]:
     """Return the run of the first part of fine-tuning, begun or to be gone on with."""
     configuration = run.configuration.model_copy(update={"set_up": "synthetic"})
-    folder = run.folder / PRETRAINING
-    try:
-        return Run.start(folder, configuration, resume=True)
-    except OutputError:
-        raise
-    except InputError:  # of an earlier run with other settings, which was to be overwritten
-        return Run.start(folder, configuration, overwrite=True)
+    return Run.start(run.folder / PRETRAINING, configuration, resume=True)
 
 
 def _fit(

@@ -16,7 +16,7 @@ from ml import evaluate as evaluate_command
 from ml import predict as predict_command
 from ml import train as train_command
 from ml.configuration import load_configuration
-from ml.runs import Run
+from ml.runs import PRETRAINING, Run
 from ml.segmentation import experiment as experiments
 from ml.segmentation import task
 from ml.segmentation.crops import Item, Seeds
@@ -27,7 +27,7 @@ from ml.segmentation.network import build
 from ml.segmentation.recipes import Data
 from ml.segmentation.sources import Source, read_tiles
 from ml.segmentation.tiles import scalings
-from ml.segmentation.training import PRETRAINING, smoothed_loss
+from ml.segmentation.training import smoothed_loss
 from ml.tasks import Evaluation, kinds
 from synthroads_addon.core.cloud.labels import class_scheme
 from synthroads_addon.core.errors import InputError, MissingFileError
@@ -143,6 +143,8 @@ def test_fine_tuning_begins_with_what_synthetic_data_taught(data: Path, tmp_path
     changed = toy(data, set_up="fine_tuned", fine_tuning=nothing, seed=5)
     task.train(Run.start(tmp_path / "tuned", changed, overwrite=True))  # nor with what another seed did
     assert not same(first, weights(tmp_path / "tuned" / PRETRAINING))
+    begun = Run.start(tmp_path / "tuned", changed, overwrite=True)  # nor with what the same seed learned of other data
+    assert not (begun.folder / PRETRAINING).exists()
 
 
 def test_every_set_up_and_option_trains(data: Path, tmp_path: Path) -> None:
