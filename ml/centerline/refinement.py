@@ -114,10 +114,12 @@ def parabola(frame: Tensor, center: Tensor, weight: Tensor, stiffness: Tensor) -
 
 
 def _in_the_middle(frame: Tensor, dtype: torch.dtype) -> tuple[Tensor, Tensor]:
-    """Return origins (B, S, 2) and directions (B, S) of frames in that of the sequence's middle slice."""
+    """Return origins (B, S, 2) and directions (B, S), -pi to pi, of frames in that of the sequence's middle slice."""
     middle = frame[:, frame.shape[1] // 2, :]
     delta = frame[..., :2] - middle[:, None, :2]
     cos, sin = torch.cos(middle[:, 2:3]), torch.sin(middle[:, 2:3])
     x, y = delta.unbind(-1)
     place = torch.stack([cos * x + sin * y, cos * y - sin * x], dim=-1)
-    return place.to(dtype), (frame[..., 2] - middle[:, 2:3]).to(dtype)
+    # Directions of a path towards the west jump by a whole turn.
+    turn = torch.remainder(frame[..., 2] - middle[:, 2:3] + torch.pi, 2.0 * torch.pi) - torch.pi
+    return place.to(dtype), turn.to(dtype)
