@@ -21,8 +21,8 @@ GROUND_CLASSES = ("ground", "road", "road_marking", "roadside", "road_surface")
 UNSORTED_CLASSES = ("never_classified", "unclassified")
 """What points are called that nobody has sorted."""
 ROAD_CLASSES = ("road", "road_marking", "road_surface")
-_SIXTEEN_BITS = 65535.0
-_EIGHT_BITS = 255
+SIXTEEN_BITS = 65535.0
+_EIGHT_BITS = 255.0
 
 
 @dataclass(frozen=True)
@@ -109,18 +109,22 @@ def read_ground(path: Path) -> Points:
     raise InputError(str(path), None, f"holds classes, but none of {', '.join(GROUND_CLASSES)}")
 
 
+def full_color(largest: int) -> float:
+    """Return the value of full brightness in a cloud whose largest is given: some store 8 bits in the fields of 16."""
+    return SIXTEEN_BITS if largest > _EIGHT_BITS else _EIGHT_BITS
+
+
 def _points(header: CloudHeader, blocks: list[PointBlock], names: Mapping[int, str]) -> Points:
     xyz = _joined([block.xyz for block in blocks])
     origin = np.floor(xyz.min(axis=0))
     rgb = _joined([block.rgb for block in blocks])
     largest = int(rgb.max())
-    scale = (header.intensity_scale or 1.0) / _SIXTEEN_BITS
+    scale = (header.intensity_scale or 1.0) / SIXTEEN_BITS
     return Points(
         origin=origin,
         xyz=xyz - origin,
         intensity=_joined([(block.intensity * scale).astype(np.float32) for block in blocks]),
-        # Some programs store 8 bits in the fields of 16.
-        rgb=(rgb / (_SIXTEEN_BITS if largest > _EIGHT_BITS else _EIGHT_BITS)).astype(np.float32),
+        rgb=(rgb / full_color(largest)).astype(np.float32),
         class_id=_joined([block.class_id for block in blocks]),
         class_names=dict(names),
         has_color=header.has_color and largest > 0,

@@ -22,7 +22,7 @@ ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
 
 from ml.fitting import chosen_device  # noqa: E402
-from ml.runs import HISTORY, METRICS, Run  # noqa: E402
+from ml.runs import HISTORY, METRICS, PRETRAINING, Run  # noqa: E402
 from ml.segmentation.evaluation import score, trained_model  # noqa: E402
 from ml.segmentation.experiment import RESULTS  # noqa: E402
 from ml.segmentation.pack import CROP, summary  # noqa: E402
@@ -31,7 +31,6 @@ from ml.segmentation.pictures import comparison  # noqa: E402
 from ml.segmentation.recipes import SegmentationConfiguration  # noqa: E402
 from ml.segmentation.sources import Source  # noqa: E402
 from ml.segmentation.tables import by_class, by_test, cell  # noqa: E402
-from ml.segmentation.training import PRETRAINING  # noqa: E402
 from synthroads_addon.core.errors import InputError, SynthRoadsError  # noqa: E402
 from synthroads_addon.core.files import write_file  # noqa: E402
 from synthroads_addon.core.marked import fill  # noqa: E402

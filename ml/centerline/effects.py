@@ -179,7 +179,7 @@ def drop(stretch: Stretch, effects: Effects, rng: Generator) -> None:
     keep &= (rng.random(slices) >= effects.empty)[stretch.number]
     if rng.random() < effects.hidden and points:
         at, length, width = rng.integers(points), rng.uniform(2.0, 12.0), rng.uniform(1.5, 3.0)
-        x, y = stretch.xyz[:, 0] + stretch.along()[stretch.number], stretch.xyz[:, 1]
+        x, y = stretch.points_along(), stretch.xyz[:, 1]
         keep &= ~((np.abs(x - x[at]) <= length / 2.0) & (np.abs(y - y[at]) <= width / 2.0))
     stretch.keep(keep)
 
@@ -216,10 +216,10 @@ def move(stretch: Stretch, effects: Effects, rng: Generator) -> None:
     """Tilt the ground and add noise to the points. Their slices stay what they are."""
     grade, cross = rng.uniform(-effects.tilt, effects.tilt, 2)
     along = stretch.along()
-    along -= 0.5 * along[-1]
-    x, y = stretch.xyz[:, 0] + along[stretch.number], stretch.xyz[:, 1]
+    middle = 0.5 * along[-1]
+    x, y = stretch.points_along() - middle, stretch.xyz[:, 1]
     noise = rng.uniform(0.0, effects.jitter) * rng.standard_normal(stretch.xyz.shape)
     stretch.xyz = stretch.xyz + noise
     stretch.xyz[:, 2] += grade * x + cross * y
     stretch.corridor = stretch.corridor.copy()
-    stretch.corridor[:, HEIGHT] += grade * along + cross * stretch.center
+    stretch.corridor[:, HEIGHT] += grade * (along - middle) + cross * stretch.center

@@ -164,7 +164,7 @@ def _waves(stretch: Stretch, rng: Generator) -> Float:
     count = 6
     rate = 2.0 * np.pi / np.exp(rng.uniform(np.log(2.0), np.log(20.0), count))
     way, phase = rng.uniform(0.0, 2.0 * np.pi, (2, count))
-    x, y = stretch.xyz[:, 0] + stretch.along()[stretch.number], stretch.xyz[:, 1]
+    x, y = stretch.points_along(), stretch.xyz[:, 1]
     angle = x[:, None] * (rate * np.cos(way)) + y[:, None] * (rate * np.sin(way)) + phase
     result: Float = np.cos(angle).sum(axis=1) * np.sqrt(2.0 / count)
     return result

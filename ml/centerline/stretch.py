@@ -58,6 +58,10 @@ class Stretch:
         """Return how far along the path each slice lies from the first (S,), m."""
         return np.abs(self.frames.station - self.frames.station[0])
 
+    def points_along(self) -> Float:
+        """Return how far along the path each point lies from the first slice (K,), m."""
+        return self.xyz[:, 0] + self.along()[self.number]
+
     def paved_sides(self) -> Float:
         """Return how far the pavement reaches to the left and to the right of the centre (S, 2), m, or NaN."""
         return np.column_stack([self.corridor[:, LEFT] - self.center, self.center - self.corridor[:, RIGHT]])

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ml.points import GROUND_CLASSES, UNSORTED_CLASSES, Points
+from ml.points import GROUND_CLASSES, SIXTEEN_BITS, UNSORTED_CLASSES, Points, full_color
 from synthroads_addon.core.cloud.points import PointBlock
 from synthroads_addon.core.cloud.reading import CloudHeader, open_cloud
 from synthroads_addon.core.errors import InputError
@@ -28,8 +28,6 @@ MARGIN = 40.0
 """How far a strip's points and frames reach beyond its ends, m: more than a sequence of slices is long."""
 _CELL = 1.0
 """Edge of the cells in which one point each is enough to find the path, m."""
-_SIXTEEN_BITS = 65535.0
-_EIGHT_BITS = 255
 _STORED = np.dtype([("xyz", "<f8", 3), ("intensity", "<f4"), ("rgb", "<u2", 3), ("class_id", "u1")])
 
 
@@ -147,7 +145,7 @@ def _touched(station: Float) -> list[int]:
 def _rows(block: PointBlock, header: CloudHeader) -> NDArray[np.void]:
     rows = np.empty(len(block), dtype=_STORED)
     rows["xyz"] = block.xyz
-    rows["intensity"] = block.intensity * ((header.intensity_scale or 1.0) / _SIXTEEN_BITS)
+    rows["intensity"] = block.intensity * ((header.intensity_scale or 1.0) / SIXTEEN_BITS)
     rows["rgb"] = block.rgb
     rows["class_id"] = block.class_id
     return rows
@@ -155,12 +153,11 @@ def _rows(block: PointBlock, header: CloudHeader) -> NDArray[np.void]:
 
 def _points(rows: NDArray[np.void], ground: Ground) -> Points:
     origin = np.floor(rows["xyz"].min(axis=0))
-    scale = _SIXTEEN_BITS if ground.largest_color > _EIGHT_BITS else _EIGHT_BITS
     return Points(
         origin=origin,
         xyz=rows["xyz"] - origin,
         intensity=rows["intensity"].copy(),
-        rgb=(rows["rgb"] / scale).astype(np.float32),
+        rgb=(rows["rgb"] / full_color(ground.largest_color)).astype(np.float32),
         class_id=rows["class_id"].copy(),
         class_names=dict(ground.header.scheme.names()),
         has_color=ground.header.has_color and ground.largest_color > 0,

@@ -23,7 +23,7 @@ from .network import adapted, build, on_device, plan_of, prepared, scores_of
 from .recipes import SegmentationConfiguration
 from .scoring import Classifier, label_tile, score_tile
 from .sources import Source, read_tiles
-from .tiles import Tile, scalings, thin
+from .tiles import Tile, scalings
 
 
 def trained_model(run: Run[SegmentationConfiguration], device: torch.device) -> nn.Module:
@@ -105,9 +105,7 @@ def score(
     for source in sources:
         groups = _groups(source, scheme)
         for scene in _scenes(read_tiles(source, scheme, None)):
-            # As in training: of one point per voxel.
-            few = [tile.select(thin(tile.coord, configuration.voxel)) for tile in scene]
-            scaling = scalings(few, configuration.intensity)
+            scaling = scalings(scene, configuration.intensity, configuration.voxel)
             for tile in scene:
                 labels = label_tile(tile, scaling[tile.scene], scores, configuration.crop_settings())
                 score_tile(confusion, tile, labels, groups)

@@ -87,9 +87,12 @@ def _names(evaluation: Evaluation) -> list[str]:
     Raises:
         InputError: data are given twice.
     """
-    paths = [path.with_name(f"{path.name}-{evaluation.split}") if path.is_dir() else path for path in evaluation.data]
-    places = [path.absolute() if path.is_dir() else path.absolute().with_suffix("") for path in paths]
-    if twice := sorted({str(path) for path, place in zip(paths, places, strict=True) if places.count(place) > 1}):
+    places = [
+        path.with_name(f"{path.name}-{evaluation.split}") if path.is_dir() else path.with_suffix("")
+        for path in (given.absolute() for given in evaluation.data)
+    ]
+    given = zip(evaluation.data, places, strict=True)
+    if twice := sorted(str(path) for path, place in given if places.count(place) > 1):
         raise InputError("data", twice[0], "is given twice, or with two endings")
     longest = max(len(place.parts) for place in places)
     tried = (["-".join(place.parts[-parts:]) for place in places] for parts in range(1, longest + 1))

@@ -9,6 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ml.points import full_color
+
 from .metrics import IGNORED
 
 
@@ -55,9 +57,9 @@ def eight_bits(rgb: NDArray[Any], largest: int) -> NDArray[np.uint8]:
 
     Args:
         rgb: as they are stored.
-        largest: of all values of the cloud: some programs store 8 bits in the fields of 16.
+        largest: of all values of the cloud, see `full_color`.
     """
-    return (np.rint(rgb / 257.0) if largest > 255 else rgb).astype(np.uint8)
+    return np.rint(rgb * (255.0 / full_color(largest))).astype(np.uint8)
 
 
 def thin(coord: NDArray[np.floating[Any]], cell: float) -> NDArray[np.intp]:
@@ -121,18 +123,19 @@ def robust_scaling(strengths: Sequence[NDArray[np.float32]]) -> Scaling:
     return Scaling(float(middle), float(high - low) if high > low else 1.0)
 
 
-def scalings(tiles: Sequence[Tile], kind: str) -> dict[str, Scaling]:
+def scalings(tiles: Sequence[Tile], kind: str, voxel: float | None = None) -> dict[str, Scaling]:
     """Return the scaling of each scene by name.
 
     Args:
         tiles: of all scenes.
         kind: ``robust``, or ``share``: the share of 16 bits as it stands.
+        voxel: edge of the cells of which one point counts, m; None: all points do, as where tiles are thinned out.
     """
+    if kind == "share":
+        return dict.fromkeys((tile.scene for tile in tiles), Scaling())
     parts: dict[str, list[NDArray[np.float32]]] = {}
     for tile in tiles:
         found = parts.setdefault(tile.scene, [])
         if tile.strength is not None:
-            found.append(tile.strength)
-    if kind == "share":
-        return dict.fromkeys(parts, Scaling())
+            found.append(tile.strength if voxel is None else tile.strength[thin(tile.coord, voxel)])
     return {scene: robust_scaling(found) for scene, found in parts.items()}

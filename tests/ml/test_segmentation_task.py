@@ -355,6 +355,10 @@ def test_clouds_of_one_name_have_results_of_their_own(data: Path, tmp_path: Path
     found = task.evaluate(run, Evaluation(clouds, "test", tmp_path / "out"))
     assert list(found["tests"]) == ["one-cloud", "two-cloud"]
     assert {path.name for path in (tmp_path / "out").glob("*.txt")} == {"one-cloud.txt", "two-cloud.txt"}
+    for name in ("set.v1", "set.v2"):
+        (tmp_path / name).mkdir()
+    sets = Evaluation([tmp_path / "set.v1", tmp_path / "set.v2"], "test", tmp_path / "out")
+    assert task._names(sets) == ["set.v1-test", "set.v2-test"]
     with pytest.raises(InputError, match="is given twice"):
         task.evaluate(run, Evaluation([clouds[0], clouds[0]], "test", tmp_path / "out"))
 
