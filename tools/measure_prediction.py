@@ -14,6 +14,7 @@ import json
 import math
 import subprocess
 import sys
+from collections import Counter
 from copy import deepcopy
 from pathlib import Path
 from typing import Any
@@ -32,15 +33,20 @@ from synthroads_addon.core.schema import canonical_json  # noqa: E402
 RESULT = "prediction.json"
 _GAP = 2.0
 """Between copies, m."""
-_GROWING = ("LASF_Spec 4", "laszip encoded 22204")
+_GROWING = (("LASF_Spec", 4), ("laszip encoded", 22204))
 _HEADER_FIELDS = (
     "version",
     "system_identifier",
     "generating_software",
     "creation_date",
+    "file_source_id",
+    "uuid",
     "global_encoding",
     "scales",
     "offsets",
+    "mins",
+    "maxs",
+    "number_of_points_by_return",
 )
 
 
@@ -94,8 +100,7 @@ def differences(before: Path, after: Path) -> list[str]:
             was, now = (getattr(each.header, name) for each in (one, other))
             if not np.array_equal(getattr(was, "value", was), getattr(now, "value", now)):
                 found.add(f"header: {name}")
-        kept = _records(other.header)
-        found |= {f"record {key}" for key, content in _records(one.header).items() if kept.get(key) != content}
+        found |= {f"record {owner} {number}" for owner, number, _ in _records(one) - _records(other)}
         if PREDICTED not in other.header.point_format.dimension_names:
             found.add(PREDICTED)
         for old, new in zip(one.chunk_iterator(BLOCK), other.chunk_iterator(BLOCK), strict=True):
@@ -104,10 +109,11 @@ def differences(before: Path, after: Path) -> list[str]:
     return sorted(found)
 
 
-def _records(header: laspy.LasHeader) -> dict[str, bytes]:
-    """Return the variable-length records of a file but for the list of extra attributes and LAZ's own, which grow."""
-    records = {f"{record.user_id} {record.record_id}": record.record_data_bytes() for record in header.vlrs}
-    return {name: content for name, content in records.items() if name not in _GROWING}
+def _records(file: laspy.LasReader) -> Counter[tuple[str, int, bytes]]:
+    """Return a file's variable-length records but for the list of extra attributes and LAZ's own, which grow."""
+    every = [*file.header.vlrs, *(file.evlrs or [])]
+    kept = [record for record in every if (record.user_id, record.record_id) not in _GROWING]
+    return Counter((record.user_id, record.record_id, record.record_data_bytes()) for record in kept)
 
 
 def measure(run: Path, source: Path, folder: Path, points: int) -> dict[str, Any]:

@@ -22,7 +22,6 @@ from synthroads_addon.core.errors import InputError
 from synthroads_addon.core.random_streams import stream
 
 from .effects import MISSING_SIGMA, NO_EFFECTS, Crop, Effects, FloatArray, crop_of
-from .metrics import IGNORED
 from .tiles import Scaling, Tile
 
 Feature = Literal["x", "y", "z", "red", "green", "blue", "intensity"]
@@ -116,10 +115,7 @@ class CropDataset(Dataset[Item]):
     def __getitem__(self, place: int) -> Item:
         draw = self.plan[place]
         random = stream(self.seed, "crop", self.epoch, draw.tile, draw.number)
-        number, point = self.seeds.draw(draw.tile, random)
-        tile = self.tiles[number]
-        crop = cut(tile, tile.coord[point], self.settings.points, self.scalings[tile.scene])
-        return item(self.effects.apply(crop, random), self.settings, random)
+        return _drawn(self, draw.tile, random)
 
 
 class CropStream(IterableDataset[Item]):
@@ -144,10 +140,7 @@ class CropStream(IterableDataset[Item]):
         worker = get_worker_info()
         random = stream(self.seed, "crops", 0 if worker is None else worker.id)
         while True:
-            number, point = self.seeds.draw(int(random.integers(len(self.tiles))), random)
-            tile = self.tiles[number]
-            crop = cut(tile, tile.coord[point], self.settings.points, self.scalings[tile.scene])
-            yield item(self.effects.apply(crop, random), self.settings, random)
+            yield _drawn(self, int(random.integers(len(self.tiles))), random)
 
 
 def cut(tile: Tile, middle: NDArray[np.float32], points: int, scaling: Scaling) -> Crop:
@@ -192,15 +185,18 @@ def item(crop: Crop, settings: CropSettings, random: np.random.Generator) -> Ite
     return {name: torch.from_numpy(np.ascontiguousarray(array)) for name, array in arrays.items()}
 
 
+def _drawn(crops: CropDataset | CropStream, place: int, random: np.random.Generator) -> Item:
+    """Return a crop around a seed of a planned tile, or of the tile that the seeds have chosen in its place."""
+    number, point = crops.seeds.draw(place, random)
+    tile = crops.tiles[number]
+    crop = cut(tile, tile.coord[point], crops.settings.points, crops.scalings[tile.scene])
+    return item(crops.effects.apply(crop, random), crops.settings, random)
+
+
 def collate(items: Sequence[Item]) -> Item:
     """Return a batch: the items' points one after another; ``offset`` (B,) says where each item ends."""
     batch = {name: torch.cat([entry[name] for entry in items]) for name in items[0]}
     return batch | {"offset": torch.cumsum(batch["offset"], dim=0)}
-
-
-def labelled_share(batch: Item) -> float:
-    """Return the share of a batch's points that have a label."""
-    return float((batch["segment"] != IGNORED).float().mean())
 
 
 def _noise(random: np.random.Generator, shape: tuple[int, int]) -> FloatArray:

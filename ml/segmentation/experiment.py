@@ -19,6 +19,7 @@ from headless.cli import progress_bar
 from ml.configuration import load_configuration
 from ml.fitting import chosen_device
 from ml.runs import CHECKPOINT, CONFIGURATION, FREE_WHEN_RESUMING, HISTORY, METRICS, PRETRAINING, Run
+from synthroads_addon.core.dataset.manifest import checksum
 from synthroads_addon.core.errors import InputError, nearest_name
 from synthroads_addon.core.files import write_file
 from synthroads_addon.core.progress import Progress, silent
@@ -184,15 +185,18 @@ def _reuse_pretraining(configuration: SegmentationConfiguration, target: Path, o
 
 
 def _tested(configuration: SegmentationConfiguration, folder: Path, file: Path, progress: Progress) -> dict[str, Any]:
-    """Return the scores of a trained run under another configuration, tested unless it is already."""
-    if file.is_file():
-        kept: dict[str, Any] = read_json(file)
-        return kept
+    """Return the scores of a trained run under another configuration, tested unless just that was tested already."""
+    settings = {key: value for key, value in configuration.to_dict().items() if key not in FREE_WHEN_RESUMING}
+    made_from = {"configuration": settings, "checkpoint_sha256": checksum(folder / CHECKPOINT)}
+    tests: dict[str, Any]
+    if file.is_file() and (kept := read_json(file)).get("made_from") == made_from:
+        tests = kept["tests"]
+        return tests
     run = Run.open(folder, {"segmentation": SegmentationConfiguration})
     device = chosen_device(configuration)
     model = trained_model(run, device)
     tests = score_all(model, configuration, device, progress)
-    write_file(file, canonical_json(tests).encode())
+    write_file(file, canonical_json({"made_from": made_from, "tests": tests}).encode(), overwrite=True)
     return tests
 
 

@@ -145,6 +145,24 @@ def test_a_large_cloud_is_labelled_and_compared(folder: Path) -> None:
     assert "| 10,000 |" in figures_segmentation.prediction(file)
 
 
+def test_records_that_a_labelled_file_has_lost_are_found(folder: Path) -> None:
+    las = laspy.read(write_cloud(folder / "before.laz", road_block(500, 9)))
+    las.add_extra_dim(laspy.ExtraBytesParams(PREDICTED, "uint8"))
+    note = [laspy.VLR("surveyor", 7, "note", content) for content in (b"one", b"two")]
+    las.vlrs.extend(note)
+    las.evlrs = laspy.vlrs.vlrlist.VLRList()
+    las.evlrs.append(laspy.VLR("surveyor", 8, "long note", b"three"))
+    las.write(folder / "before.laz")
+    assert measure_prediction.differences(folder / "before.laz", folder / "before.laz") == []
+    las.vlrs.remove(note[0])
+    las.write(folder / "fewer.laz")
+    assert measure_prediction.differences(folder / "before.laz", folder / "fewer.laz") == ["record surveyor 7"]
+    las.evlrs.clear()
+    las.write(folder / "fewer.laz")
+    wanted = ["record surveyor 7", "record surveyor 8"]
+    assert measure_prediction.differences(folder / "before.laz", folder / "fewer.laz") == wanted
+
+
 def test_what_a_labelled_file_has_lost_is_found(folder: Path) -> None:
     cloud = write_cloud(folder / "before.laz", road_block(500, 9))
     assert measure_prediction.differences(cloud, cloud) == [PREDICTED]
@@ -155,8 +173,12 @@ def test_what_a_labelled_file_has_lost_is_found(folder: Path) -> None:
     las.gps_time[7] += 1.0
     las["instance_id"][3] += 1
     las.header.system_identifier = "other"
+    las.header.file_source_id = 3
+    las.x[5] -= 1000.0
+    las.return_number[:2] = 2
     las.write(folder / "changed.laz")
-    wanted = ["gps_time", "header: system_identifier", "instance_id"]
+    wanted = ["X", "bit_fields", "gps_time", "header: file_source_id", "header: mins"]
+    wanted += ["header: number_of_points_by_return", "header: system_identifier", "instance_id"]
     assert measure_prediction.differences(cloud, folder / "changed.laz") == wanted
     las.points = las.points[:400]
     las.write(folder / "short.laz")

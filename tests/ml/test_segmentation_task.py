@@ -16,7 +16,7 @@ from ml import evaluate as evaluate_command
 from ml import predict as predict_command
 from ml import train as train_command
 from ml.configuration import load_configuration
-from ml.runs import PRETRAINING, Run
+from ml.runs import CHECKPOINT, PRETRAINING, Run
 from ml.segmentation import experiment as experiments
 from ml.segmentation import task
 from ml.segmentation.crops import Item, Seeds
@@ -24,13 +24,14 @@ from ml.segmentation.experiment import configurations, load_experiment, table
 from ml.segmentation.loading import adaptation_batches, epoch_batches, read_domains
 from ml.segmentation.metrics import IGNORED
 from ml.segmentation.network import build
-from ml.segmentation.recipes import Data
+from ml.segmentation.recipes import Data, SegmentationConfiguration
 from ml.segmentation.sources import Source, read_tiles
 from ml.segmentation.tiles import scalings
 from ml.segmentation.training import smoothed_loss
 from ml.tasks import Evaluation, kinds
 from synthroads_addon.core.cloud.labels import class_scheme
 from synthroads_addon.core.errors import InputError, MissingFileError
+from synthroads_addon.core.progress import silent
 from tests.ml.segmentation_data import road_block, road_tile, toy, write_cloud, write_pointcept
 
 torch.set_num_threads(1)
@@ -190,6 +191,36 @@ def test_small_experiments_run_from_end_to_end(tmp_path: Path, name: str) -> Non
     assert f"| class | points | {' | '.join(variants)} |" in text
     assert text.count("**") // 2 == (2 if five else 1)
     assert f"Seeds: {', '.join(f'{variant} 2' for variant in variants)}." in text
+
+
+def test_a_variant_is_tested_anew_when_its_network_or_its_settings_have_changed(
+    data: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    configuration = toy(data)
+    run = tmp_path / "run"
+    task.train(Run.start(run, configuration), silent)
+    tested: list[int] = []
+    score = experiments.score_all
+
+    def counted(*arguments: Any) -> Any:
+        tested.append(len(tested))
+        return score(*arguments)
+
+    monkeypatch.setattr(experiments, "score_all", counted)
+
+    def scores(settings: SegmentationConfiguration) -> Any:
+        return experiments._tested(settings, run, tmp_path / "seed-1.json", silent)
+
+    first = scores(configuration)
+    assert scores(configuration.model_copy(update={"threads": 2})) == first
+    assert len(tested) == 1
+    scores(configuration.model_copy(update={"crop_points": 200}))
+    assert len(tested) == 2
+    scores(configuration)
+    checkpoint = torch.load(run / CHECKPOINT, weights_only=False)
+    torch.save(checkpoint | {"note": 1}, run / CHECKPOINT)
+    scores(configuration)
+    assert len(tested) == 4
 
 
 def test_clouds_are_laid_over_as_often_as_asked(data: Path) -> None:
