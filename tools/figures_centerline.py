@@ -116,7 +116,7 @@ def models(runs: Sequence[str]) -> dict[str, list[Model]]:
     for text in runs:
         name, _, folder = text.partition("=")
         run = Run.open(Path(folder), kinds())
-        predictor = import_module("ml.centerline.task").predictor(run)
+        predictor = import_module("ml.centerline.task").predictor(run).remembering()
         alike = (kind_of(run), learned_by(run), _part(run, SliceSettings).half_width)
         found.setdefault(name, {}).setdefault(alike, []).append(predictor)
     return {

@@ -149,7 +149,7 @@ def trivial_predictor(name: str, half_width: float = HALF_WIDTH) -> Predictor:
 
     def predict(road: Road, frames: Frames) -> Float:
         found = road.slices(frames, half_width, length)
-        own = belonging(road)[found.index]
+        own = road.belonging[found.index]
         y, intensity = found.xy[own, 1], road.intensity[found.index[own]].astype(np.float64)
         return trivial.centers(rule, found.number[own], y, intensity, len(frames))[:, None]
 
@@ -168,21 +168,9 @@ def skeleton_predictor(settings: skeleton.SkeletonSettings) -> Predictor:
 
 def _mask_points(road: Road, mask: str) -> tuple[Float, Float]:
     """Return places (N, 2) and intensities (N,) of the points that the skeleton's mask is made of."""
-    own = belonging(road)
     paved = np.isin(road.class_id, road.ids_of(ROAD_CLASSES))
-    if mask == "classes" and paved.any():
-        own &= paved
+    own = road.belonging & paved if mask == "classes" and paved.any() else road.belonging
     return road.xyz[own, :2].astype(np.float64), road.intensity[own].astype(np.float64)
-
-
-def belonging(road: Road) -> NDArray[np.bool_]:
-    """Return which points (N,) belong to the road: of a carriageway those up to the middle of the median."""
-    if road.truth is None or not np.isfinite(road.truth.room).any():
-        return np.ones(len(road), dtype=bool)
-    station, offset = road.truth.axis.project(road.xyz)
-    nearest = np.clip(np.searchsorted(road.truth.axis.station, station), 0, len(road.truth.room) - 1)
-    room = road.truth.room[nearest]
-    return (offset <= room[:, 0]) & (-offset <= room[:, 1])
 
 
 def path_itself(road: Road, frames: Frames) -> Float:

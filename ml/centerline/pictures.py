@@ -13,7 +13,7 @@ from scipy.stats import rankdata
 
 from .calibration import DEVIATIONS, LEVELS
 from .corridor import CORRIDOR
-from .evaluation import CORRIDOR_COLUMNS, Case, belonging, truth_of
+from .evaluation import CORRIDOR_COLUMNS, Case, truth_of
 from .frames import Frames
 
 if TYPE_CHECKING:
@@ -106,7 +106,7 @@ def _cloud(axes: Axes, shown: Case, view: View, height: float) -> None:
 
     Where only an axis is known, as of real scans that may not be passed on, means of cells are drawn and no points.
     """
-    own = np.flatnonzero(belonging(shown.road))
+    own = np.flatnonzero(shown.road.belonging)
     station, offset = truth_of(shown.road).axis.project(shown.road.xyz[own])
     near = np.flatnonzero((station >= view.first) & (station <= view.last) & (np.abs(offset) <= height))
     intensity = shown.road.intensity[own[near]]

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Iterable, Iterator, Mapping
+from copy import copy
 from dataclasses import dataclass
 
 import numpy as np
@@ -82,6 +84,16 @@ class CenterlinePredictor:
         self.use = use
         found = calibration or {}
         self.calibration = {name: found.get(name, Calibration()) for name in TARGETS}
+        self._memory: dict[str, tuple[Float, Float]] | None = None
+
+    def remembering(self) -> CenterlinePredictor:
+        """Return the same, but what it found on the same points in the same frames isn't found twice.
+
+        Those that `calibrated_on` makes of it share its memory.
+        """
+        other = copy(self)
+        other._memory = {}
+        return other
 
     def __call__(self, road: Road, frames: Frames) -> Float:
         """Return (M, 4 + 2 K), `evaluation.CORRIDOR_COLUMNS`; the height is an elevation."""
@@ -96,6 +108,21 @@ class CenterlinePredictor:
         their mean as well, since errors of the same points don't average out. Where sequences are interleaved, lines
         are `joined`.
         """
+        mean, raw = self._found(road, frames)
+        factors = np.array([self.calibration[name].factor for name in TARGETS])
+        return Regression(frames, mean, raw, raw * factors)
+
+    def _found(self, road: Road, frames: Frames) -> tuple[Float, Float]:
+        """Return values and the model's own deviations (M, T), from memory if there is one that has them."""
+        if self._memory is None:
+            return self._regress(road, frames)
+        parts = (road.xyz, road.intensity, frames.position, frames.direction)
+        key = hashlib.sha256(b"".join(np.ascontiguousarray(part).tobytes() for part in parts)).hexdigest()
+        if key not in self._memory:
+            self._memory[key] = self._regress(road, frames)
+        return self._memory[key]
+
+    def _regress(self, road: Road, frames: Frames) -> tuple[Float, Float]:
         shape = (len(frames), len(TARGETS))
         weight, value, spread = np.zeros(shape), np.zeros(shape), np.zeros(shape)
         seen = np.zeros(len(frames), dtype=bool)
@@ -115,8 +142,7 @@ class CenterlinePredictor:
         for line in LINES:
             column = TARGETS.index(line)
             mean[:, column] = joined(frames, mean[:, column], raw[:, column], reach)
-        factors = np.array([self.calibration[name].factor for name in TARGETS])
-        return Regression(frames, mean, raw, raw * factors)
+        return mean, raw
 
     def calibrated_on(self, shown: Iterable[tuple[Road, Frames]]) -> tuple[CenterlinePredictor, Float]:
         """Return the model with the deviations that are right on some roads, and its errors there (N, T).
@@ -138,8 +164,9 @@ class CenterlinePredictor:
             error.append(errors(found, road.truth))
             raw.append(found.raw_std)
         every = np.concatenate(error)
-        calibration = all_calibrated(TARGETS, every, np.concatenate(raw))
-        return CenterlinePredictor(self.model, self.settings, self.use, calibration), every
+        other = copy(self)
+        other.calibration = all_calibrated(TARGETS, every, np.concatenate(raw))
+        return other, every
 
     def widths(self, found: Regression) -> Float:
         """Return half-widths (M, T, 2) of the intervals that cover 68 % and 95 % on roads like the validation's."""

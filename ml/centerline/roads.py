@@ -9,6 +9,7 @@ import tempfile
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -101,6 +102,16 @@ class Road:
     def select(self, keep: NDArray[np.bool_]) -> Road:
         """Return the road with the points (N,) of a mask only."""
         return replace(self, **{name: getattr(self, name)[keep] for name in _CACHED})
+
+    @cached_property
+    def belonging(self) -> NDArray[np.bool_]:
+        """Which points (N,) belong to the road: of a carriageway those up to the middle of the median."""
+        if self.truth is None or not np.isfinite(self.truth.room).any():
+            return np.ones(len(self), dtype=bool)
+        station, offset = self.truth.axis.project(self.xyz)
+        nearest = np.clip(np.searchsorted(self.truth.axis.station, station), 0, len(self.truth.room) - 1)
+        room = self.truth.room[nearest]
+        return np.asarray((offset <= room[:, 0]) & (-offset <= room[:, 1]))
 
     def ids_of(self, names: Sequence[str]) -> list[int]:
         """Return the ids of the classes that have one of the names."""

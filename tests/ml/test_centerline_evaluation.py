@@ -16,7 +16,6 @@ from ml.centerline.evaluation import (
     Case,
     Cropping,
     along_parabolas,
-    belonging,
     case,
     evaluate,
     grid_search,
@@ -133,13 +132,13 @@ def test_without_classes_the_skeleton_takes_the_ground() -> None:
 
 
 def test_only_one_carriageways_points_belong_to_it(road: Road) -> None:
-    assert belonging(road).all()
+    assert road.belonging.all()
     room = np.column_stack(
         [np.full(len(truth_of(road).axis.points), np.inf), np.full(len(truth_of(road).axis.points), 2.0)]
     )
     half = replace(road, truth=replace(truth_of(road), room=room))
     _, offset = truth_of(road).axis.project(road.xyz)
-    assert offset[belonging(half)].min() == pytest.approx(-2.0, abs=0.05)
+    assert offset[half.belonging].min() == pytest.approx(-2.0, abs=0.05)
     shown = Case(half, case(road, 1, cropping=None, estimated=False).frames)
     assert evaluate(trivial_predictor(MIDDLE), shown)["bias"] == pytest.approx(2.5, abs=0.1)
     assert evaluate(skeleton_predictor(SkeletonSettings(0.5, 5.0, "ground")), shown)["bias"] == pytest.approx(

@@ -269,3 +269,30 @@ def test_lines_of_interleaved_sequences_are_joined():
     other = jagged.copy()
     other[60:] += 5.0
     np.testing.assert_array_equal(joined(places, other, std, 4)[:60], again[:60])
+
+
+def test_what_was_found_is_remembered_by_points_and_frames(monkeypatch: pytest.MonkeyPatch):
+    seen: list[int] = []
+    sequences = CenterlinePredictor._sequences
+
+    def counted(self: CenterlinePredictor, road: Road, frames: Frames):
+        seen.append(len(frames))
+        return sequences(self, road, frames)
+
+    monkeypatch.setattr(CenterlinePredictor, "_sequences", counted)
+    plain, places = predictor(), frames(20.0, 43.0)
+    wanted = plain.regress(road(), places)
+    remembering = plain.remembering()
+    for _ in range(2):
+        found = remembering.regress(road(), places)
+        np.testing.assert_array_equal(found.value, wanted.value)
+        np.testing.assert_array_equal(found.std, wanted.std)
+    again, _ = remembering.calibrated_on([(road(), places)])
+    factors = np.array([again.calibration[name].factor for name in TARGETS])
+    np.testing.assert_allclose(again.regress(road(), places).std, wanted.raw_std * factors)
+    assert len(seen) == 2
+    fewer = np.arange(len(road())) % 2 == 0
+    other = remembering.regress(road().select(fewer), places)
+    assert not np.array_equal(other.value, wanted.value)
+    remembering.regress(road(), places.select(np.arange(len(places)) > 3))
+    assert len(seen) == 4
