@@ -34,7 +34,7 @@ from . import skeleton, trivial
 from .corridor import CORRIDOR, Truth
 from .frames import Frames, along, displaced, estimated_path, stretches
 from .metrics import Spread, figures, over_roads, over_seeds
-from .roads import Road, cropped, cut_beside_median
+from .roads import Road, Slices, cropped, cut_beside_median
 from .slices import SliceSettings
 
 Float = NDArray[np.float64]
@@ -128,32 +128,57 @@ def measure(
         InputError: two roads have the same name, by which figures are told apart.
     """
     rows: dict[str, dict[str, list[dict[str, float]]]] = {name: {} for name in predictors}
+    for name, versions in predictors.items():
+        if len(versions) not in (1, len(seeds)):
+            raise ValueError(f"{name}: {len(versions)} predictors for {len(seeds)} seeds")
     for index, seed in enumerate(seeds):
         shown = cases(seed)
         names = [one.road.name for one in shown]
         if twice := {name for name in names if names.count(name) > 1}:
             raise InputError("road", sorted(twice)[0], "is the name of several roads; give data sets of other names")
-        for name, versions in predictors.items():
-            if len(versions) not in (1, len(seeds)):
-                raise ValueError(f"{name}: {len(versions)} predictors for {len(seeds)} seeds")
-            predictor = versions[0] if len(versions) == 1 else versions[index]
-            found = {one.road.name: evaluate(predictor, one) for one in shown}
-            for road, row in (*found.items(), ("all", over_roads(found.values()))):
+        found: dict[str, dict[str, dict[str, float]]] = {name: {} for name in predictors}
+        for one in shown:  # road by road: predictors share what they cut out of it
+            for name, versions in predictors.items():
+                found[name][one.road.name] = evaluate(versions[0 if len(versions) == 1 else index], one)
+        for name, by_name in found.items():
+            for road, row in (*by_name.items(), ("all", over_roads(by_name.values()))):
                 rows[name].setdefault(road, []).append(row)
     return {name: {road: over_seeds(values) for road, values in by_road.items()} for name, by_road in rows.items()}
 
 
-def trivial_predictor(name: str, half_width: float = HALF_WIDTH) -> Predictor:
-    """Return one of `trivial.RULES`, which sees points up to ``half_width`` beside a frame, m."""
+def trivial_predictor(name: str, half_width: float = HALF_WIDTH, cut: Cut | None = None) -> Predictor:
+    """Return one of `trivial.RULES`, which sees points up to ``half_width`` (m) beside a frame; slices of ``cut``."""
     rule, length = trivial.RULES[name]
+    cut = cut or Cut(half_width)
 
     def predict(road: Road, frames: Frames) -> Float:
-        found = road.slices(frames, half_width, length)
+        found = cut(road, frames, length)
         own = road.belonging[found.index]
         y, intensity = found.xy[own, 1], road.intensity[found.index[own]].astype(np.float64)
         return trivial.centers(rule, found.number[own], y, intensity, len(frames))[:, None]
 
     return predict
+
+
+class Cut:
+    """Slices of one road at a time, of each thickness cut out once.
+
+    Args:
+        half_width: points up to this are seen beside a frame, m.
+    """
+
+    def __init__(self, half_width: float) -> None:
+        self.half_width = half_width
+        self._last: tuple[Road, Frames] | None = None
+        self._slices: dict[float, Slices] = {}
+
+    def __call__(self, road: Road, frames: Frames, thickness: float) -> Slices:
+        """Return the points in each slice of so many metres."""
+        if self._last is None or self._last[0] is not road or self._last[1] is not frames:
+            self._last, self._slices = (road, frames), {}
+        if thickness not in self._slices:
+            self._slices[thickness] = road.slices(frames, self.half_width, thickness)
+        return self._slices[thickness]
 
 
 def skeleton_predictor(settings: skeleton.SkeletonSettings) -> Predictor:
@@ -181,9 +206,10 @@ def path_itself(road: Road, frames: Frames) -> Float:
 def trivial_predictors(half_width: float = HALF_WIDTH) -> dict[str, list[Predictor]]:
     """Return all predictors that learn nothing, by name, for `measure`; see `trivial_predictor`."""
     found: dict[str, list[Predictor]] = {"the displaced path": [path_itself]}
-    found |= {name: [trivial_predictor(name, half_width)] for name in trivial.RULES}
+    cut = Cut(half_width)
+    found |= {name: [trivial_predictor(name, half_width, cut)] for name in trivial.RULES}
     for name in trivial.SPANNED:
-        rule = trivial_predictor(name, half_width)
+        rule = trivial_predictor(name, half_width, cut)
         found[f"{name}, parabola of {trivial.SPAN:.0f} m"] = [along_parabolas(rule, trivial.SPAN)]
     return found
 

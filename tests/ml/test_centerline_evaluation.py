@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from ml.centerline import trivial
 from ml.centerline.axis import Axis
 from ml.centerline.evaluation import (
     CORRIDOR_COLUMNS,
@@ -32,6 +33,7 @@ from ml.centerline.roads import Road, read_measured
 from ml.centerline.skeleton import SkeletonSettings
 from ml.centerline.tables import COLUMNS, as_data, cell, road_table, table, write_tables
 from synthroads_addon.core.errors import InputError
+from tests.ml import analytic_roads
 from tests.ml.centerline_roads import REAL, strip_road
 
 Float = NDArray[np.float64]
@@ -263,3 +265,12 @@ def test_roads_of_one_name_are_refused(road: Road) -> None:
     shown = case(road, 1, cropping=None, estimated=False)
     with pytest.raises(InputError, match=f"road is '{road.name}': is the name of several roads"):
         measure({MIDDLE: [trivial_predictor(MIDDLE)]}, lambda seed: [shown, shown], [1])
+
+
+def test_predictors_that_share_slices_say_the_same_as_alone() -> None:
+    roads = [case(road, 1, cropping=None, estimated=False) for road in analytic_roads.roads()[:2]]
+    shared = trivial_predictors(8.0)
+    for shown in (*roads, replace(roads[0], frames=roads[0].frames.select(roads[0].frames.station < 50.0))):
+        for name in trivial.RULES:
+            alone = trivial_predictor(name, 8.0)(shown.road, shown.frames)
+            np.testing.assert_array_equal(shared[name][0](shown.road, shown.frames), alone)
