@@ -26,6 +26,8 @@ TRUE = "#00e5a0"
 EDGE = "#ff8f00"
 CENTER = "#1e88e5"
 _MOST_POINTS = 60_000
+_LINEAR = 0.1
+"""Offsets from the true axis are drawn to a linear scale up to this and to a logarithmic one beyond, m."""
 _APART = 4.0
 """Predictions farther apart than this, m, are not joined."""
 
@@ -58,7 +60,11 @@ def lines_picture(shown: Case, lines: Mapping[str, Float], view: View, title: st
         panels[0].plot(station, offset, color=color, lw=1.2, label=name)
         panels[1].plot(station, offset, color=color, lw=1.2)
         largest = max(largest, float(np.nanquantile(np.abs(offset), 0.98)) if np.isfinite(offset).any() else 0.0)
-    panels[1].set(ylabel="offset from it, m", ylim=(-1.15 * max(largest, 0.1), 1.15 * max(largest, 0.1)))
+    limit = 1.3 * max(largest, _LINEAR)
+    panels[1].set_yscale("symlog", linthresh=_LINEAR, linscale=1.5)
+    ticks = [sign * size for size in (0.05, 0.1, 1.0, 10.0) for sign in (-1.0, 1.0) if size <= limit]
+    panels[1].set_yticks([0.0, *ticks], [f"{tick:g}" for tick in (0.0, *ticks)])
+    panels[1].set(ylabel="offset from it, m", ylim=(-limit, limit))
     panels[0].legend(loc="upper right", ncols=3, fontsize=8, framealpha=0.9)
     return _png(figure)
 
