@@ -243,15 +243,23 @@ def over_seeds(rows: Sequence[Mapping[str, float]]) -> dict[str, Spread]:
 
 
 def over_roads(rows: Iterable[Mapping[str, float]]) -> dict[str, float]:
-    """Return the figures of several roads as one: means weighted by the number of slices; ``slices`` are summed."""
+    """Return the figures of several roads as one: means weighted by the number of slices; ``slices`` are summed.
+
+    Roads too short for a window say nothing of Chamfer distances.
+    """
     rows = list(rows)
-    weight = np.array([row["slices"] for row in rows])
+    slices = np.array([row["slices"] for row in rows])
     names = list(dict.fromkeys(name for row in rows for name in row if name != "slices"))
     table = {name: np.array([row.get(name, np.nan) for row in rows]) for name in names}
-    summed = {name: float((values * weight).sum() / weight.sum()) for name, values in table.items()}
+    windows = table.get("chamfer_windows", np.zeros(len(rows)))
+    summed = {"slices": float(slices.sum())}
+    for name, values in table.items():
+        counted = windows > 0 if name.startswith("chamfer_") else np.ones(len(rows), dtype=bool)
+        weight = slices[counted]
+        summed[name] = float((values[counted] * weight).sum() / weight.sum()) if weight.sum() else np.nan
     if "chamfer_windows" in table:
-        summed["chamfer_windows"] = float(table["chamfer_windows"].sum())
-    return {"slices": float(weight.sum())} | summed
+        summed["chamfer_windows"] = float(windows.sum())
+    return summed
 
 
 def _mean(values: Float) -> float:

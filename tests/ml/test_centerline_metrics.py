@@ -164,3 +164,16 @@ def test_seeds_are_averaged_with_the_sample_deviation() -> None:
 def test_roads_count_by_their_slices() -> None:
     result = over_roads([{"slices": 100.0, "mae": 0.1}, {"slices": 300.0, "mae": 0.3}])
     assert result == {"slices": 400.0, "mae": pytest.approx(0.25)}
+
+
+def test_roads_too_short_for_a_window_say_nothing_of_chamfer_distances() -> None:
+    def row(slices: float, distance: float, windows: float) -> dict[str, float]:
+        told = {"chamfer_full": distance, "chamfer_compared": float(windows > 0), "chamfer_windows": windows}
+        return {"slices": slices, "mae": 0.1, **told}
+
+    long, short, unseen = row(500.0, 0.2, 8.0), row(10.0, np.nan, 0.0), row(300.0, np.nan, 5.0)
+    both = over_roads([long, short])
+    assert both["chamfer_full"] == pytest.approx(0.2)
+    assert (both["chamfer_compared"], both["chamfer_windows"], both["slices"]) == (1.0, 8.0, 510.0)
+    assert np.isnan(over_roads([long, unseen])["chamfer_full"])
+    assert np.isnan(over_roads([short])["chamfer_full"])
