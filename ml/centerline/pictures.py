@@ -29,7 +29,7 @@ CENTER = "#1e88e5"
 _MOST_POINTS = 60_000
 _LINEAR = 0.1
 """Offsets from the true axis are drawn to a linear scale up to this and to a logarithmic one beyond, m."""
-_COLORS = 128
+_COLORS = 256
 _APART = 4.0
 """Predictions farther apart than this, m, are not joined."""
 
