@@ -12,6 +12,7 @@ import shutil
 import subprocess
 import sys
 import tempfile
+import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from contextlib import contextmanager
@@ -89,7 +90,9 @@ def run_task(folder: str, threads: int, stopping: Event) -> Outcome:
 
 
 def _run_process(path: Path, threads: int, stopping: Event) -> int:
-    """Run the process of the task in a folder to its end; return its exit code."""
+    """Run the process of the task in a folder to its end, or not at all if all is stopping; return its exit code."""
+    if stopping.is_set():
+        return 0
     command = [sys.executable, str(_MODULE), str(path / "task.json"), str(threads)]
     with (
         (path / "log.txt").open("wb") as log,
@@ -269,12 +272,25 @@ def local_processes(jobs: int) -> Submit:
     def submit(folders: list[str]) -> Iterator[Outcome]:
         stopping = Event()
         pool = ThreadPoolExecutor(jobs)
+        begun: list[str] = []
+        ended: list[str] = []
+
+        def task(folder: str) -> Outcome:
+            begun.append(folder)
+            try:
+                return run_task(folder, threads, stopping)
+            finally:
+                ended.append(folder)
+
         try:
-            for future in as_completed([pool.submit(run_task, folder, threads, stopping) for folder in folders]):
+            for future in as_completed([pool.submit(task, folder) for folder in folders]):
                 yield future.result()
         finally:
             stopping.set()
             pool.shutdown(wait=True, cancel_futures=True)
+            # The pool doesn't know, and doesn't wait for, a thread that was just starting when the user interrupted.
+            while len(ended) < len(begun):
+                time.sleep(_TICK)
 
     return submit
 
