@@ -123,9 +123,8 @@ class Run(Generic[C]):
         if not isinstance(before, dict):
             raise InputError(str(self.folder / CONFIGURATION), None, "must be a JSON object")
         now = self.configuration.to_dict()
-        different = [
-            name for name in {**before, **now} if name not in FREE_WHEN_RESUMING and before.get(name) != now.get(name)
-        ]
+        begun, wanted = lasting(before), lasting(now)
+        different = [name for name in {**begun, **wanted} if begun.get(name) != wanted.get(name)]
         if different:
             name = different[0]
             raise InputError(f"--resume: {name}", now.get(name), f"the run was begun with {before.get(name)!r}")
@@ -140,6 +139,11 @@ def stream_seed(seed: int, *purpose: str | int) -> int:
     from synthroads_addon.core.random_streams import stream
 
     return int(stream(seed, *purpose).integers(2**63))
+
+
+def lasting(configuration: Mapping[str, Any]) -> dict[str, Any]:
+    """Return a configuration's data without what may differ from call to call of one training."""
+    return {name: value for name, value in configuration.items() if name not in FREE_WHEN_RESUMING}
 
 
 def plain(value: Any) -> Any:

@@ -146,10 +146,10 @@ def measure(
     return {name: {road: over_seeds(values) for road, values in by_road.items()} for name, by_road in rows.items()}
 
 
-def trivial_predictor(name: str, half_width: float = HALF_WIDTH, cut: Cut | None = None) -> Predictor:
-    """Return one of `trivial.RULES`, which sees points up to ``half_width`` (m) beside a frame; slices of ``cut``."""
+def trivial_predictor(name: str, cut: Cut | None = None) -> Predictor:
+    """Return one of `trivial.RULES`, which sees what is cut out: its own, or what several predictors share."""
     rule, length = trivial.RULES[name]
-    cut = cut or Cut(half_width)
+    cut = cut or Cut()
 
     def predict(road: Road, frames: Frames) -> Float:
         found = cut(road, frames, length)
@@ -167,7 +167,7 @@ class Cut:
         half_width: points up to this are seen beside a frame, m.
     """
 
-    def __init__(self, half_width: float) -> None:
+    def __init__(self, half_width: float = HALF_WIDTH) -> None:
         self.half_width = half_width
         self._last: tuple[Road, Frames] | None = None
         self._slices: dict[float, Slices] = {}
@@ -207,9 +207,9 @@ def trivial_predictors(half_width: float = HALF_WIDTH) -> dict[str, list[Predict
     """Return all predictors that learn nothing, by name, for `measure`; see `trivial_predictor`."""
     found: dict[str, list[Predictor]] = {"the displaced path": [path_itself]}
     cut = Cut(half_width)
-    found |= {name: [trivial_predictor(name, half_width, cut)] for name in trivial.RULES}
+    found |= {name: [trivial_predictor(name, cut)] for name in trivial.RULES}
     for name in trivial.SPANNED:
-        rule = trivial_predictor(name, half_width, cut)
+        rule = trivial_predictor(name, cut)
         found[f"{name}, parabola of {trivial.SPAN:.0f} m"] = [along_parabolas(rule, trivial.SPAN)]
     return found
 

@@ -18,7 +18,7 @@ from pydantic import Field
 from headless.cli import progress_bar
 from ml.configuration import load_configuration
 from ml.fitting import chosen_device
-from ml.runs import CHECKPOINT, CONFIGURATION, FREE_WHEN_RESUMING, HISTORY, METRICS, PRETRAINING, Run
+from ml.runs import CHECKPOINT, CONFIGURATION, HISTORY, METRICS, PRETRAINING, Run, lasting
 from synthroads_addon.core.dataset.manifest import checksum
 from synthroads_addon.core.errors import InputError, nearest_name
 from synthroads_addon.core.files import write_file
@@ -171,13 +171,11 @@ def _trained(
 
 def _reuse_pretraining(configuration: SegmentationConfiguration, target: Path, output: Path) -> None:
     """Take the first part of fine-tuning from the run that has trained just that, if there is one."""
-    wanted = configuration.model_copy(update={"set_up": "synthetic"}).to_dict()
+    wanted = lasting(configuration.model_copy(update={"set_up": "synthetic"}).to_dict())
     if (target / CONFIGURATION).is_file():
         return
     for file in sorted(output.glob(f"*/*/{CONFIGURATION}")):
-        found = read_json(file)
-        same = all(found.get(key) == wanted.get(key) for key in {**found, **wanted} if key not in FREE_WHEN_RESUMING)
-        if same and (file.parent / METRICS).is_file():
+        if lasting(read_json(file)) == wanted and (file.parent / METRICS).is_file():
             target.mkdir(parents=True, exist_ok=True)
             for name in (CONFIGURATION, CHECKPOINT, HISTORY):
                 shutil.copyfile(file.parent / name, target / name)
@@ -186,8 +184,7 @@ def _reuse_pretraining(configuration: SegmentationConfiguration, target: Path, o
 
 def _tested(configuration: SegmentationConfiguration, folder: Path, file: Path, progress: Progress) -> dict[str, Any]:
     """Return the scores of a trained run under another configuration, tested unless just that was tested already."""
-    settings = {key: value for key, value in configuration.to_dict().items() if key not in FREE_WHEN_RESUMING}
-    made_from = {"configuration": settings, "checkpoint_sha256": checksum(folder / CHECKPOINT)}
+    made_from = {"configuration": lasting(configuration.to_dict()), "checkpoint_sha256": checksum(folder / CHECKPOINT)}
     tests: dict[str, Any]
     if file.is_file() and (kept := read_json(file)).get("made_from") == made_from:
         tests = kept["tests"]

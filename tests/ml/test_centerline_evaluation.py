@@ -16,6 +16,7 @@ from ml.centerline.evaluation import (
     CORRIDOR_COLUMNS,
     Case,
     Cropping,
+    Cut,
     along_parabolas,
     case,
     evaluate,
@@ -272,5 +273,5 @@ def test_predictors_that_share_slices_say_the_same_as_alone() -> None:
     shared = trivial_predictors(8.0)
     for shown in (*roads, replace(roads[0], frames=roads[0].frames.select(roads[0].frames.station < 50.0))):
         for name in trivial.RULES:
-            alone = trivial_predictor(name, 8.0)(shown.road, shown.frames)
+            alone = trivial_predictor(name, Cut(8.0))(shown.road, shown.frames)
             np.testing.assert_array_equal(shared[name][0](shown.road, shown.frames), alone)
