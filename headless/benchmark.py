@@ -9,7 +9,6 @@ import platform
 import subprocess
 import sys
 import tempfile
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -17,8 +16,9 @@ if __name__ == "__main__":
     sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from headless.cli import Outcome, add_changes_argument, add_common_arguments, entry, progress_bar
-from synthroads_addon.core.benchmark import DEMO, QUICK, TABLE, judged, machine, markdown
+from synthroads_addon.core.benchmark import DEMO, QUICK, TABLE, judged, markdown
 from synthroads_addon.core.errors import InputError
+from synthroads_addon.core.machine import available_cores, machine
 from synthroads_addon.core.marked import fill
 from synthroads_addon.core.scenario import Scenario, load_scenario
 from synthroads_addon.core.schema import canonical_json
@@ -35,7 +35,7 @@ _QUICK_CELLS = 60
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments of `synthroads benchmark`."""
-    available = _available()
+    available = available_cores()
     cores = sorted({1, min(2, available)})
     parser.add_argument("--output", type=Path, metavar="DIR", help=f"folder for {' and '.join(_FILES)}")
     parser.add_argument("--document", type=Path, metavar="FILE", help="fill the tables of this Markdown file as well")
@@ -56,8 +56,8 @@ def run(arguments: argparse.Namespace) -> Outcome:
         return 0, result, canonical_json(result)
     _scenario(arguments.scenario, arguments.changes, arguments.quick)
     for cores in arguments.cores:
-        if not 1 <= cores <= _available():
-            raise InputError("--cores", cores, f"must be 1 to {_available()}, the cores that are there")
+        if not 1 <= cores <= available_cores():
+            raise InputError("--cores", cores, f"must be 1 to {available_cores()}, the cores that are there")
     found: dict[str, Any] = {}
 
     def measured() -> dict[str, str]:
@@ -94,7 +94,7 @@ def _runs(arguments: argparse.Namespace, waves: dict[str, Any]) -> dict[str, Any
             measured |= found | {"lines": measured["lines"] | found["lines"]}
         runs.append(measured | {"cores": cores})
     versions = {"Blender": runs[0]["blender"], "Python": platform.python_version()}
-    return {"machine": machine(_cpu(), _available(), versions), "quick": arguments.quick, "runs": runs}
+    return {"machine": machine(versions), "quick": arguments.quick, "runs": runs}
 
 
 def _in_own_process(part: dict[str, Any], cores: int) -> dict[str, Any]:
@@ -157,23 +157,6 @@ def _verdict(result: dict[str, Any]) -> str:
         return ""
     missed = [name for name, _, kept in judged(result) if not kept]
     return f"\nmissed: {', '.join(missed)}" if missed else "\nall limits that were measured are kept"
-
-
-def _available() -> int:
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-
-
-def _cpu() -> str:
-    """Return the processor's name."""
-    for line in _lines_of(Path("/proc/cpuinfo")):
-        if line.startswith("model name"):
-            return line.partition(":")[2].strip()
-    return platform.processor() or platform.machine()
-
-
-def _lines_of(path: Path) -> Iterator[str]:
-    if path.is_file():
-        yield from path.read_text(encoding="utf-8", errors="replace").splitlines()
 
 
 if __name__ == "__main__":

@@ -37,8 +37,8 @@ from synthroads_addon.core.dataset.manifest import (
 from synthroads_addon.core.dataset.recipe import Recipe, SceneJob, scene_jobs
 from synthroads_addon.core.errors import InputError, OutputError
 from synthroads_addon.core.generator import generator
+from synthroads_addon.core.machine import available_cores
 from synthroads_addon.core.progress import Progress, silent
-from synthroads_addon.scan_files import available_cores
 
 WORK = ".work"
 LOCK = ".lock"

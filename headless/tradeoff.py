@@ -23,7 +23,7 @@ from synthroads_addon.core.marked import fill
 from synthroads_addon.core.progress import Progress
 from synthroads_addon.core.scenario import load_scenario
 from synthroads_addon.core.schema import canonical_json, read_json
-from synthroads_addon.core.tradeoff import KNOBS, SCENES, markdown, row_scenario, rows
+from synthroads_addon.core.tradeoff import KNOBS, REPEATED, SCENES, markdown, row_scenario, rows
 
 _ROW = "--row"
 _ROWS = "rows"
@@ -133,14 +133,25 @@ def _fingerprint(scene: str, knob: str, value: Any) -> str:
 
 
 def _kept(path: Path, job: str) -> dict[str, Any] | None:
-    """Return the row of this job that was measured before, if there is one."""
+    """Return the row of this job that was measured before, if there is one; another Blender may have what it lacked."""
     if not path.exists():
         return None
     data = read_json(path)
-    return data["row"] if isinstance(data, dict) and data.get("job") == job else None
+    if not isinstance(data, dict) or data.get("job") != job or "left_out" in data["row"]:
+        return None
+    row: dict[str, Any] = data["row"]
+    return row
 
 
 def _measured(scene: str, knob: str, value: Any) -> dict[str, Any]:
+    """Measure a row, those of some knobs several times: the fastest is returned, with the times of all."""
+    several = [_measured_once(scene, knob, value) for _ in range(REPEATED.get(knob, 1))]
+    if len(several) == 1 or "left_out" in several[0]:
+        return several[0]
+    return min(several, key=lambda row: row["seconds"]) | {"all_seconds": [row["seconds"] for row in several]}
+
+
+def _measured_once(scene: str, knob: str, value: Any) -> dict[str, Any]:
     request = json.dumps({"scenario": scene, "knob": knob, "value": value})
     line = [sys.executable, str(Path(__file__).resolve()), "--output", ".", _ROW, request, "--json"]
     done = subprocess.run(line, capture_output=True, text=True, check=False)

@@ -16,14 +16,14 @@ import laspy
 import numpy as np
 from numpy.typing import NDArray
 
-from .blender.benchmark import REPEATS, RenderClock, panel_edit, rendering, seconds_of
+from .blender.benchmark import REPEATS, panel_edit, rendering, seconds_of
 from .blender.cameras import layer_source
 from .blender.casters.measure import bare_rate
 from .blender.files import empty_file
 from .blender.model import build_road
 from .blender.scene import scanned_scene
 from .core.colour import LayerSource
-from .core.colour_views import scene_sample, views_along
+from .core.machine import available_cores
 from .core.parameters.geometry import RoadGeometry
 from .core.parameters.sampler import sample_road
 from .core.progress import StageTimer, peak_memory_mb
@@ -32,7 +32,7 @@ from .core.scanning.caster import Caster
 from .core.scanning.scan import Scan, scan_block
 from .core.scenario import Scenario
 from .pipeline import write_texts
-from .scan_files import ScanToFiles, available_cores, colour_job, make_scan, road_path, scan_blocks
+from .scan_files import ScanToFiles, colour_job, make_scan, road_path, scan_blocks
 
 _BLOCKS = 8
 """Blocks, spread over the scan, on which stages are measured beside their floors."""
@@ -66,9 +66,7 @@ def measure_demo(scenario: Scenario) -> dict[str, Any]:
             path = road_path(scenario, geometry)
             scan = make_scan(scenario, scene, path, parameters.environment, variation=parameters.materials)
         job = colour_job(scenario, scan, scene, parameters.environment)
-        clock = RenderClock()
         with ExitStack() as stack:
-            stack.enter_context(clock)
             with timer.stage("images"):
                 source = stack.enter_context(layer_source(job))
             with timer.stage("scan and files"):
@@ -77,10 +75,8 @@ def measure_demo(scenario: Scenario) -> dict[str, Any]:
                     pass
             seconds, memory = timer.seconds, peak_memory_mb()
             floors = [*_casting(scan), _writing(scan, source, task, folder)]
-        settings_of_images = job.scenario.settings(job.fidelity, path.typical_range)
-        views = views_along(path, scene_sample(scene.static), settings_of_images, job.field_of_view, 4096)
-        if clock.pixels:
-            floors.append(rendering(clock, views[:: max(1, len(views) // _VIEWS)], parameters))
+        if job.scenario.source != "material":
+            floors.append(rendering(job, _VIEWS))
     own = next(row for row in floors if row["rays"] == scan.rays_per_pulse)
     writing = next(row for row in floors if row["name"].startswith("writing"))
     lines = {

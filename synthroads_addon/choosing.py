@@ -35,9 +35,10 @@ from .core.scenario import FIDELITIES, Scenario
 from .measuring_errors import CONVERGED
 from .pilot import LINES, PULSES, Air, Errors, Pilot, beam_errors
 from .pilot_colour import colour_errors, image_seconds
-from .scan_files import may_render
+from .scan_files import may_render, wanted_layers
 
 _BEAM = ("position", "intensity", "labels", "density")
+_COLOURS = frozenset({"colour", "layers"})
 _TIMED_RAYS = (1, 7, 19)
 """Rays per pulse whose time is measured; that of others lies between or beyond."""
 _PILOT_SHARE = 0.25
@@ -124,7 +125,8 @@ class _Choice:
         self.prior: Prior = prior_of(scenario.scan.platform.kind)
         self.rays, self.octaves = rays_choices(scenario), octave_choices(scenario)
         colours = colour_choices(scenario, site.path.typical_range, HAS_RETURN_CAMERA)
-        self.colours = colours if may_render(scenario) else {}
+        limited = bool(_COLOURS & set(self.limits))
+        self.colours = colours if limited or may_render(scenario) else {}
         self.costs = Costs(scenario, site.path, site.area, self.prior)
         self.tried: list[_Tried] = []
         self.source = f"pilot measurements on {LINES} scan lines"
@@ -152,7 +154,7 @@ class _Choice:
             "chosen": {path: value for path, value in chosen.changes.items() if path not in kept},
             "expected": {
                 "errors": {name: float(f"{value:.6g}") for name, value in chosen.errors.items()},
-                "at_most": {name: float(f"{chosen.bounds.get(name, 0.0):.6g}") for name in self.limits},
+                "at_most": {name: float(f"{chosen.bounds[name]:.6g}") for name in self.limits},
                 "seconds": expected,
             },
             "by": self.source,
@@ -173,8 +175,8 @@ class _Choice:
         relief = self._relief_ladder(self.tried[-1].pilot)
         ladders += [relief] if relief else []
         if self.colours:
-            limited = {name: self.limits[name] for name in ("colour", "layers") if name in self.limits}
-            ladders.append(self._colour_ladder(self.tried[-1].pilot, measured=bool(limited)))
+            pilot = self.tried[-1].pilot
+            ladders.append(self._colour_ladder(pilot, self._pilot_colours(pilot) if self._limits_colours else {}))
         chosen = cheapest(ladders, self.limits)
         return self._timed(chosen)
 
@@ -183,8 +185,7 @@ class _Choice:
         if not beam:
             self._try(models[0])
             fewest = min(self.rays)
-            table = {fewest: self._prior_errors(fewest, models[0])}
-            return Ladder("beam", (self._rung(models[0], fewest, table[fewest]),))
+            return Ladder("beam", (self._rung(models[0], fewest, {}),))
         points = {}
         for model in models[:-1]:
             tried = self._try(model)
@@ -237,11 +238,14 @@ class _Choice:
         first.seconds, self.costs.points = first.pilot.scan_seconds({fewest: self.rays[fewest]})
         pulses = pulses_of(first.pilot)
         self.costs.speed = first.seconds[fewest] / max(pulses * self.prior.pulse_seconds(fewest), 1e-9)
-        fastest = first.seconds[fewest] + self.costs.apart()
+        fastest, pilots = first.seconds[fewest] + self.costs.apart(), self._pilot_cost(first, pulses)
         if fastest > self.left():
             raise too_short(self.left(), fastest)
-        measured = self._pilot_cost(first, pulses) <= _PILOT_SHARE * (self.left() - fastest)
-        if measured:
+        # What is to keep a tolerance must have been measured; but for the height, which follows from the model.
+        must = bool(set(self.limits) - {"height"})
+        if must and pilots + fastest > self.left():
+            raise too_short(self.left(), pilots + fastest, tolerance=True)
+        if must or pilots <= _PILOT_SHARE * (self.left() - fastest):
             return self._measured_choice(models, first)
         self.source = "shipped table: the time is too short for pilot measurements"
         return self._unmeasured_choice(models, first)
@@ -291,7 +295,7 @@ class _Choice:
                 )
             )
         if self.colours:
-            ladders.append(self._colour_ladder(first.pilot, measured=False, timing=self.prior.image))
+            ladders.append(self._colour_ladder(first.pilot, self._table_colours(), self.prior.image))
         return best_in_time(ladders, _UNSURE * self.left(), self._reference(ladders), self.limits, self.costs.apart())
 
     def _refuse_hopeless(self, model: ModelKnobs | None) -> None:
@@ -367,25 +371,30 @@ class _Choice:
         seconds = self.costs.relief_seconds(number) if timed else None
         return Rung({"scan.relief_octaves": number}, expected, bounds, number, seconds)
 
+    @property
+    def _limits_colours(self) -> bool:
+        return bool(_COLOURS & set(self.limits))
+
+    def _pilot_colours(self, pilot: Pilot) -> dict[str, Errors]:
+        return colour_errors(pilot, self.colours, self.costs.wanted)
+
+    def _table_colours(self) -> dict[str, Errors]:
+        kinds = [kind for kind in sorted(_COLOURS) if has_kind(self.scenario, kind)]
+        return {name: {kind: _exact(self.prior.colour[name][kind]) for kind in kinds} for name in self.colours}
+
     def _colour_ladder(
-        self, pilot: Pilot, measured: bool, timing: tuple[float, float, float] | None = None
+        self,
+        pilot: Pilot,
+        errors: Mapping[str, Errors],
+        timing: tuple[float, float, float] | None = None,
     ) -> Ladder:
-        if measured:
-            errors = colour_errors(pilot, self.colours, self.costs.wanted)
-        else:
-            kinds = [kind for kind in ("colour", "layers") if self._is_wanted(kind)]
-            errors = {
-                name: {kind: _exact(self.prior.colour[name][kind]) for kind in kinds} for name in self.colours
-            }
+        """Return the sources of colours with their errors by name, as far as these are known."""
         rungs = []
         for name, changes in self.colours.items():
             seconds = None if timing is None else self.costs.colour_seconds(pilot, changes, timing)
-            expected, bounds = ({kind: pair[side] for kind, pair in errors[name].items()} for side in (0, 1))
+            expected, bounds = ({kind: pair[side] for kind, pair in errors.get(name, {}).items()} for side in (0, 1))
             rungs.append(Rung(changes, expected, bounds, self.costs.colour_cost(pilot, changes), seconds))
         return Ladder("colour", tuple(rungs))
-
-    def _is_wanted(self, kind: str) -> bool:
-        return "rgb" in self.costs.wanted if kind == "colour" else bool(set(MATERIAL_LAYERS) & self.costs.wanted)
 
     def _timed_colours(self, pilot: Pilot) -> Ladder:
         """Return the sources of colours with the time that images take here, as far as there is time to find out."""
@@ -394,7 +403,18 @@ class _Choice:
         if images and timing[0] + 4.0 * timing[1] < 0.5 * _PILOT_SHARE * self.left():
             measured = self.colours["standard" if "standard" in images else images[0]]
             timing = image_seconds(pilot, measured, self.costs.wanted)
-        return self._colour_ladder(pilot, measured=False, timing=(timing[0], timing[1], timing[2]))
+        if self._limits_colours:
+            errors = self._pilot_colours(pilot)
+        else:
+            errors, self.source = self._table_colours(), f"{self.source}; colours by the shipped table"
+        return self._colour_ladder(pilot, errors, (timing[0], timing[1], timing[2]))
+
+
+def has_kind(scenario: Scenario, kind: str) -> bool:
+    """Return whether points of a job have what a kind of error of colours is of: ``colour`` or ``layers``."""
+    wanted = wanted_layers(scenario)
+    return "rgb" in wanted if kind == "colour" else bool(set(MATERIAL_LAYERS) & wanted)
+
 
 def _exact(value: float) -> tuple[float, float]:
     return value, value
@@ -422,6 +442,10 @@ def check(scenario: Scenario, foreign: bool = False) -> None:
     limits = scenario.tolerance.limits() if scenario.tolerance else {}
     if foreign and "height" in limits:
         raise InputError("tolerance.height", limits["height"], "can't be promised of a scene that was built elsewhere")
+    for kind in sorted(_COLOURS & set(limits)):
+        if not has_kind(scenario, kind):
+            has = "colours: colour.rgb is false" if kind == "colour" else "layers: cloud.attributes names none of them"
+            raise InputError(f"tolerance.{kind}", limits[kind], f"nothing has such an error, as points get no {has}")
     if not set(scenario.outputs) & {"cloud", "previews"}:
         raise InputError("outputs", list(scenario.outputs), "must have the cloud or previews for settings to be chosen")
 

@@ -12,7 +12,7 @@ from .core.scanning.pattern import shot_count
 from .core.scenario import Scenario
 from .pilot import Pilot
 from .pilot_colour import image_counts
-from .scan_files import available_cores, wanted_layers
+from .scan_files import wanted_layers
 
 _IMAGE = 0.3
 """Megapixels whose rendering costs as much as it costs to begin an image."""
@@ -41,9 +41,12 @@ class Costs:
         self.points, self.speed = 0, 1.0
 
     def relief_seconds(self, octaves: int) -> float:
-        """Return what octaves cost beyond the two that are timed with the scan, s."""
+        """Return what octaves cost beyond the two that are timed with the scan, s.
+
+        The table has processor seconds, and `speed` is a second here for one of the table's cores together.
+        """
         extra = nearest(self.prior.octave, octaves) - nearest(self.prior.octave, 2)
-        return max(0.0, extra) * 1e-6 * self.points * self.speed / available_cores()
+        return max(0.0, extra) * 1e-6 * self.points * self.speed / self.prior.cores
 
     def colour_cost(self, pilot: Pilot, changes: Mapping[str, Any]) -> float:
         """Return what a source of colours costs in megapixels, which is the same on every machine."""

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+import sys
 import tempfile
 import time
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from .blender.cameras import HAS_RETURN_CAMERA, layer_source
+from .blender.cameras import HAS_RETURN_CAMERA, layer_source, takes_returns
+from .blender.cameras.returns import RENDERINGS_KEPT
 from .blender.model import build_road
 from .blender.scene import scanned_scene
 from .core.colour import LayerSource, LayerValues, Targets, shares_by_source
+from .core.machine import machine
 from .core.parameters.geometry import RoadGeometry
 from .core.parameters.model import RoadParameters
 from .core.parameters.sampler import sample_road
@@ -23,7 +26,7 @@ from .core.scanning.stretches import spread
 from .core.scenario import Scenario, load_scenario
 from .core.tradeoff import KNOBS, row_scenario
 from .measuring_errors import CONVERGED, LAYERS, Sample, errors_of, fast_target
-from .scan_files import ScanToFiles, colour_job, make_scan, road_path
+from .scan_files import RETURNS_AT_ONCE, ScanToFiles, colour_job, make_scan, road_path
 
 _STRETCHES, _SECONDS = 16, 0.08
 """Stretches of each strip that are scanned, spread evenly over it, and the duration of each."""
@@ -67,6 +70,7 @@ def measure_row(scenario_name: str, knob: str, value: Any) -> dict[str, Any]:
         "images": cost.rendered.get("images", 0),
         "megapixels": round(cost.rendered.get("pixels", 0) / 1e6, 3),
         "shares": cost.shares,
+        "machine": machine({"Blender": sys.modules["bpy"].app.version_string}),
         **errors,
     }
 
@@ -115,10 +119,13 @@ def _run(
         done = time.process_time()
         peak = peak_memory_mb()
         values = _coloured(source, result.seen) if coloured and result.seen is not None else None
-    seconds = done - prepared
+    seconds, images = done - prepared, prepared - start
+    restarts = 0
+    if coloured and takes_returns(scenario.colour):  # stretches are too few for the renderer to begin anew
+        restarts = int(task.counts.points / path.share / RETURNS_AT_ONCE / RENDERINGS_KEPT)
     cost = _Cost(
-        image_seconds=prepared - start,
-        scan_seconds=seconds / path.share,
+        image_seconds=images,
+        scan_seconds=seconds / path.share + restarts * images,
         rays_per_second=round(task.counts.rays / seconds),
         peak_memory_mb=peak,
         rendered=rendered,

@@ -20,6 +20,7 @@ from .blender.cameras import layer_source
 from .core.choice import quantile_bound, ratio_bound
 from .core.cloud.points import PointBlock
 from .core.cloud.roughness import adjusted, micro_relief
+from .core.machine import available_cores
 from .core.parameters.model_surroundings import Environment, MaterialVariation
 from .core.scan_scenario import Noise
 from .core.scanning.beam import RINGS
@@ -29,7 +30,7 @@ from .core.scanning.scan import BlockResult, Scan, joined_results, scan_block
 from .core.scanning.stretches import Stretches, scattered
 from .core.scenario import Scenario
 from .measuring_errors import CONVERGED, paired
-from .scan_files import ScanToFiles, available_cores, colour_job, make_scan, material_rows
+from .scan_files import ScanToFiles, colour_job, make_scan, material_rows
 
 Float = NDArray[np.float64]
 Errors = dict[str, tuple[float, float]]
@@ -152,6 +153,8 @@ class Pilot:
         plain = self.scenario.colour.model_copy(update={"source": "material"})
         scenario = self.scenario.model_copy(update={"colour": plain})
         scenario = scenario.model_copy(update={"scan": scenario.scan.model_copy(update={"relief_octaves": 2})})
+        # Pulses come in whole lines, so that stretches hold fewer of them than their duration says.
+        share = sum(map(self.scan.pulses, path.strips)) / sum(map(self.scan.pulses, path.whole.strips))
         times, points = {}, 0
         with layer_source(colour_job(scenario, self.scan, self.scene)) as source:
             for number, rings in rays.items():
@@ -161,8 +164,8 @@ class Pilot:
                     begin = self.clock()
                     for _ in task.run():
                         pass
-                    times[number] = (self.clock() - begin) / path.share
-                points = round(task.counts.points / path.share)
+                    times[number] = (self.clock() - begin) / share
+                points = round(task.counts.points / share)
         return times, points
 
 

@@ -19,6 +19,7 @@ from .core.crs import wkt
 from .core.errors import InputError
 from .core.files import output_folder
 from .core.generator import generator
+from .core.machine import available_cores
 from .core.parameters.geometry import RoadGeometry
 from .core.parameters.model import RoadParameters, read_parameters
 from .core.parameters.sampler import sample_road
@@ -29,7 +30,7 @@ from .core.scanning.motion import ScannedScene
 from .core.scenario import Scenario
 from .core.schema import canonical_json
 from .core.twin import check_formats, twin_file_names, write_twin
-from .scan_files import available_cores, colour_job, make_scan, road_path, scan_to_files, top_view
+from .scan_files import colour_job, make_scan, road_path, scan_to_files, top_view
 from .section_scan import check_by_section, scan_by_section
 
 if TYPE_CHECKING:

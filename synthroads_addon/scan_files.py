@@ -15,6 +15,7 @@ from .cloud_files import CloudFiles, ScanCounts
 from .core.cloud.previews import TopView
 from .core.cloud.roughness import micro_relief
 from .core.colour import LayerSource
+from .core.machine import available_cores
 from .core.material_variation import varied
 from .core.materials import Material
 from .core.parameters.geometry import RoadGeometry
@@ -219,13 +220,6 @@ def _side_by_side(
         while pending:
             yield pending.pop(0).result()
             pending += [pool.submit(work, *task) for task in islice(tasks, 1)]
-
-
-def available_cores() -> int:
-    """Return how many cores this process may use."""
-    import os
-
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 @contextmanager

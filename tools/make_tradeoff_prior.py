@@ -4,7 +4,7 @@
 
 writes `synthroads_addon/presets/tradeoff_prior.json`, which choices by time fall back on (see docs/tradeoff.md); of the
 platforms that aren't named it keeps what it holds. Seconds are those of processors: the whole job's on two cores, if
-these share the scan and the images evenly. Blender 4.5 has no pixel per return: what a point costs there is kept.
+these share the scan and the images evenly. It needs a Blender that has a pixel per return, which the true colours are.
 """
 
 from __future__ import annotations
@@ -21,6 +21,7 @@ from typing import Any
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
 
+from synthroads_addon.blender.cameras import HAS_RETURN_CAMERA  # noqa: E402
 from synthroads_addon.blender.files import empty_file, save_scene  # noqa: E402
 from synthroads_addon.choosing_sites import RoadSite  # noqa: E402
 from synthroads_addon.core.knobs import colour_choices  # noqa: E402
@@ -64,6 +65,7 @@ def measured(platform: str) -> dict[str, Any]:
     site = RoadSite(scenario, sample_road(scenario.road, scenario.seed))
     builds, few = [], None
     pilot = None
+    site.scene(site.models({})[0])  # untimed: the first build pays for what Blender loads once
     for model in site.models({}):
         begin = time.process_time()
         pilot = Pilot.on(scenario, site.scene(model), site.path, site.air)
@@ -105,6 +107,8 @@ def _saving(area: float) -> float:
 
 def main(platforms: Sequence[str]) -> None:
     """Command line."""
+    if not HAS_RETURN_CAMERA:
+        raise SystemExit("needs Blender 5.0 or newer: true colours are those of a pixel per return")
     found = read_json(FILE)["platforms"] if FILE.exists() else {}
     for platform in platforms or SCENES:
         found[platform] = measured(platform)

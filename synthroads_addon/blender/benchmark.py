@@ -1,9 +1,10 @@
-"""What the benchmark needs of Blender: time spent rendering, bare rendering, and the time that an edit takes."""
+"""What the benchmark needs of Blender: rendering beside bare rendering, and the time that an edit takes."""
 
 from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -11,6 +12,7 @@ import bpy
 
 from ..core.colour_views import View
 from ..core.parameters.model import RoadParameters, Vegetation
+from .cameras import ColourJob, image_views, layer_source
 from .cameras.images import aim
 from .cameras.light import daylight
 from .cameras.stage import Passes, Stage, stage
@@ -28,45 +30,45 @@ def seconds_of(work: Callable[[], object]) -> float:
     return time.perf_counter() - begin
 
 
-class RenderClock:
-    """Counts what is rendered, and the time that it takes, while it is entered."""
+def rendering(job: ColourJob, count: int) -> dict[str, Any]:
+    """Return the rendering of all layers beside that of nothing but the picture, of the same images.
 
-    def __init__(self) -> None:
-        self.seconds, self.pixels = 0.0, 0
+    Both are without what the first image costs, which brings the scene into the renderer.
 
-    def __enter__(self) -> RenderClock:
-        self._render = Stage.render
-        clock = self
+    Args:
+        job: whose images are rendered, whatever its colours come from.
+        count: about so many of them.
+    """
+    job = replace(job, scenario=job.scenario.model_copy(update={"source": "images"}))
+    every = image_views(job)
+    views = every[:: max(1, len(every) // count)]
+    stamps: list[float] = []
 
-        def timed(self: Stage, width: int, height: int) -> Any:
-            begin = time.perf_counter()
-            try:
-                return clock._render(self, width, height)
-            finally:
-                clock.seconds += time.perf_counter() - begin
-                clock.pixels += width * height
+    def pick(_: list[View]) -> list[View]:
+        return [views[0], *views]
 
-        Stage.render = timed  # type: ignore[method-assign]
-        return self
+    def stamp(_: float) -> None:
+        stamps.append(time.perf_counter())
 
-    def __exit__(self, *_: object) -> None:
-        Stage.render = self._render  # type: ignore[method-assign]
+    with layer_source(replace(job, pick=pick), progress=stamp):
+        ours = stamps[-1] - stamps[0]
+    pixels = sum(view.pixels for view in views) / 1e6
+    rates = {"ours": pixels / ours, "floor": pixels / _bare_seconds(job, views)}
+    return {"name": "rendering, all layers; Cycles, the picture alone", "unit": "million samples/s", **rates, "rays": 0}
 
 
-def rendering(clock: RenderClock, views: list[View], parameters: RoadParameters) -> dict[str, Any]:
-    """Return the rendering of all layers beside that of nothing but the picture, of some of the same images."""
-    with daylight(parameters.environment, True) as day:
+def _bare_seconds(job: ColourJob, views: list[View]) -> float:
+    """Return the seconds that the picture alone of some images takes."""
+    with daylight(job.environment, True) as day:
         passes = Passes((), lit=True)
         with stage(bpy.context.scene, (), passes, (day.sun,), None) as bare:
             aim(bare.camera, views[0])
             bare.render(16, 16)  # the tree is built by the first image
-            seconds = pixels = 0.0
+            seconds = 0.0
             for view in views:
                 aim(bare.camera, view)
                 seconds += seconds_of(partial(_rendered, bare, view))
-                pixels += view.pixels
-    rates = {"ours": clock.pixels / clock.seconds / 1e6, "floor": pixels / seconds / 1e6}
-    return {"name": "rendering, all layers; Cycles, the picture alone", "unit": "million samples/s", **rates, "rays": 0}
+    return seconds
 
 
 def _rendered(bare: Stage, view: View) -> None:

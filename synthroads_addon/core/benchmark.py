@@ -66,11 +66,6 @@ LIMITS = {
 """Lines by name. HELIOS++ did 0.32 million pulses/s, 0.85 million rays/s, 2 kB per triangle and 21 s on two cores."""
 
 
-def machine(cpu: str, available: int, versions: dict[str, str]) -> str:
-    """Return the machine in words."""
-    return f"{cpu}, {available} cores; " + ", ".join(f"{name} {version}" for name, version in versions.items())
-
-
 def markdown(result: dict[str, Any]) -> str:
     """Return the tables of a result as `headless.benchmark` gathers it."""
     lines = [f"Machine: {result['machine']}", ""]

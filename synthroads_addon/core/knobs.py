@@ -147,6 +147,9 @@ def check_choice(scenario: Scenario) -> None:
     if "intensity" in limits and scenario.colour.intensity_from_layers:
         text = "can't be promised for intensities from the points' layers: take colour.intensity_from_layers out"
         raise InputError("tolerance.intensity", limits["intensity"], text)
+    if "relief" in limits and scenario.scan.relief != 1.0:
+        text = "can't be promised for a relief of another strength than the surfaces': scan.relief must be 1"
+        raise InputError("tolerance.relief", limits["relief"], text)
     if {"colour", "layers"} & set(limits) and scenario.colour.lighting == "path":
         name = "colour" if "colour" in limits else "layers"
         text = "can't be promised for whole light paths: colour.lighting must be direct"

@@ -14,12 +14,17 @@ from .scene_mesh import SceneMesh
 
 Float = NDArray[np.float64]
 
+_BESIDE_STEPS = 0.01
+"""To either side of a step, m: faces at it may begin a little aside."""
 
 
 def mesh_height_errors(
     mesh: SceneMesh, geometry: RoadGeometry, samples: int = 100_000, names: tuple[str, ...] = ("road", "roadside")
 ) -> Float:
     """Return signed height errors (N,) in metres of random points of the mesh's road surface.
+
+    Without the centimetres along which the pavement changes at once, at noses and ends of ramps: faces there go
+    slantwise from one cross-section to quite another one.
 
     Args:
         mesh: scene mesh in local coordinates.
@@ -37,6 +42,8 @@ def mesh_height_errors(
     points = corners[:, 0] + u[:, None] * (corners[:, 1] - corners[:, 0]) + v[:, None] * (corners[:, 2] - corners[:, 0])
     station, offset = geometry.alignment.project(points[:, :2])
     inside = (station >= 0) & (station <= geometry.length)
+    for low, high in (step for section in geometry.sections.values() for step in section.steps()):
+        inside &= (station < low - _BESIDE_STEPS) | (station > high + _BESIDE_STEPS)
     error = points[inside, 2] - geometry.elevation(station[inside], offset[inside])
     return np.asarray(error[np.isfinite(error)])
 

@@ -32,6 +32,7 @@ class Prior:
         image: seconds before the first image, of each image, of each megapixel.
         sample: microseconds per point that takes its colour from images, or is rendered by itself.
         scene_file, previews: microseconds per square metre of the model, and per point.
+        cores: that the machine of the measurements used; times per octave are of one of them.
     """
 
     beam: Mapping[str, Mapping[str, float]]
@@ -45,6 +46,7 @@ class Prior:
     sample: Mapping[str, float]
     scene_file: float
     previews: float
+    cores: int
 
     def pulse_seconds(self, rays: int) -> float:
         """Return the seconds of a pulse of so many rays, linear between what was measured."""
@@ -60,5 +62,6 @@ class Prior:
 @cache
 def prior_of(platform: str) -> Prior:
     """Return the table of a kind of platform; a trajectory has the UAV's."""
-    data: dict[str, Any] = read_json(FILE)["platforms"]
-    return Prior(**data.get(platform, data["uav"]))
+    data: dict[str, Any] = read_json(FILE)
+    platforms = data["platforms"]
+    return Prior(**platforms.get(platform, platforms["uav"]), cores=data["cores"])

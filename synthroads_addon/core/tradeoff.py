@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -20,8 +19,12 @@ IMAGES = ("scan.relief=0", "colour.source=images")
 WHOLE_PATHS = ("scan.relief=0", "colour.source=returns", "colour.lighting=path")
 TRUE_SAMPLES = 256
 """Samples per pixel of the light that counts as true beside whole light paths."""
-DENSEST = {"image_spacing": 15.0, "ground_sampling_distance": 0.06}
-"""Images that count as true where Blender has no pixel per return: for a range of 60 m."""
+DENSEST = {"image_spacing": 7.5, "ground_sampling_distance": 0.03}
+"""Images that count as true where Blender has no pixel per return: for a range of 60 m. Denser than any preset's."""
+REPEATED = {"fidelity": 2}
+"""Knobs whose rows are measured several times; the least time counts, and they say how far times scatter."""
+ALIKE = 0.05
+"""Errors count as equal up to this share: they are of stretches, and plants on another mesh stand elsewhere."""
 _LENGTHS_OF_IMAGES = tuple(f"colour.{name}" for name in DENSEST)
 
 
@@ -51,15 +54,27 @@ _ALL_ERRORS = ("height", "beam", "relief", "colour")
 _BETWEEN: dict[Any, tuple[str, ...]] = {
     f"{preset}, {title}": (f"fidelity={preset}", change)
     for preset, others in {
-        "draft": ("geometric_tolerance=0.005", "vegetation_detail=1", "scan.rays_per_pulse=7"),
+        "draft": (
+            "geometric_tolerance=0.005",
+            "vegetation_detail=1",
+            "scan.rays_per_pulse=7",
+            "scan.relief_octaves=4",
+        ),
         "standard": (
             "geometric_tolerance=0.02",
             "geometric_tolerance=0.001",
             "vegetation_detail=0.3",
             "scan.rays_per_pulse=1",
             "scan.rays_per_pulse=19",
+            "scan.relief_octaves=2",
+            "scan.relief_octaves=6",
         ),
-        "high": ("geometric_tolerance=0.005", "scan.rays_per_pulse=7", "scan.rays_per_pulse=37"),
+        "high": (
+            "geometric_tolerance=0.005",
+            "scan.rays_per_pulse=7",
+            "scan.rays_per_pulse=37",
+            "scan.relief_octaves=4",
+        ),
     }.items()
     for change in others
     for title in [change.rpartition(".")[2] if change.startswith("scan.") else change]
@@ -149,10 +164,12 @@ def rows(knobs: Iterable[str]) -> Iterator[tuple[str, Any]]:
 def row_scenario(scenario: str, knob: str, value: Any, changes: Iterable[str] = ()) -> Scenario:
     """Return the job that a row is about: the scenario with the knob's changes, and others before them.
 
-    Spacings and pixels of images are those for a range of 60 m, and farther apart and coarser from farther away.
+    What a knob doesn't change is as in the standard fidelity, so that its errors aren't drowned by those of a coarser
+    one. Spacings and pixels of images are those for a range of 60 m, and farther apart and coarser from farther away.
     """
     scale = image_scale(_seen_from(load_scenario(scenario).scan.platform))
-    return load_scenario(scenario, [*changes, *(_scaled(change, scale) for change in KNOBS[knob].rows[value])])
+    base = () if KNOBS[knob].table == "presets" else ("fidelity=standard",)
+    return load_scenario(scenario, [*base, *changes, *(_scaled(change, scale) for change in KNOBS[knob].rows[value])])
 
 
 def _seen_from(platform: Platform) -> float:
@@ -170,64 +187,53 @@ def measured_of(results: Iterable[Mapping[str, Any]]) -> list[Mapping[str, Any]]
     return [row for row in results if "left_out" not in row]
 
 
-def effective(scenario: Scenario) -> str:
-    """Return a job's settings as text, equal for scenarios that say the same in different words."""
-    data, settings = scenario.to_dict(), scenario.settings()
-    data |= {"geometric_tolerance": settings.tolerance, "vegetation_detail": settings.vegetation_detail}
-    caster = "embree" if scenario.scan.caster == "auto" else scenario.scan.caster
-    data["scan"] |= {"rays_per_pulse": settings.rays_per_pulse, "caster": caster}
-    return json.dumps(data, sort_keys=True)
+def time_noise(results: Iterable[Mapping[str, Any]]) -> float | None:
+    """Return the measured noise of the times: how far those of one row are apart, as a share of their mean.
 
-
-def time_noise(results: Iterable[Mapping[str, Any]], scenario: str) -> float | None:
-    """Return the measured noise of the times: how far rows of the same settings are apart, as a share of their mean.
-
-    The largest such spread of any settings that several knobs' rows share; None if no two rows do.
+    The largest such spread of the rows that were measured `REPEATED` times; None if there is none.
     """
-    same: dict[str, list[float]] = {}
-    for row in measured_of(results):
-        own = row_scenario(scenario, row["knob"], row["value"])
-        same.setdefault(f"{KNOBS[row['knob']].errors} {effective(own)}", []).append(float(row["seconds"]))
-    spreads = [(max(times) - min(times)) * len(times) / sum(times) for times in same.values() if len(times) > 1]
-    return max(spreads, default=None)
+    several = [row["all_seconds"] for row in measured_of(results) if len(row.get("all_seconds", ())) > 1]
+    return max(((max(times) - min(times)) * len(times) / sum(times) for times in several), default=None)
 
 
 def better_row(
     row: Mapping[str, Any], others: Iterable[Mapping[str, Any]], noise: float
 ) -> Mapping[str, Any] | None:
-    """Return a row that is faster than `row`, beyond the noise of time, and at least as accurate in all errors.
+    """Return a row that is faster than `row`, beyond the noise of time, and as accurate in all errors.
 
-    The fastest such row; None if there is none, so that `row` lies on the front.
+    Errors count as equal up to `ALIKE`. The fastest such row; None if there is none, so that `row` lies on the front.
     """
 
     def as_accurate(other: Mapping[str, Any]) -> bool:
-        return all(abs(other["errors"][name]) <= abs(error) for name, error in row["errors"].items())
+        return all(abs(other["errors"][name]) <= (1.0 + ALIKE) * abs(error) for name, error in row["errors"].items())
 
     faster = [other for other in others if other["seconds"] < row["seconds"] * (1.0 - noise) and as_accurate(other)]
     return min(faster, key=lambda other: other["seconds"], default=None)
 
 
-def front_lines(results: Sequence[Mapping[str, Any]], scenario: str) -> list[str]:
+def front_lines(results: Sequence[Mapping[str, Any]]) -> list[str]:
     """Return a table of the presets that says of each whether it lies on the front; nothing without presets."""
     job = [row for row in measured_of(results) if KNOBS[row["knob"]].table == "presets"]
     presets = [row for row in job if row["knob"] == "fidelity"]
     if not presets:
         return []
-    noise = time_noise(results, scenario)
+    noise = time_noise(results)
     lines = ["| preset | on the front | faster, and as accurate in all errors |", "|---|---|---|"]
     for row in presets:
         other = better_row(row, [one for one in job if one is not row], noise or 0.0)
         shown = "-" if other is None else f"{other['value']}: {other['seconds']:.1f} s for {row['seconds']:.1f} s"
         lines.append(f"| {row['value']} | {'yes' if other is None else 'no'} | {shown} |")
-    text = "times of the same settings weren't measured twice, so every difference of time counts"
+    text = "times weren't measured twice, so every difference of time counts"
     if noise is not None:
         text = f"times of the same settings differ by up to {100.0 * noise:.0f} %: only what is faster by more counts"
-    return [*lines, "", f"Each is compared with {len(job) - 1} others of the same job; {text}."]
+    alike = f"errors that are larger by less than {100.0 * ALIKE:.0f} % count as equal"
+    return [*lines, "", f"Each is compared with {len(job) - 1} others of the same job; {alike}; {text}."]
 
 
 def markdown(results: Sequence[Mapping[str, Any]], scenario: str) -> str:
     """Return the tables of rows as `measuring.measure_row` gives them, and what was left out of them and why."""
-    lines = [f"Scene `{scenario}`: `synthroads tradeoff --scenario {scenario} --output DIR`", ""]
+    machines = dict.fromkeys(row["machine"] for row in results if "machine" in row)
+    lines = [f"Scene `{scenario}`: `synthroads tradeoff --scenario {scenario} --output DIR`; {'; '.join(machines)}", ""]
     for table, costs in TABLES.items():
         own = [row for row in results if KNOBS[row["knob"]].table == table]
         measured = measured_of(own)
@@ -235,7 +241,7 @@ def markdown(results: Sequence[Mapping[str, Any]], scenario: str) -> str:
             lines += [f"{table.capitalize()}:", "", *_table(measured, costs), ""]
         left_out = [f"- {row['knob']} {row['value']}: {row['left_out']}" for row in own if "left_out" in row]
         lines += [*left_out, ""] if left_out else []
-    front = front_lines(results, scenario)
+    front = front_lines(results)
     lines += [*front, ""] if front else []
     scale = image_scale(_seen_from(load_scenario(scenario).scan.platform))
     if scale != 1.0 and any(KNOBS[row["knob"]].table == "colours" for row in results):

@@ -76,6 +76,14 @@ def test_what_cannot_be_kept_is_refused_with_the_best(tmp_path: Path) -> None:
         report_of(tmp_path / "out", "tolerance=height=1mm", "geometric_tolerance=0.02")
     with pytest.raises(InputError, match="time_budget: too short: 0 s"):
         report_of(tmp_path / "out", "time_budget=0.5s")
+    with pytest.raises(InputError, match=r"tolerance.relief is 0.001: .* relief of another strength"):
+        report_of(tmp_path / "out", "tolerance=relief=1mm", "scan.relief=0")
+    with pytest.raises(InputError, match=r"tolerance.colour is 1.0: .* points get no colours: colour.rgb is false"):
+        report_of(tmp_path / "out", "tolerance=colour=1", "colour.rgb=false")
+    with pytest.raises(InputError, match=r"tolerance.layers is 0.1: .* points get no layers"):
+        report_of(tmp_path / "out", "tolerance=layers=0.1")
+    with pytest.raises(InputError, match=r"tolerance.colour is 0.1: can't be kept here: the best to be had is \d"):
+        report_of(tmp_path / "out", "tolerance=colour=0.1", "colour.source=material")
     with pytest.raises(InputError, match="outputs"):
         report_of(tmp_path / "out", "time_budget=60s", 'outputs=["parameters"]')
     assert not (tmp_path / "out").exists()

@@ -20,7 +20,7 @@ BLOCK = 1 << 20
 _HEIGHT = 1024
 _SMALLEST = 64
 """Width and height of an image, px: Cycles reads very narrow textures wrongly."""
-_KEPT = 12
+RENDERINGS_KEPT = 12
 """Renderings after which the renderer begins anew: it keeps the images of rays, 60 bytes for each of them."""
 _BEFORE = 0.002
 """How far before the return its ray starts, m: behind leaves, not before them."""
@@ -99,7 +99,7 @@ class ReturnCamera:
         height = int(np.clip(1 << ((len(points) - 1).bit_length() // 2), _SMALLEST, _HEIGHT))
         width = max(_SMALLEST, -(-len(points) // height))
         middle = self._aim(points, width, height)
-        if self._blocks % _KEPT == 0:
+        if self._blocks % RENDERINGS_KEPT == 0:
             self._stage.forget()
         rendered = self._stage.render(width, height)
         assert rendered.position is not None

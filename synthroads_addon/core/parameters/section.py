@@ -108,6 +108,10 @@ class CarriagewaySection:
         own = [width_kinks(width) for width in (self.carriageway.inner_offset, *(w for _, w in self._widths))]
         return [s for stations in (*own, *(shape.kinks() for shape in self.turnouts)) for s in stations]
 
+    def steps(self) -> list[tuple[float, float]]:
+        """Return lowest and highest station of the centimetres along which the pavement changes at once."""
+        return [step for shape in self.turnouts for step in shape.steps()]
+
     def bend(self, station: Float) -> Float:
         """Return the largest second derivative (N,) of a boundary's distance by station, 1/m."""
         return sum((shape.bend(station) for shape in self.turnouts), np.zeros(station.shape))

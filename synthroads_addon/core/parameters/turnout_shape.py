@@ -82,9 +82,21 @@ class TurnoutShape:
         if turnout.ramp is None:
             marks = [0.0, taper, tip, turnout.length]
         else:
-            nose, end = tip + self.nose, tip + turnout.ramp.length
-            marks = [0.0, taper, tip, nose, nose + STEP, end, end + STEP, end + STEP + BLEND]
+            end = tip + turnout.ramp.length
+            marks = [0.0, taper, tip, end + STEP + BLEND, *(w for step in self._steps() for w in step)]
         return [self.station(w) for w in marks]
+
+    def steps(self) -> list[tuple[float, float]]:
+        """Return lowest and highest station of each `STEP` along which the pavement changes at once."""
+        found = [sorted(map(self.station, step)) for step in self._steps()]
+        return [(low, high) for low, high in found]
+
+    def _steps(self) -> list[tuple[float, float]]:
+        """Return the w of each step's two ends."""
+        if self.turnout.ramp is None:
+            return []
+        tip = self._taper + self.turnout.lane_length
+        return [(tip + x, tip + x + STEP) for x in (self.nose, self.turnout.ramp.length)]
 
     def range(self) -> tuple[float, float]:
         """Return the lowest and the highest station at which it changes anything."""

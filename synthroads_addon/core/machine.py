@@ -1,0 +1,31 @@
+"""The machine that something was measured on, in words."""
+
+from __future__ import annotations
+
+import os
+import platform
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+
+
+def machine(versions: Mapping[str, str]) -> str:
+    """Return processor, cores that may be used, and versions of programs by their names, in words."""
+    programs = ", ".join(f"{name} {version}" for name, version in versions.items())
+    return f"{_processor()}, {available_cores()} cores; {programs}"
+
+
+def available_cores() -> int:
+    """Return how many cores this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def _processor() -> str:
+    for line in _lines_of(Path("/proc/cpuinfo")):
+        if line.startswith("model name"):
+            return line.partition(":")[2].strip()
+    return platform.processor() or platform.machine()
+
+
+def _lines_of(path: Path) -> Iterator[str]:
+    if path.is_file():
+        yield from path.read_text(encoding="utf-8", errors="replace").splitlines()
