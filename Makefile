@@ -4,7 +4,7 @@
 PYTHON ?=
 OUT ?= out
 PLATFORM ?=
-# Extras of the two test environments: `ml` in the first only, as torch for Python 3.13 comes with gigabytes of CUDA.
+# Extras of the two test environments: `ml` in the first only, as on Linux PyPI's torch comes with gigabytes of CUDA.
 EXTRAS_3_11 ?= blender,dev,ml
 EXTRAS_3_13 ?= blender,dev
 

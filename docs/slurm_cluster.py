@@ -1,7 +1,7 @@
 """Have the nodes of a Slurm cluster make a data set: start this on the login node and leave it running.
 
-    pip install 'synthroads[blender,cluster]'
-    python slurm_cluster.py reference /shared/reference --jobs 20
+    pip install '.[blender,cluster]'        # in a copy of the repository
+    python docs/slurm_cluster.py reference /shared/reference --jobs 20
 
 One Slurm job is one Dask worker, which makes one scene at a time on all of its cores. The folder must be on a file
 system that all nodes see.
