@@ -41,7 +41,10 @@ class Platform(ScenarioModel):
         80.0, ge=1, le=5000, unit="m", description="Spacing of a tripod's positions where no stations are given."
     )
     turn_seconds: float = quantity(
-        60.0, gt=0, le=3600, unit="s", description="Time in which a tripod turns the scanner once."
+        60.0, gt=0, le=3600, unit="s", description="Time in which a tripod turns the scanner at each position."
+    )
+    turn_deg: float = quantity(
+        360.0, ge=0, le=360, unit="deg", description="Angle of that turn; 0 for a head that turns by itself."
     )
     file: str | None = Field(None, description="CSV with time, x, y, z, roll, pitch, heading of a trajectory.")
     roll_deg: float = quantity(

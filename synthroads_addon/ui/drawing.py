@@ -191,6 +191,7 @@ RELEVANT: dict[str, Callable[[Any], bool]] = {
     "scan.platform.stations": _on("tripod"),
     "scan.platform.station_spacing": _on("tripod"),
     "scan.platform.turn_seconds": _on("tripod"),
+    "scan.platform.turn_deg": _on("tripod"),
     "scan.platform.file": _on("trajectory"),
     "scan.weather.rate_mm_h": lambda settings: settings.scan.weather.condition in ("rain", "snow"),
     "colour.engine": _rendered,

@@ -23,9 +23,10 @@ from synthroads_addon.core.parameters.geometry import RoadGeometry
 from synthroads_addon.core.parameters.sampler import sample_road
 from synthroads_addon.core.prior import prior_of
 from synthroads_addon.core.scanning.beam import RINGS
-from synthroads_addon.core.scenario import Scenario, load_scenario
+from synthroads_addon.core.scenario import Scenario, apply_change, load_scenario
 from synthroads_addon.pilot import Pilot, beam_errors
 from synthroads_addon.pipeline import Job, generate
+from synthroads_addon.scene_scan import SceneScan, scan_scene
 
 ROOT = Path(__file__).parents[2]
 SMALL = (
@@ -123,6 +124,30 @@ def test_the_command_says_what_it_chose(tmp_path: Path) -> None:
         check=False,
     )
     assert (wrong.returncode, "--fidelity is 'high'" in wrong.stderr) == (2, True)
+
+
+def test_a_scene_that_is_there_is_scanned_within_a_tolerance(tmp_path: Path) -> None:
+    # Planks with gaps: beams that lie on an edge tell one ray from many.
+    edges = [(x, i % 2) for i in range(1000) for x in (i / 10 - 50, i / 10 - 49.9)]
+    planks = [f"v {x} {y} {z}" for x, z in edges for y in (-50, 50)]
+    faces = [f"f {i + 1} {i + 3} {i + 4} {i + 2}" for i in range(0, len(planks), 4)]
+    scene = tmp_path / "planks.obj"
+    scene.write_text("\n".join([*planks, *faces]))
+
+    def scanned(folder: str, *changes: str) -> dict[str, Any]:
+        data: Any = Scenario().to_dict()
+        for change in ("scan.platform.height=40", "scan.relief=0", "colour.rgb=false", 'outputs=["cloud"]', *changes):
+            data = apply_change(data, change)
+        return scan_scene(SceneScan(Scenario.from_dict(data), tmp_path / folder, scene, up="z"))
+
+    loose, tight = (scanned(f"{size}", f"tolerance=position={size}")["choice"] for size in ("2m", "4mm"))
+    assert loose["chosen"]["scan.rays_per_pulse"] == 1 < tight["chosen"]["scan.rays_per_pulse"]
+    assert tight["expected"]["errors"]["position"] <= tight["expected"]["at_most"]["position"] <= 0.004
+    assert "geometric_tolerance" not in tight["chosen"], "there is nothing to build"
+    assert "colour" not in tight["expected"]["errors"], "nothing is expected of what wasn't measured"
+    with pytest.raises(InputError, match=r"tolerance.height is 0.005: can't be promised"):
+        scanned("refused", "tolerance=height=5mm")
+    assert not (tmp_path / "refused").exists()
 
 
 def random_scenes() -> list[tuple[str, list[str]]]:

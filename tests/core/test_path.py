@@ -12,12 +12,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.optimize import brentq
 
+from synthroads_addon.core.dataset.recipe import load_recipe, scene_jobs
 from synthroads_addon.core.errors import InputError
 from synthroads_addon.core.parameters.alignment import Alignment, Element
 from synthroads_addon.core.parameters.geometry import RoadGeometry
 from synthroads_addon.core.parameters.model import AlignmentObject, HorizontalElement, RoadParameters, VerticalPoint
 from synthroads_addon.core.parameters.sampler import sample_road
 from synthroads_addon.core.scan_scenario import Platform
+from synthroads_addon.core.scanning.devices import scanner_setting
 from synthroads_addon.core.scanning.path import (
     KNOT_ERROR,
     TURNAROUND,
@@ -31,7 +33,9 @@ from synthroads_addon.core.scanning.path import (
     TripodPath,
     make_path,
 )
+from synthroads_addon.core.scanning.path_positions import PositionsPath
 from synthroads_addon.core.scanning.path_track import Sway
+from synthroads_addon.core.scanning.pattern import shot_count, shots
 from synthroads_addon.core.scenario import load_scenario
 
 GAUSS = np.polynomial.legendre.leggauss(30)
@@ -511,6 +515,30 @@ def test_a_tripod_turns_once_at_each_position() -> None:
         np.testing.assert_allclose(rotation[-1], rotation[0], atol=1e-12)
         facing = guide.geometry.alignment.heading(station[strip.index])
         np.testing.assert_allclose(rotation[0, :2, 0], [np.cos(facing), np.sin(facing)], atol=1e-9)
+
+
+@pytest.mark.parametrize("angle", [0.0, 90.0])
+def test_a_tripod_turns_as_far_as_told_or_stands_still(angle: float) -> None:
+    platform = Platform(kind="tripod", turn_seconds=2.0, turn_deg=angle, stations=(50.0, 90.0))
+    for path in (make_path(platform, road()), PositionsPath(platform, [(0, 0, 0), (1, 2, 3)])):
+        for strip in path.strips:
+            _, rotation = path.pose(strip, strip.start_time + np.array([0.0, 1.0, 2.0]))
+            heading = np.unwrap(np.arctan2(rotation[:, 1, 0], rotation[:, 0, 0]))
+            np.testing.assert_allclose(np.rad2deg(heading - heading[0]), [0.0, angle / 2.0, angle], atol=1e-9)
+
+
+def test_a_recipe_of_sweeps_sees_all_around() -> None:
+    """A head that turns one way on a tripod that turns the other way at the same rate would look one way only."""
+    job = scene_jobs(load_recipe("sweeps"))[0]
+    path = make_path(job.scenario.scan.platform, road())
+    setting = scanner_setting(job.scenario.scan)
+    (strip,) = path.strips
+    fired = shots(setting, 0, shot_count(setting, strip.duration))
+    _, rotation = path.pose(strip, strip.start_time + fired.time)
+    x, y, _ = np.einsum("pij,jp->ip", rotation, fired.direction)
+    azimuth = np.sort(np.rad2deg(np.arctan2(y, x)))
+    gaps = np.diff(np.append(azimuth, azimuth[0] + 360.0))
+    assert gaps.max() < 1.0
 
 
 def test_tripods_stand_by_turns_on_the_pavements_outer_edges_above_the_ground() -> None:

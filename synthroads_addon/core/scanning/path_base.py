@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -129,6 +130,11 @@ def strips_of(durations: list[float]) -> tuple[Strip, ...]:
         raise InputError("scan.platform", len(durations), f"at most {_MOST_STRIPS} strips or positions are possible")
     starts = np.concatenate(([0.0], np.cumsum(np.array(durations) + TURNAROUND)))
     return tuple(Strip(i, float(starts[i]), float(duration)) for i, duration in enumerate(durations))
+
+
+def turning(platform: Platform) -> float:
+    """Return the rate, rad/s, at which a tripod turns the scanner, counter-clockwise."""
+    return math.radians(platform.turn_deg) / platform.turn_seconds
 
 
 def knots_for(bend: float, jump: float = 0.0) -> float:

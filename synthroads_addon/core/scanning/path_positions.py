@@ -8,14 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..scan_scenario import Platform
-from .path_base import KNOT_RANGE, USUAL, Strip, knots_for, mounting, strips_of
+from .path_base import KNOT_RANGE, USUAL, Strip, knots_for, mounting, strips_of, turning
 from .rotations import rotation_matrix
 
 Float = NDArray[np.float64]
 
 
 class PositionsPath:
-    """One strip at each position; the scanner stands upright, begins facing along x and turns counter-clockwise once.
+    """One strip at each position; the scanner stands upright, begins facing along x and turns counter-clockwise.
 
     Attributes:
         strips: in the order of the positions.
@@ -33,7 +33,7 @@ class PositionsPath:
 
     def __init__(self, platform: Platform, positions: Sequence[Sequence[float]]) -> None:
         self.positions = np.array(positions, dtype=np.float64).reshape(-1, 3)
-        self._turning = 2.0 * np.pi / platform.turn_seconds
+        self._turning = turning(platform)
         self._mounting = mounting(platform)
         self.strips = strips_of([platform.turn_seconds] * len(self.positions))
         self.knot_spacing = knots_for(KNOT_RANGE * self._turning**2)

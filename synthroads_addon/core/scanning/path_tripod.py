@@ -1,4 +1,4 @@
-"""A tripod beside the road: at each position the scanner turns about the vertical once."""
+"""A tripod beside the road: at each position it turns the scanner about the vertical, once if not told otherwise."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..scan_scenario import Platform
-from .path_base import KNOT_RANGE, USUAL, Strip, knots_for, mounting, strips_of
+from .path_base import KNOT_RANGE, USUAL, Strip, knots_for, mounting, strips_of, turning
 from .path_guides import Float, Guide
 from .rotations import rotation_matrix
 
@@ -45,7 +45,7 @@ class TripodPath:
             raise InputError("scan.platform.lateral_offsets", float(offset[place]), allowed)
         height = USUAL["tripod"].height if platform.height is None else platform.height
         self.positions = np.column_stack([plan + offset[:, None] * left, ground + height])
-        self._turning = 2.0 * np.pi / platform.turn_seconds
+        self._turning = turning(platform)
         self._mounting = mounting(platform)
         self.strips = strips_of([platform.turn_seconds] * len(station))
         self.knot_spacing = knots_for(KNOT_RANGE * self._turning**2)
