@@ -51,7 +51,7 @@ LABELS = {
     "scan.platform.stations": "Stations (m)",
     "scan.platform.lateral_offsets": "Strips at (m)",
     "scan.platform.turn_seconds": "Time of a Turn",
-    "scan.platform.turn_deg": "Angle of a Turn",
+    "scan.platform.turn_deg": "Angle of a Turn (°)",
     "scan.relief": "Micro-Relief",
     "scan.traffic_speed_factor": "Speed of Traffic",
     "colour.rgb": "Coloured Points",
