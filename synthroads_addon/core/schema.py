@@ -99,7 +99,10 @@ class Model(BaseModel):
     @model_validator(mode="before")
     @classmethod
     def _prepare(cls, data: Any) -> Any:
-        """Refuse unknown keys; take 2.0 for 2 where a whole number is wanted, as JSON doesn't tell them apart."""
+        """Refuse unknown keys; take 2.0 for 2 where a whole number is wanted, and 0.0 for -0.0.
+
+        JSON doesn't tell the first two apart, comparisons don't the others: what is equal has to have the same text.
+        """
         if not isinstance(data, dict):
             return data
         known, whole = _keys(cls)
@@ -107,8 +110,9 @@ class Model(BaseModel):
             if key in known or (cls.vendor_keys_allowed and str(key).startswith(VENDOR_PREFIX)):
                 continue
             raise ValueError(f"unknown key {str(key)!r}{nearest_name(str(key), cls.model_fields)}")
+        data = {key: _unsigned_zeros(value) if key in known else value for key, value in data.items()}
         changed = {key: int(data[key]) for key in whole if isinstance(data.get(key), float) and data[key].is_integer()}
-        return data | changed if changed else data
+        return data | changed
 
     @classmethod
     def from_dict(cls: type[T], data: object, source: str = "") -> T:
@@ -131,6 +135,13 @@ class Model(BaseModel):
 
 
 T = TypeVar("T", bound=Model)
+
+
+def _unsigned_zeros(value: Any) -> Any:
+    """Return a field's value with 0.0 for every -0.0, in lists too (objects in them see to their own fields)."""
+    if isinstance(value, float):
+        return value + 0.0
+    return type(value)(map(_unsigned_zeros, value)) if type(value) in (list, tuple) else value
 
 
 def _without_absent_fields(data: Any) -> Any:

@@ -11,7 +11,7 @@ import annotated_types
 import bpy
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, assume, given, settings
+from hypothesis import HealthCheck, assume, example, given, settings
 from hypothesis import strategies as st
 from pydantic import BaseModel, Field
 
@@ -132,6 +132,7 @@ def of_type(kind: Any, notes: list[Any]) -> st.SearchStrategy[Any]:
 
 
 @given(data=of_model(Scenario))
+@example(data={"scan": {"platform": {"file": "0", "height": 1.0, "lateral_offsets": [-0.0]}}})
 @settings(max_examples=200, suppress_health_check=[HealthCheck.filter_too_much, HealthCheck.too_slow])
 def test_any_scenario_comes_back_to_the_last_digit(data: dict[str, Any]) -> None:
     try:
