@@ -23,6 +23,7 @@ import torch
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from ml.cells import thin
 from synthroads_addon.core.errors import InputError
 
 Floats = NDArray[np.float64]
@@ -39,7 +40,6 @@ Neighbours = dict[str, torch.Tensor]
 - ``weight{s}`` (M_{s-1}, 3): their weights by inverse distance, of the sum 1
 """
 
-_CELL_BITS = 21
 _CHUNK = 1 << 15
 """Queries whose pairs are held at once."""
 _TINY = 1e-8
@@ -97,8 +97,8 @@ def build_neighbours(coord: torch.Tensor, offset: torch.Tensor, neighbourhood: N
         neighbourhood: what to look for.
 
     Raises:
-        InputError: the offsets don't fit the points, a coordinate is not finite, or a cloud has an extent of more than
-            two million cells.
+        InputError: the offsets don't fit the points, a coordinate is not finite, or a cloud spans more cells of
+            its thinnings than 2^62.
     """
     ends = _checked_ends(coord, offset)
     stages = len(neighbourhood.strides)
@@ -211,24 +211,8 @@ def _sample(points: Floats, stride: int, radius: float, sampling: str) -> Indice
     if not len(points):
         return np.zeros(0, dtype=np.int64)
     if sampling == "grid":
-        return grid_sample(points, radius * 2.0 / 3.0)
+        return thin(points - points.min(axis=0), radius * 2.0 / 3.0)
     return farthest_sample(points, max(len(points) // stride, 1))
-
-
-def grid_sample(points: Floats, cell: float) -> Indices:
-    """Return, in rising order, the point nearest to the middle of each cell that has any; the first of equal ones.
-
-    Raises:
-        InputError: there are more than 2^21 cells along an axis.
-    """
-    steps = (points - points.min(axis=0)) / cell
-    cells = np.floor(steps)
-    if cells.max() >= 1 << _CELL_BITS:
-        raise InputError("coord", float(np.ptp(points, axis=0).max()), f"an extent of at most 2^21 cells of {cell:g} m")
-    whole = cells.astype(np.int64)
-    key = (whole[:, 0] << 2 * _CELL_BITS) | (whole[:, 1] << _CELL_BITS) | whole[:, 2]
-    order = np.lexsort((np.square(steps - cells - 0.5).sum(axis=1), key))
-    return np.sort(order[np.flatnonzero(np.diff(key[order], prepend=-1))])
 
 
 def farthest_sample(points: Floats, count: int) -> Indices:

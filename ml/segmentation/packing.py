@@ -19,13 +19,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ml.cells import cell_keys
 from synthroads_addon.core.cloud.labels import ClassScheme, stored_scheme
 from synthroads_addon.core.cloud.npz import ARCHIVE_FAULTS
 from synthroads_addon.core.errors import InputError, MissingFileError
 from synthroads_addon.core.files import write_file
 
 from .metrics import IGNORED
-from .tiles import Tile, cell_keys
+from .tiles import Tile
 
 STEP = 0.01
 """Size of a coordinate's step, m."""

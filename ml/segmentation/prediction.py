@@ -19,6 +19,7 @@ import laspy
 import numpy as np
 from numpy.typing import NDArray
 
+from ml.cells import thin
 from synthroads_addon.core.cloud.labels import ClassScheme
 from synthroads_addon.core.cloud.las_reading import open_to_copy
 from synthroads_addon.core.cloud.quantiles import LEVELS
@@ -30,7 +31,7 @@ from .crops import CropSettings
 from .metrics import IGNORED
 from .scoring import Classifier, label_tile
 from .sources import FULL
-from .tiles import Scaling, Tile, eight_bits, thin
+from .tiles import Scaling, Tile, eight_bits
 
 HEADER_TEXTS = range(26, 90)
 """Bytes of a LAS file that hold the system identifier and the generating software, of 32 each."""

@@ -11,12 +11,13 @@ import torch
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from ml.cells import thin
 from synthroads_addon.core.random_streams import stream
 
 from .crops import CropSettings, Item, item
 from .effects import crop_of
 from .metrics import IGNORED, Confusion
-from .tiles import Scaling, Tile, thin
+from .tiles import Scaling, Tile
 
 EDGE = 24.0
 """Edge of the pieces that are predicted at a time, m: about as wide as a crop of training."""

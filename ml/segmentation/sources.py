@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
+from ml.cells import thin
 from ml.configuration import Part
 from synthroads_addon.core.cloud.labels import UNLABELLED, ClassScheme
 from synthroads_addon.core.cloud.npz import ARCHIVE_FAULTS
@@ -27,7 +28,7 @@ from synthroads_addon.core.schema import quantity, read_json
 from .classes import LabelMapping, class_names, load_mapping, table_between
 from .metrics import IGNORED
 from .packing import PackReader
-from .tiles import Tile, eight_bits, thin
+from .tiles import Tile, eight_bits
 
 FULL = 65535.0
 """Largest 16-bit intensity."""

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ml.cells import thin
 from ml.points import full_color
 
 from .metrics import IGNORED
@@ -60,41 +61,6 @@ def eight_bits(rgb: NDArray[Any], largest: int) -> NDArray[np.uint8]:
         largest: of all values of the cloud, see `full_color`.
     """
     return np.rint(rgb * (255.0 / full_color(largest))).astype(np.uint8)
-
-
-def thin(coord: NDArray[np.floating[Any]], cell: float) -> NDArray[np.intp]:
-    """Return the indices of the points that stay, one per occupied cell of a cubic grid, in order.
-
-    The point nearest the cell's centre stays, of equally near ones the first.
-
-    Args:
-        coord: (N, 3) m.
-        cell: edge of the cells, m.
-    """
-    if len(coord) == 0:
-        return np.zeros(0, dtype=np.intp)
-    position = np.asarray(coord, dtype=np.float64)
-    cells = np.floor(position / cell)
-    away = ((position / cell - cells - 0.5) ** 2).sum(axis=1)
-    key = cell_keys(cells)
-    order = np.lexsort((away, key))
-    first = np.r_[True, np.diff(key[order]) != 0]
-    return np.sort(order[first])
-
-
-def cell_keys(cells: NDArray[np.float64]) -> NDArray[np.int64]:
-    """Return one number per cell (N, 3) of whole numbers, unique within the array.
-
-    Raises:
-        ValueError: the cells span more than 64 bits can tell apart.
-    """
-    low = cells.min(axis=0)
-    spans = cells.max(axis=0) - low + 1
-    if float(np.prod(spans)) >= 2**62:
-        raise ValueError("cells span too far for one key")
-    relative = (cells - low).astype(np.int64)
-    width, depth = int(spans[0]), int(spans[1])
-    return np.asarray((relative[:, 2] * depth + relative[:, 1]) * width + relative[:, 0])
 
 
 @dataclass(frozen=True)

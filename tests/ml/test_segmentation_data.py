@@ -10,12 +10,13 @@ import laspy
 import numpy as np
 import pytest
 
+from ml.cells import thin
 from ml.segmentation import pack
 from ml.segmentation.classes import LabelMapping, load_mapping, table_between
 from ml.segmentation.metrics import IGNORED
 from ml.segmentation.packing import PackReader, pack_tile, unpack_tile, write_pack
 from ml.segmentation.sources import Source, read_tiles
-from ml.segmentation.tiles import Tile, robust_scaling, scalings, thin
+from ml.segmentation.tiles import Tile, robust_scaling, scalings
 from synthroads_addon.core.cloud.labels import class_scheme
 from synthroads_addon.core.errors import InputError, MissingFileError
 from tests.ml.segmentation_data import NAMES, road_block, road_points, road_tile, write_cloud, write_pointcept
@@ -34,6 +35,8 @@ def test_thinning_keeps_one_point_per_cell_whatever_the_order() -> None:
     order = random.permutation(len(coord))
     assert set(order[thin(coord[order], 0.5)]) == set(keep)
     assert len(thin(np.zeros((0, 3)), 0.1)) == 0
+    with pytest.raises(InputError, match="cells"):
+        thin(np.array([[0.0, 0.0, 0.0], [1e9, 1e9, 1e9]]), 0.1)
 
 
 def test_packing_keeps_points_within_half_a_step() -> None:
