@@ -5,6 +5,7 @@ python tools/example_scene.py out/village.glb
 
 from __future__ import annotations
 
+import argparse
 import os
 import sys
 from pathlib import Path
@@ -159,7 +160,9 @@ def village() -> None:
 
 def main() -> None:
     """Write the scene to the file named on the command line."""
-    target = Path(sys.argv[1]).resolve()
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
+    parser.add_argument("file", type=Path)
+    target = parser.parse_args().file.resolve()
     target.parent.mkdir(parents=True, exist_ok=True)
     empty_file()
     village()

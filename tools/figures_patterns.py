@@ -5,6 +5,7 @@ Usage: python tools/figures_patterns.py [FILE]
 
 from __future__ import annotations
 
+import argparse
 import sys
 from dataclasses import dataclass
 from pathlib import Path
@@ -136,4 +137,6 @@ def main(target: Path = TARGET) -> None:
 
 
 if __name__ == "__main__":
-    main(*(Path(argument) for argument in sys.argv[1:2]))
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
+    parser.add_argument("file", type=Path, nargs="?", default=TARGET)
+    main(parser.parse_args().file)

@@ -5,6 +5,7 @@ Usage: python tools/figures_twin_ifc.py docs/pictures
 
 from __future__ import annotations
 
+import argparse
 import sys
 import tempfile
 from pathlib import Path
@@ -120,4 +121,6 @@ def _draw(mesh: tuple[np.ndarray, np.ndarray, np.ndarray], eye: np.ndarray, targ
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]))
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
+    parser.add_argument("folder", type=Path)
+    main(parser.parse_args().folder)

@@ -9,6 +9,7 @@ these share the scan and the images evenly. It needs a Blender that has a pixel 
 
 from __future__ import annotations
 
+import argparse
 import os
 import sys
 import tempfile
@@ -105,12 +106,17 @@ def _saving(area: float) -> float:
         return 1e6 * (time.process_time() - begin) / area
 
 
-def main(platforms: Sequence[str]) -> None:
+def main() -> None:
     """Command line."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
+    parser.add_argument("platforms", nargs="*", metavar="PLATFORM", help=f"{', '.join(SCENES)}; without any, all")
+    platforms = parser.parse_args().platforms or list(SCENES)
+    if unknown := set(platforms) - set(SCENES):
+        parser.error(f"no such platform: {', '.join(sorted(unknown))}; there are {', '.join(SCENES)}")
     if not HAS_RETURN_CAMERA:
         raise SystemExit("needs Blender 5.0 or newer: true colours are those of a pixel per return")
     found = read_json(FILE)["platforms"] if FILE.exists() else {}
-    for platform in platforms or SCENES:
+    for platform in platforms:
         found[platform] = measured(platform)
         data = {"command": "python tools/make_tradeoff_prior.py", "cores": CORES, "platforms": found}
         FILE.write_text(canonical_json(data), encoding="utf-8")
@@ -118,6 +124,6 @@ def main(platforms: Sequence[str]) -> None:
 
 
 if __name__ == "__main__":
-    main(sys.argv[1:])
+    main()
     sys.stdout.flush()
     os._exit(0)
