@@ -62,13 +62,12 @@ def scan(scenario: str, changes: list[str], folder: Path) -> laspy.LasData:
 
 def platforms(output: Path) -> None:
     """Draw the cloud of each platform from above, by class."""
-    figure, axes = pyplot.subplots(len(PLATFORMS), 1, figsize=(9, 3.9 * len(PLATFORMS)))
+    figure, axes = pyplot.subplots(len(PLATFORMS), 1, figsize=(9, 3.9 * len(PLATFORMS)), layout="constrained")
     with tempfile.TemporaryDirectory() as folder:
         for axis, (title, (name, changes)) in zip(axes, PLATFORMS.items(), strict=True):
             path = _trajectory(Path(folder), name, changes) if title == "trajectory file" else []
             cloud = scan(name, [*SHORT, *changes, *path], Path(folder) / "scan")
             _draw(axis, cloud, title)
-    figure.tight_layout()
     figure.savefig(output / "scan-platforms.png", dpi=100, metadata={"Software": None})
 
 
@@ -119,7 +118,7 @@ def _draw_colors(
     picture[place] = color[order]
     axis.imshow(picture, extent=(-REACH, REACH, -ASIDE, ASIDE), origin="lower", interpolation="nearest")
     axis.set_title(title, fontsize=10, loc="left")
-    axis.set(ylabel="m")
+    axis.set(ylabel="across (m)")
 
 
 def clouds(output: Path) -> None:
@@ -128,7 +127,7 @@ def clouds(output: Path) -> None:
     changes += ['road.environment.cloud_cover={"minimum":0.45,"maximum":0.45}']
     with tempfile.TemporaryDirectory() as folder:
         cloud = scan("rq31-600m", changes, Path(folder) / "scan")
-    figure, axes = pyplot.subplots(2, 1, figsize=(9, 7.6))
+    figure, axes = pyplot.subplots(2, 1, figsize=(9, 7.6), layout="constrained")
     time = np.asarray(cloud.gps_time)
     strips = np.asarray(cloud.point_source_id)
     for axis, strip in zip(axes, (1, 2), strict=True):
@@ -136,7 +135,6 @@ def clouds(output: Path) -> None:
         title = f"strip {strip}, {time[mine].min():.0f} to {time[mine].max():.0f} s"
         rgb = np.column_stack([cloud.red, cloud.green, cloud.blue])[mine] >> 8
         _draw_colors(axis, cloud, mine, rgb.astype(np.uint8), title)
-    figure.tight_layout()
     figure.savefig(output / "cloud-shadows.png", dpi=100, metadata={"Software": None})
 
 
