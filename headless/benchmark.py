@@ -9,6 +9,7 @@ import platform
 import subprocess
 import sys
 import tempfile
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +19,7 @@ if __name__ == "__main__":
 from headless.cli import Outcome, add_changes_argument, add_common_arguments, entry, progress_bar
 from synthroads_addon.core.benchmark import DEMO, QUICK, TABLE, judged, markdown
 from synthroads_addon.core.errors import InputError
+from synthroads_addon.core.files import output_folder
 from synthroads_addon.core.machine import available_cores, machine
 from synthroads_addon.core.marked import fill
 from synthroads_addon.core.scenario import Scenario, load_scenario
@@ -64,11 +66,12 @@ def run(arguments: argparse.Namespace) -> Outcome:
         found.update(_all(arguments))
         return {TABLE: markdown(found)}
 
-    table = fill(arguments.document, [TABLE], measured)[TABLE]
-    if arguments.output:
-        from synthroads_addon.core.files import output_folder
-
-        with output_folder(arguments.output, _FILES, arguments.overwrite) as folder:
+    with ExitStack() as opened:
+        folder = None
+        if arguments.output:
+            folder = opened.enter_context(output_folder(arguments.output, _FILES, arguments.overwrite))
+        table = fill(arguments.document, [TABLE], measured)[TABLE]
+        if folder:
             (folder / _FILES[0]).write_text(canonical_json(found), encoding="utf-8")
             (folder / _FILES[1]).write_text(table, encoding="utf-8")
     return 0, found, table + _verdict(found)

@@ -62,3 +62,13 @@ def test_wrong_numbers_of_cores_are_refused(capfd: pytest.CaptureFixture[str]) -
     assert "--cores is 0: must be 1 to" in capfd.readouterr().err
     assert main(["benchmark", "--document", "/nowhere/x.md", "--cores", "1"]) == 2
     assert "--document is '/nowhere/x.md': cannot be read" in capfd.readouterr().err
+
+
+def test_an_occupied_folder_is_refused_before_anything_is_measured(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "benchmark.md").write_text("mine")
+    monkeypatch.setattr("headless.benchmark._all", lambda _: pytest.fail("measured"))
+    assert main(["benchmark", "--cores", "1", "--output", str(tmp_path)]) == 2
+    assert "already holds benchmark.md" in capfd.readouterr().err
+    assert (tmp_path / "benchmark.md").read_text() == "mine"
