@@ -23,6 +23,7 @@ from ..parameters.model import (
     TrafficLight,
     TrafficSign,
 )
+from ..parameters.surface import highest_pavement
 from .faces import Faces, Float, loft
 from .surfaces import on_ground
 
@@ -122,13 +123,8 @@ def pavement_below(place: Place, x: tuple[float, float], y: tuple[float, float],
     beside, forth = (grid.ravel() for grid in np.meshgrid(across, np.linspace(*y, 7)))
     plan = place.origin[:2] + beside[:, None] * place.right + (forth + shear * beside)[:, None] * place.along
     station, offset = place.geometry.alignment.project(plan)
-    inside = (station >= 0.0) & (station <= place.geometry.length)
-    strip = place.geometry.strip_index(station, offset)
-    paved = np.array([item.class_name == "road" for item in place.geometry.strips])
-    inside &= (strip >= 0) & paved[strip]
-    if not inside.any():
-        return float(place.origin[2])
-    return float(np.max(place.geometry.elevation(station[inside], offset[inside])))
+    highest = highest_pavement(place.geometry, station, offset)
+    return float(place.origin[2]) if highest is None else highest
 
 
 def _circle(count: int) -> list[tuple[float, float]]:

@@ -14,7 +14,7 @@ from ..parameters.body_shapes import (
     BRIDGE_SEAT,
 )
 from ..parameters.model import Overpass
-from .ifc_clearance import highest_pavement
+from .ifc_clearance import pavement_below
 from .ifc_file import Entity
 from .ifc_scene import Place, Scene
 from .ifc_solids import Point2, Solids
@@ -38,7 +38,7 @@ class _Bridge:
         self.shear = math.tan(math.radians(item.rotation_deg))
         self.left, self.right = item.left_abutment - item.offset, item.right_abutment - item.offset
         along, across = (-item.width / 2.0, item.width / 2.0), (self.left, self.right)
-        pavement = highest_pavement(scene.geometry, self.place, along, across, self.shear)
+        pavement = pavement_below(scene.geometry, self.place, along, across, self.shear)
         self.low = pavement + item.clearance - float(self.place.origin[2])
         self.solids = Solids(scene.ifc)
 

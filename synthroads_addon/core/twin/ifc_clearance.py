@@ -7,6 +7,7 @@ import math
 import numpy as np
 
 from ..parameters.geometry import RoadGeometry
+from ..parameters.surface import highest_pavement
 from .ifc_scene import Place
 
 _ACROSS = 0.05
@@ -14,7 +15,7 @@ _ACROSS = 0.05
 _ROWS = 7
 
 
-def highest_pavement(
+def pavement_below(
     geometry: RoadGeometry, place: Place, along: tuple[float, float], across: tuple[float, float], shear: float = 0.0
 ) -> float:
     """Return the local elevation (m) of the pavement's highest point below something; without any, the place's.
@@ -33,9 +34,5 @@ def highest_pavement(
     cosine, sine = math.cos(place.heading), math.sin(place.heading)
     plan = place.origin[:2] + np.column_stack([cosine * x - sine * y, sine * x + cosine * y])
     station, offset = geometry.alignment.project(plan)
-    strip = geometry.strip_index(station, offset)
-    paved = np.array([each.class_name == "road" for each in geometry.strips] + [False])[strip]
-    paved &= (station >= 0.0) & (station <= geometry.length)
-    if not paved.any():
-        return float(place.origin[2])
-    return float(geometry.elevation(station[paved], offset[paved]).max())
+    highest = highest_pavement(geometry, station, offset)
+    return float(place.origin[2]) if highest is None else highest

@@ -7,7 +7,7 @@ import math
 from ..parameters.body_shapes import GANTRY_BOARD, GANTRY_DISPLAY, GANTRY_HANGER, GANTRY_OVERHANG
 from ..parameters.model import Gantry
 from ..parameters.model_furniture import GantrySign
-from .ifc_clearance import highest_pavement
+from .ifc_clearance import pavement_below
 from .ifc_file import Entity
 from .ifc_furniture import part_of
 from .ifc_scene import Place, Scene
@@ -32,7 +32,7 @@ class _Gantry:
         self.solids = Solids(scene.ifc, math.radians(item.rotation_deg))
         across = (item.left_offset - item.offset, item.right_offset - item.offset)
         along = (-self._reach(1.0), self._reach(-1.0))
-        pavement = highest_pavement(scene.geometry, self.place, along, across)
+        pavement = pavement_below(scene.geometry, self.place, along, across)
         self.low = pavement + item.clearance - float(self.place.origin[2])
         tallest = max((sign.height for sign in item.signs), default=0.0)
         self.bottom = self.low + max(tallest - item.beam_height, 0.0) * GANTRY_OVERHANG

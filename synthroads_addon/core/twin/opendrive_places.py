@@ -10,10 +10,9 @@ import numpy as np
 from ..errors import InputError
 from ..parameters.geometry import RoadGeometry
 from ..parameters.model import LineObject, PointObject
-from ..parameters.surface import surface_elevation
+from ..parameters.surface import highest_pavement, known_elevation
 from .opendrive_pieces import CLOSE, Float, chords, merged_stations
 
-_BLOCK = 20_000  # places looked up at a time
 _COLUMNS, _ROWS = 240, 7
 
 
@@ -44,18 +43,8 @@ class Ground:
 
     def height(self, station: Float, offset: Float) -> Float:
         """Return the height (N,) of road or ground above the reference line; the road's edge where there is no data."""
-        found = np.empty(station.shape)
-        for first in range(0, len(station), _BLOCK):
-            part = slice(first, first + _BLOCK)
-            s, t = np.clip(station[part], 0.0, self.geometry.length), offset[part]
-            height = surface_elevation(self.geometry, s, t)
-            unknown = np.flatnonzero(np.isnan(height))
-            if len(unknown):
-                edges = self.geometry.offsets(s[unknown])
-                within = np.clip(t[unknown], edges[:, -1], edges[:, 0])
-                height[unknown] = self.geometry.elevation(s[unknown], within)
-            found[part] = height - self.geometry.profile.elevation(s)
-        return found
+        along = np.clip(station, 0.0, self.geometry.length)
+        return known_elevation(self.geometry, along, offset) - self.geometry.profile.elevation(along)
 
     def along(self, item: LineObject, share: Callable[[Float], Float], kinks: list[float]) -> Float:
         """Return rows (N, 4) of station, offset, height of the ground and height of the object, m.
@@ -93,14 +82,8 @@ class Ground:
         middle, across = sum(stations) / 2.0, sum(offsets) / 2.0
         s, t = (grid.ravel() for grid in np.meshgrid(np.linspace(*stations, _ROWS), np.linspace(*offsets, _COLUMNS)))
         s = s + lean * (t - across)
-        inside = (s >= 0.0) & (s <= geometry.length)
-        s, t = s[inside], t[inside]
-        strips = geometry.strip_index(s, t)
-        paved = np.array([strip.class_name == "road" for strip in geometry.strips])
-        on = (strips >= 0) & paved[strips]
-        if not on.any():
-            return 0.0
-        return float(np.max(geometry.elevation(s[on], t[on]))) - float(geometry.profile.elevation(middle))
+        highest = highest_pavement(geometry, s, t)
+        return 0.0 if highest is None else highest - float(geometry.profile.elevation(middle))
 
 
 def ramp_share(item: LineObject, length: float) -> tuple[Callable[[Float], Float], list[float]]:

@@ -9,13 +9,12 @@ from ..parameters.geometry import RoadGeometry
 from ..parameters.model import Arrow, Hatching, LineMarking, Pothole, TemporaryBarrier
 from ..parameters.model_base import LineObject
 from ..parameters.painted_areas import arrow_outlines, hatching_outlines, pieces
-from ..parameters.surface import surface_elevation
+from ..parameters.surface import known_elevation
 from ..parameters.tessellation import sample_stations
 from .faces import FLAT, Faces, Int, compact, grid_corners, joined, quads, twist
 
 Float = NDArray[np.float64]
 
-_CHUNK = 20_000  # places whose height is looked up at a time: each needs a row of all strips
 
 
 def road_stations(geometry: RoadGeometry, tolerance: float) -> Float:
@@ -33,15 +32,7 @@ def on_ground(geometry: RoadGeometry, station: Float, offset: Float) -> Float:
     """
     plan, heading, _ = geometry.alignment.frame(station)
     left = np.stack([-np.sin(heading), np.cos(heading)], axis=1)
-    height = np.empty(station.shape)
-    for first in range(0, len(station), _CHUNK):
-        part = slice(first, first + _CHUNK)
-        height[part] = surface_elevation(geometry, station[part], offset[part])
-    unknown = np.flatnonzero(np.isnan(height))
-    if len(unknown):
-        edges = geometry.offsets(station[unknown])
-        height[unknown] = geometry.elevation(station[unknown], np.clip(offset[unknown], edges[:, -1], edges[:, 0]))
-    return np.column_stack([plan + offset[:, None] * left, height])
+    return np.column_stack([plan + offset[:, None] * left, known_elevation(geometry, station, offset)])
 
 
 # --- markings ---------------------------------------------------------------------------------------------------
