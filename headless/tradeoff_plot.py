@@ -10,6 +10,9 @@ from synthroads_addon.core.errors import InputError
 from synthroads_addon.core.tradeoff import KNOBS, ROW_TITLES, measured_of
 
 Row = Mapping[str, Any]
+_ORDER = list(KNOBS)
+_DECADES = 30.0
+"""An error that spans more than this is drawn on a logarithmic axis."""
 
 
 def plot(results: Sequence[Row], path: Path) -> None:
@@ -29,23 +32,45 @@ def plot(results: Sequence[Row], path: Path) -> None:
     panels = [name for name in ROW_TITLES if any(_varies(measured, knob, name) for knob in _knobs(measured))]
     columns = min(3, max(1, len(panels)))
     lines = -(-max(1, len(panels)) // columns)
-    figure, axes = pyplot.subplots(lines, columns, figsize=(5.2 * columns, 4.2 * lines), squeeze=False)
+    size = (5.2 * columns, 3.9 * lines + 0.6)
+    figure, axes = pyplot.subplots(lines, columns, figsize=size, squeeze=False, layout="constrained")
     for axis in axes.flat[len(panels) :]:
         axis.set_visible(False)
+    shown: dict[str, Any] = {}
     for axis, name in zip(axes.flat, panels, strict=False):
-        for knob in _knobs(measured):
+        for knob in sorted(_knobs(measured), key=_ORDER.index):
             if _varies(measured, knob, name):
-                _draw_knob(axis, [row for row in measured if row["knob"] == knob], knob, name)
-        axis.set(xlabel="processor time of the whole job (s)", ylabel=ROW_TITLES[name], xscale="log")
-        axis.xaxis.set_major_formatter("{x:g}")
-        axis.xaxis.set_minor_formatter("{x:g}")
-        axis.tick_params(axis="x", which="both", labelsize=7, rotation=45)
-        axis.set_ylim(0, 1.15 * axis.get_ylim()[1])
+                shown[_label(knob)] = _draw_knob(axis, [row for row in measured if row["knob"] == knob], knob, name)
+        _scale(axis, [abs(row["errors"][name]) for row in measured if name in row["errors"]])
+        axis.set(xlabel="processor time of the whole job (s)", ylabel=ROW_TITLES[name])
         axis.grid(alpha=0.3)
-        axis.legend(fontsize=8)
-    figure.tight_layout()
-    figure.savefig(path, dpi=110, metadata={"Software": None})
+    if shown:
+        figure.legend(shown.values(), shown.keys(), loc="outside lower center", ncols=5, fontsize=9, frameon=False)
+    figure.savefig(path, dpi=90, metadata={"Software": None})
     pyplot.close(figure)
+
+
+def _scale(axis: Any, errors: Sequence[float]) -> None:
+    """Make time logarithmic, and the error where it spans decades: linear below the smallest, to show exact ones."""
+    from matplotlib.ticker import LogLocator, NullFormatter
+
+    axis.set_xscale("log")
+    axis.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    axis.xaxis.set_major_formatter("{x:g}")
+    axis.xaxis.set_minor_formatter(NullFormatter())
+    axis.margins(x=0.12)
+    largest = max(errors, default=0.0) or 1.0
+    if _spans_decades(errors):
+        smallest = min(value for value in errors if value > 0.0)
+        axis.set_yscale("symlog", linthresh=smallest)
+        axis.yaxis.set_major_formatter("{x:g}")
+        axis.set_ylim(-0.7 * smallest, 2.0 * largest)
+    else:
+        axis.set_ylim(-0.1 * largest, 1.12 * largest)
+
+
+def _label(knob: str) -> str:
+    return {"between": "presets with one knob of another", "fidelity": "presets"}.get(knob, knob.replace("_", " "))
 
 
 def _knobs(measured: Sequence[Row]) -> list[str]:
@@ -57,23 +82,34 @@ def _whole_job(knob: str) -> bool:
 
 
 def _varies(measured: Sequence[Row], knob: str, name: str) -> bool:
-    """Return whether a knob changes a kind of error at all: a flat line says nothing."""
-    errors = [row["errors"][name] for row in measured if row["knob"] == knob and name in row["errors"]]
+    """Return whether a knob changes a kind of error, so that it can be seen: a flat line says nothing."""
+    errors = [abs(row["errors"][name]) for row in measured if row["knob"] == knob and name in row["errors"]]
     if _whole_job(knob):
         return bool(errors)
-    largest = max(abs(row["errors"].get(name, 0.0)) for row in measured)
-    if not errors or max(map(abs, errors)) < 0.05 * largest:
+    every = [abs(row["errors"][name]) for row in measured if name in row["errors"]]
+    if not errors or (not _spans_decades(every) and max(errors) < 0.05 * max(every)):
         return False
-    return max(errors) - min(errors) > 0.5 * max(map(abs, errors))
+    return max(errors) - min(errors) > 0.5 * max(errors)
 
 
-def _draw_knob(axis: Any, rows_of_knob: Sequence[Row], knob: str, name: str) -> None:
+def _spans_decades(errors: Sequence[float]) -> bool:
+    positive = [value for value in errors if value > 0.0]
+    return bool(positive) and max(positive) > _DECADES * min(positive)
+
+
+def _draw_knob(axis: Any, rows_of_knob: Sequence[Row], knob: str, name: str) -> Any:
+    """Draw the rows of a knob, those of a knob of its own joined, and say their values; return the handle."""
     preset = knob == "fidelity"
     style = "*" if preset else "x" if _whole_job(knob) else "o-"
-    x, y = [row["seconds"] for row in rows_of_knob], [row["errors"][name] for row in rows_of_knob]
-    label = "presets with one knob of another" if knob == "between" else knob.replace("_", " ")
-    axis.plot(x, y, style, label=label, markersize=14 if preset else 6)
+    colour = "black" if preset else "0.55" if _whole_job(knob) else f"C{_ORDER.index(knob) % 10}"
+    x, y = [row["seconds"] for row in rows_of_knob], [abs(row["errors"][name]) for row in rows_of_knob]
+    (handle,) = axis.plot(x, y, style, color=colour, markersize=13 if preset else 5, zorder=3 if preset else 2)
     for row, a, b in zip(rows_of_knob, x, y, strict=True):
         if knob != "between":
-            place = (8, -14 if preset else 5)
-            axis.annotate(str(row["value"]), (a, b), textcoords="offset points", xytext=place, fontsize=8)
+            place = (7, 7) if preset else (4, 4 if b > 0.0 else -11)
+            weight = "bold" if preset else "normal"
+            text = str(row["value"])
+            axis.annotate(
+                text, (a, b), textcoords="offset points", xytext=place, fontsize=8, color=colour, weight=weight
+            )
+    return handle
