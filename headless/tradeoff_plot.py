@@ -104,12 +104,10 @@ def _draw_knob(axis: Any, rows_of_knob: Sequence[Row], knob: str, name: str) -> 
     colour = "black" if preset else "0.55" if _whole_job(knob) else f"C{_ORDER.index(knob) % 10}"
     x, y = [row["seconds"] for row in rows_of_knob], [abs(row["errors"][name]) for row in rows_of_knob]
     (handle,) = axis.plot(x, y, style, color=colour, markersize=13 if preset else 5, zorder=3 if preset else 2)
+    if knob == "between":
+        return handle
     for row, a, b in zip(rows_of_knob, x, y, strict=True):
-        if knob != "between":
-            place = (7, 7) if preset else (4, 4 if b > 0.0 else -11)
-            weight = "bold" if preset else "normal"
-            text = str(row["value"])
-            axis.annotate(
-                text, (a, b), textcoords="offset points", xytext=place, fontsize=8, color=colour, weight=weight
-            )
+        place = (7, 7) if preset else (4, 4 if b > 0.0 else -11)
+        look: dict[str, Any] = {"fontsize": 8, "color": colour, "weight": "bold" if preset else "normal"}
+        axis.annotate(str(row["value"]), (a, b), textcoords="offset points", xytext=place, **look)
     return handle

@@ -40,7 +40,7 @@ def cell_keys(cells: NDArray[np.float64]) -> NDArray[np.int64]:
     """
     low = cells.min(axis=0)
     spans = cells.max(axis=0) - low + 1
-    if not float(np.prod(spans)) < 2**62:
+    if not float(np.prod(spans)) < 2**62:  # so that NaN is refused too
         text = " x ".join(f"{span:.0f}" for span in spans)
         raise InputError("coord", text, "must span fewer than 2^62 cells in all")
     relative = (cells - low).astype(np.int64)

@@ -16,7 +16,6 @@ from .faces import FLAT, Faces, Int, compact, grid_corners, joined, quads, twist
 Float = NDArray[np.float64]
 
 
-
 def road_stations(geometry: RoadGeometry, tolerance: float) -> Float:
     """Return the (N,) stations at which the road's surface is sampled; the ends of dashes don't matter to it."""
     parameters = geometry.parameters
