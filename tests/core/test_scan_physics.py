@@ -9,7 +9,6 @@ from hypothesis import strategies as st
 
 from synthroads_addon.core.materials import materials
 from synthroads_addon.core.scan_scenario import Noise, Weather
-from synthroads_addon.core.scanning import scan as scan_module
 from synthroads_addon.core.scanning.motion import LinearMotion, MovingMesh
 from synthroads_addon.core.scanning.scan import Scan, beam_rays, scan_block, scan_pulses
 from synthroads_addon.core.scanning.surfaces import surfaces_of
@@ -279,13 +278,3 @@ def test_platform_errors_have_their_size_and_the_truth_is_kept() -> None:
     assert (shaken.xyz - calm.xyz).std(axis=0) == pytest.approx(np.full(3, 0.03), rel=0.1)
     on_ground = calm.true_xyz[:, 2] - ORIGIN[2]
     assert np.abs(on_ground).max() < 1e-4
-
-
-def test_results_do_not_depend_on_the_chunks(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Blocks are worked on in chunks that fit a processor's cache; their size changes no bit."""
-    scan = replace(leaf_scan(0.4, rays=19, range_sigma=0.01), noise=Noise(angle_sigma_mrad=0.1, dropout=0.1))
-    strip = scan.path.strips[0]
-    whole = scan_pulses(scan, strip, 0, 3000).points
-    monkeypatch.setattr(scan_module, "RAYS_PER_CHUNK", 777)
-    for name, array in scan_pulses(scan, strip, 0, 3000).points.attributes().items():
-        np.testing.assert_array_equal(array, getattr(whole, name), err_msg=name)

@@ -33,7 +33,8 @@ class EmbreeCaster:
             used, corners = np.unique(triangles, return_inverse=True)
             corners = corners.reshape(triangles.shape).astype(np.int32)
             self._meshes.append(TriangleMesh(self._scene, mesh.vertices[used], corners))
-        self._firsts = np.array(firsts, np.int32)
+        self._firsts = np.array([*firsts, 0], np.int32)
+        "First face of each mesh; the last is that of none, -1."
         if self._meshes:
             # The tree is built by the first ray: cast one here, before threads do.
             self._scene.run(np.zeros((1, 3), np.float32), np.array([[0, 0, 1]], np.float32))
@@ -48,5 +49,4 @@ class EmbreeCaster:
         if len(self._meshes) == 1:
             return np.asarray(self._scene.run(origins, directions, dists=limit))
         found = self._scene.run(origins, directions, dists=limit, output=1)
-        mesh, face = found["geomID"], found["primID"]
-        return np.where(mesh >= 0, self._firsts[np.maximum(mesh, 0)] + face, np.int32(-1))
+        return np.asarray(np.take(self._firsts, found["geomID"]) + found["primID"])

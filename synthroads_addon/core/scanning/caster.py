@@ -73,9 +73,11 @@ class FacePlanes:
         """
         # Clipped, indices needn't be checked one by one before.
         height, product = np.take(self.planes[3], faces, mode="clip"), np.empty(faces.shape)
-        along = np.zeros(faces.shape)
-        for i in range(3):
-            normal = np.take(self.planes[i], faces, mode="clip")
+        normal = np.take(self.planes[0], faces, mode="clip")
+        along = normal * directions[0]
+        height -= np.multiply(normal, origins[0], out=product)
+        for i in (1, 2):
+            np.take(self.planes[i], faces, mode="clip", out=normal)
             along += np.multiply(normal, directions[i], out=product)
             height -= np.multiply(normal, origins[i], out=product)
         with np.errstate(divide="ignore", invalid="ignore"):

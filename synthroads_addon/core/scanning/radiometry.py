@@ -123,16 +123,17 @@ def received(share: ArrayLike, distance: ArrayLike, attenuation: float = 0.0, em
         emitted: I0.
     """
     distance = np.asarray(distance, dtype=np.float64)
-    reach = np.maximum(distance, NEAREST)
+    far = bool(np.all(distance >= NEAREST))
+    reach = distance if far else np.maximum(distance, NEAREST)
     # Underflow in dense fog is a true zero, and so is what comes back from infinitely far away.
     with np.errstate(under="ignore", over="ignore"):
-        intensity = np.asarray(share, dtype=np.float64) / (reach * reach)
+        intensity = np.asarray(np.asarray(share, dtype=np.float64) / (reach * reach))
         if emitted != 1.0:
-            intensity = intensity * emitted
+            intensity *= emitted
         if attenuation > 0.0:
-            intensity = intensity * np.exp(-attenuation * reach)
-    nowhere = ~(distance > 0.0)
-    return np.asarray(np.where(nowhere, 0.0, intensity) if nowhere.any() else intensity)
+            left = np.asarray(reach * -attenuation)
+            intensity *= np.exp(left, out=left)
+    return intensity if far else np.where(distance > 0.0, intensity, 0.0)
 
 
 def lambert_intensity(

@@ -85,9 +85,18 @@ def _whole_pulses(pulse: Index, nearest: Float, first: Marks) -> Echoes:
         total = first.weight.sum(axis=0)
         mean = nearest + near.sum(axis=0) / total
     energy = first.intensity.sum(axis=0)
-    strongest = first.intensity.argmax(axis=0)
+    strongest = _brightest_ray(first.intensity)
     columns = (np.take(array, pulse) for array in (mean, energy, total))
     return Echoes(pulse, np.take(strongest, pulse) * pulses + pulse, *columns)
+
+
+def _brightest_ray(energy: Float) -> Index:
+    """Return the first ray (P,) of those with the most energy (K, P); ``argmax`` takes three times as long."""
+    most, result = energy[0].copy(), np.zeros(energy.shape[1], dtype=np.intp)
+    for ray, row in enumerate(energy[1:], 1):
+        np.copyto(result, ray, where=row > most)
+        np.maximum(most, row, out=most)
+    return result
 
 
 def _split_pulses(chosen: Index, first: Marks, behind: Marks, pulse: Index, resolution: float) -> Echoes:
@@ -98,7 +107,7 @@ def _split_pulses(chosen: Index, first: Marks, behind: Marks, pulse: Index, reso
     hit = np.concatenate([ray * pulses + chosen[column], rays * pulses + np.arange(len(pulse))])
     owner = np.concatenate([chosen[column], pulse])
     reach = np.concatenate([near[ray, column], behind.distance])
-    # One key for both: ranges of some kilometres keep a micrometre beside the pulses of a chunk.
+    # One key for both: ranges of some kilometres keep a micrometre beside the pulses of a block.
     order = np.argsort(owner * (2.0 * max(1.0, float(reach.max()))) + reach, kind="stable")
     hit, owner, reach = hit[order], owner[order], reach[order]
     begins = np.ones(len(hit), dtype=bool)

@@ -28,8 +28,6 @@ from .track import Track
 Float = NDArray[np.float64]
 Index = NDArray[np.intp]
 
-RAYS_PER_CHUNK = 2**16
-"""Rays that are worked on at once: fewer are slow by the number of calls, more by memory. No result depends on it."""
 LENIENT = 0.25
 """Share of the threshold that is enough for an echo whose intensity is yet to change: none is expected to become four
 times as bright as its material's mean makes it."""
@@ -144,34 +142,19 @@ def scan_block(scan: Scan, strip: Strip, block: int) -> BlockResult:
 
 
 def scan_pulses(scan: Scan, strip: Strip, first: int, count: int, key: int = 0) -> BlockResult:
-    """Scan pulses ``first`` to ``first + count`` of a strip; ``key`` is that of their random numbers."""
+    """Scan pulses ``first`` to ``first + count`` of a strip at once; ``key`` is that of their random numbers.
+
+    A block isn't cut any smaller, though its arrays leave the processor's cache: blocks are scanned side by side in
+    threads that take turns in Python, so that few long calls beat many short ones.
+    """
     errors = Errors.drawn(scan, strip, count, key)
     poses = Poses.between(scan, strip, *(scan.cut.time(strip, i) for i in (first, first + count - 1)))
-    size = max(1, RAYS_PER_CHUNK // scan.rays_per_pulse)
-    parts = [
-        _scan_chunk(scan, strip, poses, errors, first + start, start, min(size, count - start))
-        for start in range(0, count, size)
-    ]
-    return replace(joined_results(parts), blocks=1)
-
-
-def _scan_chunk(
-    scan: Scan, strip: Strip, poses: Poses, errors: Errors, first: int, offset: int, count: int
-) -> BlockResult:
-    """Scan a few pulses: their arrays stay in the processor's cache.
-
-    Args:
-        errors: of the whole block.
-        first: first pulse, counted within the strip.
-        offset: the same, counted within the block.
-    """
-    own = slice(offset, offset + count)
-    pulses = make_pulses(scan, strip, poses, None if errors.angle is None else errors.angle[:, own], first, count)
-    number = np.arange(offset, offset + count)  # of each pulse within the block
+    pulses = make_pulses(scan, strip, poses, errors.angle, first, count)
+    number = np.arange(count)  # of each pulse within the block
     towards = reaching_scene(scan, pulses, poses.motions)
     if towards is not None:
-        chosen = np.flatnonzero(towards)
-        pulses, number = pulses.select(chosen), number[chosen]
+        number = np.flatnonzero(towards)
+        pulses = pulses.select(number)
     rays = beam_rays(scan, pulses, poses.motions)
     traced = trace(
         scan.target, scan.surfaces, rays, poses.motions, scan.setting.minimum_range, scan.setting.maximum_range
@@ -209,7 +192,7 @@ def beam_rays(scan: Scan, pulses: Pulses, motions: list[Track]) -> Rays:
 
 
 def echoes_of(scan: Scan, traced: Traced) -> Echoes:
-    """Return the returns of a chunk, before the threshold."""
+    """Return the returns of traced rays, before the threshold."""
     first, behind = (_marks(scan, hits) for hits in (traced.first, traced.behind))
     return group_returns(first, behind, traced.pulse, scan.setting.range_resolution)
 

@@ -180,11 +180,8 @@ def _part(mesh: SceneMesh, caster: Caster, first: int) -> _Part:
 def _cast(part: _Part, origins: Float, directions: Float, maximum_range: float) -> Met:
     """Cast rays at one part in its own frame; face numbers are those of all parts."""
     shape = directions.shape[1:]
-    single = np.empty((2, *shape, 3), dtype=np.float32)
-    for i in range(3):
-        single[0, ..., i] = origins[i]
-        single[1, ..., i] = directions[i]
-    found = part.caster.cast(single[0].reshape(-1, 3), single[1].reshape(-1, 3), maximum_range)
+    single = (np.broadcast_to(_rows(array), (*shape, 3)).reshape(-1, 3) for array in (origins, directions))
+    found = part.caster.cast(*single, maximum_range)
     face = found.reshape(shape).astype(np.intp)
     if not part.count:
         return Met(face, np.full(shape, np.inf), np.zeros(shape))
@@ -199,6 +196,14 @@ def _cast(part: _Part, origins: Float, directions: Float, maximum_range: float) 
     if part.first or edge_on:
         face[missed] = -1
     return Met(face, distance, along)
+
+
+def _rows(vectors: Float) -> NDArray[np.float32]:
+    """Return vectors (3, ...) as casters take them, (..., 3)."""
+    result = np.empty((*vectors.shape[1:], 3), dtype=np.float32)
+    for i in range(3):
+        result[..., i] = vectors[i]
+    return result
 
 
 def _cast_moving(

@@ -47,7 +47,7 @@ class Hits:
 
     Attributes:
         face: number among all faces of the target; -1 for none.
-        material: uint16 of the face; any for none.
+        material: of the face; any for none. As wide as indices are: looking tables up is several times faster then.
         distance: range from the ray's origin, m; inf for none, or where it is out of the device's reach.
         along: n . d of the face's normal and the ray.
         share: of the pulse's energy that the surface takes: what arrives less what goes through. It may spread to the
@@ -55,7 +55,7 @@ class Hits:
     """
 
     face: NDArray[np.intp]
-    material: NDArray[np.uint16]
+    material: NDArray[np.intp]
     distance: Float
     along: Float
     share: Float
@@ -108,7 +108,7 @@ def trace(
     The shares taken along one ray never add up to more than its own.
     """
     met = target.cast(rays.origin, rays.direction, farthest, rays.time, motions)
-    material = np.take(target.material, met.face, mode="clip")
+    material = np.take(target.material, met.face, mode="clip").astype(np.intp)
     if not surfaces.permeable:
         first = Hits(met.face, material, _within(met.distance, nearest, np.inf), met.along, rays.share)
         return _traced(rays, first, [], [])
@@ -127,14 +127,15 @@ def trace(
         if not len(bright):
             break
         on, left, start = on[bright], left[bright], start[bright] + _BEYOND
-        ray, pulse = np.divmod(on, material.shape[1])
-        direction = rays.direction[:, ray, pulse]
-        origin = rays.origin[:, ray if rays.origin.shape[1] > 1 else 0, pulse] + start * direction
+        pulse = on % material.shape[1]
+        direction = np.take(rays.direction.reshape(3, -1), on, axis=1)
+        origin = np.take(rays.origin.reshape(3, -1), on if rays.origin.shape[1] > 1 else pulse, axis=1)
+        origin += start * direction
         met = target.cast(origin, direction, farthest, rays.time[pulse], motions)
         hit = np.flatnonzero(met.face >= 0)
         on, left, start = on[hit], left[hit], start[hit] + met.distance[hit]
         face = met.face[hit]
-        own = np.take(target.material, face)
+        own = np.take(target.material, face).astype(np.intp)
         through = np.take(surfaces.transmission, own)
         layers.append(Hits(face, own, _within(start, nearest, farthest), met.along[hit], left * (1.0 - through)))
         rays_on.append(on)
