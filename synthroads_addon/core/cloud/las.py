@@ -32,7 +32,7 @@ NO_STRIP = 65535
 _CHUNK = 50_000
 """Points in a chunk of LAZ, the unit of its compression: whole ones are compressed side by side."""
 _BUFFER = 8 * _CHUNK
-_SLICE = 32_768
+_SLICE = 16_384
 """Points that are packed at a time: their intermediate arrays then stay in the processor's cache."""
 
 
@@ -43,7 +43,7 @@ class LasWriter(CloudWriter):
 
     def _open(self) -> None:
         self._header = self._make_header()
-        self._codes = self.scheme.las_codes()
+        self._codes = self.scheme.las_codes()[self.scheme.ids]
         self._file = self._temporary.open("wb")
         self._writer = laspy.LasWriter(
             self._file,
@@ -110,13 +110,12 @@ class LasWriter(CloudWriter):
         record["point_source_id"] = self.integers(block.strip, "uint16", "strip") + np.uint16(1)
         for column in self.columns:
             record[column.name] = self.stored(column, block)
-        record["classification"] = self._codes[record["class_id"]]
+        record["classification"] = np.take(self._codes, self.integers(block.class_id, "uint8", "class_id"))
 
     def _pack_coordinates(self, xyz: NDArray[np.float64], record: NDArray[Any]) -> None:
         steps = np.empty((3, len(xyz)))  # a row per axis: its extremes are found ten times as fast
         np.subtract(xyz.T, self._header.offsets[:, None], out=steps)
-        steps *= 1.0 / SCALE
-        np.rint(steps, out=steps)
+        np.rint(np.multiply(steps, 1.0 / SCALE, out=steps), out=steps)
         low, high = steps.min(axis=1), steps.max(axis=1)
         if not (np.all(low >= -(2**31)) and np.all(high < 2**31)):
             worst = xyz[np.abs(steps).max(axis=0).argmax()]
@@ -133,7 +132,7 @@ class LasWriter(CloudWriter):
         if most > 15:
             raise OutputError(str(self.path), int(most), "returns of a pulse must be at most 15")
         record["bit_fields"] = number | (of << np.uint8(4))
-        self._by_return += np.bincount(number, minlength=16)
+        self._by_return += [np.count_nonzero(number == k) for k in range(16)]  # faster than to sort them into bins
 
     def _scan_angle(self, block: PointBlock) -> NDArray[np.int16]:
         steps = self.integers(block.scan_angle_deg, "int16", "scan_angle", SCAN_ANGLE_STEP)

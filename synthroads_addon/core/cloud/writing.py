@@ -134,7 +134,9 @@ class CloudWriter(ABC):
         if values.dtype == np.dtype(kind) and scale is None:
             return values
         limits = np.iinfo(kind)
-        steps = np.rint(values * (1.0 / scale) if scale else values)
+        steps = np.asarray(values * (1.0 / scale)) if scale else np.array(values)
+        if steps.dtype.kind == "f":
+            np.rint(steps, out=steps)
         low, high = steps.min(), steps.max()
         if not (low >= limits.min and high <= limits.max):
             worst = low if not low >= limits.min else high
@@ -152,7 +154,7 @@ class CloudWriter(ABC):
 
     def own_class_ids(self, block: PointBlock) -> NDArray[np.uint8]:
         """Return the block's classes (N,) in the file's scheme."""
-        return self.scheme.ids[self.integers(block.class_id, "uint8", "class_id")]
+        return np.take(self.scheme.ids, self.integers(block.class_id, "uint8", "class_id"))
 
     def stored(self, column: Column, block: PointBlock) -> NDArray[Any]:
         """Return a column (N,) of a block as the integers that LAS and E57 store."""
