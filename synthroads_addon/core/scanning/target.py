@@ -180,8 +180,8 @@ def _part(mesh: SceneMesh, caster: Caster, first: int) -> _Part:
 def _cast(part: _Part, origins: Float, directions: Float, maximum_range: float) -> Met:
     """Cast rays at one part in its own frame; face numbers are those of all parts."""
     shape = directions.shape[1:]
-    single = (np.broadcast_to(_rows(array), (*shape, 3)).reshape(-1, 3) for array in (origins, directions))
-    found = part.caster.cast(*single, maximum_range)
+    begin, towards = (np.broadcast_to(_rows(array), (*shape, 3)).reshape(-1, 3) for array in (origins, directions))
+    found = part.caster.cast(begin, towards, maximum_range)
     face = found.reshape(shape).astype(np.intp)
     if not part.count:
         return Met(face, np.full(shape, np.inf), np.zeros(shape))
