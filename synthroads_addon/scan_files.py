@@ -77,6 +77,7 @@ def make_scan(
         wanted=measured_arrays(scenario),
         targets=needs_targets(scenario),
         detects_later=scenario.colour.intensity_from_layers,
+        driven=scenario.scan.platform.kind == "vehicle",
     )
 
 

@@ -14,6 +14,7 @@ from synthroads_addon.core.scanning.scan import Scan, beam_rays, scan_block, sca
 from synthroads_addon.core.scanning.surfaces import surfaces_of
 from synthroads_addon.core.scanning.trace import trace
 from synthroads_addon.core.scanning.weather import attenuation
+from synthroads_addon.core.scene_mesh import SceneMesh
 from tests.core.scan_scenes import ORIGIN, Standing, echoes_and_pulses, mesh_of, middle_pulses, plane, scan_of
 
 
@@ -212,16 +213,20 @@ def ground_points() -> np.ndarray:
 # --- motion ---------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("rays", [1, 7])
-def test_a_moving_box_unwarped_by_its_points_times_is_the_box(rays: int) -> None:
-    """A box drives at 30 m/s below a scanner that flies at 8: its points, brought back by their times, lie on it."""
-    box = mesh_of(
+def box(class_id: int, instance: int = 7) -> SceneMesh:
+    """Return a box of 4 x 2 x 1.5 m that stands on the ground and has no bottom."""
+    mesh = mesh_of(
         [(x, y, z) for x in (-2.0, 2.0) for y in (-1.0, 1.0) for z in (0.0, 1.5)],
         [(0, 1, 3), (0, 3, 2), (4, 6, 7), (4, 7, 5), (0, 4, 5), (0, 5, 1), (2, 3, 7), (2, 7, 6), (1, 5, 7), (1, 7, 3)],
     )
-    box = replace(box, class_id=np.full(10, 14, dtype=np.uint8))
+    return replace(mesh, class_id=np.full(10, class_id, np.uint8), instance_id=np.full(10, instance, np.uint32))
+
+
+@pytest.mark.parametrize("rays", [1, 7])
+def test_a_moving_box_unwarped_by_its_points_times_is_the_box(rays: int) -> None:
+    """A box drives at 30 m/s below a scanner that flies at 8: its points, brought back by their times, lie on it."""
     velocity = np.array([-30.0, 0.5, 0.0])
-    moving = MovingMesh(box, LinearMotion(velocity, place=(3.0, 0.0, 0.0)))
+    moving = MovingMesh(box(14), LinearMotion(velocity, place=(3.0, 0.0, 0.0)))
     scan = scan_of(plane(), rays, Standing(60.0, speed=8.0), moving=[moving])
     points = scan_pulses(scan, scan.path.strips[0], 0, 30_000).points
     mine = points.select(points.class_id == 14)
@@ -235,6 +240,25 @@ def test_a_moving_box_unwarped_by_its_points_times_is_the_box(rays: int) -> None
         assert np.median(np.abs(outside.max(axis=1))) < 1e-3
     warped = np.abs(mine.xyz - ORIGIN - (3.0, 0.0, 0.75)) - (2.0, 1.0, 0.75)
     assert np.abs(warped.max(axis=1)).max() > 0.5  # motion distortion is there to be undone
+
+
+@pytest.mark.parametrize("driven", [True, False])
+def test_nothing_drives_through_the_scanner_s_own_vehicle(driven: bool) -> None:
+    """One box catches up with a scanner 1 m above the road in its lane, another one in the lane beside it."""
+    lanes = {1: 0.0, 2: 3.5}
+    moving = [
+        MovingMesh(box(14, lane), LinearMotion((28.0, 0.0, 0.0), place=(-7.0, y, 0.0))) for lane, y in lanes.items()
+    ]
+    scan = replace(scan_of(plane(), path=Standing(1.0, 20.0), moving=moving, minimum_range=0.1), driven=driven)
+    points = scan_pulses(scan, scan.path.strips[0], 0, 150_000).points
+    seen = {lane: points.gps_time[points.instance_id == lane] for lane in lanes}
+    if not driven:
+        assert len(seen[1]) > 20_000  # all around, from inside
+        return
+    assert len(seen[1]) == 0
+    assert len(seen[2]) > 1000
+    # It is beside the scanner while it gains 5 to 9 m, at 8 m/s.
+    assert (seen[2].min(), seen[2].max()) == pytest.approx((5.0 / 8.0, 9.0 / 8.0), abs=0.02)
 
 
 # --- noise ----------------------------------------------------------------------------------------------------------

@@ -50,6 +50,7 @@ class Scan:
         frame: (3,) where the scene's local frame begins, in the coordinates of the surfaces' random fields, m: those of
             the whole road where only a section of it is scanned.
         only: blocks that are scanned, in their order; all if None.
+        driven: whether a vehicle carries the scanner.
     """
 
     target: Target
@@ -66,6 +67,7 @@ class Scan:
     detects_later: bool = False
     frame: Float = field(default_factory=lambda: np.zeros(3))
     only: tuple[Block, ...] | None = None
+    driven: bool = False
     pattern: BeamPattern = field(init=False)
 
     def __post_init__(self) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -11,12 +12,15 @@ from numpy.typing import NDArray
 
 from ..scene_mesh import SceneMesh
 from .caster import Caster, FacePlanes
-from .motion import MovingMesh, ScannedScene
+from .motion import MovingMesh, Pose, ScannedScene
 from .track import Track
 
 Float = NDArray[np.float64]
 Faces = NDArray[np.intp]
+Place = Callable[[Float], Float]
 
+CLEARANCE = np.array([2.5, 1.0, 3.0])
+"""What a vehicle that carries the scanner takes up around it: half its length and width, and its height, m."""
 _CHUNK = 512
 """Rays side by side that are told together whether they come near a moving object."""
 
@@ -27,7 +31,8 @@ class _Part:
 
     Attributes:
         first: number of its first face among all.
-        radius: of the sphere around ``centre`` (own frame) that holds it, m.
+        half: (3,) half the size of the box around ``centre`` (own frame) that holds it, m.
+        radius: of the sphere that holds it, m.
     """
 
     caster: Caster
@@ -35,6 +40,7 @@ class _Part:
     first: int
     count: int
     centre: Float
+    half: Float
     radius: float
 
 
@@ -91,9 +97,18 @@ class Target:
             else None
         )
 
-    def motions(self, begin: float, end: float, spacing: float) -> list[Track]:
-        """Return the moving parts' poses between two times, on knots ``spacing`` (s) apart."""
-        return [Track.of(part.motion.pose, begin, end, spacing) for part in self.moving]
+    def motions(self, begin: float, end: float, spacing: float, driven: Place | None = None) -> list[Track]:
+        """Return the moving parts' poses between two times, on knots ``spacing`` (s) apart.
+
+        Args:
+            driven: where (K, 3) the scanner is at times (K,), local, m, if a vehicle carries it. What drives through
+                this vehicle isn't there meanwhile: others' ways know nothing of it.
+        """
+        poses = (part.motion.pose for part in self.moving)
+        if driven is not None:
+            pairs = zip(poses, self._parts[1:], strict=True)
+            poses = (partial(_pose_out_of_the_way, pose, part, driven) for pose, part in pairs)
+        return [Track.of(pose, begin, end, spacing) for pose in poses]
 
     def moving_bounds(self, motions: list[Track]) -> list[Float]:
         """Return (2, 3) smallest and largest corner that each moving part reaches on its way, if it is there."""
@@ -173,8 +188,16 @@ def _part(mesh: SceneMesh, caster: Caster, first: int) -> _Part:
     else:
         low = high = np.zeros(3)
     centre = (low + high) / 2.0
-    radius = float(np.linalg.norm(high - low) / 2.0) + 1e-3
-    return _Part(caster, FacePlanes(mesh), first, len(mesh.triangles), centre, radius)
+    half = (high - low) / 2.0
+    radius = float(np.linalg.norm(half)) + 1e-3
+    return _Part(caster, FacePlanes(mesh), first, len(mesh.triangles), centre, half, radius)
+
+
+def _pose_out_of_the_way(pose: Callable[[Float], Pose], part: _Part, driven: Place, time: Float) -> Pose:
+    """Return poses (K,) of a part at times (K,), see `Motion`; it isn't there where the scanner's vehicle is."""
+    rotation, place, present = pose(time)
+    own = np.einsum("kji,kj->ki", rotation, driven(time) - place) - part.centre
+    return rotation, place, present & (np.abs(own) > part.half + CLEARANCE).any(axis=1)
 
 
 def _cast(part: _Part, origins: Float, directions: Float, maximum_range: float) -> Met:
