@@ -100,9 +100,6 @@ class Poses:
             position, rotation = scan.path.pose(strip, time)
             return rotation, position, np.ones(len(time))
 
-        def driven(time: Float) -> Float:
-            return scan.path.pose(strip, time)[0]
-
         def measured(time: Float) -> tuple[Float, Float, Float]:
             errors = TrajectoryNoise(scan.noise, scan.seed, strip).errors(time)
             position, rotation = measured_pose(*scan.path.pose(strip, time), errors)
@@ -114,7 +111,7 @@ class Poses:
             track,
             # Linear between knots, errors would lose some of their spread if they changed much meanwhile.
             Track.of(measured, begin, end, min(spacing, scan.noise.correlation_time / 50.0)) if noisy else track,
-            scan.target.motions(begin, end, min(spacing, _MOTION_KNOTS), driven if scan.driven else None),
+            scan.target.motions(begin, end, min(spacing, _MOTION_KNOTS), track if scan.driven else None),
         )
 
 

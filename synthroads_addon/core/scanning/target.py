@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
-from functools import partial
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -12,12 +11,11 @@ from numpy.typing import NDArray
 
 from ..scene_mesh import SceneMesh
 from .caster import Caster, FacePlanes
-from .motion import MovingMesh, Pose, ScannedScene
-from .track import Track
+from .motion import MovingMesh, ScannedScene
+from .track import Track, track_knots
 
 Float = NDArray[np.float64]
 Faces = NDArray[np.intp]
-Place = Callable[[Float], Float]
 
 CLEARANCE = np.array([2.5, 1.0, 3.0])
 """What a vehicle that carries the scanner takes up around it: half its length and width, and its height, m."""
@@ -97,18 +95,18 @@ class Target:
             else None
         )
 
-    def motions(self, begin: float, end: float, spacing: float, driven: Place | None = None) -> list[Track]:
+    def motions(self, begin: float, end: float, spacing: float, driven: Track | None = None) -> list[Track]:
         """Return the moving parts' poses between two times, on knots ``spacing`` (s) apart.
 
         Args:
-            driven: where (K, 3) the scanner is at times (K,), local, m, if a vehicle carries it. What drives through
-                this vehicle isn't there meanwhile: others' ways know nothing of it.
+            driven: the scanner's, if a vehicle carries it. What drives through this vehicle isn't there meanwhile:
+                others' ways know nothing of it.
         """
-        poses = (part.motion.pose for part in self.moving)
-        if driven is not None:
-            pairs = zip(poses, self._parts[1:], strict=True)
-            poses = (partial(_pose_out_of_the_way, pose, part, driven) for pose, part in pairs)
-        return [Track.of(pose, begin, end, spacing) for pose in poses]
+        tracks = [Track.of(part.motion.pose, begin, end, spacing) for part in self.moving]
+        if driven is None or not tracks:
+            return tracks
+        _, scanner, _ = driven.at(track_knots(begin, end, spacing))
+        return [_out_of_the_way(track, part, scanner) for track, part in zip(tracks, self._parts[1:], strict=True)]
 
     def moving_bounds(self, motions: list[Track]) -> list[Float]:
         """Return (2, 3) smallest and largest corner that each moving part reaches on its way, if it is there."""
@@ -193,11 +191,11 @@ def _part(mesh: SceneMesh, caster: Caster, first: int) -> _Part:
     return _Part(caster, FacePlanes(mesh), first, len(mesh.triangles), centre, half, radius)
 
 
-def _pose_out_of_the_way(pose: Callable[[Float], Pose], part: _Part, driven: Place, time: Float) -> Pose:
-    """Return poses (K,) of a part at times (K,), see `Motion`; it isn't there where the scanner's vehicle is."""
-    rotation, place, present = pose(time)
-    own = np.einsum("kji,kj->ki", rotation, driven(time) - place) - part.centre
-    return rotation, place, present & (np.abs(own) > part.half + CLEARANCE).any(axis=1)
+def _out_of_the_way(track: Track, part: _Part, scanner: Float) -> Track:
+    """Return a part's track on which it isn't there where the scanner's vehicle is; places (3, K) at its knots."""
+    own = _inverse(track.rotation, scanner - track.position)
+    away = (np.abs(own.T - part.centre) > part.half + CLEARANCE).any(axis=1)
+    return replace(track, present=track.present & away)
 
 
 def _cast(part: _Part, origins: Float, directions: Float, maximum_range: float) -> Met:
