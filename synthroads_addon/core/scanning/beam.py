@@ -176,12 +176,10 @@ def _combined(terms: Sequence[tuple[Float, Float]], rays: int) -> Float:
     The pulses stand side by side, as there are many more of them: rows that long are worked on fastest.
     """
     pulses = terms[0][0].shape[1]
-    result = np.empty((3, rays, pulses))
-    product = np.empty((rays, pulses))
-    for component in range(3):
-        total = result[component]
-        np.multiply(terms[0][0][component], terms[0][1][:, None], out=total)
+    result, product = np.empty((3, rays, pulses)), np.empty(pulses)
+    for component, ray in np.ndindex(3, rays):  # row by row: a row stays in the processor's cache
+        total = result[component, ray]
+        np.multiply(terms[0][0][component], terms[0][1][ray], out=total)
         for vectors, factors in terms[1:]:
-            np.multiply(vectors[component], factors[:, None], out=product)
-            total += product
+            total += np.multiply(vectors[component], factors[ray], out=product)
     return result
