@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..scene_mesh import SceneMesh
+from .bundles import Bundles
 from .caster import Caster, FacePlanes
 from .motion import MovingMesh, ScannedScene
 from .track import Track, track_knots
@@ -19,8 +20,6 @@ Faces = NDArray[np.intp]
 
 CLEARANCE = np.array([2.5, 1.0, 3.0])
 """What a vehicle that carries the scanner takes up around it: half its length and width, and its height, m."""
-_CHUNK = 512
-"""Rays side by side that are told together whether they come near a moving object."""
 
 
 @dataclass(frozen=True)
@@ -132,8 +131,10 @@ class Target:
         flat_origins = np.broadcast_to(origins, shape).reshape(3, -1)
         flat_directions, flat_times = directions.reshape(3, -1), np.broadcast_to(times, shape[1:]).ravel()
         nearest = Met(*(getattr(met, name).ravel() for name in ("face", "distance", "along")))
+        rays = Bundles.of(flat_origins, flat_directions, flat_times, np.minimum(nearest.distance, maximum_range))
         for part, track in zip(self._parts[1:], motions, strict=True):
-            _cast_moving(part, track, flat_origins, flat_directions, flat_times, maximum_range, nearest)
+            if track.present.any():
+                _cast_moving(part, track, rays, maximum_range, nearest)
         return Met(*(getattr(nearest, name).reshape(shape[1:]) for name in ("face", "distance", "along")))
 
     def at_start(
@@ -227,60 +228,18 @@ def _rows(vectors: Float) -> NDArray[np.float32]:
     return result
 
 
-def _cast_moving(
-    part: _Part,
-    track: Track,
-    origins: Float,
-    directions: Float,
-    times: Float,
-    maximum_range: float,
-    nearest: Met,
-) -> None:
+def _cast_moving(part: _Part, track: Track, rays: Bundles, maximum_range: float, nearest: Met) -> None:
     """Put a moving part's hits in place of farther ones; all arrays are flat."""
-    near = _near_sphere(part, track, origins, directions, times, np.minimum(nearest.distance, maximum_range))
+    near = rays.near(track, part.centre, part.radius)
     if not len(near):
         return
-    rotation, place, present = track.at(times[near])
+    rotation, place, present = track.at(rays.times[near])
     near, rotation, place = near[present], rotation[:, present], place[:, present]
-    own = _cast(
-        part, _inverse(rotation, origins[:, near] - place), _inverse(rotation, directions[:, near]), maximum_range
-    )
+    begin, towards = rays.origins[:, near] - place, rays.directions[:, near]
+    own = _cast(part, _inverse(rotation, begin), _inverse(rotation, towards), maximum_range)
     closer = np.flatnonzero(own.distance < nearest.distance[near])
     for name in ("face", "distance", "along"):
         getattr(nearest, name)[near[closer]] = getattr(own, name)[closer]
-
-
-def _near_sphere(
-    part: _Part, track: Track, origins: Float, directions: Float, times: Float, reach: Float
-) -> NDArray[np.intp]:
-    """Return the rays that come nearer to the part's middle than its radius before their ``reach``."""
-    chunks = _chunks_near(part, track, origins, directions, reach)
-    if not len(chunks):
-        return chunks
-    rotation, place, _ = track.at(times[chunks])
-    middle = np.einsum("ijn,j->in", rotation.reshape(3, 3, -1), part.centre) + place
-    middle -= origins[:, chunks]
-    direction = directions[:, chunks]
-    ahead = np.einsum("in,in->n", middle, direction)
-    middle -= np.clip(ahead, 0.0, reach[chunks]) * direction
-    return chunks[np.einsum("in,in->n", middle, middle) <= part.radius**2]
-
-
-def _chunks_near(part: _Part, track: Track, origins: Float, directions: Float, reach: Float) -> NDArray[np.intp]:
-    """Return the rays of the chunks whose bounding box touches that of the part on its way: a cheap first look."""
-    box = track.swept(part.centre, part.radius)
-    if box is None:
-        return np.empty(0, dtype=np.intp)
-    low, high = box
-    starts = np.arange(0, len(reach), _CHUNK)
-    apart = np.zeros(len(starts), dtype=bool)
-    for i in range(3):
-        end = origins[i] + reach * directions[i]
-        smallest = np.minimum(np.minimum.reduceat(end, starts), np.minimum.reduceat(origins[i], starts))
-        largest = np.maximum(np.maximum.reduceat(end, starts), np.maximum.reduceat(origins[i], starts))
-        apart |= (smallest > high[i]) | (largest < low[i])
-    keep = np.repeat(~apart, np.diff(starts, append=len(reach)))
-    return np.flatnonzero(keep)
 
 
 def _inverse(rotation: Float, vectors: Float) -> Float:

@@ -52,14 +52,17 @@ class Track:
 
     def at(self, times: Float) -> tuple[Float, Float, NDArray[np.bool_]]:
         """Return rotation (9, N), position (3, N) and presence (N,) at times within the track."""
-        knot = (times - self.begin) / self.spacing
-        index = np.clip(knot.astype(np.intp), 0, len(self.present) - 2)
-        knot -= index
-        rotation = _between(self.rotation, index, knot)
-        position = _between(self.position, index, knot)
+        index, share = _knots(self, times)
+        rotation = _between(self.rotation, index, share)
+        position = _between(self.position, index, share)
         if self.present.all():
             return rotation, position, np.ones(len(times), dtype=bool)
         return rotation, position, self.present[index] & self.present[index + 1]
+
+    def way(self, point: Float) -> Way:
+        """Return the way of a point (3,) of the own frame, m."""
+        place = np.einsum("ijk,j->ik", self.rotation.reshape(3, 3, -1), point) + self.position
+        return Way(self.begin, self.spacing, place)
 
     def swept(self, centre: Float, radius: float) -> tuple[Float, Float] | None:
         """Return the smallest and largest corner (3,) that a sphere reaches on the way; None where it is never there.
@@ -76,11 +79,43 @@ class Track:
         return middle.min(axis=1) - radius, middle.max(axis=1) + radius
 
 
+@dataclass(frozen=True)
+class Way:
+    """Where a point of a body is on its track, whether the body is there or not.
+
+    Attributes:
+        begin: time of the first knot, s.
+        spacing: s between two.
+        position: (3, K) m.
+    """
+
+    begin: float
+    spacing: float
+    position: Float
+
+    @property
+    def fastest(self) -> float:
+        """Return the largest speed between two knots, m/s."""
+        return float(np.sqrt(np.square(np.diff(self.position, axis=1)).sum(axis=0).max())) / self.spacing
+
+    def at(self, times: Float) -> Float:
+        """Return places (3, N) at times within the track."""
+        return _between(self.position, *_knots(self, times))
+
+
 def track_knots(begin: float, end: float, spacing: float) -> Float:
     """Return the knots (K,), at least two, that span two times: whole multiples of ``spacing``."""
     first = int(np.floor(begin / spacing))
     last = max(int(np.ceil(end / spacing)), first + 1)
     return np.arange(first, last + 1) * spacing
+
+
+def _knots(track: Track | Way, times: Float) -> tuple[NDArray[np.intp], Float]:
+    """Return the knots before times (N,), and which share of the way to the next has passed."""
+    knot = (times - track.begin) / track.spacing
+    index = np.clip(knot.astype(np.intp), 0, track.position.shape[1] - 2)
+    knot -= index
+    return index, knot
 
 
 def _between(values: Float, index: NDArray[np.intp], share: Float) -> Float:
