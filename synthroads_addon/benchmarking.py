@@ -1,4 +1,4 @@
-"""The demo job, each stage beside its floor: bare Embree, laspy and Cycles on the same rays, points and images.
+"""The demo job, each stage beside its floor: bare Embree, lazrs and Cycles on the same rays, points and images.
 
 A process measures one number of cores: those that it may use.
 """
@@ -6,7 +6,7 @@ A process measures one number of cores: those that it may use.
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
@@ -16,7 +16,7 @@ import laspy
 import numpy as np
 from numpy.typing import NDArray
 
-from .blender.benchmark import REPEATS, panel_edit, rendering, seconds_of
+from .blender.benchmark import panel_edit, rendering, seconds_of
 from .blender.cameras import layer_source
 from .blender.casters.measure import bare_rate
 from .blender.files import empty_file
@@ -38,6 +38,8 @@ _CAST_BLOCKS, _WRITTEN_BLOCKS = 24, 96
 """Blocks, spread over the scan, on which casting and writing are measured beside their floors: so many that what is
 left over for one core at the end doesn't count."""
 _RAYS = (1, 7, 19, 61)
+_TURNS = 5
+"""Measurements of each rate, of which the best counts, as other work on the machine only slows."""
 _VIEWS = 4
 """Images that are rendered bare."""
 
@@ -139,15 +141,26 @@ def _cast_beside(scan: Scan) -> Rate:
         object.__setattr__(part, "caster", caster)
     origins, directions = np.concatenate(kept.origins), np.concatenate(kept.directions)
     few = replace(scan, only=tuple(blocks))
-    seconds = min(seconds_of(lambda: _exhaust(scan_blocks(few, threads))) for _ in range(REPEATS))
-    floor = bare_rate(caster, origins, directions, scan.setting.maximum_range, threads, repeats=REPEATS)
+
+    def ours() -> float:
+        return len(origins) / seconds_of(lambda: _exhaust(scan_blocks(few, threads)))
+
+    def floor() -> float:
+        limit = scan.setting.maximum_range
+        return bare_rate(caster, origins, directions, limit, threads, repeats=1).rays_per_second
+
     return {
         "name": f"casting and radiometry, {scan.rays_per_pulse} rays per pulse; Embree",
         "unit": "million rays/s",
-        "ours": len(origins) / seconds / 1e6,
-        "floor": floor.rays_per_second / 1e6,
+        **_best_of_both(ours, floor),
         "rays": scan.rays_per_pulse,
     }
+
+
+def _best_of_both(ours: Callable[[], float], floor: Callable[[], float]) -> dict[str, float]:
+    """Return the best rates, in millions, of two works that take turns: what disturbs one disturbs the other."""
+    rates = [(ours(), floor()) for _ in range(_TURNS)]
+    return {"ours": max(own for own, _ in rates) / 1e6, "floor": max(bare for _, bare in rates) / 1e6}
 
 
 def _writing(scan: Scan, source: LayerSource, task: ScanToFiles, folder: Path) -> Rate:
@@ -165,7 +178,7 @@ def _writing(scan: Scan, source: LayerSource, task: ScanToFiles, folder: Path) -
             for block in blocks:
                 writer.write(block)
 
-    seconds = min(seconds_of(ours) for _ in range(REPEATS))
+    ours()
     written = laspy.read(folder / "ours.laz")
 
     def floor() -> None:
@@ -173,8 +186,7 @@ def _writing(scan: Scan, source: LayerSource, task: ScanToFiles, folder: Path) -
         with laspy.open(folder / "bare.laz", "w", header=written.header, laz_backend=backend) as writer:
             writer.point_writer.write_points(written.points)  # without laspy's bookkeeping
 
-    bare = min(seconds_of(floor) for _ in range(REPEATS))
-    rates = {"ours": count / seconds / 1e6, "floor": count / bare / 1e6}
+    rates = _best_of_both(lambda: count / seconds_of(ours), lambda: count / seconds_of(floor))
     return {"name": "writing LAZ; lazrs alone", "unit": "million points/s", **rates, "rays": 0}
 
 

@@ -104,6 +104,13 @@ def scan_of(scenario, geometry, scene):
 
 
 @pytest.mark.keep_scene
+@pytest.mark.parametrize(("name", "driven"), [("mobile-mapping-300m", True), ("rq31-600m", False)])
+def test_a_vehicle_carries_the_scanner_where_the_platform_is_one(demo, name: str, driven: bool) -> None:
+    _, geometry, scene = demo
+    assert scan_of(load_scenario(name), geometry, scene).driven is driven
+
+
+@pytest.mark.keep_scene
 @pytest.mark.parametrize(("sigma", "rays"), [(0.0, 1), (0.01, 1)])
 def test_labels_of_the_pavement_agree_with_the_parameters(demo, sigma: float, rays: int) -> None:
     """99.9 % of the pavement's points lie in a strip of their class within 2 cm (+ three sigma with noise)."""

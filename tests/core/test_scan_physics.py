@@ -13,6 +13,7 @@ from synthroads_addon.core.scanning.motion import LinearMotion, MovingMesh
 from synthroads_addon.core.scanning.scan import Scan, beam_rays, scan_block, scan_pulses
 from synthroads_addon.core.scanning.surfaces import surfaces_of
 from synthroads_addon.core.scanning.trace import trace
+from synthroads_addon.core.scanning.track import Track
 from synthroads_addon.core.scanning.weather import attenuation
 from synthroads_addon.core.scene_mesh import SceneMesh
 from tests.core.scan_scenes import ORIGIN, Standing, echoes_and_pulses, mesh_of, middle_pulses, plane, scan_of
@@ -259,6 +260,31 @@ def test_nothing_drives_through_the_scanner_s_own_vehicle(driven: bool) -> None:
     assert len(seen[2]) > 1000
     # It is beside the scanner while it gains 5 to 9 m, at 8 m/s.
     assert (seen[2].min(), seen[2].max()) == pytest.approx((5.0 / 8.0, 9.0 / 8.0), abs=0.02)
+
+
+class Parked:
+    """A body that stands turned about z."""
+
+    def __init__(self, angle: float, place: np.ndarray) -> None:
+        c, s = np.cos(angle), np.sin(angle)
+        self.rotation, self.place = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]]), place
+
+    def pose(self, time):
+        count = len(time)
+        return np.tile(self.rotation, (count, 1, 1)), np.tile(self.place, (count, 1)), np.ones(count, dtype=bool)
+
+
+def test_the_scanner_s_vehicle_takes_up_a_box_in_the_other_one_s_frame() -> None:
+    """Whichever way that is turned: half a box of 4 x 2 x 1.5 m, and 2.5 x 1 x 3 m for the scanner's vehicle."""
+    source = np.random.default_rng(5)
+    room = np.array([4.5, 2.0, 3.75])
+    for own in source.uniform(-1.3, 1.3, (300, 3)) * room:
+        body = Parked(source.uniform(0.0, 2.0 * np.pi), source.uniform(-50.0, 50.0, 3))
+        scanner = body.rotation @ (own + (0.0, 0.0, 0.75)) + body.place
+        driven = Track.of(Parked(1.0, scanner).pose, 0.0, 0.1, 0.01)
+        target = scan_of(plane(), moving=[MovingMesh(box(14), body)]).target
+        (track,) = target.motions(0.0, 0.1, 0.01, driven)
+        assert (track.present == (np.abs(own) > room).any()).all()
 
 
 # --- noise ----------------------------------------------------------------------------------------------------------

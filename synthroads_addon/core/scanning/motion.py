@@ -28,8 +28,8 @@ class Motion(Protocol):
     def pose(self, time: Float) -> Pose:
         """Return rotation (K, 3, 3), translation (K, 3) and whether (K,) the body is there, at times (K,), s.
 
-        Both take the body's own frame to the local one: ``local = rotation @ own + translation``. Exact at any time;
-        the same from any thread.
+        Both take the body's own frame to the local one: ``local = rotation @ own + translation``. Exact at any time,
+        finite even where the body isn't there; the same from any thread.
         """
 
 

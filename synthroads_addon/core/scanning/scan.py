@@ -121,7 +121,7 @@ class BlockResult:
 
 
 def joined_results(results: list[BlockResult]) -> BlockResult:
-    """Return several blocks, or parts of one, that aren't finished yet as one, in their order."""
+    """Return several blocks that aren't finished yet as one, in their order."""
     seen = [result.seen for result in results if result.seen is not None]
 
     def total(name: str) -> int:
