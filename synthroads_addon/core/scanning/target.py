@@ -13,7 +13,7 @@ from ..scene_mesh import SceneMesh
 from .bundles import Bundles
 from .caster import Caster, FacePlanes
 from .motion import MovingMesh, ScannedScene
-from .track import Track, track_knots
+from .track import KeptPoses, Track, track_knots
 
 Float = NDArray[np.float64]
 Faces = NDArray[np.intp]
@@ -77,6 +77,7 @@ class Target:
         self.materials = static.materials
         self.origin = static.origin
         self.moving: tuple[MovingMesh, ...] = scene.moving
+        self._poses = [KeptPoses(part.motion.pose) for part in scene.moving]
         meshes = [static, *(part.mesh for part in scene.moving)]
         self.class_id = _joined([mesh.class_id for mesh in meshes])
         self.instance_id = _joined([mesh.instance_id for mesh in meshes])
@@ -101,7 +102,7 @@ class Target:
             driven: the scanner's, if a vehicle carries it. What drives through this vehicle isn't there meanwhile:
                 others' ways know nothing of it.
         """
-        tracks = [Track.of(part.motion.pose, begin, end, spacing) for part in self.moving]
+        tracks = [poses.track(begin, end, spacing) for poses in self._poses]
         if driven is None or not tracks:
             return tracks
         _, scanner, _ = driven.at(track_knots(begin, end, spacing))

@@ -4,12 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 Float = NDArray[np.float64]
+
+_AT_ONCE = 256
+"""Knots whose poses are worked out at once: for so many it takes hardly longer than for a few."""
+_KEPT = 16
+"""So many times `_AT_ONCE` knots are kept, for the blocks that are being scanned and those that follow."""
 
 
 @dataclass(frozen=True)
@@ -39,7 +45,12 @@ class Track:
 
         Knots are whole multiples of the spacing, so that no result depends on where a block begins.
         """
-        times = track_knots(begin, end, spacing)
+        return cls._at_knots(pose, *_knot_numbers(begin, end, spacing), spacing)
+
+    @classmethod
+    def _at_knots(cls, pose: Callable[[Float], Any], first: int, last: int, spacing: float) -> Track:
+        """Return the poses at knots ``first`` to ``last``."""
+        times = np.arange(first, last + 1) * spacing
         rotation, position, present = pose(times)
         count = len(times)
         return cls(
@@ -103,11 +114,41 @@ class Way:
         return _between(self.position, *_knots(self, times))
 
 
+class KeptPoses:
+    """Poses of one body, kept for other blocks that ask for the same knots; any threads may share it.
+
+    Args:
+        pose: see `Track.of`.
+    """
+
+    def __init__(self, pose: Callable[[Float], Any]) -> None:
+        @lru_cache(maxsize=_KEPT)
+        def stretch(number: int, spacing: float) -> Track:
+            return Track._at_knots(pose, number * _AT_ONCE, (number + 1) * _AT_ONCE - 1, spacing)
+
+        self._stretch = stretch
+
+    def track(self, begin: float, end: float, spacing: float) -> Track:
+        """Return the track between two times, s, as `Track.of` does."""
+        first, last = _knot_numbers(begin, end, spacing)
+        before = first // _AT_ONCE
+        stretches = [self._stretch(number, spacing) for number in range(before, last // _AT_ONCE + 1)]
+        own = slice(first - before * _AT_ONCE, last + 1 - before * _AT_ONCE)
+        names = ("rotation", "position", "present")
+        joined = (np.concatenate([getattr(one, name) for one in stretches], axis=-1) for name in names)
+        return Track(first * spacing, spacing, *(array[..., own] for array in joined))
+
+
 def track_knots(begin: float, end: float, spacing: float) -> Float:
     """Return the knots (K,), at least two, that span two times: whole multiples of ``spacing``."""
-    first = int(np.floor(begin / spacing))
-    last = max(int(np.ceil(end / spacing)), first + 1)
+    first, last = _knot_numbers(begin, end, spacing)
     return np.arange(first, last + 1) * spacing
+
+
+def _knot_numbers(begin: float, end: float, spacing: float) -> tuple[int, int]:
+    """Return the first and the last of the knots that span two times, as multiples of ``spacing``."""
+    first = int(np.floor(begin / spacing))
+    return first, max(int(np.ceil(end / spacing)), first + 1)
 
 
 def _knots(track: Track | Way, times: Float) -> tuple[NDArray[np.intp], Float]:
