@@ -34,11 +34,11 @@ from .core.scenario import Scenario
 from .pipeline import write_texts
 from .scan_files import ScanToFiles, colour_job, make_scan, road_path, scan_blocks
 
-_CAST_BLOCKS, _WRITTEN_BLOCKS = 24, 96
+_CAST_BLOCKS, _WRITTEN_BLOCKS = 48, 96
 """Blocks, spread over the scan, on which casting and writing are measured beside their floors: so many that what is
 left over for one core at the end doesn't count."""
 _RAYS = (1, 7, 19, 61)
-_TURNS = 5
+_TURNS = 4
 """Measurements of each rate, of which the best counts, as other work on the machine only slows."""
 _VIEWS = 4
 """Images that are rendered bare."""
