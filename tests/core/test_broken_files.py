@@ -146,6 +146,16 @@ def test_a_number_of_records_behind_the_points_beyond_the_file(tmp_path: Path) -
         open_to_copy(path)
 
 
+def test_an_attribute_without_bytes_isn_t_copied(tmp_path: Path) -> None:
+    """laspy divides by its size where it writes such a header."""
+    las = laspy.read(foreign(path := tmp_path / "cloud.las", "1.4", 6))
+    las.add_extra_dim(laspy.ExtraBytesParams("amplitude", "uint8"))
+    las.write(path)
+    kind = path.read_bytes().index(b"amplitude") - 2  # LAS 1.4: data type and options of an extra bytes record
+    with pytest.raises(InputError, match="its attribute 'amplitude' has no bytes"):
+        open_to_copy(changed(path, kind, 0, 2))
+
+
 def chunk_table(path: Path) -> int:
     """Return where the table of chunks of a LAZ file begins."""
     data = path.read_bytes()

@@ -129,10 +129,11 @@ def open_to_copy(path: Path) -> laspy.LasReader:
     """Open a file that `LasReader` takes with laspy itself, the records behind its points included.
 
     Raises:
-        InputError: these records are damaged.
+        InputError: these records are damaged, or a header can't be written again as it is.
     """
     reader = laspy.open(path, read_evlrs=False, laz_backend=laspy.LazBackend.LazrsParallel)
     try:
+        _check_attributes(path, reader.header)
         _check_records_behind(path, reader.header)
         reader.read_evlrs()
     except InputError:
@@ -142,6 +143,13 @@ def open_to_copy(path: Path) -> laspy.LasReader:
         reader.close()
         raise InputError(str(path), None, f"the records behind its points are damaged ({problem})") from None
     return reader
+
+
+def _check_attributes(path: Path, header: laspy.LasHeader) -> None:
+    """Refuse attributes of no bytes: laspy has no type for them where it writes a header."""
+    for dimension in header.point_format.extra_dimensions:
+        if dimension.num_bits == 0:
+            raise InputError(str(path), None, f"can't be copied: its attribute {dimension.name!r} has no bytes")
 
 
 def _check_records_behind(path: Path, header: laspy.LasHeader) -> None:
