@@ -19,8 +19,8 @@ from .cameras.stage import Passes, Stage, stage
 from .compat import modifier_input, set_modifier_input
 from .model import RoadModel
 
-_EDITS = 6
-"""Changes whose times are measured."""
+_EDITS = 3
+"""Changes there and back whose times are measured."""
 
 
 def seconds_of(work: Callable[[], object]) -> float:
@@ -87,7 +87,7 @@ def panel_edit(model: RoadModel, parameters: RoadParameters) -> float:
     modifier = road.modifiers[0]
     side = "Left" if parameters.carriageway("left") else "Right"
     name, runs = f"{side} Lane 1 Width", []
-    for change in (0.05, -0.05) * (_EDITS // 2):
+    for change in (0.05, -0.05) * _EDITS:
         set_modifier_input(modifier, name, modifier_input(modifier, name) + change)
         road.update_tag()
         runs.append(seconds_of(bpy.context.view_layer.update))

@@ -46,6 +46,12 @@ class BruteForce:
         return hit
 
 
+def upright(angle: np.ndarray) -> np.ndarray:
+    """Return rotations (K, 3, 3) about the vertical by angles (K,), rad."""
+    cos, sin, none = np.cos(angle), np.sin(angle), np.zeros_like(angle)
+    return np.stack([cos, -sin, none, sin, cos, none, none, none, none + 1.0], axis=-1).reshape(-1, 3, 3)
+
+
 class Standing:
     """A scanner that hovers over the origin, above z = 0, heading east; or flies east at a speed."""
 

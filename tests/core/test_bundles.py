@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from synthroads_addon.core.scanning.bundles import RAYS, Bundles
 from synthroads_addon.core.scanning.track import Track
+from tests.core.scan_scenes import upright
 
 Float = NDArray[np.float64]
 CENTRE, RADIUS = np.array([0.5, -0.2, 1.0]), 3.0
@@ -19,9 +20,7 @@ def turning(place: Float, velocity: Float) -> Track:
     """Return the track of a body that drives on and turns about the vertical for 2 s."""
 
     def pose(time: Float) -> tuple[Float, Float, NDArray[np.bool_]]:
-        cos, sin, none, one = np.cos(time), np.sin(time), np.zeros(len(time)), np.ones(len(time))
-        rotation = np.stack([cos, -sin, none, sin, cos, none, none, none, one], axis=1)
-        return rotation.reshape(-1, 3, 3), place + time[:, None] * velocity, np.ones(len(time), dtype=bool)
+        return upright(time), place + time[:, None] * velocity, np.ones(len(time), dtype=bool)
 
     return Track.of(pose, 0.0, 2.0, 0.01)
 

@@ -16,7 +16,16 @@ from synthroads_addon.core.scanning.trace import trace
 from synthroads_addon.core.scanning.track import Track
 from synthroads_addon.core.scanning.weather import attenuation
 from synthroads_addon.core.scene_mesh import SceneMesh
-from tests.core.scan_scenes import ORIGIN, Standing, echoes_and_pulses, mesh_of, middle_pulses, plane, scan_of
+from tests.core.scan_scenes import (
+    ORIGIN,
+    Standing,
+    echoes_and_pulses,
+    mesh_of,
+    middle_pulses,
+    plane,
+    scan_of,
+    upright,
+)
 
 
 def gaussian_mean(scan: Scan, angle: float, slope: tuple[float, float], height: float) -> float:
@@ -266,8 +275,7 @@ class Parked:
     """A body that stands turned about z."""
 
     def __init__(self, angle: float, place: np.ndarray) -> None:
-        c, s = np.cos(angle), np.sin(angle)
-        self.rotation, self.place = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]]), place
+        (self.rotation,), self.place = upright(np.array([angle])), place
 
     def pose(self, time):
         count = len(time)

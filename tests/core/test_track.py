@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from synthroads_addon.core.scanning.track import KeptPoses, Track
+from tests.core.scan_scenes import upright
 
 Float = NDArray[np.float64]
 
@@ -22,9 +23,8 @@ class Waltz:
 
     def pose(self, time: Float) -> tuple[Float, Float, NDArray[np.bool_]]:
         self.asked += 1
-        c, s, o = np.cos(time), np.sin(time), np.zeros_like(time)
-        rotation = np.stack([c, -s, o, s, c, o, o, o, o + 1.0], axis=1).reshape(-1, 3, 3)
-        return rotation, np.stack([20.0 * time, s, o], axis=1), np.mod(time, 3.0) < 2.0
+        place = np.stack([20.0 * time, np.sin(time), np.zeros_like(time)], axis=1)
+        return upright(time), place, np.mod(time, 3.0) < 2.0
 
 
 def assert_same(found: Track, expected: Track) -> None:
