@@ -6,8 +6,6 @@ from itertools import pairwise
 import jsonschema
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from synthroads_addon.core.cloud.labels import PRESETS
 from synthroads_addon.core.errors import InputError, MissingFileError
@@ -34,6 +32,7 @@ from synthroads_addon.core.parameters.sampler import sample_road
 from synthroads_addon.core.parameters.tessellation import sample_stations
 from synthroads_addon.core.scenario import RoadScenario, load_scenario
 from synthroads_addon.core.schema import read_json
+from tests.core.mutations import cases
 
 CURVE = AlignmentObject(
     instance=1,
@@ -75,14 +74,6 @@ def broken(data: dict, path: str, value: object) -> dict:
         target = target[int(part)] if isinstance(target, list) else target[part]
     target[int(last) if isinstance(target, list) else last] = value
     return copy
-
-
-@given(st.integers(0, 2**40))
-@settings(max_examples=50, deadline=None)
-def test_write_read_write_gives_the_same_bytes_and_fits_the_schema(seed: int) -> None:
-    text = road(seed).to_json()
-    assert RoadParameters.from_dict(json.loads(text)).to_json() == text
-    jsonschema.validate(json.loads(text), parameters_schema())
 
 
 def test_the_published_schema_is_that_of_the_code() -> None:
@@ -149,10 +140,11 @@ def test_standard_cross_sections_add_up() -> None:
 
 @pytest.mark.parametrize("section", list(STANDARD_CROSS_SECTIONS))
 @pytest.mark.parametrize("length", [600, 5000])
-def test_roads_keep_the_limits_of_their_class(section: str, length: int) -> None:
+@cases(2, 20)
+def test_roads_keep_the_limits_of_their_class(section: str, length: int, count: int) -> None:
     limits = LIMITS[CLASS_OF.get(section, "EKA3")]
     scenario = RoadScenario(design_class=CLASS_OF.get(section, "EKA3"), cross_section=section, length=length)
-    for seed in range(20):
+    for seed in range(count):
         parameters = sample_road(scenario, seed)
         elements = parameters.alignment.horizontal
         assert parameters.alignment.length == pytest.approx(length, abs=1e-6)
@@ -176,26 +168,28 @@ def test_roads_keep_the_limits_of_their_class(section: str, length: int) -> None
             assert 2.5 <= min(values) <= max(values) <= 6.0
 
 
-def test_every_kind_of_joint_occurs_and_both_directions_alike() -> None:
+@cases(60, 300)
+def test_every_kind_of_joint_occurs_and_both_directions_alike(count: int) -> None:
     chains, turns = set(), []
-    for seed in range(300):
+    for seed in range(count):
         elements = sample_road(RoadScenario(length=3000), seed).alignment.horizontal
         signs = [np.sign(e.curvature_start + e.curvature_end) for e in elements]
         turns += [sign for sign, e in zip(signs, elements, strict=True) if e.kind == "arc"]
         kinds = "".join(e.kind[0] for e in elements)
         chains |= {kinds[i : i + n] for i in range(len(kinds)) for n in (3, 4)}
     assert {"aca", "acca", "acl", "lca"} <= chains  # egg, S-curve, straights
-    assert 0.45 <= np.mean(np.array(turns) > 0) <= 0.55
+    assert abs(np.mean(np.array(turns) > 0) - 0.5) <= 0.05 * np.sqrt(300 / count)
 
 
 def test_the_demo_always_has_a_clothoid() -> None:
-    for seed in range(100):
+    for seed in range(25):
         assert any(e.kind == "clothoid" for e in road(seed).alignment.horizontal)
 
 
-def test_long_roads_do_not_spiral() -> None:
+@cases(10, 100)
+def test_long_roads_do_not_spiral(count: int) -> None:
     for design_class, section in (("EKA1A", "RQ31"), ("EKA3", "RQ25")):
-        for seed in range(100):
+        for seed in range(count):
             scenario = RoadScenario(design_class=design_class, cross_section=section, length=5000)
             elements = sample_road(scenario, seed).alignment.horizontal
             heading = np.cumsum([e.length * (e.curvature_start + e.curvature_end) / 2 for e in elements])

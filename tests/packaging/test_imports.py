@@ -5,10 +5,8 @@ from __future__ import annotations
 import ast
 import subprocess
 import sys
-from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
-
-import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
 ADDON = ROOT / "synthroads_addon"
@@ -24,37 +22,40 @@ def _name(path: Path) -> str:
     return str(path.relative_to(ROOT))
 
 
-def _imports(path: Path) -> Iterator[tuple[ast.stmt, str, int]]:
-    """Yield each import statement of a file with the module's name as written and its number of leading dots."""
+@cache
+def _imports(path: Path) -> list[tuple[ast.stmt, str, int]]:
+    """Return each import statement of a file with the module's name as written and its number of leading dots."""
+    found: list[tuple[ast.stmt, str, int]] = []
     for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"), str(path))):
         if isinstance(node, ast.Import):
-            yield from ((node, alias.name, 0) for alias in node.names)
+            found += [(node, alias.name, 0) for alias in node.names]
         elif isinstance(node, ast.ImportFrom):
-            yield node, node.module or "", node.level
+            found.append((node, node.module or "", node.level))
+    return found
 
 
 def _absolute_top_levels(path: Path) -> set[str]:
     return {name.split(".")[0] for _, name, level in _imports(path) if level == 0}
 
 
-@pytest.mark.parametrize("path", _sources(ADDON), ids=_name)
-def test_addon_imports_itself_relatively(path: Path) -> None:
+def test_addon_imports_itself_relatively() -> None:
     """As an extension the package is bl_ext.user_default.synthroads, and headless and ml are not there."""
-    assert not _absolute_top_levels(path) & OWN_PACKAGES
-    depth = len(path.relative_to(ADDON).parts)
-    for node, name, level in _imports(path):
-        assert level <= depth, f"line {node.lineno}: {'.' * level}{name} leaves the package"
-
-
-@pytest.mark.parametrize("path", [*_sources(ADDON / "core"), *_sources(ROOT / "ml")], ids=_name)
-def test_core_and_ml_know_no_blender(path: Path) -> None:
-    assert not _absolute_top_levels(path) & BLENDER
-    if path.is_relative_to(ADDON):
-        above_core = len(path.relative_to(ADDON).parts)
+    for path in _sources(ADDON):
+        assert not _absolute_top_levels(path) & OWN_PACKAGES, _name(path)
+        depth = len(path.relative_to(ADDON).parts)
         for node, name, level in _imports(path):
-            if level == above_core and isinstance(node, ast.ImportFrom):
-                reached = {name.split(".")[0]} if name else {alias.name for alias in node.names}
-                assert not reached & {"blender", "pipeline", "ui"}, f"line {node.lineno}"
+            assert level <= depth, f"{_name(path)}, line {node.lineno}: {'.' * level}{name} leaves the package"
+
+
+def test_core_and_ml_know_no_blender() -> None:
+    for path in [*_sources(ADDON / "core"), *_sources(ROOT / "ml")]:
+        assert not _absolute_top_levels(path) & BLENDER, _name(path)
+        if path.is_relative_to(ADDON):
+            above_core = len(path.relative_to(ADDON).parts)
+            for node, name, level in _imports(path):
+                if level == above_core and isinstance(node, ast.ImportFrom):
+                    reached = {name.split(".")[0]} if name else {alias.name for alias in node.names}
+                    assert not reached & {"blender", "pipeline", "ui"}, f"{_name(path)}, line {node.lineno}"
 
 
 def test_ml_imports_the_core_alone() -> None:
