@@ -1,8 +1,8 @@
 """Plant small faults in the source, one at a time, and see whether the tests find them.
 
 Cosmic-ray knows where a fault can be planted (another operator, another number, a condition turned round). A seed
-draws the same number of places from each area; what the tests of a coverage record run is judged, test files that
-reach the faulty line first by their tests that do. Three steps, in an environment with the extra `faults`:
+draws the same number of places from each area; the tests that a coverage record has seen on a fault's line are run
+with the fault, until the first that fails. Three steps, in an environment with the extra `faults`:
 
     python -m pytest -m "not slow" --cov --cov-context=test --cov-report=    # in both parts: tests/blender, the rest
     python tools/plant_faults.py draw --seed 1 faults.json
@@ -16,6 +16,7 @@ from __future__ import annotations
 import argparse
 import json
 import random
+import re
 import subprocess
 import sys
 import time
@@ -90,26 +91,34 @@ def _faults(area: str, file: str, names: list[str]) -> Iterator[Fault]:
         yield from (Fault(area, file, line, name, number) for number, (line, _) in enumerate(places))
 
 
-def covering_tests(coverage: list[Path], fault: Fault) -> tuple[list[str], list[str]]:
-    """Return the tests that run a fault's line, and the files of tests that may meet it through what they share.
+def covering_tests(coverage: list[Path], fault: Fault) -> list[str]:
+    """Return the tests that run a fault's line, and those that share a fixture which runs it.
 
-    A line that only an import runs (a constant) counts as met by all tests that run anything of its file.
+    A line that the import alone runs names a constant or a field: the lines that use the name stand in its place, or
+    else the whole file.
     """
-    lines: set[str] = set()
-    anywhere: set[str] = set()
+    code = (ROOT / fault.file).read_text(encoding="utf-8").splitlines()
+    name = re.match(r"\s*([A-Za-z_]\w*)\s*(?::[^=]*)?=", code[fault.line - 1])
+    uses = {number for number, text in enumerate(code, 1) if name and re.search(rf"\b{name[1]}\b", text)}
+    records = []
     for path in coverage:
         data = CoverageData(str(path))
         data.read()
-        for measured in data.measured_files():
-            if not measured.endswith(fault.file):
-                continue
-            for line, contexts in data.contexts_by_lineno(measured).items():
-                tests = {context.rpartition("|")[0] for context in contexts if context}
-                anywhere |= tests
-                if line == fault.line:
-                    lines |= tests
-    tests = lines or anywhere
-    return sorted(tests), sorted({test.partition("::")[0] for test in tests})
+        records += [(data, measured) for measured in data.measured_files() if measured.endswith(fault.file)]
+    for lines in ({fault.line}, uses, set(range(1, len(code) + 1))):
+        if tests := set().union(*(_tests_on(lines, data, measured) for data, measured in records)):
+            return sorted(tests)
+    return []
+
+
+def _tests_on(lines: set[int], data: CoverageData, measured: str) -> set[str]:
+    tests = set()
+    for contexts in (contexts for line, contexts in data.contexts_by_lineno(measured).items() if line in lines):
+        for test, _, phase in (context.rpartition("|") for context in contexts if context):
+            shared = f"{test.partition('::')[0]}::"
+            every = (context.rpartition("|")[0] for context in data.measured_contexts() if context.startswith(shared))
+            tests |= set(every) if phase == "setup" else {test}
+    return tests
 
 
 def run_tests(tests: list[str], options: list[str]) -> tuple[bool, str]:
@@ -132,7 +141,7 @@ def run_tests(tests: list[str], options: list[str]) -> tuple[bool, str]:
 
 def judge(fault: Fault, coverage: list[Path], options: list[str]) -> dict[str, object]:
     """Return what the tests say of the source with a fault in it."""
-    tests, files = covering_tests(coverage, fault)
+    tests = covering_tests(coverage, fault)
     path = ROOT / fault.file
     code = path.read_text(encoding="utf-8")
     changed = fault.planted(code)
@@ -141,12 +150,10 @@ def judge(fault: Fault, coverage: list[Path], options: list[str]) -> dict[str, o
     path.write_text(changed, encoding="utf-8")
     try:
         found, by = run_tests(tests, options)
-        if not found:
-            found, by = run_tests(files, options)
     finally:
         path.write_text(code, encoding="utf-8")
     seconds = round(time.perf_counter() - begun, 1)
-    return {**asdict(fault), "tests": len(tests), "files": len(files), "found": found, "by": by, "seconds": seconds}
+    return {**asdict(fault), "tests": len(tests), "found": found, "by": by, "seconds": seconds}
 
 
 def main() -> int:

@@ -54,6 +54,12 @@ def sampled(alignment: Alignment, step: float = 1.0, noise: float = 0.0, seed: i
     return position + lateral[:, None] * np.column_stack((-np.sin(heading), np.cos(heading)))
 
 
+@functools.cache
+def fitted(name: str, noise: float = 0.0, seed: int = 0) -> AxisFit:
+    """Return the fit to points every metre along one of `ROADS`."""
+    return fit_axis(sampled(road(ROADS[name]), noise=noise, seed=seed))
+
+
 def kinds(alignment: Alignment) -> list[str]:
     return [element.kind for element in alignment.elements]
 
@@ -74,8 +80,7 @@ def off_road(found: Alignment, truth: Alignment) -> float:
 
 @pytest.mark.parametrize("name", ROADS)
 def test_exact_points_give_the_elements_back(name: str) -> None:
-    truth = road(ROADS[name])
-    fit = fit_axis(sampled(truth))
+    truth, fit = road(ROADS[name]), fitted(name)
     assert kinds(fit.alignment) == kinds(truth)
     length, curvature = differences(fit.alignment, truth)
     assert length < 1e-4
@@ -83,7 +88,7 @@ def test_exact_points_give_the_elements_back(name: str) -> None:
     assert fit.worst < 1e-6
 
 
-@pytest.mark.parametrize("step", [0.5, 2.0, 5.0])
+@pytest.mark.parametrize("step", [pytest.param(0.5, marks=pytest.mark.slow), 2.0, 5.0])
 def test_the_spacing_of_the_points_makes_no_difference(step: float) -> None:
     truth = road(BEND)
     fit = fit_axis(sampled(truth, step))
@@ -102,10 +107,9 @@ def test_coordinates_rounded_to_a_millimetre_give_the_elements_back() -> None:
 
 
 @pytest.mark.parametrize("name", ["line", "bend", "s-curve"])
-@pytest.mark.parametrize("seed", [1, 2])
+@pytest.mark.parametrize("seed", [0, pytest.param(1, marks=pytest.mark.slow), pytest.param(2, marks=pytest.mark.slow)])
 def test_noise_of_2_cm_leaves_the_kinds_and_nearly_the_lengths(name: str, seed: int) -> None:
-    truth = road(ROADS[name])
-    fit = fit_axis(sampled(truth, noise=0.02, seed=seed))
+    truth, fit = road(ROADS[name]), fitted(name, 0.02, seed)
     assert kinds(fit.alignment) == kinds(truth)
     length, curvature = differences(fit.alignment, truth)
     assert length < 8.0
@@ -118,8 +122,8 @@ def test_noise_of_2_cm_leaves_the_kinds_and_nearly_the_lengths(name: str, seed: 
 
 def test_at_map_coordinates_the_same_elements_are_found() -> None:
     """At 5.6e6 m, and the alignment lies where the points are."""
-    here, there = road(BEND), road(BEND, 356_789.123, 5_612_345.678)
-    near, far = fit_axis(sampled(here, noise=0.02)), fit_axis(sampled(there, noise=0.02))
+    there = road(BEND, 356_789.123, 5_612_345.678)
+    near, far = fitted("bend", 0.02), fit_axis(sampled(there, noise=0.02))
     assert kinds(near.alignment) == kinds(far.alignment)
     assert differences(near.alignment, far.alignment)[0] < 0.1
     assert off_road(far.alignment, there) < 0.02
@@ -130,7 +134,7 @@ def test_at_map_coordinates_the_same_elements_are_found() -> None:
 
 def test_turned_and_mirrored_points_give_the_turned_and_mirrored_fit() -> None:
     points = sampled(road(S_CURVE), noise=0.02)
-    plain, mirrored = fit_axis(points), fit_axis(points * [1.0, -1.0])
+    plain, mirrored = fitted("s-curve", 0.02), fit_axis(points * [1.0, -1.0])
     c, s = np.cos(2.0), np.sin(2.0)
     turned = fit_axis(points @ np.array([[c, s], [-s, c]]))
     for other, sign in ((turned, 1.0), (mirrored, -1.0)):
@@ -142,8 +146,7 @@ def test_turned_and_mirrored_points_give_the_turned_and_mirrored_fit() -> None:
 
 
 def test_a_second_run_gives_the_same_bytes() -> None:
-    points = sampled(road(BEND), noise=0.03)
-    first, second = fit_axis(points), fit_axis(points)
+    first, second = fitted("bend", 0.02), fit_axis(sampled(road(BEND), noise=0.02))
     assert first.alignment.elements == second.alignment.elements
     assert first.profile.points == second.profile.points
     assert (first.rms, first.worst) == (second.rms, second.worst)
@@ -165,9 +168,8 @@ def test_figures_are_those_of_the_points_given() -> None:
 
 
 def test_the_alignment_begins_and_ends_with_the_points() -> None:
-    for noise in (0.0, 0.03):
-        points = sampled(road(EGG), noise=noise)
-        fit = fit_axis(points)
+    for name, noise in (("egg", 0.0), ("bend", 0.02)):
+        points, fit = sampled(road(ROADS[name]), noise=noise), fitted(name, noise)
         station, _ = fit.alignment.project(points[[0, -1]])
         np.testing.assert_allclose(station, [0.0, fit.alignment.length], atol=1e-4)
 
@@ -206,7 +208,7 @@ def test_noise_beyond_the_tolerance_is_reported_and_not_followed() -> None:
 
 
 def test_a_wider_tolerance_needs_no_more_elements() -> None:
-    s = np.arange(0.0, 900.0)
+    s = np.arange(0.0, 900.0, 2.0)
     points = np.column_stack((s, 20.0 * np.sin(s / 150.0) + np.random.default_rng(1).normal(0.0, 0.01, s.size)))
     counts = []
     for tolerance in (0.02, 0.1, 0.5, 50.0):
@@ -289,20 +291,21 @@ def test_several_turns_above_each_other() -> None:
     assert fit.height_worst < 1e-3
 
 
-def test_windows_of_a_long_road_join_without_a_seam() -> None:
+@pytest.mark.parametrize("noise", [0.0, pytest.param(0.02, marks=pytest.mark.slow)])
+def test_windows_of_a_long_road_join_without_a_seam(noise: float) -> None:
     """4.6 km, several windows, a straight and an arc longer than one of them."""
     rows = [(1900.0, 0.0, 0.0), (120.0, 0.0, 1 / 2000), (1700.0, 1 / 2000, 1 / 2000), (120.0, 1 / 2000, 0.0)]
     rows += [(90.0, 0.0, -1 / 600), (300.0, -1 / 600, -1 / 600), (90.0, -1 / 600, 0.0), (300.0, 0.0, 0.0)]
     truth = road(rows, 3e5, 5.6e6)
-    exact = fit_axis(sampled(truth, 2.0))
-    assert kinds(exact.alignment) == kinds(truth)
-    assert differences(exact.alignment, truth)[0] < 1e-2
-    noisy = fit_axis(sampled(truth, 2.0, noise=0.02))
-    assert noisy.rms < 0.022
-    assert off_road(noisy.alignment, truth) < 0.05
-    assert len(noisy.alignment.elements) <= len(rows) + 2
-    ends = noisy.alignment.element_starts[1:-1]
-    np.testing.assert_allclose(noisy.alignment.curvature(ends - 1e-6), noisy.alignment.curvature(ends), atol=1e-8)
+    fit = fit_axis(sampled(truth, 2.0, noise))
+    if not noise:
+        assert kinds(fit.alignment) == kinds(truth)
+        assert differences(fit.alignment, truth)[0] < 1e-2
+    assert fit.rms < max(1e-4, 1.1 * noise)
+    assert off_road(fit.alignment, truth) < max(1e-3, 2.5 * noise)
+    assert len(fit.alignment.elements) <= len(rows) + 2
+    ends = fit.alignment.element_starts[1:-1]
+    np.testing.assert_allclose(fit.alignment.curvature(ends - 1e-6), fit.alignment.curvature(ends), atol=1e-8)
 
 
 def test_the_profile_finds_its_parabolas_again() -> None:
@@ -418,7 +421,10 @@ def real_fit(path: Path) -> AxisFit:
 
 
 @pytest.mark.skipif(not REAL, reason="no real axes beside the repository")
-@pytest.mark.parametrize("path", REAL, ids=lambda path: path.stem)
+@pytest.mark.parametrize(
+    "path",
+    [pytest.param(path, id=path.stem, marks=() if "dual6lane" in path.stem else pytest.mark.slow) for path in REAL],
+)
 class TestRealAxes:
     def test_follows_within_the_tolerance_with_few_elements(self, path: Path) -> None:
         fit = real_fit(path)

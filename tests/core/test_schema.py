@@ -11,19 +11,17 @@ from typing import Any
 import jsonschema
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, Phase, given, settings
 from hypothesis import strategies as st
 
 from synthroads_addon.core.errors import InputError
 from synthroads_addon.core.parameters.model import RoadParameters, parameters_schema
 from synthroads_addon.core.scenario import Scenario
 from synthroads_addon.core.schema import Model, read_json
+from tests.core.mutations import cases, for_all
 from tests.core.parameter_sets import LIBRARY_ONLY, OBJECTS, POINTS, SMALL_ROAD, model_data, road_data
 
 SCHEMA = parameters_schema()
 VALIDATOR = jsonschema.Draft202012Validator(SCHEMA)
-LARGE = [HealthCheck.too_slow, HealthCheck.data_too_large]
-QUICK = [Phase.explicit, Phase.reuse, Phase.generate]
 
 
 def fault(data: object, model: type[Model] = RoadParameters) -> str:
@@ -56,14 +54,6 @@ def changed(place: str, value: Any) -> dict:
 # --- the schema and the library ------------------------------------------------------------------------------------
 
 
-@given(road_data(*OBJECTS))
-@settings(max_examples=25, suppress_health_check=LARGE, phases=QUICK)
-def test_what_the_library_writes_fits_the_schema_and_reads_back_to_the_same_bytes(data: dict) -> None:
-    text = RoadParameters.from_dict(data).to_json()
-    VALIDATOR.validate(json.loads(text))
-    assert RoadParameters.from_dict(json.loads(text)).to_json() == text
-
-
 def signed_zeros(data: Any) -> Any:
     """Return JSON data with -0.0 for each of its zeros, but for what a vendor wrote."""
     if isinstance(data, dict):
@@ -73,12 +63,17 @@ def signed_zeros(data: Any) -> Any:
     return -0.0 if type(data) in (int, float) and data == 0 else data
 
 
-@given(road_data(*OBJECTS))
-@settings(max_examples=25, suppress_health_check=LARGE, phases=QUICK)
-def test_equal_sets_have_the_same_bytes_whatever_the_signs_of_their_zeros(data: dict) -> None:
-    road, other = RoadParameters.from_dict(data), RoadParameters.from_dict(signed_zeros(data))
-    assert other == road
-    assert other.to_json() == road.to_json()
+@cases(6, 100)
+def test_what_is_written_fits_the_schema_and_is_read_to_the_same_bytes_whatever_the_signs_of_zeros(count: int) -> None:
+    def check(data: dict) -> None:
+        road, other = RoadParameters.from_dict(data), RoadParameters.from_dict(signed_zeros(data))
+        text = road.to_json()
+        VALIDATOR.validate(json.loads(text))
+        assert RoadParameters.from_dict(json.loads(text)).to_json() == text
+        assert other == road
+        assert other.to_json() == text
+
+    for_all(road_data(*OBJECTS), count, check)
 
 
 def numbers_of(schema: Any) -> set[float]:
@@ -164,26 +159,31 @@ def agree(data: dict, model: type[Model], validator: Any) -> None:
         assert model.from_dict(json.loads(text)).to_json() == text
 
 
-@given(st.data())
-@settings(max_examples=40, suppress_health_check=LARGE, phases=QUICK)
-def test_schema_and_library_refuse_the_same_sets(data: st.DataObject) -> None:
-    whole = data.draw(road_data(data.draw(st.sampled_from(sorted(OBJECTS)))))
-    written = RoadParameters.from_dict(whole).to_dict()
-    for start in (whole, written) * 5:
-        agree(mutated(data.draw, start, depth=3), RoadParameters, VALIDATOR)
+@cases(10, 200)
+def test_schema_and_library_refuse_the_same_sets(count: int) -> None:
+    def check(data: st.DataObject) -> None:
+        whole = data.draw(road_data(data.draw(st.sampled_from(sorted(OBJECTS)))))
+        written = RoadParameters.from_dict(whole).to_dict()
+        for start in (whole, written) * 5:
+            agree(mutated(data.draw, start, depth=3), RoadParameters, VALIDATOR)
+
+    for_all(st.data(), count, check)
 
 
 @pytest.mark.parametrize("kind", OBJECTS)
-@given(st.data())
-@settings(max_examples=20, suppress_health_check=LARGE)
-def test_schema_and_library_refuse_the_same_objects(kind: str, data: st.DataObject) -> None:
+@cases(6, 60)
+def test_schema_and_library_refuse_the_same_objects(kind: str, count: int) -> None:
     model = OBJECTS[kind]
     validator = VALIDATOR.evolve(schema={"$defs": SCHEMA["$defs"], "$ref": f"#/$defs/{model.__name__}"})
-    item = data.draw(model_data(model)) | {"type": kind}
-    for start in (item, model.from_dict(item).to_dict()) * 15:
-        changed = mutated(data.draw, start)
-        if "type" in changed:  # which only the set needs, to tell its objects apart
-            agree(changed, model, validator)
+
+    def check(data: st.DataObject) -> None:
+        item = data.draw(model_data(model)) | {"type": kind}
+        for start in (item, model.from_dict(item).to_dict()) * 15:
+            changed = mutated(data.draw, start)
+            if "type" in changed:  # which only the set needs, to tell its objects apart
+                agree(changed, model, validator)
+
+    for_all(st.data(), count, check)
 
 
 RAIL = SMALL_ROAD["objects"]["rail"] | {"instance": 99}
