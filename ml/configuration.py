@@ -81,8 +81,10 @@ def load_configuration(name_or_file: str, kinds: Mapping[str, type[C]], changes:
         hint = nearest_name(name_or_file, shipped_names())
         raise InputError("configuration", name_or_file, f"must be a .yaml or .json file or one of {known}{hint}")
     data = read_yaml(path)
+    task = data.get("task") if isinstance(data, dict) else None
+    kind = kinds.get(task, Configuration) if isinstance(task, str) else Configuration
     for change in changes:
-        data = apply_change(data, change)
+        data = apply_change(data, change, kind)
     return from_data(data, kinds, str(name_or_file))
 
 

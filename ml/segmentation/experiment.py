@@ -23,7 +23,7 @@ from synthroads_addon.core.dataset.manifest import checksum
 from synthroads_addon.core.errors import InputError, nearest_name
 from synthroads_addon.core.files import write_file
 from synthroads_addon.core.progress import Progress, silent
-from synthroads_addon.core.scenario import apply_change
+from synthroads_addon.core.scenario import apply_change, apply_values
 from synthroads_addon.core.schema import Model, canonical_json, read_json, read_yaml
 
 from .evaluation import score_all, trained_model
@@ -98,10 +98,9 @@ def configurations(
     for name, variant in experiment.variants.items():
         data = base
         for part in (experiment.set, experiment.variants[variant.of].set if variant.of else {}, variant.set):
-            for path, value in part.items():
-                data = apply_change(data, f"{path}={canonical_json(value)}")
+            data = apply_values(data, part)
         for change in changes:
-            data = apply_change(data, change)
+            data = apply_change(data, change, SegmentationConfiguration)
         result[name] = SegmentationConfiguration.from_dict(data, f"variants.{name}")
     return result
 

@@ -310,6 +310,14 @@ def test_shipped_configurations_and_experiments_are_whole() -> None:
             configurations(found, {"synthetic": "b"})
 
 
+def test_changes_are_of_the_type_of_their_field() -> None:
+    changes = ["classes=17", "title=2", "schedule.epochs=3", "voxel=0.5"]
+    made = load_configuration("segmentation-small", kinds(), changes)
+    assert (made.classes, made.title, made.schedule.epochs, made.voxel) == ("17", "2", 3, 0.5)
+    of_all = configurations(load_experiment("gantries"), {"real": "a", "synthetic": "b"}, ["classes=5"])
+    assert {configuration.classes for configuration in of_all.values()} == {"5"}
+
+
 def ml_segmentation_configurations() -> list[str]:
     """Return the names of the shipped configurations of this task."""
     from ml.configuration import SHIPPED, shipped_names
