@@ -10,7 +10,7 @@ import io
 import json
 import os
 import sys
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from importlib import import_module
 from pathlib import Path
@@ -35,6 +35,7 @@ def _missing(error: ModuleNotFoundError) -> str:
 
 
 try:
+    from synthroads_addon.core.scenario import apply_change
     from synthroads_addon.core.schema import canonical_json
     from synthroads_addon.core.tolerance import KINDS, TIMES, parse_tolerance, shown, with_unit
     from synthroads_addon.core.twin import TWIN_FORMATS
@@ -106,6 +107,40 @@ def add_changes_argument(parser: argparse.ArgumentParser) -> None:
     """Add ``--set PATH=VALUE``, gathered in ``changes``."""
     text = "change one field of the scenario, e.g. road.length=800 (can be repeated)"
     parser.add_argument("--set", action="append", default=[], metavar="PATH=VALUE", dest="changes", help=text)
+
+
+def add_device_argument(parser: argparse.ArgumentParser) -> None:
+    """Add ``--device NAME``, short for the field ``scan.device``."""
+    text = "scanner: a preset's name (`synthroads list devices`) or a .json file (the scenario's own)"
+    parser.add_argument("--device", metavar="NAME", help=text)
+
+
+def all_changes(arguments: argparse.Namespace, short: Mapping[str, str]) -> list[str]:
+    """Return the changes of the scenario that ``--set`` and options which are short for fields ask for.
+
+    Args:
+        arguments: of the command.
+        short: name of an option's argument -> path of its field; options that aren't given are None or empty.
+
+    Raises:
+        InputError: an option and ``--set`` contradict each other.
+    """
+    said: Any = {}
+    for change in arguments.changes:
+        said = apply_change(said, change)
+    changes = list(arguments.changes)
+    for name, path in short.items():
+        value = getattr(arguments, name)
+        if value in (None, []):
+            continue
+        other = said
+        for key in path.split("."):
+            other = other.get(key, value) if isinstance(other, dict) else value
+        if other != value:
+            option = f"--{name.replace('_', '-')}"
+            raise InputError(option, value, f"contradicts --set {path}={other}; leave one of the two out")
+        changes.append(f"{path}={json.dumps(value)}")
+    return changes
 
 
 def add_choice_arguments(parser: argparse.ArgumentParser) -> None:

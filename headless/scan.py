@@ -18,6 +18,8 @@ from headless.cli import (
     add_changes_argument,
     add_choice_arguments,
     add_common_arguments,
+    add_device_argument,
+    all_changes,
     choice_changes,
     entry,
     progress_bar,
@@ -41,7 +43,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     names = ", ".join(scenario_names())
     parser.add_argument("scene", type=Path, metavar="SCENE", help="file with the scene")
     parser.add_argument("--output", required=True, type=Path, metavar="DIR", help="folder for the files")
-    parser.add_argument("--device", metavar="NAME", help="scanner: a preset's name or a file (the scenario's own)")
+    add_device_argument(parser)
     where = parser.add_mutually_exclusive_group()
     where.add_argument("--path", type=Path, metavar="FILE", help="follow this line, CSV (x, y, z) or GeoJSON")
     where.add_argument("--trajectory", metavar="FILE", help="CSV: time, x, y, z, roll, pitch, heading")
@@ -94,17 +96,15 @@ def run(arguments: argparse.Namespace) -> Outcome:
 
 def scenario_of(arguments: argparse.Namespace) -> Scenario:
     """Return the scenario that the arguments stand for."""
-    given = {name: getattr(arguments, name) for name in _FIELDS if getattr(arguments, name) is not None}
-    changes = [*choice_changes(arguments), *arguments.changes]
-    changes += [f"{_FIELDS[name]}={json.dumps(value)}" for name, value in given.items()]
+    changes = [*choice_changes(arguments), *all_changes(arguments, _FIELDS)]
     if arguments.trajectory:
         for name in ("height", "speed"):
-            if name in given:
-                raise InputError(f"--{name}", given[name], "can't be given with --trajectory, which says it")
+            if (value := getattr(arguments, name)) is not None:
+                raise InputError(f"--{name}", value, "can't be given with --trajectory, which says it")
         changes += ['scan.platform.kind="trajectory"', f"scan.platform.file={json.dumps(arguments.trajectory)}"]
     if arguments.tripod:
-        if "speed" in given:
-            raise InputError("--speed", given["speed"], "can't be given with --tripod, which doesn't move")
+        if arguments.speed is not None:
+            raise InputError("--speed", arguments.speed, "can't be given with --tripod, which doesn't move")
         changes.append('scan.platform.kind="tripod"')
     if arguments.scenario:
         return load_scenario(arguments.scenario, changes)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal, get_args
@@ -12,6 +12,7 @@ from pydantic import Field, field_validator
 from .cloud_scenario import CloudScenario
 from .colour_scenario import ColourScenario
 from .errors import InputError, nearest_name
+from .giving_way import without_what_gives_way
 from .materials import Material, material_table_path, read_material_table
 from .road_scenario import RoadScenario, ScenarioModel
 from .scan_scenario import ScanScenario
@@ -155,10 +156,19 @@ def load_scenario(name_or_file: str, changes: list[str] | None = None) -> Scenar
     scenario = Scenario.from_dict(read_json(path), source=str(name_or_file))
     if not changes:
         return scenario
-    data = scenario.to_dict()
-    for change in changes:
-        data = apply_change(data, change)
-    return Scenario.from_dict(data)
+    return Scenario.from_dict(with_changes(scenario.to_dict(), map(parsed_change, changes)))
+
+
+def with_changes(data: Any, changes: Iterable[tuple[str, Any]]) -> Any:
+    """Return a scenario's JSON data with values set by their dotted paths, one after another.
+
+    What the scenario said itself and doesn't fit them any more gives way, see `without_what_gives_way`.
+    """
+    named = set()
+    for path, value in changes:
+        data = apply_values(data, {path: value})
+        named.add(path)
+    return without_what_gives_way(data, named)
 
 
 def apply_change(data: Any, change: str, model: type[Model] = Scenario) -> Any:

@@ -2,7 +2,13 @@
 
 from __future__ import annotations
 
-from headless import dataset
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from headless import cli, dataset, generate, scan
 from synthroads_addon.core.dataset.recipe import load_recipe, scene_jobs
 
 
@@ -10,3 +16,72 @@ def test_changes_of_a_data_set_are_of_the_type_of_their_field() -> None:
     changed = dataset._changed(load_recipe("small-gantries"), ["cloud.classes=5", "title=7", "road.length=200"])
     scenarios = [job.scenario for job in scene_jobs(changed)]
     assert {(one.cloud.classes, one.title, one.road.length) for one in scenarios} == {("5", "7", 200.0)}
+
+
+def parsed(*words: str) -> Any:
+    return cli.build_parser().parse_args(words)
+
+
+def refusal(capsys: pytest.CaptureFixture[str], *words: str) -> str:
+    """Return the one line with which a command refuses its arguments."""
+    try:
+        code = cli.main(words)
+    except SystemExit as error:
+        code = int(str(error.code))
+    said = capsys.readouterr().err
+    assert code == 2, said
+    assert said.count("\n") == 1
+    return said
+
+
+def test_device_is_short_for_its_field() -> None:
+    words = ["generate", "--output", "out", "--device", "riegl-vux-1uav22"]
+    assert cli.all_changes(parsed(*words), generate._FIELDS) == ['scan.device="riegl-vux-1uav22"']
+    same = [*words, "--set", "scan.device=riegl-vux-1uav22", "--seed", "7", "--twin", "ifc"]
+    assert cli.all_changes(parsed(*same), generate._FIELDS)[1:] == [
+        'scan.device="riegl-vux-1uav22"',
+        "seed=7",
+        'twin=["ifc"]',
+    ]
+    scenario = scan.scenario_of(parsed("scan", "scene.obj", "--output", "out", "--device", "velodyne-vlp-16"))
+    assert scenario.scan.device == "velodyne-vlp-16"
+
+
+@pytest.mark.parametrize(
+    ("words", "wanted"),
+    [
+        (["--device", "generic-grid", "--set", "scan.device=livox-mid-70"], "--device is 'generic-grid': contradicts"),
+        (["--device", "generic-grid", "--set", 'scan={"device": "livox-mid-70"}'], "--set scan.device=livox-mid-70"),
+        (["--seed", "7", "--set", "seed=8"], "--seed is 7: contradicts --set seed=8"),
+        (["--fidelity", "draft", "--set", "fidelity=high"], "--fidelity is 'draft': contradicts --set fidelity=high"),
+    ],
+)
+def test_options_that_set_contradicts_are_refused(
+    words: list[str], wanted: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = ["--output", str(tmp_path / "out")]
+    assert wanted in refusal(capsys, "generate", *out, *words)
+    assert wanted in refusal(capsys, "scan", str(tmp_path / "scene.obj"), *out, *words)
+    assert "scan.device is 'livox': must be a .json file" in refusal(capsys, "generate", *out, "--device", "livox")
+    assert not (tmp_path / "out").exists()
+
+
+def first_set(capsys: pytest.CaptureFixture[str], *words: str) -> dict[str, Any]:
+    assert cli.main(["parameters", "--length", "300", *words]) == 0
+    made: dict[str, Any] = json.loads(capsys.readouterr().out)
+    return made
+
+
+def test_one_of_design_class_and_cross_section_is_enough(capsys: pytest.CaptureFixture[str]) -> None:
+    for words, name in (
+        (["--design-class", "EKA3"], "rq25-eka3-1"),
+        (["--set", "road.design_class=EKA3"], "rq25-eka3-1"),
+        (["--design-class", "EKA2"], "rq28-eka2-1"),
+        (["--cross-section", "RQ31.5"], "rq31.5-eka3-1"),
+        ([], "rq31-eka1a-1"),
+    ):
+        assert first_set(capsys, *words)["metadata"]["identifier"] == name
+    both = refusal(capsys, "parameters", "--design-class", "EKA3", "--cross-section", "RQ31")
+    assert "cross_section is 'RQ31': EKA3 allows" in both
+    twice = refusal(capsys, "parameters", "--design-class", "EKA3", "--set", "road.design_class=EKA2")
+    assert "--design-class is 'EKA3': contradicts --set road.design_class=EKA2" in twice

@@ -11,7 +11,7 @@ from pydantic import Field, field_validator, model_validator
 from ..errors import InputError, nearest_name
 from ..random_streams import stream
 from ..road_scenario import ScenarioModel
-from ..scenario import Scenario, apply_values, load_scenario
+from ..scenario import Scenario, load_scenario, with_changes
 from ..schema import quantity, read_yaml
 
 RECIPES = Path(__file__).parents[2] / "presets" / "recipes"
@@ -149,10 +149,9 @@ def _scenario(recipe: Recipe, group: SceneGroup, name: str, place: int) -> Scena
         turn, place_in_turn = divmod(place, len(group.variants))
         order = stream(recipe.seed, "variants", group.name, turn).permutation(len(group.variants))
         changes.append(group.variants[order[place_in_turn]])
-    data: Any = load_scenario(group.scenario or recipe.scenario).to_dict()
-    for values in changes:
-        data = apply_values(data, values)
-    scenario = Scenario.from_dict(data)
+    data = load_scenario(group.scenario or recipe.scenario).to_dict()
+    pairs = (pair for values in changes for pair in values.items())
+    scenario = Scenario.from_dict(with_changes(data, pairs))
     if _UNSTABLE in group_outputs(group, recipe):
         raise InputError("outputs", list(scenario.outputs), f"a data set can't hold {_UNSTABLE}: it differs each time")
     wanted = dict.fromkeys((*NEEDED_OUTPUTS, *(name for name in scenario.outputs if name != _UNSTABLE)))
