@@ -182,6 +182,16 @@ def choice_summary(report: dict[str, Any]) -> list[str]:
     return lines + ([f"  expected time: {seconds:.0f} s in all"] if seconds is not None else [])
 
 
+def add_renamed_argument(parser: argparse.ArgumentParser, former: str, name: str) -> None:
+    """Refuse an option's former name with a hint at its name; help doesn't show it."""
+
+    class Renamed(argparse.Action):
+        def __call__(self, parser: argparse.ArgumentParser, *_: Any) -> None:
+            parser.error(f"{former} is now {name}")
+
+    parser.add_argument(former, action=Renamed, nargs="?", help=argparse.SUPPRESS)
+
+
 def add_twin_argument(parser: argparse.ArgumentParser, default: Sequence[str] = ()) -> None:
     """Add ``--twin FORMATS``, a list of names of formats in ``twin``."""
     text = f"geometric-semantic models, with commas: {', '.join(TWIN_FORMATS)} ({','.join(default) or 'none'})"

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import argparse
 import json
+import re
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -32,6 +35,26 @@ def refusal(capsys: pytest.CaptureFixture[str], *words: str) -> str:
     assert code == 2, said
     assert said.count("\n") == 1
     return said
+
+
+def parsers(parser: argparse.ArgumentParser, name: str = "") -> Iterator[tuple[str, argparse.ArgumentParser]]:
+    """Yield every command and tool with its parser."""
+    for action in parser._actions:
+        if isinstance(action, argparse._SubParsersAction):
+            for tool, its_parser in action.choices.items():
+                yield from parsers(its_parser, f"{name} {tool}".strip())
+    yield name, parser
+
+
+PARSERS = dict(parsers(cli.build_parser()))
+
+
+def test_tolerance_means_one_thing(capsys: pytest.CaptureFixture[str]) -> None:
+    with_it = {name for name, parser in PARSERS.items() if "--tolerance" in parser.format_help()}
+    assert with_it == {"generate", "scan"}
+    for words in (["twin", "road.json"], ["reconstruct", "cloud.laz"]):
+        said = refusal(capsys, *words, "--output", "out", "--tolerance", "0.01")
+        assert re.search(r"--tolerance is now --(max-deviation|fit-tolerance)\n", said)
 
 
 def test_device_is_short_for_its_field() -> None:
