@@ -61,9 +61,10 @@ COMMANDS = {
     "train": "train a segmentation or centreline model",
     "evaluate": "measure a trained model",
     "predict": "label a cloud, or find its road, with a trained model",
+    "experiment": "train variants of a segmentation with several seeds, and compare their scores",
     "reconstruct": "turn a cloud into the parameters of its road",
 }
-_LEARNING = ("train", "evaluate", "predict", "reconstruct")
+_LEARNING = ("train", "evaluate", "predict", "experiment", "reconstruct")
 """Commands whose modules are in `ml`."""
 
 

@@ -13,6 +13,7 @@ from synthroads_addon.core.scenario import apply_change
 from synthroads_addon.core.schema import Model, quantity, read_yaml
 
 SHIPPED = Path(__file__).parent / "configurations"
+EXPERIMENTS = SHIPPED / "experiments"
 _LARGEST_SEED = 2**63 - 1
 
 
@@ -59,6 +60,11 @@ C = TypeVar("C", bound=Configuration)
 def shipped_names() -> list[str]:
     """Return the names of the configurations that come with the package."""
     return sorted(path.stem for path in SHIPPED.glob("*.yaml"))
+
+
+def experiment_names() -> list[str]:
+    """Return the names of the experiments that come with the package."""
+    return sorted(path.stem for path in EXPERIMENTS.glob("*.yaml"))
 
 
 def load_configuration(name_or_file: str, kinds: Mapping[str, type[C]], changes: Sequence[str] = ()) -> C:

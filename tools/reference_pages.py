@@ -147,7 +147,7 @@ def presets() -> str:
         _table("Trainings", "`synthroads train NAME`", _titled(CONFIGURATIONS.glob("*.yaml"))),
         _table(
             "Experiments",
-            "`python -m ml.segmentation.experiment NAME`",
+            "`synthroads experiment NAME`",
             _titled(CONFIGURATIONS.glob("experiments/*.yaml")),
         ),
         _table("Libraries of assets", "`--set 'road.assets=[\"NAME\"]'`", _libraries()),

@@ -12,10 +12,11 @@ import numpy as np
 import pytest
 import torch
 
+from headless import cli
 from ml import evaluate as evaluate_command
 from ml import predict as predict_command
 from ml import train as train_command
-from ml.configuration import load_configuration
+from ml.configuration import EXPERIMENTS, load_configuration
 from ml.runs import CHECKPOINT, PRETRAINING, Run
 from ml.segmentation import experiment as experiments
 from ml.segmentation import task
@@ -182,10 +183,10 @@ def test_small_experiments_run_from_end_to_end(tmp_path: Path, name: str) -> Non
         write_pointcept(tmp_path / "real", split, [road_tile(2000, 1, split)], scheme="17")
     five = name == "real-synthetic-mixed-small"
     write_pointcept(tmp_path / "synthetic", "train", [road_tile(2000, 2)], scheme="5" if five else "17")
-    words = [name, "--output", str(tmp_path / "out"), "--seeds", "1", "2", "--quiet"]
+    words = ["experiment", name, "--output", str(tmp_path / "out"), "--seeds", "1", "2", "--quiet"]
     words += [f"--data={each}={tmp_path / each}" for each in ("real", "synthetic")]
     changes = ("threads=1", "network.width=8", "voxel=0.4", "crop_points=300", "schedule.epochs=1")
-    assert experiments.main([*words, *(f"--set={change}" for change in changes), "--set=fine_tuning.epochs=1"]) == 0
+    assert cli.main([*words, *(f"--set={change}" for change in changes), "--set=fine_tuning.epochs=1"]) == 0
     text = (tmp_path / "out" / "table.md").read_text()
     variants = load_experiment(name).variants
     assert f"| class | points | {' | '.join(variants)} |" in text
@@ -239,8 +240,6 @@ def test_clouds_are_laid_over_as_often_as_asked(data: Path) -> None:
 
 
 def test_commands_train_evaluate_and_predict(data: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    from headless import cli
-
     (tmp_path / "toy.yaml").write_text(json.dumps(toy(data).to_dict()))
 
     def command(module: Any, *arguments: object) -> dict[str, Any]:
@@ -298,7 +297,7 @@ def test_shipped_configurations_and_experiments_are_whole() -> None:
     assert "segmentation" in known
     for name in known:
         assert load_configuration(name, kinds()).task == "segmentation"
-    for path in experiments.SHIPPED.glob("*.yaml"):
+    for path in EXPERIMENTS.glob("*.yaml"):
         found = load_experiment(path.stem)
         made = configurations(found, {"real": "a", "synthetic": "b"})
         assert list(made) == list(found.variants)
@@ -345,13 +344,13 @@ def test_an_experiment_makes_a_table_and_goes_on_where_it_stopped(data: Path, tm
     (tmp_path / "toy.yaml").write_text(json.dumps(toy(data, schedule={"epochs": 1}).to_dict()))
     (tmp_path / "own.yaml").write_text(json.dumps(own))
     folders = [f"--data={name}={data / name}" for name in ("real", "synthetic")]
-    arguments = [str(tmp_path / "own.yaml"), *folders, "--output", str(tmp_path / "out"), "--quiet"]
-    assert experiments.main([*arguments, "--seeds", "1"]) == 0
+    arguments = ["experiment", str(tmp_path / "own.yaml"), *folders, "--output", str(tmp_path / "out"), "--quiet"]
+    assert cli.main([*arguments, "--seeds", "1"]) == 0
     before = (tmp_path / "out" / "synthetic" / "seed-1" / "checkpoint.pt").stat().st_mtime_ns
     assert same(
         weights(tmp_path / "out" / "synthetic" / "seed-1"), weights(tmp_path / "out" / "tuned" / "seed-1" / PRETRAINING)
     )
-    assert experiments.main(arguments) == 0
+    assert cli.main(arguments) == 0
     assert (tmp_path / "out" / "synthetic" / "seed-1" / "checkpoint.pt").stat().st_mtime_ns == before
     results = json.loads((tmp_path / "out" / "results.json").read_text())
     assert {name: sorted(seeds) for name, seeds in results.items()} == {name: ["1", "2"] for name in own["variants"]}
@@ -375,13 +374,39 @@ def test_table_shows_undefined_scores_as_such() -> None:
 def test_an_experiments_faults_are_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     wrong = {"title": "T", "data": {}, "variants": {"a": {"of": "b"}}}
     (tmp_path / "wrong.yaml").write_text(json.dumps(wrong))
-    assert experiments.main([str(tmp_path / "wrong.yaml"), "--output", str(tmp_path / "out")]) == 2
+    assert cli.main(["experiment", str(tmp_path / "wrong.yaml"), "--output", str(tmp_path / "out")]) == 2
     assert "must be a variant that is trained" in capsys.readouterr().err
     with pytest.raises(InputError, match="gantries"):
         load_experiment("gantrys")
     words = ["--data", "real=a", "--data", "synthetic=b", "--output", str(tmp_path / "out"), "--seeds", "-1"]
-    assert experiments.main(["real-synthetic-mixed-small", *words]) == 2
+    assert cli.main(["experiment", "real-synthetic-mixed-small", *words]) == 2
     assert "--seeds is -1: must be whole numbers from 0" in capsys.readouterr().err
+    with pytest.raises(SystemExit, match="2"):
+        cli.main(["experiment", "gantries", "--data", "real", "--output", str(tmp_path / "out")])
+    assert "is 'real': must be NAME=FOLDER" in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
+
+
+def test_an_experiment_tells_its_scores(data: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    tests = {"unseen": [{"path": "{real}", "split": "test"}]}
+    own = {
+        "title": "Toy",
+        "configuration": str(tmp_path / "toy.yaml"),
+        "data": {"synthetic": [{"path": "{synthetic}", "split": "train"}], "tests": tests},
+        "variants": {"plain": {"set": {"set_up": "synthetic"}}},
+        "seeds": [1],
+    }
+    (tmp_path / "toy.yaml").write_text(json.dumps(toy(data, schedule={"epochs": 1}).to_dict()))
+    (tmp_path / "own.yaml").write_text(json.dumps(own))
+    folders = [f"--data={name}={data / name}" for name in ("real", "synthetic")]
+    words = ["experiment", str(tmp_path / "own.yaml"), *folders, "--output", str(tmp_path / "out")]
+    assert cli.main(words) == 0
+    said = capsys.readouterr().out
+    assert "# Toy" in said
+    assert "| class | points | plain |" in said
+    assert said.rstrip().endswith(f"written to {tmp_path / 'out'}: table.md, results.json and the runs")
+    assert cli.main([*words, "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["results"] == json.loads((tmp_path / "out/results.json").read_text())
 
 
 def test_clouds_of_one_name_have_results_of_their_own(data: Path, tmp_path: Path) -> None:
