@@ -63,6 +63,7 @@ COMMANDS = {
     "predict": "label a cloud, or find its road, with a trained model",
     "experiment": "train variants of a segmentation with several seeds, and compare their scores",
     "reconstruct": "turn a cloud into the parameters of its road",
+    "list": "list what comes under a name, and the fields that --set takes",
 }
 _LEARNING = ("train", "evaluate", "predict", "experiment", "reconstruct")
 """Commands whose modules are in `ml`."""
