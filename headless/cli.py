@@ -151,10 +151,13 @@ def add_choice_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--tolerance",
         metavar="KIND=VALUE,...",
-        help=f"choose the cheapest settings whose errors keep this, e.g. height=5mm,intensity=5%%; kinds: {kinds}",
+        help=f"choose the cheapest settings whose errors keep this, e.g. height=5mm,intensity=5%%; kinds: {kinds} "
+        "(the fidelity's settings)",
     )
     parser.add_argument(
-        "--time-budget", metavar="TIME", help="choose the best settings that fit this time, e.g. 60s or 2min"
+        "--time-budget",
+        metavar="TIME",
+        help="choose the best settings that fit this time, e.g. 60s or 2min (the fidelity's settings)",
     )
 
 

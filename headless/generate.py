@@ -38,7 +38,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--output", required=True, type=Path, metavar="DIR", help="folder for the files")
     add_device_argument(parser)
     parser.add_argument("--seed", type=_seed, metavar="N", help="seed of everything random (the scenario's own)")
-    parser.add_argument("--fidelity", choices=("draft", "standard", "high"), help="point on the trade-off")
+    text = "point on the trade-off (the scenario's own)"
+    parser.add_argument("--fidelity", choices=("draft", "standard", "high"), help=text)
     parser.add_argument("--parameters", type=Path, metavar="FILE", help="take this road instead of sampling one")
     parser.add_argument("--axis", type=Path, metavar="FILE", help="centreline, CSV (x, y, z in order) or GeoJSON")
     add_choice_arguments(parser)

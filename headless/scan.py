@@ -45,7 +45,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--output", required=True, type=Path, metavar="DIR", help="folder for the files")
     add_device_argument(parser)
     where = parser.add_mutually_exclusive_group()
-    where.add_argument("--path", type=Path, metavar="FILE", help="follow this line, CSV (x, y, z) or GeoJSON")
+    text = "follow this line, CSV (x, y, z) or GeoJSON (the scene's road, else straight over its middle)"
+    where.add_argument("--path", type=Path, metavar="FILE", help=text)
     where.add_argument("--trajectory", metavar="FILE", help="CSV: time, x, y, z, roll, pitch, heading")
     where.add_argument(
         "--tripod",
@@ -55,16 +56,19 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="X,Y[,Z]",
         help="stand here, on the surface or with the scanner at Z (can be repeated; --tripod=-4,7 where X < 0)",
     )
-    parser.add_argument("--height", type=float, metavar="M", help="flight height, or that of the scanner on a tripod")
-    parser.add_argument("--speed", type=float, metavar="M/S", help="speed over ground")
+    text = "flight height, or that of the scanner on a tripod, m (the platform's usual one)"
+    parser.add_argument("--height", type=float, metavar="M", help=text)
+    parser.add_argument("--speed", type=float, metavar="M/S", help="speed over ground, m/s (the platform's usual one)")
     parser.add_argument("--rays", type=int, metavar="N", help="rays per pulse (the fidelity's own)")
-    parser.add_argument("--classes", type=Path, metavar="FILE", help="JSON: classes by names, see docs/scan.md")
-    parser.add_argument("--scenario", metavar="NAME_OR_FILE", help=f"take the scan from it: {names}, or a .json file")
+    parser.add_argument("--classes", type=Path, metavar="FILE", help="JSON: classes by names (none), see docs/scan.md")
+    text = f"take the scan from it: {names}, or a .json file (the defaults of a scenario)"
+    parser.add_argument("--scenario", metavar="NAME_OR_FILE", help=text)
     add_changes_argument(parser)
-    parser.add_argument("--seed", type=int, metavar="N", help="seed of the noise (1)")
-    parser.add_argument("--fidelity", choices=("draft", "standard", "high"), help="point on the trade-off")
+    parser.add_argument("--seed", type=int, metavar="N", help="seed of the noise (the scenario's own)")
+    text = "point on the trade-off (the scenario's own)"
+    parser.add_argument("--fidelity", choices=("draft", "standard", "high"), help=text)
     add_choice_arguments(parser)
-    parser.add_argument("--epsg", type=int, metavar="N", help="coordinate system of the map")
+    parser.add_argument("--epsg", type=int, metavar="N", help="coordinate system of the map (that of the scene's road)")
     parser.add_argument("--origin", type=_origin, metavar="X,Y,Z", help="map coordinates of the scene's origin (0,0,0)")
     parser.add_argument("--up", choices=("y", "z"), help="what points up in .obj (y), .ply and .stl (z)")
     parser.add_argument("--overwrite", action="store_true", help="replace files that are already there")

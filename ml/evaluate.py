@@ -19,7 +19,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("data", type=Path, nargs="+", metavar="DATA", help="data sets' folders or clouds")
     parser.add_argument("--split", default="test", metavar="NAME", help="split of the data sets (test)")
     parser.add_argument("--output", required=True, type=Path, metavar="DIR", help="folder for tables and pictures")
-    text = "classes of clouds of others, for segmentation: semantickitti, ign or a JSON file"
+    text = "classes of clouds of others, for segmentation: semantickitti, ign or a JSON file (the cloud's own)"
     parser.add_argument("--mapping", metavar="MAPPING", help=text)
     add_common_arguments(parser)
 

@@ -42,7 +42,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments of `synthroads reconstruct`."""
     parser.add_argument("cloud", type=Path, metavar="CLOUD", help="cloud to read (.laz, .las, .ply, .e57, .npz)")
     parser.add_argument("--output", required=True, type=Path, metavar="DIR", help="folder for the files")
-    text = "kind of road, where it is known (found out)"
+    text = "kind of road, where it is known (auto: found out)"
     parser.add_argument("--road", choices=("auto", "dual", "single"), default="auto", help=text)
     text = "course of the road, roughly: CSV or GeoJSON in the cloud's coordinates (found in the cloud)"
     parser.add_argument("--path", type=Path, metavar="FILE", help=text)

@@ -49,6 +49,39 @@ def parsers(parser: argparse.ArgumentParser, name: str = "") -> Iterator[tuple[s
 PARSERS = dict(parsers(cli.build_parser()))
 
 
+def texts_of(default: object) -> list[str]:
+    """Return a default as the texts that help has to name."""
+    values = default if isinstance(default, (list, tuple)) else [default]
+    return [f"{value:g}" if isinstance(value, float) else str(value) for value in values]
+
+
+def unnamed(parser: argparse.ArgumentParser) -> list[str]:
+    """Return the arguments that have a default which their help doesn't name in parentheses."""
+    found = []
+    for action in parser._actions:
+        if action.default in (None, False, [], argparse.SUPPRESS) or action.help == argparse.SUPPRESS:
+            continue
+        said = re.findall(r"\(([^()]*)\)", parser._get_formatter()._expand_help(action))
+        words = {*said, *(word for text in said for word in re.split(r"[\s,;:]+", text))}
+        everything = "all" in words and all(text in str(action.help) for text in texts_of(action.default))
+        if not everything and not set(texts_of(action.default)) <= words:
+            found.append(f"{'/'.join(action.option_strings) or action.dest} is {action.default!r}: {action.help}")
+    return found
+
+
+@pytest.mark.parametrize("name", PARSERS)
+def test_help_names_every_default(name: str) -> None:
+    assert unnamed(PARSERS[name]) == []
+
+
+def test_a_default_that_help_does_not_name_is_found() -> None:
+    parser = argparse.ArgumentParser()
+    parser.add_argument("--width", type=float, default=2.0, help="width, m (2)")
+    parser.add_argument("--wide", type=float, default=2.0, help="width, m (20)")
+    parser.add_argument("--formats", nargs="+", default=["laz", "ply"], help="formats: laz, ply")
+    assert [text.split()[0] for text in unnamed(parser)] == ["--wide", "--formats"]
+
+
 def test_tolerance_means_one_thing(capsys: pytest.CaptureFixture[str]) -> None:
     with_it = {name for name, parser in PARSERS.items() if "--tolerance" in parser.format_help()}
     assert with_it == {"generate", "scan"}
