@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 
-_NUMBER = re.compile(r"[-+\d.,]*%?|nan")
+_NUMBER = re.compile(r"[-–+\d.,]*( \([\d.,]+\))?")
 
 
 def text_table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:

@@ -260,6 +260,17 @@ def test_commands_train_evaluate_and_predict(data: Path, tmp_path: Path, capsys:
     assert again["tests"]["real-test"] == trained["tests"]["unseen"]
     assert (tmp_path / "scores" / "real-test.png").read_bytes()[:4] == b"\x89PNG"
     assert "road_marking" in (tmp_path / "scores" / "real-test.txt").read_text()
+    assert again["files"] == ["real-test.txt", "real-test.png"]
+    words = ["evaluate", str(tmp_path / "run"), str(data / "real"), "--output", str(tmp_path / "scores")]
+    assert cli.main(words) == 0
+    said = capsys.readouterr().out
+    scores = again["tests"]["real-test"]
+    assert (tmp_path / "scores" / "real-test.txt").read_text() in said
+    rows = {line.split()[0]: line.split()[1:] for line in said.splitlines() if line}
+    assert rows["mean"][2] == f"{100 * scores['mean_iou']:.1f}"
+    assert rows["road_marking"][2] == f"{100 * scores['classes']['road_marking']['iou']:.1f}"
+    assert f"{100 * scores['accuracy']:.1f} % of the points are right" in said
+    assert said.endswith(f"written to {tmp_path / 'scores'}: real-test.txt, real-test.png\n")
     cloud = write_cloud(tmp_path / "cloud.laz", road_block(4000, 9))
     told = command(predict_command, tmp_path / "run", cloud, "--output", tmp_path / "labelled.laz", "--classification")
     assert told["points"] == 4000
