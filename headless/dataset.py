@@ -58,7 +58,12 @@ def _changed(recipe: Recipe, changes: list[str]) -> Recipe:
     if not changes:
         return recipe
     own = dict(parsed_change(change) for change in changes)
-    groups = [group.model_copy(update={"set": {**group.set, **own}}) for group in recipe.groups]
+    groups = [
+        group.model_copy(
+            update={"set": {**group.set, **own}, "variants": tuple({**each, **own} for each in group.variants)}
+        )
+        for group in recipe.groups
+    ]
     return Recipe.from_dict(recipe.model_copy(update={"groups": tuple(groups)}).to_dict(), "recipe")
 
 

@@ -21,6 +21,13 @@ def test_changes_of_a_data_set_are_of_the_type_of_their_field() -> None:
     assert {(one.cloud.classes, one.title, one.road.length) for one in scenarios} == {("5", "7", 200.0)}
 
 
+def test_changes_of_a_data_set_hold_for_every_variant() -> None:
+    recipe = load_recipe("small-roads")
+    assert len({job.scenario.road.cross_section for job in scene_jobs(recipe)}) == 4
+    changed = dataset._changed(recipe, ["road.design_class=EKA2", "road.cross_section=RQ28"])
+    assert {job.scenario.road.cross_section for job in scene_jobs(changed)} == {"RQ28"}
+
+
 def parsed(*words: str) -> Any:
     return cli.build_parser().parse_args(words)
 
