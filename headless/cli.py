@@ -70,7 +70,21 @@ _LEARNING = ("train", "evaluate", "predict", "experiment", "reconstruct")
 
 
 class _Parser(argparse.ArgumentParser):
-    """A parser whose complaints are one line, like every other bad input."""
+    """A parser whose complaints are one line, like every other bad input.
+
+    Attributes:
+        words: argument that takes words on both sides of options; argparse by itself ends one with ``*`` at the first.
+    """
+
+    words: str | None = None
+
+    def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
+        """Parse what is known; return it and the rest."""
+        found, rest = super().parse_known_args(args, namespace)
+        if self.words and not any(word.startswith("-") for word in rest):
+            setattr(found, self.words, [*(getattr(found, self.words) or ()), *rest])
+            rest = []
+        return found, rest
 
     def error(self, message: str) -> Any:
         self.exit(2, f"{self.prog}: {message}\n")

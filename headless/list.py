@@ -16,7 +16,7 @@ from headless.cli import Outcome, add_common_arguments, entry
 from ml import catalogue as of_learning
 from synthroads_addon.core import catalogue
 from synthroads_addon.core.catalogue import Kind, entries
-from synthroads_addon.core.errors import InputError
+from synthroads_addon.core.errors import InputError, nearest_name
 from synthroads_addon.core.field_list import Field, fields_of
 from synthroads_addon.core.scenario import Scenario
 from synthroads_addon.core.text_table import text_table
@@ -46,11 +46,11 @@ _OWNERS: dict[str, Callable[[], Any]] = {
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments of `synthroads list`."""
-    kinds = [*KINDS, _FIELDS]
-    text = f"{', '.join(kinds[:-1])}, or {_FIELDS}: what --set takes (the kinds themselves)"
-    parser.add_argument("kind", nargs="?", choices=kinds, metavar="KIND", help=text)
+    text = f"{', '.join(KINDS)}, or {_FIELDS}: what --set takes (the kinds themselves)"
+    parser.add_argument("kind", nargs="?", metavar="KIND", help=text)
     text = "only names (of fields: paths) that begin so; or files of your own, or folders of them (all that is shipped)"
     parser.add_argument("names", nargs="*", metavar="NAME_OR_FILE", help=text)
+    parser.words = "names"  # type: ignore[attr-defined]
     text = "whose fields: the scenario's, or those of a training (%(default)s)"
     parser.add_argument("--of", choices=_OWNERS, default="scenario", help=text)
     add_common_arguments(parser)
@@ -58,17 +58,22 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> Outcome:
     """Run `synthroads list`."""
-    if arguments.kind != _FIELDS and arguments.of != "scenario":
+    words = [*filter(None, [arguments.kind]), *arguments.names]  # after an option all of them are names
+    name, *wanted = words or [None]
+    if name != _FIELDS and arguments.of != "scenario":
         raise InputError("--of", arguments.of, f"is for {_FIELDS} only")
-    if arguments.kind is None:
+    if name is None:
         return _kinds()
-    if arguments.kind == _FIELDS:
-        return _fields(arguments.of, arguments.names)
-    kind = KINDS[arguments.kind]
-    found = entries(kind, arguments.names)
+    if name == _FIELDS:
+        return _fields(arguments.of, wanted)
+    if name not in KINDS:
+        known = [*KINDS, _FIELDS]
+        raise InputError("KIND", name, f"must be one of {', '.join(known)}{nearest_name(name, known)}")
+    kind = KINDS[name]
+    found = entries(kind, wanted)
     rows = [(one.name, *row) for one in found for row in kind.rows(one)]
     lines = [*text_table(("name", *kind.head), rows), "", f"use: {kind.use}"]
-    return 0, {arguments.kind: [one.to_dict() for one in found]}, "\n".join(lines)
+    return 0, {name: [one.to_dict() for one in found]}, "\n".join(lines)
 
 
 def _kinds() -> Outcome:

@@ -78,6 +78,7 @@ def unnamed(parser: argparse.ArgumentParser) -> list[str]:
 
 @pytest.mark.parametrize("name", PARSERS)
 def test_help_names_every_default(name: str) -> None:
+    assert PARSERS[name].format_help()
     assert unnamed(PARSERS[name]) == []
 
 

@@ -91,9 +91,18 @@ def test_names_can_be_chosen_by_their_beginning(capsys: Capture) -> None:
         *(name for name in device_names() if name.startswith("velodyne")),
         "generic-grid",
     ]
+    both_sides = ["list", "--json", "devices", "--quiet", "livox", "velodyne-vlp"]
+    for argv in (both_sides, [*both_sides[:1], *both_sides[2:], "--json"]):
+        assert cli.main(argv) == 0
+        found = json.loads(capsys.readouterr().out)["devices"]
+        assert [one["name"] for one in found] == ["livox-mid-70", "velodyne-vlp-16"]
     assert "did you mean 'riegl-vq-450'" in refused(capsys, "devices", "rigel-vq-450")
     assert "fields is 'scan.x': no field of the scenario begins so" in refused(capsys, "fields", "scan.x")
     assert "--of is 'segmentation': is for fields only" in refused(capsys, "devices", "--of", "segmentation")
+    assert "KIND is 'device': must be one of" in refused(capsys, "device")
+    with pytest.raises(SystemExit, match="2"):
+        cli.main(["list", "devices", "--jsn", "livox"])
+    assert "unrecognized arguments: --jsn" in capsys.readouterr().err
 
 
 def test_files_of_ones_own_are_described_or_refused(tmp_path: Path, capsys: Capture) -> None:
