@@ -43,7 +43,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--document", type=Path, metavar="FILE", help="fill the tables of this Markdown file as well")
     usual = " ".join(map(str, cores))
     parser.add_argument("--cores", nargs="+", type=int, default=cores, metavar="N", help=f"numbers of cores ({usual})")
-    parser.add_argument("--scenario", default="rq31-600m", metavar="NAME_OR_FILE", help="scene to measure on")
+    text = "scene to measure on (%(default)s)"
+    parser.add_argument("--scenario", default="rq31-600m", metavar="NAME_OR_FILE", help=text)
     add_changes_argument(parser)
     parser.add_argument("--quick", action="store_true", help="a small scene: to see that all works, in seconds")
     parser.add_argument("--overwrite", action="store_true", help="replace files that are already there")

@@ -46,7 +46,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def _cloud_arguments(group: argparse._ArgumentGroup) -> None:
     group.add_argument("--real", type=Path, metavar="CLOUD", help="compare with this cloud (.laz, .las, .ply, ...)")
-    group.add_argument("--class-field", metavar="NAME", help="extra attribute of it that holds the classes")
+    text = "extra attribute of it that holds the classes (its own classes)"
+    group.add_argument("--class-field", metavar="NAME", help=text)
     group.add_argument("--axis", type=Path, metavar="FILE", help="axis of its road: tells the classes by offset")
     group.add_argument(
         "--paved", type=_pair, action="append", default=[], metavar="FROM,TO",
@@ -55,13 +56,14 @@ def _cloud_arguments(group: argparse._ArgumentGroup) -> None:
     group.add_argument(
         "--line", type=_number, action="append", default=[], metavar="M", help="offset of a marking (can be repeated)"
     )
-    group.add_argument("--line-width", type=float, default=0.15, metavar="M", help="of the markings (0.15)")
+    group.add_argument("--line-width", type=float, default=0.15, metavar="M", help="of the markings, m (0.15)")
 
 
 def _view_arguments(group: argparse._ArgumentGroup) -> None:
     group.add_argument("--device", metavar="NAME", help="preset or file: its beam's divergence (a ray)")
-    group.add_argument("--incidence-deg", type=_numbers, default=(0.0,), metavar="D,D,...", help="angles (0)")
-    group.add_argument("--range", type=_numbers, default=(60.0,), metavar="M,M,...", help="ranges (60)", dest="ranges")
+    group.add_argument("--incidence-deg", type=_numbers, default=(0.0,), metavar="D,D,...", help="angles, degrees (0)")
+    text = "ranges, m (60)"
+    group.add_argument("--range", type=_numbers, default=(60.0,), metavar="M,M,...", help=text, dest="ranges")
     group.add_argument("--scanner", type=_place, metavar="X,Y,Z", help="one place that all was seen from, instead")
     group.add_argument(
         "--reflection", choices=("lambert", "oren_nayar"), default="lambert", help="as in the scan (lambert)"
@@ -82,7 +84,7 @@ def _fit_arguments(group: argparse._ArgumentGroup) -> None:
         help=f"besides the brightness: any of {', '.join(PARTS)}, or none (spread,wavelength)",
     )
     group.add_argument("--hold", metavar="NAME", help="keep this material's brightness: it says what the gain is")
-    group.add_argument("--gain", type=float, metavar="G", help="the device's gain, known from another cloud")
+    group.add_argument("--gain", type=float, metavar="G", help="the device's gain, known from another cloud (free)")
 
 
 def run(arguments: argparse.Namespace) -> Outcome:

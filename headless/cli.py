@@ -10,7 +10,7 @@ import io
 import json
 import os
 import sys
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from importlib import import_module
 from pathlib import Path
@@ -35,6 +35,7 @@ def _missing(error: ModuleNotFoundError) -> str:
 
 
 try:
+    from synthroads_addon.core.scenario import apply_change
     from synthroads_addon.core.schema import canonical_json
     from synthroads_addon.core.tolerance import KINDS, TIMES, parse_tolerance, shown, with_unit
     from synthroads_addon.core.twin import TWIN_FORMATS
@@ -60,14 +61,30 @@ COMMANDS = {
     "train": "train a segmentation or centreline model",
     "evaluate": "measure a trained model",
     "predict": "label a cloud, or find its road, with a trained model",
+    "experiment": "train variants of a segmentation with several seeds, and compare their scores",
     "reconstruct": "turn a cloud into the parameters of its road",
+    "list": "list what comes under a name, and the fields that --set takes",
 }
-_LEARNING = ("train", "evaluate", "predict", "reconstruct")
+_LEARNING = ("train", "evaluate", "predict", "experiment", "reconstruct")
 """Commands whose modules are in `ml`."""
 
 
 class _Parser(argparse.ArgumentParser):
-    """A parser whose complaints are one line, like every other bad input."""
+    """A parser whose complaints are one line, like every other bad input.
+
+    Attributes:
+        words: argument that takes words on both sides of options; argparse by itself ends one with ``*`` at the first.
+    """
+
+    words: str | None = None
+
+    def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
+        """Parse what is known; return it and the rest."""
+        found, rest = super().parse_known_args(args, namespace)
+        if self.words and not any(word.startswith("-") for word in rest):
+            setattr(found, self.words, [*(getattr(found, self.words) or ()), *rest])
+            rest = []
+        return found, rest
 
     def error(self, message: str) -> Any:
         self.exit(2, f"{self.prog}: {message}\n")
@@ -108,16 +125,53 @@ def add_changes_argument(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--set", action="append", default=[], metavar="PATH=VALUE", dest="changes", help=text)
 
 
+def add_device_argument(parser: argparse.ArgumentParser) -> None:
+    """Add ``--device NAME``, short for the field ``scan.device``."""
+    text = "scanner: a preset's name (`synthroads list devices`) or a .json file (the scenario's own)"
+    parser.add_argument("--device", metavar="NAME", help=text)
+
+
+def all_changes(arguments: argparse.Namespace, short: Mapping[str, str]) -> list[str]:
+    """Return the changes of the scenario that ``--set`` and options which are short for fields ask for.
+
+    Args:
+        arguments: of the command.
+        short: name of an option's argument -> path of its field; options that aren't given are None or empty.
+
+    Raises:
+        InputError: an option and ``--set`` contradict each other.
+    """
+    said: Any = {}
+    for change in arguments.changes:
+        said = apply_change(said, change)
+    changes = list(arguments.changes)
+    for name, path in short.items():
+        value = getattr(arguments, name)
+        if value in (None, []):
+            continue
+        other = said
+        for key in path.split("."):
+            other = other.get(key, value) if isinstance(other, dict) else value
+        if other != value:
+            option = f"--{name.replace('_', '-')}"
+            raise InputError(option, value, f"contradicts --set {path}={other}; leave one of the two out")
+        changes.append(f"{path}={json.dumps(value)}")
+    return changes
+
+
 def add_choice_arguments(parser: argparse.ArgumentParser) -> None:
     """Add ``--tolerance`` and ``--time-budget``, by which settings are chosen."""
     kinds = ", ".join(KINDS)
     parser.add_argument(
         "--tolerance",
         metavar="KIND=VALUE,...",
-        help=f"choose the cheapest settings whose errors keep this, e.g. height=5mm,intensity=5%%; kinds: {kinds}",
+        help=f"choose the cheapest settings whose errors keep this, e.g. height=5mm,intensity=5%%; kinds: {kinds} "
+        "(the fidelity's settings)",
     )
     parser.add_argument(
-        "--time-budget", metavar="TIME", help="choose the best settings that fit this time, e.g. 60s or 2min"
+        "--time-budget",
+        metavar="TIME",
+        help="choose the best settings that fit this time, e.g. 60s or 2min (the fidelity's settings)",
     )
 
 
@@ -145,6 +199,16 @@ def choice_summary(report: dict[str, Any]) -> list[str]:
     lines += [f"  at most, with a confidence of 95 %: {at_most}"] if at_most else []
     seconds = choice["expected"]["seconds"]
     return lines + ([f"  expected time: {seconds:.0f} s in all"] if seconds is not None else [])
+
+
+def add_renamed_argument(parser: argparse.ArgumentParser, former: str, name: str) -> None:
+    """Refuse an option's former name with a hint at its name; help doesn't show it."""
+
+    class Renamed(argparse.Action):
+        def __call__(self, parser: argparse.ArgumentParser, *_: Any) -> None:
+            parser.error(f"{former} is now {name}")
+
+    parser.add_argument(former, action=Renamed, nargs="?", help=argparse.SUPPRESS)
 
 
 def add_twin_argument(parser: argparse.ArgumentParser, default: Sequence[str] = ()) -> None:

@@ -88,7 +88,8 @@ def _file_arguments(parser: argparse.ArgumentParser) -> None:
 
 def _info_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("file", type=Path, metavar="FILE", help="cloud (.laz, .las, .ply, .e57, .npz)")
-    parser.add_argument("--radius", type=_positive, default=0.5, metavar="M", help="of roughness's neighbourhood (0.5)")
+    text = "of roughness's neighbourhood, m (0.5)"
+    parser.add_argument("--radius", type=_positive, default=0.5, metavar="M", help=text)
     parser.add_argument(
         "--samples", type=_count, default=5000, metavar="N", help="points per class for the roughness (5000; 0: none)"
     )
@@ -98,10 +99,10 @@ def _info_arguments(parser: argparse.ArgumentParser) -> None:
 def _preview_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("file", type=Path, metavar="FILE", help="cloud (.laz, .las, .ply, .e57, .npz)")
     parser.add_argument("--output", required=True, type=Path, metavar="DIR", help="folder for the pictures")
-    parser.add_argument("--station", type=float, metavar="M", help="where to cut (the middle)")
-    parser.add_argument("--centerline", type=Path, metavar="FILE", help="GeoJSON line that stations count along")
+    parser.add_argument("--station", type=float, metavar="M", help="where to cut, m along the line (the middle)")
+    parser.add_argument("--centerline", type=Path, metavar="FILE", help="GeoJSON line of the stations (the long axis)")
     parser.add_argument("--line", type=float, nargs=4, metavar=("X1", "Y1", "X2", "Y2"), help="cut along this line")
-    parser.add_argument("--depth", type=_positive, default=1.0, metavar="M", help="thickness of the cut (1)")
+    parser.add_argument("--depth", type=_positive, default=1.0, metavar="M", help="thickness of the cut, m (1)")
     parser.add_argument("--overwrite", action="store_true", help="replace pictures that are already there")
     add_common_arguments(parser)
 

@@ -22,11 +22,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("recipe", metavar="RECIPE", help=f"{known}, or a .yaml or .json file")
     parser.add_argument("--output", required=True, type=Path, metavar="DIR", help="folder for the data set")
     where = parser.add_mutually_exclusive_group()
-    where.add_argument("--jobs", type=int, metavar="N", help="scenes made at once on this machine (default: 1)")
-    where.add_argument("--scheduler", metavar="ADDRESS", help="Dask scheduler whose workers make them, tcp://HOST:PORT")
+    where.add_argument("--jobs", type=int, metavar="N", help="scenes made at once on this machine (1)")
+    where.add_argument("--scheduler", metavar="ADDRESS", help="Dask scheduler whose workers make them (none), tcp://HOST:PORT")
     parser.add_argument("--resume", action="store_true", help="continue what was begun in this folder")
     parser.add_argument(
-        "--splits", nargs="+", metavar="SPLIT", help="make the scenes of these splits only; --resume makes the others"
+        "--splits", nargs="+", metavar="SPLIT", help="make scenes of these splits only (all); --resume makes the others"
     )
     parser.add_argument("--verify", action="store_true", help="make nothing: compare every file with its checksum")
     parser.add_argument("--set", action="append", default=[], metavar="PATH=VALUE", dest="changes", help=_SET)
@@ -58,7 +58,12 @@ def _changed(recipe: Recipe, changes: list[str]) -> Recipe:
     if not changes:
         return recipe
     own = dict(parsed_change(change) for change in changes)
-    groups = [group.model_copy(update={"set": {**group.set, **own}}) for group in recipe.groups]
+    groups = [
+        group.model_copy(
+            update={"set": {**group.set, **own}, "variants": tuple({**each, **own} for each in group.variants)}
+        )
+        for group in recipe.groups
+    ]
     return Recipe.from_dict(recipe.model_copy(update={"groups": tuple(groups)}).to_dict(), "recipe")
 
 

@@ -15,7 +15,7 @@ from headless.cli import Outcome, add_common_arguments, entry
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments of `synthroads gallery`."""
     parser.add_argument("--output", required=True, type=Path, metavar="DIR", help="folder for the pictures")
-    parser.add_argument("--only", default="", metavar="TEXT", help="only pictures whose name contains this")
+    parser.add_argument("--only", default="", metavar="TEXT", help="only pictures whose name contains this (all)")
     parser.add_argument("--width", type=int, default=1280, metavar="N", help="width of a picture, pixels (1280)")
     parser.add_argument("--samples", type=int, default=48, metavar="N", help="samples per pixel (48)")
     add_common_arguments(parser)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import json
 import sys
 import time
 from pathlib import Path
@@ -17,7 +16,9 @@ from headless.cli import (
     add_changes_argument,
     add_choice_arguments,
     add_common_arguments,
+    add_device_argument,
     add_twin_argument,
+    all_changes,
     choice_changes,
     choice_summary,
     entry,
@@ -25,14 +26,20 @@ from headless.cli import (
 )
 from synthroads_addon.core.scenario import load_scenario, scenario_names
 
+_FIELDS = {"device": "scan.device", "seed": "seed", "fidelity": "fidelity", "twin": "twin"}
+"""Arguments that are short for fields of the scenario."""
+
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments of `synthroads generate`."""
     names = ", ".join(scenario_names())
-    parser.add_argument("--scenario", default="rq31-600m", metavar="NAME_OR_FILE", help=f"{names}, or a .json file")
+    text = f"{names}, or a .json file (%(default)s)"
+    parser.add_argument("--scenario", default="rq31-600m", metavar="NAME_OR_FILE", help=text)
     parser.add_argument("--output", required=True, type=Path, metavar="DIR", help="folder for the files")
+    add_device_argument(parser)
     parser.add_argument("--seed", type=_seed, metavar="N", help="seed of everything random (the scenario's own)")
-    parser.add_argument("--fidelity", choices=("draft", "standard", "high"), help="point on the trade-off")
+    text = "point on the trade-off (the scenario's own)"
+    parser.add_argument("--fidelity", choices=("draft", "standard", "high"), help=text)
     parser.add_argument("--parameters", type=Path, metavar="FILE", help="take this road instead of sampling one")
     parser.add_argument("--axis", type=Path, metavar="FILE", help="centreline, CSV (x, y, z in order) or GeoJSON")
     add_choice_arguments(parser)
@@ -45,14 +52,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> Outcome:
     """Run `synthroads generate`."""
     begun = time.perf_counter()
-    changes = [*choice_changes(arguments), *arguments.changes]
-    if arguments.seed is not None:
-        changes.append(f"seed={arguments.seed}")
-    if arguments.fidelity:
-        changes.append(f"fidelity={arguments.fidelity}")
-    if arguments.twin:
-        changes.append(f"twin={json.dumps(arguments.twin)}")
-    scenario = load_scenario(arguments.scenario, changes)
+    scenario = load_scenario(arguments.scenario, [*choice_changes(arguments), *all_changes(arguments, _FIELDS)])
     from synthroads_addon.pipeline import Job, generate
 
     job = Job(

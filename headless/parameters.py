@@ -10,34 +10,41 @@ from typing import Any
 if __name__ == "__main__":
     sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from headless.cli import Outcome, add_changes_argument, add_common_arguments, entry
-from synthroads_addon.core.parameters.limits import STANDARD_CROSS_SECTIONS
+from headless.cli import Outcome, add_changes_argument, add_common_arguments, all_changes, entry
+from synthroads_addon.core.parameters.limits import STANDARD_CROSS_SECTIONS, USUAL_SECTION
 from synthroads_addon.core.parameters.model import DESIGN_CLASSES, RoadParameters
 from synthroads_addon.core.parameters.sampler import sample_road
+from synthroads_addon.core.road_scenario import RoadScenario
 from synthroads_addon.core.scenario import Scenario, apply_change
+
+_FIELDS = {
+    "design_class": "road.design_class",
+    "cross_section": "road.cross_section",
+    "length": "road.length",
+    "seed": "seed",
+}
+"""Arguments that are short for fields of the scenario."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments of `synthroads parameters`."""
-    parser.add_argument("--seed", type=int, default=1, metavar="N", help="seed of the first set (1)")
+    parser.add_argument("--seed", type=int, metavar="N", help=f"seed of the first set ({Scenario().seed})")
     parser.add_argument("--count", type=int, metavar="K", help="write K sets of consecutive seeds, one per line")
-    parser.add_argument("--design-class", choices=DESIGN_CLASSES, default="EKA1A", help="design class of the RAA")
-    sections = ", ".join(STANDARD_CROSS_SECTIONS)
-    parser.add_argument("--cross-section", default="RQ31", metavar="RQ", help=f"one of {sections}")
-    parser.add_argument("--length", type=float, default=600.0, metavar="M", help="length of the road, m (600)")
+    usual, sections = next(iter(USUAL_SECTION)), ", ".join(STANDARD_CROSS_SECTIONS)
+    text = f"design class of the RAA ({usual}, or the first that has the cross-section)"
+    parser.add_argument("--design-class", choices=DESIGN_CLASSES, help=text)
+    text = ", ".join(f"{section} for {name}" for name, section in USUAL_SECTION.items())
+    parser.add_argument("--cross-section", metavar="RQ", help=f"one of {sections} (the class's: {text})")
+    text = f"length of the road, m ({RoadScenario().length:g})"
+    parser.add_argument("--length", type=float, metavar="M", help=text)
     add_changes_argument(parser)
     add_common_arguments(parser)
 
 
 def run(arguments: argparse.Namespace) -> Outcome:
     """Run `synthroads parameters`."""
-    road = {
-        "design_class": arguments.design_class,
-        "cross_section": arguments.cross_section,
-        "length": arguments.length,
-    }
-    data: dict[str, Any] = {"road": road, "seed": arguments.seed}
-    for change in arguments.changes:
+    data: Any = {}
+    for change in all_changes(arguments, _FIELDS):
         data = apply_change(data, change)
     scenario = Scenario.from_dict(data)
     first = sample_road(scenario.road, scenario.seed)

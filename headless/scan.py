@@ -18,6 +18,8 @@ from headless.cli import (
     add_changes_argument,
     add_choice_arguments,
     add_common_arguments,
+    add_device_argument,
+    all_changes,
     choice_changes,
     entry,
     progress_bar,
@@ -41,9 +43,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     names = ", ".join(scenario_names())
     parser.add_argument("scene", type=Path, metavar="SCENE", help="file with the scene")
     parser.add_argument("--output", required=True, type=Path, metavar="DIR", help="folder for the files")
-    parser.add_argument("--device", metavar="NAME", help="scanner: a preset's name or a file (the scenario's own)")
+    add_device_argument(parser)
     where = parser.add_mutually_exclusive_group()
-    where.add_argument("--path", type=Path, metavar="FILE", help="follow this line, CSV (x, y, z) or GeoJSON")
+    text = "follow this line, CSV (x, y, z) or GeoJSON (the scene's road, else straight over its middle)"
+    where.add_argument("--path", type=Path, metavar="FILE", help=text)
     where.add_argument("--trajectory", metavar="FILE", help="CSV: time, x, y, z, roll, pitch, heading")
     where.add_argument(
         "--tripod",
@@ -53,16 +56,19 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="X,Y[,Z]",
         help="stand here, on the surface or with the scanner at Z (can be repeated; --tripod=-4,7 where X < 0)",
     )
-    parser.add_argument("--height", type=float, metavar="M", help="flight height, or that of the scanner on a tripod")
-    parser.add_argument("--speed", type=float, metavar="M/S", help="speed over ground")
+    text = "flight height, or that of the scanner on a tripod, m (the platform's usual one)"
+    parser.add_argument("--height", type=float, metavar="M", help=text)
+    parser.add_argument("--speed", type=float, metavar="M/S", help="speed over ground, m/s (the platform's usual one)")
     parser.add_argument("--rays", type=int, metavar="N", help="rays per pulse (the fidelity's own)")
-    parser.add_argument("--classes", type=Path, metavar="FILE", help="JSON: classes by names, see docs/scan.md")
-    parser.add_argument("--scenario", metavar="NAME_OR_FILE", help=f"take the scan from it: {names}, or a .json file")
+    parser.add_argument("--classes", type=Path, metavar="FILE", help="JSON: classes by names (none), see docs/scan.md")
+    text = f"take the scan from it: {names}, or a .json file (the defaults of a scenario)"
+    parser.add_argument("--scenario", metavar="NAME_OR_FILE", help=text)
     add_changes_argument(parser)
-    parser.add_argument("--seed", type=int, metavar="N", help="seed of the noise (1)")
-    parser.add_argument("--fidelity", choices=("draft", "standard", "high"), help="point on the trade-off")
+    parser.add_argument("--seed", type=int, metavar="N", help="seed of the noise (the scenario's own)")
+    text = "point on the trade-off (the scenario's own)"
+    parser.add_argument("--fidelity", choices=("draft", "standard", "high"), help=text)
     add_choice_arguments(parser)
-    parser.add_argument("--epsg", type=int, metavar="N", help="coordinate system of the map")
+    parser.add_argument("--epsg", type=int, metavar="N", help="coordinate system of the map (that of the scene's road)")
     parser.add_argument("--origin", type=_origin, metavar="X,Y,Z", help="map coordinates of the scene's origin (0,0,0)")
     parser.add_argument("--up", choices=("y", "z"), help="what points up in .obj (y), .ply and .stl (z)")
     parser.add_argument("--overwrite", action="store_true", help="replace files that are already there")
@@ -94,17 +100,15 @@ def run(arguments: argparse.Namespace) -> Outcome:
 
 def scenario_of(arguments: argparse.Namespace) -> Scenario:
     """Return the scenario that the arguments stand for."""
-    given = {name: getattr(arguments, name) for name in _FIELDS if getattr(arguments, name) is not None}
-    changes = [*choice_changes(arguments), *arguments.changes]
-    changes += [f"{_FIELDS[name]}={json.dumps(value)}" for name, value in given.items()]
+    changes = [*choice_changes(arguments), *all_changes(arguments, _FIELDS)]
     if arguments.trajectory:
         for name in ("height", "speed"):
-            if name in given:
-                raise InputError(f"--{name}", given[name], "can't be given with --trajectory, which says it")
+            if (value := getattr(arguments, name)) is not None:
+                raise InputError(f"--{name}", value, "can't be given with --trajectory, which says it")
         changes += ['scan.platform.kind="trajectory"', f"scan.platform.file={json.dumps(arguments.trajectory)}"]
     if arguments.tripod:
-        if "speed" in given:
-            raise InputError("--speed", given["speed"], "can't be given with --tripod, which doesn't move")
+        if arguments.speed is not None:
+            raise InputError("--speed", arguments.speed, "can't be given with --tripod, which doesn't move")
         changes.append('scan.platform.kind="tripod"')
     if arguments.scenario:
         return load_scenario(arguments.scenario, changes)

@@ -42,7 +42,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help=f"scene to measure on; can be repeated ({scenes})",
     )
     parser.add_argument("--output", required=True, type=Path, metavar="DIR", help="folder for tables, JSON and plots")
-    parser.add_argument("--knobs", nargs="+", default=list(KNOBS), metavar="KNOB", help=f"any of {', '.join(KNOBS)}")
+    text = f"any of {', '.join(KNOBS)} (all)"
+    parser.add_argument("--knobs", nargs="+", default=list(KNOBS), metavar="KNOB", help=text)
     parser.add_argument(
         "--resume", action="store_true", help="keep the rows that the folder holds already; measure the others"
     )

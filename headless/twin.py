@@ -9,7 +9,7 @@ from pathlib import Path
 if __name__ == "__main__":
     sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from headless.cli import Outcome, add_common_arguments, add_twin_argument, entry
+from headless.cli import Outcome, add_common_arguments, add_renamed_argument, add_twin_argument, entry
 from synthroads_addon.core.errors import InputError
 from synthroads_addon.core.files import output_folder
 from synthroads_addon.core.parameters.model import read_parameters
@@ -23,22 +23,24 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("parameters", type=Path, metavar="PARAMETERS", help="parameter set (parameters.json)")
     parser.add_argument("--output", required=True, type=Path, metavar="DIR", help="folder for the files")
     add_twin_argument(parser, TWIN_FORMATS)
-    text = f"largest chord error of curved lines and surfaces, m ({TOLERANCE:g})"
-    parser.add_argument("--tolerance", type=float, default=TOLERANCE, metavar="M", help=text)
+    text = f"largest distance of chords from curved lines and surfaces, m ({TOLERANCE:g})"
+    parser.add_argument("--max-deviation", type=float, default=TOLERANCE, metavar="M", help=text)
+    add_renamed_argument(parser, "--tolerance", "--max-deviation")
     parser.add_argument("--overwrite", action="store_true", help="replace files that are already there")
     add_common_arguments(parser)
 
 
 def run(arguments: argparse.Namespace) -> Outcome:
     """Run `synthroads twin`."""
-    if not _LIMITS[0] <= arguments.tolerance <= _LIMITS[1]:
-        raise InputError("--tolerance", arguments.tolerance, f"must be from {_LIMITS[0]:g} to {_LIMITS[1]:g} m")
+    deviation = arguments.max_deviation
+    if not _LIMITS[0] <= deviation <= _LIMITS[1]:
+        raise InputError("--max-deviation", deviation, f"must be from {_LIMITS[0]:g} to {_LIMITS[1]:g} m")
     formats = arguments.twin
     check_formats(formats)
     parameters = read_parameters(arguments.parameters)
     names = twin_file_names(formats)
     with output_folder(arguments.output, names, arguments.overwrite) as folder:
-        write_twin(parameters, folder, formats, arguments.tolerance)
+        write_twin(parameters, folder, formats, deviation)
     written = [arguments.output / name for name in names]
     result = {"files": {kind: str(path) for kind, path in zip(formats, written, strict=True)}}
     return 0, result, "\n".join(f"written {path} ({path.stat().st_size / 1e6:.2f} MB)" for path in written)

@@ -13,6 +13,7 @@ from synthroads_addon.core.scenario import apply_change
 from synthroads_addon.core.schema import Model, quantity, read_yaml
 
 SHIPPED = Path(__file__).parent / "configurations"
+EXPERIMENTS = SHIPPED / "experiments"
 _LARGEST_SEED = 2**63 - 1
 
 
@@ -61,6 +62,11 @@ def shipped_names() -> list[str]:
     return sorted(path.stem for path in SHIPPED.glob("*.yaml"))
 
 
+def experiment_names() -> list[str]:
+    """Return the names of the experiments that come with the package."""
+    return sorted(path.stem for path in EXPERIMENTS.glob("*.yaml"))
+
+
 def load_configuration(name_or_file: str, kinds: Mapping[str, type[C]], changes: Sequence[str] = ()) -> C:
     """Load a shipped configuration or a YAML file and apply ``path=value`` changes.
 
@@ -81,8 +87,10 @@ def load_configuration(name_or_file: str, kinds: Mapping[str, type[C]], changes:
         hint = nearest_name(name_or_file, shipped_names())
         raise InputError("configuration", name_or_file, f"must be a .yaml or .json file or one of {known}{hint}")
     data = read_yaml(path)
+    task = data.get("task") if isinstance(data, dict) else None
+    kind = kinds.get(task, Configuration) if isinstance(task, str) else Configuration
     for change in changes:
-        data = apply_change(data, change)
+        data = apply_change(data, change, kind)
     return from_data(data, kinds, str(name_or_file))
 
 

@@ -1,4 +1,4 @@
-"""Measure a trained run on data sets or clouds with known truth, with tables and pictures."""
+"""Measure a trained run on data sets or clouds with known truth: prints the scores, writes tables and pictures."""
 
 from __future__ import annotations
 
@@ -10,7 +10,6 @@ if __name__ == "__main__":
     sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from headless.cli import Outcome, add_common_arguments, entry, progress_bar
-from ml.train import summary
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -19,7 +18,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("data", type=Path, nargs="+", metavar="DATA", help="data sets' folders or clouds")
     parser.add_argument("--split", default="test", metavar="NAME", help="split of the data sets (test)")
     parser.add_argument("--output", required=True, type=Path, metavar="DIR", help="folder for tables and pictures")
-    text = "classes of clouds of others, for segmentation: semantickitti, ign or a JSON file"
+    text = "classes of clouds of others, for segmentation: semantickitti, ign or a JSON file (the cloud's own)"
     parser.add_argument("--mapping", metavar="MAPPING", help=text)
     add_common_arguments(parser)
 
@@ -31,8 +30,10 @@ def run(arguments: argparse.Namespace) -> Outcome:
 
     trained = Run.open(arguments.run, kinds())
     evaluation = Evaluation(arguments.data, arguments.split, arguments.output, arguments.mapping)
-    metrics = task(trained.configuration.task).evaluate(trained, evaluation, progress_bar(arguments))
-    return 0, metrics, f"evaluated {arguments.run}: {summary(metrics)}"
+    used = task(trained.configuration.task)
+    found = used.evaluate(trained, evaluation, progress_bar(arguments))
+    written = f"written to {arguments.output}: {', '.join(found['files'])}"
+    return 0, found, f"{used.report(found)}\n\n{written}"
 
 
 if __name__ == "__main__":

@@ -11,7 +11,14 @@ from typing import TYPE_CHECKING, Any
 if __name__ == "__main__":
     sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from headless.cli import Outcome, add_common_arguments, add_twin_argument, entry, progress_bar
+from headless.cli import (
+    Outcome,
+    add_common_arguments,
+    add_renamed_argument,
+    add_twin_argument,
+    entry,
+    progress_bar,
+)
 from synthroads_addon.core.errors import InputError
 from synthroads_addon.core.files import output_folder
 from synthroads_addon.core.schema import canonical_json
@@ -35,14 +42,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments of `synthroads reconstruct`."""
     parser.add_argument("cloud", type=Path, metavar="CLOUD", help="cloud to read (.laz, .las, .ply, .e57, .npz)")
     parser.add_argument("--output", required=True, type=Path, metavar="DIR", help="folder for the files")
-    text = "kind of road, where it is known (found out)"
+    text = "kind of road, where it is known (auto: found out)"
     parser.add_argument("--road", choices=("auto", "dual", "single"), default="auto", help=text)
     text = "course of the road, roughly: CSV or GeoJSON in the cloud's coordinates (found in the cloud)"
     parser.add_argument("--path", type=Path, metavar="FILE", help=text)
     text = "folder of a trained centreline model that tells the axis (the line markings do)"
     parser.add_argument("--run", type=Path, metavar="DIR", help=text)
     text = "root mean square that the alignment may keep from the measured axis, m (0.03)"
-    parser.add_argument("--tolerance", type=float, default=0.03, metavar="M", help=text)
+    parser.add_argument("--fit-tolerance", type=float, default=0.03, metavar="M", help=text)
+    add_renamed_argument(parser, "--tolerance", "--fit-tolerance")
     text = "take the widths of the standard cross-section that all measured ones are near to (the measured ones)"
     parser.add_argument("--snap", action="store_true", help=text)
     text = "true parameters (.json) or axis (CSV, GeoJSON) to compare with afterwards; they change nothing"
@@ -55,8 +63,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> Outcome:
     """Run `synthroads reconstruct`."""
-    if not _TOLERANCES[0] <= arguments.tolerance <= _TOLERANCES[1]:
-        raise InputError("--tolerance", arguments.tolerance, f"must be from {_TOLERANCES[0]:g} to {_TOLERANCES[1]:g} m")
+    tolerance = arguments.fit_tolerance
+    if not _TOLERANCES[0] <= tolerance <= _TOLERANCES[1]:
+        raise InputError("--fit-tolerance", tolerance, f"must be from {_TOLERANCES[0]:g} to {_TOLERANCES[1]:g} m")
     check_formats(arguments.twin)
     from ml.reconstruction.cloud import read_road_cloud
     from ml.reconstruction.pipeline import reconstruct
@@ -103,7 +112,7 @@ def _options(arguments: argparse.Namespace, cloud: RoadCloud, folder: Path) -> O
         predictor = learned_axis(arguments.run, arguments.cloud, folder)
     return Options(
         road=None if arguments.road == "auto" else arguments.road,
-        tolerance=arguments.tolerance,
+        tolerance=arguments.fit_tolerance,
         path=course,
         predictor=predictor,
         snap=arguments.snap,

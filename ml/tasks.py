@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
@@ -62,7 +62,10 @@ class Task(Protocol):
         """Train a `Run`, save it and return its metrics."""
 
     def evaluate(self, run: Any, evaluation: Evaluation, progress: Progress = silent) -> dict[str, Any]:
-        """Measure a trained `Run`."""
+        """Measure a trained `Run`; ``files`` are the names of what was written to the output."""
+
+    def report(self, result: Mapping[str, Any]) -> str:
+        """Return what `evaluate` found as tables for people."""
 
     def predict(self, run: Any, prediction: Prediction, progress: Progress = silent) -> dict[str, Any]:
         """Use a trained `Run` on a cloud and write what it says."""

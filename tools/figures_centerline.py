@@ -75,22 +75,6 @@ CROPPINGS: dict[str, Cropping | None] = {
 """Tables of the real roads, and how their slices are cropped."""
 REFERENCE = SkeletonSettings()
 OTHER = "other-scanner"
-TARGETS_SHOWN = {
-    "center": ("centre (m)", 1.0),
-    "left_edge": ("left edge (m)", 1.0),
-    "right_edge": ("right edge (m)", 1.0),
-    "lanes": ("lanes", 1.0),
-    "lane_width": ("lane width (m)", 1.0),
-    "heading": ("heading (mrad)", 1000.0),
-    "height": ("height (m)", 1.0),
-}
-"""Targets of the corridor: title and factor."""
-CORRIDOR_COLUMNS = (
-    tables.Column("mae", "mean error"),
-    tables.Column("right", "right when rounded (%)", 100.0, 1),
-    tables.Column("interval_68", "in 68 % (%)", 100.0, 1),
-    tables.Column("interval_95", "in 95 % (%)", 100.0, 1),
-)
 
 
 @dataclass(frozen=True)
@@ -283,7 +267,7 @@ def corridor_table(
         return {}
     corridor = measure_corridor(learned, cases, arguments.seeds)
     tables.write_tables(arguments.output, f"corridor-{name}", corridor)
-    return {f"corridor-{name}": tables.table(corridor, columns=CORRIDOR_COLUMNS)}
+    return {f"corridor-{name}": tables.table(corridor, columns=tables.CORRIDOR_COLUMNS)}
 
 
 def measure_corridor(
@@ -298,8 +282,8 @@ def measure_corridor(
             found = corridor_figures(versions[min(index, len(versions) - 1)], shown)
             for target, figures in found.items():
                 known = {figure: np.nan if value is None else value for figure, value in figures.items()}
-                known["mae"] *= TARGETS_SHOWN[target][1]
-                rows.setdefault(f"{name}: {TARGETS_SHOWN[target][0]}", []).append(known)
+                known["mae"] *= tables.TARGETS_SHOWN[target][1]
+                rows.setdefault(f"{name}: {tables.TARGETS_SHOWN[target][0]}", []).append(known)
     return {name: {"all": over_seeds(values)} for name, values in rows.items()}
 
 

@@ -28,7 +28,7 @@ def _split(parser: argparse.ArgumentParser) -> tuple[list[argparse.Action], Choi
         if isinstance(action, argparse._SubParsersAction):
             parsers = dict(action.choices)
             summaries = {choice.dest: choice.help or "" for choice in action._choices_actions}
-        elif not isinstance(action, argparse._HelpAction):
+        elif not isinstance(action, argparse._HelpAction) and action.help != argparse.SUPPRESS:
             own.append(action)
     return own, (summaries, parsers)
 

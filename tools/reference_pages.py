@@ -9,18 +9,19 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from functools import cache, partial
 from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-from synthroads_addon.core.schema import LARGEST, Model, read_json, read_yaml
+from headless.list import KINDS
+from synthroads_addon.core.catalogue import Entry, Kind, entries
+from synthroads_addon.core.field_list import Wording, class_of
+from synthroads_addon.core.schema import Model
 from tools.reference_commands import commands
 
 ROOT = Path(__file__).resolve().parents[1]
-PRESETS = ROOT / "synthroads_addon" / "presets"
-CONFIGURATIONS = ROOT / "ml" / "configurations"
 MARK = re.compile(r"<!-- generated: ([a-z-]+) -->")
 
 FILES = {
@@ -39,6 +40,7 @@ FILES = {
     "centerline": ["ml.centerline.task:CenterlineConfiguration"],
 }
 """Name of a page part -> the classes that read the files which it describes."""
+_WORDING = Wording(lambda text: f"`{text}`", lambda name: f"[{name}](#{name.lower()})")
 
 
 def fields(classes: Sequence[str]) -> str:
@@ -68,16 +70,11 @@ def _section(name: str, parts: dict[str, dict[str, Any]]) -> str:
     text = schema.get("description", "").split("\n\nAttributes:")[0]
     rows = []
     for field, rule in schema["properties"].items():
-        same = parts[_name(rule)].get("description", "") if "$ref" in rule else ""  # pydantic says it once
+        same = parts[class_of(rule)].get("description", "") if "$ref" in rule else ""  # pydantic says it once
         cells = {"description": same.partition("\n")[0], **rule}
         rows.append(_row(field, cells, field in schema.get("required", ())))
     head = ["| field | value | default | meaning |", "|---|---|---|---|"]
     return "\n".join([f"# {name}", "", _plain(text), "", *head, *rows])
-
-
-def _name(rule: Mapping[str, Any]) -> str:
-    """Return the name of the class that a rule refers to."""
-    return str(rule["$ref"]).rpartition("/")[2]
 
 
 def _plain(docstring: str) -> str:
@@ -88,7 +85,7 @@ def _plain(docstring: str) -> str:
 def _row(field: str, rule: dict[str, Any], required: bool) -> str:
     unit = "" if rule.get("unit") in (None, "1") else f" ({rule['unit']})"
     default = "**required**" if required else _default(rule)
-    cells = [f"`{field}`", f"{_value(rule)}{unit}", default, _plain(rule.get("description", ""))]
+    cells = [f"`{field}`", f"{_WORDING.value(rule)}{unit}", default, _plain(rule.get("description", ""))]
     return f"| {' | '.join(cell.replace('|', chr(92) + '|') for cell in cells)} |"
 
 
@@ -103,87 +100,25 @@ def _default(rule: dict[str, Any]) -> str:
     return f"`{text}`" if len(text) <= 60 else ""
 
 
-def _value(rule: Mapping[str, Any]) -> str:
-    """Return what a value may be, with its limits."""
-    if "$ref" in rule:
-        return f"[{_name(rule)}](#{_name(rule).lower()})"
-    if "const" in rule:
-        return f"`{json.dumps(rule['const'])}`"
-    if "enum" in rule:
-        return ", ".join(f"`{json.dumps(value)}`" for value in rule["enum"])
-    for several in ("anyOf", "oneOf"):
-        if several in rule:
-            return " or ".join(dict.fromkeys(_value(choice) for choice in rule[several] if choice != {"type": "null"}))
-    if rule.get("type") == "array":
-        return _list(rule)
-    if rule.get("type") == "object":
-        inner = rule.get("additionalProperties")
-        return f"object of {_value(inner)}" if isinstance(inner, dict) and inner else "object"
-    names = {"integer": "whole number", "number": "number", "string": "text", "boolean": "`true` or `false`"}
-    return f"{names.get(rule.get('type', ''), 'any value')}{_limits(rule)}"
-
-
-def _list(rule: Mapping[str, Any]) -> str:
-    if "prefixItems" in rule:
-        return f"list of {len(rule['prefixItems'])}: {'; '.join(dict.fromkeys(map(_value, rule['prefixItems'])))}"
-    low, high = rule.get("minItems", 0), rule.get("maxItems")
-    count = f" ({low} to {high})" if high else f" (at least {low})" if low else ""
-    return f"list{count} of {_value(rule.get('items', {}))}"
-
-
-def _limits(rule: Mapping[str, Any]) -> str:
-    """Return a number's limits in words; those that only keep out overflow are none."""
-    words = {"minimum": "from", "exclusiveMinimum": "above", "maximum": "to", "exclusiveMaximum": "below"}
-    found = [f"{word} {rule[key]:g}" for key, word in words.items() if abs(rule.get(key, LARGEST)) < LARGEST]
-    return f", {' '.join(found)}" if found else ""
-
-
 def presets() -> str:
     """Return tables of everything that is shipped under a name; links are those of a page in docs/reference."""
-    parts = [
-        _table("Scenarios", "`--scenario NAME`", _titled(PRESETS.glob("scenarios/*.json"))),
-        _table("Laser scanners", "`--set scan.device=NAME`", _titled(PRESETS.glob("devices/*.json"))),
-        _table("Recipes", "`synthroads dataset NAME`", _titled(PRESETS.glob("recipes/*.yaml"), _scenes)),
-        _table("Trainings", "`synthroads train NAME`", _titled(CONFIGURATIONS.glob("*.yaml"))),
-        _table(
-            "Experiments",
-            "`python -m ml.segmentation.experiment NAME`",
-            _titled(CONFIGURATIONS.glob("experiments/*.yaml")),
-        ),
-        _table("Libraries of assets", "`--set 'road.assets=[\"NAME\"]'`", _libraries()),
-        _table("Tables of materials", "`--set materials_table=NAME`", _materials()),
-    ]
-    return "\n\n".join(parts)
+    return "\n\n".join(map(_table, KINDS.values()))
 
 
-def _table(heading: str, use: str, rows: Iterable[tuple[str, Path, str]]) -> str:
-    lines = [f"| [`{name}`](../../{path.relative_to(ROOT).as_posix()}) | {text} |" for name, path, text in rows]
-    return "\n".join([f"# {heading}", "", f"By name: {use}", "", "| name | what it is |", "|---|---|", *lines])
+def _table(kind: Kind) -> str:
+    files = ((one, one.file.relative_to(ROOT).as_posix()) for one in entries(kind))
+    rows = [f"| [`{one.name}`](../../{file}) | {_what(one)} |" for one, file in files]
+    return "\n".join([f"# {kind.title}", "", f"By name: `{kind.use}`", "", "| name | what it is |", "|---|---|", *rows])
 
 
-def _titled(
-    paths: Iterable[Path], more: Callable[[dict[str, Any]], str] = lambda data: ""
-) -> Iterator[tuple[str, Path, str]]:
-    """Yield name, file, and title with what ``more`` says of the file's content."""
-    for path in sorted(paths):
-        data = read_json(path) if path.suffix == ".json" else read_yaml(path)
-        yield path.stem, path, f"{data['title']}{more(data)}"
-
-
-def _scenes(recipe: dict[str, Any]) -> str:
-    scenes = sum(group["scenes"] for group in recipe["groups"])
-    return f": {scenes} scenes. {' '.join(recipe.get('description', '').split())}"
-
-
-def _libraries() -> Iterator[tuple[str, Path, str]]:
-    for path in sorted(PRESETS.glob("assets/*/library.json")):
-        yield path.parent.name, path, ", ".join(read_json(path)["assets"])
-
-
-def _materials() -> Iterator[tuple[str, Path, str]]:
-    for path in sorted(PRESETS.glob("material_tables/*.json")):
-        names = ", ".join(read_json(path)["materials"])
-        yield path.stem, path, f"in place of the usual ones: {names}"
+def _what(one: Entry) -> str:
+    """Return what a thing is: its title with the key figures of those that are made of others."""
+    if "scenes" in one.figures:
+        return f"{one.title}: {one.figures['scenes']} scenes. {one.note}"
+    for parts in ("assets", "materials"):
+        if parts in one.figures:
+            return f"{one.title}: {', '.join(one.figures[parts])}"
+    return one.title
 
 
 GENERATED: dict[str, Callable[[], str]] = {

@@ -61,7 +61,8 @@ def measure_run(
     around the axis, have both sides of each slice cropped at random, and the path is found in what is left.
 
     Returns:
-        the model's mean figures; ``tables`` has those of all predictors and roads, ``corridor`` its errors by target.
+        the model's mean figures; ``tables`` has those of all predictors and roads, ``corridor`` its errors by target,
+        ``files`` the names of what was written.
     """
     shown = read_cases(configuration, evaluation, progress)
     name = f"{configuration.model.name}, seed {configuration.seed}"
@@ -71,14 +72,14 @@ def measure_run(
     progress("measuring", 0.0)
     measured = measure(predictors, lambda seed: shown, [configuration.seed])
     corridor = corridor_figures(predictor, shown)
-    write_tables(evaluation.output, "centerline", measured)
-    write_file(evaluation.output / "corridor.json", canonical_json(corridor).encode(), overwrite=True)
+    files = [*write_tables(evaluation.output, "centerline", measured), "corridor.json"]
+    write_file(evaluation.output / files[-1], canonical_json(corridor).encode(), overwrite=True)
     for number, one in enumerate(shown[:PICTURES]):
         progress("drawing", number / min(len(shown), PICTURES))
-        _draw(evaluation.output, one, predictor, name)
+        files += _draw(evaluation.output, one, predictor, name)
     rows = {figure: spread.mean for figure, spread in measured[name]["all"].items()}
     plain = {figure: value if np.isfinite(value) else None for figure, value in rows.items()}
-    return {"roads": len(shown), **plain, "corridor": corridor, "tables": as_data(measured)}
+    return {"roads": len(shown), **plain, "corridor": corridor, "tables": as_data(measured), "files": files}
 
 
 def read_cases(
@@ -148,7 +149,8 @@ def _measured(cloud: Path, truth: TruthKind) -> Road:
     return read_measured(cloud, there[0], truth)
 
 
-def _draw(folder: Path, one: Case, predictor: CenterlinePredictor, name: str) -> None:
+def _draw(folder: Path, one: Case, predictor: CenterlinePredictor, name: str) -> list[str]:
+    """Draw a road; return the names of the pictures."""
     length = truth_of(one.road).axis.length
     view = View(max(0.0, 0.5 * (length - _VIEW)), min(length, 0.5 * (length + _VIEW)))
     prediction = predictor(one.road, one.frames)
@@ -162,3 +164,4 @@ def _draw(folder: Path, one: Case, predictor: CenterlinePredictor, name: str) ->
     }
     for kind, content in pictures.items():
         write_file(folder / f"{one.road.name}-{kind}.png", content, overwrite=True)
+    return [f"{one.road.name}-{kind}.png" for kind in pictures]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Literal
 
@@ -90,6 +90,13 @@ def evaluate(run: Run[CenterlineConfiguration], evaluation: Evaluation, progress
     from .measuring import measure_run
 
     return measure_run(run.configuration, predictor(run), evaluation, progress)
+
+
+def report(result: Mapping[str, Any]) -> str:
+    """Return what `evaluate` found as tables for people."""
+    from .tables import report
+
+    return report(result)
 
 
 def predict(run: Run[CenterlineConfiguration], prediction: Prediction, progress: Progress = silent) -> dict[str, Any]:

@@ -1,29 +1,25 @@
 """Experiments: several trainings that differ in their data, each with several seeds, and one table of all scores.
 
-Example: ``python -m ml.segmentation.experiment real-synthetic-mixed --data real=out/standin --data
-synthetic=out/reference --output out/experiment``. What is trained already isn't trained again.
+`synthroads experiment` runs them. What is trained already isn't trained again.
 """
 
 from __future__ import annotations
 
-import argparse
 import shutil
-import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, ClassVar
 
 from pydantic import Field
 
-from headless.cli import progress_bar
-from ml.configuration import load_configuration
+from ml.configuration import EXPERIMENTS, experiment_names, load_configuration
 from ml.fitting import chosen_device
 from ml.runs import CHECKPOINT, CONFIGURATION, HISTORY, METRICS, PRETRAINING, Run, lasting
 from synthroads_addon.core.dataset.manifest import checksum
 from synthroads_addon.core.errors import InputError, nearest_name
 from synthroads_addon.core.files import write_file
 from synthroads_addon.core.progress import Progress, silent
-from synthroads_addon.core.scenario import apply_change
+from synthroads_addon.core.scenario import apply_change, apply_values
 from synthroads_addon.core.schema import Model, canonical_json, read_json, read_yaml
 
 from .evaluation import score_all, trained_model
@@ -32,9 +28,8 @@ from .sources import Source
 from .tables import by_test
 from .task import train
 
-SHIPPED = Path(__file__).parents[1] / "configurations" / "experiments"
-RESULTS = "results.json"
-"""File with the scores of all variants, seeds and tests, in an experiment's folder."""
+RESULTS, TABLE = "results.json", "table.md"
+"""Files with the scores of all variants, seeds and tests, in an experiment's folder."""
 
 
 class Variant(Model):
@@ -66,8 +61,8 @@ def load_experiment(name_or_file: str) -> Experiment:
         MissingFileError: there is no such file.
         InputError: a field is unknown or wrong.
     """
-    shipped = sorted(path.stem for path in SHIPPED.glob("*.yaml"))
-    path = SHIPPED / f"{name_or_file}.yaml" if name_or_file in shipped else Path(name_or_file)
+    shipped = experiment_names()
+    path = EXPERIMENTS / f"{name_or_file}.yaml" if name_or_file in shipped else Path(name_or_file)
     if path.suffix.lower() not in (".yaml", ".yml", ".json"):
         hint = nearest_name(name_or_file, shipped)
         raise InputError("experiment", name_or_file, f"must be a .yaml file or one of {', '.join(shipped)}{hint}")
@@ -98,10 +93,9 @@ def configurations(
     for name, variant in experiment.variants.items():
         data = base
         for part in (experiment.set, experiment.variants[variant.of].set if variant.of else {}, variant.set):
-            for path, value in part.items():
-                data = apply_change(data, f"{path}={canonical_json(value)}")
+            data = apply_values(data, part)
         for change in changes:
-            data = apply_change(data, change)
+            data = apply_change(data, change, SegmentationConfiguration)
         result[name] = SegmentationConfiguration.from_dict(data, f"variants.{name}")
     return result
 
@@ -136,7 +130,7 @@ def run_experiment(
     Args:
         experiment: what is compared.
         configured: see `configurations`.
-        output: folder; ``VARIANT/seed-N`` are the runs, ``results.json`` and ``table.md`` the scores.
+        output: folder; ``VARIANT/seed-N`` are the runs, `RESULTS` and `TABLE` the scores.
         seeds: one after another, each over all variants: a table is there as soon as the first is through.
         progress: of each training.
     """
@@ -151,7 +145,7 @@ def run_experiment(
                 tests = _tested(configuration, folder, output / name / f"seed-{seed}.json", progress)
             results[name][str(seed)] = tests
             write_file(output / RESULTS, canonical_json(results).encode(), overwrite=True)
-            write_file(output / "table.md", table(experiment.title, results).encode(), overwrite=True)
+            write_file(output / TABLE, table(experiment.title, results).encode(), overwrite=True)
     return results
 
 
@@ -205,48 +199,3 @@ def table(title: str, results: Mapping[str, Mapping[str, Any]]) -> str:
         results: variant -> seed -> test -> scores as of `Confusion.to_dict`.
     """
     return f"# {title}\n\n{by_test(results)}\n"
-
-
-def parser() -> argparse.ArgumentParser:
-    """Return the parser of the command."""
-    known = ", ".join(sorted(path.stem for path in SHIPPED.glob("*.yaml")))
-    made = argparse.ArgumentParser(prog="python -m ml.segmentation.experiment", description=__doc__)
-    made.add_argument("experiment", metavar="EXPERIMENT", help=f"YAML file, or one of {known}")
-    text = "folder that {NAME} in the experiment's paths stands for (can be repeated)"
-    made.add_argument("--data", action="append", default=[], metavar="NAME=FOLDER", help=text)
-    made.add_argument("--output", type=Path, required=True, metavar="DIR", help="folder for runs and table")
-    made.add_argument("--configuration", metavar="NAME", help="configuration in place of the experiment's")
-    made.add_argument("--seeds", type=int, nargs="+", metavar="N", help="seeds in place of the experiment's")
-    made.add_argument("--set", action="append", default=[], metavar="PATH=VALUE", dest="changes", help="of all runs")
-    made.add_argument("--quiet", action="store_true", help="print nothing but errors")
-    return made
-
-
-def main(argv: list[str] | None = None) -> int:
-    """Run the command; return its exit code."""
-    arguments = parser().parse_args(argv)
-    arguments.json = False
-    try:
-        experiment = load_experiment(arguments.experiment)
-        if arguments.configuration:
-            experiment = experiment.model_copy(update={"configuration": arguments.configuration})
-        folders = dict(text.partition("=")[::2] for text in arguments.data)
-        configured = configurations(experiment, folders, arguments.changes)
-        seeds = arguments.seeds or experiment.seeds
-        for seed in seeds:
-            if not 0 <= seed < 2**63:
-                raise InputError("--seeds", seed, "must be whole numbers from 0")
-        results = run_experiment(experiment, configured, arguments.output, seeds, progress_bar(arguments))
-    except InputError as error:
-        print(f"error: {error}", file=sys.stderr)
-        return 2
-    except KeyboardInterrupt:
-        print("interrupted; the same command goes on", file=sys.stderr)
-        return 130
-    if not arguments.quiet:
-        print(table(experiment.title, results))
-    return 0
-
-
-if __name__ == "__main__":
-    raise SystemExit(main())

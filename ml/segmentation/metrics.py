@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from synthroads_addon.core.errors import InputError
+from synthroads_addon.core.text_table import text_table
 
 IGNORED = -1
 """Label of points that count nowhere."""
@@ -98,16 +99,18 @@ class Confusion:
             "confusion": self.counts.tolist(),
         }
 
-    def to_text(self) -> str:
-        """Return a table for people, in percent."""
-        head = f"{'class':<22}{'precision':>11}{'recall':>9}{'IoU':>9}{'points':>14}"
-        rows = [
-            f"{name:<22}{_percent(p):>11}{_percent(r):>9}{_percent(i):>9}{s:>14,}"
-            for name, p, r, i, s in zip(self.names, self.precision, self.recall, self.iou, self.support, strict=True)
-        ]
-        means = (mean(values) for values in (self.precision, self.recall, self.iou))
-        p, r, i = (_percent(value) for value in means)
-        return "\n".join([head, *rows, f"{'mean':<22}{p:>11}{r:>9}{i:>9}{int(self.counts.sum()):>14,}"])
+
+def score_table(scores: Mapping[str, Any]) -> str:
+    """Return the scores that `Confusion.to_dict` has as a table for people, in percent."""
+    columns = ("precision", "recall", "iou")
+    rows = [
+        [name, *(_percent(row[column]) for column in columns), f"{row['support']:,}"]
+        for name, row in scores["classes"].items()
+    ]
+    rows.append(["mean", *(_percent(scores[f"mean_{column}"]) for column in columns), f"{scores['points']:,}"])
+    lines = text_table(["class", "precision", "recall", "IoU", "points"], rows)
+    unlabelled = f", {scores['ignored']:,} without a class left out" if scores["ignored"] else ""
+    return "\n".join([*lines, f"{_percent(scores['accuracy'])} % of the points are right{unlabelled}"])
 
 
 def mean(values: FloatArray) -> float:
@@ -132,5 +135,5 @@ def _or_none(value: float) -> float | None:
     return None if np.isnan(value) else float(value)
 
 
-def _percent(value: float) -> str:
-    return "-" if np.isnan(value) else f"{100 * value:.1f}"
+def _percent(value: float | None) -> str:
+    return "-" if value is None else f"{100 * value:.1f}"

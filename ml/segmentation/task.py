@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -17,6 +18,7 @@ from synthroads_addon.core.files import write_file
 from synthroads_addon.core.progress import Progress, peak_memory_mb, silent
 
 from .evaluation import check_tests, classifier, score, score_all, trained_model
+from .metrics import score_table
 from .pictures import comparison
 from .prediction import Labelling, predict_file
 from .recipes import SegmentationConfiguration
@@ -68,17 +70,25 @@ def evaluate(run: SegmentationRun, evaluation: Evaluation, progress: Progress = 
     device = chosen_device(configuration)
     model = trained_model(run, device)
     results: dict[str, Any] = {}
+    files: list[str] = []
     for path, name in zip(evaluation.data, _names(evaluation), strict=True):
         source = _test_source(path, evaluation)
         confusion, shown = score(model, configuration, [source], device, progress)
-        write_file(evaluation.output / f"{name}.txt", (confusion.to_text() + "\n").encode(), overwrite=True)
+        results[name] = confusion.to_dict()
+        files.append(f"{name}.txt")
+        write_file(evaluation.output / files[-1], (score_table(results[name]) + "\n").encode(), overwrite=True)
         if shown is not None:
             tile, labels = shown
             classes = source.targets(configuration.scheme())
-            write_file(evaluation.output / f"{name}.png", comparison(tile, labels, classes), overwrite=True)
-        results[name] = confusion.to_dict()
+            files.append(f"{name}.png")
+            write_file(evaluation.output / files[-1], comparison(tile, labels, classes), overwrite=True)
     means = {f"{name}_mean_iou": result["mean_iou"] for name, result in results.items()}
-    return {**means, "tests": results}
+    return {**means, "tests": results, "files": files}
+
+
+def report(result: Mapping[str, Any]) -> str:
+    """Return what `evaluate` found as tables for people: scores by class of each test, in percent."""
+    return "\n\n".join(f"{name}:\n{score_table(scores)}" for name, scores in result["tests"].items())
 
 
 def _names(evaluation: Evaluation) -> list[str]:

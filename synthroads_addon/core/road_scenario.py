@@ -6,7 +6,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Discriminator, Field, Tag, model_validator
 
-from .parameters.limits import SECTIONS_OF_CLASS, STANDARD_CROSS_SECTIONS
+from .parameters.limits import SECTIONS_OF_CLASS, STANDARD_CROSS_SECTIONS, USUAL_SECTION, design_class_of
 from .parameters.model_section import SHORTEST_DASH
 from .parameters.model_surroundings import GRASSES, SHRUBS, TREES
 from .schema import Model, quantity
@@ -204,8 +204,12 @@ class MaterialLimits(ScenarioModel):
 class RoadScenario(ScenarioModel):
     """Limits that the road is sampled within."""
 
-    design_class: Literal["EKA1A", "EKA1B", "EKA2", "EKA3"] = Field("EKA1A", description="Design class (RAA).")
-    cross_section: CrossSection = Field("RQ31", description="Standard cross-section, or one by hand.")
+    design_class: Literal["EKA1A", "EKA1B", "EKA2", "EKA3"] = Field(
+        "EKA1A", description="Design class (RAA); if not given, the first that has the cross-section."
+    )
+    cross_section: CrossSection = Field(
+        "RQ31", description="Standard cross-section, or one by hand; if not given, EKA2 has RQ28 and EKA3 RQ25."
+    )
     lanes: int | None = quantity(
         None, ge=1, le=8, unit="1", description="Lanes per direction; the cross-section's if not given."
     )
@@ -254,6 +258,19 @@ class RoadScenario(ScenarioModel):
     environment: EnvironmentLimits = Field(EnvironmentLimits(), description="Light and weather.")
     materials: MaterialLimits = Field(MaterialLimits(), description="Variation of materials.")
     assets: tuple[str, ...] = Field((), description="Libraries of free assets to place from: roadside, or JSON files.")
+
+    @model_validator(mode="before")
+    @classmethod
+    def _what_fits(cls, data: Any) -> Any:
+        """Take, where one of design class and cross-section isn't given, what fits the other."""
+        if not isinstance(data, dict):
+            return data
+        given, section = str(data.get("design_class")), data.get("cross_section")
+        if "cross_section" not in data and given in USUAL_SECTION:
+            return {**data, "cross_section": USUAL_SECTION[given]}
+        if "design_class" not in data and isinstance(section, str) and section in STANDARD_CROSS_SECTIONS:
+            return {**data, "design_class": design_class_of(section, next(iter(USUAL_SECTION)))}
+        return data
 
     @model_validator(mode="after")
     def _known(self) -> RoadScenario:

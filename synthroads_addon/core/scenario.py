@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import json
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal, get_args
@@ -13,12 +12,14 @@ from pydantic import Field, field_validator
 from .cloud_scenario import CloudScenario
 from .colour_scenario import ColourScenario
 from .errors import InputError, nearest_name
+from .giving_way import without_what_gives_way
 from .materials import Material, material_table_path, read_material_table
 from .road_scenario import RoadScenario, ScenarioModel
 from .scan_scenario import ScanScenario
-from .schema import quantity, read_json
+from .schema import Model, quantity, read_json
 from .tolerance import TIMES, Tolerance, with_unit
 from .twin import TwinFormat
+from .typed_text import typed_value
 
 SCENARIOS = Path(__file__).parents[1] / "presets" / "scenarios"
 
@@ -155,38 +156,51 @@ def load_scenario(name_or_file: str, changes: list[str] | None = None) -> Scenar
     scenario = Scenario.from_dict(read_json(path), source=str(name_or_file))
     if not changes:
         return scenario
-    data = scenario.to_dict()
-    for change in changes:
-        data = apply_change(data, change)
-    return Scenario.from_dict(data)
+    return Scenario.from_dict(with_changes(scenario.to_dict(), map(parsed_change, changes)))
 
 
-def apply_change(data: Any, change: str) -> Any:
-    """Return the scenario's JSON data with one ``path=value`` applied; the value is JSON, or else plain text."""
-    path, value = parsed_change(change)
+def with_changes(data: Any, changes: Iterable[tuple[str, Any]]) -> Any:
+    """Return a scenario's JSON data with values set by their dotted paths, one after another.
+
+    What the scenario said itself and doesn't fit them any more gives way, see `without_what_gives_way`.
+    """
+    named = set()
+    for path, value in changes:
+        data = apply_values(data, {path: value})
+        named.add(path)
+    return without_what_gives_way(data, named)
+
+
+def apply_change(data: Any, change: str, model: type[Model] = Scenario) -> Any:
+    """Return JSON data with one ``path=value`` applied, the value being of the type of the model's field."""
+    path, value = parsed_change(change, model)
     return _with_value(data, path, value)
 
 
 def apply_values(data: Any, values: Mapping[str, Any]) -> Any:
-    """Return the scenario's JSON data with values set by their dotted paths."""
+    """Return JSON data with values set by their dotted paths; raise `InputError` where a path is none."""
     for path, value in values.items():
+        if not _is_path(path):
+            raise InputError("set", path, "must be the path of a field, e.g. road.length")
         data = _with_value(data, path, value)
     return data
 
 
-def parsed_change(change: str) -> tuple[str, Any]:
-    """Return path and value of ``path=value``; raise `InputError` if it has another form."""
+def parsed_change(change: str, model: type[Model] = Scenario) -> tuple[str, Any]:
+    """Return path and value of ``path=value``, see `typed_value`; raise `InputError` if it has another form."""
     path, equals, text = change.partition("=")
-    if not equals or not path or path.count(".") > _DEEPEST:
+    if not equals or not _is_path(path):
         raise InputError("--set", change, "must be path=value, e.g. road.length=800")
-    try:
-        return path, json.loads(text)
-    except (ValueError, RecursionError):
-        return path, text
+    return path, typed_value(model, path, text)
 
 
-def _with_value(data: Any, path: str, value: Any) -> Any:
-    if not isinstance(data, dict):
-        raise InputError("scenario", data, "must be a JSON object")
+def _is_path(text: str) -> bool:
+    return bool(text) and text.count(".") <= _DEEPEST
+
+
+def _with_value(data: Any, path: str, value: Any, above: str = "") -> Any:
     head, dot, rest = path.partition(".")
-    return {**data, head: _with_value(data.get(head, {}), rest, value) if dot else value}
+    if not isinstance(data, dict):
+        raise InputError(above or "scenario", data, f"must be a JSON object before its field {head} can be set")
+    here = f"{above}.{head}" if above else head
+    return {**data, head: _with_value(data.get(head, {}), rest, value, here) if dot else value}

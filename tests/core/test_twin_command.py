@@ -53,8 +53,8 @@ def test_command_needs_no_blender(parameters: Path, tmp_path: Path) -> None:
     [
         (("--twin", "cityjsn"), "twin is 'cityjsn': must be one of cityjson, ifc, opendrive, geojson (did you mean"),
         (("--twin", ""), "twin is '': must be one of"),
-        (("--tolerance", "0"), "--tolerance is 0.0: must be from 0.0001 to 1 m"),
-        (("--tolerance", "nan"), "--tolerance is nan: must be from 0.0001 to 1 m"),
+        (("--max-deviation", "0"), "--max-deviation is 0.0: must be from 0.0001 to 1 m"),
+        (("--max-deviation", "nan"), "--max-deviation is nan: must be from 0.0001 to 1 m"),
     ],
 )
 def test_bad_input_is_one_line_and_nothing_is_written(

@@ -32,7 +32,7 @@ from ml.centerline.metrics import Spread
 from ml.centerline.pictures import View, corridor_picture, lines_picture
 from ml.centerline.roads import Road, read_measured
 from ml.centerline.skeleton import SkeletonSettings
-from ml.centerline.tables import COLUMNS, as_data, cell, road_table, table, write_tables
+from ml.centerline.tables import COLUMNS, as_data, cell, report, road_table, table, write_tables
 from synthroads_addon.core.errors import InputError
 from tests.ml import analytic_roads
 from tests.ml.centerline_roads import REAL, strip_road
@@ -196,6 +196,30 @@ def test_tables_say_mean_and_deviation(tmp_path: Path) -> None:
     data = json.loads((tmp_path / "roads.json").read_text())
     assert data["baseline"]["all"]["mae"] == {"mean": 0.9, "std": None, "seeds": 1}
     assert data == as_data(measured())
+
+
+def test_a_report_shows_every_road_and_the_corridor() -> None:
+    figures = {"mae": Spread(0.1234, np.nan, 1), "coverage_68": Spread(0.69, np.nan, 1)}
+    rows = {
+        "model, seed 1": {"all": figures, "a": figures, "b": {"mae": Spread(0.2, np.nan, 1)}},
+        "skeleton": {"all": {"mae": Spread(1.5, np.nan, 1)}},
+    }
+    corridor = {
+        "lanes": {"slices": 9.0, "mae": 0.5, "right": 0.75, "interval_68": 0.7},
+        "heading": {"slices": 9.0, "mae": 0.004, "interval_68": None},
+    }
+    text = report({"tables": as_data(rows), "corridor": corridor})
+    assert [line.split("  ")[0].strip() for line in text.splitlines()] == [
+        *("2 roads:", "", "model, seed 1", "skeleton", ""),
+        *("model, seed 1, by road:", "", "a", "b", ""),
+        *("model, seed 1, the corridor:", "", "lanes", "heading (mrad)"),
+    ]
+    cells = {line.split("  ")[0]: line.split()[-2:] for line in text.splitlines() if line}
+    assert cells["a"] == ["0.123", "69.0"]
+    assert cells["b"] == ["0.200", "–"]
+    assert cells["skeleton"] == ["1.500", "–"]
+    assert cells["lanes"] == ["75.0", "70.0"]
+    assert text.splitlines()[-1].split()[2:] == ["4.000", "–", "–"]
 
 
 def test_pictures_are_drawn_with_and_without_uncertainty(road: Road) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 from typing import Any
 
@@ -124,6 +125,17 @@ def test_measuring_and_using_a_run(data: Path, tmp_path: Path):
     names = {path.name for path in (tmp_path / "measured").iterdir()}
     assert {"centerline.json", "centerline.md", "corridor.json", "a-03-lines.png", "a-03-corridor.png"} <= names
     json.dumps(figures, allow_nan=False)
+    assert names == set(figures["files"])
+    rows = [re.split(r"\s{2,}", line.strip()) for line in task.report(figures).splitlines()]
+    assert rows[0] == ["1 road:"]
+    assert rows[1][:2] == ["MAE (m)", "95 % (m)"]
+    assert rows[1][-3:] == ["in 68 % (%)", "in 95 % (%)", "found (%)"]
+    model = next(row for row in rows if row[0].endswith(", seed 1"))
+    assert model[1] == f"{figures['mae']:.3f}"
+    assert model[-1] == f"{100 * figures['found']:.1f}"
+    assert next(row for row in rows if row[0] == "skeleton")[-3:-1] == ["–", "–"], "it says no intervals"
+    heading = next(row for row in rows if row[0] == "heading (mrad)")
+    assert heading[1] == f"{1000 * figures['corridor']['heading']['mae']:.3f}"
 
     cloud, output = data / "scenes" / "a-03" / "cloud.laz", tmp_path / "line.geojson"
     metrics = task.predict(run, Prediction(cloud, output), silent)

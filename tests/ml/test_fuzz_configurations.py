@@ -8,11 +8,10 @@ from typing import Any
 
 import pytest
 
-from ml.configuration import SHIPPED, load_configuration
+from ml.configuration import EXPERIMENTS, SHIPPED, load_configuration
 from ml.runs import CHECKPOINT, CONFIGURATION, Run
 from ml.segmentation.classes import SHIPPED as MAPPINGS
 from ml.segmentation.classes import load_mapping
-from ml.segmentation.experiment import SHIPPED as EXPERIMENTS
 from ml.segmentation.experiment import configurations, load_experiment
 from ml.tasks import kinds
 from synthroads_addon.core.errors import InputError

@@ -78,7 +78,7 @@ def test_a_known_axis_is_compared_with(made: tuple[Path, dict[str, Any]], tmp_pa
 def test_wrong_input_is_one_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     for words, message in (
         (["no-such.laz"], "no such file"),
-        (["no-such.laz", "--tolerance", "9"], "--tolerance is 9.0"),
+        (["no-such.laz", "--fit-tolerance", "9"], "--fit-tolerance is 9.0"),
     ):
         assert main(["reconstruct", *words, "--output", str(tmp_path / "out")]) == 2
         said = capsys.readouterr().err

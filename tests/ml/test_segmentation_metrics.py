@@ -7,7 +7,7 @@ import json
 import numpy as np
 import pytest
 
-from ml.segmentation.metrics import IGNORED, Confusion, mean, mean_and_deviation
+from ml.segmentation.metrics import IGNORED, Confusion, mean, mean_and_deviation, score_table
 from synthroads_addon.core.errors import InputError
 
 NAMES = tuple("abcdef")
@@ -55,7 +55,20 @@ def test_undefined_scores_are_nan_and_left_out_of_means() -> None:
     assert confusion.iou[3] == 0.0
     assert confusion.iou[4] == 0.0
     assert confusion.to_dict()["mean_iou"] == pytest.approx(np.mean(confusion.iou[:5]))
-    assert "-" in confusion.to_text().splitlines()[6]
+    assert "-" in score_table(confusion.to_dict()).splitlines()[6]
+
+
+def test_scores_are_shown_as_they_are() -> None:
+    confusion = Confusion(("road", "sign"))
+    confusion.add(np.array([0] * 1500 + [1, 1, IGNORED]), np.array([0] * 1500 + [0, 1, 1]))
+    lines = [line.split() for line in score_table(confusion.to_dict()).splitlines()]
+    assert lines == [
+        ["class", "precision", "recall", "IoU", "points"],
+        ["road", "99.9", "100.0", "99.9", "1,500"],
+        ["sign", "100.0", "50.0", "50.0", "2"],
+        ["mean", "100.0", "75.0", "75.0", "1,502"],
+        ["99.9", "%", "of", "the", "points", "are", "right,", "1", "without", "a", "class", "left", "out"],
+    ]
 
 
 def test_no_points_give_no_scores() -> None:
@@ -66,6 +79,7 @@ def test_no_points_give_no_scores() -> None:
     assert result["mean_iou"] is result["accuracy"] is result["classes"]["a"]["iou"] is None
     json.dumps(result, allow_nan=False)
     assert result["points"] == 0
+    assert score_table(result).endswith("- % of the points are right, 1 without a class left out")
 
 
 def test_wrong_labels_are_refused() -> None:

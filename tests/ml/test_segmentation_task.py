@@ -12,10 +12,11 @@ import numpy as np
 import pytest
 import torch
 
+from headless import cli
 from ml import evaluate as evaluate_command
 from ml import predict as predict_command
 from ml import train as train_command
-from ml.configuration import load_configuration
+from ml.configuration import EXPERIMENTS, load_configuration
 from ml.runs import CHECKPOINT, PRETRAINING, Run
 from ml.segmentation import experiment as experiments
 from ml.segmentation import task
@@ -182,10 +183,10 @@ def test_small_experiments_run_from_end_to_end(tmp_path: Path, name: str) -> Non
         write_pointcept(tmp_path / "real", split, [road_tile(2000, 1, split)], scheme="17")
     five = name == "real-synthetic-mixed-small"
     write_pointcept(tmp_path / "synthetic", "train", [road_tile(2000, 2)], scheme="5" if five else "17")
-    words = [name, "--output", str(tmp_path / "out"), "--seeds", "1", "2", "--quiet"]
+    words = ["experiment", name, "--output", str(tmp_path / "out"), "--seeds", "1", "2", "--quiet"]
     words += [f"--data={each}={tmp_path / each}" for each in ("real", "synthetic")]
     changes = ("threads=1", "network.width=8", "voxel=0.4", "crop_points=300", "schedule.epochs=1")
-    assert experiments.main([*words, *(f"--set={change}" for change in changes), "--set=fine_tuning.epochs=1"]) == 0
+    assert cli.main([*words, *(f"--set={change}" for change in changes), "--set=fine_tuning.epochs=1"]) == 0
     text = (tmp_path / "out" / "table.md").read_text()
     variants = load_experiment(name).variants
     assert f"| class | points | {' | '.join(variants)} |" in text
@@ -239,8 +240,6 @@ def test_clouds_are_laid_over_as_often_as_asked(data: Path) -> None:
 
 
 def test_commands_train_evaluate_and_predict(data: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    from headless import cli
-
     (tmp_path / "toy.yaml").write_text(json.dumps(toy(data).to_dict()))
 
     def command(module: Any, *arguments: object) -> dict[str, Any]:
@@ -261,6 +260,17 @@ def test_commands_train_evaluate_and_predict(data: Path, tmp_path: Path, capsys:
     assert again["tests"]["real-test"] == trained["tests"]["unseen"]
     assert (tmp_path / "scores" / "real-test.png").read_bytes()[:4] == b"\x89PNG"
     assert "road_marking" in (tmp_path / "scores" / "real-test.txt").read_text()
+    assert again["files"] == ["real-test.txt", "real-test.png"]
+    words = ["evaluate", str(tmp_path / "run"), str(data / "real"), "--output", str(tmp_path / "scores")]
+    assert cli.main(words) == 0
+    said = capsys.readouterr().out
+    scores = again["tests"]["real-test"]
+    assert (tmp_path / "scores" / "real-test.txt").read_text() in said
+    rows = {line.split()[0]: line.split()[1:] for line in said.splitlines() if line}
+    assert rows["mean"][2] == f"{100 * scores['mean_iou']:.1f}"
+    assert rows["road_marking"][2] == f"{100 * scores['classes']['road_marking']['iou']:.1f}"
+    assert f"{100 * scores['accuracy']:.1f} % of the points are right" in said
+    assert said.endswith(f"written to {tmp_path / 'scores'}: real-test.txt, real-test.png\n")
     cloud = write_cloud(tmp_path / "cloud.laz", road_block(4000, 9))
     told = command(predict_command, tmp_path / "run", cloud, "--output", tmp_path / "labelled.laz", "--classification")
     assert told["points"] == 4000
@@ -298,7 +308,7 @@ def test_shipped_configurations_and_experiments_are_whole() -> None:
     assert "segmentation" in known
     for name in known:
         assert load_configuration(name, kinds()).task == "segmentation"
-    for path in experiments.SHIPPED.glob("*.yaml"):
+    for path in EXPERIMENTS.glob("*.yaml"):
         found = load_experiment(path.stem)
         made = configurations(found, {"real": "a", "synthetic": "b"})
         assert list(made) == list(found.variants)
@@ -308,6 +318,14 @@ def test_shipped_configurations_and_experiments_are_whole() -> None:
             assert configuration.data.tests
         with pytest.raises(InputError, match="real=FOLDER"):
             configurations(found, {"synthetic": "b"})
+
+
+def test_changes_are_of_the_type_of_their_field() -> None:
+    changes = ["classes=17", "title=2", "schedule.epochs=3", "voxel=0.5"]
+    made = load_configuration("segmentation-small", kinds(), changes)
+    assert (made.classes, made.title, made.schedule.epochs, made.voxel) == ("17", "2", 3, 0.5)
+    of_all = configurations(load_experiment("gantries"), {"real": "a", "synthetic": "b"}, ["classes=5"])
+    assert {configuration.classes for configuration in of_all.values()} == {"5"}
 
 
 def ml_segmentation_configurations() -> list[str]:
@@ -337,13 +355,13 @@ def test_an_experiment_makes_a_table_and_goes_on_where_it_stopped(data: Path, tm
     (tmp_path / "toy.yaml").write_text(json.dumps(toy(data, schedule={"epochs": 1}).to_dict()))
     (tmp_path / "own.yaml").write_text(json.dumps(own))
     folders = [f"--data={name}={data / name}" for name in ("real", "synthetic")]
-    arguments = [str(tmp_path / "own.yaml"), *folders, "--output", str(tmp_path / "out"), "--quiet"]
-    assert experiments.main([*arguments, "--seeds", "1"]) == 0
+    arguments = ["experiment", str(tmp_path / "own.yaml"), *folders, "--output", str(tmp_path / "out"), "--quiet"]
+    assert cli.main([*arguments, "--seeds", "1"]) == 0
     before = (tmp_path / "out" / "synthetic" / "seed-1" / "checkpoint.pt").stat().st_mtime_ns
     assert same(
         weights(tmp_path / "out" / "synthetic" / "seed-1"), weights(tmp_path / "out" / "tuned" / "seed-1" / PRETRAINING)
     )
-    assert experiments.main(arguments) == 0
+    assert cli.main(arguments) == 0
     assert (tmp_path / "out" / "synthetic" / "seed-1" / "checkpoint.pt").stat().st_mtime_ns == before
     results = json.loads((tmp_path / "out" / "results.json").read_text())
     assert {name: sorted(seeds) for name, seeds in results.items()} == {name: ["1", "2"] for name in own["variants"]}
@@ -367,13 +385,39 @@ def test_table_shows_undefined_scores_as_such() -> None:
 def test_an_experiments_faults_are_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     wrong = {"title": "T", "data": {}, "variants": {"a": {"of": "b"}}}
     (tmp_path / "wrong.yaml").write_text(json.dumps(wrong))
-    assert experiments.main([str(tmp_path / "wrong.yaml"), "--output", str(tmp_path / "out")]) == 2
+    assert cli.main(["experiment", str(tmp_path / "wrong.yaml"), "--output", str(tmp_path / "out")]) == 2
     assert "must be a variant that is trained" in capsys.readouterr().err
     with pytest.raises(InputError, match="gantries"):
         load_experiment("gantrys")
     words = ["--data", "real=a", "--data", "synthetic=b", "--output", str(tmp_path / "out"), "--seeds", "-1"]
-    assert experiments.main(["real-synthetic-mixed-small", *words]) == 2
+    assert cli.main(["experiment", "real-synthetic-mixed-small", *words]) == 2
     assert "--seeds is -1: must be whole numbers from 0" in capsys.readouterr().err
+    with pytest.raises(SystemExit, match="2"):
+        cli.main(["experiment", "gantries", "--data", "real", "--output", str(tmp_path / "out")])
+    assert "is 'real': must be NAME=FOLDER" in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
+
+
+def test_an_experiment_tells_its_scores(data: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    tests = {"unseen": [{"path": "{real}", "split": "test"}]}
+    own = {
+        "title": "Toy",
+        "configuration": str(tmp_path / "toy.yaml"),
+        "data": {"synthetic": [{"path": "{synthetic}", "split": "train"}], "tests": tests},
+        "variants": {"plain": {"set": {"set_up": "synthetic"}}},
+        "seeds": [1],
+    }
+    (tmp_path / "toy.yaml").write_text(json.dumps(toy(data, schedule={"epochs": 1}).to_dict()))
+    (tmp_path / "own.yaml").write_text(json.dumps(own))
+    folders = [f"--data={name}={data / name}" for name in ("real", "synthetic")]
+    words = ["experiment", str(tmp_path / "own.yaml"), *folders, "--output", str(tmp_path / "out")]
+    assert cli.main(words) == 0
+    said = capsys.readouterr().out
+    assert "# Toy" in said
+    assert "| class | points | plain |" in said
+    assert said.rstrip().endswith(f"written to {tmp_path / 'out'}: table.md, results.json and the runs")
+    assert cli.main([*words, "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["results"] == json.loads((tmp_path / "out/results.json").read_text())
 
 
 def test_clouds_of_one_name_have_results_of_their_own(data: Path, tmp_path: Path) -> None:

@@ -166,6 +166,13 @@ def test_the_reference_of_commands_has_all_of_them() -> None:
     assert set(COMMANDS) <= {heading.strip() for heading in re.findall(r"(?m)^# (.*)$", generated("commands"))}
 
 
+def test_the_reference_of_commands_shows_no_option_that_help_hides() -> None:
+    text = generated("commands")
+    assert "SUPPRESS" not in text
+    assert "`--part" not in text
+    assert "`--tolerance M`" not in text
+
+
 def test_headings_of_generated_parts_lie_below_the_one_before() -> None:
     page = "# Page\n\n## Recipes\n\n<!-- generated: fields-recipe -->\n"
     assert [line for line in filled(page).splitlines() if line.startswith("#")][:3] == [

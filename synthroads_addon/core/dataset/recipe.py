@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import json
-from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -13,7 +11,7 @@ from pydantic import Field, field_validator, model_validator
 from ..errors import InputError, nearest_name
 from ..random_streams import stream
 from ..road_scenario import ScenarioModel
-from ..scenario import Scenario, load_scenario
+from ..scenario import Scenario, load_scenario, with_changes
 from ..schema import quantity, read_yaml
 
 RECIPES = Path(__file__).parents[2] / "presets" / "recipes"
@@ -146,12 +144,14 @@ def scene_jobs(recipe: Recipe) -> list[SceneJob]:
 
 def _scenario(recipe: Recipe, group: SceneGroup, name: str, place: int) -> Scenario:
     seed = int(stream(recipe.seed, "scene", name).integers(_LARGEST_SEED))
-    changes = [*_changes({"seed": seed}), *_changes(recipe.set), *_changes(group.set)]
+    changes = [{"seed": seed}, recipe.set, group.set]
     if group.variants:
         turn, place_in_turn = divmod(place, len(group.variants))
         order = stream(recipe.seed, "variants", group.name, turn).permutation(len(group.variants))
-        changes += _changes(group.variants[order[place_in_turn]])
-    scenario = load_scenario(group.scenario or recipe.scenario, changes)
+        changes.append(group.variants[order[place_in_turn]])
+    data = load_scenario(group.scenario or recipe.scenario).to_dict()
+    pairs = (pair for values in changes for pair in values.items())
+    scenario = Scenario.from_dict(with_changes(data, pairs))
     if _UNSTABLE in group_outputs(group, recipe):
         raise InputError("outputs", list(scenario.outputs), f"a data set can't hold {_UNSTABLE}: it differs each time")
     wanted = dict.fromkeys((*NEEDED_OUTPUTS, *(name for name in scenario.outputs if name != _UNSTABLE)))
@@ -162,7 +162,3 @@ def group_outputs(group: SceneGroup, recipe: Recipe) -> list[str]:
     """Return the outputs that the recipe itself names for a group, if it does."""
     outputs = group.set.get("outputs", recipe.set.get("outputs", []))
     return list(outputs) if isinstance(outputs, list) else []
-
-
-def _changes(values: Mapping[str, Any]) -> list[str]:
-    return [f"{path}={json.dumps(value)}" for path, value in values.items()]

@@ -82,6 +82,8 @@ SECTIONS_OF_CLASS = {
     "EKA3": ("RQ38.5", "RQ31.5", "RQ25"),
 }
 """Design class -> standard cross-sections that it may have."""
+USUAL_SECTION = {"EKA1A": "RQ31", "EKA1B": "RQ31", "EKA2": "RQ28", "EKA3": "RQ25"}
+"""Design class -> the cross-section that it has where none is given: of two lanes each way."""
 
 
 def design_class_of(cross_section: str, preferred: str) -> str:

@@ -1,0 +1,119 @@
+"""List what comes under a name: scenarios, scanners, recipes, classes, trainings; and the fields that --set takes."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+if __name__ == "__main__":
+    sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
+from headless.cli import Outcome, add_common_arguments, entry
+from ml import catalogue as of_learning
+from synthroads_addon.core import catalogue
+from synthroads_addon.core.catalogue import Kind, entries
+from synthroads_addon.core.errors import InputError, nearest_name
+from synthroads_addon.core.field_list import Field, fields_of
+from synthroads_addon.core.scenario import Scenario
+from synthroads_addon.core.text_table import text_table
+
+_FIELDS = "fields"
+_LONGEST_DEFAULT = 24
+KINDS: dict[str, Kind] = {**catalogue.KINDS, **of_learning.KINDS}
+"""Kinds of things that are listed."""
+
+
+def _learned(task: str) -> Callable[[], Any]:
+    def kind() -> Any:
+        from ml.tasks import task as module
+
+        return module(task).configuration_kind()
+
+    return kind
+
+
+_OWNERS: dict[str, Callable[[], Any]] = {
+    "scenario": lambda: Scenario,
+    "segmentation": _learned("segmentation"),
+    "centerline": _learned("centerline"),
+}
+"""What has fields that ``--set`` takes, and its class: of `train` and `experiment` the task's."""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments of `synthroads list`."""
+    text = f"{', '.join(KINDS)}, or {_FIELDS}: what --set takes (the kinds themselves)"
+    parser.add_argument("kind", nargs="?", metavar="KIND", help=text)
+    text = "only names (of fields: paths) that begin so; or files of your own, or folders of them (all that is shipped)"
+    parser.add_argument("names", nargs="*", metavar="NAME_OR_FILE", help=text)
+    parser.words = "names"  # type: ignore[attr-defined]
+    text = "whose fields: the scenario's, or those of a training (%(default)s)"
+    parser.add_argument("--of", choices=_OWNERS, default="scenario", help=text)
+    add_common_arguments(parser)
+
+
+def run(arguments: argparse.Namespace) -> Outcome:
+    """Run `synthroads list`."""
+    words = [*filter(None, [arguments.kind]), *arguments.names]  # after an option all of them are names
+    name, *wanted = words or [None]
+    if name != _FIELDS and arguments.of != "scenario":
+        raise InputError("--of", arguments.of, f"is for {_FIELDS} only")
+    if name is None:
+        return _kinds()
+    if name == _FIELDS:
+        return _fields(arguments.of, wanted)
+    if name not in KINDS:
+        known = [*KINDS, _FIELDS]
+        raise InputError("KIND", name, f"must be one of {', '.join(known)}{nearest_name(name, known)}")
+    kind = KINDS[name]
+    found = entries(kind, wanted)
+    rows = [(one.name, *row) for one in found for row in kind.rows(one)]
+    lines = [*text_table(("name", *kind.head), rows), "", f"use: {kind.use}"]
+    return 0, {name: [one.to_dict() for one in found]}, "\n".join(lines)
+
+
+def _kinds() -> Outcome:
+    about = {name: (len(kind.names()), kind.title, kind.use) for name, kind in KINDS.items()}
+    paths = sum(1 for _ in fields_of(Scenario))
+    about[_FIELDS] = (paths, "Fields of a scenario; of trainings with --of", "--set PATH=VALUE")
+    rows = [(name, str(count), *texts) for name, (count, *texts) in about.items()]
+    data = {name: {"count": count, "title": title, "use": use} for name, (count, title, use) in about.items()}
+    return 0, {"kinds": data}, "\n".join(text_table(("kind", "number", "what it is", "use"), rows))
+
+
+def _fields(owner: str, wanted: Sequence[str]) -> Outcome:
+    known = list(fields_of(_OWNERS[owner]()))
+    for text in wanted:
+        if not any(one.path.startswith(text) for one in known):
+            raise InputError(_FIELDS, text, f"no field of the {owner} begins so; `synthroads list fields` has them all")
+    found = [one for one in known if not wanted or one.path.startswith(tuple(wanted))]
+    intervals = tuple(f"{one.path}." for one in found if one.interval)
+    shown = [one for one in found if not (intervals and one.path.startswith(intervals))]
+    rows = [_row(one) for one in shown]
+    return 0, {_FIELDS: [one.to_dict() for one in found]}, "\n".join(text_table(("path", "default", "meaning"), rows))
+
+
+def _row(one: Field) -> tuple[str, str, str]:
+    """Return the cells of a field; an interval's two fields stand in one line."""
+    if one.interval:
+        given = f"{one.default['minimum']:g} to {one.default['maximum']:g} {one.unit}" if one.default else ""
+        return f"{one.path}.{{minimum,maximum}}", given.strip(), f"{one.description} [two numbers{_in(one.unit)}]"
+    text = "" if one.default is None or isinstance(one.default, dict) else json.dumps(one.default).strip('"')
+    allowed = f"{'one of ' if one.allowed else ''}{one.value}{_in(one.unit)}{', required' if one.required else ''}"
+    if len(text) > _LONGEST_DEFAULT:
+        text, allowed = "...", f"{allowed}; by default {text}"
+    elif text and one.unit:
+        text = f"{text} {one.unit}"
+    return one.path, text, f"{one.description} [{allowed}]"
+
+
+def _in(unit: str) -> str:
+    return f", in {unit}" if unit else ""
+
+
+if __name__ == "__main__":
+    entry("list")

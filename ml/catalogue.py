@@ -1,0 +1,98 @@
+"""What of learning comes under a name, with its key figures; read without PyTorch."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from synthroads_addon.core.catalogue import Entry, Kind, figures, preset
+from synthroads_addon.core.errors import InputError
+from synthroads_addon.core.schema import read_yaml
+
+from .configuration import EXPERIMENTS, SHIPPED, Schedule, experiment_names, shipped_names
+from .segmentation.classes import SHIPPED as MAPPINGS
+from .segmentation.classes import load_mapping
+
+_YAML = (".yaml", ".yml", ".json")
+
+
+def _training(name: str) -> Entry:
+    data = _object(preset(SHIPPED, ".yaml", name, shipped_names()))
+    own = data.get("data")
+    learned = own if isinstance(own, dict) else {}
+    told = {
+        "task": data.get("task"),
+        "epochs": Schedule.from_dict(data.get("schedule", {}), f"{name}: schedule").epochs,
+        "data": _paths([learned.get(key, ()) for key in ("data_sets", "measured", "synthetic", "real")]),
+    }
+    return Entry(name, str(data.get("title", "")), preset(SHIPPED, ".yaml", name, shipped_names()), told)
+
+
+def _experiment(name: str) -> Entry:
+    file = preset(EXPERIMENTS, ".yaml", name, experiment_names())
+    data = _object(file)
+    variants = data.get("variants")
+    told = {
+        "configuration": data.get("configuration"),
+        "variants": list(variants) if isinstance(variants, dict) else [],
+    }
+    return Entry(name, str(data.get("title", "")), file, told)
+
+
+def _mapping(name: str) -> Entry:
+    made = load_mapping(name)
+    told = {"field": made.field, "classes": list(dict.fromkeys(made.classes.values()))}
+    return Entry(name, made.title, preset(MAPPINGS, ".json", name, _mapping_names()), told)
+
+
+def _mapping_names() -> list[str]:
+    return sorted(path.stem for path in MAPPINGS.glob("*.json"))
+
+
+def _object(file: Path) -> Mapping[str, Any]:
+    data = read_yaml(file)
+    if not isinstance(data, dict):
+        raise InputError(str(file), None, "must be an object")
+    return data
+
+
+def _paths(named: Any) -> list[str]:
+    """Return the paths in lists of paths and of objects that have one."""
+    if isinstance(named, str):
+        return [named]
+    if isinstance(named, dict):
+        return _paths(named.get("path", named.get("cloud", ())))
+    return [path for part in named for path in _paths(part)] if isinstance(named, (list, tuple)) else []
+
+
+KINDS = {
+    "trainings": Kind(
+        "Trainings",
+        "synthroads train NAME",
+        shipped_names,
+        _training,
+        _YAML,
+        ("what it is", "task", "epochs", "learned from"),
+        figures("task", "epochs", "data"),
+    ),
+    "experiments": Kind(
+        "Experiments",
+        "synthroads experiment NAME",
+        experiment_names,
+        _experiment,
+        _YAML,
+        ("what it is", "from", "variants"),
+        figures("configuration", "variants", variants="; ".join),
+    ),
+    "mappings": Kind(
+        "Mappings of the classes of others",
+        "synthroads evaluate --mapping NAME",
+        _mapping_names,
+        _mapping,
+        (".json",),
+        ("what it is", "attribute", "classes"),
+        figures("field", "classes"),
+    ),
+}
+"""What can be listed of learning, by the name of its kind."""

@@ -1,0 +1,175 @@
+"""Every field of a class that reads a file, by its dotted path: type, limits, unit, default, description.
+
+All of it comes from the JSON Schema that pydantic derives from the class, so it is what a value is checked against.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from pydantic import BaseModel
+
+from .schema import LARGEST
+
+Rule = Mapping[str, Any]
+"""What JSON Schema says of a field."""
+_LIMITS = {"minimum": "from", "exclusiveMinimum": "above", "maximum": "to", "exclusiveMaximum": "below"}
+_TYPES = {"integer": "whole number", "number": "number", "string": "text"}
+
+
+@dataclass(frozen=True)
+class Field:
+    """A field as ``--set`` takes it.
+
+    Attributes:
+        path: e.g. ``scan.platform.height``.
+        value: what it may be, in words with its limits.
+        unit: of the number; empty if it has none.
+        required: whether it must be given, as it has no default.
+        default: as JSON data; None also where it may be left out.
+        description: what it means.
+        allowed: the values that it may have, if these are counted.
+        limits: of the number, in the words of JSON Schema (``minimum`` and so on).
+        interval: whether it holds the minimum and the maximum of what is drawn.
+    """
+
+    path: str
+    value: str
+    unit: str
+    required: bool
+    default: Any
+    description: str
+    allowed: tuple[Any, ...] = ()
+    limits: dict[str, float] = field(default_factory=dict)
+    interval: bool = False
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return everything as JSON data."""
+        return {
+            "path": self.path,
+            "type": self.value,
+            "unit": self.unit or None,
+            "allowed": list(self.allowed) or None,
+            **self.limits,
+            "required": self.required,
+            "default": self.default,
+            "description": self.description,
+        }
+
+
+@dataclass(frozen=True)
+class Wording:
+    """How a rule's value is told.
+
+    Attributes:
+        constant: from JSON's text of a value that may be chosen to what is shown of it.
+        group: from the name of a class of fields to what is shown of it.
+    """
+
+    constant: Callable[[str], str]
+    group: Callable[[str], str]
+
+    def value(self, rule: Rule) -> str:
+        """Return what a value may be, with its limits."""
+        if "$ref" in rule:
+            return self.group(class_of(rule))
+        if "const" in rule:
+            return self.constant(json.dumps(rule["const"]))
+        if "enum" in rule:
+            return ", ".join(self.constant(json.dumps(value)) for value in rule["enum"])
+        for several in ("anyOf", "oneOf"):
+            if several in rule:
+                choices = (choice for choice in rule[several] if choice != {"type": "null"})
+                return " or ".join(dict.fromkeys(self.value(choice) for choice in choices))
+        if rule.get("type") == "array":
+            return self._list(rule)
+        if rule.get("type") == "object":
+            inner = rule.get("additionalProperties")
+            return f"object of {self.value(inner)}" if isinstance(inner, dict) and inner else "object"
+        if rule.get("type") == "boolean":
+            return f"{self.constant('true')} or {self.constant('false')}"
+        return f"{_TYPES.get(rule.get('type', ''), 'any value')}{_limits_in_words(rule)}"
+
+    def _list(self, rule: Rule) -> str:
+        if "prefixItems" in rule:
+            inner = "; ".join(dict.fromkeys(map(self.value, rule["prefixItems"])))
+            return f"list of {len(rule['prefixItems'])}: {inner}"
+        low, high = rule.get("minItems", 0), rule.get("maxItems")
+        count = f" ({low} to {high})" if high else f" (at least {low})" if low else ""
+        return f"list{count} of {self.value(rule.get('items', {}))}"
+
+
+PLAIN = Wording(lambda text: text.strip('"'), lambda name: "object")
+"""For a terminal: no marks around what may be chosen."""
+
+
+def class_of(rule: Rule) -> str:
+    """Return the name of the class that a rule refers to."""
+    return str(rule["$ref"]).rpartition("/")[2]
+
+
+def fields_of(model: type[BaseModel]) -> Iterator[Field]:
+    """Yield the fields of a class and of all that lie in them, each before its own; those of one value are left out."""
+    schema = model.model_json_schema()
+    yield from _fields(schema, schema.get("$defs", {}), None)
+
+
+def _fields(schema: Rule, parts: Mapping[str, Rule], outer: Field | None) -> Iterator[Field]:
+    """Yield the fields of a class, which lies in a field or (None) in nothing."""
+    for name, rule in schema["properties"].items():
+        if "const" in rule:
+            continue
+        inner = [parts[class_of(choice)] for choice in _choices(rule) if "$ref" in choice]
+        made = _field(name, rule, schema, inner, outer)
+        yield made
+        for part in inner:
+            yield from _fields(part, parts, made)
+
+
+def _field(name: str, rule: Rule, schema: Rule, inner: Sequence[Rule], outer: Field | None) -> Field:
+    """Return a field of a class; what lies in an interval has its unit and its meaning.
+
+    Args:
+        name: of the field.
+        rule: what the schema says of it.
+        schema: of its class.
+        inner: classes whose fields lie in it.
+        outer: field that it lies in.
+    """
+    default, unit = rule.get("default"), rule.get("unit", "")
+    said = rule.get("description") or (inner[0].get("description", "").partition("\n")[0] if inner else "")
+    if outer and isinstance(outer.default, dict):
+        default = outer.default.get(name, default)
+    if outer and outer.interval:
+        unit, said = outer.unit, f"{outer.description} {said}"
+    choice = next((choice for choice in _choices(rule) if choice.get("type") != "null"), rule)
+    return Field(
+        path=f"{outer.path}.{name}" if outer else name,
+        value=PLAIN.value(rule),
+        unit="" if unit == "1" else unit,
+        required=default is None and name in schema.get("required", ()),
+        default=default,
+        description=said,
+        allowed=tuple(choice.get("enum", ())),
+        limits=_limits(choice),
+        interval=any(set(part["properties"]) == {"minimum", "maximum"} for part in inner),
+    )
+
+
+def _choices(rule: Rule) -> Sequence[Rule]:
+    """Return the rules of which a field follows one."""
+    return rule.get("anyOf") or rule.get("oneOf") or [rule]
+
+
+def _limits(rule: Rule) -> dict[str, float]:
+    """Return a number's limits, but for those that only keep out overflow."""
+    return {key: rule[key] for key in _LIMITS if abs(rule.get(key, LARGEST)) < LARGEST}
+
+
+def _limits_in_words(rule: Rule) -> str:
+    """Return a number's limits in words."""
+    found = [f"{_LIMITS[key]} {value:g}" for key, value in _limits(rule).items()]
+    return f", {' '.join(found)}" if found else ""

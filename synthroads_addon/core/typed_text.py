@@ -1,0 +1,75 @@
+"""What a text that somebody typed for a field stands for, by the type that the field is declared with."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Sequence
+from types import NoneType, UnionType
+from typing import Annotated, Any, Union, get_args, get_origin
+
+from pydantic import BaseModel, TypeAdapter, ValidationError
+
+from .errors import SynthRoadsError
+
+
+def typed_value(model: type[BaseModel], path: str, text: str) -> Any:
+    """Return the value that a text stands for: JSON where the field takes that, else the text as it stands.
+
+    ``5`` is a number for a field of numbers and the text "5" for one of text; ``null`` takes a value away everywhere.
+
+    Args:
+        model: that the path begins in.
+        path: dotted, e.g. ``scan.platform.height``; of one that isn't there, JSON is taken where the text is JSON.
+        text: what was typed, e.g. ``80``, ``draft`` or ``["laz"]``.
+    """
+    try:
+        value = json.loads(text)
+    except (ValueError, RecursionError):
+        return text
+    if value is None or isinstance(value, str):
+        return value
+    kinds = [one for kind in declared_kinds(model, path.split(".")) for one in alternatives(kind)]
+    if isinstance(value, (dict, list)) and set(kinds) - {str, NoneType}:
+        return value
+    return text if not _is_taken(value, kinds) and _is_taken(text, kinds) else value
+
+
+def declared_kinds(kind: Any, path: Sequence[str]) -> list[Any]:
+    """Return the types that the field at a path is declared with, one of each class that it may lie in; none: no field.
+
+    Args:
+        kind: a class of fields, or any other type, in which the path begins.
+        path: names of the fields, outermost first.
+    """
+    if not path:
+        return [kind]
+    found: list[Any] = []
+    for one in alternatives(kind):
+        if isinstance(one, type) and issubclass(one, BaseModel):
+            named = (field for name, field in one.model_fields.items() if path[0] == (field.alias or name))
+            found += [inner for field in named for inner in declared_kinds(field.annotation, path[1:])]
+        elif get_origin(one) is dict:
+            found += declared_kinds(get_args(one)[1], path[1:])
+    return found
+
+
+def alternatives(kind: Any) -> Iterator[Any]:
+    """Yield the types that a type allows: those of a union, without annotations."""
+    if get_origin(kind) is Annotated:
+        yield from alternatives(get_args(kind)[0])
+    elif get_origin(kind) in (Union, UnionType):
+        for one in get_args(kind):
+            yield from alternatives(one)
+    else:
+        yield kind
+
+
+def _is_taken(value: Any, kinds: Sequence[Any]) -> bool:
+    """Return whether a value is of one of some types; limits of the field don't count."""
+    for kind in kinds:
+        try:
+            TypeAdapter(kind).validate_python(value)
+        except (ValidationError, SynthRoadsError):
+            continue
+        return True
+    return False
