@@ -17,9 +17,9 @@ from pathlib import Path
 from typing import Any
 
 from headless import was_stopped
+from headless.messages import messages
 from synthroads_addon.core.errors import InputError
 from synthroads_addon.core.generator import generator
-from synthroads_addon.core.progress import Progress, silent
 
 
 def _missing(error: ModuleNotFoundError) -> str:
@@ -62,6 +62,18 @@ COMMANDS = {
     "predict": "label a cloud, or find its road, with a trained model",
     "reconstruct": "turn a cloud into the parameters of its road",
 }
+SHORT_OPTIONS = {
+    "--count": "-n",
+    "--device": "-d",
+    "--fidelity": "-f",
+    "--jobs": "-j",
+    "--output": "-o",
+    "--quiet": "-q",
+    "--seed": "-s",
+    "--verbose": "-v",
+    "--version": "-V",
+}
+"""Letters that stand for options, the same for all commands."""
 _LEARNING = ("train", "evaluate", "predict", "reconstruct")
 """Commands whose modules are in `ml`."""
 
@@ -87,7 +99,19 @@ def build_parser() -> argparse.ArgumentParser:
     for name, summary in COMMANDS.items():
         module = _module(name)
         module.add_arguments(commands.add_parser(name, help=summary, description=module.__doc__))
+    add_short_options(parser)
     return parser
+
+
+def add_short_options(parser: argparse.ArgumentParser) -> None:
+    """Let `SHORT_OPTIONS` stand for a parser's long options, and for those of its sub-commands."""
+    for action in parser._actions:
+        if isinstance(action, argparse._SubParsersAction):
+            for its_parser in action.choices.values():
+                add_short_options(its_parser)
+        letters = [SHORT_OPTIONS[name] for name in action.option_strings if name in SHORT_OPTIONS]
+        action.option_strings = [*letters, *action.option_strings]
+        parser._option_string_actions.update(dict.fromkeys(letters, action))
 
 
 def _module(name: str) -> Any:
@@ -99,6 +123,7 @@ def command(name: str, argv: Sequence[str] | None = None) -> int:
     module = _module(name)
     parser = _Parser(prog=f"synthroads {name}", description=module.__doc__)
     module.add_arguments(parser)
+    add_short_options(parser)
     return run(module.run, parser.parse_args(argv))
 
 
@@ -160,18 +185,27 @@ def _listed(text: str) -> list[str]:
 
 def add_common_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the flags that every sub-command understands."""
-    parser.add_argument("--quiet", action="store_true", help="print nothing but errors")
+    amount = parser.add_mutually_exclusive_group()
+    text = "no progress and no notes: print errors only, and the result where it is written to no file"
+    amount.add_argument("--quiet", action="store_true", help=text)
+    amount.add_argument("--verbose", action="store_true", help="print settings, versions and times of stages as well")
     parser.add_argument("--json", action="store_true", help="print the result as JSON on standard output")
+
+
+def _writes_files(arguments: argparse.Namespace) -> bool:
+    """Return whether a command's result is in files, so that what it prints are notes on them."""
+    named = ("output", "save", "plot", "document")
+    return any(getattr(arguments, name, None) for name in named) and not getattr(arguments, "verify", False)
 
 
 def run(action: Callable[[argparse.Namespace], Outcome], arguments: argparse.Namespace) -> int:
     """Run an action and print of its outcome what was asked for; turn errors into one line and an exit code."""
     try:
-        with _without_blenders_chatter():
+        with _without_blenders_chatter(), messages(arguments):
             code, result, text = action(arguments)
         if arguments.json:
             print(canonical_json(result), end="")
-        elif not arguments.quiet:
+        elif not arguments.quiet or not _writes_files(arguments):
             for line in [text] if isinstance(text, str) else text:
                 print(line)
         sys.stdout.flush()
@@ -236,23 +270,6 @@ def leave(action: Callable[[], int]) -> None:
     sys.stdout.flush()
     sys.stderr.flush()
     os._exit(code)
-
-
-def progress_bar(arguments: argparse.Namespace) -> Progress:
-    """Return the progress that suits the flags: a bar on standard error, or nothing."""
-    if arguments.quiet or arguments.json or not sys.stderr.isatty():
-        return silent
-    from tqdm import tqdm
-
-    bar = tqdm(total=100, bar_format="{desc:<12} {bar:40} {n:3.0f} %  {elapsed}", file=sys.stderr, leave=False)
-
-    def show(stage: str, share: float) -> None:
-        if bar.desc != f"{stage}: ":
-            bar.reset()
-            bar.set_description(stage)
-        bar.update(100 * share - bar.n)
-
-    return show
 
 
 @contextmanager

@@ -9,7 +9,8 @@ from pathlib import Path
 if __name__ == "__main__":
     sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from headless.cli import Outcome, add_common_arguments, entry, progress_bar
+from headless.cli import Outcome, add_common_arguments, entry
+from headless.messages import detail, progress_bar
 from synthroads_addon.core.dataset.manifest import Manifest, faults, read_manifest
 from synthroads_addon.core.dataset.recipe import Recipe, load_recipe, recipe_names
 from synthroads_addon.core.errors import InputError
@@ -43,6 +44,7 @@ def run(arguments: argparse.Namespace) -> Outcome:
     if arguments.jobs is not None and not 1 <= arguments.jobs <= 1024:
         raise InputError("--jobs", arguments.jobs, "must be 1 to 1024")
     recipe = _changed(load_recipe(arguments.recipe), arguments.changes)
+    detail("recipe", recipe.to_dict())
     from headless.dataset_run import DatasetRun, dask_workers, local_processes
 
     splits = frozenset(arguments.splits) if arguments.splits else None
@@ -74,9 +76,7 @@ def summary(manifest: Manifest, folder: Path) -> str:
     """Return what was made, for people."""
     done = [scene for scene in manifest.scenes if scene.status == "done"]
     points = sum(scene.points or 0 for scene in done)
-    lines = [f"{len(done)} of {len(manifest.scenes)} scenes, {points:,} points"]
-    lines += [f"failed: {scene.name}: {scene.error}" for scene in manifest.scenes if scene.status == "failed"]
-    return "\n".join([*lines, f"written to {folder}"])
+    return f"{len(done)} of {len(manifest.scenes)} scenes, {points:,} points\nwritten to {folder}"
 
 
 if __name__ == "__main__":

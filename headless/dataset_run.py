@@ -22,6 +22,7 @@ from threading import Event
 from typing import Any
 
 from headless.dataset_scene import DONE, FAILED, FILES, PUBLISHED
+from headless.messages import logger
 from synthroads_addon.core.dataset.data_card import data_card
 from synthroads_addon.core.dataset.layouts import layout_descriptions
 from synthroads_addon.core.dataset.manifest import (
@@ -167,9 +168,11 @@ class DatasetRun:
         self._write_manifest()
         wanted = [job for job in self.jobs if self.splits is None or job.split in self.splits]
         missing = [job for job in wanted if not self._is_done(job)]
+        done = len(wanted) - len(missing)
+        self.progress("scenes", done / len(wanted))
         for number, outcome in enumerate(submit([self._write_task(job) for job in missing]), start=1):
             self._take(outcome)
-            self.progress("scenes", (len(wanted) - len(missing) + number) / len(wanted))
+            self.progress("scenes", (done + number) / len(wanted))
 
     @contextmanager
     def _locked(self) -> Iterator[None]:
@@ -237,9 +240,11 @@ class DatasetRun:
                 (outcome.folder / FILES / name).rename(target)
             entry = SceneEntry.from_dict({**about, "status": "done", **done}, "scene")
             (outcome.folder / "report.json").replace(self.folder / "logs" / f"{job.name}.json")
+            logger.debug("%s is done: %s points", job.name, f"{entry.points:,}")
         else:
             entry = SceneEntry.from_dict({**about, "status": "failed", "error": outcome.error}, "scene")
             (outcome.folder / "log.txt").replace(self.folder / "logs" / f"{job.name}.txt")
+            logger.error("failed: %s: %s", job.name, outcome.error)
         self.entries[job.name] = entry
         shutil.rmtree(outcome.folder, ignore_errors=True)
         self._write_manifest()

@@ -21,8 +21,8 @@ from headless.cli import (
     choice_changes,
     choice_summary,
     entry,
-    progress_bar,
 )
+from headless.messages import detail, progress_bar
 from synthroads_addon.core.scenario import load_scenario, scenario_names
 
 
@@ -53,6 +53,7 @@ def run(arguments: argparse.Namespace) -> Outcome:
     if arguments.twin:
         changes.append(f"twin={json.dumps(arguments.twin)}")
     scenario = load_scenario(arguments.scenario, changes)
+    detail("scenario", scenario.to_dict())
     from synthroads_addon.pipeline import Job, generate
 
     job = Job(

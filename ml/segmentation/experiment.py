@@ -15,7 +15,7 @@ from typing import Any, ClassVar
 
 from pydantic import Field
 
-from headless.cli import progress_bar
+from headless.messages import progress_bar
 from ml.configuration import load_configuration
 from ml.fitting import chosen_device
 from ml.runs import CHECKPOINT, CONFIGURATION, HISTORY, METRICS, PRETRAINING, Run, lasting
