@@ -85,6 +85,23 @@ class _Parser(argparse.ArgumentParser):
         self.exit(2, f"{self.prog}: {message}\n")
 
 
+class _PrintCompletion(argparse.Action):
+    """Prints the script that completes the command line in a shell, and ends the process."""
+
+    def __call__(
+        self, parser: argparse.ArgumentParser, namespace: argparse.Namespace, values: Any, option: str | None = None
+    ) -> None:
+        try:
+            from headless.completion import completion_script
+
+            print(completion_script(parser, values))
+        except ModuleNotFoundError as error:
+            if error.name != "shtab":
+                raise
+            parser.error(f"argument {option}: needs the package shtab: pip install shtab")
+        parser.exit()
+
+
 def main(argv: Sequence[str] | None = None) -> int:
     """Run one sub-command; return its exit code."""
     arguments = build_parser().parse_args(argv)
@@ -95,6 +112,8 @@ def build_parser() -> argparse.ArgumentParser:
     """Return the parser of `synthroads` with all of `COMMANDS`; the documentation's reference is made from it."""
     parser = _Parser(prog="synthroads", description="Synthetic motorways, scanned and labelled.")
     parser.add_argument("--version", action="version", version=generator())
+    text = "print what makes a shell complete commands, options, names and files"
+    parser.add_argument("--print-completion", action=_PrintCompletion, choices=("bash", "fish", "zsh"), help=text)
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
     for name, summary in COMMANDS.items():
         module = _module(name)
