@@ -26,6 +26,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     where.add_argument("--jobs", type=int, metavar="N", help="scenes made at once on this machine (default: 1)")
     where.add_argument("--scheduler", metavar="ADDRESS", help="Dask scheduler whose workers make them, tcp://HOST:PORT")
     parser.add_argument("--resume", action="store_true", help="continue what was begun in this folder")
+    parser.add_argument("--overwrite", action="store_true", help="replace the data set that is there")
     parser.add_argument(
         "--splits", nargs="+", metavar="SPLIT", help="make the scenes of these splits only; --resume makes the others"
     )
@@ -39,6 +40,9 @@ _SET = "change one field of every scenario after the recipe's own, e.g. fidelity
 
 def run(arguments: argparse.Namespace) -> Outcome:
     """Run `synthroads dataset`."""
+    for name, kept in (("--resume", arguments.resume), ("--verify", arguments.verify)):
+        if kept and arguments.overwrite:
+            raise InputError("--overwrite", None, f"can't be given with {name}, which keeps what is there")
     if arguments.verify:
         return _verify(arguments.output)
     if arguments.jobs is not None and not 1 <= arguments.jobs <= 1024:
@@ -48,7 +52,8 @@ def run(arguments: argparse.Namespace) -> Outcome:
     from headless.dataset_run import DatasetRun, dask_workers, local_processes
 
     splits = frozenset(arguments.splits) if arguments.splits else None
-    work = DatasetRun(recipe, arguments.output.absolute(), arguments.resume, progress_bar(arguments), splits)
+    folder, progress = arguments.output.absolute(), progress_bar(arguments)
+    work = DatasetRun(recipe, folder, arguments.resume, progress, splits, arguments.overwrite)
     submit = dask_workers(arguments.scheduler) if arguments.scheduler else local_processes(arguments.jobs or 1)
     manifest = work.run(submit)
     failed = [scene for scene in manifest.scenes if scene.status == "failed"]
