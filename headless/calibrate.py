@@ -16,7 +16,8 @@ from typing import Any
 if __name__ == "__main__":
     sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from headless.cli import Outcome, add_common_arguments, entry, progress_bar
+from headless.cli import Outcome, add_common_arguments, entry
+from headless.messages import progress_bar
 from synthroads_addon.core.calibration_axis import RoadClasses
 from synthroads_addon.core.calibration_job import PARTS, Calibration, CalibrationJob, Wanted, check, save_fitted, steps
 from synthroads_addon.core.errors import InputError

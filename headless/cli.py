@@ -17,9 +17,9 @@ from pathlib import Path
 from typing import Any
 
 from headless import was_stopped
+from headless.messages import messages
 from synthroads_addon.core.errors import InputError
 from synthroads_addon.core.generator import generator
-from synthroads_addon.core.progress import Progress, silent
 
 
 def _missing(error: ModuleNotFoundError) -> str:
@@ -65,6 +65,18 @@ COMMANDS = {
     "reconstruct": "turn a cloud into the parameters of its road",
     "list": "list what comes under a name, and the fields that --set takes",
 }
+SHORT_OPTIONS = {
+    "--count": "-n",
+    "--device": "-d",
+    "--fidelity": "-f",
+    "--jobs": "-j",
+    "--output": "-o",
+    "--quiet": "-q",
+    "--seed": "-s",
+    "--verbose": "-v",
+    "--version": "-V",
+}
+"""Letters that stand for options, the same for all commands."""
 _LEARNING = ("train", "evaluate", "predict", "experiment", "reconstruct")
 """Commands whose modules are in `ml`."""
 
@@ -90,6 +102,23 @@ class _Parser(argparse.ArgumentParser):
         self.exit(2, f"{self.prog}: {message}\n")
 
 
+class _PrintCompletion(argparse.Action):
+    """Prints the script that completes the command line in a shell, and ends the process."""
+
+    def __call__(
+        self, parser: argparse.ArgumentParser, namespace: argparse.Namespace, values: Any, option: str | None = None
+    ) -> None:
+        try:
+            from headless.completion import completion_script
+
+            print(completion_script(parser, values))
+        except ModuleNotFoundError as error:
+            if error.name != "shtab":
+                raise
+            parser.error(f"argument {option}: needs the package shtab: pip install shtab")
+        parser.exit()
+
+
 def main(argv: Sequence[str] | None = None) -> int:
     """Run one sub-command; return its exit code."""
     arguments = build_parser().parse_args(argv)
@@ -100,11 +129,25 @@ def build_parser() -> argparse.ArgumentParser:
     """Return the parser of `synthroads` with all of `COMMANDS`; the documentation's reference is made from it."""
     parser = _Parser(prog="synthroads", description="Synthetic motorways, scanned and labelled.")
     parser.add_argument("--version", action="version", version=generator())
+    text = "print what makes a shell complete commands, options, names and files"
+    parser.add_argument("--print-completion", action=_PrintCompletion, choices=("bash", "fish", "zsh"), help=text)
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
     for name, summary in COMMANDS.items():
         module = _module(name)
         module.add_arguments(commands.add_parser(name, help=summary, description=module.__doc__))
+    add_short_options(parser)
     return parser
+
+
+def add_short_options(parser: argparse.ArgumentParser) -> None:
+    """Let `SHORT_OPTIONS` stand for a parser's long options, and for those of its sub-commands."""
+    for action in parser._actions:
+        if isinstance(action, argparse._SubParsersAction):
+            for its_parser in action.choices.values():
+                add_short_options(its_parser)
+        letters = [SHORT_OPTIONS[name] for name in action.option_strings if name in SHORT_OPTIONS]
+        action.option_strings = [*letters, *action.option_strings]
+        parser._option_string_actions.update(dict.fromkeys(letters, action))
 
 
 def _module(name: str) -> Any:
@@ -116,6 +159,7 @@ def command(name: str, argv: Sequence[str] | None = None) -> int:
     module = _module(name)
     parser = _Parser(prog=f"synthroads {name}", description=module.__doc__)
     module.add_arguments(parser)
+    add_short_options(parser)
     return run(module.run, parser.parse_args(argv))
 
 
@@ -224,18 +268,27 @@ def _listed(text: str) -> list[str]:
 
 def add_common_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the flags that every sub-command understands."""
-    parser.add_argument("--quiet", action="store_true", help="print nothing but errors")
+    amount = parser.add_mutually_exclusive_group()
+    text = "no progress and no notes: print errors only, and the result where it is written to no file"
+    amount.add_argument("--quiet", action="store_true", help=text)
+    amount.add_argument("--verbose", action="store_true", help="print settings, versions and times of stages as well")
     parser.add_argument("--json", action="store_true", help="print the result as JSON on standard output")
+
+
+def _writes_files(arguments: argparse.Namespace) -> bool:
+    """Return whether a command's result is in files, so that what it prints are notes on them."""
+    named = ("output", "save", "plot", "document")
+    return any(getattr(arguments, name, None) for name in named) and not getattr(arguments, "verify", False)
 
 
 def run(action: Callable[[argparse.Namespace], Outcome], arguments: argparse.Namespace) -> int:
     """Run an action and print of its outcome what was asked for; turn errors into one line and an exit code."""
     try:
-        with _without_blenders_chatter():
+        with _without_blenders_chatter(), messages(arguments):
             code, result, text = action(arguments)
         if arguments.json:
             print(canonical_json(result), end="")
-        elif not arguments.quiet:
+        elif not arguments.quiet or not _writes_files(arguments):
             for line in [text] if isinstance(text, str) else text:
                 print(line)
         sys.stdout.flush()
@@ -300,23 +353,6 @@ def leave(action: Callable[[], int]) -> None:
     sys.stdout.flush()
     sys.stderr.flush()
     os._exit(code)
-
-
-def progress_bar(arguments: argparse.Namespace) -> Progress:
-    """Return the progress that suits the flags: a bar on standard error, or nothing."""
-    if arguments.quiet or arguments.json or not sys.stderr.isatty():
-        return silent
-    from tqdm import tqdm
-
-    bar = tqdm(total=100, bar_format="{desc:<12} {bar:40} {n:3.0f} %  {elapsed}", file=sys.stderr, leave=False)
-
-    def show(stage: str, share: float) -> None:
-        if bar.desc != f"{stage}: ":
-            bar.reset()
-            bar.set_description(stage)
-        bar.update(100 * share - bar.n)
-
-    return show
 
 
 @contextmanager

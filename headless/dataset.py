@@ -9,7 +9,8 @@ from pathlib import Path
 if __name__ == "__main__":
     sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from headless.cli import Outcome, add_common_arguments, entry, progress_bar
+from headless.cli import Outcome, add_common_arguments, entry
+from headless.messages import detail, progress_bar
 from synthroads_addon.core.dataset.manifest import Manifest, faults, read_manifest
 from synthroads_addon.core.dataset.recipe import Recipe, load_recipe, recipe_names
 from synthroads_addon.core.errors import InputError
@@ -25,6 +26,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     where.add_argument("--jobs", type=int, metavar="N", help="scenes made at once on this machine (1)")
     where.add_argument("--scheduler", metavar="ADDRESS", help="Dask scheduler whose workers make them (none), tcp://HOST:PORT")
     parser.add_argument("--resume", action="store_true", help="continue what was begun in this folder")
+    parser.add_argument("--overwrite", action="store_true", help="replace the data set that is there")
     parser.add_argument(
         "--splits", nargs="+", metavar="SPLIT", help="make scenes of these splits only (all); --resume makes the others"
     )
@@ -38,15 +40,20 @@ _SET = "change one field of every scenario after the recipe's own, e.g. fidelity
 
 def run(arguments: argparse.Namespace) -> Outcome:
     """Run `synthroads dataset`."""
+    for name, kept in (("--resume", arguments.resume), ("--verify", arguments.verify)):
+        if kept and arguments.overwrite:
+            raise InputError("--overwrite", None, f"can't be given with {name}, which keeps what is there")
     if arguments.verify:
         return _verify(arguments.output)
     if arguments.jobs is not None and not 1 <= arguments.jobs <= 1024:
         raise InputError("--jobs", arguments.jobs, "must be 1 to 1024")
     recipe = _changed(load_recipe(arguments.recipe), arguments.changes)
+    detail("recipe", recipe.to_dict())
     from headless.dataset_run import DatasetRun, dask_workers, local_processes
 
     splits = frozenset(arguments.splits) if arguments.splits else None
-    work = DatasetRun(recipe, arguments.output.absolute(), arguments.resume, progress_bar(arguments), splits)
+    folder, progress = arguments.output.absolute(), progress_bar(arguments)
+    work = DatasetRun(recipe, folder, arguments.resume, progress, splits, arguments.overwrite)
     submit = dask_workers(arguments.scheduler) if arguments.scheduler else local_processes(arguments.jobs or 1)
     manifest = work.run(submit)
     failed = [scene for scene in manifest.scenes if scene.status == "failed"]
@@ -79,9 +86,7 @@ def summary(manifest: Manifest, folder: Path) -> str:
     """Return what was made, for people."""
     done = [scene for scene in manifest.scenes if scene.status == "done"]
     points = sum(scene.points or 0 for scene in done)
-    lines = [f"{len(done)} of {len(manifest.scenes)} scenes, {points:,} points"]
-    lines += [f"failed: {scene.name}: {scene.error}" for scene in manifest.scenes if scene.status == "failed"]
-    return "\n".join([*lines, f"written to {folder}"])
+    return f"{len(done)} of {len(manifest.scenes)} scenes, {points:,} points\nwritten to {folder}"
 
 
 if __name__ == "__main__":

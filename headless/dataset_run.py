@@ -13,7 +13,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Set
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -21,11 +21,13 @@ from pathlib import Path
 from threading import Event
 from typing import Any
 
-from headless.dataset_scene import DONE, FAILED, FILES, PUBLISHED
+from headless.dataset_scene import DONE, FAILED, FILES
+from headless.messages import logger
 from synthroads_addon.core.dataset.data_card import data_card
 from synthroads_addon.core.dataset.layouts import layout_descriptions
 from synthroads_addon.core.dataset.manifest import (
     MANIFEST,
+    PUBLISHED,
     Manifest,
     SceneEntry,
     check_same_recipe,
@@ -35,6 +37,7 @@ from synthroads_addon.core.dataset.manifest import (
     write_atomically,
 )
 from synthroads_addon.core.dataset.recipe import Recipe, SceneJob, scene_jobs
+from synthroads_addon.core.dataset.replacing import begin_removal, finish_removal, made_by, remove
 from synthroads_addon.core.errors import InputError, OutputError
 from synthroads_addon.core.generator import generator
 from synthroads_addon.core.machine import available_cores
@@ -120,6 +123,7 @@ class DatasetRun:
         resume: continue what was begun there.
         progress: told how many scenes are done.
         splits: whose scenes are made; None: those of all.
+        overwrite: replace the data set that is there.
 
     Attributes:
         jobs: all scenes.
@@ -131,6 +135,7 @@ class DatasetRun:
     resume: bool = False
     progress: Progress = silent
     splits: frozenset[str] | None = None
+    overwrite: bool = False
     jobs: list[SceneJob] = field(init=False)
     entries: dict[str, SceneEntry] = field(init=False, default_factory=dict)
 
@@ -167,9 +172,11 @@ class DatasetRun:
         self._write_manifest()
         wanted = [job for job in self.jobs if self.splits is None or job.split in self.splits]
         missing = [job for job in wanted if not self._is_done(job)]
+        done = len(wanted) - len(missing)
+        self.progress("scenes", done / len(wanted))
         for number, outcome in enumerate(submit([self._write_task(job) for job in missing]), start=1):
             self._take(outcome)
-            self.progress("scenes", (len(wanted) - len(missing) + number) / len(wanted))
+            self.progress("scenes", (done + number) / len(wanted))
 
     @contextmanager
     def _locked(self) -> Iterator[None]:
@@ -185,28 +192,54 @@ class DatasetRun:
             yield
 
     def _open(self) -> None:
-        """Take over what is done, and remove what a run before left unfinished."""
+        """Take over what is done or remove it, as is wanted, and remove what a run before left unfinished."""
         if (self.folder / MANIFEST).exists():
-            if not self.resume:
-                raise OutputError("--output", str(self.folder), "already holds a data set; --resume continues it")
-            manifest = check_same_recipe(self.folder, self._recipe_text, self._generator)
-            done = [scene for scene in manifest.scenes if scene.status == "done"]
-            self.entries = {scene.name: scene for scene in done if not faults(self.folder, [scene], checksums=False)}
+            self._open_again()
         elif any(path.name != LOCK for path in self.folder.iterdir()):
             raise OutputError("--output", str(self.folder), "holds other files; choose an empty folder")
         shutil.rmtree(self.folder / WORK, ignore_errors=True)
-        self._remove_unknown()
+        for path in self._unknown():
+            remove(path)
         (self.folder / WORK).mkdir()
         (self.folder / "logs").mkdir(exist_ok=True)
         write_atomically(self.folder / "recipe.json", self._recipe_text)
 
-    def _remove_unknown(self) -> None:
-        """Remove folders that were published without having come into the manifest."""
-        known = {name for entry in self.entries.values() for name in entry.folders or ()}
-        for pattern in PUBLISHED:
-            for path in self.folder.glob(pattern):
-                if path.is_dir() and path.relative_to(self.folder).as_posix() not in known:
-                    shutil.rmtree(path)
+    def _open_again(self) -> None:
+        """Take over the scenes of the set that is there, or have a new one take its place."""
+        if self.overwrite:
+            finish_removal(self.folder)
+            paths = [*made_by(self.folder, read_manifest(self.folder)), *self._published()]
+            for path in self._unknown(set(paths)):
+                name = path.relative_to(self.folder).as_posix()
+                raise OutputError("--output", str(self.folder), f"holds {name}, which is no scene's; move it away")
+            begin_removal(self.folder, paths)
+            self._write_manifest()
+        elif self.resume:
+            manifest = check_same_recipe(self.folder, self._recipe_text, self._generator)
+            done = [scene for scene in manifest.scenes if scene.status == "done"]
+            self.entries = {scene.name: scene for scene in done if not faults(self.folder, [scene], checksums=False)}
+        else:
+            allowed = "already holds a data set; --resume continues it, --overwrite replaces it"
+            raise OutputError("--output", str(self.folder), allowed)
+        finish_removal(self.folder)
+
+    def _published(self) -> list[str]:
+        """Return the folders of scenes that a run before published, or was about to, when it was killed."""
+        tasks = [json.loads(path.read_text(encoding="utf-8")) for path in (self.folder / WORK).glob(f"*/{DONE}")]
+        return [name for task in tasks for name in task["folders"]]
+
+    def _unknown(self, known: Set[str] = frozenset()) -> list[Path]:
+        """Return the folders where scenes of the recipe go that are neither in the manifest nor among the known."""
+        there = {name for entry in self.entries.values() for name in entry.folders or ()} | known
+        paths = [path for pattern in PUBLISHED for path in sorted(self.folder.glob(pattern)) if self._is_scenes(path)]
+        return [path for path in paths if path.relative_to(self.folder).as_posix() not in there]
+
+    def _is_scenes(self, path: Path) -> bool:
+        """Return whether a folder's name is one that a scene of the recipe has in its place."""
+        top = path.relative_to(self.folder).parts[0]
+        if top == "semantickitti":
+            return path.name in {f"{job.number:02d}" for job in self.jobs}
+        return (path.name if top == "scenes" else path.name.rpartition("-")[0]) in {job.name for job in self.jobs}
 
     def _is_done(self, job: SceneJob) -> bool:
         return job.name in self.entries
@@ -237,12 +270,14 @@ class DatasetRun:
                 (outcome.folder / FILES / name).rename(target)
             entry = SceneEntry.from_dict({**about, "status": "done", **done}, "scene")
             (outcome.folder / "report.json").replace(self.folder / "logs" / f"{job.name}.json")
+            logger.debug("%s is done: %s points", job.name, f"{entry.points:,}")
         else:
             entry = SceneEntry.from_dict({**about, "status": "failed", "error": outcome.error}, "scene")
             (outcome.folder / "log.txt").replace(self.folder / "logs" / f"{job.name}.txt")
+            logger.error("failed: %s: %s", job.name, outcome.error)
         self.entries[job.name] = entry
-        shutil.rmtree(outcome.folder, ignore_errors=True)
         self._write_manifest()
+        shutil.rmtree(outcome.folder, ignore_errors=True)  # until now `_published` knows what is where
 
     def _write_manifest(self) -> None:
         entries = [self.entries[job.name] for job in self.jobs if job.name in self.entries]
@@ -298,6 +333,8 @@ def local_processes(jobs: int) -> Submit:
 def dask_workers(address: str) -> Submit:
     """Return what has the workers of a Dask cluster do it; they must see the same folder under the same name.
 
+    The scheduler is called at once, before anything in the folder is touched.
+
     Raises:
         InputError: nobody answers at the address, the packages are missing, or the scheduler is lost meanwhile.
     """
@@ -305,12 +342,12 @@ def dask_workers(address: str) -> Submit:
         import distributed
     except ImportError:
         raise InputError("--scheduler", address, "needs Dask: pip install 'synthroads[cluster]'") from None
+    try:
+        client = distributed.Client(address, timeout="10s", set_as_default=False)
+    except (OSError, ValueError, TimeoutError) as error:
+        raise InputError("--scheduler", address, f"nobody answers there ({error})") from None
 
     def submit(folders: list[str]) -> Iterator[Outcome]:
-        try:
-            client = distributed.Client(address, timeout="10s", set_as_default=False)
-        except (OSError, ValueError, TimeoutError) as error:
-            raise InputError("--scheduler", address, f"nobody answers there ({error})") from None
         with client:
             futures = client.map(run_on_worker, folders, key=folders, retries=ATTEMPTS, pure=False)
             yield from _results(client, futures, address)

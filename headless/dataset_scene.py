@@ -21,7 +21,7 @@ if __name__ == "__main__":
 from headless.cli import leave
 from synthroads_addon.core.cloud.reading import open_cloud
 from synthroads_addon.core.dataset.layouts import write_layouts
-from synthroads_addon.core.dataset.manifest import file_entries, write_atomically
+from synthroads_addon.core.dataset.manifest import PUBLISHED, file_entries, write_atomically
 from synthroads_addon.core.dataset.recipe import Recipe, SceneJob
 from synthroads_addon.core.errors import InputError
 from synthroads_addon.core.parameters.model import read_parameters
@@ -30,8 +30,6 @@ from synthroads_addon.core.schema import canonical_json, read_json
 
 FILES = "files"
 """Subfolder of a task's folder that is laid out as the data set."""
-PUBLISHED = ("scenes/*", "pointcept/*/*/*", "semantickitti/*/sequences/*")
-"""Folders of a scene that are published whole: its own, its tiles and its sequence."""
 DONE = "done.json"
 FAILED = "failed.json"
 

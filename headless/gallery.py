@@ -10,6 +10,7 @@ if __name__ == "__main__":
     sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from headless.cli import Outcome, add_common_arguments, entry
+from headless.messages import logger
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -25,12 +26,8 @@ def run(arguments: argparse.Namespace) -> Outcome:
     """Run `synthroads gallery`."""
     from synthroads_addon.blender.gallery import Quality, make_gallery
 
-    def say(path: str) -> None:
-        if not (arguments.quiet or arguments.json):
-            print(path, flush=True)
-
     quality = Quality((arguments.width, arguments.width * 9 // 16), arguments.samples)
-    made = make_gallery(arguments.output, quality, arguments.only, say)
+    made = make_gallery(arguments.output, quality, arguments.only, logger.info)
     return 0, {"pictures": [str(path) for path in made]}, f"{len(made)} pictures in {arguments.output}"
 
 

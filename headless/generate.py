@@ -22,8 +22,8 @@ from headless.cli import (
     choice_changes,
     choice_summary,
     entry,
-    progress_bar,
 )
+from headless.messages import detail, progress_bar
 from synthroads_addon.core.scenario import load_scenario, scenario_names
 
 _FIELDS = {"device": "scan.device", "seed": "seed", "fidelity": "fidelity", "twin": "twin"}
@@ -53,6 +53,7 @@ def run(arguments: argparse.Namespace) -> Outcome:
     """Run `synthroads generate`."""
     begun = time.perf_counter()
     scenario = load_scenario(arguments.scenario, [*choice_changes(arguments), *all_changes(arguments, _FIELDS)])
+    detail("scenario", scenario.to_dict())
     from synthroads_addon.pipeline import Job, generate
 
     job = Job(

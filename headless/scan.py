@@ -22,8 +22,8 @@ from headless.cli import (
     all_changes,
     choice_changes,
     entry,
-    progress_bar,
 )
+from headless.messages import detail, progress_bar
 from synthroads_addon.core.errors import InputError
 from synthroads_addon.core.scenario import Scenario, apply_change, load_scenario, scenario_names
 
@@ -79,6 +79,7 @@ def run(arguments: argparse.Namespace) -> Outcome:
     """Run `synthroads scan`."""
     begun = time.perf_counter()
     scenario = scenario_of(arguments)
+    detail("scenario", scenario.to_dict())
     from synthroads_addon.scene_scan import SceneScan, scan_scene
 
     job = SceneScan(

@@ -9,7 +9,8 @@ from pathlib import Path
 if __name__ == "__main__":
     sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from headless.cli import Outcome, add_common_arguments, entry, progress_bar
+from headless.cli import Outcome, add_common_arguments, entry
+from headless.messages import detail, progress_bar
 from ml.configuration import load_configuration, shipped_names
 
 
@@ -31,6 +32,7 @@ def run(arguments: argparse.Namespace) -> Outcome:
     from ml.tasks import kinds, task
 
     configuration = load_configuration(arguments.configuration, kinds(), arguments.changes)
+    detail("configuration", configuration.to_dict())
     begun = Run.start(arguments.output, configuration, resume=arguments.resume, overwrite=arguments.overwrite)
     metrics = task(configuration.task).train(begun, progress_bar(arguments))
     return 0, metrics, f"trained {arguments.output}: {summary(metrics)}"

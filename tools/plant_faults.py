@@ -168,7 +168,7 @@ def main() -> int:
     running.add_argument("faults", type=Path, help="file that they were written to")
     running.add_argument("--coverage", type=Path, nargs="+", required=True, help="records with the tests as contexts")
     running.add_argument("--markers", default="not slow", help="which tests, as pytest's -m takes it ('not slow')")
-    running.add_argument("--deselect", nargs="+", default=[], metavar="TEST", help="tests that fail without a fault too")
+    running.add_argument("--deselect", nargs="+", default=[], metavar="TEST", help="that fail without a fault too")
     running.add_argument("--numbers", type=int, nargs="+", help="plant these alone, counted from 0")
     running.add_argument("--output", type=Path, required=True, help="what was found (JSON lines)")
     arguments = parser.parse_args()
@@ -182,7 +182,8 @@ def main() -> int:
         for number in arguments.numbers or range(len(faults)):
             result = {"number": number, **judge(faults[number], arguments.coverage, options)}
             print(json.dumps(result), file=output, flush=True)
-            print(number, faults[number].file, faults[number].line, "found" if result["found"] else "NOT FOUND", flush=True)
+            outcome = "found" if result["found"] else "NOT FOUND"
+            print(number, faults[number].file, faults[number].line, outcome, flush=True)
     return 0
 
 

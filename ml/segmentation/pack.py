@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from headless.cli import add_short_options
 from synthroads_addon.core.cloud.grid import GridSubsampler
 from synthroads_addon.core.cloud.labels import ClassScheme, class_scheme
 from synthroads_addon.core.cloud.points import PointBlock, concatenate
@@ -183,6 +184,7 @@ def parser() -> argparse.ArgumentParser:
     )
     made.add_argument("--seed", type=int, default=1, metavar="N", help="seed of the choice of tiles (default: 1)")
     made.add_argument("--overwrite", action="store_true", help="replace a file that is there")
+    add_short_options(made)
     return made
 
 

@@ -23,6 +23,7 @@ from synthroads_addon.core.cloud.reading import BLOCK, CloudReader, open_cloud
 from synthroads_addon.core.cloud.writing import ENDINGS
 from synthroads_addon.core.dataset.tiles import TileSorter
 from synthroads_addon.core.errors import InputError, MissingFileError
+from synthroads_addon.core.files import files_below
 from synthroads_addon.core.schema import quantity, read_json
 
 from .classes import LabelMapping, class_names, load_mapping, table_between
@@ -111,7 +112,7 @@ def _folder_tiles(path: Path, scheme: ClassScheme, source: Source) -> Iterator[T
         yield from pointcept_tiles(root, scheme, source.split)
         return
     folder = path / source.split if source.split else path
-    clouds = sorted(file for file in folder.rglob("*") if file.suffix.lower() in ENDINGS and file.is_file())
+    clouds = sorted(file for file in files_below(folder) if file.suffix.lower() in ENDINGS and file.is_file())
     if not clouds:
         raise MissingFileError(str(folder), None, "holds neither tiles of a data set nor clouds")
     for cloud in clouds:

@@ -53,6 +53,25 @@ def stamp(path: str, wanted: str) -> tuple[int, int]:
     return found.st_mtime_ns, found.st_size
 
 
+def files_below(folder: Path) -> Iterator[Path]:
+    """Yield every file below a folder, also by way of links to folders; each folder is entered once, links last.
+
+    A link to a folder that is entered already, such as one above it, leads nowhere new and is left out.
+    """
+    entered: set[str] = set()
+    waiting = [folder]
+    while waiting:
+        for here, folders, files in os.walk(waiting.pop(0)):
+            real = os.path.realpath(here)
+            if real in entered:
+                folders.clear()
+                continue
+            entered.add(real)
+            folders.sort()
+            waiting += [path for path in (Path(here, name) for name in folders) if path.is_symlink()]
+            yield from (Path(here, name) for name in sorted(files))
+
+
 @contextmanager
 def output_folder(target: Path, names: Iterable[str], overwrite: bool) -> Iterator[Path]:
     """Yield a temporary folder inside ``target``; at the end its files are moved into ``target``.

@@ -51,7 +51,7 @@ def command(name: str, inputs: Path, output: Path) -> list[str]:
         "scan": [str(inputs / "yard.obj"), "--up", "z", *scan],
         "twin": [str(inputs / "road.json")],
     }[name]
-    return [sys.executable, "-m", f"headless.{name}", *arguments, "--output", str(output)]
+    return [sys.executable, "-m", f"headless.{name}", *arguments, "--quiet", "--output", str(output)]
 
 
 NAMES = ("generate", "scan", "twin")
@@ -138,7 +138,7 @@ def test_a_data_set_on_a_full_disk_tells_so_and_is_continued(tmp_path: Path) -> 
     recipe = tmp_path / "recipe.yaml"
     changes = {name: str(value).strip('"') if isinstance(value, str) else value for name, value in SMALL.items()}
     recipe.write_text(json.dumps({"title": "t", "set": changes, "groups": [{"name": "a", "scenes": 2}]}))
-    arguments = [sys.executable, "-m", "headless.dataset", str(recipe), "--output"]
+    arguments = [sys.executable, "-m", "headless.dataset", str(recipe), "--quiet", "--output"]
     with small_disk(tmp_path / "disk", 12) as disk:
         refused(ran([*arguments, str(disk / "set")]))
     with small_disk(tmp_path / "larger", 60) as disk:

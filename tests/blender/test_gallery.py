@@ -12,9 +12,12 @@ from headless.cli import command
 
 
 @pytest.mark.parametrize("only", ["materials-base_color", "materials-lit", "scene-rural-driver"])
-def test_a_picture_is_made(tmp_path: Path, only: str) -> None:
-    arguments = ["--output", str(tmp_path), "--only", only, "--width", "160", "--samples", "1", "--quiet"]
+def test_a_picture_is_made(tmp_path: Path, only: str, capsys: pytest.CaptureFixture[str]) -> None:
+    arguments = ["--output", str(tmp_path), "--only", only, "--width", "160", "--samples", "1"]
     assert command("gallery", arguments) == 0
+    out, err = capsys.readouterr()
+    assert out == f"1 pictures in {tmp_path}\n"
+    assert f"{tmp_path / only}.png" in err.splitlines(), "told as soon as it is there"
     assert [path.name for path in tmp_path.iterdir()] == [f"{only}.png"]
     picture = np.asarray(Image.open(tmp_path / f"{only}.png").convert("L"), dtype=np.float64)
     assert picture.shape == (90, 160)

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from synthroads_addon.core.errors import OutputError
-from synthroads_addon.core.files import output_folder, write_file
+from synthroads_addon.core.files import files_below, output_folder, write_file
 
 
 def test_files_appear_at_the_end(tmp_path: Path) -> None:
@@ -87,3 +87,17 @@ def test_a_file_whose_writing_is_stopped_leaves_nothing(
         write_file(tmp_path / "a.txt", b"new", overwrite=True)
     assert [path.name for path in tmp_path.iterdir()] == ["a.txt"]
     assert (tmp_path / "a.txt").read_text() == "old"
+
+
+def test_folders_that_are_links_are_entered_once(tmp_path: Path) -> None:
+    """Scenes of a data set may lie on another disk; a link that leads back, or to what was there, adds nothing."""
+    here, there = tmp_path / "set", tmp_path / "disk"
+    for folder in (here / "a", there / "b" / "deep"):
+        folder.mkdir(parents=True)
+        (folder / "cloud.laz").touch()
+    (here / "b").symlink_to(there / "b", target_is_directory=True)
+    (there / "b" / "loop").symlink_to(here, target_is_directory=True)
+    (here / "0-again").symlink_to(here / "a", target_is_directory=True)
+    (here / "gone").symlink_to(there / "no-such", target_is_directory=True)
+    found = [path.relative_to(here).as_posix() for path in files_below(here)]
+    assert found == ["gone", "a/cloud.laz", "b/deep/cloud.laz"]

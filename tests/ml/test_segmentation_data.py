@@ -169,6 +169,30 @@ def test_data_set_and_clouds_give_the_same_points(tmp_path: Path) -> None:
         next(read_tiles(Source(path=str(tmp_path / "nowhere")), class_scheme("5"), None))
 
 
+def test_scenes_that_are_links_are_read_once(tmp_path: Path) -> None:
+    """As where they lie on another disk; a link that leads back adds nothing."""
+    for name in ("set/scenes/a", "disk/b"):
+        (tmp_path / name).mkdir(parents=True)
+        write_cloud(tmp_path / name / "cloud.laz", road_block(3000, 1))
+    (tmp_path / "set" / "scenes" / "b").symlink_to(tmp_path / "disk" / "b", target_is_directory=True)
+    (tmp_path / "disk" / "b" / "loop").symlink_to(tmp_path / "set", target_is_directory=True)
+    tiles = read_tiles(Source(path=str(tmp_path / "set")), class_scheme("5"), None)
+    assert {tile.scene for tile in tiles} == {"scenes/a/cloud", "scenes/b/cloud"}
+
+
+def test_tiles_of_a_data_set_that_are_links_are_read(tmp_path: Path) -> None:
+    root = write_pointcept(tmp_path / "set", "train", [road_tile(3000, 1, "a"), road_tile(3000, 2, "b")])
+    (root / "train" / "b-1").rename(tmp_path / "b-1")
+    (root / "train" / "b-1").symlink_to(tmp_path / "b-1", target_is_directory=True)
+    tiles = read_tiles(Source(path=str(tmp_path / "set"), split="train"), class_scheme("5"), None)
+    assert [tile.scene for tile in tiles] == ["a", "b"]
+
+
+def test_short_options_of_packing_are_those_of_all_commands() -> None:
+    words = pack.parser().parse_args(["set", "-o", "train.npz", "-s", "3"])
+    assert (words.output, words.seed) == (Path("train.npz"), 3)
+
+
 def test_clouds_of_one_name_are_scenes_of_their_own(tmp_path: Path) -> None:
     """The scenes of a data set all hold a ``cloud.laz``; each has its own scanner, perhaps, and its own scaling."""
     for name, gain in (("a", 1.0), ("b", 0.1)):

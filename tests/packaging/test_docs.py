@@ -56,8 +56,8 @@ def parser() -> argparse.ArgumentParser:
 
 
 def parsed(words: list[str]) -> Any:
-    """Parse a command's words after `synthroads`; fail where the parser complains. `--help` has nothing to parse."""
-    if words == ["--help"]:
+    """Parse a command's words after `synthroads`; fail where the parser complains. Some end it before it is done."""
+    if words[0] in ("--help", "--print-completion"):
         return None
     try:
         return parser().parse_args(words)

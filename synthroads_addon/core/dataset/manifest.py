@@ -15,6 +15,8 @@ from ..road_scenario import ScenarioModel
 from ..schema import canonical_json, quantity, read_json
 
 MANIFEST = "manifest.json"
+PUBLISHED = ("scenes/*", "pointcept/*/*/*", "semantickitti/*/sequences/*")
+"""Folders of a scene that are published whole: its own, its tiles and its sequence."""
 _BLOCK = 1 << 20
 
 

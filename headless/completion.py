@@ -1,0 +1,86 @@
+"""What a shell completes after `synthroads`: commands, options, names and files, as a script for the shell.
+
+The scripts are made by `shtab` from the parsers: a shell that has read one asks no program at each press of the key.
+"""
+
+from __future__ import annotations
+
+import argparse
+import shlex
+from collections.abc import Callable, Iterable, Sequence
+from pathlib import Path
+from typing import Any
+
+from ml.configuration import SHIPPED, experiment_names, shipped_names
+from synthroads_addon.core.cloud.labels import scheme_names
+from synthroads_addon.core.dataset.recipe import recipe_names
+from synthroads_addon.core.parameters.limits import STANDARD_CROSS_SECTIONS
+from synthroads_addon.core.scanning.devices import device_names
+from synthroads_addon.core.scenario import scenario_names
+from synthroads_addon.core.tradeoff import KNOBS
+from synthroads_addon.core.twin import TWIN_FORMATS
+
+_NAMES_OR_FILES: dict[str, Callable[[], Iterable[str]]] = {
+    "--classes": scheme_names,
+    "--device": device_names,
+    "--mapping": lambda: (path.stem for path in (SHIPPED / "classes").glob("*.json")),
+    "--scenario": scenario_names,
+    "configuration": shipped_names,
+    "experiment": experiment_names,
+    "recipe": recipe_names,
+}
+"""Names that an option or an argument takes in place of a file."""
+_NAMES: dict[str, Iterable[str]] = {
+    "--cross-section": STANDARD_CROSS_SECTIONS,
+    "--knobs": KNOBS,
+    "--twin": TWIN_FORMATS,
+}
+"""Names that an option takes, beside those that its parser knows as its choices."""
+
+
+def completion_script(parser: argparse.ArgumentParser, shell: str) -> str:
+    """Return the script that completes a parser's command line; the parser is of no other use afterwards.
+
+    Args:
+        parser: with all sub-commands.
+        shell: bash, fish or zsh.
+
+    Raises:
+        ModuleNotFoundError: `shtab` isn't installed.
+    """
+    import shtab
+
+    _describe(parser, shtab.FILE, shtab.DIRECTORY)
+    return str(shtab.complete(parser, shell))
+
+
+def _describe(parser: argparse.ArgumentParser, file: Any, directory: Any) -> None:
+    """Note at each argument what it takes, as `shtab` wants it."""
+    for action in parser._actions:
+        if isinstance(action, argparse._SubParsersAction):
+            for its_parser in action.choices.values():
+                _describe(its_parser, file, directory)
+            continue
+        called: Sequence[str] = action.option_strings or [action.dest]
+        kind = next((name for name in called if name in _NAMES_OR_FILES), None)
+        takes_files = action.type is Path or action.metavar == "FILE"
+        if action.metavar == "DIR":
+            action.complete = directory  # type: ignore[attr-defined] # an attribute of shtab's
+        elif takes_files:
+            action.complete = file  # type: ignore[attr-defined]
+        elif kind is not None:
+            action.complete = _names_or_files(kind, sorted(_NAMES_OR_FILES[kind]()))  # type: ignore[attr-defined]
+        elif called[-1] in _NAMES:
+            action.choices = sorted(_NAMES[called[-1]])
+
+
+def _names_or_files(kind: str, names: Sequence[str]) -> dict[str, Any]:
+    """Return the function, for each shell, that completes names and files."""
+    function = f"_synthroads_{kind.strip('-')}_or_files"
+    words = shlex.join(names)
+    bash = f'{function}() {{\n  compgen -W {shlex.quote(words)} -- "$1"\n  compgen -f -- "$1"\n}}'
+    fish = f"function {function}\n  printf '%s\\n' {words}\n  __fish_complete_path (commandline -ct)\nend"
+    alternatives = f"{shlex.quote(f'names:name:({words})')} 'files:file:_files'"
+    zsh = f"{function}() {{\n  _alternative {alternatives}\n}}"
+    preamble = {"bash": bash, "fish": fish, "zsh": zsh}
+    return {"bash": function, "fish": f"({function})", "zsh": function, "preamble": preamble}
