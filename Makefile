@@ -10,7 +10,7 @@ PYENV_ROOT ?= $(HOME)/.pyenv
 UV_ROOT = $(HOME)/.local/share/uv/python
 PYTHONS = $(or $(PYTHON),$(foreach version,3.11 3.13,python$(version) $(wildcard \
 	$(PYENV_ROOT)/versions/$(version).*/bin/python3 $(UV_ROOT)/cpython-$(version).*/bin/python3)) python3)
-RUNNER = .nox/runner$(addprefix -,$(notdir $(PYTHON)))
+RUNNER = .nox/runner$(addprefix -,$(subst /,-,$(PYTHON)))
 NOX = $(RUNNER)/bin/python -m nox
 
 .DEFAULT_GOAL := help
@@ -50,7 +50,7 @@ $(RUNNER)/made: Makefile
 	echo "Debian 12 and 13: apt install python3 python3-venv" >&2; exit 1
 
 clean: ## remove what was built, the demo's output and the caches
-	rm -rf build dist docs/reference/api $(OUT)/demo .pytest_cache .mypy_cache .ruff_cache .hypothesis *.egg-info
+	rm -rf build dist docs/reference/api $(OUT)/demo .pytest_cache .mypy_cache .ruff_cache .hypothesis *.egg-info __pycache__
 	find synthroads_addon headless ml tests tools -name __pycache__ -type d -prune -exec rm -rf {} +
 
 distclean: clean ## and the environments too

@@ -103,7 +103,7 @@ def lint(session: nox.Session) -> None:
     session.run(python_of(session, f"tests-{HERE}"), "tools/lint.py")  # with its PyTorch: one is large enough
 
 
-def test_runs(version: str, markers: str, arguments: list[str]) -> list[list[str]]:
+def pytest_runs(version: str, markers: str, arguments: list[str]) -> list[list[str]]:
     """Return what pytest is called with, once for each part; arguments that name tests are left as they are."""
     if any(argument.startswith("tests") for argument in arguments):
         return [arguments]
@@ -114,24 +114,24 @@ def test_runs(version: str, markers: str, arguments: list[str]) -> list[list[str
 @nox.session(python=[HERE] if os.environ.get("PYTHON") else list(BLENDER))
 def tests(session: nox.Session) -> None:
     """Run the tests; arguments are pytest's."""
-    start = time.perf_counter()
+    version = str(session.python)
+    outcomes[version] = "FAILED, the environment could not be made"
+    install(session, session.name)
     markers = os.environ.get("TEST_MARKERS") or "not slow"
     # Without a limit on restarts a worker that crashes can leave the others waiting for ever.
     workers = ["-n", os.environ.get("TEST_WORKERS") or "2", "--dist", "loadfile", "--max-worker-restart", "0"]
     # The processes share the cores already; spinning threads of linear algebra would only slow each other down.
     threads = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
     codes = [0] if markers == "not slow" and not session.posargs else [0, 5]  # 5: a part has no such tests
-    outcomes[str(session.python)] = "FAILED, the environment could not be made"
-    install(session, session.name)
-    failures = []
-    for arguments in test_runs(str(session.python), markers, session.posargs):
+    start, failures = time.perf_counter(), []
+    for arguments in pytest_runs(version, markers, session.posargs):
         command = ["python", "-m", "pytest", "-q", *workers, *arguments]
         try:
             session.run(*command, env=threads, success_codes=codes, interrupt_timeout=10)
         except CommandFailed as failure:  # the other part is run all the same
             failures.append(failure)
     outcome = "FAILED" if failures else "passed"
-    outcomes[str(session.python)] = f"{outcome}, {time.perf_counter() - start:.0f} s"
+    outcomes[version] = f"{outcome}, {time.perf_counter() - start:.0f} s"
     if failures:
         raise failures[0]
 
