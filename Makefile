@@ -44,7 +44,7 @@ $(RUNNER)/made: Makefile
 	sys.exit(sys.version_info[:2] not in ((3, 11), (3, 13)) or sysconfig.get_config_var("Py_GIL_DISABLED"))' \
 	2>/dev/null; then \
 	  $$python -m venv --clear $(RUNNER) && \
-	  $(RUNNER)/bin/python -m pip install -q --disable-pip-version-check "nox>=2026.4,<2027" && touch $@; exit; \
+	  $(RUNNER)/bin/python -m pip install -q --disable-pip-version-check "nox>=2026.10,<2027" && touch $@; exit; \
 	fi; done; \
 	echo "None of these is a Python 3.11 or 3.13 that can make environments: $(PYTHONS)" >&2; \
 	echo "Debian 12 and 13: apt install python3 python3-venv" >&2; exit 1

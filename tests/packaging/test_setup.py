@@ -128,6 +128,13 @@ def test_blender_and_the_other_tests_have_processes_of_their_own(monkeypatch: py
     assert noxfile.pytest_runs("3.11", "not slow", named) == [named]
 
 
+def test_a_part_without_tests_is_a_failure_unless_some_tests_were_chosen() -> None:
+    assert noxfile.passed([0, 0], everything=True)
+    assert noxfile.passed([5, 0], everything=False)
+    for codes, everything in [([5, 0], True), ([5, 5], False), ([1, 0], False), ([0, -6], True)]:
+        assert not noxfile.passed(codes, everything=everything)
+
+
 def test_testing_nothing_is_a_failure() -> None:
     command = [sys.executable, "-m", "nox", "-s", "summary"]
     answer = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
