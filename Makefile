@@ -1,15 +1,17 @@
-# Every target does its own set-up: it needs make and a Python 3.11 or 3.13, nothing else.
-# PYTHON=COMMAND chooses the interpreter.
+# The two commands and the others: sets nox up, which needs a Python 3.11 or 3.13, and calls the sessions of noxfile.py.
 
+# PYTHON=COMMAND chooses the interpreter.
 PYTHON ?=
 OUT ?= out
 PLATFORM ?=
-# Extras of the two test environments: `ml` in the first only, as on Linux PyPI's torch comes with gigabytes of CUDA.
-EXTRAS_3_11 ?= blender,dev,ml
-EXTRAS_3_13 ?= blender,dev
-
 export PYTHON
-ENVIRONMENT = sh tools/any_env.sh
+
+PYENV_ROOT ?= $(HOME)/.pyenv
+UV_ROOT = $(HOME)/.local/share/uv/python
+PYTHONS = $(or $(PYTHON),$(foreach version,3.11 3.13,python$(version) $(wildcard \
+	$(PYENV_ROOT)/versions/$(version).*/bin/python3 $(UV_ROOT)/cpython-$(version).*/bin/python3)) python3)
+RUNNER = .nox/runner$(addprefix -,$(subst /,-,$(PYTHON)))
+NOX = $(RUNNER)/bin/python -m nox
 
 .DEFAULT_GOAL := help
 .NOTPARALLEL:
@@ -19,33 +21,37 @@ help: ## say what there is
 	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/  make \1|\2/p' $(MAKEFILE_LIST) | awk -F'|' '{ printf "%-18s %s\n", $$1, $$2 }'
 	@echo "  PYTHON=COMMAND chooses the interpreter; the default is the first that fits."
 
-demo: ## make 600 m of motorway and scan it: out/demo
-	@python=$$($(ENVIRONMENT) blender) && \
-	"$$python" -m headless.generate --scenario rq31-600m --output $(OUT)/demo --overwrite
+demo: $(RUNNER)/made ## make 600 m of motorway and scan it: out/demo
+	@$(NOX) -s demo -- --output $(OUT)/demo
 
-test: ## check the source and run the tests on both Blender LTS releases
-	@sh tools/run_tests.sh "$(EXTRAS_3_11)" "$(EXTRAS_3_13)" "not slow"
+test: $(RUNNER)/made ## check the source and run the tests on both Blender LTS releases
+	@$(NOX)
 
-test-slow: ## the tests that take long, and the documentation's own
-	@sh tools/run_tests.sh "$(EXTRAS_3_11)" "$(EXTRAS_3_13)" "slow"
-	@$(MAKE) --no-print-directory docs
+test-slow: $(RUNNER)/made ## the tests that take long, and the documentation's own
+	@TEST_MARKERS=slow $(NOX) -s tests docs summary
 
+lint docs: $(RUNNER)/made
+	@$(NOX) -s $@
 lint: ## check the source: ruff and mypy
-	@python=$$($(ENVIRONMENT) dev,ml) && "$$python" tools/lint.py
-
-# Whatever the generator complains of is a failure: a link that leads nowhere, a page that is missing or in no menu.
 docs: ## build the documentation: build/site/index.html
-	@python=$$($(ENVIRONMENT) docs) && \
-	"$$python" -m sphinx --jobs auto --fresh-env --fail-on-warning --quiet --doctree-dir build/doctrees docs build/site && \
-	echo "built build/site/index.html"
 
-extension: ## build the Blender extensions: dist/*.zip (PLATFORM=windows-x64, macos-arm64 or all)
-	@python=$$($(ENVIRONMENT) blender) && \
-	"$$python" tools/build_extension.py $(if $(PLATFORM),--platform $(PLATFORM))
+extension: $(RUNNER)/made ## build the Blender extensions: dist/*.zip (PLATFORM=windows-x64, macos-arm64 or all)
+	@$(NOX) -s extension -- $(if $(PLATFORM),--platform $(PLATFORM))
+
+# bpy has no wheels for free-threaded Pythons.
+$(RUNNER)/made: Makefile
+	@for python in $(PYTHONS); do if $$python -c 'import ensurepip, sys, sysconfig, venv; \
+	sys.exit(sys.version_info[:2] not in ((3, 11), (3, 13)) or sysconfig.get_config_var("Py_GIL_DISABLED"))' \
+	2>/dev/null; then \
+	  $$python -m venv --clear $(RUNNER) && \
+	  $(RUNNER)/bin/python -m pip install -q --disable-pip-version-check "nox>=2026.10,<2027" && touch $@; exit; \
+	fi; done; \
+	echo "None of these is a Python 3.11 or 3.13 that can make environments: $(PYTHONS)" >&2; \
+	echo "Debian 12 and 13: apt install python3 python3-venv" >&2; exit 1
 
 clean: ## remove what was built, the demo's output and the caches
-	rm -rf build dist docs/reference/api $(OUT)/demo .pytest_cache .mypy_cache .ruff_cache .hypothesis *.egg-info
+	rm -rf build dist docs/reference/api $(OUT)/demo .pytest_cache .mypy_cache .ruff_cache .hypothesis *.egg-info __pycache__
 	find synthroads_addon headless ml tests tools -name __pycache__ -type d -prune -exec rm -rf {} +
 
 distclean: clean ## and the environments too
-	rm -rf .venv-3.11 .venv-3.13
+	rm -rf .venv .nox

@@ -7,6 +7,7 @@ import os
 import shutil
 import sys
 import tempfile
+from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -36,6 +37,14 @@ def pytest_report_header() -> str:
     spec = importlib.util.find_spec("bpy")
     folders = Path(spec.origin).parent.glob("[0-9].[0-9]*") if spec and spec.origin else []
     return f"bpy {', '.join(folder.name for folder in folders)}{learning}"
+
+
+def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
+    """Say how many tests were skipped for each reason."""
+    reports = terminalreporter.getreports("skipped")
+    reasons = Counter(str(report.longrepr[-1]).removeprefix("Skipped: ") for report in reports)
+    for reason, count in reasons.most_common():
+        terminalreporter.write_line(f"skipped {count} times: {reason}")
 
 
 def _needs_blender(request: pytest.FixtureRequest) -> bool:

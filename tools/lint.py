@@ -42,8 +42,11 @@ def main() -> int:
     checks = {
         "ruff": [sys.executable, "-m", "ruff", "check", "."],
         "ruff, reproducibility": [*reproducibility_command(), *paths],
-        "mypy": [sys.executable, "-m", "mypy"],
     }
+    if sys.version_info[:2] == (3, 11):
+        checks["mypy"] = [sys.executable, "-m", "mypy"]
+    else:  # the annotations are those of Blender 4.5's NumPy
+        print("-- mypy is left out: types are checked with the libraries that Python 3.11 has")
     failed = []
     for name, command in checks.items():
         print(f"-- {name}", flush=True)

@@ -1,125 +1,166 @@
-"""The set-up that `make` does: finding a Python, saying what is missing, failing where nothing was tested."""
+"""What `make` and nox do: finding a Python, saying what is missing, failing where nothing was tested."""
 
 from __future__ import annotations
 
-import importlib.util
 import os
 import re
 import shutil
 import subprocess
 import sys
+import tomllib
 from pathlib import Path
-from types import ModuleType
 
 import pytest
 
+import noxfile
+
 ROOT = Path(__file__).resolve().parents[2]
-VERSION = "{}.{}".format(*sys.version_info)
+MAKEFILE = (ROOT / "Makefile").read_text(encoding="utf-8")
 
-pytestmark = pytest.mark.skipif(shutil.which("sh") is None, reason="needs a POSIX shell")
+needs_make = pytest.mark.skipif(shutil.which("make") is None, reason="needs make")
 
-# A Python as Debian has it where python3.X-venv is not installed: $1 $2 are -I -c, $3 is the probe, $4 the version.
-WITHOUT_VENV = """#!/bin/sh
-PROBE="$3" exec {python} -I -c '
+# A Python that makes no environment and says so; as Debian has it, if python3-venv isn't installed.
+FAKE = """#!/bin/sh
+if [ "$1" = -m ]; then echo "$0 makes an environment"; exit 3; fi
+PROBE="$2" exec {python} -I -c '
 import os, sys
-sys.modules["ensurepip"] = None
-exec(os.environ["PROBE"])' "$4"
+{lack}
+exec(os.environ["PROBE"])'
 """
+WITHOUT_VENV = 'sys.modules["ensurepip"] = None'
 
 
-def _bare_path(folder: Path) -> str:
-    """Return a PATH that has the usual tools and no Python."""
-    for name in ("sh", "cat", "date", "dirname", "ls", "mktemp", "readlink", "rm", "sed", "tail", "which"):
-        found = shutil.which(name)
-        assert found is not None, name
-        (folder / name).symlink_to(found)
-    return str(folder)
-
-
-def _script(name: str, *arguments: str, path: str, home: Path) -> subprocess.CompletedProcess[str]:
+def _make(*arguments: str, folder: Path = ROOT, **environment: str) -> subprocess.CompletedProcess[str]:
+    inherited = {name: value for name, value in os.environ.items() if not name.startswith(("MAKE", "MFLAGS"))}
     return subprocess.run(
-        ["sh", ROOT / "tools" / name, *arguments],
-        env={"PATH": path, "HOME": str(home)},
+        [shutil.which("make") or "make", *arguments],
+        cwd=folder,
+        env={**inherited, **environment},
         capture_output=True,
         text=True,
         check=False,
     )
 
 
-@pytest.fixture
-def bare(tmp_path: Path) -> Path:
-    """Return a folder that is a PATH without a Python."""
-    folder = tmp_path / "bin"
-    folder.mkdir()
-    _bare_path(folder)
-    return folder
+def _lint_with(folder: Path, **pythons: str) -> subprocess.CompletedProcess[str]:
+    """Call `make lint` where these are all the Pythons there are: a name and what the interpreter lacks."""
+    programs = folder / "bin"
+    programs.mkdir()
+    (programs / "sh").symlink_to(shutil.which("sh") or "")
+    for name, lack in pythons.items():
+        (programs / name).write_text(FAKE.format(python=sys.executable, lack=lack))
+        (programs / name).chmod(0o755)
+    (folder / "Makefile").write_text(MAKEFILE)
+    return _make("lint", folder=folder, PATH=str(programs), HOME=str(folder), PYENV_ROOT=str(folder), PYTHON="")
 
 
-def test_finds_a_python_by_its_version_and_not_by_its_name(bare: Path, tmp_path: Path) -> None:
-    wrong = "3.11" if VERSION != "3.11" else "3.13"
-    (bare / f"python{wrong}").symlink_to(sys.executable)
-    (bare / "python3").symlink_to(sys.executable)
-    found = _script("find_python.sh", VERSION, path=str(bare), home=tmp_path)
-    assert found.returncode == 0, found.stderr
-    answer = subprocess.run([found.stdout.strip(), "--version"], capture_output=True, text=True, check=True)
-    assert answer.stdout.startswith(f"Python {VERSION}.")
-    assert _script("find_python.sh", wrong, path=str(bare), home=tmp_path).returncode == 1
+@needs_make
+def test_names_the_debian_package_without_which_there_are_no_environments(tmp_path: Path) -> None:
+    answer = _lint_with(tmp_path, python3=WITHOUT_VENV)
+    assert answer.returncode != 0
+    assert "apt install python3 python3-venv" in answer.stderr
 
 
-def test_passes_over_a_shim_that_fails_and_finds_pyenvs_versions(bare: Path, tmp_path: Path) -> None:
-    shim = bare / f"python{VERSION}"
-    shim.write_text("#!/bin/sh\necho 'pyenv: command not found' >&2\nexit 127\n")
-    shim.chmod(0o755)
-    versions = tmp_path / ".pyenv" / "versions" / f"{VERSION}.0" / "bin"
-    versions.mkdir(parents=True)
-    (versions / "python3").symlink_to(sys.executable)
-    found = _script("find_python.sh", VERSION, path=str(bare), home=tmp_path)
-    assert found.returncode == 0, found.stderr
+@needs_make
+def test_takes_the_first_python_that_can_make_environments(tmp_path: Path) -> None:
+    other_version = "sys.version_info = (3, 12, 0)"
+    answer = _lint_with(tmp_path, **{"python3.11": other_version, "python3.13": WITHOUT_VENV, "python3": ""})
+    assert "python3 makes an environment" in answer.stdout
+    assert "python3.1" not in answer.stdout
 
 
-def test_names_the_debian_package_without_which_there_are_no_environments(bare: Path, tmp_path: Path) -> None:
-    python = bare / f"python{VERSION}"
-    python.write_text(WITHOUT_VENV.format(python=sys.executable))
-    python.chmod(0o755)
-    found = _script("find_python.sh", VERSION, path=str(bare), home=tmp_path)
-    assert found.returncode == 1
-    assert f"apt install python{VERSION}-venv" in found.stderr
-
-
-def test_testing_nothing_is_a_failure(bare: Path, tmp_path: Path) -> None:
-    answer = _script("run_tests.sh", "dev", "dev", "not slow", path=str(bare), home=tmp_path)
-    assert answer.returncode == 1
-    assert "Python 3.11 (Blender 4.5 LTS): NOT RUN" in answer.stdout
-    assert "Python 3.13 (Blender 5.2 LTS): NOT RUN" in answer.stdout
-    assert "Nothing was tested" in answer.stderr
-
-
-def _tool(name: str) -> ModuleType:
-    spec = importlib.util.spec_from_file_location(name, ROOT / "tools" / f"{name}.py")
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
-
-
-def test_missing_system_libraries_are_named_with_their_packages() -> None:
-    check_bpy = _tool("check_bpy")
-    libraries = check_bpy.missing_libraries(
-        "\tlibXi.so.6 => not found\n\tlibm.so.6 => /lib/x86_64-linux-gnu/libm.so.6 (0x00007f0000000000)\n"
-        "\tlibSM.so.6 => not found\n\tlibodd.so.1 => not found\n\tlibXi.so.6 => not found\n"
-    )
-    assert libraries == ["libXi.so.6", "libSM.so.6", "libodd.so.1"]
-    advice = check_bpy.advice(libraries)
-    assert "sudo apt install libsm6 libxi6\n" in advice
-    assert advice.endswith("libodd.so.1")
-
-
-@pytest.mark.skipif(shutil.which("make") is None, reason="needs make")
+@needs_make
 def test_make_alone_says_what_there_is() -> None:
-    environment = {name: value for name, value in os.environ.items() if not name.startswith("MAKE")}
-    answer = subprocess.run(["make"], cwd=ROOT, env=environment, capture_output=True, text=True, check=True)
-    targets = re.findall(r"^\.PHONY: (.*)$", (ROOT / "Makefile").read_text(encoding="utf-8"), re.MULTILINE)[0].split()
+    answer = _make()
+    assert answer.returncode == 0, answer.stderr
+    targets = re.findall(r"^\.PHONY: (.*)$", MAKEFILE, re.MULTILINE)[0].split()
     assert {"demo", "test", "lint", "extension", "clean", "help"} <= set(targets)
     for target in targets:
         assert f"make {target} " in answer.stdout
+
+
+def test_make_sets_up_the_nox_that_the_tests_know() -> None:
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    assert re.findall(r'"(nox[<=>][^"]*)"', MAKEFILE)[0] in project["optional-dependencies"]["dev"]
+
+
+def test_finds_pyenvs_versions(tmp_path: Path) -> None:
+    for version in ("3.9.18", "3.11.7", "3.13.0", "3.13.0t"):
+        (tmp_path / "versions" / version / "bin").mkdir(parents=True)
+    found = [Path(folder).parent.name for folder in noxfile.pyenv_folders(tmp_path)]
+    assert found == ["3.11.7", "3.13.0"], "free-threaded ones have no wheels of Blender"
+
+
+@pytest.mark.parametrize(
+    ("file", "old", "new", "matters"),
+    [
+        ("pyproject.toml", "line-length = 120", "line-length = 100", False),
+        ("pyproject.toml", '"furo>=2025.9"', '"furo>=2025.10"', False),
+        ("pyproject.toml", '"bpy>=4.5.15,<4.6;', '"bpy>=4.5.16,<4.6;', True),
+        ("pyproject.toml", '"tqdm>=4.66,<5"', '"tqdm>=4.67,<5"', True),
+        ("blender_manifest.toml", '\nversion = "', '\nversion = "9', True),
+    ],
+)
+def test_environments_are_renewed_when_their_packages_change(
+    tmp_path: Path, file: str, old: str, new: str, matters: bool
+) -> None:
+    for name in ("pyproject.toml", "blender_manifest.toml"):
+        shutil.copy(ROOT / name, tmp_path)
+    before = noxfile.made_from("blender", tmp_path)
+    text = (tmp_path / file).read_text(encoding="utf-8")
+    assert old in text
+    (tmp_path / file).write_text(text.replace(old, new), encoding="utf-8")
+    assert (noxfile.made_from("blender", tmp_path) != before) == matters
+
+
+def test_extras_are_those_of_the_package() -> None:
+    for extras in noxfile.EXTRAS.values():
+        assert noxfile.made_from(extras, ROOT)
+
+
+def test_blender_and_the_other_tests_have_processes_of_their_own(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(noxfile, "ONLY", {("3.13", "others"): "smoke or ui"})
+    assert noxfile.pytest_runs("3.13", "not slow", ["-x"]) == [
+        ["-m", "(not slow)", "-x", "tests/blender"],
+        ["-m", "(smoke or ui) and (not slow)", "-x", "tests", "--ignore=tests/blender"],
+    ]
+    named = ["tests/core/test_alignment.py", "-q"]
+    assert noxfile.pytest_runs("3.11", "not slow", named) == [named]
+
+
+def test_a_part_without_tests_is_a_failure_unless_some_tests_were_chosen() -> None:
+    assert noxfile.passed([0, 0], everything=True)
+    assert noxfile.passed([5, 0], everything=False)
+    for codes, everything in [([5, 0], True), ([5, 5], False), ([1, 0], False), ([0, -6], True)]:
+        assert not noxfile.passed(codes, everything=everything)
+
+
+def test_testing_nothing_is_a_failure() -> None:
+    command = [sys.executable, "-m", "nox", "-s", "summary"]
+    answer = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
+    assert answer.returncode == 1
+    assert "Python 3.11 (Blender 4.5 LTS): NOT RUN" in answer.stderr
+    assert "Python 3.13 (Blender 5.2 LTS): NOT RUN" in answer.stderr
+    assert "nothing was tested" in answer.stderr
+
+
+TESTS_THAT_SKIP = """
+import pytest
+
+@pytest.mark.parametrize("number", range(3))
+def test_three(number):
+    pytest.skip("no judge")
+
+@pytest.mark.skipif(True, reason="no GPU")
+def test_one():
+    pass
+"""
+
+
+def test_skips_are_counted_by_reason(tmp_path: Path) -> None:
+    (tmp_path / "conftest.py").write_text((ROOT / "tests" / "conftest.py").read_text(encoding="utf-8"))
+    (tmp_path / "test_one.py").write_text(TESTS_THAT_SKIP)
+    (tmp_path / "test_two.py").write_text('import pytest\npytest.skip("no judge", allow_module_level=True)\n')
+    command = [sys.executable, "-m", "pytest", "-q", "-n", "2", "--rootdir", tmp_path, "-c", os.devnull, tmp_path]
+    answer = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert "skipped 4 times: no judge\nskipped 1 times: no GPU\n" in answer.stdout

@@ -1,0 +1,159 @@
+"""What `make demo`, `make test` and the others do, as sessions of nox: `nox -l` lists them.
+
+`nox -s tests-3.11 -- tests/core -k curve` hands arguments to pytest. In the environment TEST_WORKERS=N sets how many
+processes test side by side, TEST_MARKERS which tests, PYTHON that only the Python that runs nox is tested.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+import time
+from pathlib import Path
+
+import nox
+from nox.command import CommandFailed
+
+BLENDER = {"3.11": "Blender 4.5 LTS", "3.13": "Blender 5.2 LTS"}
+"""The Pythons that Blender is built for."""
+HERE = f"3.{sys.version_info.minor}" if f"3.{sys.version_info.minor}" in BLENDER else "3.11"
+"""The Python of all that isn't done on both: the one that runs nox."""
+EXTRAS = {
+    "demo": "blender",
+    "docs": "docs",
+    # `ml` on one Python only, as on Linux PyPI's torch comes with gigabytes of CUDA.
+    "tests-3.11": "blender,dev,ml",
+    "tests-3.13": "blender,dev",
+}
+"""What of pyproject.toml is installed into each environment."""
+PARTS = {"blender": ["tests/blender"], "others": ["tests", "--ignore=tests/blender"]}
+"""The tests in two processes: once ifcopenshell has worked in one, Blender 5.2's OBJ exporter aborts there."""
+ONLY: dict[tuple[str, str], str] = {}
+"""Marker expressions by Python and part, where not all of a part's tests are run on that Python."""
+
+nox.needs_version = ">=2026.10"
+nox.options.sessions = ["lint", "tests", "summary"]
+nox.options.reuse_venv = "yes"
+nox.options.download_python = "never"
+
+outcomes: dict[str, str] = {}
+"""What the tests came to, by Python."""
+
+
+def pyenv_folders(root: Path) -> list[str]:
+    """Return where pyenv keeps these Pythons; its shims fail for those that it hasn't been told to use."""
+    return [str(folder) for version in BLENDER for folder in sorted(root.glob(f"versions/{version}.*[0-9]/bin"))]
+
+
+_PYENV = Path(os.environ.get("PYENV_ROOT") or Path.home() / ".pyenv")
+os.environ["PATH"] = os.pathsep.join([os.environ.get("PATH", ""), *pyenv_folders(_PYENV)])
+
+
+def made_from(extras: str, root: Path) -> str:
+    """Return all that an environment is made from: where the text has changed, it has to be brought up to date."""
+    settings = nox.project.load_toml(root / "pyproject.toml")
+    offered = settings["project"].pop("optional-dependencies")
+    chosen = {extra: offered[extra] for extra in extras.split(",")}
+    manifest = (root / "blender_manifest.toml").read_text(encoding="utf-8")
+    package = [settings["build-system"], settings["project"], settings["tool"]["hatch"]]
+    return json.dumps([str(root), chosen, package, manifest])
+
+
+def install(session: nox.Session, name: str) -> None:
+    """Bring a session's environment up to date; where nothing has changed that takes no time."""
+    stamp, wanted = Path(session.bin).parent / "synthroads-stamp", made_from(EXTRAS[name], Path.cwd())
+    if stamp.exists() and stamp.read_text(encoding="utf-8") == wanted:
+        return
+    stamp.unlink(missing_ok=True)
+    session.log("The first time this downloads some 400 MB, for the tests more.")
+    session.install("--no-compile", "--editable", f".[{EXTRAS[name]}]")  # most of it is never imported
+    if "blender" in EXTRAS[name]:
+        session.run_install("python", "tools/check_bpy.py")
+    stamp.write_text(wanted, encoding="utf-8")
+
+
+def python_of(session: nox.Session, name: str) -> str:
+    """Bring another session's environment up to date and return its interpreter."""
+    session.run(sys.executable, "-m", "nox", "--install-only", "--session", name)
+    return f".nox/{name.replace('.', '-')}/bin/python"
+
+
+@nox.session(python=[HERE])
+def demo(session: nox.Session) -> None:
+    """Make 600 m of motorway and scan it; arguments are those of `synthroads generate`."""
+    install(session, "demo")
+    link = Path(".venv")
+    if link.is_symlink() or not link.exists():
+        link.unlink(missing_ok=True)
+        link.symlink_to(Path(session.bin).parent.relative_to(Path.cwd()))
+    settings = ["--scenario", "rq31-600m", "--output", "out/demo", "--overwrite"]
+    session.run("python", "-m", "headless.generate", *settings, *session.posargs, interrupt_timeout=10)
+
+
+@nox.session(python=False)
+def extension(session: nox.Session) -> None:
+    """Build the Blender extensions: dist/*.zip."""
+    session.run(python_of(session, f"demo-{HERE}"), "tools/build_extension.py", *session.posargs)
+
+
+@nox.session(python=False)
+def lint(session: nox.Session) -> None:
+    """Check the source: ruff and mypy."""
+    session.run(python_of(session, f"tests-{HERE}"), "tools/lint.py")  # with its PyTorch: one is large enough
+
+
+def pytest_runs(version: str, markers: str, arguments: list[str]) -> list[list[str]]:
+    """Return what pytest is called with, once for each part; arguments that name tests are left as they are."""
+    if any(argument.startswith("tests") for argument in arguments):
+        return [arguments]
+    only = {part: f"({ONLY[version, part]}) and " if (version, part) in ONLY else "" for part in PARTS}
+    return [["-m", f"{only[part]}({markers})", *arguments, *paths] for part, paths in PARTS.items()]
+
+
+def passed(codes: list[int], *, everything: bool) -> bool:
+    """Say whether the tests passed by pytest's exit codes; a part may be empty (5) unless everything is to be run."""
+    return 0 in codes and set(codes) <= ({0} if everything else {0, 5})
+
+
+@nox.session(python=[HERE] if os.environ.get("PYTHON") else list(BLENDER))
+def tests(session: nox.Session) -> None:
+    """Run the tests; arguments are pytest's."""
+    version = str(session.python)
+    outcomes[version] = "FAILED, the environment could not be made"
+    install(session, session.name)
+    markers = os.environ.get("TEST_MARKERS") or "not slow"
+    # Without a limit on restarts a worker that crashes can leave the others waiting for ever.
+    workers = ["-n", os.environ.get("TEST_WORKERS") or "2", "--dist", "loadfile", "--max-worker-restart", "0"]
+    # The processes share the cores already; spinning threads of linear algebra would only slow each other down.
+    threads = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
+    start, codes = time.perf_counter(), []
+    for arguments in pytest_runs(version, markers, session.posargs):
+        try:  # the other part is run also after one has failed
+            session.run("python", "-m", "pytest", "-q", *workers, *arguments, env=threads, interrupt_timeout=10)
+            codes.append(0)
+        except CommandFailed as failure:
+            codes.append(failure.return_code or 1)
+    good = passed(codes, everything=markers == "not slow" and not session.posargs)
+    outcomes[version] = f"{'passed' if good else 'FAILED'}, {time.perf_counter() - start:.0f} s"
+    if not good:
+        raise CommandFailed(f"pytest ended with {codes}")
+
+
+@nox.session(python=HERE)
+def docs(session: nox.Session) -> None:
+    """Build the documentation: build/site/index.html."""
+    install(session, "docs")
+    # Whatever the generator complains of is a failure: a link that leads nowhere, a page that is missing or in no menu.
+    strict = ["--jobs", "auto", "--fresh-env", "--fail-on-warning", "--quiet"]
+    session.run("python", "-m", "sphinx", *strict, "--doctree-dir", "build/doctrees", "docs", "build/site")
+    session.log("built build/site/index.html")
+
+
+@nox.session(python=False)
+def summary(session: nox.Session) -> None:
+    """Say what the tests came to; it is a failure if nothing was tested."""
+    for version, blender in BLENDER.items():
+        session.log(f"Python {version} ({blender}): {outcomes.get(version, 'NOT RUN')}")
+    if not outcomes:
+        session.error("nothing was tested: install Python 3.11 or 3.13")
