@@ -319,7 +319,7 @@ def test_cross_section_is_to_scale(tmp_path: Path) -> None:
 
 def test_previews_of_a_file(tmp_path: Path) -> None:
     square = plane(20_000, 0.01)
-    oblong = replace(square, xyz=(square.xyz - ORIGIN) * [2, 1, 1] + ORIGIN)  # 60 m by 30 m
+    oblong = replace(square, xyz=(square.xyz - ORIGIN) * [2, 0.4, 1] + ORIGIN)  # 60 m by 12 m
     write(tmp_path / "cloud.laz", oblong)
     done = draw_previews(tmp_path / "cloud.laz", tmp_path / "out", station=10.0)
     assert sorted(path.name for path in (tmp_path / "out").iterdir()) == sorted(done["pictures"])
@@ -328,7 +328,7 @@ def test_previews_of_a_file(tmp_path: Path) -> None:
     x, y = ORIGIN[:2]
     line = (x - 10, y + 3, x + 10, y + 3)
     cut = draw_previews(tmp_path / "cloud.laz", tmp_path / "out", line=line, depth=0.5, overwrite=True)
-    assert cut["section_points"] == pytest.approx(20_000 / 60, rel=0.2)
+    assert cut["section_points"] == pytest.approx(20_000 * 0.5 / 12, rel=0.2)
     with pytest.raises(InputError, match=r"--station is 10000.0: must be 0 to"):
         draw_previews(tmp_path / "cloud.laz", tmp_path / "else", station=1e4)
     with pytest.raises(InputError, match="cuts no points"):

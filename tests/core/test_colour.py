@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -133,9 +135,14 @@ def test_clouds_cover_their_share_of_the_ground(cover: float) -> None:
     assert np.isclose(((1.0 - share) / (1.0 - SHADE)).mean(), cover, atol=0.01)
 
 
+@cache
+def _cloudy() -> CloudShadows:
+    return CloudShadows(CLOUDY, seed=3)
+
+
 @given(st.floats(-200.0, 200.0), st.floats(-500.0, 500.0), st.floats(0.0, 300.0))
 def test_shadows_drift_with_the_wind(x: float, y: float, seconds: float) -> None:
-    shadows = CloudShadows(CLOUDY, seed=3)
+    shadows = _cloudy()
     drift = 8.0 * seconds * np.array([np.sin(np.deg2rad(120.0)), np.cos(np.deg2rad(120.0)), 0.0])
     here = np.array([[x, y, 0.0]])
     assert np.allclose(shadows.transmission(here, 10.0), shadows.transmission(here + drift, 10.0 + seconds), atol=1e-3)

@@ -450,7 +450,7 @@ def test_a_smoothed_path_turns_through_west_without_a_jerk() -> None:
 
 
 @given(degree=st.integers(1, 9), length=st.floats(1.0, 1e5))
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=10, deadline=None)
 def test_a_straight_line_is_smoothed_into_itself(degree: int, length: float) -> None:
     guide = PolylineGuide([(5.0, 3.0), (5.0 - length * 0.6, 3.0 + length * 0.8)])
     path = make_path(Platform(path="smoothed", polynomial_degree=degree, lateral_offsets=(2.0,)), guide)
@@ -727,7 +727,7 @@ def test_a_polylines_corners_are_rounded_in_heading_and_curvature() -> None:
         st.tuples(st.floats(2.0, 200.0), st.floats(-2.0, 2.0), st.floats(-3.0, 3.0)), min_size=1, max_size=12
     )
 )
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=30, deadline=None)
 def test_any_polyline_without_sharp_corners_is_followed(steps: list[tuple[float, float, float]]) -> None:
     lengths = np.array([length for length, _, _ in steps])
     # Turns grow with the shorter neighbour, so that each can be rounded.

@@ -25,6 +25,7 @@ from synthroads_addon.core.parameters.model_furniture import (
 )
 from synthroads_addon.core.parameters.model_section import LineMarking
 from synthroads_addon.core.parameters.site import Site
+from tests.core.mutations import cases
 from tests.core.sites import (
     BODIES,
     EVERYTHING,
@@ -104,16 +105,17 @@ def site_of(name: str, seed: int, **changes: Any) -> Site:
     return make_site(**merged(SWITCHED_ON, SITES[name] | {"seed": seed} | changes))
 
 
+@cases(8, 50)
 @pytest.mark.parametrize("name", SITES)
-def test_no_rule_is_broken(name: str) -> None:
-    for seed in range(25):
+def test_no_rule_is_broken(name: str, count: int) -> None:
+    for seed in range(count):
         site = site_of(name, seed)
         assert faults(site, place(site)) == [], seed
 
 
 @pytest.mark.parametrize("length", [1.0, 7.0, 40.0, 75.0, 150.0])
 def test_no_rule_is_broken_on_a_short_road(length: float) -> None:
-    for seed in range(25):
+    for seed in range(10):
         site = site_of("straight", seed, elements=straight(length), embankment=4.0)
         assert faults(site, place(site)) == [], seed
 
@@ -188,9 +190,10 @@ def _drawn(item: Any) -> list[tuple[str, float]]:
     return []
 
 
+@cases(5, 30)
 @pytest.mark.parametrize("name", SITES)
-def test_at_random_nothing_collides_or_stands_on_the_pavement(name: str) -> None:
-    for seed in range(15):
+def test_at_random_nothing_collides_or_stands_on_the_pavement(name: str, count: int) -> None:
+    for seed in range(count):
         site = site_of(name, seed, placement="random")
         assert faults(site, place(site), BODIES) == [], seed
 

@@ -77,7 +77,22 @@ def points(section: str = "RQ31", design_class: str = "EKA1A", seed: int = SEED,
 
 
 def roads(kind: TruthKind = "road", section: str = "RQ31", design_class: str = "EKA1A", seed: int = SEED) -> list[Road]:
-    """Return a road for each truth of a kind."""
-    cloud, known = points(section, design_class, seed), parameters(section, design_class, seed)
-    whole = Road.of_points(section, cloud, truths(known, "road", cloud.origin)[0].axis)
-    return [replace(whole, truth=truth) for truth in truths(known, kind, cloud.origin)]
+    """Return a road for each truth of a kind; tests share their arrays, which can't be written to."""
+    return list(_roads(kind, section, design_class, seed))
+
+
+@cache
+def _roads(kind: TruthKind, section: str, design_class: str, seed: int) -> tuple[Road, ...]:
+    known = parameters(section, design_class, seed)
+    whole = _sorted(section, design_class, seed)
+    return tuple(replace(whole, truth=truth) for truth in truths(known, kind, whole.origin))
+
+
+@cache
+def _sorted(section: str, design_class: str, seed: int) -> Road:
+    cloud = points(section, design_class, seed)
+    line = truths(parameters(section, design_class, seed), "road", cloud.origin)[0].axis
+    whole = Road.of_points(section, cloud, line)
+    for array in (whole.xyz, whole.intensity, whole.rgb, whole.class_id, whole.station):
+        array.setflags(write=False)
+    return whole

@@ -125,11 +125,16 @@ def test_checkpoints(tmp_path: Path, count: int) -> None:
     checked(tmp_path / CHECKPOINT, run.saved, count)
 
 
+@pytest.fixture(scope="module")
+def scene(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return the folder of a scene of a data set."""
+    return write_data_set(tmp_path_factory.mktemp("set")) / "scenes" / "a-01"
+
+
 @cases(3, 150)
 @pytest.mark.parametrize("name", ["notes.json", "xyz.npy", "station.npy", "reference.npy", "class_id.npy"])
-def test_roads_that_were_kept(tmp_path: Path, name: str, count: int) -> None:
+def test_roads_that_were_kept(scene: Path, tmp_path: Path, name: str, count: int) -> None:
     """A kept copy that is damaged is made anew from the cloud."""
-    scene = write_data_set(tmp_path / "set") / "scenes" / "a-01"
     read_scene(scene, "road", tmp_path / "cache")
     (path,) = (tmp_path / "cache").glob(f"*/{name}")
 

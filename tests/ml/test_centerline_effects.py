@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from copy import deepcopy
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -47,6 +49,12 @@ def rng(seed: int = 0) -> np.random.Generator:
 
 
 def cut(kind: str = "road", which: int = 0, seed: int = 4, spacing: int = 1) -> Stretch:
+    """Return ten slices of a road, the same for each call; effects may change them."""
+    return deepcopy(_cut(kind, which, seed, spacing))
+
+
+@cache
+def _cut(kind: str, which: int, seed: int, spacing: int) -> Stretch:
     road = roads(kind)[which]  # type: ignore[arg-type]
     assert road.truth is not None
     frames = displaced(along(road.truth.axis), rng(seed), 12.0, 2.0, 100.0)

@@ -58,6 +58,7 @@ def weights(model: nn.Module) -> Tensor:
     return torch.cat([weight.detach().ravel() for weight in model.parameters()])
 
 
+@pytest.mark.usefixtures("drawn_curves")
 def test_training_learns_and_writes_its_files(tmp_path: Path) -> None:
     train(tmp_path / "run")
     history = json.loads((tmp_path / "run/history.json").read_text())
@@ -65,7 +66,9 @@ def test_training_learns_and_writes_its_files(tmp_path: Path) -> None:
     assert history[-1]["loss"] < 0.7 * history[0]["loss"]
     assert history[-1]["learning_rate"] == pytest.approx(1e-5)
     assert json.loads((tmp_path / "run" / METRICS).read_text()) == {"done": 1, "undefined": None}
-    assert (tmp_path / "run" / CURVES).read_bytes().startswith(b"\x89PNG")
+    picture = (tmp_path / "run" / CURVES).read_bytes()
+    assert picture.startswith(b"\x89PNG\r\n")
+    assert len(picture) > 1000
 
 
 def test_interrupted_training_ends_with_the_same_weights(tmp_path: Path) -> None:

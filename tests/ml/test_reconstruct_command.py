@@ -22,7 +22,7 @@ def made(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactor
     section, design_class, seed = request.param
     truth = road(section, design_class, 300.0, seed)
     (folder / "truth.json").write_text(truth.to_json(), encoding="utf-8")
-    cloud = write(folder / "cloud.laz", cloud_of(truth, 60.0, seed))
+    cloud = write(folder / "cloud.laz", cloud_of(truth, 15.0, seed))
     words = ["reconstruct", str(cloud), "--output", str(folder / "out"), "--truth", str(folder / "truth.json")]
     assert main([*words, "--twin", "cityjson,opendrive", "--quiet"]) == 0
     return folder, json.loads((folder / "out/reconstruction.json").read_text())["comparison"]

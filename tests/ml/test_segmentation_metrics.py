@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from ml.segmentation.metrics import IGNORED, Confusion, mean, mean_and_deviation, score_table
+from ml.segmentation.tables import by_class, by_test
 from synthroads_addon.core.errors import InputError
 
 NAMES = tuple("abcdef")
@@ -118,3 +119,24 @@ def test_scores_are_those_of_scikit_learn(seed: int) -> None:
     defined = ~np.isnan(confusion.iou)  # scikit-learn's IoU has no NaN for classes that occur nowhere
     iou = metrics.jaccard_score(truth[known], predicted[known], labels=labels, average=None, zero_division=0)
     np.testing.assert_allclose(confusion.iou[defined], iou[defined])
+
+
+def test_classes_that_do_not_occur_have_no_row_and_there_is_no_mean() -> None:
+    confusion = Confusion(("a", "b", "c"))
+    confusion.add(np.array([0, 0, 1, 1]), np.array([0, 1, 1, 2]))
+    text = by_class([confusion.to_dict()] * 2)
+    assert [line.split("|")[1].strip() for line in text.splitlines()] == ["class", "---", "a", "b"]
+    assert "| a | 2 | 100.0 (0.0) | 50.0 (0.0) | 50.0 (0.0) |" in text
+    confusion.add(np.array([2]), np.array([2]))
+    assert "| mean | 5 |" in by_class([confusion.to_dict()])
+    assert by_test({"one": {}}).endswith("Seeds: .")
+
+
+def test_further_rows_end_the_first_tests_table() -> None:
+    scores = {"classes": {"a": {"iou": 0.5, "support": 9}}, "mean_iou": 0.5, "points": 9}
+    run = {"seen": scores, "unseen": scores}
+    row = "| *training, s* |  | 132 (3) | - |"
+    lines = by_test({"tuned": {"1": run, "2": run}, "adapted": {"1": run}}, [row]).splitlines()
+    assert lines.index(row) + 2 == lines.index("**unseen**")
+    assert lines.count("| mean | 9 | 50.0 (0.0) | 50.0 |") == 2
+    assert lines[-1] == "Seeds: tuned 2, adapted 1."

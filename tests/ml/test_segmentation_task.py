@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import shutil
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -36,6 +38,8 @@ from synthroads_addon.core.progress import silent
 from tests.ml.segmentation_data import road_block, road_tile, toy, write_cloud, write_pointcept
 
 torch.set_num_threads(1)
+Trained = Callable[..., Path]
+FINE_TUNING = {"epochs": 2, "learning_rate": 0.001}
 
 
 @pytest.fixture(autouse=True)
@@ -50,9 +54,28 @@ def data(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("data")
     for name, gain in (("real", 1.0), ("synthetic", 0.3)):
         for split, seed in (("train", 1), ("test", 3)):
-            tiles = [road_tile(3000, seed + k, f"{name}{k}", gain) for k in range(2)]
+            tiles = [road_tile(1200, seed + k, f"{name}{k}", gain) for k in range(2)]
             write_pointcept(folder / name, split, tiles)
     return folder
+
+
+@pytest.fixture(scope="module")
+def trained(data: Path, tmp_path_factory: pytest.TempPathFactory) -> Trained:
+    """Return what trains with a set-up, once for all tests, which may read its run but not change it."""
+    found: dict[str, Path] = {}
+
+    def folder(set_up: str = "real") -> Path:
+        if set_up not in found:
+            found[set_up] = tmp_path_factory.mktemp(set_up) / "run"
+            task.train(Run.start(found[set_up], small(data, set_up=set_up, fine_tuning=FINE_TUNING)))
+        return found[set_up]
+
+    return folder
+
+
+def small(data: Path, **changes: Any) -> SegmentationConfiguration:
+    """Return the toy with the smallest crops."""
+    return toy(data, **{"crop_points": 300, **changes})
 
 
 def weights(folder: Path) -> dict[str, torch.Tensor]:
@@ -98,23 +121,20 @@ def test_best_answer_to_a_smoothed_label_is_the_label_however_rare_others_are() 
 
 
 @pytest.mark.parametrize("set_up", ["real", "mixed_mapped"])
-def test_two_trainings_with_one_seed_are_the_same(data: Path, tmp_path: Path, set_up: str) -> None:
-    for name in ("one", "two"):
-        task.train(Run.start(tmp_path / name, toy(data, set_up=set_up)))
-    task.train(Run.start(tmp_path / "three", toy(data, set_up=set_up, seed=2)))
-    one, two, three = (weights(tmp_path / name) for name in ("one", "two", "three"))
-    assert same(one, two)
-    assert not same(one, three)
-    figures = [json.loads((tmp_path / name / "metrics.json").read_text())["tests"] for name in ("one", "two")]
-    assert figures[0] == figures[1]
+def test_another_seed_gives_another_network(data: Path, trained: Trained, tmp_path: Path, set_up: str) -> None:
+    task.train(Run.start(tmp_path / "other", small(data, set_up=set_up, fine_tuning=FINE_TUNING, seed=2)))
+    assert not same(weights(tmp_path / "other"), weights(trained(set_up)))
 
 
-@pytest.mark.parametrize(("set_up", "stop_at"), [("real", 1), ("fine_tuned", 1), ("fine_tuned", 3)])
+@pytest.mark.parametrize(
+    ("set_up", "stop_at"), [("real", 1), ("mixed_mapped", 1), ("fine_tuned", 1), ("fine_tuned", 3)]
+)
 def test_an_interrupted_training_ends_as_an_undisturbed_one(
-    data: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, set_up: str, stop_at: int
+    data: Path, trained: Trained, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, set_up: str, stop_at: int
 ) -> None:
-    changes = {"set_up": set_up, "fine_tuning": {"epochs": 2, "learning_rate": 0.001}}
-    task.train(Run.start(tmp_path / "whole", toy(data, **changes)))
+    """The same weights and figures to the bit, as those of any two trainings with one seed."""
+    configuration = small(data, set_up=set_up, fine_tuning=FINE_TUNING)
+    whole = trained(set_up)
     with monkeypatch.context() as patch:
         saved, original = [], Run.save
 
@@ -126,23 +146,26 @@ def test_an_interrupted_training_ends_as_an_undisturbed_one(
 
         patch.setattr(Run, "save", save)
         with pytest.raises(KeyboardInterrupt):
-            task.train(Run.start(tmp_path / "cut", toy(data, **changes)))
-    task.train(Run.start(tmp_path / "cut", toy(data, **changes), resume=True))
-    assert same(weights(tmp_path / "whole"), weights(tmp_path / "cut"))
+            task.train(Run.start(tmp_path / "cut", configuration))
+    task.train(Run.start(tmp_path / "cut", configuration, resume=True))
+    assert same(weights(whole), weights(tmp_path / "cut"))
     assert (tmp_path / "cut" / PRETRAINING).exists() == (set_up == "fine_tuned")
-    histories = [json.loads((tmp_path / name / "history.json").read_text()) for name in ("whole", "cut")]
+    histories = [json.loads((folder / "history.json").read_text()) for folder in (whole, tmp_path / "cut")]
     assert [len(history) for history in histories] == [2, 2]
+    figures = [json.loads((folder / "metrics.json").read_text())["tests"] for folder in (whole, tmp_path / "cut")]
+    assert figures[0] == figures[1]
 
 
 def test_fine_tuning_begins_with_what_synthetic_data_taught(data: Path, tmp_path: Path) -> None:
-    task.train(Run.start(tmp_path / "synthetic", toy(data, set_up="synthetic")))
+    short = {"schedule": {"epochs": 1}}
+    task.train(Run.start(tmp_path / "synthetic", small(data, set_up="synthetic", **short)))
     nothing = {"epochs": 1, "learning_rate": 1e-12, "final_learning_rate": 0.0}
-    task.train(Run.start(tmp_path / "tuned", toy(data, set_up="fine_tuned", fine_tuning=nothing)))
+    task.train(Run.start(tmp_path / "tuned", small(data, set_up="fine_tuned", fine_tuning=nothing, **short)))
     first, tuned = weights(tmp_path / "synthetic"), weights(tmp_path / "tuned")
     assert same(first, weights(tmp_path / "tuned" / PRETRAINING))
     learned = [name for name in first if "running" not in name and "num_batches" not in name]
     assert all(torch.allclose(first[name], tuned[name], atol=1e-6) for name in learned)
-    changed = toy(data, set_up="fine_tuned", fine_tuning=nothing, seed=5)
+    changed = small(data, set_up="fine_tuned", fine_tuning=nothing, seed=5, **short)
     task.train(Run.start(tmp_path / "tuned", changed, overwrite=True))  # nor with what another seed did
     assert not same(first, weights(tmp_path / "tuned" / PRETRAINING))
     begun = Run.start(tmp_path / "tuned", changed, overwrite=True)  # nor with what the same seed learned of other data
@@ -157,9 +180,9 @@ def test_every_set_up_and_option_trains(data: Path, tmp_path: Path) -> None:
         {"set_up": "mixed", "effects": {"mirror": True, "dropout": 0.3, "intensity_gain": 0.2}, "class_weights": False},
     ]
     for number, case in enumerate(cases):
-        metrics = task.train(Run.start(tmp_path / str(number), toy(data, **short, **case)))
+        metrics = task.train(Run.start(tmp_path / str(number), small(data, **short, **case)))
         assert 0.0 <= metrics["unseen_mean_iou"] <= 1.0
-        assert metrics["tests"]["unseen"]["points"] == 6000
+        assert metrics["tests"]["unseen"]["points"] == 2400
     assert set(metrics["training_points"]) == {"real", "synthetic"}
 
 
@@ -180,26 +203,26 @@ def test_scenes_of_one_name_in_two_sources_are_scaled_apart(data: Path) -> None:
 @pytest.mark.parametrize("name", ["real-synthetic-mixed-small", "gantries-small"])
 def test_small_experiments_run_from_end_to_end(tmp_path: Path, name: str) -> None:
     for split in ("train", "test", "test_tripod", "test_gantries"):
-        write_pointcept(tmp_path / "real", split, [road_tile(2000, 1, split)], scheme="17")
+        write_pointcept(tmp_path / "real", split, [road_tile(600, 1, split)], scheme="17")
     five = name == "real-synthetic-mixed-small"
-    write_pointcept(tmp_path / "synthetic", "train", [road_tile(2000, 2)], scheme="5" if five else "17")
-    words = ["experiment", name, "--output", str(tmp_path / "out"), "--seeds", "1", "2", "--quiet"]
+    write_pointcept(tmp_path / "synthetic", "train", [road_tile(600, 2)], scheme="5" if five else "17")
+    words = ["experiment", name, "--output", str(tmp_path / "out"), "--seeds", "1", "--quiet"]
     words += [f"--data={each}={tmp_path / each}" for each in ("real", "synthetic")]
-    changes = ("threads=1", "network.width=8", "voxel=0.4", "crop_points=300", "schedule.epochs=1")
+    changes = ["threads=1", "network.width=8", "voxel=0.4", "crop_points=100", "schedule.epochs=1"]
+    changes += ["adaptation.adabn_crops=4"]
     assert cli.main([*words, *(f"--set={change}" for change in changes), "--set=fine_tuning.epochs=1"]) == 0
     text = (tmp_path / "out" / "table.md").read_text()
     variants = load_experiment(name).variants
     assert f"| class | points | {' | '.join(variants)} |" in text
     assert text.count("**") // 2 == (2 if five else 1)
-    assert f"Seeds: {', '.join(f'{variant} 2' for variant in variants)}." in text
+    assert f"Seeds: {', '.join(f'{variant} 1' for variant in variants)}." in text
 
 
 def test_a_variant_is_tested_anew_when_its_network_or_its_settings_have_changed(
-    data: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+    data: Path, trained: Trained, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    configuration = toy(data)
-    run = tmp_path / "run"
-    task.train(Run.start(run, configuration), silent)
+    configuration = small(data)
+    run = shutil.copytree(trained(), tmp_path / "run")
     tested: list[int] = []
     score = experiments.score_all
 
@@ -226,7 +249,7 @@ def test_a_variant_is_tested_anew_when_its_network_or_its_settings_have_changed(
 
 def test_clouds_are_laid_over_as_often_as_asked(data: Path) -> None:
     for share, wanted in ((0.0, [4]), (1.0, [2]), (0.5, [2, 4])):
-        configuration = toy(data, adaptation={"mix3d": share}, crops_per_tile=24)
+        configuration = toy(data, adaptation={"mix3d": share}, crops_per_tile=12, crop_points=64)
         tiles = read_domains(configuration)["real"]
         seeds, scaling = Seeds(tiles, 5, False), scalings(tiles, "share")
 
@@ -240,7 +263,7 @@ def test_clouds_are_laid_over_as_often_as_asked(data: Path) -> None:
 
 
 def test_commands_train_evaluate_and_predict(data: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    (tmp_path / "toy.yaml").write_text(json.dumps(toy(data).to_dict()))
+    (tmp_path / "toy.yaml").write_text(json.dumps(small(data).to_dict()))
 
     def command(module: Any, *arguments: object) -> dict[str, Any]:
         import argparse
@@ -271,9 +294,9 @@ def test_commands_train_evaluate_and_predict(data: Path, tmp_path: Path, capsys:
     assert rows["road_marking"][2] == f"{100 * scores['classes']['road_marking']['iou']:.1f}"
     assert f"{100 * scores['accuracy']:.1f} % of the points are right" in said
     assert said.endswith(f"written to {tmp_path / 'scores'}: real-test.txt, real-test.png\n")
-    cloud = write_cloud(tmp_path / "cloud.laz", road_block(4000, 9))
+    cloud = write_cloud(tmp_path / "cloud.laz", road_block(1500, 9))
     told = command(predict_command, tmp_path / "run", cloud, "--output", tmp_path / "labelled.laz", "--classification")
-    assert told["points"] == 4000
+    assert told["points"] == 1500
     found = np.asarray(laspy.read(tmp_path / "labelled.laz")["predicted_class"])
     assert np.bincount(found, minlength=5).tolist() == list(told["classes"].values())
 
@@ -286,11 +309,10 @@ def test_a_checkpoint_of_another_network_is_refused(data: Path, tmp_path: Path) 
         task.trained_model(run, torch.device("cpu"))
 
 
-def test_evaluation_with_a_mapping_scores_groups(data: Path, tmp_path: Path) -> None:
-    task.train(Run.start(tmp_path / "run", toy(data)))
-    run = Run.open(tmp_path / "run", kinds())
+def test_evaluation_with_a_mapping_scores_groups(trained: Trained, tmp_path: Path) -> None:
+    run = Run.open(trained(), kinds())
     las = laspy.LasData(laspy.LasHeader(point_format=6, version="1.4"))
-    block = road_block(3000, 4)
+    block = road_block(1500, 4)
     las.header.scales, las.header.offsets = np.full(3, 0.001), np.array([4e5, 5.6e6, 100.0])
     las.x, las.y, las.z = block.xyz.T
     las.intensity = np.rint(block.intensity * 65535)
@@ -352,7 +374,7 @@ def test_an_experiment_makes_a_table_and_goes_on_where_it_stopped(data: Path, tm
         },
         "seeds": [1, 2],
     }
-    (tmp_path / "toy.yaml").write_text(json.dumps(toy(data, schedule={"epochs": 1}).to_dict()))
+    (tmp_path / "toy.yaml").write_text(json.dumps(small(data, schedule={"epochs": 1}).to_dict()))
     (tmp_path / "own.yaml").write_text(json.dumps(own))
     folders = [f"--data={name}={data / name}" for name in ("real", "synthetic")]
     arguments = ["experiment", str(tmp_path / "own.yaml"), *folders, "--output", str(tmp_path / "out"), "--quiet"]
@@ -407,7 +429,7 @@ def test_an_experiment_tells_its_scores(data: Path, tmp_path: Path, capsys: pyte
         "variants": {"plain": {"set": {"set_up": "synthetic"}}},
         "seeds": [1],
     }
-    (tmp_path / "toy.yaml").write_text(json.dumps(toy(data, schedule={"epochs": 1}).to_dict()))
+    (tmp_path / "toy.yaml").write_text(json.dumps(small(data, schedule={"epochs": 1}).to_dict()))
     (tmp_path / "own.yaml").write_text(json.dumps(own))
     folders = [f"--data={name}={data / name}" for name in ("real", "synthetic")]
     words = ["experiment", str(tmp_path / "own.yaml"), *folders, "--output", str(tmp_path / "out")]
@@ -420,13 +442,12 @@ def test_an_experiment_tells_its_scores(data: Path, tmp_path: Path, capsys: pyte
     assert json.loads(capsys.readouterr().out)["results"] == json.loads((tmp_path / "out/results.json").read_text())
 
 
-def test_clouds_of_one_name_have_results_of_their_own(data: Path, tmp_path: Path) -> None:
-    task.train(Run.start(tmp_path / "run", toy(data)))
-    run = Run.open(tmp_path / "run", kinds())
+def test_clouds_of_one_name_have_results_of_their_own(trained: Trained, tmp_path: Path) -> None:
+    run = Run.open(trained(), kinds())
     clouds = [tmp_path / scene / "cloud.laz" for scene in ("one", "two")]
     for number, cloud in enumerate(clouds):
         cloud.parent.mkdir()
-        write_cloud(cloud, road_block(2000 + number, 4))
+        write_cloud(cloud, road_block(500 + number, 4))
     found = task.evaluate(run, Evaluation(clouds, "test", tmp_path / "out"))
     assert list(found["tests"]) == ["one-cloud", "two-cloud"]
     assert {path.name for path in (tmp_path / "out").glob("*.txt")} == {"one-cloud.txt", "two-cloud.txt"}
@@ -450,8 +471,8 @@ def test_tests_are_looked_at_before_the_training(data: Path, tmp_path: Path) -> 
 
 
 def test_norms_are_adapted_by_points_and_not_by_tiles(data: Path) -> None:
-    large, sliver = road_tile(19_000, 1, "large"), road_tile(1000, 2, "sliver")
-    configuration = toy(data, adaptation={"adabn": True, "adabn_crops": 200}, batch=1, crop_points=500)
+    large, sliver = road_tile(1900, 1, "large"), road_tile(100, 2, "sliver")
+    configuration = toy(data, adaptation={"adabn": True, "adabn_crops": 200}, batch=1, crop_points=64)
     dark = replace(sliver, strength=np.zeros_like(sliver.strength))
     of_sliver = [not bool(batch["strength"].any()) for batch in adaptation_batches([large, dark], configuration)]
     assert len(of_sliver) == 200
