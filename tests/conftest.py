@@ -10,6 +10,7 @@ import tempfile
 from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
+from zlib import crc32
 
 import hypothesis
 import pytest
@@ -45,6 +46,14 @@ def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
     reasons = Counter(str(report.longrepr[-1]).removeprefix("Skipped: ") for report in reports)
     for reason, count in reasons.most_common():
         terminalreporter.write_line(f"skipped {count} times: {reason}")
+
+
+@pytest.hookimpl(tryfirst=True)  # before pytest chooses by markers
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Mark a tenth of the tests outside tests/blender, drawn by their names, as `smoke`."""
+    for item in items:
+        if TESTS / "blender" not in item.path.parents and crc32(item.nodeid.encode()) % 10 == 0:
+            item.add_marker("smoke")
 
 
 def _needs_blender(request: pytest.FixtureRequest) -> bool:
