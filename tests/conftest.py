@@ -9,11 +9,16 @@ import sys
 import tempfile
 from collections import Counter
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
+from typing import TYPE_CHECKING
 from zlib import crc32
 
 import hypothesis
 import pytest
+
+if TYPE_CHECKING:
+    from tests.blender.kept_groups import KeptGroups
 
 TESTS = Path(__file__).resolve().parent
 HAS_BPY = importlib.util.find_spec("bpy") is not None
@@ -66,60 +71,42 @@ def _empty_scene() -> None:
     bpy.ops.wm.read_factory_settings(use_empty=True)
 
 
-class _NodeGroups:
-    """The node groups of the road model that the tests of one module have made: a second or two of each new road."""
+@cache
+def _kept_groups() -> KeptGroups:
+    """Return the node groups that tests have made so far."""
+    from tests.blender.kept_groups import KeptGroups
 
-    MOST = 120
-    """Groups that are kept: taking over more would take as long as making those that a test needs."""
+    return KeptGroups(BLENDER_FOLDER)
 
-    def __init__(self) -> None:
-        self.file = BLENDER_FOLDER / "groups.blend"
-        self.names: set[str] = set()
 
-    def keep(self) -> None:
-        """Write the groups of the open file, unless they are known."""
-        import bpy
-
-        groups = {group for group in bpy.data.node_groups if group.name.startswith("SR ")}
-        if {group.name for group in groups} - self.names and len(groups) <= self.MOST:
-            bpy.data.libraries.write(str(self.file), groups, fake_user=True)
-            self.names = {group.name for group in groups}
-
-    def take(self) -> None:
-        """Put the groups that were kept into the open file."""
-        import bpy
-
-        if self.names:
-            with bpy.data.libraries.load(str(self.file), link=False) as (kept, mine):
-                mine.node_groups = kept.node_groups
-            bpy.data.libraries.remove(bpy.data.libraries[self.file.name])
+@pytest.fixture(scope="session")
+def kept_groups() -> KeptGroups:
+    """The node groups that tests have made so far; `on` says whether they are taken again."""
+    return _kept_groups()
 
 
 @pytest.fixture(scope="module", autouse=True)
-def _empty_scene_for_module(request: pytest.FixtureRequest) -> Iterator[_NodeGroups | None]:
+def _empty_scene_for_module(request: pytest.FixtureRequest) -> Iterator[None]:
     """Start each module of tests/blender with an empty scene, and leave none of its data behind."""
     if not _needs_blender(request):
-        yield None
+        yield
         return
+    _kept_groups().on = True
     _empty_scene()
-    yield _NodeGroups()
+    yield
     _empty_scene()
 
 
 @pytest.fixture(autouse=True)
-def _empty_scene_for_test(request: pytest.FixtureRequest, _empty_scene_for_module: _NodeGroups | None) -> None:
+def _empty_scene_for_test(request: pytest.FixtureRequest, _empty_scene_for_module: None) -> None:
     """Start each test of tests/blender with an empty scene, unless it is marked `keep_scene`.
 
-    Those that are marked `keep_groups` find the node groups of the module's tests before.
+    The road model's node groups are taken from a test before, unless it is marked `new_groups`.
     """
-    groups = _empty_scene_for_module
-    if groups is None or request.node.get_closest_marker("keep_scene"):
+    if not _needs_blender(request):
         return
-    if request.node.get_closest_marker("keep_groups"):
-        groups.keep()
-        _empty_scene()
-        groups.take()
-    else:
+    _kept_groups().on = request.node.get_closest_marker("new_groups") is None
+    if not request.node.get_closest_marker("keep_scene"):
         _empty_scene()
 
 

@@ -18,8 +18,6 @@ from synthroads_addon.ui import calibration, calibration_run
 from synthroads_addon.ui.job import Job
 from tests.core.calibration_cloud import labelled, striped
 
-pytestmark = pytest.mark.keep_groups
-
 
 @pytest.fixture(autouse=True)
 def settings() -> Iterator[Any]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import numpy as np
@@ -9,8 +10,21 @@ import pytest
 from PIL import Image
 
 from headless.cli import command
+from synthroads_addon.blender import gallery
 
 
+@pytest.fixture
+def short_roads(tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let the scenes have roads of 200 m."""
+    preset = json.loads(gallery.PRESET.read_text(encoding="utf-8"))
+    for scene in preset["scenes"].values():
+        scene["road"]["length"] = 200.0
+    file = tmp_path_factory.mktemp("preset") / "gallery.json"
+    file.write_text(json.dumps(preset), encoding="utf-8")
+    monkeypatch.setattr(gallery, "PRESET", file)
+
+
+@pytest.mark.usefixtures("short_roads")
 @pytest.mark.parametrize("only", ["materials-base_color", "materials-lit", "scene-rural-driver"])
 def test_a_picture_is_made(tmp_path: Path, only: str, capsys: pytest.CaptureFixture[str]) -> None:
     arguments = ["--output", str(tmp_path), "--only", only, "--width", "160", "--samples", "1"]

@@ -34,8 +34,6 @@ from synthroads_addon.core.parameters.tessellation import sample_stations
 from synthroads_addon.core.scenario import load_scenario
 from synthroads_addon.core.scene_mesh import SceneMesh
 
-pytestmark = pytest.mark.keep_groups
-
 TOLERANCE = 0.005
 ROUNDING = 2e-4
 """What float32 coordinates of some hundred metres may cost, m."""

@@ -30,8 +30,6 @@ from synthroads_addon.scan_files import make_scan, scan_blocks
 from tests.blender.furnished_road import Data, Float, road_data
 from tests.blender.test_parts_vehicles import MODELS, VEHICLES, alone, vehicle
 
-pytestmark = pytest.mark.keep_groups
-
 FINE = 1e-4
 """Tolerance (m) of a road whose mesh is hardly farther from the analytic surface than 32 bits make it."""
 HEIGHTS = 5e-5

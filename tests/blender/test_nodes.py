@@ -26,6 +26,7 @@ from synthroads_addon.blender.nodes.road_layout import MarkingLayout, SideLayout
 from synthroads_addon.blender.nodes.strip import strip_group
 from synthroads_addon.blender.nodes.vehicle import vehicle_group
 from synthroads_addon.core.parameters.chassis import CHASSIS
+from tests.blender.kept_groups import KeptGroups
 
 LAYOUT = (
     SideLayout("Left", 3, (MarkingLayout("outer", "outer_edge", 0), MarkingLayout("dashes", "lane", 1))),
@@ -178,6 +179,28 @@ class TestBuilder:
             set_modifier_input(modifier, "Hieght", 1.0)
 
 
+class TestKeptGroups:
+    def test_what_is_taken_is_what_would_be_made(self, kept_groups: KeptGroups) -> None:
+        def road() -> dict[str, str]:
+            bpy.ops.wm.read_factory_settings(use_empty=True)
+            strip_group()  # one of the road's that is there already
+            road_group(LAYOUT)
+            groups = bpy.data.node_groups
+            return {f"{group.name} {group[builder.KEY]} {group.users}": describe(group) for group in groups}
+
+        kept_groups.on = False
+        made = road()
+        kept_groups.on = True
+        road()
+        make, kept_groups._make = kept_groups._make, None
+        try:
+            taken = road()
+        finally:
+            kept_groups._make = make
+        assert taken == made
+        assert not bpy.data.libraries
+
+
 class TestGroups:
     def test_inputs_are_described_and_limited(self) -> None:
         for group in all_groups():
@@ -197,7 +220,6 @@ class TestGroups:
                     assert item.subtype in ("DISTANCE", "FACTOR"), where
             assert len(set(names)) == len(names), group.name
 
-    @pytest.mark.keep_groups
     def test_nodes_stand_in_named_frames_and_do_not_overlap(self) -> None:
         for group in all_groups():
             nodes = [node for node in group.nodes if node.type not in ("FRAME", "GROUP_OUTPUT")]
@@ -209,7 +231,6 @@ class TestGroups:
                 if link.from_node.parent == link.to_node.parent and link.to_node.parent is not None:
                     assert link.from_node.location_absolute.x < link.to_node.location_absolute.x, group.name
 
-    @pytest.mark.keep_groups
     def test_groups_are_valid(self) -> None:
         for group in all_groups():
             assert all(link.is_valid for link in group.links), group.name

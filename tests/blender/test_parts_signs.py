@@ -41,8 +41,6 @@ from tests.blender.furnished_road import (
 from tests.blender.own_frame import axes, own_frame
 from tests.blender.test_nodes import evaluated
 
-pytestmark = pytest.mark.keep_groups
-
 MOST_TRIANGLES = 1500
 MOST_MILLISECONDS = 20.0
 """Processor time for making a sign, on a busy machine."""

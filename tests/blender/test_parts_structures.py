@@ -29,8 +29,6 @@ from tests.blender.furnished_road import (
     volume,
 )
 
-pytestmark = pytest.mark.keep_groups
-
 PARTS = ("gantries", "overpasses", "beacons")
 
 

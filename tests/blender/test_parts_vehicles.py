@@ -31,8 +31,6 @@ from tests.blender.furnished_road import (
     volume,
 )
 
-pytestmark = pytest.mark.keep_groups
-
 MODELS = tuple(VEHICLE_TYPES)
 ON_ROAD = 0.01
 """What the wheels may be above or below the road, m."""

@@ -25,8 +25,6 @@ from synthroads_addon.core.parameters.turnout_shape import STEP
 from synthroads_addon.core.road_scenario import RoadScenario
 from synthroads_addon.core.scene_mesh import SceneMesh
 
-pytestmark = pytest.mark.keep_groups
-
 ROUNDING = 2e-4
 TOLERANCES = {"draft": 0.020, "standard": 0.005, "high": 0.001}
 CASES = [(name, section) for name, sections in SECTIONS_OF_CLASS.items() for section in sections]

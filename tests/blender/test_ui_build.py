@@ -20,6 +20,7 @@ from synthroads_addon.core.parameters.sampler import sample_road
 from synthroads_addon.core.scenario import load_scenario
 from synthroads_addon.ui import build
 from synthroads_addon.ui.job import Job, running_job
+from tests.blender.kept_groups import KeptGroups
 from tests.blender.panel_road import SAME, block_counts, cheap, choose, fingerprint, settings, users_own  # noqa: F401
 from tests.blender.scene_hash import changes, digest, lines
 
@@ -85,11 +86,13 @@ def test_cancelling_at_any_step_leaves_the_file_as_it_was(
     before: str,
     users_own: bpy.types.Object,  # noqa: F811
     monkeypatch: pytest.MonkeyPatch,
+    kept_groups: KeptGroups,
 ) -> None:
     if before != "nothing":
         model = build_road(parameters(length=40), 0.02, 0.1)
         model.collection.objects.link(users_own)
         model.collection.color_tag = "COLOR_03"
+        kept_groups.on = False  # steps end in the midst of making groups too
     monkeypatch.setattr(model_module, "_TURN", 0.002)
     expected, counts = digest(), block_counts()
     road = parameters()
@@ -143,8 +146,9 @@ def test_a_part_that_fails_leaves_the_road_before(monkeypatch: pytest.MonkeyPatc
         assert digest() == expected
 
 
-def test_groups_of_an_older_version_get_their_names_back(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_groups_of_an_older_version_get_their_names_back(kept_groups: KeptGroups) -> None:
     build_road(parameters(length=40), 0.02, 0.1)
+    kept_groups.on = False
     for group in bpy.data.node_groups:
         group["synthroads_key"] = "older"
     expected = digest()
@@ -193,6 +197,7 @@ def test_building_leaves_the_users_objects_alone(cheap: Any, users_own: bpy.type
     assert [item.name for item in bpy.data.objects if ROLE not in item] == [users_own.name]
 
 
+@pytest.mark.new_groups
 def test_the_operator_cancelled_at_any_tick_leaves_the_file(cheap: Any) -> None:  # noqa: F811
     choose(cheap, **{"road.length": 60.0})
     expected, counts = lines(), block_counts()

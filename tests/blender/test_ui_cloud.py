@@ -25,8 +25,6 @@ from tests.blender.panel_road import choose
 from tests.blender.scene_hash import digest
 from tests.core.conftest import make_points
 
-pytestmark = pytest.mark.keep_groups
-
 ORIGIN = np.array([294_000.0, 5_628_000.0, 180.0])
 
 

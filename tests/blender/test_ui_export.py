@@ -24,8 +24,6 @@ from tests.blender.fake_layout import FakeLayout, drawn
 from tests.blender.test_ui_cloud import write
 from tests.core.conftest import make_points
 
-pytestmark = pytest.mark.keep_groups
-
 
 @pytest.fixture(autouse=True)
 def settings() -> Iterator[Any]:

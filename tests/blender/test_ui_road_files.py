@@ -17,8 +17,6 @@ from synthroads_addon.pipeline import Job, generate, road_parameters
 from synthroads_addon.ui.road_files import source_of
 from tests.blender.panel_road import SAME, cheap, settings
 
-pytestmark = pytest.mark.keep_groups
-
 __all__ = ["cheap", "settings"]
 
 

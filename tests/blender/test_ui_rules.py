@@ -20,8 +20,6 @@ from synthroads_addon.core.parameters.model import Carriageway
 from synthroads_addon.ui import rules
 from tests.blender.fake_layout import drawn
 
-pytestmark = pytest.mark.keep_groups
-
 
 @pytest.fixture(autouse=True)
 def found() -> Iterator[Any]:

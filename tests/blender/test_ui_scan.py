@@ -23,8 +23,6 @@ from synthroads_addon.ui.scan_job import Written, scan_work
 from tests.blender.panel_road import SAME, block_counts, cheap, choose, road, road_file, settings  # noqa: F401
 from tests.blender.scene_hash import digest
 
-pytestmark = pytest.mark.keep_groups
-
 WRITTEN = sorted([n for o in ("parameters", "cloud", "centerline", "previews") for n in FILES[o]] + ["report.json"])
 
 
