@@ -64,6 +64,7 @@ from tests.core.ifc_reading import (
 )
 from tests.core.parameter_sets import OBJECTS, road_data
 from tests.core.sampled_parts import PAIRS, scenario
+from tests.core.twin_roads import full_road
 
 UTM = (294_123.456, 5_628_987.654, 181.25)
 MILLIMETRE = 1e-3
@@ -594,6 +595,17 @@ def test_both_kernels_read_the_same_surface(road) -> None:
     quick, exact = (body(course, exact)[0] for exact in (False, True))
     assert len(quick) == len(exact)
     assert np.abs(np.unique(quick.round(6), axis=0) - np.unique(exact.round(6), axis=0)).max() < 1e-6
+
+
+def test_no_face_is_thinner_than_points_are_apart(tmp_path) -> None:
+    """Where a gore begins it is micrometres wide; ifcopenshell's kernel for meshes refuses corners that near."""
+    file = written(full_road(), tmp_path)
+    for item in file.by_type("IfcTriangulatedFaceSet"):
+        corners = np.array(item.Coordinates.CoordList)[np.array(item.CoordIndex) - 1]
+        edges = np.linalg.norm(corners - np.roll(corners, -1, axis=1), axis=2)
+        doubled = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+        assert (doubled / edges.max(axis=1)).min() > 5e-6
+    assert len(body(named(file, "entry-left/gore", "IfcCourse"))[1]) > 60
 
 
 def test_finer_tolerance_more_rows(tmp_path) -> None:

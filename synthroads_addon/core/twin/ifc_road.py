@@ -26,6 +26,8 @@ from .ifc_scene import Scene, grid_triangles
 
 _NARROWEST = 1e-4
 """A strip that is nowhere wider (m) isn't there."""
+_POINTED = 1e-5
+"""Where a strip is narrower (m) it ends in a point: readers take corners this near for one, and its faces for faulty."""
 _SIDES = ("left", "right")
 _PART_TYPES = {
     "lane": "TRAFFICLANE",
@@ -257,6 +259,8 @@ class _Direction:
         inner, outer = section.distances(station)[:, index : index + 2].T
         crossfall = geometry.crossfall(self.carriageway, station)
         low, high = section.elevations(station, crossfall)[:, index : index + 2].T
+        there = outer - inner > _POINTED
+        outer, high = np.where(there, outer, inner), np.where(there, high, low)
         distance = inner[:, None] + (outer - inner)[:, None] * shares
         height = geometry.profile.elevation(station)[:, None] + low[:, None] + (high - low)[:, None] * shares
         every, offset = np.repeat(station, len(shares)), self.carriageway.sign * distance.ravel()
