@@ -5,8 +5,8 @@ PYTHON ?=
 OUT ?= out
 PLATFORM ?=
 # Extras of the two test environments: `ml` in the first only, as on Linux PyPI's torch comes with gigabytes of CUDA.
-EXTRAS_3_11 ?= blender,dev,ml
-EXTRAS_3_13 ?= blender,dev
+EXTRAS_3_11 ?= blender,dev,judges,ml
+EXTRAS_3_13 ?= blender,dev,judges
 
 export PYTHON
 ENVIRONMENT = sh tools/any_env.sh
