@@ -23,13 +23,13 @@ EXTRAS = {
     "demo": "blender",
     "docs": "docs",
     # `ml` on one Python only, as on Linux PyPI's torch comes with gigabytes of CUDA.
-    "tests-3.11": "blender,dev,ml",
-    "tests-3.13": "blender,dev",
+    "tests-3.11": "blender,dev,judges,ml",
+    "tests-3.13": "blender,dev,judges",
 }
 """What of pyproject.toml is installed into each environment."""
 PARTS = {"blender": ["tests/blender"], "others": ["tests", "--ignore=tests/blender"]}
 """The tests in two processes: once ifcopenshell has worked in one, Blender 5.2's OBJ exporter aborts there."""
-ONLY: dict[tuple[str, str], str] = {}
+ONLY: dict[tuple[str, str], str] = {("3.13", "others"): "smoke"}
 """Marker expressions by Python and part, where not all of a part's tests are run on that Python."""
 
 nox.needs_version = ">=2026.10"

@@ -11,7 +11,6 @@ from typing import Any
 import jsonschema
 import numpy as np
 
-SCHEMA = Path(__file__).resolve().parents[3] / "shared" / "standards" / "cityjson-2.0.2.min.schema.json"
 SURFACES = ("MultiSurface", "CompositeSurface")
 
 

@@ -1,4 +1,4 @@
-"""An IFC file as its readers see it: ifcopenshell's geometry, placements, curves and validator."""
+"""An IFC file as its readers see it: ifcopenshell's geometry, placements and curves."""
 
 from __future__ import annotations
 
@@ -10,7 +10,6 @@ import ifcopenshell.geom
 import ifcopenshell.util.element
 import ifcopenshell.util.geolocation
 import ifcopenshell.util.placement
-import ifcopenshell.validate
 import numpy as np
 
 from synthroads_addon.core.parameters.model import RoadParameters
@@ -26,13 +25,6 @@ def written(parameters: RoadParameters, folder: Path, tolerance: float = 0.005) 
     path = folder / "twin.ifc"
     write_ifc(parameters, path, tolerance)
     return ifcopenshell.open(str(path))
-
-
-def issues(file: Any, express_rules: bool = True) -> list[str]:
-    """Return what the validator finds."""
-    log = ifcopenshell.validate.json_logger()
-    ifcopenshell.validate.validate(file, log, express_rules=express_rules)
-    return [f"{item['level']}: {item['message'][:300]}" for item in log.statements]
 
 
 def named(file: Any, name: str, entity: str = "IfcProduct") -> Any:
@@ -73,6 +65,12 @@ def body(item: Any, exact: bool = False) -> tuple[np.ndarray, np.ndarray]:
         SETTINGS, item, geometry_library="manifold" if tessellated and not exact else "opencascade"
     ).geometry
     return np.array(shape.verts).reshape(-1, 3), np.array(shape.faces).reshape(-1, 3)
+
+
+def local_body(item: Any) -> tuple[np.ndarray, np.ndarray]:
+    """Return the vertices (N, 3) and triangles (M, 3) of a product in the frame of its placement."""
+    (vertices, triangles), frame = body(item), placement(item)
+    return (vertices - frame[:3, 3]) @ frame[:3, :3], triangles
 
 
 def parts(item: Any) -> list[Any]:

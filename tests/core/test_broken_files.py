@@ -24,6 +24,7 @@ from synthroads_addon.core.parameters.elevation_model import read_elevation_mode
 from tests.core.conftest import make_points
 from tests.core.mutations import TOKENS, accepted, cases, damaged, for_all, limited
 from tests.core.test_elevation_model import EPSG, ascii_grid, centres, corridor, geotiff, plane
+from tests.judges import require
 
 ORIGIN = np.array([294_000.0, 5_628_000.0, 180.0])
 SHORT = [token for token in TOKENS if len(token) < 100]
@@ -215,7 +216,7 @@ def test_points_that_are_not_finite_are_refused_by_name(tmp_path: Path, ending: 
 
 def test_points_of_e57_that_are_not_finite_are_refused_by_name(tmp_path: Path, monkeypatch) -> None:
     """pye57 writes no NaN, but others do: here the scan's pose is the one."""
-    pytest.importorskip("pye57")
+    require("pye57")
     from synthroads_addon.core.cloud import e57_reading
 
     monkeypatch.setattr(e57_reading, "_pose", lambda scan: (np.eye(3), np.array([0.0, 0.0, np.nan])))

@@ -24,6 +24,7 @@ from synthroads_addon.core.cloud.writing import ENDINGS, CloudWriter, open_write
 from synthroads_addon.core.errors import InputError, MissingFileError, OutputError
 from tests.core.cloud_points import with_every_attribute
 from tests.core.conftest import make_points
+from tests.judges import require
 
 SCALE = 65535 * 900.0
 ORIGIN = np.array([294_000.5, 5_628_000.0, 180.0])
@@ -48,7 +49,7 @@ ROUNDING = 8e-6
 @pytest.fixture(params=ENDINGS)
 def ending(request) -> str:
     if request.param == ".e57":
-        pytest.importorskip("pye57")
+        require("pye57")
     return request.param
 
 
@@ -100,7 +101,7 @@ def test_any_points_in_any_blocks_round_trip(tmp_path: Path, data, count, wanted
     """Extremes included: empty blocks, no range, zero and full values, returns 0 to 15, unlabelled points."""
     suffix = data.draw(st.sampled_from(ENDINGS))
     if suffix == ".e57":
-        pytest.importorskip("pye57")
+        require("pye57")
     rng = np.random.default_rng(seed)
     block = with_every_attribute(make_points(count, seed), seed)
     smallest = 1 if suffix == ".e57" else 0  # E57 counts returns from 0
@@ -265,7 +266,7 @@ def test_unknown_ending(tmp_path: Path) -> None:
 
 def test_conversion_through_every_format_loses_nothing(tmp_path: Path, points) -> None:
     """A cloud with 8-bit colours and whole millimetres comes back to the byte."""
-    pytest.importorskip("pye57")
+    require("pye57")
     block = with_every_attribute(points)
     block = replace(block, rgb=block.rgb // 257 * 257, true_xyz=block.xyz, scanner=block.xyz)
     write(tmp_path / "a.laz", block)
@@ -276,7 +277,9 @@ def test_conversion_through_every_format_loses_nothing(tmp_path: Path, points) -
 
 
 def test_ply_is_read_by_an_independent_reader(tmp_path: Path, points) -> None:
-    plyfile = pytest.importorskip("plyfile")
+    require("plyfile")
+    import plyfile
+
     block = with_every_attribute(points)
     write(tmp_path / "cloud.ply", block)
     vertex = plyfile.PlyData.read(tmp_path / "cloud.ply")["vertex"]
@@ -296,7 +299,9 @@ def test_ply_header_is_right_for_any_number(tmp_path: Path, count: int) -> None:
 
 
 def test_foreign_ply(tmp_path: Path) -> None:
-    plyfile = pytest.importorskip("plyfile")
+    require("plyfile")
+    import plyfile
+
     kinds = [("x", "f4"), ("y", "f4"), ("z", "f4"), ("red", "u1"), ("green", "u1"), ("blue", "u1"), ("label", "u1")]
     record = np.zeros(5, dtype=[*kinds, ("curvature", "f4")])
     record["x"], record["red"], record["label"] = np.arange(5), 255, 6
@@ -313,7 +318,9 @@ def test_foreign_ply(tmp_path: Path) -> None:
 
 
 def test_e57_is_read_by_pye57_in_map_coordinates(tmp_path: Path, points) -> None:
-    pye57 = pytest.importorskip("pye57")
+    require("pye57")
+    import pye57
+
     write(tmp_path / "cloud.e57", points, attributes=DEFAULT_ATTRIBUTES)
     with pye57.E57(str(tmp_path / "cloud.e57")) as file:
         assert file.get_header(0).point_count == len(points)
@@ -327,7 +334,9 @@ def test_e57_is_read_by_pye57_in_map_coordinates(tmp_path: Path, points) -> None
 
 
 def test_foreign_e57_with_a_turned_pose(tmp_path: Path) -> None:
-    pye57 = pytest.importorskip("pye57")
+    require("pye57")
+    import pye57
+
     local = np.array([[1.0, 0.0, 0.0], [0.0, 2.0, 0.5]])
     data = {f"cartesian{axis}": local[:, i] for i, axis in enumerate("XYZ")}
     with pye57.E57(str(tmp_path / "cloud.e57"), mode="w") as file:

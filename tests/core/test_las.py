@@ -17,6 +17,7 @@ from synthroads_addon.core.cloud.las import LasWriter
 from synthroads_addon.core.cloud.points import concatenate
 from synthroads_addon.core.errors import InputError, OutputError
 from tests.core.cloud_points import with_every_attribute
+from tests.judges import require
 
 SCALE = 65535 * 900.0
 ORIGIN = np.array([294_000.0, 5_628_000.0, 180.0])
@@ -178,7 +179,7 @@ def _check_extra_bytes(data: bytes, head: dict[str, Any]) -> None:
 
 def test_an_independent_reader_reads_every_attribute(tmp_path: Path, points) -> None:
     """LASzip's own code, which has nothing in common with the writer's."""
-    pytest.importorskip("laszip")
+    require("laszip")
     block = with_every_attribute(points)
     with LasWriter(tmp_path / "cloud.laz", 25832, ORIGIN, SCALE, ATTRIBUTES) as writer:
         writer.write(block)

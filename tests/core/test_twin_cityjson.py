@@ -24,8 +24,10 @@ from synthroads_addon.core.parameters.model import (
 )
 from synthroads_addon.core.parameters.turnout_shape import STEP
 from synthroads_addon.core.twin.cityjson import write_cityjson
-from tests.core.cityjson_files import SCHEMA, City, OfficialSchema, faults_of, read_city, thinned
+from tests.core.cityjson_files import City, OfficialSchema, faults_of, read_city, thinned
 from tests.core.twin_roads import full_road, many_roads
+from tests.judges import JUDGES, require
+from tests.judges.cityjson import official_schema
 
 TOLERANCE = 0.005
 AREAS = ("TrafficArea", "AuxiliaryTrafficArea")
@@ -45,7 +47,7 @@ def full_city(tmp_path_factory: pytest.TempPathFactory) -> City:
 @pytest.fixture(scope="module")
 def schema() -> OfficialSchema | None:
     """The official schema where it is there."""
-    return OfficialSchema(json.loads(SCHEMA.read_text(encoding="utf-8"))) if SCHEMA.exists() else None
+    return OfficialSchema(official_schema()) if JUDGES["cityjson-schema"].version() else None
 
 
 # --- valid ------------------------------------------------------------------------------------------------------
@@ -68,8 +70,8 @@ def test_the_roads_are_of_all_kinds() -> None:
     assert wanted <= set(kinds)
 
 
-@pytest.mark.skipif(not SCHEMA.exists(), reason=f"the official schema is not at {SCHEMA}")
 def test_a_whole_file_fits_the_official_schema(schema: OfficialSchema, full_city: City, tmp_path: Path) -> None:
+    require("cityjson-schema")
     assert schema.errors(full_city.data) == []
     data = thinned(city_of(many_roads()[3], tmp_path).data)
     assert [error.message for error in schema.whole.iter_errors(data)] == []
@@ -273,40 +275,3 @@ def test_same_bytes_twice(tmp_path: Path) -> None:
     for name in ("a", "b"):
         write_cityjson(full_road(), tmp_path / name, TOLERANCE)
     assert (tmp_path / "a").read_bytes() == (tmp_path / "b").read_bytes()
-
-
-# --- read by others ---------------------------------------------------------------------------------------------
-
-
-def test_cjio_reads_it_and_measures_the_same(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    # Importing cjio makes the whole process write every float of JSON with six decimals: put back what it replaces.
-    monkeypatch.setattr(json.encoder, "c_make_encoder", json.encoder.c_make_encoder)
-    monkeypatch.setattr(json.encoder, "float", float, raising=False)
-    cityjson = pytest.importorskip("cjio.cityjson")
-    road = full_road()
-    write_cityjson(road, tmp_path / "a.city.json", TOLERANCE)
-    with (tmp_path / "a.city.json").open(encoding="utf-8") as file:
-        model = cityjson.reader(file)
-    count = len(model.j["vertices"])
-    model.remove_duplicate_vertices()
-    model.remove_orphan_vertices()
-    assert len(model.j["vertices"]) == count
-    assert model.get_epsg() == road.metadata.epsg
-    model.decompress()
-    city = City(model.j, np.array(model.j["vertices"]))
-    axis = next(name for name, item in road.objects.items() if item is road.alignment)
-    (line,) = model.j["CityObjects"][axis]["geometry"][0]["boundaries"]
-    plan = city.vertices[line, :2]
-    # Chords are shorter than the arc; at this tolerance by millimetres on the whole road.
-    assert np.linalg.norm(np.diff(plan, axis=0), axis=1).sum() == pytest.approx(road.alignment.length, abs=0.02)
-    carriageway = road.carriageway("right")
-    section = RoadGeometry(road).sections["right"]
-    boundaries = section.lane_boundaries(700.0)[0]
-    for _, about, rings in city.surfaces("TrafficArea"):
-        if about["instance"] == carriageway.instance and about["strip"] == "lane":
-            wanted = boundaries[about["lane"]] - boundaries[about["lane"] + 1]
-            assert width_at(road, rings, 700.0) == pytest.approx(wanted, abs=0.001)
-    roads = model.get_subset_cotype(["Road"])
-    monkeypatch.undo()
-    assert json.dumps(1.5) == "1.5"
-    assert set(roads.j["CityObjects"]) == {n for n, item in city.objects.items() if item["type"] == "Road"}

@@ -31,10 +31,11 @@ from synthroads_addon.core.parameters.painted_areas import arrow_outlines, hatch
 from synthroads_addon.core.parameters.sampler import sample_road
 from synthroads_addon.core.twin.opendrive import geo_reference, write_opendrive
 from synthroads_addon.core.twin.opendrive_pieces import chords, cubics, runs
-from tests.core import opendrive_checkers as others
 from tests.core.checker_full_road import full
 from tests.core.opendrive_reader import OpenDrive, corners_local, corners_road, notes_of, number
 from tests.core.sampled_parts import PAIRS, full_roads, scenario
+from tests.judges import require
+from tests.judges.opendrive import quality, quality_faults
 
 ORIGIN = (294_010.123456, 5_628_000.456789, 181.25)
 EVERYTHING = {"turnouts": {"exits": 1, "entries": 1, "emergency_bays": 1}, "lane_changes": {"share": 1}}
@@ -487,7 +488,9 @@ def test_header_tells_where_on_earth(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("epsg", [25832, 32633, 31467, 2056, 5555])
 def test_coordinate_systems_place_points_alike(epsg: int) -> None:
-    pyproj = pytest.importorskip("pyproj")
+    require("pyproj")
+    import pyproj
+
     other = pyproj.CRS.from_user_input(geo_reference(epsg))
     own = pyproj.CRS.from_epsg(epsg)
     for crs in (own, other):
@@ -582,31 +585,19 @@ def test_planted_faults_show(tmp_path: Path, path: str, name: str, by: float) ->
     assert worst_border(road, OpenDrive.read(tmp_path / "bad.xodr")) > MILLIMETRE / 2.0
 
 
-# --- programs of others -------------------------------------------------------------------------------------------
-
-with_quality_checker = pytest.mark.skipif(not others.has("qc_opendrive"), reason="asam-qc-opendrive isn't installed")
+# --- ASAM's checker; `tests/core/test_judges.py` has other readers ------------------------------------------------
 
 
-def faultless(paths: list[Path]) -> None:
-    for path, checks in others.quality(paths).items():
-        assert len(checks) == 23
-        for name, (status, issues) in checks.items():
-            assert issues == [], (path, name)
-            assert status == ("skipped" if name == others.NOT_APPLICABLE else "completed"), (path, name)
+@pytest.mark.parametrize("name", ["widening", "sampled"])
+def test_quality_checker_finds_nothing(name: str, tmp_path: Path) -> None:
+    require("asam-qc-opendrive")
+    write_opendrive(ROADS[name](), tmp_path / "road.xodr", TOLERANCE)
+    assert quality_faults(tmp_path / "road.xodr") == []
 
 
-@with_quality_checker
-def test_quality_checker_finds_nothing(tmp_path: Path) -> None:
-    paths = []
-    for name in ("widening", "sampled"):
-        paths.append(tmp_path / f"{name}.xodr")
-        write_opendrive(ROADS[name](), paths[-1], TOLERANCE)
-    faultless(paths)
-
-
-@with_quality_checker
 @pytest.mark.slow
 def test_quality_checker_finds_nothing_in_fifty_roads(tmp_path: Path) -> None:
+    require("asam-qc-opendrive")
     roads = [ROADS[name]() for name in ("everything", "curved", "right only", "left only", "widening")]
     for i, (design_class, section) in enumerate(PAIRS):
         for seed, more in enumerate(
@@ -618,15 +609,15 @@ def test_quality_checker_finds_nothing_in_fifty_roads(tmp_path: Path) -> None:
     assert len(roads) == 50
     assert sum(bool(road.of_type(Turnout)) for road in roads) >= 20
     assert sum(bool(road.of_type(ConstructionBeacon)) for road in roads) >= 10
-    paths = [tmp_path / f"{i}.xodr" for i in range(len(roads))]
-    for road, path in zip(roads, paths, strict=True):
+    for i, road in enumerate(roads):
+        path = tmp_path / f"{i}.xodr"
         write_opendrive(road, path, TOLERANCE)
         assert worst_border(road, OpenDrive.read(path)) < 0.2 * MILLIMETRE
-    faultless(paths)
+        assert quality_faults(path) == []
 
 
-@with_quality_checker
 def test_quality_checker_sees_planted_faults(tmp_path: Path) -> None:
+    require("asam-qc-opendrive")
     write_opendrive(sample_road(scenario(length=600.0), 7), tmp_path / "good.xodr", TOLERANCE)
     text = (tmp_path / "good.xodr").read_text()
     faults = {
@@ -642,54 +633,15 @@ def test_quality_checker_sees_planted_faults(tmp_path: Path) -> None:
             r"\g<1>0\2\g<1>0.01\2",
         ),
     }
-    paths = {}
     for name, (pattern, to) in faults.items():
         bad, count = re.subn(pattern, to, text, count=1)
         assert count == 1, name
-        paths[name] = tmp_path / f"{name}.xodr"
-        paths[name].write_text(bad)
-    found = others.quality(list(paths.values()))
-    for name, path in paths.items():
-        assert [check for check, (_, issues) in found[str(path)].items() if issues and name in check], name
+        (tmp_path / "bad.xodr").write_text(bad)
+        found = quality(tmp_path / "bad.xodr")
+        assert [check for check, (_, issues) in found.items() if issues and name in check], name
 
 
-@pytest.mark.slow
-@pytest.mark.skipif(not others.has("pyxodr"), reason="pyxodr isn't installed")
-def test_pyxodr_reads_the_same_borders(tmp_path: Path) -> None:
-    road = sample_road(scenario(length=600.0), 7)
-    write_opendrive(road, tmp_path / "road.xodr", TOLERANCE)
-    geometry, resolution = RoadGeometry(road), 0.02
-    borders = others.pyxodr_borders(tmp_path / "road.xodr", resolution)
-    assert len(borders) > 50
-    for _, points in borders:
-        s, t = geometry.alignment.project(np.array(points)[:, :2])
-        inside = (s > 0.1) & (s < geometry.length - 0.1)
-        s, t = s[inside], t[inside]
-        # It samples at its own resolution: where a border runs obliquely that is as far off as it moves on.
-        slope = np.abs(geometry.offsets(s + resolution) - geometry.offsets(s - resolution)).max(axis=1, initial=0.0)
-        assert np.all(np.abs(geometry.offsets(s) - t[:, None]).min(axis=1) < MILLIMETRE + slope)
-
-
-@pytest.mark.skipif(not others.has("ad_map_access"), reason="ad-map-access isn't installed")
-def test_ad_map_access_reads_the_same_edges(tmp_path: Path) -> None:
-    """It leaves the header's offset out, so its points lie around the origin of the map's coordinate system."""
-    pyproj = pytest.importorskip("pyproj")
-    road = sample_road(scenario(length=600.0), 7)
-    write_opendrive(road, tmp_path / "road.xodr", TOLERANCE)
-    geometry = RoadGeometry(road)
-    to_geographic = pyproj.Transformer.from_crs(4978, 4979, always_xy=True)
-    to_map = pyproj.Proj(geo_reference(road.metadata.epsg))
-    edges = others.ad_map_edges(tmp_path / "road.xodr", tmp_path / "edges.json")
-    assert len(edges) > 200
-    for _, points in edges:
-        longitude, latitude, _ = to_geographic.transform(*np.array(points).T)
-        s, t = geometry.alignment.project(np.column_stack(to_map(longitude, latitude)))
-        inside = (s > 0.01) & (s < geometry.length - 0.01)
-        s, t = s[inside], t[inside]
-        known = np.column_stack([geometry.offsets(s), np.zeros(len(s))])
-        # What opens at once does so over 5 cm, in which it has its own points.
-        steep = np.abs(geometry.offsets(s + 0.05) - geometry.offsets(s - 0.05)).max(axis=1, initial=0.0) > 0.1
-        assert np.all((np.abs(known - t[:, None]).min(axis=1) < 0.2 * MILLIMETRE) | steep)
+# --- cost ---------------------------------------------------------------------------------------------------------
 
 
 def test_long_road_takes_seconds(tmp_path: Path) -> None:

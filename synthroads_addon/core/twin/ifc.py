@@ -26,6 +26,8 @@ from .surfaces import road_stations
 
 _LONGEST = 200_000.0
 """Longest road that is written as one file, m: as long as scenarios can be."""
+_SHORTEST = 1e-3
+"""Shortest road, m: lengths have six decimals."""
 
 
 def write_ifc(parameters: RoadParameters, path: Path, tolerance: float = 0.005) -> None:
@@ -37,8 +39,11 @@ def write_ifc(parameters: RoadParameters, path: Path, tolerance: float = 0.005) 
         tolerance: largest chord error of the road's surfaces, m; their vertices are exact.
 
     Raises:
-        InputError: ifcopenshell isn't installed, the map coordinate system is unknown, or the road is too long.
+        InputError: ifcopenshell isn't installed, the map coordinate system is unknown, or the road is too long or too
+            short.
     """
+    if parameters.alignment.length < _SHORTEST:
+        raise InputError("alignment: length", parameters.alignment.length, "an IFC file holds a millimetre or more")
     if parameters.alignment.length > _LONGEST:
         raise InputError("alignment: length", parameters.alignment.length, "an IFC file holds up to 200 km (200000 m)")
     ifc = IfcFile(parameters.metadata.identifier)

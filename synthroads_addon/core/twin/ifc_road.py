@@ -26,6 +26,8 @@ from .ifc_scene import Scene, grid_triangles
 
 _NARROWEST = 1e-4
 """A strip that is nowhere wider (m) isn't there."""
+_POINTED = 1e-5
+"""Where a strip is narrower (m) it ends in a point: readers take corners so near for one, and its faces for faulty."""
 _SIDES = ("left", "right")
 _PART_TYPES = {
     "lane": "TRAFFICLANE",
@@ -67,8 +69,7 @@ def write_carriageways(scene: Scene) -> None:
         scene.parts[f"roadside-{side}"] = _part(scene, scene.road, f"road/roadside-{side}", "ROADSIDE")
     for name, carriageway in scene.geometry.parameters.of_type(Carriageway).items():
         _Direction(scene, name, carriageway).write()
-    if any(strip.kind == "median" for strip in scene.geometry.strips):
-        _write_median(scene)
+    _write_median(scene)
 
 
 def _part(scene: Scene, whole: Entity, name: str, kind: str, usage: str = "LATERAL", about: str = "") -> Entity:
@@ -257,6 +258,8 @@ class _Direction:
         inner, outer = section.distances(station)[:, index : index + 2].T
         crossfall = geometry.crossfall(self.carriageway, station)
         low, high = section.elevations(station, crossfall)[:, index : index + 2].T
+        there = outer - inner > _POINTED
+        outer, high = np.where(there, outer, inner), np.where(there, high, low)
         distance = inner[:, None] + (outer - inner)[:, None] * shares
         height = geometry.profile.elevation(station)[:, None] + low[:, None] + (high - low)[:, None] * shares
         every, offset = np.repeat(station, len(shares)), self.carriageway.sign * distance.ravel()
@@ -329,14 +332,25 @@ def _local_damage(section: CarriagewaySection, low: float, high: float) -> Carri
 
 
 def _write_median(scene: Scene) -> None:
-    """Add the strip between the carriageways."""
-    ifc, geometry = scene.ifc, scene.geometry
-    index = next(i for i, strip in enumerate(geometry.strips) if strip.kind == "median")
-    strip = geometry.strips[index]
+    """Add the strip between the carriageways; beside a single one a median is named, and has no surface."""
+    geometry = scene.geometry
+    index = next((i for i, strip in enumerate(geometry.strips) if strip.kind == "median"), None)
     found = next(iter(geometry.parameters.of_type(Median).items()), None)
+    if index is None and found is None:
+        return
     name = found[0] if found else "road/median"
     part = _part(scene, scene.road, name, "CENTRALRESERVE")
     scene.parts["median"] = part
+    if index is not None:
+        _write_median_surface(scene, index, name, part)
+    if found:
+        scene.describe(part, found[1])
+
+
+def _write_median_surface(scene: Scene, index: int, name: str, part: Entity) -> None:
+    """Add the surface of a strip to the part of the road that it is."""
+    ifc, geometry = scene.ifc, scene.geometry
+    strip = geometry.strips[index]
     station = scene.stations
     sides = geometry.offsets(station)[:, index : index + 2][:, ::-1]
     heights = geometry.boundary_elevations(station)[:, index : index + 2][:, ::-1]
@@ -356,5 +370,3 @@ def _write_median(scene: Scene) -> None:
     ifc.made_of(fill, strip.material)
     values = {"instance": ifc.value(strip.instance), "class": ifc.value(strip.class_name)}
     ifc.properties(fill, "SynthRoads", values)
-    if found:
-        scene.describe(part, found[1])

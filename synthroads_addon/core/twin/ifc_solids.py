@@ -15,31 +15,44 @@ from .ifc_file import Entity, IfcFile, short
 Point2 = tuple[float, float]
 Point3 = tuple[float, float, float]
 
+
 class Solids:
-    """Makes extrusions that are turned about the vertical by an angle (rad)."""
+    """Makes extrusions that are turned about the vertical by an angle (rad).
+
+    What has no extent along one of its axes, as the post of a gantry whose beam lies below the post's foot, has no
+    body: None.
+    """
 
     def __init__(self, ifc: IfcFile, turn: float = 0.0) -> None:
         self.ifc = ifc
         self._turn = turn
 
-    def box(self, size: Point3, foot: Point3) -> Entity:
+    def box(self, size: Point3, foot: Point3) -> Entity | None:
         """Add a box of a size along x, y and z; ``foot`` is the middle of its underside."""
+        if _flat(*size):
+            return None
         axes = self.ifc.add("IfcAxis2Placement2D", self.ifc.point(0.0, 0.0), None)
         profile = self.ifc.add("IfcRectangleProfileDef", "AREA", None, axes, *short(size[:2]))
         return self._upwards(profile, foot, size[2])
 
-    def cylinder(self, diameter: float, foot: Point3, height: float) -> Entity:
+    def cylinder(self, diameter: float, foot: Point3, height: float) -> Entity | None:
         """Add an upright cylinder."""
+        if _flat(diameter / 2.0, height):
+            return None
         axes = self.ifc.add("IfcAxis2Placement2D", self.ifc.point(0.0, 0.0), None)
         profile = self.ifc.add("IfcCircleProfileDef", "AREA", None, axes, short(diameter / 2.0))
         return self._upwards(profile, foot, height)
 
-    def prism(self, outline: Sequence[Point2], foot: Point3, height: float) -> Entity:
+    def prism(self, outline: Sequence[Point2], foot: Point3, height: float) -> Entity | None:
         """Add an upright prism over an outline in x and y around its foot."""
+        if _flat(height):
+            return None
         return self._upwards(self._outline(outline), foot, height)
 
-    def plate(self, shape: str, width: float, height: float, middle: Point3, thickness: float) -> Entity:
+    def plate(self, shape: str, width: float, height: float, middle: Point3, thickness: float) -> Entity | None:
         """Add an upright plate that faces the driver; ``middle`` is that of its back."""
+        if _flat(width / 2.0, height / 2.0, thickness):
+            return None
         ifc = self.ifc
         if shape not in SIGN_OUTLINES:
             axes = ifc.add("IfcAxis2Placement2D", ifc.point(0.0, 0.0), None)
@@ -74,3 +87,8 @@ class Solids:
         return self.ifc.add(
             "IfcExtrudedAreaSolid", profile, position, self.ifc.direction(0.0, 0.0, 1.0), short(depth)
         )
+
+
+def _flat(*lengths: float) -> bool:
+    """Return whether one of some lengths (m) isn't positive as it would be written."""
+    return min(short(lengths)) <= 0.0

@@ -1,0 +1,91 @@
+"""Clouds, judged by readers that share no code with the writers."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from tests.judges.samples import Samples
+
+_LAS_STEP, _E57_STEP = 5e-4, 5e-5
+"""Half a step of stored coordinates, m."""
+
+
+def _compared(samples: Samples, xyz: np.ndarray, step: float, exact: Mapping[str, tuple[Any, Any]]) -> list[str]:
+    """Return what differs from the points that were written: coordinates by more than a step, others at all."""
+    wanted = samples.points.xyz
+    if xyz.shape != wanted.shape:
+        return [f"{len(xyz)} points of {len(wanted)}"]
+    found = []
+    away = float(np.abs(xyz - wanted).max())
+    if away > step + 1e-9:
+        found.append(f"coordinates are up to {away:.3g} m off")
+    for name, (have, want) in exact.items():
+        if not np.array_equal(have, want):
+            found.append(f"{name} differs")
+    return found
+
+
+def laszip_verdict(samples: Samples) -> list[str]:
+    """Return what LASzip's own code reads differently."""
+    import laspy
+
+    with laspy.open(samples.file("cloud.laz"), laz_backend=laspy.LazBackend.Laszip) as reader:
+        las = reader.read()
+    points = samples.points
+    exact = {
+        "gps_time": (las.gps_time, points.gps_time),
+        "red": (las.red, points.rgb[:, 0]),
+        "class_id": (las["class_id"], points.class_id),
+        "instance_id": (las["instance_id"], points.instance_id),
+        "return_number": (las.return_number, points.return_number),
+    }
+    return _compared(samples, np.asarray(las.xyz), _LAS_STEP, exact)
+
+
+def with_another_scale(samples: Samples) -> Samples:
+    """Return files with a LAZ whose steps of x are said to be twice as long."""
+    data = bytearray(samples.file("cloud.laz").read_bytes())
+    data[131:139] = (2.0 * np.frombuffer(data[131:139], "<f8")).tobytes()
+    return samples.with_file("cloud.laz", bytes(data))
+
+
+def plyfile_verdict(samples: Samples) -> list[str]:
+    """Return what plyfile reads differently."""
+    import plyfile
+
+    vertex = plyfile.PlyData.read(samples.file("cloud.ply"))["vertex"]
+    points = samples.points
+    exact = {
+        "red": (vertex["red"], points.rgb[:, 0] >> 8),
+        "class_id": (vertex["class_id"], points.class_id),
+        "instance_id": (vertex["instance_id"], points.instance_id),
+        "gps_time": (vertex["gps_time"], points.gps_time),
+    }
+    return _compared(samples, np.stack([vertex[axis] for axis in "xyz"], axis=1), 0.0, exact)
+
+
+def with_another_point(samples: Samples) -> Samples:
+    """Return files with a PLY in which a bit of the first point is another."""
+    data = bytearray(samples.file("cloud.ply").read_bytes())
+    data[data.index(b"end_header\n") + 11 + 6] ^= 1
+    return samples.with_file("cloud.ply", bytes(data))
+
+
+def pye57_verdict(samples: Samples) -> list[str]:
+    """Return what libE57 reads differently, by pye57."""
+    import pye57
+
+    with pye57.E57(str(samples.file("cloud.e57"))) as file:
+        scan = file.read_scan(0, intensity=True, colors=True, ignore_missing_fields=True)
+    xyz = np.stack([scan[f"cartesian{axis}"] for axis in "XYZ"], axis=1)
+    return _compared(samples, xyz, _E57_STEP, {"red": (scan["colorRed"], samples.points.rgb[:, 0] >> 8)})
+
+
+def with_a_broken_page(samples: Samples) -> Samples:
+    """Return files with an E57 in which a bit of the points is another: its pages have checksums."""
+    data = bytearray(samples.file("cloud.e57").read_bytes())
+    data[len(data) // 2] ^= 1
+    return samples.with_file("cloud.e57", bytes(data))
