@@ -35,9 +35,9 @@ def road_points(count: int, seed: int, length: float = 60.0) -> tuple[np.ndarray
     return xyz, color.astype(np.uint8), np.clip(bright, 0.01, 1.0), label
 
 
-def road_tile(count: int = 6000, seed: int = 1, scene: str = "road", gain: float = 1.0) -> Tile:
+def road_tile(count: int = 6000, seed: int = 1, scene: str = "road", gain: float = 1.0, length: float = 60.0) -> Tile:
     """Return the points as a tile; intensities times ``gain``."""
-    xyz, rgb, intensity, label = road_points(count, seed)
+    xyz, rgb, intensity, label = road_points(count, seed, length)
     strength = np.clip(intensity * gain, 0.0, 1.0).astype(np.float32)
     return Tile(scene, np.array([4e5, 5.6e6, 100.0]), xyz.astype(np.float32), rgb, strength, label.astype(np.int16))
 

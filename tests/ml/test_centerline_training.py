@@ -42,7 +42,7 @@ def configuration(folder: Path, name: str = "transformer", **changes: Any) -> ta
         "data": {"data_sets": [str(folder)], "cache": str(folder / "cache")},
         "slices": {"half_width": 20.0, "points_per_slice": 96},
         "model": SMALL | {"name": name, "dropout": 0.1},
-        "batches": {"size": 4, "steps": 4, "passes": 2, "validation": 8},
+        "batches": {"size": 4, "steps": 4, "passes": 2, "validation": 4},
         "schedule": {"epochs": 2, "learning_rate": 0.003, "warmup": 0.2},
     }
     return from_data(plain | changes, KINDS, "test")

@@ -54,7 +54,7 @@ def data(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("data")
     for name, gain in (("real", 1.0), ("synthetic", 0.3)):
         for split, seed in (("train", 1), ("test", 3)):
-            tiles = [road_tile(1200, seed + k, f"{name}{k}", gain) for k in range(2)]
+            tiles = [road_tile(500, seed + k, f"{name}{k}", gain, 20.0) for k in range(2)]
             write_pointcept(folder / name, split, tiles)
     return folder
 
@@ -74,8 +74,8 @@ def trained(data: Path, tmp_path_factory: pytest.TempPathFactory) -> Trained:
 
 
 def small(data: Path, **changes: Any) -> SegmentationConfiguration:
-    """Return the toy with the smallest crops."""
-    return toy(data, **{"crop_points": 300, **changes})
+    """Return the toy with few small crops."""
+    return toy(data, **{"crop_points": 300, "crops_per_tile": 2, **changes})
 
 
 def weights(folder: Path) -> dict[str, torch.Tensor]:
@@ -182,7 +182,7 @@ def test_every_set_up_and_option_trains(data: Path, tmp_path: Path) -> None:
     for number, case in enumerate(cases):
         metrics = task.train(Run.start(tmp_path / str(number), small(data, **short, **case)))
         assert 0.0 <= metrics["unseen_mean_iou"] <= 1.0
-        assert metrics["tests"]["unseen"]["points"] == 2400
+        assert metrics["tests"]["unseen"]["points"] == 1000
     assert set(metrics["training_points"]) == {"real", "synthetic"}
 
 
@@ -203,9 +203,9 @@ def test_scenes_of_one_name_in_two_sources_are_scaled_apart(data: Path) -> None:
 @pytest.mark.parametrize("name", ["real-synthetic-mixed-small", "gantries-small"])
 def test_small_experiments_run_from_end_to_end(tmp_path: Path, name: str) -> None:
     for split in ("train", "test", "test_tripod", "test_gantries"):
-        write_pointcept(tmp_path / "real", split, [road_tile(600, 1, split)], scheme="17")
+        write_pointcept(tmp_path / "real", split, [road_tile(200, 1, split, length=20.0)], scheme="17")
     five = name == "real-synthetic-mixed-small"
-    write_pointcept(tmp_path / "synthetic", "train", [road_tile(600, 2)], scheme="5" if five else "17")
+    write_pointcept(tmp_path / "synthetic", "train", [road_tile(200, 2, length=20.0)], scheme="5" if five else "17")
     words = ["experiment", name, "--output", str(tmp_path / "out"), "--seeds", "1", "--quiet"]
     words += [f"--data={each}={tmp_path / each}" for each in ("real", "synthetic")]
     changes = ["threads=1", "network.width=8", "voxel=0.4", "crop_points=100", "schedule.epochs=1"]
@@ -294,7 +294,7 @@ def test_commands_train_evaluate_and_predict(data: Path, tmp_path: Path, capsys:
     assert rows["road_marking"][2] == f"{100 * scores['classes']['road_marking']['iou']:.1f}"
     assert f"{100 * scores['accuracy']:.1f} % of the points are right" in said
     assert said.endswith(f"written to {tmp_path / 'scores'}: real-test.txt, real-test.png\n")
-    cloud = write_cloud(tmp_path / "cloud.laz", road_block(1500, 9))
+    cloud = write_cloud(tmp_path / "cloud.laz", road_block(1500, 9, 20.0))
     told = command(predict_command, tmp_path / "run", cloud, "--output", tmp_path / "labelled.laz", "--classification")
     assert told["points"] == 1500
     found = np.asarray(laspy.read(tmp_path / "labelled.laz")["predicted_class"])
@@ -312,7 +312,7 @@ def test_a_checkpoint_of_another_network_is_refused(data: Path, tmp_path: Path) 
 def test_evaluation_with_a_mapping_scores_groups(trained: Trained, tmp_path: Path) -> None:
     run = Run.open(trained(), kinds())
     las = laspy.LasData(laspy.LasHeader(point_format=6, version="1.4"))
-    block = road_block(1500, 4)
+    block = road_block(1500, 4, 20.0)
     las.header.scales, las.header.offsets = np.full(3, 0.001), np.array([4e5, 5.6e6, 100.0])
     las.x, las.y, las.z = block.xyz.T
     las.intensity = np.rint(block.intensity * 65535)
@@ -447,7 +447,7 @@ def test_clouds_of_one_name_have_results_of_their_own(trained: Trained, tmp_path
     clouds = [tmp_path / scene / "cloud.laz" for scene in ("one", "two")]
     for number, cloud in enumerate(clouds):
         cloud.parent.mkdir()
-        write_cloud(cloud, road_block(500 + number, 4))
+        write_cloud(cloud, road_block(500 + number, 4, 20.0))
     found = task.evaluate(run, Evaluation(clouds, "test", tmp_path / "out"))
     assert list(found["tests"]) == ["one-cloud", "two-cloud"]
     assert {path.name for path in (tmp_path / "out").glob("*.txt")} == {"one-cloud.txt", "two-cloud.txt"}
