@@ -11,6 +11,9 @@ from typing import Any
 import jsonschema
 import numpy as np
 
+from synthroads_addon.core.parameters.geometry import RoadGeometry
+from synthroads_addon.core.parameters.model import RoadParameters
+
 SURFACES = ("MultiSurface", "CompositeSurface")
 
 
@@ -53,6 +56,22 @@ def read_city(path: Path) -> City:
     numbers = np.array(data["vertices"], dtype=np.int64).reshape(-1, 3)
     transform = data["transform"]
     return City(data, numbers * np.array(transform["scale"]) + np.array(transform["translate"]))
+
+
+def width_at(road: RoadParameters, rings: list[np.ndarray], station: float) -> float:
+    """Return how wide in plan, along the normal of the centreline at a station, polygons are together."""
+    position, heading, _ = RoadGeometry(road).alignment.frame(np.array([station]))
+    along = np.array([np.cos(heading[0]), np.sin(heading[0])])
+    left = np.array([-along[1], along[0]])
+    crossed = []
+    for ring in rings:
+        local = ring[:, :2] - np.array(road.transform.translate[:2]) - position[0]
+        s, o = local @ along, local @ left
+        for i in range(len(ring)):
+            if (s[i - 1] < 0.0) != (s[i] < 0.0) and abs(o[i]) < 60.0:
+                share = s[i - 1] / (s[i - 1] - s[i])
+                crossed.append(o[i - 1] + share * (o[i] - o[i - 1]))
+    return max(crossed) - min(crossed)
 
 
 @dataclass(frozen=True)

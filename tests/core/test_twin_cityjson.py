@@ -24,7 +24,7 @@ from synthroads_addon.core.parameters.model import (
 )
 from synthroads_addon.core.parameters.turnout_shape import STEP
 from synthroads_addon.core.twin.cityjson import write_cityjson
-from tests.core.cityjson_files import City, OfficialSchema, faults_of, read_city, thinned
+from tests.core.cityjson_files import City, OfficialSchema, faults_of, read_city, thinned, width_at
 from tests.core.twin_roads import full_road, many_roads
 from tests.judges import JUDGES, require
 from tests.judges.cityjson import official_schema
@@ -193,22 +193,6 @@ def test_lanes_are_as_wide_as_the_parameters_say(full_city: City) -> None:
                 wanted = boundaries[about["lane"]] - boundaries[about["lane"] + 1]
                 if wanted > 0.01:  # the lane is there
                     assert width_at(road, rings, station) == pytest.approx(wanted, abs=0.001), name
-
-
-def width_at(road: RoadParameters, rings: list[np.ndarray], station: float) -> float:
-    """Return how wide in plan, along the normal of the centreline at a station, polygons are together."""
-    position, heading, _ = RoadGeometry(road).alignment.frame(np.array([station]))
-    along = np.array([np.cos(heading[0]), np.sin(heading[0])])
-    left = np.array([-along[1], along[0]])
-    crossed = []
-    for ring in rings:
-        local = ring[:, :2] - np.array(road.transform.translate[:2]) - position[0]
-        s, o = local @ along, local @ left
-        for i in range(len(ring)):
-            if (s[i - 1] < 0.0) != (s[i] < 0.0) and abs(o[i]) < 60.0:
-                share = s[i - 1] / (s[i - 1] - s[i])
-                crossed.append(o[i - 1] + share * (o[i] - o[i - 1]))
-    return max(crossed) - min(crossed)
 
 
 def test_dashes_begin_end_and_measure_as_the_parameters_say(full_city: City) -> None:

@@ -97,7 +97,7 @@ def _off_axis(samples: Samples, city: Any) -> list[str]:
 
 def _wrong_widths(samples: Samples, city: Any) -> list[str]:
     """Return the lanes that aren't as wide as in the parameters, at some stations."""
-    from tests.core.test_twin_cityjson import width_at
+    from tests.core.cityjson_files import width_at
 
     found = []
     for side, section in samples.geometry.sections.items():
