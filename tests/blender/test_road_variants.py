@@ -64,7 +64,7 @@ def random_points(mesh: SceneMesh, triangles: NDArray[np.int32], count: int = 30
     return np.einsum("nk,nkd->nd", weight, corners[rng.choice(len(area), count, p=area / area.sum())])
 
 
-def everything(design_class: str = "EKA1A", cross_section: str = "RQ31", length: float = 1500.0) -> RoadScenario:
+def everything(design_class: str = "EKA1A", cross_section: str = "RQ31", length: float = 900.0) -> RoadScenario:
     """Return a scenario whose carriageways have exits, entries, bays, lane changes and damage wherever they fit."""
     data: dict[str, Any] = {"design_class": design_class, "cross_section": cross_section, "length": length}
     data["turnouts"] = {"exits": 0.9, "entries": 0.9, "emergency_bays": 0.9}
@@ -222,11 +222,11 @@ class TestEdits:
 
 class TestStretches:
     def test_stretches_join_to_the_whole(self) -> None:
-        parameters = sample_road(everything("EKA1A", "RQ31", 900.0), 3)
+        parameters = sample_road(everything("EKA1A", "RQ31", 600.0), 3)
         parts = ("road", "painted_areas", "terrain", "guardrails", "delineators")
         whole = built(parameters, parts=parts).mesh()
         area: dict[int, float] = {}
-        for stretch in stretches(900.0, 300.0):
+        for stretch in stretches(600.0, 200.0):
             build_road(parameters, 0.005, 0.3, parts, stretch)
             mesh = scene_mesh()
             assert np.abs(mesh.vertices).max() < FRAME
