@@ -27,7 +27,13 @@ from synthroads_addon.core.scene_mesh import SceneMesh
 
 ROUNDING = 2e-4
 TOLERANCES = {"draft": 0.020, "standard": 0.005, "high": 0.001}
-CASES = [(name, section) for name, sections in SECTIONS_OF_CLASS.items() for section in sections]
+CLASS_OF_SECTION = {section: name for name, sections in SECTIONS_OF_CLASS.items() for section in sections}
+CASES = [
+    pytest.param(name, section, marks=() if CLASS_OF_SECTION[section] == name else pytest.mark.slow)
+    for name, sections in SECTIONS_OF_CLASS.items()
+    for section in sections
+]
+"""Each cross-section once, and as slow tests those of all classes."""
 
 Float = NDArray[np.float64]
 
@@ -64,7 +70,7 @@ def random_points(mesh: SceneMesh, triangles: NDArray[np.int32], count: int = 30
     return np.einsum("nk,nkd->nd", weight, corners[rng.choice(len(area), count, p=area / area.sum())])
 
 
-def everything(design_class: str = "EKA1A", cross_section: str = "RQ31", length: float = 900.0) -> RoadScenario:
+def everything(design_class: str = "EKA1A", cross_section: str = "RQ31", length: float = 1500.0) -> RoadScenario:
     """Return a scenario whose carriageways have exits, entries, bays, lane changes and damage wherever they fit."""
     data: dict[str, Any] = {"design_class": design_class, "cross_section": cross_section, "length": length}
     data["turnouts"] = {"exits": 0.9, "entries": 0.9, "emergency_bays": 0.9}
@@ -95,7 +101,7 @@ def test_every_cross_section_follows_the_analytic_surface(design_class: str, cro
 
 @pytest.mark.parametrize("fidelity", TOLERANCES)
 def test_every_fidelity_keeps_its_tolerance_with_turnouts_and_damage(fidelity: str) -> None:
-    parameters = sample_road(everything("EKA1A", "RQ36"), 5)
+    parameters = sample_road(everything("EKA1A", "RQ36", 800.0), 5)
     assert parameters.of_type(Turnout)
     assert any(c.pavement.potholes and c.pavement.ruts for c in parameters.of_type(Carriageway).values())
     road = built(parameters, TOLERANCES[fidelity])
@@ -105,7 +111,7 @@ def test_every_fidelity_keeps_its_tolerance_with_turnouts_and_damage(fidelity: s
 
 
 def test_there_are_no_cracks_where_widths_change() -> None:
-    road = built(sample_road(everything("EKA1A", "RQ36"), 5), parts=("road", "terrain"))
+    road = built(sample_road(everything("EKA1A", "RQ36", 800.0), 5), parts=("road", "terrain"))
     mesh = road.mesh("Road", "Terrain")
     chosen = np.isin(mesh.class_id, [class_id(name) for name in ("road", "roadside", "ground")])
     _, same = np.unique(mesh.vertices, axis=0, return_inverse=True)
@@ -183,7 +189,7 @@ class TestEdits:
         return road, edited_parameters(road.parameters, road.model.objects)
 
     def test_nothing_edited_is_nothing_changed(self) -> None:
-        road = built(sample_road(everything("EKA1A", "RQ36"), 5), parts=("road", "terrain", "guardrails"))
+        road = built(sample_road(everything("EKA1A", "RQ36", 800.0), 5), parts=("road", "terrain", "guardrails"))
         assert edited_parameters(road.parameters, road.model.objects).to_json() == road.parameters.to_json()
 
     @pytest.mark.parametrize(
