@@ -37,6 +37,12 @@ def settings() -> Iterator[Any]:
 
 
 @pytest.fixture
+def small_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let previews be small: at full size they take longer than the scan of a small scene."""
+    monkeypatch.setattr("synthroads_addon.core.cloud.previews.WIDTH", 300)
+
+
+@pytest.fixture
 def cheap(settings: Any) -> Any:
     """The panel's settings of a small scene."""
     choose(settings, **SMALL)

@@ -33,6 +33,7 @@ SMALL = (
     "road.length=100",
     "road.half_width=25",
     "scan.platform.lateral_offsets=[5]",
+    "scan.platform.speed=80",
     "scan.pulse_rate_khz=100",
     "scan.field_of_view_deg=360",
     'outputs=["cloud"]',
@@ -44,6 +45,21 @@ def report_of(folder: Path, *changes: str) -> dict[str, Any]:
     return generate(job)
 
 
+class FewLines(Pilot):
+    """Pilot measurements on fewer scan lines than usual."""
+
+    @classmethod
+    def on(cls, *arguments: Any, **options: Any) -> Pilot:
+        return super().on(*arguments, **{"lines": 24, **options})
+
+
+@pytest.fixture
+def few_lines(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let settings be chosen by fewer scan lines."""
+    monkeypatch.setattr("synthroads_addon.choosing.Pilot", FewLines)
+
+
+@pytest.mark.usefixtures("few_lines")
 def test_a_tolerance_takes_what_keeps_it_and_leaves_what_is_given(tmp_path: Path) -> None:
     words = ("tolerance=height=8mm,intensity=3%,labels=2%", "scan.relief_octaves=3")
     report = report_of(tmp_path, *words)
@@ -70,6 +86,7 @@ def test_a_tolerance_takes_what_keeps_it_and_leaves_what_is_given(tmp_path: Path
     assert report_of(tmp_path / "twice", *words)["choice"]["chosen"] == choice["chosen"]
 
 
+@pytest.mark.usefixtures("few_lines")
 def test_what_cannot_be_kept_is_refused_with_the_best(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"tolerance.intensity is 0.01: can't be kept here: the best to be had is"):
         report_of(tmp_path / "out", "tolerance=intensity=1%", "scan.rays_per_pulse=7")
@@ -126,6 +143,7 @@ def test_the_command_says_what_it_chose(tmp_path: Path) -> None:
     assert (wrong.returncode, "--fidelity is 'high'" in wrong.stderr) == (2, True)
 
 
+@pytest.mark.usefixtures("few_lines")
 def test_a_scene_that_is_there_is_scanned_within_a_tolerance(tmp_path: Path) -> None:
     # Planks with gaps: beams that lie on an edge tell one ray from many.
     edges = [(x, i % 2) for i in range(1000) for x in (i / 10 - 50, i / 10 - 49.9)]

@@ -27,7 +27,13 @@ from synthroads_addon.core.scene_mesh import SceneMesh
 
 ROUNDING = 2e-4
 TOLERANCES = {"draft": 0.020, "standard": 0.005, "high": 0.001}
-CASES = [(name, section) for name, sections in SECTIONS_OF_CLASS.items() for section in sections]
+CLASS_OF_SECTION = {section: name for name, sections in SECTIONS_OF_CLASS.items() for section in sections}
+CASES = [
+    pytest.param(name, section, marks=() if CLASS_OF_SECTION[section] == name else pytest.mark.slow)
+    for name, sections in SECTIONS_OF_CLASS.items()
+    for section in sections
+]
+"""Each cross-section once, and as slow tests those of all classes."""
 
 Float = NDArray[np.float64]
 
@@ -95,7 +101,7 @@ def test_every_cross_section_follows_the_analytic_surface(design_class: str, cro
 
 @pytest.mark.parametrize("fidelity", TOLERANCES)
 def test_every_fidelity_keeps_its_tolerance_with_turnouts_and_damage(fidelity: str) -> None:
-    parameters = sample_road(everything("EKA1A", "RQ36"), 5)
+    parameters = sample_road(everything("EKA1A", "RQ36", 800.0), 5)
     assert parameters.of_type(Turnout)
     assert any(c.pavement.potholes and c.pavement.ruts for c in parameters.of_type(Carriageway).values())
     road = built(parameters, TOLERANCES[fidelity])
@@ -105,7 +111,7 @@ def test_every_fidelity_keeps_its_tolerance_with_turnouts_and_damage(fidelity: s
 
 
 def test_there_are_no_cracks_where_widths_change() -> None:
-    road = built(sample_road(everything("EKA1A", "RQ36"), 5), parts=("road", "terrain"))
+    road = built(sample_road(everything("EKA1A", "RQ36", 800.0), 5), parts=("road", "terrain"))
     mesh = road.mesh("Road", "Terrain")
     chosen = np.isin(mesh.class_id, [class_id(name) for name in ("road", "roadside", "ground")])
     _, same = np.unique(mesh.vertices, axis=0, return_inverse=True)
@@ -183,7 +189,7 @@ class TestEdits:
         return road, edited_parameters(road.parameters, road.model.objects)
 
     def test_nothing_edited_is_nothing_changed(self) -> None:
-        road = built(sample_road(everything("EKA1A", "RQ36"), 5), parts=("road", "terrain", "guardrails"))
+        road = built(sample_road(everything("EKA1A", "RQ36", 800.0), 5), parts=("road", "terrain", "guardrails"))
         assert edited_parameters(road.parameters, road.model.objects).to_json() == road.parameters.to_json()
 
     @pytest.mark.parametrize(
@@ -222,11 +228,11 @@ class TestEdits:
 
 class TestStretches:
     def test_stretches_join_to_the_whole(self) -> None:
-        parameters = sample_road(everything("EKA1A", "RQ31", 900.0), 3)
+        parameters = sample_road(everything("EKA1A", "RQ31", 600.0), 3)
         parts = ("road", "painted_areas", "terrain", "guardrails", "delineators")
         whole = built(parameters, parts=parts).mesh()
         area: dict[int, float] = {}
-        for stretch in stretches(900.0, 300.0):
+        for stretch in stretches(600.0, 200.0):
             build_road(parameters, 0.005, 0.3, parts, stretch)
             mesh = scene_mesh()
             assert np.abs(mesh.vertices).max() < FRAME

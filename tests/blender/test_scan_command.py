@@ -30,6 +30,7 @@ from tests.blender.scene_hash import digest
 
 ROOT = Path(__file__).parents[2]
 DRAFT = ["--set", "scan.noise.range_sigma=0", "--set", "scan.lines_per_second=50", "--rays", "1"]
+DRAFT += ["--set", "colour.source=material", "--set", 'outputs=["cloud"]']
 
 
 def primitives() -> None:
@@ -107,9 +108,7 @@ def test_scenes_of_others_are_scanned_with_their_classes(
     before = file.read_bytes()
     las = scan(file, tmp_path / "out", "--height", "30", "--classes", mapping)
     assert file.read_bytes() == before
-    assert sorted(path.name for path in (tmp_path / "out").iterdir()) == [
-        "cloud.laz", "preview_class.png", "preview_intensity.png", "preview_rgb.png", "report.json"
-    ]  # fmt: skip
+    assert sorted(path.name for path in (tmp_path / "out").iterdir()) == ["cloud.laz", "report.json"]
     label, xyz = np.array(las.class_id), las.xyz
     assert set(np.unique(label)) == {class_id("road"), class_id("pole"), 255}
     floor = xyz[label == class_id("road")]
@@ -143,6 +142,16 @@ def test_what_points_up_can_be_said(up: str | None, flat: bool, tmp_path: Path) 
     open_scene(file, up)
     bpy.context.view_layer.update()
     assert (np.ptp(scene_mesh().vertices[:, 2]) < 1e-5) == flat
+
+
+def test_pictures_come_with_the_cloud_and_colours_are_rendered(scene: Callable[[str], Path], tmp_path: Path) -> None:
+    usual = ("--set", 'outputs=["cloud","previews"]', "--set", "colour.source=images")
+    las = scan(scene(".blend"), tmp_path / "out", "--height", "30", *usual)
+    assert sorted(path.name for path in (tmp_path / "out").iterdir()) == [
+        "cloud.laz", "preview_class.png", "preview_intensity.png", "preview_rgb.png", "report.json"
+    ]  # fmt: skip
+    assert report(tmp_path / "out")["counts"]["rendered"]["images"] > 0
+    assert las.red.std() > 0
 
 
 # Where the scanner is
@@ -307,7 +316,8 @@ def test_a_scan_leaves_the_open_scene_as_it_was(caster: str, tmp_path: Path, map
 
 def test_a_scan_leaves_a_road_of_ours_as_it_was(road_scene: tuple[Path, RoadGeometry], tmp_path: Path) -> None:
     before = digest()
-    scenario = Scenario.from_dict({"fidelity": "draft", "scan": {"platform": {"height": 30.0, "speed": 30.0}}})
+    thin = {"lines_per_second": 20.0, "platform": {"height": 30.0, "speed": 30.0}}
+    scenario = Scenario.from_dict({"fidelity": "draft", "scan": thin, "outputs": ["cloud"]})
     assert scan_scene(SceneScan(scenario, tmp_path / "out"))["counts"]["points"] > 1000
     assert digest() == before
 

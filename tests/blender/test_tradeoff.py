@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from headless import cli
 from synthroads_addon.blender.cameras import HAS_RETURN_CAMERA
 from synthroads_addon.blender.model import build_road
 from synthroads_addon.blender.scene import scanned_scene
@@ -21,6 +22,7 @@ from synthroads_addon.core.scenario import load_scenario
 from synthroads_addon.core.schema import canonical_json
 from synthroads_addon.core.tradeoff import KNOBS, ROW_TITLES, SCENES, row_scenario, rows
 from synthroads_addon.measuring import measure_row
+from tests.blender.sparse_scanner import sparse_scanner
 
 ROOT = Path(__file__).parents[2]
 COLOURS = {"colour_median", "colour_95", "layers_rmse"}
@@ -47,7 +49,9 @@ def command(*words: str) -> subprocess.CompletedProcess[str]:
 def test_a_knob_is_measured(tmp_path: Path) -> None:
     document = tmp_path / "page.md"
     document.write_text("<!-- table: tradeoff small -->\n<!-- end of table -->\n")
-    words = ["--scenario", str(small_scenario(tmp_path)), "--output", str(tmp_path / "out"), "--knobs", "caster"]
+    sparse = [f"scan.device={sparse_scanner(tmp_path, 20.0)}", "scan.pulse_rate_khz=20", "scan.field_of_view_deg=60"]
+    scenario = str(small_scenario(tmp_path, *sparse))
+    words = ["--scenario", scenario, "--output", str(tmp_path / "out"), "--knobs", "caster"]
     done = command(*words, "--document", str(document), "--pictures", str(tmp_path / "pictures"))
     assert done.returncode == 0, done.stderr
     out = tmp_path / "out"
@@ -66,18 +70,18 @@ def test_a_knob_is_measured(tmp_path: Path) -> None:
     assert abs(slow["errors"]["position_mm"] - fast["errors"]["position_mm"]) < 0.05 * fast["errors"]["position_mm"]
 
     # What is there already is refused, or kept: also a row of which we only pretend that it was measured.
-    assert command(*words).returncode == 2
+    assert cli.command("tradeoff", words) == 2
     file = out / "rows" / "small" / "caster-embree.json"
     data = json.loads(file.read_text())
     file.write_text(json.dumps(data | {"row": fast | {"seconds": 4711.0}}))
-    assert command(*words, "--resume").returncode == 0
+    assert cli.command("tradeoff", [*words, "--resume"]) == 0
     assert json.loads((out / "small.json").read_text())["rows"] == [slow, fast | {"seconds": 4711.0}]
     # A row of another job is measured again, and so is what another Blender couldn't measure.
     file.write_text(json.dumps(data | {"row": {"knob": "caster", "value": "embree", "left_out": "lacks it"}}))
-    assert command(*words, "--resume").returncode == 0
+    assert cli.command("tradeoff", [*words, "--resume"]) == 0
     assert json.loads((out / "small.json").read_text())["rows"][1]["machine"] == fast["machine"]
     file.write_text(json.dumps(data | {"job": "another", "row": fast | {"seconds": 4711.0}}))
-    assert command(*words, "--resume").returncode == 0
+    assert cli.command("tradeoff", [*words, "--resume"]) == 0
     assert json.loads((out / "small.json").read_text())["rows"][1]["seconds"] < 4711.0
 
 
@@ -105,7 +109,7 @@ def test_bad_input_is_refused_before_anything_is_measured(tmp_path: Path, words:
 
 
 def test_colours_of_images_are_nearer_to_the_truth_than_the_materials(tmp_path: Path) -> None:
-    material, images = (row(tmp_path, "colour_source", value) for value in ("material", "images"))
+    material, images = (row(tmp_path, "colour_source", value, "road.length=60") for value in ("material", "images"))
     assert material["shares"] == {"material": 1.0}
     assert material["images"] == 0 < images["images"]
     assert images["shares"]["material"] < 0.02

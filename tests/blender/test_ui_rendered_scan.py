@@ -28,6 +28,7 @@ from tests.blender.scene_hash import lines
 COARSE = {"colour.image_spacing": 60.0, "colour.ground_sampling_distance": 1.0}
 # Ticking a field fills in its usual value: it is ticked first.
 RENDERED = {"colour.source": "images"} | dict.fromkeys(map(own, COARSE), True) | COARSE
+NO_PICTURES = RENDERED | {"outputs": {"cloud"}}
 WRITTEN = sorted([n for o in ("parameters", "cloud", "centerline", "previews") for n in FILES[o]] + ["report.json"])
 
 
@@ -83,14 +84,14 @@ def test_what_is_rendered_is_the_librarys(cheap: Any, tmp_path: Path, source: st
 
 
 def test_nothing_is_rendered_where_no_colour_is_wanted(road: Any, started: list[Any]) -> None:  # noqa: F811
-    choose(road, **{"colour.source": "images", "colour.rgb": False})
+    choose(road, **{"colour.source": "images", "colour.rgb": False, "outputs": {"cloud"}})
     assert bpy.ops.synthroads.scan() == {"FINISHED"}
     assert not started
 
 
 def test_the_scene_that_the_window_shows_is_scanned_as_it_is_now(road: Any, tmp_path: Path) -> None:  # noqa: F811
     """What was changed and not saved counts, in the view layer at hand; the file stays unsaved and its own."""
-    choose(road, **RENDERED)
+    choose(road, **NO_PICTURES)
     name, saved = bpy.data.filepath, Path(bpy.data.filepath).read_bytes()
     assert bpy.ops.synthroads.scan() == {"FINISHED"}
     layer = bpy.context.scene.view_layers.new("Less")
@@ -112,7 +113,7 @@ def test_a_cancelled_scan_leaves_nothing_and_no_process(
     started: list[subprocess.Popen[bytes]],
     when: str,
 ) -> None:
-    choose(road, **RENDERED)
+    choose(road, **NO_PICTURES)
     job = job_of_the_panel()
     job.start()
     while not started or (when == "later" and job.share < 0.2):
@@ -128,7 +129,7 @@ def test_a_cancelled_scan_leaves_nothing_and_no_process(
 
 
 def test_its_error_is_one_line(road: Any, tmp_path: Path) -> None:  # noqa: F811
-    choose(road, **RENDERED)
+    choose(road, **NO_PICTURES)
     bpy.context.view_layer.layer_collection.children["SynthRoads"].exclude = True
     with pytest.raises(RuntimeError, match="Scene: nothing that could be scanned is visible") as caught:
         bpy.ops.synthroads.scan()
@@ -151,7 +152,7 @@ def test_a_blender_that_is_missing_dies_or_fails_is_reported(tmp_path: Path) -> 
 
 
 def test_the_other_blender_ends_with_this_one(road: Any, tmp_path: Path) -> None:  # noqa: F811
-    choose(road, **RENDERED)
+    choose(road, **NO_PICTURES)
     asked = scan.asked_for(bpy.context)
     (tmp_path / "files").mkdir()
     saved = rendered_scan.save_open_scene(asked.scenario, asked.parameters, tmp_path / "files")

@@ -15,9 +15,11 @@ from synthroads_addon.core.parameters.sampler import sample_road
 from synthroads_addon.core.scenario import Scenario, load_scenario
 from synthroads_addon.pipeline import Job, generate, road_parameters
 from synthroads_addon.ui.road_files import source_of
-from tests.blender.panel_road import SAME, cheap, settings
+from tests.blender.panel_road import SAME, cheap, settings, small_pictures
 
-__all__ = ["cheap", "settings"]
+__all__ = ["cheap", "settings", "small_pictures"]
+
+pytestmark = pytest.mark.usefixtures("small_pictures")
 
 
 def set_file(folder: Path) -> Path:

@@ -20,8 +20,19 @@ from synthroads_addon.pipeline import Job as PipelineJob
 from synthroads_addon.ui import scan, scan_job
 from synthroads_addon.ui.job import Job, running_job
 from synthroads_addon.ui.scan_job import Written, scan_work
-from tests.blender.panel_road import SAME, block_counts, cheap, choose, road, road_file, settings  # noqa: F401
+from tests.blender.panel_road import (  # noqa: F401
+    SAME,
+    block_counts,
+    cheap,
+    choose,
+    road,
+    road_file,
+    settings,
+    small_pictures,
+)
 from tests.blender.scene_hash import digest
+
+pytestmark = pytest.mark.usefixtures("small_pictures")
 
 WRITTEN = sorted([n for o in ("parameters", "cloud", "centerline", "previews") for n in FILES[o]] + ["report.json"])
 
