@@ -15,7 +15,7 @@ NOX = $(RUNNER)/bin/python -m nox
 
 .DEFAULT_GOAL := help
 .NOTPARALLEL:
-.PHONY: help demo test test-slow lint docs extension clean distclean
+.PHONY: help demo test test-slow lint judges docs extension clean distclean
 
 help: ## say what there is
 	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/  make \1|\2/p' $(MAKEFILE_LIST) | awk -F'|' '{ printf "%-18s %s\n", $$1, $$2 }'
@@ -30,9 +30,10 @@ test: $(RUNNER)/made ## check the source and run the tests on both Blender LTS r
 test-slow: $(RUNNER)/made ## the tests that take long, and the documentation's own
 	@TEST_MARKERS=slow $(NOX) -s tests docs summary
 
-lint docs: $(RUNNER)/made
+lint docs judges: $(RUNNER)/made
 	@$(NOX) -s $@
 lint: ## check the source: ruff and mypy
+judges: ## have programs of others judge the files that SynthRoads writes
 docs: ## build the documentation: build/site/index.html
 
 extension: $(RUNNER)/made ## build the Blender extensions: dist/*.zip (PLATFORM=windows-x64, macos-arm64 or all)

@@ -103,6 +103,12 @@ def lint(session: nox.Session) -> None:
     session.run(python_of(session, f"tests-{HERE}"), "tools/lint.py")  # with its PyTorch: one is large enough
 
 
+@nox.session(python=False)
+def judges(session: nox.Session) -> None:
+    """Have the programs of others judge files of a small road, and print what they say."""
+    session.run(python_of(session, f"tests-{HERE}"), "-m", "tests.judges", *session.posargs)
+
+
 def pytest_runs(version: str, markers: str, arguments: list[str]) -> list[list[str]]:
     """Return what pytest is called with, once for each part; arguments that name tests are left as they are."""
     if any(argument.startswith("tests") for argument in arguments):
