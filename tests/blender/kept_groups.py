@@ -52,14 +52,16 @@ class KeptGroups:
         """Put a group that was kept into the open file, with those in it that the file hasn't."""
         if old := bpy.data.node_groups.get(name):
             old.name = f"{name} (older)"
-        there = {group[builder.KEY]: group for group in bpy.data.node_groups if builder.KEY in group}
+        groups = bpy.data.node_groups
+        before = {group.session_uid for group in groups}
+        there = {group[builder.KEY]: group for group in groups if builder.KEY in group}
         with bpy.data.libraries.load(str(self._file(key)), link=False) as (_, mine):
             mine.node_groups = [name]
         bpy.data.libraries.remove(bpy.data.libraries[self._file(key).name])
-        for group in [group for group in bpy.data.node_groups if group not in there.values()]:
+        for group in [group for group in groups if group.session_uid not in before]:
             if (same := there.get(group.get(builder.KEY))) is not None:
                 group.user_remap(same)
-                bpy.data.node_groups.remove(group)
-        group = bpy.data.node_groups[name]
+                groups.remove(group)
+        group = groups[name]
         group.use_fake_user = False
         return group

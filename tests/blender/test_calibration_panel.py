@@ -49,10 +49,11 @@ def test_buttons_fit_and_save_what_the_library_does(settings: Any, tmp_path: Pat
         range_corrected=True,
         decibels=30.0,
     )
-    save_fitted(calibrate(job), tmp_path / "library.json")
+    wanted = calibrate(job)
+    save_fitted(wanted, tmp_path / "library.json")
     assert (tmp_path / "panel.json").read_bytes() == (tmp_path / "library.json").read_bytes()
     result = calibration_run.latest
-    assert result.to_dict() == calibrate(job).to_dict()
+    assert result.to_dict() == wanted.to_dict()
     lines = calibration.lines_of(result.compared[0])
     assert "50 zeros left out" in lines[1]
     assert lines[-1].startswith("Error / IQR: ")

@@ -48,6 +48,7 @@ def test_a_built_road_takes_and_keeps_the_table(table: Path, tmp_path: Path) -> 
         "fidelity": "draft",
         "materials_table": str(table),
         "outputs": ["cloud"],
+        "scan": {"platform": {"speed": 40}},
         "colour": {"source": "material"},
     }
     scenario = Scenario.from_dict(changes)

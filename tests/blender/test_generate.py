@@ -26,7 +26,7 @@ from synthroads_addon.scan_files import make_scan, road_path
 ROOT = Path(__file__).parents[2]
 REAL_AXIS = ROOT.parent / "shared" / "real" / "als_rural2lane_t211-278_axis.csv"
 SMALL = ["fidelity=draft", "road.length=120", "road.half_width=40", "scan.platform.lateral_offsets=[5]"]
-SMALL += ["scan.lines_per_second=50", "colour.source=material"]
+SMALL += ["scan.lines_per_second=50", "scan.platform.speed=24", "colour.source=material"]
 
 
 def job(output: Path, *changes: str, **options) -> Job:

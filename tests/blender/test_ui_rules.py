@@ -26,7 +26,7 @@ def found() -> Iterator[Any]:
     """Register the add-on with a small road for one test; return the list."""
     synthroads_addon.register()
     settings = bpy.context.scene.synthroads
-    settings.road.length, settings.seed = 150.0, 3
+    settings.road.length, settings.road.half_width, settings.seed = 150.0, 20.0, 3
     bpy.ops.synthroads.build()
     yield bpy.context.window_manager.synthroads_rules
     synthroads_addon.unregister()
