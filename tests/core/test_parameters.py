@@ -311,7 +311,7 @@ def test_every_kink_is_a_station(geometry: RoadGeometry) -> None:
 
 def test_a_cross_section_must_suit_its_design_class() -> None:
     with pytest.raises(InputError, match=r"'RQ25': EKA1A allows RQ43\.5, RQ36, RQ31"):
-        road(1, "road.cross_section=RQ25")
+        road(1, "road.cross_section=RQ25", "road.design_class=EKA1A")
     for section in STANDARD_CROSS_SECTIONS:
         design_class = design_class_of(section, "EKA1A")
         assert section in SECTIONS_OF_CLASS[design_class]
