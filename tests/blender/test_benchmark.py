@@ -11,6 +11,8 @@ from headless.cli import main
 from synthroads_addon.core.benchmark import LIMITS, TABLE, judged, markdown
 from synthroads_addon.core.marked import BEGIN, END
 
+pytestmark = pytest.mark.any_blender
+
 
 def a_result(quick: bool, **lines: float) -> dict[str, object]:
     stages = {"model": {"seconds": 7.0, "peak_memory_mb": 900.0}}

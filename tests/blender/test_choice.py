@@ -28,6 +28,8 @@ from synthroads_addon.pilot import Pilot, beam_errors
 from synthroads_addon.pipeline import Job, generate
 from synthroads_addon.scene_scan import SceneScan, scan_scene
 
+pytestmark = pytest.mark.any_blender
+
 ROOT = Path(__file__).parents[2]
 SMALL = (
     "road.length=100",

@@ -19,6 +19,8 @@ import yaml
 
 from synthroads_addon.core.dataset.manifest import read_manifest
 
+pytestmark = pytest.mark.any_blender
+
 ROOT = Path(__file__).resolve().parents[2]
 TINY: dict[str, Any] = {
     "title": "Tiny",

@@ -20,7 +20,10 @@ from synthroads_addon.core.parameters.model import read_parameters
 from synthroads_addon.core.parameters.sampler import sample_road
 from synthroads_addon.core.road_scenario import RoadScenario
 
-pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="limits and signals as Linux has them")
+pytestmark = [
+    pytest.mark.any_blender,
+    pytest.mark.skipif(sys.platform != "linux", reason="limits and signals as Linux has them"),
+]
 
 ROOT = Path(__file__).resolve().parents[2]
 SMALL = {

@@ -46,6 +46,7 @@ def command(*words: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run(line, cwd=ROOT, capture_output=True, text=True, timeout=900, check=False)
 
 
+@pytest.mark.any_blender
 def test_a_knob_is_measured(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     document = tmp_path / "page.md"
     document.write_text("<!-- table: tradeoff small -->\n<!-- end of table -->\n")

@@ -19,9 +19,14 @@ MODULES = {"eclipse-sumo": "sumo", "scikit-learn": "sklearn", "asam-qc-opendrive
 """Names that judges are imported by, where they aren't their own."""
 
 
+ELSEWHERE = ("ifcopenshell", "pyxodr")
+"""Judges that quick tests of the twin ask the same, of other roads."""
+
+
 def each(judges: list[Judge]) -> pytest.MarkDecorator:
     """Parametrize over judges, the slow ones marked so."""
-    marked = [pytest.param(item, marks=pytest.mark.slow if item.slow else (), id=item.name) for item in judges]
+    slow = {item.name for item in judges if item.slow or item.name in ELSEWHERE}
+    marked = [pytest.param(item, marks=pytest.mark.slow if item.name in slow else (), id=item.name) for item in judges]
     return pytest.mark.parametrize("judge", marked)
 
 

@@ -85,7 +85,7 @@ def road(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactor
     if request.param == "straight":
         parameters = _moved(full())
     else:
-        limits = scenario(design_class="EKA3", cross_section="RQ38.5", length=1500.0, **EVERYTHING)
+        limits = scenario(design_class="EKA3", cross_section="RQ38.5", length=1000.0, **EVERYTHING)
         parameters = _moved(sample_road(limits, 11).to_dict())
     return parameters, written(parameters, tmp_path_factory.mktemp(request.param))
 

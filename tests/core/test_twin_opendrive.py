@@ -117,7 +117,13 @@ ROADS = {
 }
 
 
-@pytest.fixture(params=list(ROADS), scope="module")
+MANY = ("left only", "sampled", "wide")
+"""Roads that the slow tests alone take: another of their kind is among the quick ones."""
+
+
+@pytest.fixture(
+    params=[pytest.param(name, marks=pytest.mark.slow if name in MANY else ()) for name in ROADS], scope="module"
+)
 def road(request: pytest.FixtureRequest) -> RoadParameters:
     return ROADS[request.param]()
 
