@@ -7,29 +7,25 @@ from __future__ import annotations
 
 import argparse
 import shlex
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
-from ml.configuration import SHIPPED, experiment_names, shipped_names
-from synthroads_addon.core.cloud.labels import scheme_names
-from synthroads_addon.core.dataset.recipe import recipe_names
+from headless.list import KINDS
 from synthroads_addon.core.parameters.limits import STANDARD_CROSS_SECTIONS
-from synthroads_addon.core.scanning.devices import device_names
-from synthroads_addon.core.scenario import scenario_names
 from synthroads_addon.core.tradeoff import KNOBS
 from synthroads_addon.core.twin import TWIN_FORMATS
 
-_NAMES_OR_FILES: dict[str, Callable[[], Iterable[str]]] = {
-    "--classes": scheme_names,
-    "--device": device_names,
-    "--mapping": lambda: (path.stem for path in (SHIPPED / "classes").glob("*.json")),
-    "--scenario": scenario_names,
-    "configuration": shipped_names,
-    "experiment": experiment_names,
-    "recipe": recipe_names,
+_NAMES_OR_FILES = {
+    "--classes": "classes",
+    "--device": "devices",
+    "--mapping": "mappings",
+    "--scenario": "scenarios",
+    "configuration": "trainings",
+    "experiment": "experiments",
+    "recipe": "recipes",
 }
-"""Names that an option or an argument takes in place of a file."""
+"""Option or argument -> kind of `synthroads list` whose names it takes in place of a file."""
 _NAMES: dict[str, Iterable[str]] = {
     "--cross-section": STANDARD_CROSS_SECTIONS,
     "--knobs": KNOBS,
@@ -69,7 +65,7 @@ def _describe(parser: argparse.ArgumentParser, file: Any, directory: Any) -> Non
         elif takes_files:
             action.complete = file  # type: ignore[attr-defined]
         elif kind is not None:
-            action.complete = _names_or_files(kind, sorted(_NAMES_OR_FILES[kind]()))  # type: ignore[attr-defined]
+            action.complete = _names_or_files(kind, sorted(KINDS[_NAMES_OR_FILES[kind]].names()))  # type: ignore[attr-defined]
         elif called[-1] in _NAMES:
             action.choices = sorted(_NAMES[called[-1]])
 
