@@ -58,7 +58,8 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Mark a tenth of the tests that don't depend on Blender's release, drawn by their names, as `smoke`."""
     for item in items:
         free = TESTS / "blender" not in item.path.parents or item.get_closest_marker("any_blender")
-        if free and crc32(item.nodeid.encode()) % 10 == 0:
+        there = not item.get_closest_marker("first_python")
+        if free and there and crc32(item.nodeid.encode()) % 10 == 0:
             item.add_marker("smoke")
 
 

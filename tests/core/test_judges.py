@@ -25,8 +25,11 @@ ELSEWHERE = ("ifcopenshell", "pyxodr")
 
 def each(judges: list[Judge]) -> pytest.MarkDecorator:
     """Parametrize over judges, the slow ones marked so."""
-    slow = {item.name for item in judges if item.slow or item.name in ELSEWHERE}
-    marked = [pytest.param(item, marks=pytest.mark.slow if item.name in slow else (), id=item.name) for item in judges]
+    marked = []
+    for item in judges:
+        marks = [pytest.mark.slow] if item.slow or item.name in ELSEWHERE else []
+        marks += [] if item.comes_with_pip() else [pytest.mark.first_python]
+        marked.append(pytest.param(item, marks=marks, id=item.name))
     return pytest.mark.parametrize("judge", marked)
 
 

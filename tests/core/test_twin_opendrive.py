@@ -595,6 +595,7 @@ def test_planted_faults_show(tmp_path: Path, path: str, name: str, by: float) ->
 
 
 @pytest.mark.parametrize("name", ["widening", "sampled"])
+@pytest.mark.first_python
 def test_quality_checker_finds_nothing(name: str, tmp_path: Path) -> None:
     require("asam-qc-opendrive")
     write_opendrive(ROADS[name](), tmp_path / "road.xodr", TOLERANCE)
@@ -602,6 +603,7 @@ def test_quality_checker_finds_nothing(name: str, tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.first_python
 def test_quality_checker_finds_nothing_in_fifty_roads(tmp_path: Path) -> None:
     require("asam-qc-opendrive")
     roads = [ROADS[name]() for name in ("everything", "curved", "right only", "left only", "widening")]
@@ -622,6 +624,7 @@ def test_quality_checker_finds_nothing_in_fifty_roads(tmp_path: Path) -> None:
         assert quality_faults(path) == []
 
 
+@pytest.mark.first_python
 def test_quality_checker_sees_planted_faults(tmp_path: Path) -> None:
     require("asam-qc-opendrive")
     write_opendrive(sample_road(scenario(length=600.0), 7), tmp_path / "good.xodr", TOLERANCE)

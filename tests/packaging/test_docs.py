@@ -147,7 +147,9 @@ def test_every_generated_part_has_its_place() -> None:
     assert marks == Counter(list(GENERATED))
 
 
-@pytest.mark.parametrize("name", GENERATED)
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=pytest.mark.first_python if name in WITH_PYTORCH else ()) for name in GENERATED]
+)
 def test_generated_parts_say_what_everything_is(name: str) -> None:
     if name in WITH_PYTORCH:
         pytest.importorskip("torch")
