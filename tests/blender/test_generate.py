@@ -274,12 +274,12 @@ def test_wrong_input_is_one_line_and_exit_code_2(
     assert not (tmp_path / "out").exists()
 
 
-def test_output_already_there_needs_overwrite(tmp_path: Path) -> None:
+def test_output_already_there_needs_overwrite(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     small = [part for change in [*SMALL, 'outputs=["parameters"]'] for part in ("--set", change)]
-    assert command("--output", tmp_path, *small).returncode == 0
-    again = command("--output", tmp_path, *small)
-    assert again.returncode == 2
-    assert "--overwrite" in again.stderr
+    assert cli.command("generate", ["--output", str(tmp_path), *small]) == 0
+    capsys.readouterr()
+    assert cli.command("generate", ["--output", str(tmp_path), *small]) == 2
+    assert "--overwrite" in capsys.readouterr().err
     json_run = command("--output", tmp_path, *small, "--overwrite", "--json")
     assert json_run.returncode == 0
     assert json.loads(json_run.stdout)["type"] == "Report"

@@ -6,6 +6,10 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
+from headless import cli
+
 ROOT = Path(__file__).parents[2]
 
 
@@ -39,11 +43,10 @@ def test_two_processes_write_the_same_bytes() -> None:
     assert first == second
 
 
-def test_wrong_input_is_one_line() -> None:
+def test_wrong_input_is_one_line(capsys: pytest.CaptureFixture[str]) -> None:
     for arguments in (["--cross-section", "RQ3"], ["--length", "-1"], ["--seed", "-1"], ["--set", "road.widht=3"]):
-        done = command(*arguments)
-        assert done.returncode == 2
-        assert len(done.stderr.strip().splitlines()) == 1
+        assert cli.command("parameters", arguments) == 2
+        assert len(capsys.readouterr().err.strip().splitlines()) == 1
 
 
 def test_limits_that_conflict_are_all_named_in_one_line() -> None:
