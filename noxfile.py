@@ -1,6 +1,6 @@
 """What `make demo`, `make test` and the others do, as sessions of nox: `nox -l` lists them.
 
-`nox -s tests-3.11 -- tests/core -k curve` hands arguments to pytest. In the environment TEST_WORKERS=N sets how many
+`nox -s tests-3.11 -- tests/road -k curve` hands arguments to pytest. In the environment TEST_WORKERS=N sets how many
 processes test side by side, TEST_MARKERS which tests, PYTHON that only the Python that runs nox is tested.
 """
 
@@ -27,7 +27,8 @@ EXTRAS = {
     "tests-3.13": "blender,dev,judges",
 }
 """What of pyproject.toml is installed into each environment."""
-PARTS = {"blender": ["tests/blender"], "others": ["tests", "--ignore=tests/blender"]}
+BLENDER_TESTS = ("tests/blender", "tests/jobs", "tests/ui")
+PARTS = {"blender": [*BLENDER_TESTS], "others": ["tests", *(f"--ignore={folder}" for folder in BLENDER_TESTS)]}
 """The tests in two processes: once ifcopenshell has worked in one, Blender 5.2's OBJ exporter aborts there."""
 ONLY = {("3.13", "blender"): "smoke or not any_blender", ("3.13", "others"): "smoke"}
 """Marker expressions by Python and part, where not all of a part's tests are run on that Python."""

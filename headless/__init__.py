@@ -50,7 +50,7 @@ def _end_quietly(kind: type[BaseException], error: BaseException, trace: Traceba
 
 
 _started = Path(sys.argv[0]) if sys.argv else Path()
-if _started.name in ("-m", "synthroads") or _started.parent.name in ("headless", "ml"):  # a command, not a library
+if _started.name in ("-m", "synthroads") or _started.parent.name == "headless":  # a command, not a library
     sys.excepthook = _end_quietly
     if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
         signal.signal(signal.SIGINT, _stop)

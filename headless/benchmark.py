@@ -18,14 +18,14 @@ if __name__ == "__main__":
 
 from headless.cli import Outcome, add_changes_argument, add_common_arguments, entry
 from headless.messages import progress_bar
-from synthroads_addon.core.benchmark import DEMO, QUICK, TABLE, judged, markdown
-from synthroads_addon.core.errors import InputError
-from synthroads_addon.core.files import output_folder
-from synthroads_addon.core.machine import available_cores, machine
-from synthroads_addon.core.marked import fill
-from synthroads_addon.core.scenario import Scenario, load_scenario
-from synthroads_addon.core.schema import canonical_json
-from synthroads_addon.waves import CELLS, write_waves
+from synthroads_addon.base.errors import InputError
+from synthroads_addon.base.files import output_folder
+from synthroads_addon.base.machine import available_cores, machine
+from synthroads_addon.base.marked_documents import fill
+from synthroads_addon.base.schema import canonical_json
+from synthroads_addon.jobs.measure.benchmark_table import DEMO, QUICK, TABLE, judged, markdown
+from synthroads_addon.jobs.measure.waves import CELLS, write_waves
+from synthroads_addon.scenario.scenario import Scenario, load_scenario
 
 _FILES = ["benchmark.json", "benchmark.md"]
 _PART = "--part"
@@ -80,7 +80,7 @@ def run(arguments: argparse.Namespace) -> Outcome:
 
 
 def _all(arguments: argparse.Namespace) -> dict[str, Any]:
-    """Measure every number of cores; return what `core.benchmark` makes tables of."""
+    """Measure every number of cores; return what `jobs.measure.benchmark_table` makes tables of."""
     with tempfile.TemporaryDirectory(prefix="synthroads-") as folder:
         scene = Path(folder) / "waves.obj"
         triangles = write_waves(scene, _QUICK_CELLS if arguments.quick else CELLS)
@@ -122,7 +122,7 @@ def _in_own_process(part: dict[str, Any], cores: int) -> dict[str, Any]:
 def _measured(part: dict[str, Any]) -> dict[str, Any]:
     """Measure a part in this process."""
     if part["part"] == "demo":
-        from synthroads_addon.benchmarking import measure_demo
+        from synthroads_addon.jobs.measure.benchmark import measure_demo
 
         found = measure_demo(_scenario(part["scenario"], part["changes"], part["quick"]))
     else:
@@ -133,9 +133,9 @@ def _measured(part: dict[str, Any]) -> dict[str, Any]:
 
 def _waves(rays: int, scene: Path, triangles: int) -> dict[str, float]:
     """Return the lines of the scene that other simulators are compared on."""
-    from synthroads_addon.core.progress import peak_memory_mb
-    from synthroads_addon.core.scenario import apply_change
-    from synthroads_addon.scene_scan import SceneScan, scan_scene
+    from synthroads_addon.base.progress import peak_memory_mb
+    from synthroads_addon.jobs.scan_scene import SceneScan, scan_scene
+    from synthroads_addon.scenario.scenario import apply_change
 
     data: Any = Scenario().to_dict()
     for change in (*_WAVES, f"scan.rays_per_pulse={rays}"):

@@ -18,10 +18,10 @@ if __name__ == "__main__":
 
 from headless.cli import Outcome, add_common_arguments, entry
 from headless.messages import progress_bar
-from synthroads_addon.core.calibration_axis import RoadClasses
-from synthroads_addon.core.calibration_job import PARTS, Calibration, CalibrationJob, Wanted, check, save_fitted, steps
-from synthroads_addon.core.errors import InputError
-from synthroads_addon.core.progress import Progress, silent
+from synthroads_addon.base.errors import InputError
+from synthroads_addon.base.progress import Progress, silent
+from synthroads_addon.calibration.job import PARTS, Calibration, CalibrationJob, Wanted, check, save_fitted, steps
+from synthroads_addon.calibration.pavement import RoadClasses
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -100,7 +100,7 @@ def run(arguments: argparse.Namespace) -> Outcome:
     if arguments.save:
         save_fitted(result, arguments.save, arguments.overwrite)
     if arguments.plot:
-        from synthroads_addon.core.calibration_plot import save_plot
+        from synthroads_addon.calibration.plot import save_plot
 
         save_plot(result, arguments.plot, arguments.overwrite)
     written = [str(path) for path in (arguments.save, arguments.plot) if path]

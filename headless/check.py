@@ -14,7 +14,7 @@ if __name__ == "__main__":
 from headless.cli import add_common_arguments, entry
 
 if TYPE_CHECKING:
-    from synthroads_addon.core.parameters.checker import Violation
+    from synthroads_addon.checking.checker import Violation
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -25,8 +25,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> tuple[int, dict[str, Any], str]:
     """Run `synthroads check`."""
-    from synthroads_addon.core.parameters.checker import check
-    from synthroads_addon.core.parameters.model import read_parameters
+    from synthroads_addon.checking.checker import check
+    from synthroads_addon.road.parameters import read_parameters
 
     violations = check(read_parameters(arguments.file))
     return 3 if violations else 0, {"violations": [asdict(item) for item in violations]}, table(violations)

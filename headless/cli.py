@@ -18,8 +18,8 @@ from typing import Any
 
 from headless import was_stopped
 from headless.messages import messages
-from synthroads_addon.core.errors import InputError
-from synthroads_addon.core.generator import generator
+from synthroads_addon.base.errors import InputError
+from synthroads_addon.base.version import generator
 
 
 def _missing(error: ModuleNotFoundError) -> str:
@@ -35,10 +35,10 @@ def _missing(error: ModuleNotFoundError) -> str:
 
 
 try:
-    from synthroads_addon.core.scenario import apply_change
-    from synthroads_addon.core.schema import canonical_json
-    from synthroads_addon.core.tolerance import KINDS, TIMES, parse_tolerance, shown, with_unit
-    from synthroads_addon.core.twin import TWIN_FORMATS
+    from synthroads_addon.base.schema import canonical_json
+    from synthroads_addon.scenario.scenario import apply_change
+    from synthroads_addon.scenario.tolerance import KINDS, TIMES, parse_tolerance, shown, with_unit
+    from synthroads_addon.twin.formats import TWIN_FORMATS
 except ModuleNotFoundError as error:  # Blender itself has none of the packages that the extension brings
     print(_missing(error), file=sys.stderr)
     raise SystemExit(2) from None
@@ -77,8 +77,6 @@ SHORT_OPTIONS = {
     "--version": "-V",
 }
 """Letters that stand for options, the same for all commands."""
-_LEARNING = ("train", "evaluate", "predict", "experiment", "reconstruct")
-"""Commands whose modules are in `ml`."""
 
 
 class _Parser(argparse.ArgumentParser):
@@ -151,7 +149,7 @@ def add_short_options(parser: argparse.ArgumentParser) -> None:
 
 
 def _module(name: str) -> Any:
-    return import_module(f"{'ml' if name in _LEARNING else 'headless'}.{name}")
+    return import_module(f"headless.{name}")
 
 
 def command(name: str, argv: Sequence[str] | None = None) -> int:

@@ -109,8 +109,8 @@ def _preview_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def _info(arguments: argparse.Namespace) -> Outcome:
-    from synthroads_addon.core.cloud.reading import open_cloud
-    from synthroads_addon.core.cloud.statistics import cloud_statistics
+    from synthroads_addon.cloud.formats.reading import open_cloud
+    from synthroads_addon.cloud.tools.statistics import cloud_statistics
 
     with open_cloud(arguments.file) as cloud:
         figures = cloud_statistics(cloud, arguments.radius, arguments.samples)
@@ -118,7 +118,7 @@ def _info(arguments: argparse.Namespace) -> Outcome:
 
 
 def _subsample(arguments: argparse.Namespace) -> Outcome:
-    from synthroads_addon.core.cloud.tools import subsample
+    from synthroads_addon.cloud.tools.convert import subsample
 
     done = subsample(
         arguments.file,
@@ -132,7 +132,7 @@ def _subsample(arguments: argparse.Namespace) -> Outcome:
 
 
 def _map_intensity(arguments: argparse.Namespace) -> Outcome:
-    from synthroads_addon.core.cloud.tools import map_intensity
+    from synthroads_addon.cloud.tools.convert import map_intensity
 
     done = map_intensity(
         arguments.file,
@@ -153,7 +153,7 @@ def _map_intensity(arguments: argparse.Namespace) -> Outcome:
 
 
 def _convert(arguments: argparse.Namespace) -> Outcome:
-    from synthroads_addon.core.cloud.tools import convert
+    from synthroads_addon.cloud.tools.convert import convert
 
     done = convert(
         arguments.file, arguments.output, arguments.classes, arguments.overwrite, progress_bar(arguments)
@@ -165,7 +165,7 @@ def _convert(arguments: argparse.Namespace) -> Outcome:
 
 
 def _preview(arguments: argparse.Namespace) -> Outcome:
-    from synthroads_addon.core.cloud.tools import draw_previews, read_centerline
+    from synthroads_addon.cloud.tools.convert import draw_previews, read_centerline
 
     done = draw_previews(
         arguments.file,

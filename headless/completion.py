@@ -12,9 +12,9 @@ from pathlib import Path
 from typing import Any
 
 from headless.list import KINDS
-from synthroads_addon.core.parameters.limits import STANDARD_CROSS_SECTIONS
-from synthroads_addon.core.tradeoff import KNOBS
-from synthroads_addon.core.twin import TWIN_FORMATS
+from synthroads_addon.jobs.measure.tradeoff import KNOBS
+from synthroads_addon.road.guidelines import STANDARD_CROSS_SECTIONS
+from synthroads_addon.twin.formats import TWIN_FORMATS
 
 _NAMES_OR_FILES = {
     "--classes": "classes",

@@ -11,10 +11,10 @@ if __name__ == "__main__":
 
 from headless.cli import Outcome, add_common_arguments, entry
 from headless.messages import detail, progress_bar
-from synthroads_addon.core.dataset.manifest import Manifest, faults, read_manifest
-from synthroads_addon.core.dataset.recipe import Recipe, load_recipe, recipe_names
-from synthroads_addon.core.errors import InputError
-from synthroads_addon.core.scenario import parsed_change
+from synthroads_addon.base.errors import InputError
+from synthroads_addon.dataset.manifest import Manifest, faults, read_manifest
+from synthroads_addon.dataset.recipe import Recipe, load_recipe, recipe_names
+from synthroads_addon.scenario.scenario import parsed_change
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

@@ -23,9 +23,13 @@ from typing import Any
 
 from headless.dataset_scene import DONE, FAILED, FILES
 from headless.messages import logger
-from synthroads_addon.core.dataset.data_card import data_card
-from synthroads_addon.core.dataset.layouts import layout_descriptions
-from synthroads_addon.core.dataset.manifest import (
+from synthroads_addon.base.errors import InputError, OutputError
+from synthroads_addon.base.machine import available_cores
+from synthroads_addon.base.progress import Progress, silent
+from synthroads_addon.base.version import generator
+from synthroads_addon.dataset.data_card import data_card
+from synthroads_addon.dataset.layouts import layout_descriptions
+from synthroads_addon.dataset.manifest import (
     MANIFEST,
     PUBLISHED,
     Manifest,
@@ -36,12 +40,8 @@ from synthroads_addon.core.dataset.manifest import (
     read_manifest,
     write_atomically,
 )
-from synthroads_addon.core.dataset.recipe import Recipe, SceneJob, scene_jobs
-from synthroads_addon.core.dataset.replacing import begin_removal, finish_removal, made_by, remove
-from synthroads_addon.core.errors import InputError, OutputError
-from synthroads_addon.core.generator import generator
-from synthroads_addon.core.machine import available_cores
-from synthroads_addon.core.progress import Progress, silent
+from synthroads_addon.dataset.recipe import Recipe, SceneJob, scene_jobs
+from synthroads_addon.dataset.replacing import begin_removal, finish_removal, made_by, remove
 
 WORK = ".work"
 LOCK = ".lock"

@@ -19,14 +19,14 @@ if __name__ == "__main__":
     sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from headless.cli import leave
-from synthroads_addon.core.cloud.reading import open_cloud
-from synthroads_addon.core.dataset.layouts import write_layouts
-from synthroads_addon.core.dataset.manifest import PUBLISHED, file_entries, write_atomically
-from synthroads_addon.core.dataset.recipe import Recipe, SceneJob
-from synthroads_addon.core.errors import InputError
-from synthroads_addon.core.parameters.model import read_parameters
-from synthroads_addon.core.scenario import Scenario
-from synthroads_addon.core.schema import canonical_json, read_json
+from synthroads_addon.base.errors import InputError
+from synthroads_addon.base.schema import canonical_json, read_json
+from synthroads_addon.cloud.formats.reading import open_cloud
+from synthroads_addon.dataset.layouts import write_layouts
+from synthroads_addon.dataset.manifest import PUBLISHED, file_entries, write_atomically
+from synthroads_addon.dataset.recipe import Recipe, SceneJob
+from synthroads_addon.road.parameters import read_parameters
+from synthroads_addon.scenario.scenario import Scenario
 
 FILES = "files"
 """Subfolder of a task's folder that is laid out as the data set."""
@@ -40,7 +40,7 @@ def make_scene(task: dict[str, Any], folder: Path, threads: int) -> None:
     Raises:
         InputError: the scenario can't be met.
     """
-    from synthroads_addon.pipeline import Job, generate
+    from synthroads_addon.jobs.generate import Job, generate
 
     recipe = Recipe.from_dict(task["recipe"], "recipe")
     scenario = Scenario.from_dict(task["scenario"], "scenario")

@@ -24,7 +24,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> Outcome:
     """Run `synthroads gallery`."""
-    from synthroads_addon.blender.gallery import Quality, make_gallery
+    from synthroads_addon.blender.views.gallery import Quality, make_gallery
 
     quality = Quality((arguments.width, arguments.width * 9 // 16), arguments.samples)
     made = make_gallery(arguments.output, quality, arguments.only, logger.info)

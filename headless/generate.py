@@ -24,7 +24,7 @@ from headless.cli import (
     entry,
 )
 from headless.messages import detail, progress_bar
-from synthroads_addon.core.scenario import load_scenario, scenario_names
+from synthroads_addon.scenario.scenario import load_scenario, scenario_names
 
 _FIELDS = {"device": "scan.device", "seed": "seed", "fidelity": "fidelity", "twin": "twin"}
 """Arguments that are short for fields of the scenario."""
@@ -54,7 +54,7 @@ def run(arguments: argparse.Namespace) -> Outcome:
     begun = time.perf_counter()
     scenario = load_scenario(arguments.scenario, [*choice_changes(arguments), *all_changes(arguments, _FIELDS)])
     detail("scenario", scenario.to_dict())
-    from synthroads_addon.pipeline import Job, generate
+    from synthroads_addon.jobs.generate import Job, generate
 
     job = Job(
         scenario,

@@ -14,12 +14,12 @@ if __name__ == "__main__":
 
 from headless.cli import Outcome, add_common_arguments, entry
 from ml import catalogue as of_learning
-from synthroads_addon.core import catalogue
-from synthroads_addon.core.catalogue import Kind, entries
-from synthroads_addon.core.errors import InputError, nearest_name
-from synthroads_addon.core.field_list import Field, fields_of
-from synthroads_addon.core.scenario import Scenario
-from synthroads_addon.core.text_table import text_table
+from synthroads_addon.base.errors import InputError, nearest_name
+from synthroads_addon.base.field_list import Field, fields_of
+from synthroads_addon.base.text_table import text_table
+from synthroads_addon.jobs import catalogue
+from synthroads_addon.jobs.catalogue import Kind, entries
+from synthroads_addon.scenario.scenario import Scenario
 
 _FIELDS = "fields"
 _LONGEST_DEFAULT = 24

@@ -18,8 +18,8 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any
 
-from synthroads_addon.core.generator import generator
-from synthroads_addon.core.progress import Progress, silent
+from synthroads_addon.base.progress import Progress, silent
+from synthroads_addon.base.version import generator
 
 logger = logging.getLogger("synthroads")
 INTERVAL = 10.0

@@ -11,11 +11,11 @@ if __name__ == "__main__":
     sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from headless.cli import Outcome, add_changes_argument, add_common_arguments, all_changes, entry
-from synthroads_addon.core.parameters.limits import STANDARD_CROSS_SECTIONS, USUAL_SECTION
-from synthroads_addon.core.parameters.model import DESIGN_CLASSES, RoadParameters
-from synthroads_addon.core.parameters.sampler import sample_road
-from synthroads_addon.core.road_scenario import RoadScenario
-from synthroads_addon.core.scenario import Scenario, apply_change
+from synthroads_addon.road.guidelines import STANDARD_CROSS_SECTIONS, USUAL_SECTION
+from synthroads_addon.road.parameters import DESIGN_CLASSES, RoadParameters
+from synthroads_addon.sampling.road import sample_road
+from synthroads_addon.scenario.road import RoadScenario
+from synthroads_addon.scenario.scenario import Scenario, apply_change
 
 _FIELDS = {
     "design_class": "road.design_class",

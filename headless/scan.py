@@ -24,8 +24,8 @@ from headless.cli import (
     entry,
 )
 from headless.messages import detail, progress_bar
-from synthroads_addon.core.errors import InputError
-from synthroads_addon.core.scenario import Scenario, apply_change, load_scenario, scenario_names
+from synthroads_addon.base.errors import InputError
+from synthroads_addon.scenario.scenario import Scenario, apply_change, load_scenario, scenario_names
 
 _FIELDS = {
     "device": "scan.device",
@@ -80,7 +80,7 @@ def run(arguments: argparse.Namespace) -> Outcome:
     begun = time.perf_counter()
     scenario = scenario_of(arguments)
     detail("scenario", scenario.to_dict())
-    from synthroads_addon.scene_scan import SceneScan, scan_scene
+    from synthroads_addon.jobs.scan_scene import SceneScan, scan_scene
 
     job = SceneScan(
         scenario=scenario,

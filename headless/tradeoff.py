@@ -17,14 +17,14 @@ if __name__ == "__main__":
 from headless.cli import Outcome, add_common_arguments, entry
 from headless.messages import progress_bar
 from headless.tradeoff_plot import plot
-from synthroads_addon.core.errors import InputError, OutputError, nearest_name
-from synthroads_addon.core.files import write_file
-from synthroads_addon.core.generator import generator
-from synthroads_addon.core.marked import fill
-from synthroads_addon.core.progress import Progress
-from synthroads_addon.core.scenario import load_scenario
-from synthroads_addon.core.schema import canonical_json, read_json
-from synthroads_addon.core.tradeoff import KNOBS, REPEATED, SCENES, markdown, row_scenario, rows
+from synthroads_addon.base.errors import InputError, OutputError, nearest_name
+from synthroads_addon.base.files import write_file
+from synthroads_addon.base.marked_documents import fill
+from synthroads_addon.base.progress import Progress
+from synthroads_addon.base.schema import canonical_json, read_json
+from synthroads_addon.base.version import generator
+from synthroads_addon.jobs.measure.tradeoff import KNOBS, REPEATED, SCENES, markdown, row_scenario, rows
+from synthroads_addon.scenario.scenario import load_scenario
 
 _ROW = "--row"
 _ROWS = "rows"
@@ -58,7 +58,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> Outcome:
     """Run `synthroads tradeoff`; each row is measured in a process of its own, so that its memory is its own."""
     if arguments.row:
-        from synthroads_addon.measuring import measure_row
+        from synthroads_addon.jobs.measure.rows import measure_row
 
         row = json.loads(arguments.row)
         result = measure_row(row["scenario"], row["knob"], row["value"])

@@ -10,10 +10,10 @@ if __name__ == "__main__":
     sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from headless.cli import Outcome, add_common_arguments, add_renamed_argument, add_twin_argument, entry
-from synthroads_addon.core.errors import InputError
-from synthroads_addon.core.files import output_folder
-from synthroads_addon.core.parameters.model import read_parameters
-from synthroads_addon.core.twin import TOLERANCE, TWIN_FORMATS, check_formats, twin_file_names, write_twin
+from synthroads_addon.base.errors import InputError
+from synthroads_addon.base.files import output_folder
+from synthroads_addon.road.parameters import read_parameters
+from synthroads_addon.twin.formats import TOLERANCE, TWIN_FORMATS, check_formats, twin_file_names, write_twin
 
 _LIMITS = (1e-4, 1.0)
 

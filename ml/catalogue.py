@@ -6,13 +6,13 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from synthroads_addon.core.catalogue import Entry, Kind, figures, preset
-from synthroads_addon.core.errors import InputError
-from synthroads_addon.core.schema import read_yaml
+from synthroads_addon.base.errors import InputError
+from synthroads_addon.base.schema import read_yaml
+from synthroads_addon.jobs.catalogue import Entry, Kind, figures, preset
 
 from .configuration import EXPERIMENTS, SHIPPED, Schedule, experiment_names, shipped_names
-from .segmentation.classes import SHIPPED as MAPPINGS
-from .segmentation.classes import load_mapping
+from .segmentation.data.classes import SHIPPED as MAPPINGS
+from .segmentation.data.classes import load_mapping
 
 _YAML = (".yaml", ".yml", ".json")
 

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from synthroads_addon.core.errors import InputError
+from synthroads_addon.base.errors import InputError
 
 
 def thin(coord: NDArray[np.floating[Any]], cell: float) -> NDArray[np.intp]:

@@ -10,8 +10,8 @@ from typing import Any, TypeVar
 import torch
 from torch import Tensor, nn
 
-from synthroads_addon.core.errors import InputError
-from synthroads_addon.core.progress import Progress, silent
+from synthroads_addon.base.errors import InputError
+from synthroads_addon.base.progress import Progress, silent
 
 from .configuration import Configuration, Schedule
 from .runs import Run, stream_seed

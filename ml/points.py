@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from synthroads_addon.core.cloud.points import PointBlock
-from synthroads_addon.core.cloud.reading import CloudHeader, open_cloud
-from synthroads_addon.core.errors import InputError
+from synthroads_addon.base.errors import InputError
+from synthroads_addon.cloud.formats.reading import CloudHeader, open_cloud
+from synthroads_addon.cloud.points import PointBlock
 
 Float = NDArray[np.float64]
 

@@ -12,9 +12,9 @@ from typing import Any, Generic, TypeVar
 
 import torch
 
-from synthroads_addon.core.errors import InputError, MissingFileError, OutputError
-from synthroads_addon.core.files import write_file
-from synthroads_addon.core.schema import canonical_json, read_json
+from synthroads_addon.base.errors import InputError, MissingFileError, OutputError
+from synthroads_addon.base.files import write_file
+from synthroads_addon.base.schema import canonical_json, read_json
 
 from .configuration import Configuration, from_data
 
@@ -136,7 +136,7 @@ class Run(Generic[C]):
 
 def stream_seed(seed: int, *purpose: str | int) -> int:
     """Return the 63-bit seed of one purpose."""
-    from synthroads_addon.core.random_streams import stream
+    from synthroads_addon.base.random_streams import stream
 
     return int(stream(seed, *purpose).integers(2**63))
 

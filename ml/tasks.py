@@ -8,7 +8,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any, Protocol, cast
 
-from synthroads_addon.core.progress import Progress, silent
+from synthroads_addon.base.progress import Progress, silent
 
 from .configuration import Configuration
 

@@ -18,9 +18,11 @@ import hypothesis
 import pytest
 
 if TYPE_CHECKING:
-    from tests.blender.kept_groups import KeptGroups
+    from tests.helpers.scenes.kept_groups import KeptGroups
 
 TESTS = Path(__file__).resolve().parent
+BLENDER_TESTS = ("blender", "jobs", "ui")
+"""Folders of the tests that need Blender."""
 HAS_BPY = importlib.util.find_spec("bpy") is not None
 
 # Before anything imports bpy: it must not read the user's settings and extensions, whose wheels would shadow ours.
@@ -28,7 +30,7 @@ BLENDER_FOLDER = Path(tempfile.mkdtemp(prefix="synthroads-blender-"))
 os.environ["BLENDER_USER_RESOURCES"] = str(BLENDER_FOLDER)
 
 HAS_TORCH = importlib.util.find_spec("torch") is not None
-collect_ignore = [name for name, there in (("blender", HAS_BPY), ("ml", HAS_TORCH)) if not there]
+collect_ignore = [*(() if HAS_BPY else BLENDER_TESTS), *(() if HAS_TORCH else ("ml",))]
 
 # The same examples in every run, and no time limit for one: the machine may be busy with something else.
 hypothesis.settings.register_profile("synthroads", deadline=None, derandomize=True)
@@ -39,7 +41,7 @@ def pytest_report_header() -> str:
     """Say which Blender the tests run on, without importing it, and whether they learn."""
     learning = "" if HAS_TORCH else "; torch is not installed: tests/ml is left out"
     if not HAS_BPY:
-        return f"bpy is not installed: tests/blender is left out{learning}"
+        return f"bpy is not installed: {', '.join(BLENDER_TESTS)} are left out{learning}"
     spec = importlib.util.find_spec("bpy")
     folders = Path(spec.origin).parent.glob("[0-9].[0-9]*") if spec and spec.origin else []
     return f"bpy {', '.join(folder.name for folder in folders)}{learning}"
@@ -57,14 +59,18 @@ def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Mark a tenth of the tests that don't depend on Blender's release, drawn by their names, as `smoke`."""
     for item in items:
-        free = TESTS / "blender" not in item.path.parents or item.get_closest_marker("any_blender")
+        free = not _is_blenders(item.path) or item.get_closest_marker("any_blender")
         there = not item.get_closest_marker("first_python")
         if free and there and crc32(item.nodeid.encode()) % 10 == 0:
             item.add_marker("smoke")
 
 
+def _is_blenders(path: Path) -> bool:
+    return path.relative_to(TESTS).parts[0] in BLENDER_TESTS
+
+
 def _needs_blender(request: pytest.FixtureRequest) -> bool:
-    return TESTS / "blender" in request.path.parents
+    return _is_blenders(request.path)
 
 
 def _empty_scene() -> None:
@@ -76,7 +82,7 @@ def _empty_scene() -> None:
 @cache
 def _kept_groups() -> KeptGroups:
     """Return the node groups that tests have made so far."""
-    from tests.blender.kept_groups import KeptGroups
+    from tests.helpers.scenes.kept_groups import KeptGroups
 
     return KeptGroups(BLENDER_FOLDER)
 
@@ -89,7 +95,7 @@ def kept_groups() -> KeptGroups:
 
 @pytest.fixture(scope="module", autouse=True)
 def _empty_scene_for_module(request: pytest.FixtureRequest) -> Iterator[None]:
-    """Start each module of tests/blender with an empty scene, and leave none of its data behind."""
+    """Start each module of tests of Blender with an empty scene, and leave none of its data behind."""
     if not _needs_blender(request):
         yield
         return
@@ -101,7 +107,7 @@ def _empty_scene_for_module(request: pytest.FixtureRequest) -> Iterator[None]:
 
 @pytest.fixture(autouse=True)
 def _empty_scene_for_test(request: pytest.FixtureRequest, _empty_scene_for_module: None) -> None:
-    """Start each test of tests/blender with an empty scene, unless it is marked `keep_scene`.
+    """Start each test of Blender with an empty scene, unless it is marked `keep_scene`.
 
     The road model's node groups are taken from a test before, unless it is marked `new_groups`.
     """

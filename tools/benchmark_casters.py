@@ -25,14 +25,14 @@ from numpy.typing import NDArray
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
+from synthroads_addon.base.progress import peak_memory_mb
+from synthroads_addon.base.random_streams import stream
 from synthroads_addon.blender.casters.bvhtree import BVHTreeCaster
 from synthroads_addon.blender.casters.embree import EmbreeCaster
 from synthroads_addon.blender.casters.measure import CHUNK, agreement, bare_rate
-from synthroads_addon.core.progress import peak_memory_mb
-from synthroads_addon.core.random_streams import stream
-from synthroads_addon.core.scanning.caster import Caster
-from synthroads_addon.core.scene_mesh import SceneMesh
-from synthroads_addon.waves import waves
+from synthroads_addon.jobs.measure.waves import waves
+from synthroads_addon.scanning.scene.caster import Caster
+from synthroads_addon.scanning.scene.mesh import SceneMesh
 from tools.raycast_nodes import RaycastNodesCaster
 
 CASTERS: dict[str, Callable[[SceneMesh], Caster]] = {
@@ -57,11 +57,11 @@ Flight: TypeAlias = tuple[NDArray[np.float64], float, float]
 def demo_scene() -> tuple[SceneMesh, Flight]:
     """Return the demo's mesh at standard fidelity, and the flight over it."""
     from synthroads_addon.blender.files import empty_file
-    from synthroads_addon.blender.model import build_road
-    from synthroads_addon.blender.scene import scene_mesh
-    from synthroads_addon.core.parameters.geometry import RoadGeometry
-    from synthroads_addon.core.parameters.sampler import sample_road
-    from synthroads_addon.core.scenario import load_scenario
+    from synthroads_addon.blender.model.build import build_road
+    from synthroads_addon.blender.scene.evaluated import scene_mesh
+    from synthroads_addon.road.geometry import RoadGeometry
+    from synthroads_addon.sampling.road import sample_road
+    from synthroads_addon.scenario.scenario import load_scenario
 
     empty_file()
     scenario = load_scenario("rq31-600m")

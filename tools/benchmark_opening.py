@@ -22,12 +22,12 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
+from synthroads_addon.base.progress import peak_memory_mb
 from synthroads_addon.blender.casters.embree import EmbreeCaster
-from synthroads_addon.blender.foreign import open_scene
-from synthroads_addon.blender.scene import scanned_scene
-from synthroads_addon.core.progress import peak_memory_mb
-from synthroads_addon.core.scanning.caster import FacePlanes
-from synthroads_addon.waves import write_waves
+from synthroads_addon.blender.scene.evaluated import scanned_scene
+from synthroads_addon.blender.scene.foreign import open_scene
+from synthroads_addon.jobs.measure.waves import write_waves
+from synthroads_addon.scanning.scene.caster import FacePlanes
 
 
 def held_mb() -> float:

@@ -12,9 +12,9 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from synthroads_addon.core.parameters.sampler import sample_road
-from synthroads_addon.core.road_scenario import RoadScenario
-from synthroads_addon.core.twin.ifc import write_ifc
+from synthroads_addon.sampling.road import sample_road
+from synthroads_addon.scenario.road import RoadScenario
+from synthroads_addon.twin.ifc.writer import write_ifc
 
 
 def main() -> None:

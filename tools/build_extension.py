@@ -78,7 +78,10 @@ LICENCES = {
     "rasterio": "BSD-3-Clause; holds GDAL and PROJ: MIT, GEOS: LGPL-2.1-or-later, and free libraries that these use",
 }
 
-LEFT_OUT = shutil.ignore_patterns("__pycache__", "*.py[co]", ".*", "*.blend[1-9]", "wheels.txt", MANIFEST.name)
+LEFT_OUT = shutil.ignore_patterns(
+    *("__pycache__", "*.py[co]", ".*", "*.blend[1-9]", "wheels.txt", MANIFEST.name),
+    "reconstruction",  # needs SciPy, and nothing in Blender uses it
+)
 ZIP_DATE = (1980, 1, 1, 0, 0, 0)
 
 

@@ -22,11 +22,11 @@ sys.path.insert(0, str(ROOT))
 
 from synthroads_addon.blender.files import empty_file  # noqa: E402
 from synthroads_addon.blender.materials import material  # noqa: E402
-from synthroads_addon.core.calibration_axis import RoadClasses  # noqa: E402
-from synthroads_addon.core.calibration_job import Calibration, CalibrationJob, Wanted, calibrate  # noqa: E402
-from synthroads_addon.core.calibration_plot import save_plot  # noqa: E402
-from synthroads_addon.core.scenario import Scenario  # noqa: E402
-from synthroads_addon.scene_scan import SceneScan, scan_scene  # noqa: E402
+from synthroads_addon.calibration.job import Calibration, CalibrationJob, Wanted, calibrate  # noqa: E402
+from synthroads_addon.calibration.pavement import RoadClasses  # noqa: E402
+from synthroads_addon.calibration.plot import save_plot  # noqa: E402
+from synthroads_addon.jobs.scan_scene import SceneScan, scan_scene  # noqa: E402
+from synthroads_addon.scenario.scenario import Scenario  # noqa: E402
 
 LINES = (-10.0, -6.0, 6.0, 10.0)
 """Offsets of the painted lines, m."""

@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
+from synthroads_addon.base.random_streams import stream
 from synthroads_addon.blender.files import empty_file
-from synthroads_addon.core.random_streams import stream
 
 Float = NDArray[np.float64]
 

@@ -26,10 +26,12 @@ import numpy as np
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
 
-from ml.centerline import pictures, tables  # noqa: E402
-from ml.centerline.corridor import TRUTH_KINDS, TruthKind  # noqa: E402
-from ml.centerline.data import DataOptions  # noqa: E402
-from ml.centerline.evaluation import (  # noqa: E402
+from ml.centerline.data.batches import DataOptions  # noqa: E402
+from ml.centerline.data.corridor import TRUTH_KINDS, TruthKind  # noqa: E402
+from ml.centerline.data.roads import Road, read_measured, read_scene, scene_folders  # noqa: E402
+from ml.centerline.data.slices import SliceSettings  # noqa: E402
+from ml.centerline.scores import pictures, tables  # noqa: E402
+from ml.centerline.scores.evaluation import (  # noqa: E402
     HALF_WIDTH,
     Case,
     Cropping,
@@ -42,17 +44,15 @@ from ml.centerline.evaluation import (  # noqa: E402
     trivial_predictors,
     truth_of,
 )
-from ml.centerline.metrics import Spread, over_seeds  # noqa: E402
-from ml.centerline.paint import with_painted_line  # noqa: E402
-from ml.centerline.roads import Road, read_measured, read_scene, scene_folders  # noqa: E402
-from ml.centerline.skeleton import SkeletonSettings  # noqa: E402
-from ml.centerline.slices import SliceSettings  # noqa: E402
+from ml.centerline.scores.metrics import Spread, over_seeds  # noqa: E402
+from ml.centerline.scores.paint import with_painted_line  # noqa: E402
+from ml.centerline.scores.skeleton import SkeletonSettings  # noqa: E402
 from ml.configuration import Part  # noqa: E402
 from ml.runs import Run  # noqa: E402
 from ml.tasks import kinds  # noqa: E402
-from synthroads_addon.core.errors import SynthRoadsError  # noqa: E402
-from synthroads_addon.core.files import write_file  # noqa: E402
-from synthroads_addon.core.marked import fill  # noqa: E402
+from synthroads_addon.base.errors import SynthRoadsError  # noqa: E402
+from synthroads_addon.base.files import write_file  # noqa: E402
+from synthroads_addon.base.marked_documents import fill  # noqa: E402
 
 Measured = dict[str, dict[str, dict[str, Spread]]]
 AnyPart = TypeVar("AnyPart", bound=Part)
@@ -274,7 +274,7 @@ def measure_corridor(
     learned: Mapping[str, Sequence[Predictor]], cases: Callable[[int], Sequence[Case]], seeds: Sequence[int]
 ) -> Measured:
     """Return mean errors and coverage of everything that the models say of the corridor, by model and target."""
-    corridor_figures = import_module("ml.centerline.measuring").corridor_figures
+    corridor_figures = import_module("ml.centerline.scores.measuring").corridor_figures
     rows: dict[str, list[dict[str, float]]] = {}
     for index, seed in enumerate(seeds):
         shown = cases(seed)

@@ -15,8 +15,8 @@ from typing import Any
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
 
-from synthroads_addon.core.dataset.manifest import SceneEntry, read_manifest  # noqa: E402
-from synthroads_addon.core.errors import SynthRoadsError  # noqa: E402
+from synthroads_addon.base.errors import SynthRoadsError  # noqa: E402
+from synthroads_addon.dataset.manifest import SceneEntry, read_manifest  # noqa: E402
 
 HEAD = ("group", "scenes", "points", "classes", "images (s)", "scan and LAZ (s)", "all stages (s)", "memory (MB)")
 

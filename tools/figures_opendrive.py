@@ -22,10 +22,10 @@ from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from synthroads_addon.core.parameters.sampler import sample_road
-from synthroads_addon.core.road_scenario import RoadScenario
-from synthroads_addon.core.twin.opendrive import write_opendrive
-from tests.core.opendrive_reader import OpenDrive, corners_local, corners_road, number
+from synthroads_addon.sampling.road import sample_road
+from synthroads_addon.scenario.road import RoadScenario
+from synthroads_addon.twin.opendrive.writer import write_opendrive
+from tests.helpers.files.opendrive_reader import OpenDrive, corners_local, corners_road, number
 
 COLOURS = {
     "driving": "#6f7782",

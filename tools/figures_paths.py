@@ -19,12 +19,12 @@ from matplotlib.axes import Axes
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
 
-from synthroads_addon.core.parameters.geometry import RoadGeometry  # noqa: E402
-from synthroads_addon.core.parameters.model import AlignmentObject, HorizontalElement, VerticalPoint  # noqa: E402
-from synthroads_addon.core.parameters.sampler import sample_road  # noqa: E402
-from synthroads_addon.core.road_scenario import RoadScenario  # noqa: E402
-from synthroads_addon.core.scan_scenario import Platform  # noqa: E402
-from synthroads_addon.core.scanning.path import RoadGuide, make_path  # noqa: E402
+from synthroads_addon.road.geometry import RoadGeometry  # noqa: E402
+from synthroads_addon.road.parameters import AlignmentObject, HorizontalElement, VerticalPoint  # noqa: E402
+from synthroads_addon.sampling.road import sample_road  # noqa: E402
+from synthroads_addon.scanning.platforms.path import RoadGuide, make_path  # noqa: E402
+from synthroads_addon.scenario.road import RoadScenario  # noqa: E402
+from synthroads_addon.scenario.scan import Platform  # noqa: E402
 
 TARGET = ROOT / "docs" / "pictures" / "scan-paths.png"
 PANELS: list[tuple[str, dict[str, Any]]] = [

@@ -18,19 +18,19 @@ import numpy as np
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
 
-from synthroads_addon.core.material_variation import varied  # noqa: E402
-from synthroads_addon.core.materials import Material, materials  # noqa: E402
-from synthroads_addon.core.parameters.model_surroundings import Environment, MaterialVariation  # noqa: E402
-from synthroads_addon.core.scan_scenario import Weather  # noqa: E402
-from synthroads_addon.core.scanning.beam import RINGS, beam_pattern, conical, cylindrical_offsets  # noqa: E402
-from synthroads_addon.core.scanning.radiometry import facet_terms, returned_share  # noqa: E402
-from synthroads_addon.core.scanning.weather import (  # noqa: E402
+from synthroads_addon.materials.table import Material, materials  # noqa: E402
+from synthroads_addon.materials.variation import varied  # noqa: E402
+from synthroads_addon.road.surroundings import Environment, MaterialVariation  # noqa: E402
+from synthroads_addon.scanning.beam import RINGS, beam_pattern, conical, cylindrical_offsets  # noqa: E402
+from synthroads_addon.scanning.radiometry import facet_terms, returned_share  # noqa: E402
+from synthroads_addon.scanning.weather import (  # noqa: E402
     USUAL_VISIBILITY,
     attenuation,
     kim_exponent,
     kruse_exponent,
     visibility_extinction,
 )
+from synthroads_addon.scenario.scan import Weather  # noqa: E402
 
 mpl.use("Agg")
 from matplotlib import pyplot  # noqa: E402

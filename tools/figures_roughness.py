@@ -19,10 +19,10 @@ from numpy.typing import NDArray
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
 
-from synthroads_addon.core.cloud.points import PointBlock  # noqa: E402
-from synthroads_addon.core.cloud.roughness import OCTAVES, RELIEF, MicroRelief, adjusted, heights  # noqa: E402
-from synthroads_addon.core.cloud.surface_variation import plane_residuals, surface_variation  # noqa: E402
-from synthroads_addon.core.random_streams import stream  # noqa: E402
+from synthroads_addon.base.random_streams import stream  # noqa: E402
+from synthroads_addon.cloud.points import PointBlock  # noqa: E402
+from synthroads_addon.cloud.tools.surface_variation import plane_residuals, surface_variation  # noqa: E402
+from synthroads_addon.scanning.relief import OCTAVES, RELIEF, MicroRelief, adjusted, heights  # noqa: E402
 
 Float = NDArray[np.float64]
 Rows = tuple[list[dict[str, float]], list[dict[str, float]]]

@@ -20,12 +20,12 @@ from numpy.typing import NDArray
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
 
-from synthroads_addon.core.cloud.labels import classes  # noqa: E402
-from synthroads_addon.core.parameters.geometry import RoadGeometry  # noqa: E402
-from synthroads_addon.core.parameters.sampler import sample_road  # noqa: E402
-from synthroads_addon.core.scanning.beam import RINGS, beam_pattern  # noqa: E402
-from synthroads_addon.core.scenario import load_scenario  # noqa: E402
-from synthroads_addon.pipeline import Job, generate  # noqa: E402
+from synthroads_addon.base.classes import classes  # noqa: E402
+from synthroads_addon.jobs.generate import Job, generate  # noqa: E402
+from synthroads_addon.road.geometry import RoadGeometry  # noqa: E402
+from synthroads_addon.sampling.road import sample_road  # noqa: E402
+from synthroads_addon.scanning.beam import RINGS, beam_pattern  # noqa: E402
+from synthroads_addon.scenario.scenario import load_scenario  # noqa: E402
 
 mpl.use("Agg")
 from matplotlib import pyplot  # noqa: E402

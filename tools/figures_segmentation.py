@@ -23,18 +23,18 @@ sys.path.insert(0, str(ROOT))
 
 from ml.fitting import chosen_device  # noqa: E402
 from ml.runs import HISTORY, METRICS, PRETRAINING, Run  # noqa: E402
-from ml.segmentation.evaluation import score, trained_model  # noqa: E402
+from ml.segmentation.data.pack import CROP, summary  # noqa: E402
+from ml.segmentation.data.packing import PackReader  # noqa: E402
+from ml.segmentation.data.sources import Source  # noqa: E402
 from ml.segmentation.experiment import RESULTS  # noqa: E402
-from ml.segmentation.pack import CROP, summary  # noqa: E402
-from ml.segmentation.packing import PackReader  # noqa: E402
-from ml.segmentation.pictures import comparison  # noqa: E402
 from ml.segmentation.recipes import SegmentationConfiguration  # noqa: E402
-from ml.segmentation.sources import Source  # noqa: E402
-from ml.segmentation.tables import by_class, by_test, cell  # noqa: E402
-from synthroads_addon.core.errors import InputError, SynthRoadsError  # noqa: E402
-from synthroads_addon.core.files import write_file  # noqa: E402
-from synthroads_addon.core.marked import fill  # noqa: E402
-from synthroads_addon.core.schema import read_json  # noqa: E402
+from ml.segmentation.scores.evaluation import score, trained_model  # noqa: E402
+from ml.segmentation.scores.pictures import comparison  # noqa: E402
+from ml.segmentation.scores.tables import by_class, by_test, cell  # noqa: E402
+from synthroads_addon.base.errors import InputError, SynthRoadsError  # noqa: E402
+from synthroads_addon.base.files import write_file  # noqa: E402
+from synthroads_addon.base.marked_documents import fill  # noqa: E402
+from synthroads_addon.base.schema import read_json  # noqa: E402
 
 REAL_CLOUDS = {"semantickitti": "semkitti_seq00_000000.laz", "ign": "ign_lidarhd_street.laz"}
 """Mapping of classes, which names table and picture, and the file in the folder of real clouds."""
@@ -153,7 +153,7 @@ def arguments_of(words: Sequence[str] | None) -> argparse.Namespace:
     parser.add_argument("--run", type=Path, action="append", default=[], metavar="RUN", help="a run to be scored")
     parser.add_argument("--real", type=Path, metavar="DIR", help="labelled real clouds, which the runs are scored on")
     parser.add_argument("--prediction", type=Path, metavar="FILE", help="result of tools/measure_prediction.py")
-    parser.add_argument("--packed", type=Path, metavar="FILE", help="file of `python -m ml.segmentation.pack`")
+    parser.add_argument("--packed", type=Path, metavar="FILE", help="file of `python -m ml.segmentation.data.pack`")
     parser.add_argument("--projection", type=Path, metavar="FILE", help="of `python -m ml.segmentation.projection`")
     parser.add_argument("--pictures", type=Path, default=Path(), metavar="DIR", help="folder for the pictures")
     parser.add_argument("--document", type=Path, metavar="FILE", help="Markdown whose tables are replaced")

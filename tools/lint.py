@@ -13,7 +13,7 @@ import tomllib
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
-MAY_USE_BLENDER = ("synthroads_addon/blender", "synthroads_addon/ui", "synthroads_addon/pipeline.py")
+MAY_USE_BLENDER = ("synthroads_addon/blender", "synthroads_addon/ui", "synthroads_addon/jobs")
 BAN_TABLE = "lint.flake8-tidy-imports.banned-api"
 
 

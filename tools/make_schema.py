@@ -11,7 +11,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
 
-from synthroads_addon.core.parameters.model import write_schema  # noqa: E402
+from synthroads_addon.road.parameters import write_schema  # noqa: E402
 
 if __name__ == "__main__":
     write_schema(ROOT / "synthroads_addon" / "presets" / "parameters.schema.json")

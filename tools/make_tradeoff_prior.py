@@ -22,17 +22,17 @@ from typing import Any
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
 
+from synthroads_addon.base.schema import canonical_json, read_json  # noqa: E402
 from synthroads_addon.blender.cameras import HAS_RETURN_CAMERA  # noqa: E402
 from synthroads_addon.blender.files import empty_file, save_scene  # noqa: E402
-from synthroads_addon.choosing_sites import RoadSite  # noqa: E402
-from synthroads_addon.core.knobs import colour_choices  # noqa: E402
-from synthroads_addon.core.parameters.sampler import sample_road  # noqa: E402
-from synthroads_addon.core.prior import FILE  # noqa: E402
-from synthroads_addon.core.scanning.beam import RINGS  # noqa: E402
-from synthroads_addon.core.scenario import load_scenario  # noqa: E402
-from synthroads_addon.core.schema import canonical_json, read_json  # noqa: E402
-from synthroads_addon.pilot import Pilot, beam_errors  # noqa: E402
-from synthroads_addon.pilot_colour import colour_errors, image_seconds  # noqa: E402
+from synthroads_addon.jobs.choose.knobs import colour_choices  # noqa: E402
+from synthroads_addon.jobs.choose.pilot import Pilot, beam_errors  # noqa: E402
+from synthroads_addon.jobs.choose.pilot_colour import colour_errors, image_seconds  # noqa: E402
+from synthroads_addon.jobs.choose.prior import FILE  # noqa: E402
+from synthroads_addon.jobs.choose.sites import RoadSite  # noqa: E402
+from synthroads_addon.sampling.road import sample_road  # noqa: E402
+from synthroads_addon.scanning.beam import RINGS  # noqa: E402
+from synthroads_addon.scenario.scenario import load_scenario  # noqa: E402
 
 SCENES: dict[str, tuple[str, Sequence[str]]] = {
     "uav": ("rq31-600m", ["road.length=300"]),

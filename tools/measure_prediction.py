@@ -26,9 +26,9 @@ ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
 
 from ml.segmentation.prediction import BLOCK, PREDICTED  # noqa: E402
-from synthroads_addon.core.errors import InputError, MissingFileError, SynthRoadsError  # noqa: E402
-from synthroads_addon.core.files import write_file  # noqa: E402
-from synthroads_addon.core.schema import canonical_json  # noqa: E402
+from synthroads_addon.base.errors import InputError, MissingFileError, SynthRoadsError  # noqa: E402
+from synthroads_addon.base.files import write_file  # noqa: E402
+from synthroads_addon.base.schema import canonical_json  # noqa: E402
 
 RESULT = "prediction.json"
 _GAP = 2.0
@@ -125,7 +125,7 @@ def measure(run: Path, source: Path, folder: Path, points: int) -> dict[str, Any
     folder.mkdir(parents=True, exist_ok=True)
     large, labelled = folder / "large.laz", folder / "labelled.laz"
     copies = tile_cloud(source, large, points)
-    command = [sys.executable, "-m", "ml.predict", str(run.resolve()), str(large.resolve())]
+    command = [sys.executable, "-m", "headless.predict", str(run.resolve()), str(large.resolve())]
     command += ["--output", str(labelled.resolve()), "--overwrite", "--json"]
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
     if done.returncode:

@@ -4,7 +4,7 @@ Cosmic-ray knows where a fault can be planted (another operator, another number,
 draws the same number of places from each area; the tests that a coverage record has seen on a fault's line are run
 with the fault, until the first that fails. Three steps, in an environment with the extra `faults`:
 
-    python -m pytest -m "not slow" --cov --cov-context=test --cov-report=    # in both parts: tests/blender, the rest
+    python -m pytest -m "not slow" --cov --cov-context=test --cov-report=    # in both parts: tests of Blender, the rest
     python tools/plant_faults.py draw --seed 1 faults.json
     python tools/plant_faults.py run faults.json --coverage .coverage --output found.json
 
@@ -31,17 +31,14 @@ from cosmic_ray.plugins import get_operator, operator_names
 from coverage import CoverageData
 
 ROOT = Path(__file__).resolve().parent.parent
-ADDON = "synthroads_addon/core"
-_ROAD = (
-    "alignment profile crossfall geometry section surface damage lane_line terrain tessellation turnout_shape "
-    "painted_areas markings stretch"
-)
+ADDON = "synthroads_addon"
 AREAS = {
-    "road geometry": [f"{ADDON}/parameters/{name}.py" for name in _ROAD.split()],
-    "scanning": [f"{ADDON}/scanning/*.py"],
-    "twin": [f"{ADDON}/twin/*.py"],
-    "cloud": [f"{ADDON}/cloud/*.py"],
+    "road geometry": [f"{ADDON}/road/*.py"],
+    "scanning": [f"{ADDON}/scanning/**/*.py"],
+    "twin": [f"{ADDON}/twin/**/*.py"],
+    "cloud": [f"{ADDON}/cloud/**/*.py"],
 }
+BLENDER_TESTS = ("tests/blender", "tests/jobs", "tests/ui")
 HARMLESS = ("BitOr", "RemoveDecorator", "ExceptionReplacer", "Variable")
 """Operators that are left out: most of theirs change an annotation or stop the import."""
 SECONDS = 1200.0
@@ -123,7 +120,7 @@ def _tests_on(lines: set[int], data: CoverageData, measured: str) -> set[str]:
 
 def run_tests(tests: list[str], options: list[str]) -> tuple[bool, str]:
     """Return whether one of the tests fails, and which; Blender's tests have a process of their own."""
-    blender = [test for test in tests if test.startswith("tests/blender")]
+    blender = [test for test in tests if test.startswith(BLENDER_TESTS)]
     for part in ([test for test in tests if test not in blender], blender):
         if not part:
             continue

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from synthroads_addon.blender.compat import set_modifier_input
 from synthroads_addon.blender.nodes.builder import Tree
-from synthroads_addon.core.scene_mesh import SceneMesh
+from synthroads_addon.scanning.scene.mesh import SceneMesh
 
 
 class RaycastNodesCaster:
@@ -34,7 +34,7 @@ class RaycastNodesCaster:
     def cast(
         self, origins: NDArray[np.float32], directions: NDArray[np.float32], maximum_range: float
     ) -> NDArray[np.int32]:
-        """Return the (N,) indices of the faces hit, -1 for none; see `core.scanning.caster.Caster.cast`."""
+        """Return the (N,) indices of the faces hit, -1 for none; see `scanning.scene.caster.Caster.cast`."""
         if not len(origins):
             return np.empty(0, np.int32)
         points = self._rays.data

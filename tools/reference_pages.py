@@ -16,23 +16,23 @@ from pathlib import Path
 from typing import Any
 
 from headless.list import KINDS
-from synthroads_addon.core.catalogue import Entry, Kind, entries
-from synthroads_addon.core.field_list import Wording, class_of
-from synthroads_addon.core.schema import Model
+from synthroads_addon.base.field_list import Wording, class_of
+from synthroads_addon.base.schema import Model
+from synthroads_addon.jobs.catalogue import Entry, Kind, entries
 from tools.reference_commands import commands
 
 ROOT = Path(__file__).resolve().parents[1]
 MARK = re.compile(r"<!-- generated: ([a-z-]+) -->")
 
 FILES = {
-    "scenario": ["synthroads_addon.core.scenario:Scenario"],
-    "parameters": ["synthroads_addon.core.parameters.model:RoadParameters"],
-    "recipe": ["synthroads_addon.core.dataset.recipe:Recipe"],
-    "device": ["synthroads_addon.core.scanning.devices:Device"],
-    "materials": ["synthroads_addon.core.materials:MaterialTable"],
-    "classes": ["synthroads_addon.core.cloud.labels:ClassTable"],
-    "mapping": ["ml.segmentation.classes:LabelMapping", "synthroads_addon.core.class_mapping:ClassMapping"],
-    "assets": ["synthroads_addon.core.parameters.assets:AssetLibrary"],
+    "scenario": ["synthroads_addon.scenario.scenario:Scenario"],
+    "parameters": ["synthroads_addon.road.parameters:RoadParameters"],
+    "recipe": ["synthroads_addon.dataset.recipe:Recipe"],
+    "device": ["synthroads_addon.scanning.devices.device:Device"],
+    "materials": ["synthroads_addon.materials.table:MaterialTable"],
+    "classes": ["synthroads_addon.base.classes:ClassTable"],
+    "mapping": ["ml.segmentation.data.classes:LabelMapping", "synthroads_addon.base.class_mapping:ClassMapping"],
+    "assets": ["synthroads_addon.road.things.assets:AssetLibrary"],
     "segmentation": [
         "ml.segmentation.recipes:SegmentationConfiguration",
         "ml.segmentation.experiment:Experiment",

@@ -15,19 +15,19 @@ from ml.configuration import Configuration
 from ml.fitting import chosen_device, fit
 from ml.runs import CALIBRATION, Run, plain, stream_seed
 from ml.tasks import Evaluation, Prediction
-from synthroads_addon.core.errors import InputError, MissingFileError, OutputError
-from synthroads_addon.core.files import write_file
-from synthroads_addon.core.progress import Progress, silent
-from synthroads_addon.core.schema import canonical_json, read_json
+from synthroads_addon.base.errors import InputError, MissingFileError, OutputError
+from synthroads_addon.base.files import write_file
+from synthroads_addon.base.progress import Progress, silent
+from synthroads_addon.base.schema import canonical_json, read_json
 
-from .calibration import DEVIATIONS, Calibration
-from .data import Batches, BatchOptions, DataOptions, Roads, fixed_batches, quiet, read_roads
-from .effects import Effects
-from .evaluation import Cropping, case
-from .losses import LossOptions, centerline_loss
-from .models import TARGETS, Batch, CenterlineModel, ModelOptions, build
-from .predictor import CenterlinePredictor, UseOptions
-from .slices import SliceSettings
+from .data.batches import Batches, BatchOptions, DataOptions, Roads, fixed_batches, quiet, read_roads
+from .data.effects import Effects
+from .data.slices import SliceSettings
+from .networks.losses import LossOptions, centerline_loss
+from .networks.models import TARGETS, Batch, CenterlineModel, ModelOptions, build
+from .scores.calibration import DEVIATIONS, Calibration
+from .scores.evaluation import Cropping, case
+from .use.predictor import CenterlinePredictor, UseOptions
 
 _FIRST_WEIGHTS = "first weights"
 
@@ -87,14 +87,14 @@ def evaluate(run: Run[CenterlineConfiguration], evaluation: Evaluation, progress
     Raises:
         InputError: the run isn't finished, or the data hold no road with a known centreline.
     """
-    from .measuring import measure_run
+    from .scores.measuring import measure_run
 
     return measure_run(run.configuration, predictor(run), evaluation, progress)
 
 
 def report(result: Mapping[str, Any]) -> str:
     """Return what `evaluate` found as tables for people."""
-    from .tables import report
+    from .scores.tables import report
 
     return report(result)
 
@@ -106,8 +106,8 @@ def predict(run: Run[CenterlineConfiguration], prediction: Prediction, progress:
         InputError: the run isn't finished, the output isn't a .geojson file, or the cloud has no ground.
         OutputError: an output is already there.
     """
-    from .using import find_road
-    from .writing import corridor_json, geojson
+    from .use.using import find_road
+    from .use.writing import corridor_json, geojson
 
     lines, corridor = prediction.output, prediction.output.with_suffix(".corridor.json")
     if lines.suffix.lower() != ".geojson":

@@ -9,7 +9,7 @@ import torch
 from torch import Tensor, nn
 from torch.nn.modules.batchnorm import _BatchNorm
 
-from synthroads_addon.core.errors import InputError
+from synthroads_addon.base.errors import InputError
 
 Batch = dict[str, Tensor]
 B = TypeVar("B")

@@ -15,17 +15,17 @@ from pydantic import Field
 from ml.configuration import EXPERIMENTS, experiment_names, load_configuration
 from ml.fitting import chosen_device
 from ml.runs import CHECKPOINT, CONFIGURATION, HISTORY, METRICS, PRETRAINING, Run, lasting
-from synthroads_addon.core.dataset.manifest import checksum
-from synthroads_addon.core.errors import InputError, nearest_name
-from synthroads_addon.core.files import write_file
-from synthroads_addon.core.progress import Progress, silent
-from synthroads_addon.core.scenario import apply_change, apply_values
-from synthroads_addon.core.schema import Model, canonical_json, read_json, read_yaml
+from synthroads_addon.base.errors import InputError, nearest_name
+from synthroads_addon.base.files import write_file
+from synthroads_addon.base.progress import Progress, silent
+from synthroads_addon.base.schema import Model, canonical_json, read_json, read_yaml
+from synthroads_addon.dataset.manifest import checksum
+from synthroads_addon.scenario.scenario import apply_change, apply_values
 
-from .evaluation import score_all, trained_model
+from .data.sources import Source
 from .recipes import Data, SegmentationConfiguration
-from .sources import Source
-from .tables import by_test
+from .scores.evaluation import score_all, trained_model
+from .scores.tables import by_test
 from .task import train
 
 RESULTS, TABLE = "results.json", "table.md"

@@ -14,15 +14,15 @@ import numpy as np
 import torch
 from torch.utils.data import DataLoader
 
-from synthroads_addon.core.errors import InputError
-from synthroads_addon.core.random_streams import stream
+from synthroads_addon.base.errors import InputError
+from synthroads_addon.base.random_streams import stream
 
 from .adaptation import laid_over
-from .crops import CropDataset, Draw, Item, Seeds, collate
+from .data.crops import CropDataset, Draw, Item, Seeds, collate
+from .data.sources import Source, read_tiles
+from .data.tiles import Scaling, Tile, scalings
 from .network import on_device, plan_of, prepared
 from .recipes import SegmentationConfiguration, mapped_intensities, plan
-from .sources import Source, read_tiles
-from .tiles import Scaling, Tile, scalings
 
 SMALLEST_SHARE = 0.25
 """Of a crop's points: tiles with fewer are left out of training, unless all have."""

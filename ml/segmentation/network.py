@@ -8,12 +8,12 @@ from copy import deepcopy
 import torch
 from torch import Tensor, nn
 
-from ml.models.neighbours import Neighbourhood, build_neighbours
-from ml.models.pointnext import Architecture, PointNeXt, architecture
+from ml.networks.neighbours import Neighbourhood, build_neighbours
+from ml.networks.pointnext import Architecture, PointNeXt, architecture
 
 from .adaptation import adapt_norms
-from .classes import class_names
-from .crops import Item
+from .data.classes import class_names
+from .data.crops import Item
 from .recipes import SegmentationConfiguration
 
 

@@ -20,18 +20,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ml.cells import thin
-from synthroads_addon.core.cloud.labels import ClassScheme
-from synthroads_addon.core.cloud.las_reading import open_to_copy
-from synthroads_addon.core.cloud.quantiles import LEVELS
-from synthroads_addon.core.cloud.reading import damaged, open_cloud
-from synthroads_addon.core.errors import InputError, OutputError
-from synthroads_addon.core.progress import Progress, silent
+from synthroads_addon.base.classes import ClassScheme
+from synthroads_addon.base.errors import InputError, OutputError
+from synthroads_addon.base.progress import Progress, silent
+from synthroads_addon.cloud.formats.las_reading import open_to_copy
+from synthroads_addon.cloud.formats.reading import damaged, open_cloud
+from synthroads_addon.cloud.tools.quantile_mapping import LEVELS
 
-from .crops import CropSettings
-from .metrics import IGNORED
-from .scoring import Classifier, label_tile
-from .sources import FULL
-from .tiles import Scaling, Tile, eight_bits
+from .data.crops import CropSettings
+from .data.sources import FULL
+from .data.tiles import Scaling, Tile, eight_bits
+from .scores.metrics import IGNORED
+from .scores.scoring import Classifier, label_tile
 
 HEADER_TEXTS = range(26, 90)
 """Bytes of a LAS file that hold the system identifier and the generating software, of 32 each."""

@@ -19,18 +19,18 @@ import torch
 
 from ml.configuration import load_configuration
 from ml.fitting import chosen_device, optimizer_of, train_step
-from synthroads_addon.core.errors import InputError
-from synthroads_addon.core.files import write_file
-from synthroads_addon.core.progress import peak_memory_mb
-from synthroads_addon.core.schema import canonical_json
+from synthroads_addon.base.errors import InputError
+from synthroads_addon.base.files import write_file
+from synthroads_addon.base.progress import peak_memory_mb
+from synthroads_addon.base.schema import canonical_json
 
-from .classes import class_names
-from .crops import Item, Seeds
+from .data.classes import class_names
+from .data.crops import Item, Seeds
+from .data.sources import Source, pointcept_folders, pointcept_root
+from .data.tiles import Tile, scalings
 from .loading import epoch_batches, thinned
 from .network import build
 from .recipes import SegmentationConfiguration
-from .sources import Source, pointcept_folders, pointcept_root
-from .tiles import Tile, scalings
 from .training import objective
 
 _TILES = 8

@@ -10,16 +10,16 @@ from numpy.typing import NDArray
 from pydantic import Field, field_validator, model_validator
 
 from ml.configuration import Configuration, Part, Schedule
-from synthroads_addon.core.cloud.labels import ClassScheme, class_scheme
-from synthroads_addon.core.cloud.quantiles import LEVELS, QuantileMap
-from synthroads_addon.core.errors import InputError
-from synthroads_addon.core.random_streams import stream
-from synthroads_addon.core.schema import quantity
+from synthroads_addon.base.classes import ClassScheme, class_scheme
+from synthroads_addon.base.errors import InputError
+from synthroads_addon.base.random_streams import stream
+from synthroads_addon.base.schema import quantity
+from synthroads_addon.cloud.tools.quantile_mapping import LEVELS, QuantileMap
 
-from .crops import FEATURES, CropSettings, Draw, Feature
-from .effects import Effects
-from .sources import FULL, Source
-from .tiles import Tile
+from .data.crops import FEATURES, CropSettings, Draw, Feature
+from .data.effects import Effects
+from .data.sources import FULL, Source
+from .data.tiles import Tile
 
 SetUp = Literal["real", "synthetic", "mixed", "mixed_mapped", "fine_tuned"]
 

@@ -11,18 +11,18 @@ from ml.configuration import Configuration
 from ml.fitting import chosen_device
 from ml.runs import Run
 from ml.tasks import Evaluation, Prediction
-from synthroads_addon.core.cloud.reading import open_cloud
-from synthroads_addon.core.cloud.writing import ENDINGS
-from synthroads_addon.core.errors import InputError
-from synthroads_addon.core.files import write_file
-from synthroads_addon.core.progress import Progress, peak_memory_mb, silent
+from synthroads_addon.base.errors import InputError
+from synthroads_addon.base.files import write_file
+from synthroads_addon.base.progress import Progress, peak_memory_mb, silent
+from synthroads_addon.cloud.formats.reading import open_cloud
+from synthroads_addon.cloud.formats.writing import ENDINGS
 
-from .evaluation import check_tests, classifier, score, score_all, trained_model
-from .metrics import score_table
-from .pictures import comparison
+from .data.sources import Source
 from .prediction import Labelling, predict_file
 from .recipes import SegmentationConfiguration
-from .sources import Source
+from .scores.evaluation import check_tests, classifier, score, score_all, trained_model
+from .scores.metrics import score_table
+from .scores.pictures import comparison
 from .training import trained
 
 _ONE_TILE = 5_000_000

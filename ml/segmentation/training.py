@@ -14,17 +14,17 @@ from torch.nn import functional
 
 from ml.fitting import Figures, chosen_device, fit
 from ml.runs import PRETRAINING, Run
-from synthroads_addon.core.progress import Progress, silent
+from synthroads_addon.base.progress import Progress, silent
 
-from .classes import class_names
-from .crops import Item, Seeds
-from .evaluation import classifier
+from .data.classes import class_names
+from .data.crops import Item, Seeds
+from .data.tiles import Tile, scalings
 from .loading import epoch_batches, read_domains, thinned, watched_workers
-from .metrics import IGNORED, Confusion, mean
 from .network import build, scores_of
 from .recipes import SegmentationConfiguration, class_shares, class_weights
-from .scoring import label_tile
-from .tiles import Tile, scalings
+from .scores.evaluation import classifier
+from .scores.metrics import IGNORED, Confusion, mean
+from .scores.scoring import label_tile
 
 Domains = dict[str, list[Tile]]
 

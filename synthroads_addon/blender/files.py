@@ -6,7 +6,7 @@ from pathlib import Path
 
 import bpy
 
-from ..core.errors import OutputError
+from ..base.errors import OutputError
 
 
 def empty_file() -> None:

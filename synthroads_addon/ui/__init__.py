@@ -8,23 +8,9 @@ from __future__ import annotations
 
 import bpy
 
-from . import (
-    build,
-    calibration,
-    cloud_view,
-    edit,
-    export,
-    file_lists,
-    long_operator,
-    panels,
-    preferences,
-    presets,
-    properties,
-    road_files,
-    rules,
-    scan,
-    swatches,
-)
+from .fields import preferences, properties
+from .panels import calibration, cloud_view, edit, export, file_lists, panels, presets, road_files, rules, swatches
+from .work import build, long_operator, scan
 
 MODULES = (
     preferences,

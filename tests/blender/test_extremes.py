@@ -8,19 +8,19 @@ import bpy
 import numpy as np
 import pytest
 
+from synthroads_addon.base.classes import class_id
+from synthroads_addon.base.errors import InputError
 from synthroads_addon.blender.casters import make_caster
-from synthroads_addon.blender.model import build_road
+from synthroads_addon.blender.model.build import build_road
 from synthroads_addon.blender.nodes.builder import Tree, node_group
-from synthroads_addon.blender.scene import scanned_scene, scene_mesh
-from synthroads_addon.blender.scene_reading import Part, Places, Whole, placed
-from synthroads_addon.core.cloud.labels import class_id
-from synthroads_addon.core.errors import InputError
-from synthroads_addon.core.parameters.geometry import RoadGeometry
-from synthroads_addon.core.parameters.sampler import sample_road
-from synthroads_addon.core.road_scenario import RoadScenario
-from synthroads_addon.core.scanning.scan import scan_block
-from synthroads_addon.core.scenario import Scenario
-from synthroads_addon.scan_files import make_scan, road_path
+from synthroads_addon.blender.scene.evaluated import scanned_scene, scene_mesh
+from synthroads_addon.blender.scene.reading import Part, Places, Whole, placed
+from synthroads_addon.jobs.scan.files import make_scan, road_path
+from synthroads_addon.road.geometry import RoadGeometry
+from synthroads_addon.sampling.road import sample_road
+from synthroads_addon.scanning.scan import scan_block
+from synthroads_addon.scenario.road import RoadScenario
+from synthroads_addon.scenario.scenario import Scenario
 from tools.benchmark_casters import bare_mesh
 
 ROUNDING = 2e-4  # m, of float32 coordinates a few hundred metres from the origin

@@ -38,7 +38,7 @@ def version() -> str | None:
 
 def verdict(samples: Samples) -> list[str]:
     """Return what doesn't fit the schema."""
-    from tests.core.cityjson_files import OfficialSchema
+    from tests.helpers.files.cityjson_files import OfficialSchema
 
     return OfficialSchema(official_schema()).errors(json.loads(samples.text("twin.city.json")))
 
@@ -62,7 +62,7 @@ def cjio_reader() -> Iterator[Any]:
 
 def cjio_verdict(samples: Samples) -> list[str]:
     """Return what cjio reads that isn't in the parameters: vertices, coordinate system, centreline, lanes' widths."""
-    from tests.core.cityjson_files import City
+    from tests.helpers.files.cityjson_files import City
 
     with cjio_reader() as reader, samples.file("twin.city.json").open(encoding="utf-8") as file:
         model = reader.reader(file)
@@ -97,7 +97,7 @@ def _off_axis(samples: Samples, city: Any) -> list[str]:
 
 def _wrong_widths(samples: Samples, city: Any) -> list[str]:
     """Return the lanes that aren't as wide as in the parameters, at some stations."""
-    from tests.core.cityjson_files import width_at
+    from tests.helpers.files.cityjson_files import width_at
 
     found = []
     for side, section in samples.geometry.sections.items():

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 
-from synthroads_addon.core.parameters.model import parameters_schema
+from synthroads_addon.road.parameters import parameters_schema
 from tests.judges.samples import Samples
 
 

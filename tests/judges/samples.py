@@ -6,11 +6,11 @@ import shutil
 from functools import cached_property
 from pathlib import Path
 
-from synthroads_addon.core.cloud.points import PointBlock
-from synthroads_addon.core.cloud.writing import open_writer
-from synthroads_addon.core.parameters.geometry import RoadGeometry
-from synthroads_addon.core.parameters.model import RoadParameters
-from synthroads_addon.core.twin import TWIN_FORMATS, twin_file_names, write_twin
+from synthroads_addon.cloud.formats.writing import open_writer
+from synthroads_addon.cloud.points import PointBlock
+from synthroads_addon.road.geometry import RoadGeometry
+from synthroads_addon.road.parameters import RoadParameters
+from synthroads_addon.twin.formats import TWIN_FORMATS, twin_file_names, write_twin
 
 _TWINS = dict(zip(twin_file_names(TWIN_FORMATS), TWIN_FORMATS, strict=True))
 INTENSITY_SCALE = 65535 * 900.0
@@ -29,7 +29,7 @@ class Samples:
     @cached_property
     def road(self) -> RoadParameters:
         """600 m with an arc, a clothoid and a line, grades and a rounding, an entry, barriers and signs, in UTM."""
-        from tests.core.twin_roads import road
+        from tests.helpers.roads.twin_roads import road
 
         return road(7, length=600.0)
 
@@ -41,7 +41,7 @@ class Samples:
     @cached_property
     def points(self) -> PointBlock:
         """What the clouds hold."""
-        from tests.core.conftest import make_points
+        from tests.helpers.clouds.random_points import make_points
 
         return make_points(5_000)
 

@@ -73,7 +73,7 @@ def verdict(samples: Samples) -> list[str]:
 
 def _wrong_body(item: Any, mesh: dict[str, Any]) -> list[str]:
     """Return in what a product's mesh differs from the one that ifcopenshell makes."""
-    from tests.core.ifc_reading import body, local_body
+    from tests.helpers.files.ifc_reading import body, local_body
 
     placed = on_curve(item.ObjectPlacement)
     vertices, triangles = local_body(item) if placed else body(item)
@@ -119,7 +119,7 @@ def misplaced(samples: Samples) -> float:
     """Return how far (m) from where it stands web-ifc puts what is placed along the road, at most."""
     import ifcopenshell
 
-    from tests.core.ifc_reading import placement
+    from tests.helpers.files.ifc_reading import placement
 
     file = ifcopenshell.open(str(samples.file("twin.ifc")))
     away = [0.0]

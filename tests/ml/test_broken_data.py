@@ -12,19 +12,19 @@ import pytest
 import torch
 from laspy.vlrs.vlrlist import VLRList
 
-from ml.centerline.roads import read_scene
+from ml.centerline.data.roads import read_scene
 from ml.points import read_ground
 from ml.runs import CHECKPOINT, Run
-from ml.segmentation.crops import CropSettings, Item
-from ml.segmentation.packing import pack_tile, write_pack
+from ml.segmentation.data.crops import CropSettings, Item
+from ml.segmentation.data.packing import pack_tile, write_pack
+from ml.segmentation.data.sources import Source, read_tiles
 from ml.segmentation.prediction import Labelling, predict_file
 from ml.segmentation.recipes import SegmentationConfiguration
-from ml.segmentation.sources import Source, read_tiles
-from synthroads_addon.core.cloud.labels import class_scheme
-from tests.core.mutations import TOKENS, accepted, cases, damaged, for_all
-from tests.core.test_broken_files import every_cloud
-from tests.ml.road_data_sets import write_data_set
-from tests.ml.segmentation_data import road_block, road_tile, write_cloud, write_pointcept
+from synthroads_addon.base.classes import class_scheme
+from tests.helpers.clouds.road_data_sets import write_data_set
+from tests.helpers.clouds.segmentation_data import road_block, road_tile, write_cloud, write_pointcept
+from tests.helpers.files.mutations import TOKENS, accepted, cases, damaged, for_all
+from tests.robustness.test_broken_files import every_cloud
 
 SHORT = [token for token in TOKENS if len(token) < 100]
 SCHEME = class_scheme("5")

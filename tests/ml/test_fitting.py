@@ -13,7 +13,7 @@ from torch import Tensor, nn
 from ml.configuration import Configuration, Schedule, load_configuration
 from ml.fitting import fit, learning_rate
 from ml.runs import CHECKPOINT, CURVES, METRICS, Run, stream_seed
-from synthroads_addon.core.errors import InputError, MissingFileError, OutputError
+from synthroads_addon.base.errors import InputError, MissingFileError, OutputError
 
 STEPS = 5
 

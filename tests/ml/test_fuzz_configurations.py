@@ -10,13 +10,13 @@ import pytest
 
 from ml.configuration import EXPERIMENTS, SHIPPED, load_configuration
 from ml.runs import CHECKPOINT, CONFIGURATION, Run
-from ml.segmentation.classes import SHIPPED as MAPPINGS
-from ml.segmentation.classes import load_mapping
+from ml.segmentation.data.classes import SHIPPED as MAPPINGS
+from ml.segmentation.data.classes import load_mapping
 from ml.segmentation.experiment import configurations, load_experiment
 from ml.tasks import kinds
-from synthroads_addon.core.errors import InputError
-from synthroads_addon.core.schema import read_json, read_yaml
-from tests.core.mutations import accepted, cases, for_all, json_files, yaml_files
+from synthroads_addon.base.errors import InputError
+from synthroads_addon.base.schema import read_json, read_yaml
+from tests.helpers.files.mutations import accepted, cases, for_all, json_files, yaml_files
 
 Body = Callable[[bytes], None]
 

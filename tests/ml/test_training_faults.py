@@ -18,8 +18,8 @@ import numpy as np
 import pytest
 import torch
 
-from tests.ml.road_data_sets import write_data_set
-from tests.ml.segmentation_data import road_tile, write_pointcept
+from tests.helpers.clouds.road_data_sets import write_data_set
+from tests.helpers.clouds.segmentation_data import road_tile, write_pointcept
 
 pytestmark = [
     pytest.mark.slow,
@@ -79,7 +79,7 @@ class Training:
     @contextmanager
     def begun(self) -> Iterator[subprocess.Popen[str]]:
         """Begin it or go on with it, in a group of processes of its own; wait until its folder is made."""
-        arguments = ["env", "--default-signal=INT", sys.executable, "-m", "ml.train", str(self.file)]
+        arguments = ["env", "--default-signal=INT", sys.executable, "-m", "headless.train", str(self.file)]
         arguments += ["--output", str(self.folder), "--resume", "--quiet"]
         pipes: dict[str, Any] = {"stdout": subprocess.DEVNULL, "stderr": subprocess.PIPE, "text": True}
         before = self._stamp()

@@ -17,8 +17,8 @@ from typing import Any
 import pytest
 
 from headless.cli import COMMANDS, build_parser
-from synthroads_addon.core.dataset.recipe import Recipe, scene_jobs
-from synthroads_addon.core.scenario import load_scenario, scenario_names
+from synthroads_addon.dataset.recipe import Recipe, scene_jobs
+from synthroads_addon.scenario.scenario import load_scenario, scenario_names
 from tests.packaging.docs_pages import DOCS, MADE_BY_THE_BUILD, PAGES, ROOT, anchors, commands, entries, fences, links
 from tools.reference_pages import FILES, GENERATED, MARK, filled, generated
 

@@ -62,7 +62,7 @@ def test_ml_imports_the_core_alone() -> None:
     for path in _sources(ROOT / "ml"):
         for node, name, level in _imports(path):
             if level == 0 and name.split(".")[0] == "synthroads_addon":
-                assert name.startswith("synthroads_addon.core"), f"{_name(path)}, line {node.lineno}: {name}"
+                assert name.startswith("synthroads_addon.base"), f"{_name(path)}, line {node.lineno}: {name}"
 
 
 def _modules(folder: Path) -> list[str]:

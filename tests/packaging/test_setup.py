@@ -121,10 +121,10 @@ def test_extras_are_those_of_the_package() -> None:
 def test_blender_and_the_other_tests_have_processes_of_their_own(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(noxfile, "ONLY", {("3.13", "others"): "smoke or ui"})
     assert noxfile.pytest_runs("3.13", "not slow", ["-x"]) == [
-        ["-m", "(not slow)", "-x", "tests/blender"],
-        ["-m", "(smoke or ui) and (not slow)", "-x", "tests", "--ignore=tests/blender"],
+        ["-m", "(not slow)", "-x", *noxfile.BLENDER_TESTS],
+        ["-m", "(smoke or ui) and (not slow)", "-x", "tests", *(f"--ignore={folder}" for folder in noxfile.BLENDER_TESTS)],
     ]
-    named = ["tests/core/test_alignment.py", "-q"]
+    named = ["tests/road/test_alignment.py", "-q"]
     assert noxfile.pytest_runs("3.11", "not slow", named) == [named]
 
 

@@ -8,13 +8,13 @@ from dataclasses import dataclass
 
 import bpy
 
-from ...core.colour import LayerSource, MaterialLayers, Shading, SurfaceConstants, needed_layers
-from ...core.colour_light import CloudShadows, SunAndSky
-from ...core.colour_scenario import ColourScenario
-from ...core.colour_views import Poses, View, scene_sample, views_along
-from ...core.errors import InputError
-from ...core.parameters.model_surroundings import Environment
-from ...core.scene_mesh import SceneMesh
+from ...base.errors import InputError
+from ...road.surroundings import Environment
+from ...scanning.colour.colour import LayerSource, MaterialLayers, Shading, SurfaceConstants, needed_layers
+from ...scanning.colour.light import CloudShadows, SunAndSky
+from ...scanning.colour.views import Poses, View, scene_sample, views_along
+from ...scanning.scene.mesh import SceneMesh
+from ...scenario.colour import ColourScenario
 from .images import RenderedLayers
 from .light import daylight
 from .returns import ReturnCamera

@@ -11,9 +11,9 @@ import bpy
 import numpy as np
 from mathutils import Matrix
 
-from ...core.colour import MaterialLayers
-from ...core.colour_images import ImageLayers
-from ...core.colour_views import RenderedImage, View
+from ...scanning.colour.colour import MaterialLayers
+from ...scanning.colour.images import ImageLayers
+from ...scanning.colour.views import RenderedImage, View
 from .stage import Rendered, Stage
 
 _LARGEST_HALF = 65504.0

@@ -13,8 +13,8 @@ import bpy
 import numpy as np
 from mathutils import Vector
 
-from ...core.colour_light import SunAndSky, exposed, sun_direction
-from ...core.parameters.model_surroundings import Environment
+from ...road.surroundings import Environment
+from ...scanning.colour.light import SunAndSky, exposed, sun_direction
 from ..compat import sky_texture
 from .stage import SUN_GROUP, Passes, stage
 

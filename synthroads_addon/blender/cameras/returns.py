@@ -9,7 +9,7 @@ import numpy as np
 from mathutils import Matrix
 from numpy.typing import NDArray
 
-from ...core.colour import FROM_MATERIAL, FROM_RETURN, LayerValues, MaterialLayers, Targets
+from ...scanning.colour.colour import FROM_MATERIAL, FROM_RETURN, LayerValues, MaterialLayers, Targets
 from .exr import write_image
 from .stage import SKY_GROUP, SUN_GROUP, Stage
 

@@ -15,7 +15,7 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from ...core.colour import MATERIAL_LAYERS
+from ...scanning.colour.colour import MATERIAL_LAYERS
 from .exr import read_layers
 from .surfaces import NUMBER, prepared_materials
 from .versions import eevee_engine, multilayer_exr

@@ -9,7 +9,7 @@ from typing import TypeAlias
 import bpy
 import numpy as np
 
-from ...core.colour import MATERIAL_LAYERS, SurfaceConstants, surface_constants
+from ...scanning.colour.colour import MATERIAL_LAYERS, SurfaceConstants, surface_constants
 from ..materials import PROPERTY, constants, table_name
 
 NUMBER = "sr_material"

@@ -1,10 +1,10 @@
-"""Ray casters behind one interface (`core.scanning.caster.Caster`)."""
+"""Ray casters behind one interface (`scanning.scene.caster.Caster`)."""
 
 from __future__ import annotations
 
-from ...core.errors import InputError
-from ...core.scanning.caster import Caster
-from ...core.scene_mesh import SceneMesh
+from ...base.errors import InputError
+from ...scanning.scene.caster import Caster
+from ...scanning.scene.mesh import SceneMesh
 
 NAMES = ("embree", "bvhtree")
 

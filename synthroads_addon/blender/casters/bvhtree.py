@@ -7,7 +7,7 @@ from mathutils import Vector
 from mathutils.bvhtree import BVHTree
 from numpy.typing import NDArray
 
-from ...core.scene_mesh import SceneMesh
+from ...scanning.scene.mesh import SceneMesh
 
 
 class BVHTreeCaster:

@@ -7,7 +7,7 @@ from embreex.mesh_construction import TriangleMesh
 from embreex.rtcore_scene import EmbreeScene
 from numpy.typing import NDArray
 
-from ...core.scene_mesh import SceneMesh
+from ...scanning.scene.mesh import SceneMesh
 
 _AT_ONCE = 20_000
 """Triangles that are handed over together: meanwhile no other thread runs, and Blender's window stands still."""

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ...core.scanning.caster import Caster, FacePlanes
-from ...core.scene_mesh import SceneMesh
+from ...scanning.scene.caster import Caster, FacePlanes
+from ...scanning.scene.mesh import SceneMesh
 
 Float = NDArray[np.float64]
 Faces = NDArray[np.int32]

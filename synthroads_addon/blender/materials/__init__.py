@@ -7,10 +7,10 @@ from collections.abc import Callable, Iterable, Mapping
 
 import bpy
 
-from ...core.errors import nearest_name
-from ...core.material_variation import varied
-from ...core.materials import UNKNOWN, Material, materials
-from ...core.parameters.model import Environment, MaterialVariation
+from ...base.errors import nearest_name
+from ...materials.table import UNKNOWN, Material, materials
+from ...materials.variation import varied
+from ...road.parameters import Environment, MaterialVariation
 from . import furniture, ground, paving, plants, signs, structures, vehicles
 from .shading import Shade, shade
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import bpy
 
-from ...core.materials import Material
+from ...materials.table import Material
 from ..nodes.builder import Operand, Tree, Value
 from ..nodes.layout import arrange
 

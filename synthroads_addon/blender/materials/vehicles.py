@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from ..nodes.builder import Value
-from ..nodes.vehicle import COLOR
+from ..things.vehicle.vehicle import COLOR
 from .shading import Shade
 
 _COVER_TINT = 0.35

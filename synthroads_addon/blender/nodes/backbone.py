@@ -11,7 +11,7 @@ from . import operations as op
 from .builder import Operand, Value
 
 FOLD_SHARE = 0.98
-"""Share of the radius at which an offset curve is cut, as in `core.parameters.alignment.clip_offset`."""
+"""Share of the radius at which an offset curve is cut, as in `road.alignment.clip_offset`."""
 
 def row(backbone: Value, number: Value) -> tuple[Value, Value, Value]:
     """Return axis point, left vector and curvature of the backbone's row `number`."""

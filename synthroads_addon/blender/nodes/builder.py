@@ -24,7 +24,7 @@ from typing import Any
 
 import bpy
 
-from ...core.turns import pause
+from ...base.stepper import pause
 from .layout import arrange
 
 KEY = "synthroads_key"
@@ -295,9 +295,9 @@ def _kind(operand: Operand) -> str:
 
 @cache
 def _sources() -> bytes:
-    """Return a digest of this package's sources: a change to any of them makes new groups."""
-    digest = hashlib.sha256()
-    for path in sorted(Path(__file__).parent.glob("*.py")):
+    """Return a digest of the sources of all node groups: a change to any of them makes new groups."""
+    digest, blender = hashlib.sha256(), Path(__file__).parents[1]
+    for path in sorted([*blender.glob("nodes/*.py"), *blender.glob("things/**/*.py")]):
         digest.update(path.read_bytes())
     return digest.digest()
 

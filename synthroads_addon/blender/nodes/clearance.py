@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ...core.cloud.labels import class_id
+from ...base.classes import class_id
 from . import operations as op
 from .builder import Operand, Value
 

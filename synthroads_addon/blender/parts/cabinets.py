@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from ...core.parameters.model import Cabinet
+from ...road.parameters import Cabinet
 from ..materials import material
-from ..model_builder import ModelBuilder
-from ..nodes.cabinet import cabinet_group
-from ..nodes.emergency_phone import emergency_phone_group
+from ..things.cabinet import cabinet_group
+from ..things.emergency_phone import emergency_phone_group
+from ..things.model_builder import ModelBuilder
 
 _MATERIALS = {
     "emergency_phone": {

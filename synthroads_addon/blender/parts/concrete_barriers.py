@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import bpy
 
-from ...core.parameters.model import ConcreteBarrier
+from ...road.parameters import ConcreteBarrier
 from ..materials import material
-from ..model_builder import ModelBuilder
-from ..nodes.concrete_barrier import concrete_barrier_group
+from ..things.concrete_barrier import concrete_barrier_group
+from ..things.model_builder import ModelBuilder
 
 
 def build_concrete_barriers(builder: ModelBuilder) -> None:

@@ -6,10 +6,10 @@ import math
 
 import numpy as np
 
-from ...core.parameters.model import ConstructionBeacon
+from ...road.parameters import ConstructionBeacon
 from ..materials import material
-from ..model_builder import ModelBuilder
-from ..nodes.beacon import beacon_group
+from ..things.beacon import beacon_group
+from ..things.model_builder import ModelBuilder
 
 
 def build_beacons(builder: ModelBuilder) -> None:

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...core.parameters.model import Delineator
+from ...road.parameters import Delineator
 from ..materials import material
-from ..model_builder import ModelBuilder
-from ..nodes.delineator import delineator_group
+from ..things.delineator import delineator_group
+from ..things.model_builder import ModelBuilder
 
 
 def build_delineators(builder: ModelBuilder) -> None:

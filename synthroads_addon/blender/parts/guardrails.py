@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import bpy
 
-from ...core.parameters.body_shapes import GUARDRAIL_SPACER
-from ...core.parameters.model import Guardrail
+from ...road.parameters import Guardrail
+from ...road.things.body_shapes import GUARDRAIL_SPACER
 from ..materials import material
-from ..model_builder import ModelBuilder
-from ..nodes.guardrail import guardrail_group
+from ..things.guardrail import guardrail_group
+from ..things.model_builder import ModelBuilder
 
 
 def build_guardrails(builder: ModelBuilder) -> None:

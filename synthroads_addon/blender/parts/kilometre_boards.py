@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from ...core.parameters.model import KilometreBoard
+from ...road.parameters import KilometreBoard
 from ..materials import material
-from ..model_builder import ModelBuilder
-from ..nodes.kilometre_board import kilometre_board_group
-from .sign_faces import FaceStyle, face_inputs
+from ..things.kilometre_board import kilometre_board_group
+from ..things.model_builder import ModelBuilder
+from ..things.sign.looks import FaceStyle, face_inputs
 
 _STYLE = FaceStyle("blue", "white", "white")
 _THICKNESS = 0.024

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import bpy
 
-from ...core.parameters.model import NoiseBarrier
+from ...road.parameters import NoiseBarrier
 from ..materials import material
-from ..model_builder import ModelBuilder
-from ..nodes.noise_barrier import noise_barrier_group
 from ..nodes.noise_panel import KINDS
+from ..things.model_builder import ModelBuilder
+from ..things.noise_barrier import noise_barrier_group
 
 _MATERIALS = {
     "aluminium": ("noise_aluminium", "noise_aluminium"),

@@ -8,13 +8,13 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from ...core.parameters.model import Arrow, Hatching
-from ...core.parameters.painted_areas import arrow_outlines, hatching_outlines, pieces
-from ...core.turns import aside
+from ...base.stepper import aside
+from ...road.paint import arrow_outlines, hatching_outlines, pieces
+from ...road.parameters import Arrow, Hatching
 from ..materials import material
-from ..meshes import attribute, fill_polygons, signed
-from ..model_builder import ModelBuilder
-from ..nodes.painted_area import painted_area_group
+from ..things.meshes import attribute, fill_polygons, signed
+from ..things.model_builder import ModelBuilder
+from ..things.painted_area import painted_area_group
 
 _LONGEST = 1.0
 """Outlines are cut into pieces no longer than this (m), so that they follow the road's curves and its crossfall."""

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from ...core.parameters.model import Pole
+from ...road.parameters import Pole
 from ..materials import material
-from ..model_builder import ModelBuilder
-from ..nodes.pole import pole_group
+from ..things.model_builder import ModelBuilder
+from ..things.pole import pole_group
 
 
 def build_poles(builder: ModelBuilder) -> None:

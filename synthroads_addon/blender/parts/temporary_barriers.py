@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import bpy
 
-from ...core.parameters.body_shapes import LONGEST_PLASTIC
-from ...core.parameters.model import TemporaryBarrier
+from ...road.parameters import TemporaryBarrier
+from ...road.things.body_shapes import LONGEST_PLASTIC
 from ..materials import material
-from ..model_builder import ModelBuilder
-from ..nodes.temporary_barrier import temporary_barrier_group
+from ..things.model_builder import ModelBuilder
+from ..things.temporary_barrier import temporary_barrier_group
 
 
 def build_temporary_barriers(builder: ModelBuilder) -> None:

@@ -6,9 +6,9 @@ import bpy
 import numpy as np
 
 from ..materials import material
-from ..meshes import ground_mesh
-from ..model_builder import ModelBuilder
-from ..nodes.terrain import terrain_group
+from ..things.meshes import ground_mesh
+from ..things.model_builder import ModelBuilder
+from ..things.terrain import terrain_group
 
 
 def build_terrain(builder: ModelBuilder) -> None:

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from ...core.parameters.model import TrafficLight
+from ...road.parameters import TrafficLight
 from ..materials import material
-from ..model_builder import ModelBuilder
-from ..nodes.traffic_light import traffic_light_group
+from ..things.model_builder import ModelBuilder
+from ..things.traffic_light import traffic_light_group
 
 
 def build_traffic_lights(builder: ModelBuilder) -> None:

@@ -1,0 +1,62 @@
+"""Run an experiment: several trainings of a segmentation that differ in their data, each with several seeds.
+
+One table has all scores. What is trained already isn't trained again: after an interruption the same command goes on.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+
+if __name__ == "__main__":
+    sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
+from headless.cli import Outcome, add_common_arguments, entry
+from headless.messages import progress_bar
+from ml.configuration import experiment_names
+from synthroads_addon.base.errors import InputError
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments of `synthroads experiment`."""
+    known = ", ".join(experiment_names())
+    parser.add_argument("experiment", metavar="EXPERIMENT", help=f"YAML file, or one of {known}")
+    text = "folder that {NAME} in the experiment's paths stands for (can be repeated)"
+    parser.add_argument("--data", type=_folder, action="append", default=[], metavar="NAME=FOLDER", help=text)
+    parser.add_argument("--output", type=Path, required=True, metavar="DIR", help="folder for runs, scores and table")
+    text = "configuration that all trainings start from: a name or a YAML file (the experiment's)"
+    parser.add_argument("--configuration", metavar="NAME_OR_FILE", help=text)
+    text = "seeds of each training, one after another (the experiment's)"
+    parser.add_argument("--seeds", type=int, nargs="+", metavar="N", help=text)
+    text = "change one field of all configurations, e.g. threads=1 (can be repeated)"
+    parser.add_argument("--set", action="append", default=[], metavar="PATH=VALUE", dest="changes", help=text)
+    add_common_arguments(parser)
+
+
+def run(arguments: argparse.Namespace) -> Outcome:
+    """Run `synthroads experiment`."""
+    from ml.segmentation.experiment import RESULTS, TABLE, configurations, load_experiment, run_experiment, table
+
+    experiment = load_experiment(arguments.experiment)
+    if arguments.configuration:
+        experiment = experiment.model_copy(update={"configuration": arguments.configuration})
+    configured = configurations(experiment, dict(arguments.data), arguments.changes)
+    seeds = arguments.seeds or experiment.seeds
+    for seed in seeds:
+        if not 0 <= seed < 2**63:
+            raise InputError("--seeds", seed, "must be whole numbers from 0")
+    results = run_experiment(experiment, configured, arguments.output, seeds, progress_bar(arguments))
+    text = f"{table(experiment.title, results)}\nwritten to {arguments.output}: {TABLE}, {RESULTS} and the runs"
+    return 0, {"title": experiment.title, "results": results}, text
+
+
+def _folder(text: str) -> tuple[str, str]:
+    name, _, folder = text.partition("=")
+    if not name or not folder:
+        raise argparse.ArgumentTypeError(f"is '{text}': must be NAME=FOLDER, e.g. real=out/standin")
+    return name, folder
+
+
+if __name__ == "__main__":
+    entry("experiment")

@@ -1,0 +1,265 @@
+"""The truth of a road's centreline and corridor at slices across it, from its parameters or a measured axis."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from synthroads_addon.base.errors import InputError
+from synthroads_addon.road.geometry import RoadGeometry
+from synthroads_addon.road.parameters import RoadParameters
+from synthroads_addon.road.section_geometry import CarriagewaySection
+from synthroads_addon.road.turnout_geometry import TURNOUT_STRIPS
+
+from .axis import Axis
+
+Float = NDArray[np.float64]
+TruthKind = Literal["road", "carriageway"]
+TRUTH_KINDS: tuple[TruthKind, ...] = ("road", "carriageway")
+
+CORRIDOR = ("left_edge", "right_edge", "lanes", "lane_width", "heading", "height")
+"""Columns of a corridor: y of the pavement's outer edges in the frame (m, left positive), number of lanes over both
+directions, their mean width (m), direction of the centreline against the frame's (rad), its height above the slice's
+origin (m). Of a carriageway they are those of the carriageway."""
+STEP = 0.5
+"""Distance of the vertices of lines that are made from parameters, m."""
+_FULL_LANE = 2.5
+"""A lane of less than this width (m) is just beginning or ending."""
+_NO_LANE = 0.01
+
+
+@dataclass(frozen=True)
+class Truth:
+    """A centreline, and where it is known the corridor around it. Arrays stand at the axis' N vertices.
+
+    Attributes:
+        kind: ``road``, the middle of the whole road; ``carriageway``, the line between a carriageway's two lanes.
+        axis: the centreline, in the coordinates of the cloud's points.
+        left, right: outer edges of the pavement; None where they aren't known anywhere.
+        lanes: (N,) number of lanes; NaN where one begins or ends, or it isn't known.
+        lane_width: (N,) mean width of the lanes, m, or NaN.
+        lines: (N, 2) distances from the centre to the left and to the right edge line, m; NaN where they aren't known.
+        room: (N, 2) how far the scene belongs to this road alone, to the left and to the right, m; infinite for a
+            whole road, for a carriageway up to the middle of the median.
+        has_height: whether the axis' elevations are known.
+    """
+
+    kind: TruthKind
+    axis: Axis
+    left: Axis | None
+    right: Axis | None
+    lanes: Float
+    lane_width: Float
+    lines: Float
+    room: Float
+    has_height: bool = True
+
+    @classmethod
+    def measured(cls, axis: Axis, kind: TruthKind) -> Truth:
+        """Return a measured centreline of which nothing else is known."""
+        unknown = np.full(len(axis.points), np.nan)
+        return cls(
+            kind=kind,
+            axis=axis,
+            left=None,
+            right=None,
+            lanes=unknown,
+            lane_width=unknown,
+            lines=np.column_stack([unknown, unknown]),
+            room=np.full((len(axis.points), 2), np.inf),
+            has_height=bool(np.ptp(axis.points[:, 2]) > 0.0),
+        )
+
+    def moved(self, by: ArrayLike) -> Truth:
+        """Return the truth moved by a vector (3,), m."""
+        return replace(
+            self,
+            axis=self.axis.moved(by),
+            left=None if self.left is None else self.left.moved(by),
+            right=None if self.right is None else self.right.moved(by),
+        )
+
+    def at(self, position: Float, direction: Float, height: Float) -> Crossings:
+        """Return the truth in frames.
+
+        Args:
+            position: (M, 2) origins of the frames.
+            direction: (M,) directions of their x axes, rad. The road may run against them.
+            height: (M,) elevations of their origins, m.
+        """
+        center, station = self.axis.crossing(position, direction)
+        turn = self.axis.direction(station) - direction
+        against = np.cos(turn) < 0.0
+        edges = [
+            np.full(len(center), np.nan) if line is None else line.crossing(position, direction)[0]
+            for line in (self.left, self.right)
+        ]
+        corridor = np.column_stack(
+            [
+                np.where(against, edges[1], edges[0]),
+                np.where(against, edges[0], edges[1]),
+                self._along(self.lanes, station),
+                self._along(self.lane_width, station),
+                (turn + np.pi / 2) % np.pi - np.pi / 2,
+                self.axis.elevation(station) - height if self.has_height else np.full(len(center), np.nan),
+            ]
+        )
+        corridor[np.isnan(center)] = np.nan
+        sides = [np.where(against, 1, 0), np.where(against, 0, 1)]
+        lines = np.column_stack([self._along(self.lines[:, 0], station), self._along(self.lines[:, 1], station)])
+        room = np.column_stack([self._along(self.room[:, 0], station), self._along(self.room[:, 1], station)])
+        row = np.arange(len(center))
+        return Crossings(
+            center,
+            station,
+            corridor,
+            lines=np.column_stack([lines[row, side] for side in sides]),
+            room=np.column_stack([room[row, side] for side in sides]),
+        )
+
+    def _along(self, values: Float, station: Float) -> Float:
+        """Return values (M,) at stations between the vertices: the lower of both neighbours' where one is infinite."""
+        known = np.nan_to_num(station)
+        after = np.clip(np.searchsorted(self.axis.station, known), 1, len(values) - 1)
+        before = after - 1
+        share = (known - self.axis.station[before]) / (self.axis.station[after] - self.axis.station[before])
+        infinite = np.isinf(values[before]) | np.isinf(values[after])
+        with np.errstate(invalid="ignore"):
+            between = values[before] * (1.0 - share) + values[after] * share
+        return np.where(np.isnan(station), np.nan, np.where(infinite, values[before], between))
+
+
+@dataclass(frozen=True)
+class Crossings:
+    """The truth in M frames.
+
+    Attributes:
+        center: (M,) y of the centreline, m; NaN where it has a gap.
+        station: (M,) station of the truth's axis there, m.
+        corridor: (M, K) columns `CORRIDOR`.
+        lines, room: (M, 2) as `Truth`'s, to the frame's left and right.
+    """
+
+    center: Float
+    station: Float
+    corridor: Float
+    lines: Float
+    room: Float
+
+
+def truths(parameters: RoadParameters, kind: TruthKind, origin: ArrayLike = (0.0, 0.0, 0.0)) -> list[Truth]:
+    """Return the truths of a road: one of kind ``road``, one of kind ``carriageway`` for each with two lanes anywhere.
+
+    Args:
+        parameters: the road.
+        kind: which centreline.
+        origin: (3,) map coordinates that were subtracted from the cloud's points.
+
+    Raises:
+        InputError: the kind isn't known.
+    """
+    if kind not in TRUTH_KINDS:
+        raise InputError("truth", kind, f"must be one of {', '.join(TRUTH_KINDS)}")
+    geometry = RoadGeometry(parameters)
+    by: Float = np.array(parameters.transform.translate) - np.asarray(origin, dtype=np.float64)
+    if kind == "road":
+        return [_whole_road(geometry).moved(by)]
+    found = (_carriageway(geometry, section) for section in geometry.sections.values())
+    return [truth.moved(by) for truth in found if truth is not None]
+
+
+def _whole_road(geometry: RoadGeometry) -> Truth:
+    axis = Axis.of_road(geometry, STEP)
+    station = _vertices(geometry)
+    count, total = np.zeros(len(station)), np.zeros(len(station))
+    edges: dict[str, Float] = {}
+    for side, section in geometry.sections.items():
+        number, width = _lanes(section, station)
+        count, total = count + number, total + width
+        edges[side] = section.carriageway.sign * _paved_edge(section, station)
+    unknown = np.full(len(station), np.nan)
+    distances = [np.abs(edges.get(side, unknown)) for side in ("left", "right")]
+    return Truth(
+        kind="road",
+        axis=axis,
+        left=_offset_line(geometry, station, edges.get("left", unknown)),
+        right=_offset_line(geometry, station, edges.get("right", unknown)),
+        lanes=count,
+        lane_width=total / np.maximum(count, 1.0),
+        lines=np.column_stack(distances),
+        room=np.full((len(station), 2), np.inf),
+    )
+
+
+def _carriageway(geometry: RoadGeometry, section: CarriagewaySection) -> Truth | None:
+    """Return the truth of one carriageway where it has two full lanes; None if it never has."""
+    station = _vertices(geometry)
+    number, width = _lanes(section, station)
+    boundaries = section.lane_boundaries(station)
+    widths = -np.diff(boundaries, axis=1)
+    outer = np.argmax(widths >= _FULL_LANE, axis=1)
+    row = np.arange(len(station))
+    middle = np.where(number == 2, boundaries[row, np.minimum(outer + 1, boundaries.shape[1] - 1)], np.nan)
+    known = ~np.isnan(middle)
+    if np.count_nonzero(known) < 2:
+        return None
+    sign = float(section.carriageway.sign)
+    inner_edge, outer_edge = section.distances(station)[:, 0], _paved_edge(section, station)
+    center = _points(geometry, station, sign * middle)[known]
+    # Distances of the outer and the inner edge line, and how far the scene reaches, outwards and inwards.
+    lines = np.column_stack([boundaries[:, 0] - middle, middle - boundaries[:, -1]])[known]
+    room = np.column_stack([np.full(len(station), np.inf), middle])[known]
+    outwards = 1 if sign > 0 else -1
+    left, right = (outer_edge, inner_edge) if sign > 0 else (inner_edge, outer_edge)
+    return Truth(
+        kind="carriageway",
+        axis=Axis(center, np.diff(np.flatnonzero(known)) == 1),
+        left=_offset_line(geometry, station, sign * left),
+        right=_offset_line(geometry, station, sign * right),
+        lanes=number[known],
+        lane_width=(width / 2.0)[known],
+        lines=lines[:, ::outwards],
+        room=room[:, ::outwards],
+    )
+
+
+def _vertices(geometry: RoadGeometry) -> Float:
+    return np.linspace(0.0, geometry.length, max(2, int(np.ceil(geometry.length / STEP)) + 1))
+
+
+def _lanes(section: CarriagewaySection, station: Float) -> tuple[Float, Float]:
+    """Return number and summed width (N,) of a carriageway's lanes, NaN where one begins or ends."""
+    widths = np.abs(np.diff(section.lane_boundaries(station), axis=1))
+    full, none = widths >= _FULL_LANE, widths <= _NO_LANE
+    clear = (full | none).all(axis=1)
+    total = np.where(full, widths, 0.0).sum(axis=1)
+    return np.where(clear, full.sum(axis=1), np.nan), np.where(clear, total, np.nan)
+
+
+def _paved_edge(section: CarriagewaySection, station: Float) -> Float:
+    """Return distances (N,) of the pavement's outer edge, NaN where a ramp leaves the road."""
+    edge = section.paved_edge(station)
+    ramp = np.zeros(len(station), dtype=bool)
+    for kind in ("island", "gore"):
+        if kind in section.kinds and kind in TURNOUT_STRIPS:
+            inner, outer = section.boundaries_of(kind, station)
+            ramp |= outer - inner > 1e-6
+    return np.where(ramp, np.nan, edge)
+
+
+def _points(geometry: RoadGeometry, station: Float, offset: Float) -> Float:
+    """Return points (N, 3) of the undamaged surface at offsets; z is the centreline's where it isn't known."""
+    position, heading, _ = geometry.alignment.frame(station)
+    plan = position + offset[:, None] * np.stack([-np.sin(heading), np.cos(heading)], axis=1)
+    height = geometry.elevation(station, np.nan_to_num(offset))
+    return np.column_stack([plan, np.where(np.isnan(height), geometry.profile.elevation(station), height)])
+
+
+def _offset_line(geometry: RoadGeometry, station: Float, offset: Float) -> Axis | None:
+    known = np.flatnonzero(~np.isnan(offset))
+    if len(known) < 2:
+        return None
+    return Axis(_points(geometry, station, offset)[known], np.diff(known) == 1)

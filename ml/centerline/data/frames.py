@@ -1,0 +1,280 @@
+"""Frames of slices across a road: along a path that was driven, flown or drawn, or found in the cloud itself.
+
+The path is never the truth. For training it is the truth displaced at random (`displaced`); in use it comes from a file
+(`read_path`) or from the points (`estimated_path`).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from synthroads_addon.base.errors import InputError
+
+from .axis import Axis
+
+Float = NDArray[np.float64]
+
+SPACING = 1.0
+"""Distance of the frames along their path, m."""
+_BIN = 4.0
+"""Length along a path over which the points' extent across it is taken, m."""
+_STRAY = 0.02
+"""Share of the points on either side that don't count for the extent."""
+_WHOLE = 0.75
+"""Share of the usual extent that a place must have to count."""
+_WAVES = 12
+"""Cosines that make up a random deviation."""
+
+
+@dataclass(frozen=True)
+class Frames:
+    """M frames: x along the path, y to its left, z up.
+
+    Attributes:
+        position: (M, 2) float64 origins in plan, m.
+        direction: (M,) float64 directions of x, rad counter-clockwise from the coordinates' x.
+        station: (M,) float64 running length along the path, m.
+    """
+
+    position: Float
+    direction: Float
+    station: Float
+
+    def __len__(self) -> int:
+        return len(self.station)
+
+    def select(self, keep: NDArray[np.bool_] | NDArray[np.intp] | slice) -> Frames:
+        """Return the frames chosen by a mask, indices or a slice."""
+        return Frames(self.position[keep], self.direction[keep], self.station[keep])
+
+    def at(self, y: ArrayLike) -> Float:
+        """Return the points (M, 2) in plan that lie y (M,) to the left of the frames' origins."""
+        left = np.column_stack([-np.sin(self.direction), np.cos(self.direction)])
+        return self.position + np.asarray(y, dtype=np.float64)[:, None] * left
+
+    def turned_round(self) -> Frames:
+        """Return the same places seen against the path, the last one first."""
+        return Frames(self.position[::-1], self.direction[::-1] + np.pi, self.station[::-1])
+
+
+def along(path: Axis, spacing: float = SPACING, reach: float = 5.0) -> Frames:
+    """Return frames every ``spacing`` along a path, none in its gaps.
+
+    Args:
+        path: the path.
+        spacing: between two frames, m.
+        reach: a frame has the direction of the path from this far before to this far behind it, m.
+    """
+    station = path.stations(spacing)
+    return Frames(path.position(station), path.direction(station, reach), station)
+
+
+def displaced(frames: Frames, rng: np.random.Generator, window: float, direction_deg: float, length: float) -> Frames:
+    """Return frames moved sideways and turned by smooth random amounts.
+
+    Args:
+        frames: where they would be without.
+        rng: of the deviation.
+        window: the deviation is uniform in -window / 2 to window / 2, m.
+        direction_deg: standard deviation of the error of direction beside what the deviation's own slope makes, deg.
+        length: correlation length of the deviation, m; that of the error of direction is a third of it.
+    """
+    share, slope = wander(frames.station, rng, length)
+    error, _ = wander(frames.station, rng, length / 3.0)
+    # A uniform share as a normal deviate, cut at two standard deviations.
+    turn = np.deg2rad(direction_deg) * np.clip(np.sqrt(12.0) * error, -2.0, 2.0)
+    return Frames(frames.at(window * share), frames.direction + np.arctan(window * slope) + turn, frames.station)
+
+
+def wander(station: Float, rng: np.random.Generator, length: float) -> tuple[Float, Float]:
+    """Return a smooth random function of the station (M,), uniform in -0.5 to 0.5, and its slope (1/m).
+
+    A Gaussian process of cosines with random wavelengths (Rahimi and Recht, "Random features", 2007; correlation length
+    ``length``, m) passed through the normal distribution function.
+    """
+    from scipy.special import ndtr
+
+    rate = rng.standard_normal(_WAVES) / length
+    phase = rng.uniform(0.0, 2.0 * np.pi, _WAVES)
+    # Normal amplitudes make the sum normal whatever the number of waves.
+    amplitude = rng.standard_normal(_WAVES) * np.sqrt(2.0 / _WAVES)
+    angle = station[:, None] * rate + phase
+    value = np.cos(angle) @ amplitude
+    slope = -np.sin(angle) @ (amplitude * rate)
+    density = np.exp(-0.5 * value**2) / np.sqrt(2.0 * np.pi)
+    return ndtr(value) - 0.5, density * slope
+
+
+def sequences(frames: Frames, length: int, step: int | None = None, spacing: float = SPACING) -> NDArray[np.intp]:
+    """Return indices (K, length) of runs of frames at equal spacing that together cover all frames.
+
+    A run never crosses a gap. The last of a stretch overlaps the one before; a shorter stretch repeats its last frame.
+    Where frames lie closer together than the spacing, runs are interleaved: each takes every n-th frame.
+
+    Args:
+        frames: M frames in the order of their stations.
+        length: frames per run.
+        step: frames of a run from its start to that of the next one; ``length`` if not given.
+        spacing: of a run's frames, m; to the nearest multiple of the frames' own.
+    """
+    step = step or length
+    every = interleaved(frames, spacing)
+    runs = []
+    for stretch in stretches(frames, spacing):
+        for some in (stretch[first::every] for first in range(min(every, len(stretch)))):
+            starts = np.arange(0, max(1, len(some) - length + 1), step)
+            if starts[-1] + length < len(some):
+                starts = np.append(starts, len(some) - length)
+            runs.append(some[np.minimum(starts[:, None] + np.arange(length), len(some) - 1)])
+    return np.concatenate(runs) if runs else np.empty((0, length), dtype=np.intp)
+
+
+def interleaved(frames: Frames, spacing: float) -> int:
+    """Return how many of the frames there are to each of a spacing, m."""
+    return max(1, round(spacing / _own_spacing(frames, spacing)))
+
+
+def stretches(frames: Frames, spacing: float = SPACING) -> list[NDArray[np.intp]]:
+    """Return the indices of the frames of every stretch without a gap; of equal spacing, at most the given one, m."""
+    gaps = np.abs(np.diff(frames.station)) > 1.5 * _own_spacing(frames, spacing)
+    return [part for part in np.split(np.arange(len(frames)), np.flatnonzero(gaps) + 1) if len(part)]
+
+
+def _own_spacing(frames: Frames, most: float) -> float:
+    return min(float(np.median(np.abs(np.diff(frames.station)))), most) if len(frames) > 1 else most
+
+
+def read_path(file: Path, origin: ArrayLike = (0.0, 0.0, 0.0), tolerance: float = 0.3) -> Axis:
+    """Read a path along the road: a drawn line, or the trajectory of the scanner's platform.
+
+    Args:
+        file: CSV with columns x and y (trajectories have more) or GeoJSON, in the cloud's map coordinates.
+        origin: (3,) map coordinates that were subtracted from the cloud's points.
+        tolerance: points are dropped until one lies at least this far from the next, m: a platform that stands still
+            has no direction.
+
+    Raises:
+        MissingFileError, InputError: see `read_axis`.
+    """
+    whole = Axis.read(file, gap=np.inf).moved(-np.asarray(origin, dtype=np.float64))
+    keep, last = [0], 0.0
+    for index, station in enumerate(whole.station[1:], 1):
+        if station - last >= tolerance:
+            keep.append(index)
+            last = station
+    if len(keep) < 2:
+        raise InputError(str(file), whole.length, f"must be a path of at least {tolerance:g} m")
+    return Axis(whole.points[keep])
+
+
+def estimated_path(xyz: Float, cell: float = 4.0, window: float = 60.0, half_width: float = 40.0) -> Axis:
+    """Find the line along the middle of a strip of points, whatever way the strip bends.
+
+    The two ends of the strip are the cells of a grid that lie farthest apart along it. The shortest way between them is
+    smoothed, then three times over drawn to the middle of the points' extent across it and smoothed.
+
+    Args:
+        xyz: (N, 2 or 3) points of the road, or of a strip around it, m.
+        cell: edge of the grid's cells, m.
+        window: length over which a parabola is fitted to smooth the line (Savitzky and Golay 1964), m.
+        half_width: points farther from the line than this don't count, m.
+
+    Raises:
+        InputError: the points make up less than two cells.
+    """
+    plan = np.asarray(xyz, dtype=np.float64)[:, :2]
+    cells = _cells(plan, cell)
+    rough = Axis(cells[_way_through(cells, cell)])
+    path = _smoothed(rough.position(rough.stations(SPACING)), window) if rough.length > 4 * SPACING else rough
+    for _ in range(3):
+        path = _centred(path, plan, window, half_width)
+    return path
+
+
+def _cells(plan: Float, cell: float) -> Float:
+    """Return the mean place (C, 2) of the points in every cell of a grid."""
+    at = np.floor((plan - plan.min(axis=0)) / cell).astype(np.int64)
+    _, owner, counts = np.unique(at @ np.array([1 << 32, 1]), return_inverse=True, return_counts=True)
+    if len(counts) < 2:
+        raise InputError("cloud", len(plan), f"must reach farther than {cell:g} m for its road to be found")
+    return np.column_stack([np.bincount(owner, plan[:, column]) for column in (0, 1)]) / counts[:, None]
+
+
+def _way_through(cells: Float, cell: float) -> NDArray[np.intp]:
+    """Return the cells on the shortest way between the two that lie farthest apart along the strip."""
+    from scipy.sparse.csgraph import dijkstra
+    from scipy.spatial import cKDTree
+
+    pairs = cKDTree(cells).query_pairs(2.1 * cell, output_type="ndarray")
+    pairs = _bridged(cells, pairs)
+    graph = _graph(len(cells), pairs, np.hypot(*(cells[pairs[:, 0]] - cells[pairs[:, 1]]).T))
+    start = 0
+    for _ in range(2):
+        start = int(np.argmax(dijkstra(graph, directed=False, indices=start)))
+    distance, before = dijkstra(graph, directed=False, indices=start, return_predecessors=True)
+    way = [int(np.argmax(distance))]
+    while way[-1] != start:
+        way.append(int(before[way[-1]]))
+    # From the lower to the higher x (or y), so that the direction doesn't hang on the order of the points.
+    return np.array(way if tuple(cells[way[0]]) < tuple(cells[way[-1]]) else way[::-1])
+
+
+def _bridged(cells: Float, pairs: NDArray[np.intp]) -> NDArray[np.intp]:
+    """Return the pairs of cells (P, 2) and those of the shortest ways that join what they leave apart."""
+    from scipy.sparse.csgraph import connected_components
+    from scipy.spatial import cKDTree
+
+    while True:
+        count, part = connected_components(_graph(len(cells), pairs, np.ones(len(pairs))), directed=False)
+        if count == 1:
+            return pairs
+        own, others = np.flatnonzero(part == part[0]), np.flatnonzero(part != part[0])
+        distance, nearest = cKDTree(cells[own]).query(cells[others])
+        closest = int(np.argmin(distance))
+        pairs = np.concatenate([pairs, [[own[nearest[closest]], others[closest]]]])
+
+
+def _graph(count: int, pairs: NDArray[np.intp], weights: Float) -> Any:
+    from scipy.sparse import coo_array
+
+    return coo_array((weights, (pairs[:, 0], pairs[:, 1])), shape=(count, count)).tocsr()
+
+
+def _centred(path: Axis, plan: Float, window: float, half_width: float) -> Axis:
+    """Return a path drawn to the middle of the points' extent across it and smoothed."""
+    station, offset = path.project(plan)
+    near = np.abs(offset) <= half_width
+    station, offset = station[near], offset[near]
+    bins = ((station - station.min()) / _BIN).astype(int)
+    order = np.lexsort((offset, bins))
+    sorted_offset, filled = offset[order], np.unique(bins)
+    start, end = (np.searchsorted(bins[order], filled, side) for side in ("left", "right"))
+    # Not the outermost points, which may be stray.
+    low = sorted_offset[start + (_STRAY * (end - start)).astype(int)]
+    high = sorted_offset[end - 1 - (_STRAY * (end - start)).astype(int)]
+    # Where a strip is cut off askew, or one side is hidden, the middle of what is left isn't the strip's.
+    whole = high - low >= _WHOLE * np.median(high - low)
+    middle, low, high = station.min() + _BIN * (filled[whole] + 0.5), low[whole], high[whole]
+    every = np.arange(station.min(), station.max() + 0.5 * SPACING, SPACING)
+    return _smoothed(_on_path(path, every).at(np.interp(every, middle, 0.5 * (low + high))), window)
+
+
+def _on_path(path: Axis, station: Float) -> Frames:
+    """Return frames at stations of a path without gaps, which goes on straight beyond its ends."""
+    inside = np.clip(station, 0.0, path.length)
+    direction = path.direction(inside, reach=8.0)
+    beyond = (station - inside)[:, None] * np.column_stack([np.cos(direction), np.sin(direction)])
+    return Frames(path.position(inside) + beyond, direction, station)
+
+
+def _smoothed(points: Float, window: float) -> Axis:
+    """Return the line through points (N, 2), `SPACING` apart, each moved on the parabola through those around it."""
+    from scipy.signal import savgol_filter
+
+    size = min(int(window / SPACING), len(points) - 1) // 2 * 2 + 1
+    return Axis(savgol_filter(points, size, polyorder=min(2, size - 1), axis=0, mode="interp"))

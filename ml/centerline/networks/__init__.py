@@ -1,0 +1,1 @@
+"""The centreline models, and what they are trained with."""

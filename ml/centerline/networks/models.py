@@ -1,0 +1,325 @@
+"""Three models that find a road's centreline and corridor in sequences of slices.
+
+- `Single`: deformable kernel points and self-attention; each slice by itself.
+- `Sequence`: fixed kernel points, and an LSTM that runs along the slices at every kernel point, both ways.
+- `Transformer`: convolutions over slices x kernel points, a transformer over the slices, at every kernel point and for
+  all of them together, soft-argmax; the heading is that of a parabola through the centres, in the frames' geometry.
+
+All take a batch (see `slices.collate`) of B sequences of S slices with P points, use its ``coord``, ``feat``, ``mask``
+and ``frame``, and return a dictionary:
+
+- ``center``, ``center_std`` (B, S), m; ``corridor``, ``corridor_std`` (B, S, K), columns `CORRIDOR`;
+- ``rough`` (B, S): the centre at first look, m;
+- ``log_std`` (B, S, 1 + K): logarithms of the deviations divided by `SCALE`, of the centre and the corridor;
+- ``logits`` (B, S, 25, 3): what the soft-argmax of centre, left and right edge is taken of; ``places`` (B, S, 25), m;
+- ``fine_logits``, ``fine_places`` (B, S, 64): the same of the second look's centre.
+
+No model knows where it is but by kernel points, all of which have the same weights: a road moved by a kernel point's
+spacing is the same road moved. Frames are only used relative to each other.
+"""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import torch
+from pydantic import Field, model_validator
+from torch import Tensor, nn
+
+from ml.configuration import Part
+from synthroads_addon.base.schema import quantity
+
+from ..data.corridor import CORRIDOR
+from ..data.slices import FEATURES
+from .layers import (
+    AttentionPool,
+    DeformableKernelPoints,
+    FixedKernelPoints,
+    GridConvolution,
+    PointFeatures,
+    RelativeAttention,
+    Tokens,
+)
+from .refinement import Refinement, parabola
+
+Batch = dict[str, Tensor]
+Output = dict[str, Tensor]
+
+LINES = ("center", "left_edge", "right_edge")
+"""What is found by soft-argmax over the kernel points."""
+TARGETS = ("center", *CORRIDOR)
+SCALE = (1.0, 1.0, 1.0, 0.5, 0.2, 0.05, 0.1)
+"""Of `TARGETS`: errors of this size weigh alike; m, and what lanes and headings are measured in."""
+_MIDDLE = {"lanes": 4.0, "lane_width": 3.5, "heading": 0.0}
+"""What the scalars are without any evidence."""
+_NATURAL = {"lanes": 2.0, "lane_width": 0.3, "heading": 0.05}
+"""Size of their deviations from it."""
+_LARGEST_LOG = 5.0
+
+
+class ModelOptions(Part):
+    """Which model, and how large."""
+
+    name: Literal["single", "sequence", "transformer"] = Field("transformer", description="Which of the models.")
+    features: tuple[Literal["intensity", "contrast", "red", "green", "blue", "has_color"], ...] = Field(
+        ("intensity", "contrast"), description="Attributes of a point beside its place."
+    )
+    kernel_points: int = quantity(25, ge=3, le=1000, unit="1", description="Kernel points across a slice.")
+    cells: int = quantity(4, ge=1, le=100, unit="1", description="Cells per spacing of the fixed kernel points.")
+    point_width: int = quantity(16, ge=1, le=1024, unit="1", description="Features of a point.")
+    width: int = quantity(48, ge=2, le=1024, unit="1", description="Features of a token.")
+    context: int = quantity(96, ge=2, le=4096, unit="1", description="Features of a slice.")
+    fine_cells: int = quantity(64, ge=2, le=1000, unit="1", description="Cells of the second look.")
+    fine_reach: float = quantity(6.4, gt=0, le=45, unit="m", description="How far it reaches to either side.")
+    fine_width: int = quantity(24, ge=1, le=1024, unit="1", description="Features of its cells.")
+    layers: int = quantity(3, ge=0, le=50, unit="1", description="Layers over the tokens.")
+    heads: int = quantity(4, ge=1, le=64, unit="1", description="Heads of each attention.")
+    dropout: float = quantity(0.0, ge=0, lt=1, unit="1", description="Share left out in the attention's layers.")
+
+    @model_validator(mode="after")
+    def _divisible(self) -> ModelOptions:
+        for name in ("width", "context"):
+            if getattr(self, name) % self.heads or getattr(self, name) % 2:
+                raise ValueError(f"{name} must be even and a multiple of heads, {self.heads}")
+        return self
+
+
+class Heads(nn.Module):
+    """Lines by soft-argmax over a slice's tokens, other numbers and all deviations from the slice's context."""
+
+    def __init__(self, width: int, context: int, spacing: float) -> None:
+        super().__init__()
+        self.spacing = spacing
+        self.local = nn.Linear(width, context)
+        self.context = nn.Linear(context, context)
+        self.maps = nn.Sequential(nn.GELU(), nn.Linear(context, 2 * len(LINES) + 1))
+        self.scalars = nn.Sequential(nn.Linear(context, context), nn.GELU(), nn.Linear(context, len(_MIDDLE)))
+        self.spread = nn.Sequential(nn.Linear(context, context), nn.GELU(), nn.Linear(context, len(CORRIDOR)))
+
+    def forward(self, tokens: Tokens, context: Tensor) -> Output:
+        """Return the output for N slices with context (N, D): center (N,), corridor (N, K) and so on."""
+        maps = self.maps(self.local(tokens.features) + self.context(context)[:, None])
+        logits, residual, lift = maps.split([len(LINES), len(LINES), 1], dim=-1)
+        share = logits.softmax(1)
+        lines = (share * (tokens.places[..., None] + self.spacing * residual)).sum(1)
+        height = (share[..., 0] * (tokens.heights + lift[..., 0])).sum(1)
+        middle, natural = context.new_tensor(list(_MIDDLE.values())), context.new_tensor(list(_NATURAL.values()))
+        scalars = middle + natural * self.scalars(context)
+        return {
+            "center": lines[:, 0],
+            "corridor": torch.cat([lines[:, 1:], scalars, height[:, None]], dim=1),
+            "log_std": self.spread(context) - 1.0,
+            "logits": logits,
+        }
+
+
+class CenterlineModel(nn.Module):
+    """What the models share: the points' features, the fixed kernel points' tokens and the heads."""
+
+    def __init__(self, options: ModelOptions, half_width: float, slices: int) -> None:
+        super().__init__()
+        self.options = options
+        width, count = options.width, options.kernel_points
+        columns = tuple(FEATURES.index(name) for name in options.features)
+        self.points = PointFeatures(columns, options.point_width)
+        self.kernel_points = FixedKernelPoints(count, half_width, options.cells, options.point_width, width)
+        self.pool = AttentionPool(width, options.heads, options.context)
+        self.heads = Heads(width, options.context, self.kernel_points.spacing)
+        fine = (options.fine_reach, options.fine_cells)
+        self.again = Refinement(options.point_width, options.fine_width, options.context, slices, *fine, options.heads)
+
+    def forward(self, batch: Batch) -> Output:
+        """Return the output for a batch."""
+        shape = batch["mask"].shape[:2]
+        coord, feat, mask = (batch[name].flatten(0, 1) for name in ("coord", "feat", "mask"))
+        features = self.points(coord, feat)
+        tokens, context = self.look(self.kernel_points(coord, mask, features), coord, mask, features, shape[1])
+        found = {name: values.unflatten(0, shape) for name, values in self.heads(tokens, context).items()}
+        context = context.unflatten(0, shape)
+        # Where to look again is no way for the second look's errors to reach the first.
+        guess, heading = self.line(found["center"].detach(), found, context, batch["frame"])
+        guess, heading = guess.detach(), heading.detach()
+        step, log_std, found["fine_logits"] = self.again(
+            batch["coord"], batch["mask"], features.unflatten(0, shape), guess, heading, context
+        )
+        found["rough"], found["center"] = found["center"], guess + step
+        found["fine_places"] = guess[..., None] + self.again.places
+        found["log_std"] = _bounded(torch.cat([log_std[..., None], found["log_std"]], dim=-1))
+        _, heading = self.line(found["center"].detach(), found, context, batch["frame"])
+        place = CORRIDOR.index("heading")
+        found["corridor"] = torch.cat(
+            [found["corridor"][..., :place], heading[..., None], found["corridor"][..., place + 1 :]], dim=-1
+        )
+        std = torch.exp(found["log_std"]) * found["log_std"].new_tensor(SCALE)
+        return found | {"center_std": std[..., 0], "corridor_std": std[..., 1:]}
+
+    def look(self, tokens: Tokens, coord: Tensor, mask: Tensor, features: Tensor, slices: int) -> tuple[Tokens, Tensor]:
+        """Return tokens that have seen their surroundings, and the context (N, D) of each of the N slices."""
+        raise NotImplementedError
+
+    def line(self, center: Tensor, found: Output, context: Tensor, frame: Tensor) -> tuple[Tensor, Tensor]:
+        """Return a line through centres (B, S): its y in the frames, m, and its direction in them, rad.
+
+        Args:
+            center: y of the centres, m; a constant.
+            found: what else the heads said.
+            context: (B, S, D).
+            frame: (B, S, 4).
+        """
+        raise NotImplementedError
+
+
+class Single(CenterlineModel):
+    """Deformable kernel points and self-attention over them, one slice at a time."""
+
+    def __init__(self, options: ModelOptions, half_width: float) -> None:
+        super().__init__(options, half_width, slices=1)
+        width, count = options.width, options.kernel_points
+        self.deformable = DeformableKernelPoints(count, half_width, options.point_width, width)
+        self.attention = nn.ModuleList(
+            RelativeAttention(count, width, options.heads, options.dropout) for _ in range(options.layers)
+        )
+
+    def look(self, tokens: Tokens, coord: Tensor, mask: Tensor, features: Tensor, slices: int) -> tuple[Tokens, Tensor]:
+        """See `CenterlineModel.look`."""
+        moved = self.deformable(coord, mask, features, tokens.features)
+        mixed = tokens.features + moved.features
+        for layer in self.attention:
+            mixed = layer(mixed)
+        return Tokens(mixed, moved.places, moved.heights), self.pool(mixed)
+
+    def line(self, center: Tensor, found: Output, context: Tensor, frame: Tensor) -> tuple[Tensor, Tensor]:
+        """See `CenterlineModel.line`: one slice knows no more than its own centre and direction."""
+        return center, found["corridor"][..., CORRIDOR.index("heading")]
+
+
+class SequenceModel(CenterlineModel):
+    """A model whose slices know of each other: the line is a parabola through the centres of all."""
+
+    def __init__(self, options: ModelOptions, half_width: float, slices: int) -> None:
+        super().__init__(options, half_width, slices)
+        self.trust = nn.Linear(options.context, 1)
+        self.stiffness = nn.Parameter(torch.tensor([-6.0, -4.0, -2.0]))
+
+    def line(self, center: Tensor, found: Output, context: Tensor, frame: Tensor) -> tuple[Tensor, Tensor]:
+        """See `CenterlineModel.line`; each centre weighs what its context says."""
+        weight = torch.exp(2.0 * torch.tanh(0.5 * self.trust(context)[..., 0]))
+        guess, heading = parabola(frame, center, weight, torch.exp(self.stiffness))
+        return guess, heading + found["corridor"][..., CORRIDOR.index("heading")]
+
+
+class Sequence(SequenceModel):
+    """Fixed kernel points, convolutions across each slice, and an LSTM along the slices at every kernel point."""
+
+    def __init__(self, options: ModelOptions, half_width: float, slices: int) -> None:
+        super().__init__(options, half_width, slices)
+        width = options.width
+        self.across = nn.ModuleList(GridConvolution(width, 1, 5) for _ in range(options.layers))
+        self.along = nn.LSTM(width, width // 2, batch_first=True, bidirectional=True)
+        self.after = nn.ModuleList(GridConvolution(width, 1, 5) for _ in range(min(1, options.layers)))
+        self.summary = nn.LSTM(options.context, options.context // 2, batch_first=True, bidirectional=True)
+
+    def look(self, tokens: Tokens, coord: Tensor, mask: Tensor, features: Tensor, slices: int) -> tuple[Tokens, Tensor]:
+        """See `CenterlineModel.look`."""
+        grid = tokens.features.unflatten(0, (-1, slices))
+        for layer in self.across:
+            grid = layer(grid)
+        sequences, _, count, width = grid.shape
+        memory, _ = self.along(grid.transpose(1, 2).reshape(-1, slices, width))
+        grid = grid + memory.view(sequences, count, slices, width).transpose(1, 2)
+        for layer in self.after:
+            grid = layer(grid)
+        mixed = grid.flatten(0, 1)
+        context = self.pool(mixed)
+        context = context + self.summary(context.unflatten(0, (-1, slices)))[0].flatten(0, 1)
+        return Tokens(mixed, tokens.places, tokens.heights), context
+
+
+class Transformer(SequenceModel):
+    """Convolutions over slices x kernel points in turn with attention along the slices at every kernel point.
+
+    What a slice knows as a whole goes through attention along the slices as well. Where paint is missing, other slices
+    say where the line would be.
+    """
+
+    def __init__(self, options: ModelOptions, half_width: float, slices: int) -> None:
+        super().__init__(options, half_width, slices)
+        width, heads, dropout = options.width, options.heads, options.dropout
+        self.grid = nn.ModuleList(GridConvolution(width, 3, 5) for _ in range(options.layers))
+        self.along = nn.ModuleList(
+            RelativeAttention(slices, width, heads, dropout) for _ in range(max(0, options.layers - 1))
+        )
+        self.summary = nn.ModuleList(RelativeAttention(slices, options.context, heads, dropout) for _ in range(2))
+
+    def look(self, tokens: Tokens, coord: Tensor, mask: Tensor, features: Tensor, slices: int) -> tuple[Tokens, Tensor]:
+        """See `CenterlineModel.look`."""
+        grid = tokens.features.unflatten(0, (-1, slices))
+        for number, layer in enumerate(self.grid):
+            grid = layer(grid)
+            if number < len(self.along):
+                at_each = grid.transpose(1, 2)
+                grid = self.along[number](at_each.flatten(0, 1)).view(at_each.shape).transpose(1, 2)
+        mixed = grid.flatten(0, 1)
+        context = self.pool(mixed).unflatten(0, (-1, slices))
+        for layer in self.summary:
+            context = layer(context)
+        return Tokens(mixed, tokens.places, tokens.heights), context.flatten(0, 1)
+
+
+def build(options: ModelOptions, half_width: float, slices: int) -> CenterlineModel:
+    """Return a model with weights from PyTorch's global generator.
+
+    Args:
+        options: which one.
+        half_width: what a slice sees to either side, m.
+        slices: of a sequence.
+    """
+    if options.name == "single":
+        return Single(options, half_width)
+    if options.name == "sequence":
+        return Sequence(options, half_width, slices)
+    return Transformer(options, half_width, slices)
+
+
+def mirrored(batch: Batch) -> Batch:
+    """Return a batch with left and right swapped, truth and frames included."""
+    flip = batch["coord"].new_tensor([1.0, -1.0, 1.0])
+    other = dict(batch, coord=batch["coord"] * flip)
+    other["frame"] = batch["frame"] * batch["frame"].new_tensor([1.0, -1.0, -1.0, 1.0])
+    if "center" in batch:
+        other["center"] = -batch["center"]
+    if "corridor" in batch:
+        other["corridor"] = _swapped(batch["corridor"]) * _signs(batch["corridor"])
+    return other
+
+
+def both_ways(model: nn.Module, batch: Batch) -> Output:
+    """Return the mean of a model's output and of that for the mirrored batch, mirrored back.
+
+    Mirroring the batch mirrors the result exactly. Variances are averaged; what the two disagree on is left out, as the
+    calibration sees it.
+    """
+    one, other = model(batch), model(mirrored(batch))
+    back = _swapped(other["corridor"]) * _signs(other["corridor"])
+    variance = _swapped(other["corridor_std"]) ** 2
+    return {
+        "center": 0.5 * (one["center"] - other["center"]),
+        "center_std": (0.5 * (one["center_std"] ** 2 + other["center_std"] ** 2)).sqrt(),
+        "corridor": 0.5 * (one["corridor"] + back),
+        "corridor_std": (0.5 * (one["corridor_std"] ** 2 + variance)).sqrt(),
+    }
+
+
+def _bounded(logarithm: Tensor) -> Tensor:
+    return _LARGEST_LOG * torch.tanh(logarithm / _LARGEST_LOG)
+
+
+def _swapped(corridor: Tensor) -> Tensor:
+    order = [
+        CORRIDOR.index({"left_edge": "right_edge", "right_edge": "left_edge"}.get(name, name)) for name in CORRIDOR
+    ]
+    return corridor[..., order]
+
+
+def _signs(corridor: Tensor) -> Tensor:
+    return corridor.new_tensor([-1.0 if name in ("left_edge", "right_edge", "heading") else 1.0 for name in CORRIDOR])

@@ -1,0 +1,1 @@
+"""How good predicted centrelines are: metrics, intervals, baselines, tables and pictures."""

@@ -1,0 +1,83 @@
+"""The painted line beside a measured axis: how far the axis itself lies from what can be seen.
+
+An axis out of a road register is a smooth line that somebody drew; where a lane line is painted, a model that follows
+the paint differs from the axis by what the axis differs from the paint. This line knows the axis, so it isn't a
+predictor; it is a second truth, independent of how the first was drawn.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from synthroads_addon.base.errors import InputError
+
+from ..data.axis import Axis
+from ..data.corridor import Truth
+from ..data.intensity import logarithms
+from ..data.roads import Road
+from .evaluation import truth_of
+
+Float = NDArray[np.float64]
+
+REACH = 1.2
+"""A line is looked for up to so far from the axis, m."""
+LENGTH = 10.0
+"""Of road of which one place of the line is taken, m."""
+STEP = 2.0
+"""Distance of the places, m."""
+CELL = 0.05
+"""Width of a cell across the road, m."""
+LINE = 0.3
+"""Width over which cells are averaged: a line's, seen by an airborne scanner, m."""
+BRIGHTER = 0.7
+"""A line is brighter than the median beside the axis by at least so much of the logarithms' 20th to 80th percentile."""
+FEWEST = 100
+"""Points of which a place is taken."""
+
+
+def with_painted_line(road: Road) -> Road:
+    """Return a road whose truth is the painted line next to its measured axis, with gaps where none is found.
+
+    Raises:
+        InputError: the road has no truth, or no two neighbouring places with a line.
+    """
+    truth = truth_of(road)
+    axis = truth.axis
+    station, offset = axis.project(road.xyz)
+    near = np.abs(offset) <= REACH + LINE
+    station, offset = station[near], offset[near]
+    logs = logarithms(road.intensity[near].astype(np.float64))
+    order = np.argsort(station, kind="stable")
+    station, offset, logs = station[order], offset[order], logs[order]
+    places = axis.stations(STEP)
+    first, last = (np.searchsorted(station, places + side * 0.5 * LENGTH) for side in (-1.0, 1.0))
+    aside = np.array([_ridge(offset[a:b], logs[a:b]) for a, b in zip(first, last, strict=True)])
+    there = np.isfinite(aside)
+    if there.sum() < 2:
+        raise InputError("road", road.name, "has no painted line beside its axis")
+    direction = axis.direction(places[there])
+    left = np.column_stack([-np.sin(direction), np.cos(direction)])
+    points = axis.position(places[there]) + aside[there, None] * left
+    line = Axis(np.column_stack([points, axis.elevation(places[there])]), np.diff(places[there]) < 1.5 * STEP)
+    return replace(road, truth=Truth.measured(line, truth.kind))
+
+
+def _ridge(offset: Float, logs: Float) -> float:
+    """Return where points are brightest across a road, m; NaN where nothing is brighter than the rest."""
+    if len(offset) < FEWEST:
+        return float("nan")
+    middles = np.arange(-REACH, REACH + 0.5 * CELL, CELL)
+    order = np.argsort(offset)
+    total = np.concatenate([[0.0], np.cumsum(logs[order])])
+    low, high = (np.searchsorted(offset[order], middles + side * 0.5 * LINE) for side in (-1.0, 1.0))
+    count = high - low
+    mean = np.where(count > 0, (total[high] - total[low]) / np.maximum(count, 1), -np.inf)
+    spread = float(np.subtract(*np.percentile(logs, (80.0, 20.0))))
+    excess = mean - float(np.median(logs)) - BRIGHTER * spread
+    best = int(np.argmax(excess))
+    # At the end of the reach the brightest may be the flank of something else.
+    inside = 0 < best < len(middles) - 1
+    return float(middles[best]) if inside and excess[best] > 0.0 else float("nan")

@@ -1,0 +1,229 @@
+"""Pictures of centrelines and corridors over the cloud that they were found in."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image
+from scipy.stats import rankdata
+
+from ..data.corridor import CORRIDOR
+from ..data.frames import Frames
+from .calibration import DEVIATIONS, LEVELS
+from .evaluation import CORRIDOR_COLUMNS, Case, truth_of
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+Float = NDArray[np.float64]
+
+COLORS = ("#d81b60", "#1e88e5", "#ffc107", "#004d40", "#8e24aa", "#6d4c41")
+TRUE = "#00e5a0"
+EDGE = "#ff8f00"
+CENTER = "#1e88e5"
+_MOST_POINTS = 60_000
+_LINEAR = 0.1
+"""Offsets from the true axis are drawn to a linear scale up to this and to a logarithmic one beyond, m."""
+_COLORS = 256
+_APART = 4.0
+"""Predictions farther apart than this, m, are not joined."""
+
+
+@dataclass(frozen=True)
+class View:
+    """The part of a road that is drawn: stations along its true axis, m."""
+
+    first: float
+    last: float
+
+
+def lines_picture(shown: Case, lines: Mapping[str, Float], view: View, title: str, height: float = 12.0) -> bytes:
+    """Return a PNG: centrelines over the cloud, and how far each is from the true axis.
+
+    Args:
+        shown: road and frames.
+        lines: y of the centres in the frames (M,), m, by the predictor's name.
+        view: what of the road.
+        title: of the picture.
+        height: of the upper panel to either side of the axis, m.
+    """
+    figure, panels = _panels(title, (2.2, 1.0), view, height)
+    _cloud(panels[0], shown, view, height)
+    _true(panels[0], shown, view)
+    panels[1].axhline(0.0, color="black", lw=1.0, label="true axis")
+    largest = 0.0
+    for (name, y), color in zip(lines.items(), COLORS, strict=False):
+        station, offset = _beside(shown, shown.frames.at(y), view)
+        panels[0].plot(station, offset, color=color, lw=1.2, label=name)
+        panels[1].plot(station, offset, color=color, lw=1.2)
+        largest = max(largest, float(np.nanquantile(np.abs(offset), 0.98)) if np.isfinite(offset).any() else 0.0)
+    limit = 1.3 * max(largest, _LINEAR)
+    panels[1].set_yscale("symlog", linthresh=_LINEAR, linscale=1.5)
+    ticks = [sign * size for size in (0.05, 0.1, 1.0, 10.0) for sign in (-1.0, 1.0) if size <= limit]
+    panels[1].set_yticks([0.0, *ticks], [f"{tick:g}" for tick in (0.0, *ticks)])
+    panels[1].set(ylabel="offset from it, m", ylim=(-limit, limit))
+    panels[0].legend(loc="upper right", ncols=3, fontsize=8, framealpha=0.9)
+    return _png(figure)
+
+
+def corridor_picture(shown: Case, prediction: Float, view: View, title: str, height: float = 16.0) -> bytes:
+    """Return a PNG: centre and edges with their 95 % bands over the cloud, the centre's error, the lanes.
+
+    Args:
+        shown: road and frames.
+        prediction: (M, 2 to 4 + 2 K) columns `CORRIDOR_COLUMNS`; panels of what isn't there stay away.
+        view: what of the road.
+        title: of the picture.
+        height: of the upper panel to either side of the axis, m.
+    """
+    column = {name: prediction[:, i] for i, name in enumerate(CORRIDOR_COLUMNS[: prediction.shape[1]])}
+    with_lanes = "lanes" in column and bool(np.isfinite(column["lanes"]).any())
+    figure, panels = _panels(title, (2.4, 1.0, 0.8) if with_lanes else (2.4, 1.0), view, height)
+    _cloud(panels[0], shown, view, height)
+    _true(panels[0], shown, view, edges=True)
+    for name, color, label in (("center", CENTER, "centre"), ("left_edge", EDGE, "edges"), ("right_edge", EDGE, None)):
+        if name in column:
+            _band(panels[0], shown, view, column[name], _half_width(column, name, 95), color, label)
+    panels[0].legend(loc="upper right", ncols=4, fontsize=8, framealpha=0.9)
+    _center_error(panels[1], shown, view, column)
+    if with_lanes:
+        _lanes(panels[2], shown, view, column)
+    return _png(figure)
+
+
+def _panels(title: str, heights: Sequence[float], view: View, height: float) -> tuple[Any, Sequence[Any]]:
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(13.0, 1.6 + 2.0 * sum(heights)), layout="constrained")
+    panels = figure.subplots(len(heights), 1, sharex=True, height_ratios=heights)
+    figure.suptitle(title, fontsize=11)
+    panels[0].set(xlim=(view.first, view.last), ylim=(-height, height), ylabel="offset from the true axis, m")
+    panels[-1].set(xlabel="station along the true axis, m")
+    for panel in panels[1:]:
+        panel.grid(alpha=0.3)
+    return figure, panels
+
+
+def _cloud(axes: Axes, shown: Case, view: View, height: float) -> None:
+    """Draw the points by intensity, straightened along the true axis.
+
+    Where only an axis is known, as of real scans that may not be passed on, means of cells are drawn and no points.
+    """
+    own = np.flatnonzero(shown.road.belonging)
+    station, offset = truth_of(shown.road).axis.project(shown.road.xyz[own])
+    near = np.flatnonzero((station >= view.first) & (station <= view.last) & (np.abs(offset) <= height))
+    intensity = shown.road.intensity[own[near]]
+    # By their ranks: a scanner beside the road sees its near side a hundred times as bright as the far one.
+    intensity = rankdata(intensity) / max(1, len(near))
+    look: dict[str, Any] = {"cmap": "gray", "vmin": -0.5, "vmax": 1.0, "rasterized": True}
+    axes.set_facecolor("#101418")
+    if truth_of(shown.road).left is None:
+        along, aside = np.arange(view.first, view.last + 0.5), np.arange(-height, height + 0.125, 0.25)
+        places = np.column_stack([station[near], offset[near]])
+        count, _ = np.histogramdd(places, bins=[along, aside])
+        total, _ = np.histogramdd(places, bins=[along, aside], weights=intensity)
+        axes.pcolormesh(along, aside, np.where(count > 0, total / np.maximum(count, 1), np.nan).T, **look)
+        return
+    some = slice(None, None, max(1, len(near) // _MOST_POINTS))
+    size = float(np.clip(60_000 / max(len(near), 1), 0.4, 6.0))
+    axes.scatter(station[near][some], offset[near][some], c=intensity[some], s=size, lw=0, **look)
+
+
+def _true(axes: Axes, shown: Case, view: View, edges: bool = False) -> None:
+    truth = truth_of(shown.road)
+    station = np.arange(view.first, view.last, 0.5)
+    axes.plot(station, np.where(truth.axis.inside(station), 0.0, np.nan), color=TRUE, lw=2.5, label="true axis")
+    if edges:
+        lines = [line for line in (truth.left, truth.right) if line is not None]
+        for line, label in zip(lines, ("true edges", None), strict=False):
+            along, aside = truth.axis.project(line.points)
+            order = np.argsort(along)
+            axes.plot(along[order], aside[order], color=TRUE, lw=2.0, ls="--", label=label)
+
+
+def _beside(shown: Case, points: Float, view: View) -> tuple[Float, Float]:
+    """Return station and offset of those points (M, 2) that lie in the view, by station; NaN between stretches."""
+    truth = truth_of(shown.road)
+    there = np.isfinite(points).all(axis=1)
+    station, offset = truth.axis.project(points[there])
+    inside = (station >= view.first) & (station <= view.last) & truth.axis.inside(station)
+    station, offset = station[inside], offset[inside]
+    order = np.argsort(station)
+    station, offset = station[order], offset[order]
+    breaks = np.flatnonzero(np.diff(station) > _APART) + 1
+    return np.insert(station, breaks, np.nan), np.insert(offset, breaks, np.nan)
+
+
+def _half_width(column: Mapping[str, Float], name: str, level: int) -> Float:
+    """Return half-widths (M,) of an interval, m: as the prediction says, else by its standard deviation, else 0."""
+    if f"{name}_{level}" in column:
+        width = column[f"{name}_{level}"]
+    else:
+        width = DEVIATIONS[LEVELS.index(level / 100.0)] * column.get(f"{name}_std", np.zeros(len(column[name])))
+    return np.nan_to_num(width)
+
+
+def _band(axes: Axes, shown: Case, view: View, y: Float, width: Float, color: str, label: str | None) -> None:
+    """Draw a line with an interval of 95 %."""
+    station, offset = _beside(shown, shown.frames.at(y), view)
+    _, low = _across(shown, shown.frames, y - width, view)
+    at, high = _across(shown, shown.frames, y + width, view)
+    axes.fill_between(at, low, high, color=color, alpha=0.35, lw=0, label=None if label is None else f"{label}, 95 %")
+    axes.plot(station, offset, color=color, lw=1.3, label=label)
+
+
+def _across(shown: Case, frames: Frames, y: Float, view: View) -> tuple[Float, Float]:
+    """Return the frames' stations on the true axis (K,) and the offsets of their points, in the frames' order."""
+    truth = truth_of(shown.road)
+    _, station = truth.axis.crossing(frames.position, frames.direction)
+    inside = (station >= view.first) & (station <= view.last) & np.isfinite(y)
+    _, offset = truth.axis.project(frames.at(y)[inside])
+    order = np.argsort(station[inside])
+    station, offset = station[inside][order], offset[order]
+    breaks = np.flatnonzero(np.diff(station) > _APART) + 1
+    return np.insert(station, breaks, np.nan), np.insert(offset, breaks, np.nan)
+
+
+def _center_error(axes: Axes, shown: Case, view: View, column: Mapping[str, Float]) -> None:
+    y = column["center"]
+    station, offset = _across(shown, shown.frames, y, view)
+    for level, alpha in ((95, 0.2), (68, 0.35)):
+        width = _half_width(column, "center", level)
+        if width.any():
+            at, low = _across(shown, shown.frames, y - width, view)
+            _, high = _across(shown, shown.frames, y + width, view)
+            axes.fill_between(at, low, high, color=CENTER, alpha=alpha, lw=0, label=f"{level} %")
+    axes.plot(station, offset, color=CENTER, lw=1.2, label="predicted centre")
+    axes.axhline(0.0, color="black", lw=1.0)
+    axes.set(ylabel="centre, m")
+    axes.legend(loc="upper right", ncols=3, fontsize=8)
+
+
+def _lanes(axes: Axes, shown: Case, view: View, column: Mapping[str, Float]) -> None:
+    there = truth_of(shown.road).at(shown.frames.position, shown.frames.direction, np.zeros(len(shown.frames)))
+    inside = np.flatnonzero((there.station >= view.first) & (there.station <= view.last))
+    inside = inside[np.argsort(there.station[inside])]
+    station = there.station[inside]
+    for name, color in (("lanes", CENTER), ("lane_width", EDGE)):
+        value, label = column[name][inside], name.replace("_", " ") + (", m" if name == "lane_width" else "")
+        spread = _half_width(column, name, 95)[inside]
+        axes.fill_between(station, value - spread, value + spread, color=color, alpha=0.25, lw=0)
+        axes.plot(station, value, color=color, lw=1.2, label=label)
+        true = there.corridor[inside, CORRIDOR.index(name)]
+        axes.plot(station, true, color="black", lw=1.0, ls="--", label="true" if name == "lanes" else None)
+    axes.set(ylabel="lanes")
+    axes.legend(loc="upper right", ncols=3, fontsize=8)
+
+
+def _png(figure: Any) -> bytes:
+    """Return a figure as a PNG of few colours; with all of them a cloud's points make it four times as large."""
+    drawn, content = io.BytesIO(), io.BytesIO()
+    figure.savefig(drawn, format="png", dpi=110, metadata={"Software": None})
+    image = Image.open(drawn).convert("RGB").quantize(_COLORS, dither=Image.Dither.NONE)
+    image.save(content, format="png", optimize=True)
+    return content.getvalue()

@@ -1,0 +1,1 @@
+"""Using a trained centreline model on a cloud."""

@@ -1,0 +1,1 @@
+"""Labelled points: where they come from, as tiles, crops and packed files."""

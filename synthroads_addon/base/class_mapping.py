@@ -1,0 +1,75 @@
+"""`ClassMapping`: which classes things have in a scene that nobody labelled, by their names."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from fnmatch import fnmatchcase
+
+from pydantic import Field, model_validator
+
+from .classes import classes
+from .errors import nearest_name
+from .schema import Model
+
+KINDS = ("objects", "materials", "collections")
+"""What can be named, the stronger first."""
+
+
+class ClassMapping(Model):
+    """Names -> classes, for scenes of others. Names are shell patterns: ``Tree*``, ``pole.???``, ``[Ss]ign*``.
+
+    Case matters, and of several patterns that fit a name the first counts. What stands nearer to the face wins; in
+    full, a face's class is
+
+    1. its attribute ``class_id``,
+    2. that of its object's name, or of the name of the object that shows it as an instance,
+    3. the custom property ``synthroads_class`` of one of these objects,
+    4. that of its material's name,
+    5. that of a collection that its object is in, the innermost first,
+    6. the class that a collection of its object is named after,
+    7. else none: unlabelled.
+    """
+
+    objects: dict[str, str] = Field({}, description="Pattern of objects' names -> class.")
+    materials: dict[str, str] = Field({}, description="Pattern of materials' names -> class.")
+    collections: dict[str, str] = Field({}, description="Pattern of collections' names -> class.")
+
+    @model_validator(mode="after")
+    def _classes_exist(self) -> ClassMapping:
+        known = [row.name for row in classes()]
+        for kind in KINDS:
+            for pattern, name in getattr(self, kind).items():
+                if name not in known:
+                    hint = nearest_name(name, known)
+                    raise ValueError(f"{kind}: {pattern!r}: there is no class {name!r}{hint}")
+        return self
+
+
+class NameClasses:
+    """A mapping at work on the names of one scene; it remembers which patterns fitted."""
+
+    def __init__(self, mapping: ClassMapping | None) -> None:
+        ids = {row.name: row.id for row in classes()}
+        rows: Mapping[str, dict[str, str]] = {kind: getattr(mapping, kind) if mapping else {} for kind in KINDS}
+        self._rows = {kind: [(pattern, ids[name]) for pattern, name in rows[kind].items()] for kind in KINDS}
+        self._found: dict[tuple[str, str], int | None] = {}
+        self._used: set[tuple[str, str]] = set()
+
+    def find(self, kind: str, *names: str) -> int | None:
+        """Return the class of the first of these names that has one; None if none has."""
+        found = [self._find(kind, name) for name in names]
+        return next((number for number in found if number is not None), None)
+
+    def unmatched(self) -> tuple[str, ...]:
+        """Return the patterns that no name fitted so far, each as ``kind: pattern``."""
+        rows = ((kind, pattern) for kind in KINDS for pattern, _ in self._rows[kind])
+        return tuple(f"{kind}: {pattern}" for kind, pattern in rows if (kind, pattern) not in self._used)
+
+    def _find(self, kind: str, name: str) -> int | None:
+        if not self._rows[kind]:
+            return None
+        if (kind, name) not in self._found:
+            fits = [(pattern, number) for pattern, number in self._rows[kind] if fnmatchcase(name, pattern)]
+            self._used |= {(kind, pattern) for pattern, _ in fits}
+            self._found[kind, name] = fits[0][1] if fits else None
+        return self._found[kind, name]

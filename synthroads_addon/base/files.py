@@ -1,0 +1,153 @@
+"""Reading text files, and writing a job's files so that nothing half-written ever stands under its final name."""
+
+from __future__ import annotations
+
+import errno
+import os
+import shutil
+import tempfile
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from .errors import InputError, MissingFileError, OutputError
+
+PRESETS = Path(__file__).parents[1] / "presets"
+"""Folder of the shipped data: classes, materials, signs, devices, scenarios, recipes, assets."""
+
+
+def read_text(path: str | os.PathLike[str], kind: str, wanted: str = "", encoding: str = "utf-8") -> str:
+    """Return the content of a text file.
+
+    Args:
+        path: of the file.
+        kind: what is said where it is no text, e.g. ``must be JSON in UTF-8``.
+        wanted: what is said before the system's own words where it can't be read, e.g. ``an axis file is needed here``.
+        encoding: ``utf-8-sig`` takes a byte order mark as well.
+
+    Raises:
+        MissingFileError: the file doesn't exist or cannot be read.
+        InputError: it is no text.
+    """
+    name = os.fspath(path)
+    try:
+        return Path(name).read_text(encoding=encoding)
+    except OSError as error:
+        if isinstance(error, FileNotFoundError) and not wanted:
+            raise MissingFileError(name, None, "no such file") from None
+        reason = os.strerror(error.errno or 0)
+    except UnicodeDecodeError:
+        raise InputError(name, None, kind) from None
+    except ValueError as error:  # no name of a file: it holds a null byte
+        reason = str(error)
+    raise MissingFileError(name, None, f"{wanted or 'cannot be read'} ({reason})")
+
+
+def stamp(path: str, wanted: str) -> tuple[int, int]:
+    """Return when a file was last changed (ns) and its size (bytes), by which one that was read is known again.
+
+    Raises:
+        MissingFileError: it doesn't exist; ``wanted`` is said before the system's own words.
+    """
+    try:
+        found = Path(path).stat()
+    except (OSError, ValueError) as error:  # ValueError: its name holds a null byte
+        raise MissingFileError(path, None, f"{wanted} ({getattr(error, 'strerror', None) or error})") from None
+    return found.st_mtime_ns, found.st_size
+
+
+def files_below(folder: Path) -> Iterator[Path]:
+    """Yield every file below a folder, also by way of links to folders; each folder is entered once, links last.
+
+    A link to a folder that is entered already, such as one above it, leads nowhere new and is left out.
+    """
+    entered: set[str] = set()
+    waiting = [folder]
+    while waiting:
+        for here, folders, files in os.walk(waiting.pop(0)):
+            real = os.path.realpath(here)
+            if real in entered:
+                folders.clear()
+                continue
+            entered.add(real)
+            folders.sort()
+            waiting += [path for path in (Path(here, name) for name in folders) if path.is_symlink()]
+            yield from (Path(here, name) for name in sorted(files))
+
+
+@contextmanager
+def output_folder(target: Path, names: Iterable[str], overwrite: bool) -> Iterator[Path]:
+    """Yield a temporary folder inside ``target``; at the end its files are moved into ``target``.
+
+    When the work fails or is stopped, the temporary folder is removed and ``target`` is as it was.
+
+    Args:
+        target: folder for the files; made if it isn't there.
+        names: the files that will be written, to find out early if one is already there.
+        overwrite: whether files of these names may be replaced; other files in the folder are never touched.
+
+    Raises:
+        OutputError: a file is already there, or the folder can't be made or written, or the disk is full.
+    """
+    made = not target.exists()
+    present = [name for name in names if (target / name).exists()]
+    if present and not overwrite:
+        raise OutputError("--output", str(target), f"already holds {present[0]}; --overwrite replaces it")
+    try:
+        target.mkdir(parents=True, exist_ok=True)
+        temporary = Path(tempfile.mkdtemp(prefix=".partial-", dir=target))
+    except OSError as error:
+        raise OutputError("--output", str(target), f"cannot be written ({error.strerror})") from None
+    try:
+        yield temporary
+        _move_all(temporary, target)
+    except OSError as error:
+        if error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EACCES, errno.EROFS):
+            raise OutputError("--output", str(target), f"cannot be written ({error.strerror})") from None
+        raise
+    finally:
+        shutil.rmtree(temporary, ignore_errors=True)
+        if made and target.exists() and not any(target.iterdir()):
+            target.rmdir()
+
+
+def _move_all(source: Path, target: Path) -> None:
+    """Move a folder's files; where the user stops the work meanwhile all the same, as a part of them fits nothing."""
+    stopped: KeyboardInterrupt | None = None
+    while paths := sorted(source.iterdir()):
+        try:
+            for path in paths:
+                path.replace(target / path.name)
+        except KeyboardInterrupt as signal:
+            stopped = signal
+    if stopped is not None:
+        raise stopped
+
+
+def write_file(path: Path, content: bytes, field: str = "--output", overwrite: bool = False) -> None:
+    """Write one file under a temporary name beside it and rename it.
+
+    Args:
+        path: of the file; its folder is made if it isn't there.
+        content: of the file.
+        field: what the caller calls the path, for the message.
+        overwrite: whether a file that is there may be replaced.
+
+    Raises:
+        OutputError: it is there already, or it can't be written.
+    """
+    if path.exists() and not overwrite:
+        raise OutputError(field, str(path), "is there already; --overwrite replaces it")
+    temporary = None
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with tempfile.NamedTemporaryFile(prefix=".partial-", dir=path.parent, delete=False) as file:
+            temporary = Path(file.name)
+            file.write(content)
+        temporary.chmod(0o644)
+        temporary.replace(path)
+    except OSError as error:
+        raise OutputError(field, str(path), f"cannot be written ({error.strerror})") from None
+    finally:  # also where the user stops the work meanwhile
+        if temporary is not None:
+            temporary.unlink(missing_ok=True)

@@ -1,0 +1,287 @@
+"""What every JSON file of the project has in common: strict models, one-line errors, byte-stable writing.
+
+The models are pydantic's, because it names field, value and limit of every fault, makes the JSON Schema from the same
+declarations, and its limits, units and descriptions can be read back by the panel. All numbers must be finite.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Sequence
+from functools import cache
+from pathlib import Path
+from typing import Any, ClassVar, TypeVar, get_args
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic.fields import FieldInfo
+
+from .errors import InputError, nearest_name
+from .files import read_text
+
+VENDOR_PREFIX = "+"
+"""Keys that begin with this are a vendor's own: read, kept, written back, never interpreted (CityJSON's habit)."""
+LARGEST = 1e15
+"""Limit, to either side, of a quantity that declares none: what is larger overflows somewhere later."""
+
+
+def quantity(
+    default: Any = ...,
+    *,
+    unit: str,
+    description: str,
+    ge: float | None = None,
+    gt: float | None = None,
+    le: float | None = None,
+    lt: float | None = None,
+) -> Any:
+    """Declare a numeric field with its unit (``m``, ``deg``, ``1``, ...) and limits."""
+    return Field(
+        default,
+        description=description,
+        ge=-LARGEST if ge is None and gt is None else ge,
+        gt=gt,
+        le=LARGEST if le is None and lt is None else le,
+        lt=lt,
+        strict=True,
+        json_schema_extra={"unit": unit},
+    )
+
+
+def when(test: dict[str, Any], then: dict[str, Any], otherwise: dict[str, Any] | None = None) -> dict[str, Any]:
+    """Return a condition of `Model.conditions`: where the fields of ``test`` are there and fit, those of ``then`` must.
+
+    Each argument maps fields to what JSON Schema says of them. A field that must be null or a constant may be left out.
+    """
+    result = {"if": {"properties": test, "required": list(test)}, "then": _fields_fit(then)}
+    return result | ({"else": _fields_fit(otherwise)} if otherwise else {})
+
+
+def _fields_fit(fields: dict[str, Any]) -> dict[str, Any]:
+    needed = [name for name, rule in fields.items() if rule.get("type") != "null" and "const" not in rule]
+    return {"properties": fields, "required": needed}
+
+
+def _complete_schema(schema: dict[str, Any], model: type[Any]) -> None:
+    """Say in a class's JSON Schema what pydantic doesn't: unknown keys and conditions between fields."""
+    schema["additionalProperties"] = False
+    if model.vendor_keys_allowed:
+        schema["patternProperties"] = {f"^\\{VENDOR_PREFIX}": {}}
+    conditions = [rule for base in reversed(model.__mro__) for rule in base.__dict__.get("conditions", ())]
+    if conditions:
+        schema["allOf"] = conditions
+
+
+@cache
+def _keys(model: type[Model]) -> tuple[frozenset[str], frozenset[str]]:
+    """Return the keys of a class, and those of whole numbers."""
+    fields = {field.alias or name: field.annotation for name, field in model.model_fields.items()}
+    whole = [name for name, kind in fields.items() if kind is int or int in get_args(kind)]
+    return frozenset(fields), frozenset(whole)
+
+
+class Model(BaseModel):
+    """Base of all parameter classes: immutable, no unknown keys but a vendor's, no NaN; numbers are strict.
+
+    Attributes:
+        conditions: what the class's validators require of several fields together, in the words of JSON Schema.
+    """
+
+    model_config = ConfigDict(
+        extra="allow",
+        frozen=True,
+        allow_inf_nan=False,
+        json_schema_extra=_complete_schema,
+    )
+    vendor_keys_allowed: ClassVar[bool] = True
+    conditions: ClassVar[Sequence[dict[str, Any]]] = ()
+
+    @model_validator(mode="before")
+    @classmethod
+    def _prepare(cls, data: Any) -> Any:
+        """Refuse unknown keys; take 2.0 for 2 where a whole number is wanted, and 0.0 for -0.0.
+
+        JSON doesn't tell the first two apart, comparisons don't the others: what is equal has to have the same text.
+        """
+        if not isinstance(data, dict):
+            return data
+        known, whole = _keys(cls)
+        for key in data:
+            if key in known or (cls.vendor_keys_allowed and str(key).startswith(VENDOR_PREFIX)):
+                continue
+            raise ValueError(f"unknown key {str(key)!r}{nearest_name(str(key), cls.model_fields)}")
+        data = {key: _unsigned_zeros(value) if key in known else value for key, value in data.items()}
+        changed = {key: int(data[key]) for key in whole if isinstance(data.get(key), float) and data[key].is_integer()}
+        return data | changed
+
+    @classmethod
+    def from_dict(cls: type[T], data: object, source: str = "") -> T:
+        """Validate plain JSON data; raise `InputError` naming the first wrong field."""
+        try:
+            return cls.model_validate(data)
+        except ValidationError as error:
+            raise _input_error(error, data, source) from None
+        except (TypeError, ValueError, RecursionError) as error:
+            raise InputError(source or cls.__name__, None, f"must be plain JSON data ({error})") from None
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return plain JSON data in the order of the declaration, without fields that are None."""
+        data: dict[str, Any] = _without_absent_fields(self.model_dump(mode="json", by_alias=True))
+        return data
+
+    def to_json(self) -> str:
+        """Return the canonical text: the same set gives the same bytes."""
+        return canonical_json(self.to_dict())
+
+
+T = TypeVar("T", bound=Model)
+
+
+def _unsigned_zeros(value: Any) -> Any:
+    """Return a field's value with 0.0 for every -0.0, in lists too (objects in them see to their own fields)."""
+    if isinstance(value, float):
+        return value + 0.0
+    return type(value)(map(_unsigned_zeros, value)) if type(value) in (list, tuple) else value
+
+
+def _without_absent_fields(data: Any) -> Any:
+    """Leave out fields that are None; what a vendor wrote is kept as it is."""
+    if isinstance(data, dict):
+        return {
+            key: value if key.startswith(VENDOR_PREFIX) else _without_absent_fields(value)
+            for key, value in data.items()
+            if value is not None or key.startswith(VENDOR_PREFIX)
+        }
+    return [_without_absent_fields(value) for value in data] if isinstance(data, list) else data
+
+
+def canonical_json(data: object) -> str:
+    """Serialise with one layout for the whole project: one space of indent, keys as ordered, final newline."""
+    return json.dumps(data, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
+
+
+def rounded(value: float, digits: int = 9) -> float:
+    """Round a sampled value so that its text is short and the same on every machine (-0.0 becomes 0.0)."""
+    return round(float(value), digits) + 0.0
+
+
+def read_json(path: Path | str) -> Any:
+    """Read a JSON file; NaN and infinity are refused, as JSON has none, and so is a key that an object has twice.
+
+    Raises:
+        MissingFileError: there is no such file, or it can't be read.
+        InputError: it isn't JSON; the message names line and column.
+    """
+    text = read_text(path, "must be JSON in UTF-8")
+    try:
+        data = json.loads(
+            text, parse_constant=_refuse_constant, parse_float=_finite, object_pairs_hook=_refuse_key_twice
+        )
+        if "\\u" in text:
+            json.dumps(data, ensure_ascii=False).encode()  # refuses half a surrogate pair, which no file could hold
+        return data
+    except (ValueError, RecursionError) as error:
+        raise InputError(str(path), None, f"must be valid JSON ({error})") from None
+
+
+def read_yaml(path: Path) -> Any:
+    """Return a YAML (or JSON) file as plain data; YAML's own types (dates, say) are refused, as JSON has none.
+
+    Raises:
+        MissingFileError: there is no such file, or it can't be read.
+        InputError: it isn't YAML.
+    """
+    import yaml
+
+    from .config_files import Loader
+
+    text = read_text(path, "must be YAML in UTF-8")
+    try:
+        data = json.loads(json.dumps(yaml.load(text, Loader=Loader), allow_nan=False))
+        if "\\" in text:
+            json.dumps(data, ensure_ascii=False).encode()  # refuses half a surrogate pair, which no file could hold
+        return data
+    except (yaml.YAMLError, ValueError, TypeError, RecursionError) as error:
+        raise InputError(str(path), None, f"must be valid YAML ({error})") from None
+    except (LookupError, AttributeError):  # PyYAML's own, of a tag such as !!int before what isn't one
+        raise InputError(str(path), None, "must be valid YAML (a value is not what its tag says)") from None
+
+
+def unit_of(field: FieldInfo) -> str:
+    """Return the unit declared by `quantity`, or an empty string."""
+    extra = field.json_schema_extra
+    return str(extra.get("unit", "")) if isinstance(extra, dict) else ""
+
+
+def _refuse_constant(name: str) -> float:
+    raise ValueError(f"{name} is not a number")
+
+
+def _finite(text: str) -> float:
+    value = float(text)
+    if value in (float("inf"), float("-inf")):
+        raise ValueError(f"{text} is too large a number")
+    return value
+
+
+def _refuse_key_twice(members: list[tuple[str, Any]]) -> dict[str, Any]:
+    """Return an object; the usual reading keeps the last of two like keys and drops the other without a word."""
+    data = dict(members)
+    if len(data) < len(members):
+        keys = [key for key, _ in members]
+        raise ValueError(f"an object has the key {next(key for key in keys if keys.count(key) > 1)!r} twice")
+    return data
+
+
+_WORDING = {
+    "missing": "is required",
+    "model_type": "must be a JSON object",
+    "model_attributes_type": "must be a JSON object",
+    "dict_type": "must be a JSON object",
+    "tuple_type": "must be a list",
+    "union_tag_not_found": "must be a JSON object that names its type",
+    "string_unicode": "must be Unicode text",
+}
+"""Type of complaint -> our words, where pydantic's speak of Python."""
+
+
+def _input_error(error: ValidationError, data: object, source: str) -> InputError:
+    """Turn pydantic's first complaint into the project's one line."""
+    first = error.errors(include_url=False)[0]
+    kind, value, context = first["type"], first.get("input"), first.get("ctx", {})
+    path = _real_path(first["loc"], data, missing=kind == "missing")
+    message = _WORDING.get(kind) or _in_our_words(str(first["msg"]))
+    if kind == "union_tag_invalid":
+        path, value = [*path, str(context["discriminator"]).strip("'")], context["tag"]
+        known = re.findall(r"\w+", context["expected_tags"])
+        message = f"must be one of {', '.join(known)}{nearest_name(str(value), known)}"
+    elif kind in ("missing", "value_error"):
+        value = None
+    field = ".".join(part if part.isprintable() else repr(part) for part in path) or "the file"
+    return InputError(f"{source}: {field}" if source else field, value, " ".join(message.split()))
+
+
+def _in_our_words(message: str) -> str:
+    message = re.sub(r"^(Input|Tuple|List|String|Dictionary) should ", "must ", message.removeprefix("Value error, "))
+    for theirs, ours in (("a valid integer", "a whole number"), ("a valid ", "a "), (" after validation", "")):
+        message = message.replace(theirs, ours)
+    return message[0].lower() + message[1:]
+
+
+def _real_path(location: tuple[int | str, ...], data: Any, missing: bool) -> list[str]:
+    """Return the keys and indices that lead to a field; pydantic also names the chosen types of unions between them.
+
+    Args:
+        location: pydantic's.
+        data: what was read.
+        missing: the last key isn't there, and that is the fault.
+    """
+    path = []
+    for depth, part in enumerate(location, start=1):
+        try:
+            data = data[part]
+        except (KeyError, IndexError, TypeError):
+            if not (missing and depth == len(location)):
+                continue
+        path.append(str(part))
+    return path

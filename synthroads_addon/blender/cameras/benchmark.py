@@ -1,0 +1,94 @@
+"""What the benchmark needs of Blender: rendering beside bare rendering, and the time that an edit takes."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from functools import partial
+from typing import Any
+
+import bpy
+
+from ...road.parameters import RoadParameters, Vegetation
+from ...scanning.colour.views import View
+from ..compat import modifier_input, set_modifier_input
+from ..model.build import RoadModel
+from . import ColourJob, image_views, layer_source
+from .images import aim
+from .light import daylight
+from .stage import Passes, Stage, stage
+
+_EDITS = 3
+"""Changes there and back whose times are measured."""
+
+
+def seconds_of(work: Callable[[], object]) -> float:
+    """Return how long something takes, s."""
+    begin = time.perf_counter()
+    work()
+    return time.perf_counter() - begin
+
+
+def rendering(job: ColourJob, count: int) -> dict[str, Any]:
+    """Return the rendering of all layers beside that of nothing but the picture, of the same images.
+
+    Both are without what the first image costs, which brings the scene into the renderer.
+
+    Args:
+        job: whose images are rendered, whatever its colours come from.
+        count: about so many of them.
+    """
+    job = replace(job, scenario=job.scenario.model_copy(update={"source": "images"}))
+    every = image_views(job)
+    views = every[:: max(1, len(every) // count)]
+    stamps: list[float] = []
+
+    def pick(_: list[View]) -> list[View]:
+        return [views[0], *views]
+
+    def stamp(_: float) -> None:
+        stamps.append(time.perf_counter())
+
+    with layer_source(replace(job, pick=pick), progress=stamp):
+        ours = stamps[-1] - stamps[0]
+    pixels = sum(view.pixels for view in views) / 1e6
+    rates = {"ours": pixels / ours, "floor": pixels / _bare_seconds(job, views)}
+    return {"name": "rendering, all layers; Cycles, the picture alone", "unit": "million samples/s", **rates, "rays": 0}
+
+
+def _bare_seconds(job: ColourJob, views: list[View]) -> float:
+    """Return the seconds that the picture alone of some images takes."""
+    with daylight(job.environment, True) as day:
+        passes = Passes((), lit=True)
+        with stage(bpy.context.scene, (), passes, (day.sun,), None) as bare:
+            aim(bare.camera, views[0])
+            bare.render(16, 16)  # the tree is built by the first image
+            seconds = 0.0
+            for view in views:
+                aim(bare.camera, view)
+                seconds += seconds_of(partial(_rendered, bare, view))
+    return seconds
+
+
+def _rendered(bare: Stage, view: View) -> None:
+    render = bare.scene.render
+    render.resolution_x, render.resolution_y, render.resolution_percentage = *view.size, 100
+    bpy.ops.render.render(scene=bare.scene.name)
+
+
+def panel_edit(model: RoadModel, parameters: RoadParameters) -> float:
+    """Return the seconds from a changed width to the updated view, vegetation hidden: the median of some changes."""
+    for name in parameters.of_type(Vegetation):
+        if name in model.objects:
+            model.objects[name].hide_viewport = True
+    bpy.context.view_layer.update()
+    road = model.objects["Road"]
+    modifier = road.modifiers[0]
+    side = "Left" if parameters.carriageway("left") else "Right"
+    name, runs = f"{side} Lane 1 Width", []
+    for change in (0.05, -0.05) * _EDITS:
+        set_modifier_input(modifier, name, modifier_input(modifier, name) + change)
+        road.update_tag()
+        runs.append(seconds_of(bpy.context.view_layer.update))
+    return sorted(runs)[len(runs) // 2]

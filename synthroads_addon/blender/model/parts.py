@@ -1,0 +1,56 @@
+"""The parts of a model, in the order in which they are built: each a function that adds its objects."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from ..parts.cabinets import build_cabinets
+from ..parts.concrete_barriers import build_concrete_barriers
+from ..parts.construction import build_beacons
+from ..parts.delineators import build_delineators
+from ..parts.guardrails import build_guardrails
+from ..parts.kilometre_boards import build_kilometre_boards
+from ..parts.noise_barriers import build_noise_barriers
+from ..parts.painted_areas import build_painted_areas
+from ..parts.poles import build_poles
+from ..parts.temporary_barriers import build_temporary_barriers
+from ..parts.terrain import build_terrain
+from ..parts.traffic_lights import build_traffic_lights
+from ..things.asset import build_assets
+from ..things.gantry.build import build_gantries
+from ..things.model_builder import ModelBuilder
+from ..things.overpass.build import build_overpasses
+from ..things.road.build import build_surface
+from ..things.sign.build import build_signs
+from ..things.vegetation.build import build_vegetation
+from ..things.vehicle.build import build_vehicles
+
+PARTS: dict[str, Callable[[ModelBuilder], None]] = {
+    "road": build_surface,
+    "terrain": build_terrain,
+    "painted_areas": build_painted_areas,
+    "guardrails": build_guardrails,
+    "concrete_barriers": build_concrete_barriers,
+    "noise_barriers": build_noise_barriers,
+    "temporary_barriers": build_temporary_barriers,
+    "beacons": build_beacons,
+    "gantries": build_gantries,
+    "overpasses": build_overpasses,
+    "signs": build_signs,
+    "kilometre_boards": build_kilometre_boards,
+    "poles": build_poles,
+    "traffic_lights": build_traffic_lights,
+    "cabinets": build_cabinets,
+    "delineators": build_delineators,
+    "assets": build_assets,
+    "vehicles": build_vehicles,
+    "vegetation": build_vegetation,
+}
+ON_THE_ROAD = ("painted_areas", "guardrails", "delineators", "assets")
+"""Parts that need no terrain: all others stand on it."""
+
+
+def needed(wanted: set[str]) -> set[str]:
+    """Return the parts that must be there for those wanted: what they stand on, too."""
+    surfaces = {"road"} if wanted else set()
+    return wanted | surfaces | ({"terrain"} if wanted - {"road", *ON_THE_ROAD} else set())

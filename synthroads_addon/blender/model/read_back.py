@@ -1,0 +1,187 @@
+"""From a model whose modifiers were edited by hand back to the parameter set that it now stands for."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+import bpy
+import numpy as np
+
+from ...road.geometry import sections_of
+from ...road.objects import AnyWidth, nominal_width
+from ...road.parameters import (
+    Carriageway,
+    Guardrail,
+    LineMarking,
+    Pavement,
+    RoadObject,
+    RoadParameters,
+    WidthPoint,
+)
+from ...road.section_geometry import CarriagewaySection
+from ..compat import modifier_input
+from ..things.road.layout import input_name, own_widths
+
+_ROLES = {"Terrain": "terrain"}
+"""Roles of objects that are not the ids of what they show."""
+_RENAMED = {"Smallest Height": "height_min", "Largest Height": "height_max"}
+"""Inputs that are not named as their fields."""
+_BEAM_OF_SIDE = ("Left Beam", "Right Beam")
+_BEAMS = frozenset(_BEAM_OF_SIDE)
+_MARKING_FIELDS = {
+    "Width": "width",
+    "Dash": "dash_length",
+    "Gap": "gap_length",
+    "Start Station": "start_station",
+    "End Station": "end_station",
+    "Film Thickness": "film_thickness",
+}
+
+
+def edited_parameters(parameters: RoadParameters, objects: Mapping[str, bpy.types.Object]) -> RoadParameters:
+    """Return the parameter set with what was changed in the modifiers' inputs since the model was built from it.
+
+    Inputs hold 32 bits: a value that differs from its input only by that rounding stays as it is.
+
+    Args:
+        parameters: what the model was built from.
+        objects: the model's objects by role.
+
+    Raises:
+        InputError: a value is out of the limits of its field.
+    """
+    changed: dict[str, RoadObject] = {}
+    for role, item in objects.items():
+        name = _ROLES.get(role, role)
+        if role == "Road":
+            changed |= dict(_road(parameters, item.modifiers[0]))
+        elif name in parameters.objects and item.modifiers:
+            changed[name] = _plain(parameters.objects[name], item.modifiers[0])
+    data = parameters.to_dict()
+    for name, item in changed.items():
+        data["objects"][name] = item.to_dict()
+    return RoadParameters.from_dict(data)
+
+
+def carried_inputs(parameters: RoadParameters, role: str, modifier: bpy.types.NodesModifier) -> frozenset[str]:
+    """Return the names of a modifier's inputs that `edited_parameters` carries back into the parameter set."""
+    if role == "Road":
+        return frozenset(_road_inputs(parameters))
+    item = parameters.objects.get(_ROLES.get(role, role))
+    if item is None:
+        return frozenset()
+    return frozenset(_named_fields(item, modifier)) | (_BEAMS if isinstance(item, Guardrail) else frozenset())
+
+
+def _road_inputs(parameters: RoadParameters) -> Iterator[str]:
+    for carriageway in parameters.of_type(Carriageway).values():
+        side = carriageway.side.title()
+        yield from (input_name(side, strip) for strip, _ in own_widths(carriageway))
+        yield from (f"{side} Verge Slope", f"{side} Turns About Inner Edge")
+    for name in parameters.of_type(LineMarking):
+        yield from (f"{name} {label}" for label in _MARKING_FIELDS)
+
+
+def _named_fields(item: RoadObject, modifier: bpy.types.NodesModifier) -> dict[str, str]:
+    """Return the inputs that are named as fields of an object, and those fields."""
+    pairs = ((name, _RENAMED.get(name, name.lower().replace(" ", "_"))) for name in _input_names(modifier))
+    fields = type(item).model_fields
+    return {name: field for name, field in pairs if field in fields and isinstance(getattr(item, field), float)}
+
+
+def _plain(item: RoadObject, modifier: bpy.types.NodesModifier) -> RoadObject:
+    """Return an object with the inputs that are named as its fields."""
+    update: dict[str, Any] = {
+        field: _value(getattr(item, field), modifier, name) for name, field in _named_fields(item, modifier).items()
+    }
+    if isinstance(item, Guardrail):
+        left, right = (bool(modifier_input(modifier, name)) for name in _BEAM_OF_SIDE)
+        update["faces"] = {(True, False): "left", (False, True): "right"}.get((left, right), "both")
+    return item.model_copy(update=update)
+
+
+def _road(parameters: RoadParameters, modifier: bpy.types.NodesModifier) -> Iterator[tuple[str, RoadObject]]:
+    sections = sections_of(parameters)
+    for name, carriageway in parameters.of_type(Carriageway).items():
+        edited = _carriageway(carriageway, modifier)
+        turnouts = [shape.turnout for shape in sections[carriageway.side].turnouts]
+        pavement = _stretched(sections[carriageway.side], CarriagewaySection(edited, turnouts))
+        yield name, edited.model_copy(update={"pavement": pavement})
+    for name, line in parameters.of_type(LineMarking).items():
+        fields = {
+            field: _value(getattr(line, field), modifier, f"{name} {label}")
+            for label, field in _MARKING_FIELDS.items()
+        }
+        yield name, line.model_copy(update=fields)
+
+
+def _carriageway(carriageway: Carriageway, modifier: bpy.types.NodesModifier) -> Carriageway:
+    side = carriageway.side.title()
+    widths = {
+        strip: _width(width, _value(nominal_width(width), modifier, input_name(side, strip)))
+        for strip, width in own_widths(carriageway)
+    }
+    lanes = tuple(
+        lane.model_copy(update={"width": widths[f"Lane {number}"]}) for number, lane in enumerate(carriageway.lanes, 1)
+    )
+    slope = carriageway.verge_slope_percent / 100.0
+    changed = _value(slope, modifier, f"{side} Verge Slope")
+    about_edge = modifier_input(modifier, f"{side} Turns About Inner Edge")
+    return carriageway.model_copy(
+        update={
+            "inner_offset": widths["Inner Offset"],
+            "inner_edge_strip_width": widths["Inner Edge Strip"],
+            "lanes": lanes,
+            "outer_edge_strip_width": widths["Outer Edge Strip"],
+            "hard_shoulder_width": widths["Hard Shoulder"],
+            "verge_width": widths["Verge"],
+            "verge_slope_percent": carriageway.verge_slope_percent if changed == slope else 100.0 * changed,
+            "rotation_axis": "inner_edge" if about_edge else "carriageway_axis",
+        }
+    )
+
+
+def _stretched(before: CarriagewaySection, after: CarriagewaySection) -> Pavement:
+    """Return the pavement's damage where it lies now: it moves and widens with the strips that it lies in."""
+    pavement, sign = before.carriageway.pavement, before.carriageway.sign
+    ruts = []
+    for rut in pavement.ruts:
+        lanes = (before.carriageway.lanes[rut.lane], after.carriageway.lanes[rut.lane])
+        was, now = (nominal_width(lane.width) for lane in lanes)
+        wider = {"width": rut.width * now / was, "track": rut.track * now / was} if now != was else {}
+        ruts.append(rut.model_copy(update=wider))
+    potholes = []
+    for hole in pavement.potholes:
+        was, now = before.distances(hole.station)[0], after.distances(hole.station)[0]
+        if np.array_equal(was, now):
+            potholes.append(hole)
+            continue
+        edges = sign * hole.offset + np.array([-0.5, 0.5]) * hole.width
+        low, high = np.interp(edges, was, now)
+        potholes.append(hole.model_copy(update={"offset": sign * (low + high) / 2.0, "width": high - low}))
+    return pavement.model_copy(update={"ruts": tuple(ruts), "potholes": tuple(potholes)})
+
+
+def _width(width: AnyWidth, nominal: float) -> AnyWidth:
+    """Return a width whose largest value along the road is `nominal`; its points keep their shares."""
+    if not isinstance(width, tuple):
+        return nominal
+    before = nominal_width(width)
+    if nominal == before:
+        return width
+    return tuple(
+        WidthPoint(station=point.station, width=nominal * point.width / max(before, 1e-9)) for point in width
+    )
+
+
+def _value(before: float, modifier: bpy.types.NodesModifier, name: str) -> float:
+    """Return an input's value: the one from before where it is the same in 32 bits, else its shortest decimal."""
+    now = np.float32(modifier_input(modifier, name))
+    return before if now == np.float32(before) else float(str(now))
+
+
+def _input_names(modifier: bpy.types.NodesModifier) -> Iterator[str]:
+    for item in modifier.node_group.interface.items_tree:
+        if item.item_type == "SOCKET" and item.in_out == "INPUT" and item.socket_type == "NodeSocketFloat":
+            yield item.name

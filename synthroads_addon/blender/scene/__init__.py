@@ -1,0 +1,1 @@
+"""Scenes as triangles, ours and foreign ones."""

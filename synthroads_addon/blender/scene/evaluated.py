@@ -1,0 +1,404 @@
+"""Evaluated scene -> triangles with class, instance and material. Any scene, not only ours."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Generator, Hashable, Iterator, Mapping
+from dataclasses import dataclass, replace
+from itertools import chain, count
+from typing import TypeAlias
+
+import bpy
+import numpy as np
+from numpy.typing import NDArray
+
+from ...base.class_mapping import ClassMapping
+from ...base.errors import InputError
+from ...road.geometry import RoadGeometry
+from ...scanning.scene.mesh import SceneMesh
+from ...scanning.scene.motion import (
+    LaneMotion,
+    LinearMotion,
+    Motion,
+    MovingMesh,
+    ScannedScene,
+    checked_factor,
+    lane_motions,
+)
+from ..model.build import ORIGIN
+from ..things.model_builder import ROLE, SUPPORT
+from .changes import Changes
+from .labels import Label, Labels, velocity_of
+from .reading import Copied, Part, Places, Whole, copy_mesh, placed, slot_names
+
+Float = NDArray[np.float64]
+Source: TypeAlias = bpy.types.Depsgraph | bpy.types.Scene | None
+
+_FARTHEST_FROM_MOTION = 100.0
+"""A vehicle whose vertices are farther (m) than this from where it should be is one of another road."""
+_ATTEMPTS = 4
+"""How often a scene is read that changes meanwhile: the last time in one step."""
+
+
+def scene_mesh(
+    source: Source = None,
+    objects: Collection[bpy.types.Object] | None = None,
+    classes: ClassMapping | None = None,
+    number_objects: bool = False,
+) -> SceneMesh:
+    """Return the triangles of the evaluated scene: everything that is visible in it and has faces.
+
+    A face's class is its attribute ``class_id``, else its object's custom property ``synthroads_class``, else the class
+    that a collection of the object is named after, else unlabelled; names can have classes as well, see `ClassMapping`.
+    Its instance likewise is the attribute ``instance_id`` or the property ``synthroads_instance``, else 0. Triangles
+    without area are left out. Nothing in the scene changes.
+
+    Args:
+        source: a depsgraph, or a scene (its first view layer); the current scene if None.
+        objects: only these and what they instance; all if None.
+        classes: classes by name.
+        number_objects: each object (one that shows a collection is one) without a number gets one, in the order of
+            their names, from 1 on past those that are taken.
+
+    Raises:
+        InputError: an object's vertices aren't finite, or a custom property isn't what it must be; names the object.
+    """
+    depsgraph = _depsgraph(source)
+    reading = _Reading(depsgraph, objects, classes)
+    reading.copy_all()
+    whole = reading.whole(_origin(depsgraph.scene), number_objects)
+    return placed(reading.pairs(None), whole)
+
+
+def scanned_scene(
+    source: Source = None,
+    objects: Collection[bpy.types.Object] | None = None,
+    classes: ClassMapping | None = None,
+    geometry: RoadGeometry | None = None,
+    speed_factor: float = 1.0,
+    *,
+    number_objects: bool = False,
+) -> ScannedScene:
+    """Return the evaluated scene as `scene_mesh` does, but what moves apart from what stands.
+
+    Vehicles of the road's model move along their lanes, see `LaneMotion`; those with a speed of 0 stand. One that the
+    user moved is at the time 0 where he put it, and drives on from there as far beside its lane as it is now. Anything
+    else moves straight on if it, or what it is parented to, has the custom property ``synthroads_velocity``:
+    (vx, vy, vz), m/s; what such an object shows or carries moves with it as one body.
+
+    Args:
+        source, objects, classes, number_objects: see `scene_mesh`.
+        geometry: the road that the scene was built from; if None its vehicles stand.
+        speed_factor: share of all speeds that they have in the scan, >= 0; with 0 everything stands.
+
+    Raises:
+        InputError: as `scene_mesh`; a velocity isn't three numbers, the factor is negative, or the geometry is that of
+            another road.
+    """
+    steps = scanned_scene_steps(source, objects, classes, geometry, speed_factor, number_objects=number_objects)
+    while True:
+        try:
+            next(steps)
+        except StopIteration as end:
+            copied: CopiedScene = end.value
+            return copied.put_together()
+
+
+def scanned_scene_steps(
+    source: Source = None,
+    objects: Collection[bpy.types.Object] | None = None,
+    classes: ClassMapping | None = None,
+    geometry: RoadGeometry | None = None,
+    speed_factor: float = 1.0,
+    *,
+    number_objects: bool = False,
+) -> Generator[float, None, CopiedScene]:
+    """Read the evaluated scene as `scanned_scene` does, in steps in the main thread between which the window may live.
+
+    Each mesh is copied in a step of its own. If the user changes something meanwhile, it begins again; if he goes on
+    changing things, all is read in one step. After an undo, or when another file was opened, it must be closed.
+
+    Yields:
+        the share that is done, 0 to 1.
+
+    Returns:
+        what was read.
+    """
+    checked_factor(speed_factor)
+    reading: _Reading | None = None
+    attempt = 0
+    with Changes() as changes:
+        while reading is None or not reading.complete:
+            attempt += 1
+            depsgraph = _depsgraph(source)
+            changes.forget()
+            origin = _origin(depsgraph.scene)
+            lanes: dict[str, LaneMotion] = {}
+            if geometry is not None:
+                lanes = lane_motions(geometry, speed_factor, origin - np.array(geometry.parameters.transform.translate))
+            reading = _Reading(depsgraph, objects, classes, lanes, speed_factor)
+            if attempt == _ATTEMPTS:
+                reading.copy_all()
+            for share in reading.copies():
+                yield share
+                if changes.seen:
+                    break
+    done = reading
+    return CopiedScene(done.materials, lambda: _put_together(done, origin, number_objects))
+
+
+def _put_together(reading: _Reading, origin: Float, number_objects: bool) -> ScannedScene:
+    whole = reading.whole(origin, number_objects)
+    moving = tuple(_moving(reading, carrier, motion, whole) for carrier, motion in reading.motions.items())
+    return ScannedScene(placed(reading.pairs(None), whole), moving, reading.labels.by_name.unmatched())
+
+
+@dataclass(frozen=True)
+class CopiedScene:
+    """What `scanned_scene_steps` has read.
+
+    Attributes:
+        materials: the scene's, in the order of the indices in its meshes.
+        put_together: returns the scene; to be called once. It touches no data of Blender: a thread may call it.
+    """
+
+    materials: tuple[str, ...]
+    put_together: Callable[[], ScannedScene]
+
+
+def _moving(reading: _Reading, carrier: Hashable, motion: Motion, whole: Whole) -> MovingMesh:
+    """Return what one carrier moves, in the motion's own frame."""
+    rotation, translation, _ = motion.pose(np.zeros(1))
+    into = np.eye(4)
+    into[:3, :3] = rotation[0].T
+    into[:3, 3] = -rotation[0].T @ translation[0]
+    mesh = placed(reading.pairs(carrier), whole, into)
+    if len(mesh) and isinstance(motion, LaneMotion):
+        far = float(np.abs(mesh.vertices).max())
+        if far > _FARTHEST_FROM_MOTION:
+            wrong = f"must be that of the road in the scene: a vehicle is {far:.0f} m off its lane"
+            raise InputError("geometry", None, wrong)
+    return MovingMesh(mesh, motion)
+
+
+@dataclass(frozen=True)
+class _Known:
+    """What all uses of one mesh by one object have in common.
+
+    Attributes:
+        part: key of the mesh's part.
+        label: number of the label.
+        lane: motion of a vehicle of the model, before it was moved.
+        velocity: of anything else that moves, m/s, with the key of what moves it.
+    """
+
+    part: tuple[Hashable, ...]
+    label: int
+    lane: tuple[str, LaneMotion] | None
+    velocity: tuple[Hashable, Float] | None
+
+
+@dataclass(frozen=True)
+class _Waiting:
+    """A mesh that has not been copied yet: that of an object, after its modifiers.
+
+    Attributes:
+        name: of the object, for messages.
+        item: the object's name and its library's.
+        slots: names of its materials.
+    """
+
+    name: str
+    item: tuple[str, str | None]
+    slots: list[str]
+
+
+class _Reading:
+    """One walk through an evaluated scene: its meshes, and who uses them where.
+
+    What the walk finds is looked at at once. Objects' own meshes are found again at any time, and are copied
+    afterwards, one by one, by `copies`.
+
+    Attributes:
+        labels: of its objects.
+        motions: of what moves, by carrier.
+    """
+
+    def __init__(
+        self,
+        depsgraph: bpy.types.Depsgraph,
+        objects: Collection[bpy.types.Object] | None,
+        classes: ClassMapping | None,
+        lanes: Mapping[str, LaneMotion] | None = None,
+        speed_factor: float = 0.0,
+    ) -> None:
+        self.labels = Labels(depsgraph.scene, classes)
+        self.motions: dict[Hashable, Motion] = {}
+        self._chosen = None if objects is None else {item.original for item in objects}
+        self._lanes = lanes or {}
+        self._speed_factor = speed_factor
+        self._materials: dict[str, int] = {}
+        self._waiting: dict[tuple[Hashable, ...], _Waiting] = {}
+        self._copied: dict[tuple[Hashable, ...], Copied] = {}
+        self._parts: dict[tuple[Hashable, ...], Part] = {}
+        self._labels: list[Label] = []
+        self._nameless: dict[int, tuple[str, tuple[Hashable, ...]]] = {}
+        self._uses: dict[Hashable, dict[tuple[Hashable, ...], Places]] = {}
+        self._depsgraph = depsgraph
+        self._walk(depsgraph)
+
+    def copies(self) -> Iterator[float]:
+        """Copy the meshes that wait, one in each step; yield the share of them that is done.
+
+        It ends early where a mesh is no longer what it was.
+        """
+        total = max(1, len(self._waiting))
+        while self._waiting:
+            key, waiting = next(iter(self._waiting.items()))
+            item = bpy.data.objects.get(waiting.item)
+            mesh = item.evaluated_get(self._depsgraph).data if item is not None else None
+            if not isinstance(mesh, bpy.types.Mesh) or mesh.as_pointer() != key[0]:
+                return  # the user has changed it
+            self._copy(key, waiting.name, mesh, waiting.slots)
+            del self._waiting[key]
+            yield 1.0 - len(self._waiting) / total
+
+    @property
+    def materials(self) -> tuple[str, ...]:
+        """Return the names of the materials, in the order of their indices."""
+        return tuple(self._materials)
+
+    @property
+    def complete(self) -> bool:
+        """Return whether no mesh waits."""
+        return not self._waiting
+
+    def copy_all(self) -> None:
+        """Copy the meshes that wait."""
+        for _ in self.copies():
+            pass
+
+    def _copy(self, key: tuple[Hashable, ...], name: str, mesh: bpy.types.Mesh, slots: list[str]) -> None:
+        self._copied[key] = copy_mesh(name, mesh, slots, self._materials, self.labels.by_name)
+
+    def pairs(self, carrier: Hashable) -> list[tuple[Part, Places]]:
+        """Return the parts that a carrier moves (that stand, for None) and their places; only once for each."""
+        pairs = [(self._part(key), places) for key, places in self._uses.pop(carrier, {}).items()]
+        if not self._uses:
+            self._parts.clear()  # what is placed needn't be held twice
+        return pairs
+
+    def _part(self, key: tuple[Hashable, ...]) -> Part:
+        if key in self._copied:
+            self._parts[key] = self._copied.pop(key).part()
+        return self._parts[key]
+
+    def whole(self, origin: Float, number_objects: bool) -> Whole:
+        """Return what all meshes have in common."""
+        labels = self._numbered() if number_objects else self._labels
+        return Whole(labels, self.materials, origin)
+
+    def _walk(self, depsgraph: bpy.types.Depsgraph) -> None:
+        known: dict[tuple[int, int, int], _Known | None] = {}
+        for use in depsgraph.object_instances:
+            # Curves, texts, surfaces and metaballs come a second time as the mesh that they make.
+            item = use.object
+            if item.type != "MESH":
+                continue
+            owner = use.parent if use.is_instance else item
+            # A million uses may share one mesh: what they have in common is found once.
+            key = (item.data.as_pointer(), item.original.as_pointer(), owner.as_pointer())
+            if key not in known:
+                known[key] = self._look(item, owner)
+            about = known[key]
+            if about is None:
+                continue
+            matrix = list(chain.from_iterable(use.matrix_world))
+            carrier = self._carrier(about, matrix) if about.lane or about.velocity else None
+            places = self._uses.setdefault(carrier, {}).setdefault(about.part, Places())
+            places.matrices.fromlist(matrix)
+            places.labels.append(about.label)
+
+    def _look(self, item: bpy.types.Object, owner: bpy.types.Object) -> _Known | None:
+        """Return what is known of an evaluated object and its owner; None if they aren't scanned."""
+        original, shown_by = item.original, owner.original
+        if not len(item.data.polygons) or SUPPORT in shown_by:
+            return None
+        if self._chosen is not None and shown_by not in self._chosen:
+            return None
+        slots = slot_names(item)
+        # Materials may be linked to the object, so that the same mesh can look different.
+        part = (item.data.as_pointer(), *slots)
+        if part not in self._waiting and part not in self._copied:
+            for name in slots:
+                self._materials.setdefault(name, len(self._materials))
+            place = (original.name, original.library.filepath if original.library else None)
+            own = original.evaluated_get(self._depsgraph).data == item.data
+            if own and bpy.data.objects.get(place) == original:
+                self._waiting[part] = _Waiting(item.name, place, slots)
+            else:  # of a geometry's instance, or of a curve: only seen in passing
+                self._copy(part, item.name, item.data, slots)
+        label = self.labels.of(original, shown_by)
+        self._labels.append(label)
+        if label.instance < 0:
+            self._nameless[len(self._labels) - 1] = (shown_by.name_full, part)
+        role = original.get(ROLE, shown_by.get(ROLE))
+        lane = (role, self._lanes[role]) if role in self._lanes else None
+        return _Known(part, len(self._labels) - 1, lane, self._velocity(original, shown_by))
+
+    def _velocity(self, item: bpy.types.Object, owner: bpy.types.Object) -> tuple[Hashable, Float] | None:
+        """Return the key of what moves an original object, and its velocity; None if nothing does."""
+        inside = velocity_of(item) if item != owner else None
+        found = inside or velocity_of(owner)
+        if not found or not self._speed_factor or not found[1].any():
+            return None
+        # What moves inside of a collection does so wherever the collection is shown.
+        return (found[0].name_full, owner.name_full if inside else ""), found[1] * self._speed_factor
+
+    def _carrier(self, known: _Known, matrix: list[float]) -> Hashable:
+        """Return the key of what moves a use, whose motion is in `motions` then; its own velocity counts first."""
+        if known.velocity is not None:
+            key, velocity = known.velocity
+            if key not in self.motions:
+                self.motions[key] = LinearMotion(velocity, matrix[3:12:4])
+            return key
+        assert known.lane is not None
+        role, motion = known.lane
+        key = (role, *matrix)
+        if key not in self.motions:
+            place = np.array(matrix).reshape(4, 4)
+            if not np.array_equal(place, np.eye(4)):
+                middle = motion.pose(np.zeros(1))[1][0]
+                motion = motion.from_elsewhere(place[:3, :3] @ middle + place[:3, 3])
+            self.motions[key] = motion
+        return key
+
+    def _numbered(self) -> list[Label]:
+        """Return the labels with a number for each object that has none."""
+        taken = {label.instance for label in self._labels}
+        for copied in self._copied.values():
+            if copied.instance_id is not None:
+                taken |= set(np.unique(copied.instance_id.view(np.uint32)).tolist())
+        free = (number for number in count(1) if number not in taken)
+        nameless = {i: name for i, (name, key) in self._nameless.items() if self._copied[key].instance_id is None}
+        numbers = {name: next(free) for name in sorted(set(nameless.values()))}
+        labels = list(self._labels)
+        for index, name in nameless.items():
+            labels[index] = replace(labels[index], instance=numbers[name])
+        return labels
+
+
+def _depsgraph(source: Source) -> bpy.types.Depsgraph:
+    if isinstance(source, bpy.types.Depsgraph):
+        return source
+    if source is None or source == bpy.context.scene:
+        return bpy.context.evaluated_depsgraph_get()
+    layer = source.view_layers[0]
+    layer.update()
+    return layer.depsgraph
+
+
+def _origin(scene: bpy.types.Scene) -> Float:
+    for collection in scene.collection.children_recursive:
+        if ORIGIN in collection:
+            return np.array(collection[ORIGIN], dtype=np.float64)
+    return np.zeros(3)

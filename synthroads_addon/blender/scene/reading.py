@@ -1,0 +1,304 @@
+"""Meshes of an evaluated scene as arrays, and their placing: what `scene` puts a scene together with."""
+
+from __future__ import annotations
+
+import ctypes
+from array import array
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import bpy
+import numpy as np
+from numpy.typing import NDArray
+
+from ...base.class_mapping import NameClasses
+from ...base.classes import UNLABELLED
+from ...base.errors import InputError
+from ...scanning.scene.mesh import SceneMesh, empty_scene_mesh
+from ..materials import table_name
+from .labels import Label
+
+Float = NDArray[np.float64]
+
+_SMALLEST_AREA = 1e-12
+_BLOCK = 1 << 17
+"""Triangles or vertices worked on at a time."""
+_PER_FACE = ("class_id", "instance_id", "material")
+_IDENTITY = array("d", np.eye(4).ravel().tolist())
+
+
+@dataclass
+class Part:
+    """Triangles of one mesh in its own frame.
+
+    Attributes:
+        vertices: (V, 3) float32.
+        triangles: (T, 3) int32.
+        material: (T,) uint16 indices into the scene's materials, or the one index that all have.
+        class_id, instance_id: (T,) labels of the faces, or None if the mesh has none.
+        material_class: (M,) int16 classes of the scene's materials that a class mapping names, -1 for none; None if it
+            names none of this mesh's.
+    """
+
+    vertices: NDArray[np.float32]
+    triangles: NDArray[np.int32]
+    material: NDArray[np.uint16] | int
+    class_id: NDArray[np.uint8] | None
+    instance_id: NDArray[np.uint32] | None
+    material_class: NDArray[np.int16] | None
+
+
+@dataclass
+class Places:
+    """Where a part stands: per use a matrix of 16 numbers, row by row, and the number of a label."""
+
+    matrices: array[float] = field(default_factory=lambda: array("d"))
+    labels: array[int] = field(default_factory=lambda: array("l"))
+
+
+@dataclass(frozen=True)
+class Whole:
+    """What the meshes of a scene have in common.
+
+    Attributes:
+        labels: of all objects.
+        materials: names.
+        origin: (3,) map coordinates of the local origin, m.
+    """
+
+    labels: Sequence[Label]
+    materials: tuple[str, ...]
+    origin: Float
+
+
+def slot_names(item: bpy.types.Object) -> list[str]:
+    """Return the names of an evaluated object's materials by slot, at least one."""
+    names = [table_name(material) for material in item.data.materials]
+    for index, slot in enumerate(item.material_slots[: len(names)]):
+        if slot.link == "OBJECT":
+            names[index] = table_name(slot.material)
+    return names or [table_name(None)]
+
+
+@dataclass
+class Copied:
+    """What is copied of an evaluated mesh, as fast as memory allows; `part` makes the rest of it without Blender.
+
+    Attributes:
+        name: of its object, for messages.
+        vertices: (V, 3) float32.
+        corners: (C,) int32 vertices of the faces' corners.
+        triangles: (T, 3) int32 corners of the triangles; None if all faces are triangles.
+        face: (T,) int32 face of each triangle; None if all faces are triangles.
+        slot, class_id, instance_id: (F,) int32 values of the faces, or None if the mesh has none.
+        materials: (S,) uint16 indices of the slots' materials into the scene's.
+        material_class: see `Part`.
+    """
+
+    name: str
+    vertices: NDArray[np.float32]
+    corners: NDArray[np.int32]
+    triangles: NDArray[np.int32] | None
+    face: NDArray[np.int32] | None
+    slot: NDArray[np.int32] | None
+    class_id: NDArray[np.int32] | None
+    instance_id: NDArray[np.int32] | None
+    materials: NDArray[np.uint16]
+    material_class: NDArray[np.int16] | None
+
+    def part(self) -> Part:
+        """Return the mesh's triangles; raise `InputError` if its vertices aren't finite."""
+        if not np.isfinite(self.vertices).all():
+            raise InputError(f"{self.name}: vertices", None, "must be finite numbers")
+        corners, face, label, number = self.corners, self.face, self.class_id, self.instance_id
+        material: NDArray[np.uint16] | int = int(self.materials[0])
+        if self.slot is not None:
+            material = _by_triangle(self.materials[np.clip(self.slot, 0, len(self.materials) - 1)], face)
+        labels = None
+        if label is not None:
+            labels = np.where((label >= 0) & (label <= UNLABELLED), label, UNLABELLED).astype(np.uint8)
+            labels = _by_triangle(labels, face)
+        numbers = None if number is None else _by_triangle(number.view(np.uint32), face)
+        triangles = corners.reshape(-1, 3) if self.triangles is None else corners[self.triangles]
+        return Part(self.vertices, triangles, material, labels, numbers, self.material_class)
+
+
+def copy_mesh(
+    name: str, mesh: bpy.types.Mesh, slots: Sequence[str], materials: dict[str, int], by_name: NameClasses
+) -> Copied:
+    """Return what is needed of an evaluated mesh.
+
+    Args:
+        name: of its object, for messages.
+        mesh: the mesh.
+        slots: names of its materials.
+        materials: indices of all materials so far; new ones are added.
+        by_name: classes of materials.
+    """
+    # Attributes are copied as a block, where `vertices` and `loops` are read one by one.
+    vertices = np.empty((len(mesh.vertices), 3), np.float32)
+    mesh.attributes["position"].data.foreach_get("vector", vertices.ravel())
+    corners = np.empty(len(mesh.loops), np.int32)
+    mesh.attributes[".corner_vert"].data.foreach_get("value", corners)
+    triangles = face = None
+    if len(corners) != 3 * len(mesh.polygons):
+        mesh.calc_loop_triangles()
+        triangles = triangle_corners(mesh)
+        face = np.empty(len(triangles), np.int32)
+        mesh.loop_triangle_polygons.foreach_get("value", face)
+    return Copied(
+        name,
+        vertices,
+        corners,
+        triangles,
+        face,
+        _face_values(mesh, "material_index") if len(set(slots)) > 1 else None,
+        _face_values(mesh, "class_id"),
+        _face_values(mesh, "instance_id"),
+        np.array([materials.setdefault(entry, len(materials)) for entry in slots], np.uint16),
+        _material_classes(slots, materials, by_name),
+    )
+
+
+def triangle_corners(mesh: bpy.types.Mesh) -> NDArray[np.int32]:
+    """Return the corners (T, 3) of a mesh's triangles, which must have been calculated.
+
+    Blender has them as an array of three 32-bit numbers each but hands them out one by one, a hundred times slower
+    than they can be copied. So they are copied from where it says that they are, if that is laid out as expected.
+    """
+    triangles = mesh.loop_triangles
+    count = len(triangles)
+    result = np.empty((count, 3), np.int32)
+    first = triangles[0].as_pointer() if count else 0
+    probes = {0, 1, count // 2, count - 1} & set(range(count))
+    if any(triangles[i].as_pointer() != first + result.strides[0] * i for i in probes):
+        triangles.foreach_get("loops", result.ravel())
+        return result
+    ctypes.memmove(result.ctypes.data, first, result.nbytes)
+    if any(tuple(result[i]) != tuple(triangles[i].loops) for i in probes):
+        triangles.foreach_get("loops", result.ravel())
+    return result
+
+
+def _by_triangle(values: NDArray[Any], face: NDArray[np.int32] | None) -> NDArray[Any]:
+    return values if face is None else values[face]
+
+
+def _material_classes(
+    slots: Iterable[str], materials: dict[str, int], by_name: NameClasses
+) -> NDArray[np.int16] | None:
+    found = {materials[name]: by_name.find("materials", name) for name in slots}
+    if all(number is None for number in found.values()):
+        return None
+    result = np.full(max(found) + 1, -1, np.int16)
+    for index, number in found.items():
+        result[index] = -1 if number is None else number
+    return result
+
+
+def _face_values(mesh: bpy.types.Mesh, name: str) -> NDArray[Any] | None:
+    """Return the (F,) int32 values of a face attribute, or None."""
+    attribute = mesh.attributes.get(name)
+    if attribute is None or attribute.domain != "FACE" or attribute.data_type not in ("INT", "INT8", "BOOLEAN"):
+        return None
+    values = np.empty(len(mesh.polygons), np.int32)
+    attribute.data.foreach_get("value", values)
+    return values
+
+
+def placed(pairs: list[tuple[Part, Places]], whole: Whole, frame: Float | None = None) -> SceneMesh:
+    """Return parts at their places as one mesh, without triangles that have no area.
+
+    Args:
+        pairs: parts and where they stand; emptied, so that no part is held longer than it is needed.
+        whole: of the scene.
+        frame: (4, 4) from the scene's frame to the mesh's own, whose origin is 0 then; the same frame if None.
+    """
+    origin = whole.origin if frame is None else np.zeros(3)
+    uses = np.array([len(places.labels) for _, places in pairs], dtype=np.int64)
+    sizes = np.array([(len(part.vertices), len(part.triangles)) for part, _ in pairs], dtype=np.int64).reshape(-1, 2)
+    counts = uses @ sizes
+    if not counts[1]:
+        return empty_scene_mesh(origin, whole.materials)
+    if counts.max() >= 2**31:
+        raise InputError("scene", int(counts.max()), "must have less than 2**31 vertices and triangles, with instances")
+    as_it_is = pairs[0][0] if len(pairs) == 1 and frame is None and pairs[0][1].matrices == _IDENTITY else None
+    arrays: dict[str, NDArray[Any]] = {
+        "vertices": as_it_is.vertices if as_it_is else np.empty((counts[0], 3), np.float32),
+        "triangles": as_it_is.triangles if as_it_is else np.empty((counts[1], 3), np.int32),
+        "class_id": np.empty(counts[1], np.uint8),
+        "instance_id": np.empty(counts[1], np.uint32),
+        "material": np.empty(counts[1], np.uint16),
+    }
+    pairs.reverse()
+    vertex = triangle = 0
+    while pairs:
+        part, places = pairs.pop()
+        for matrices, labels in _blocks(part, places):
+            last = vertex + len(matrices) * len(part.vertices), triangle + len(matrices) * len(part.triangles)
+            mine = {name: arrays[name][triangle : last[1]] for name in ("triangles", *_PER_FACE)}
+            _label(part, [whole.labels[i] for i in labels], mine)
+            if not as_it_is:
+                into = matrices if frame is None else frame @ matrices
+                _place(part, into, arrays["vertices"][vertex : last[0]], mine["triangles"], vertex)
+            vertex, triangle = last
+    keep = _with_area(arrays["vertices"], arrays["triangles"])
+    if keep is not None:
+        for name in ("triangles", *_PER_FACE):
+            arrays[name] = arrays[name][keep]
+    return SceneMesh(**arrays, materials=whole.materials, origin=origin)
+
+
+def _blocks(part: Part, places: Places) -> Iterator[tuple[Float, array[int]]]:
+    """Yield matrices (N, 4, 4) and labels of so many places at a time that their arrays stay small."""
+    matrices = np.frombuffer(places.matrices).reshape(-1, 4, 4)
+    size = max(1, _BLOCK // max(len(part.vertices), len(part.triangles), 1))
+    for start in range(0, len(matrices), size):
+        yield matrices[start : start + size], places.labels[start : start + size]
+
+
+def _place(
+    part: Part, matrices: Float, vertices: NDArray[np.float32], triangles: NDArray[np.int32], first: int
+) -> None:
+    """Fill in the vertices and triangles of a part at N places, as (N, 4, 4) matrices."""
+    count, size = len(matrices), len(part.vertices)
+    into = vertices.reshape(count, size, 3)
+    step = max(1, _BLOCK // count)
+    for start in range(0, size, step):
+        block = part.vertices[start : start + step].astype(np.float64)
+        into[:, start : start + step] = block @ matrices[:, :3, :3].transpose(0, 2, 1) + matrices[:, None, :3, 3]
+    mirrored = np.linalg.det(matrices[:, :3, :3]) < 0.0
+    numbers = triangles.reshape(count, -1, 3)
+    numbers[...] = part.triangles
+    numbers[mirrored] = part.triangles[:, ::-1]
+    numbers += (first + size * np.arange(count, dtype=np.int64)).astype(np.int32)[:, None, None]
+
+
+def _label(part: Part, labels: list[Label], into: dict[str, NDArray[Any]]) -> None:
+    """Fill in class, instance and material (N * T,) of a part at N places."""
+    count = len(labels)
+    into["material"].reshape(count, -1)[...] = part.material
+    number = into["instance_id"].reshape(count, -1)
+    if part.instance_id is not None:
+        number[...] = part.instance_id
+    else:
+        number[...] = np.array([max(label.instance, 0) for label in labels], np.uint32)[:, None]
+    class_id = into["class_id"].reshape(count, -1)
+    if part.class_id is not None:
+        class_id[...] = part.class_id
+        return
+    own, otherwise = np.array([(label.own, label.otherwise) for label in labels], np.int16).T[:, :, None]
+    of_material = np.int16(-1) if part.material_class is None else part.material_class[part.material]
+    class_id[...] = np.where(own >= 0, own, np.where(of_material >= 0, of_material, otherwise))
+
+
+def _with_area(vertices: NDArray[np.float32], triangles: NDArray[np.int32]) -> NDArray[np.bool_] | None:
+    """Return which triangles have an area (T,); None if all have."""
+    keep = np.empty(len(triangles), bool)
+    for start in range(0, len(triangles), _BLOCK):
+        corner = vertices[triangles[start : start + _BLOCK]]
+        a, b = corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]
+        square = sum((a[:, i] * b[:, j] - a[:, j] * b[:, i]) ** 2 for i, j in ((1, 2), (2, 0), (0, 1)))
+        keep[start : start + _BLOCK] = square > (2.0 * _SMALLEST_AREA) ** 2
+    return None if keep.all() else keep

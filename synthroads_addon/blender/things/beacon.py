@@ -1,0 +1,123 @@
+"""SR Beacon: beacons (Leitbaken) of a construction zone on given points."""
+
+from __future__ import annotations
+
+import bpy
+
+from ...base.classes import class_id
+from ...road.things.body_shapes import BEACON_BLADE, BEACON_BLADE_BOTTOM, BEACON_FOOT
+from ..nodes import operations as op
+from ..nodes.backbone import height_on
+from ..nodes.builder import Tree, Value, node_group
+from ..nodes.solids import box, flipped, moved, painted, prism, put
+
+CELLS = (2, 8)
+"""Cells across and up a blade, each cut by the border of a stripe: of 0.25 m x 1 m they are squares."""
+_LENS = (0.095, 0.075)
+_HEXADECAGON = 16
+
+
+def beacon_group() -> bpy.types.NodeTree:
+    """Return the group SR Beacon."""
+    return node_group("SR Beacon", _build)
+
+
+def _build(tree: Tree) -> None:
+    """A beacon on each point; points carry ``heading`` (rad), ``elevation``, ``width``, ``height``, ``pass_side``."""
+    points = tree.input("Points", "Geometry", description="One point per beacon, at any height; pass_side +1 is left")
+    road = tree.input("Road", "Object", description="Surface that the beacons stand on")
+    terrain = tree.input("Terrain", "Object", description="Surface beside the road")
+    names = {"Red": "red stripes", "White": "white stripes", "Rubber": "foot", "Housing": "lamp", "Lens": "lamp's lens"}
+    red, white, rubber, housing, lens = (
+        tree.input(f"{name} Material", "Material", description=f"Material of the {what}")
+        for name, what in names.items()
+    )
+
+    with tree.frame("Foot and its tenon"):
+        foot = painted(op.join(_foot(tree), box(tree, (0.07, 0.05, 0.1), (0.0, 0.0, 0.12))), rubber)
+    with tree.frame("Blades of size 1: stripes fall to the left or to the right"):
+        blades = [_blade(tree, red, white, side) for side in (1, -1)]
+    with tree.frame("Lamp"):
+        lamp = _lamp(tree, housing, lens)
+    with tree.frame("On the surface"):
+        place = op.position(tree)
+        height = height_on(op.object_geometry(road), op.object_geometry(terrain), place)
+        flat = tree.node("ShaderNodeVectorMath", place, (1.0, 1.0, 0.0), operation="MULTIPLY").value
+        points = op.set_position(points, flat + op.vector(tree, 0.0, 0.0, height + op.named(tree, "elevation")))
+    with tree.frame("Beacons"):
+        turned = op.turn(tree, z=op.named(tree, "heading"))
+        place, tall = op.position(tree), op.named(tree, "height")
+        bottom = place + (0.0, 0.0, BEACON_BLADE_BOTTOM)
+        parts = [put(points, foot, place, 1.0, turned)]
+        for side, blade in zip((1, -1), blades, strict=True):
+            chosen = op.separate(points, op.named(tree, "pass_side", "INT").equals(side))
+            parts.append(put(chosen, blade, bottom, op.vector(tree, op.named(tree, "width"), 1.0, tall), turned))
+        parts.append(put(points, lamp, bottom + op.vector(tree, 0.0, 0.0, tall), 1.0, turned))
+        beacons = op.join(*parts)
+    with tree.frame("Labels"):
+        beacons = op.realize(op.store(beacons, "beacon_instance", op.named(tree, "instance", "INT"), "INSTANCE"))
+        beacons = op.store(beacons, "class_id", class_id("construction_barrier"), "FACE")
+        beacons = op.store(beacons, "instance_id", op.named(tree, "beacon_instance", "INT"), "FACE")
+    tree.output("Mesh", beacons, description="Beacons; each face has its own beacon's instance number")
+
+
+def _foot(tree: Tree) -> Value:
+    """Return the foot: a slab with chamfered corners and edges, a little sunk."""
+    x, y, _ = BEACON_FOOT
+    corner = 0.06
+    outline = [(x / 2, -y / 2 + corner), (x / 2, y / 2 - corner), (x / 2 - corner, y / 2), (corner - x / 2, y / 2)]
+    outline += [(-a, -b) for a, b in outline]
+    slab = prism(tree, outline, (1.0, 1.0, BEACON_FOOT[2] * 0.7 + 0.01))
+    upper = prism(tree, outline, (0.86, 0.92, BEACON_FOOT[2]))
+    return op.join(moved(slab, (0.0, 0.0, -0.01)), upper)
+
+
+def _blade(tree: Tree, red: Value, white: Value, side: int) -> Value:
+    """Return a blade of width 1 and height 1 on z = 0, whose stripes fall to the left (side 1) or to the right (-1)."""
+    stripes = _striped(tree)
+    faces = []
+    for front in (True, False):
+        # Seen from the front they rise to the right. A mirror turns the faces round.
+        y = -BEACON_BLADE / 2 - 0.002
+        scale = (float(side), 1.0, 1.0)
+        face = tree.node(
+            "GeometryNodeTransform", stripes, translation=(0.0, y if front else -y, 0.0), scale=scale
+        ).value
+        faces.append(face if (side > 0) == front else flipped(face))
+    mesh = painted(op.join(*faces), white)
+    first = (op.named(tree, "stripe", "INT") % 2).equals(0)
+    mesh = tree.node("GeometryNodeSetMaterial", mesh, first, material=red).value
+    plate = box(tree, (1.0, BEACON_BLADE, 1.0), (0.0, 0.0, 0.5))
+    return op.join(painted(plate, white), mesh)
+
+
+def _striped(tree: Tree) -> Value:
+    """Return the face of a blade, towards -y, in triangles with the number of their ``stripe``, which rises with x."""
+    columns, rows = CELLS
+    halves = []
+    for upper in (0, 1):
+        corners = [(0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (1.0, 0.0, 1.0)]
+        if upper:
+            corners = [(0.0, 0.0, 0.0), (1.0, 0.0, 1.0), (0.0, 0.0, 1.0)]
+        half = tree.node("GeometryNodeMeshCircle", vertices=3, fill_type="NGON").value
+        half = op.set_position(half, op.choose(op.index(tree), corners))
+        cells = tree.node("GeometryNodeMeshLine", count=columns * rows).value
+        column, row = op.index(tree) % columns, op.index(tree) // columns
+        cells = op.store(cells, "stripe", row - column + upper + columns)
+        place = op.vector(tree, column / float(columns) - 0.5, 0.0, row / float(rows))
+        halves.append(put(cells, half, place, (1.0 / columns, 1.0, 1.0 / rows)))
+    return op.realize(op.join(*halves))
+
+
+def _lamp(tree: Tree, housing: Value, lens: Value) -> Value:
+    """Return a warning lamp that shines both ways."""
+    radius, deep = _LENS
+    body = painted(box(tree, (0.11, 0.07, 0.12), (0.0, 0.0, 0.05)), housing)
+    middle = (0.0, 0.0, 0.17)
+    drum = tree.node("GeometryNodeMeshCylinder", vertices=_HEXADECAGON, radius=radius, depth=deep).value
+    glass = tree.node("GeometryNodeMeshCylinder", vertices=_HEXADECAGON, radius=radius * 0.85, depth=deep + 0.03).value
+    lying = op.turn(tree, x=1.5707963)
+    parts = [
+        tree.node("GeometryNodeTransform", mesh, translation=middle, rotation=lying).value for mesh in (drum, glass)
+    ]
+    return op.join(body, painted(parts[0], housing), painted(parts[1], lens))

@@ -1,0 +1,83 @@
+"""SR Cabinet: a utility cabinet with doors, on a plinth, under a lid."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import bpy
+
+from ...base.classes import class_id
+from ..nodes import operations as op
+from ..nodes.builder import Tree, Value, node_group
+from ..nodes.solids import box, painted, put, row_of_points
+from ..nodes.standing import declare_standing, put_on
+
+BURIED = 0.5
+"""Depth of the plinth below the surface, m: the ground may fall beside its middle."""
+_PLINTH, _LID = 0.12, 0.03
+"""Height of the plinth above the surface, and of the lid, m."""
+_OVERHANG, _DOOR, _GAP = 0.02, 0.012, 0.006
+"""What the lid reaches beyond the body, how far doors stand out, and the joint around them, m."""
+_SLOTS = 5
+_WIDE = 0.7
+"""Width from which a cabinet has two doors, m."""
+
+
+@dataclass(frozen=True)
+class _Cabinet:
+    width: Value
+    depth: Value
+    height: Value
+
+
+def cabinet_group() -> bpy.types.NodeTree:
+    """Return the group SR Cabinet."""
+    return node_group("SR Cabinet", _build)
+
+
+def _build(tree: Tree) -> None:
+    """A utility cabinet, its doors towards those who drive along +y; points carry ``heading`` and ``elevation``."""
+    standing = declare_standing(tree)
+    cabinet = _Cabinet(
+        width=tree.number("Width", 0.8, (0.1, 5.0), unit="m", description="Width of its front"),
+        depth=tree.number("Depth", 0.35, (0.1, 5.0), unit="m", description="Depth (m)"),
+        height=tree.number("Height", 1.1, (0.3, 5.0), unit="m", description="Top above the surface"),
+    )
+    names = ("Body", "Plinth", "Fitting")
+    body, plinth, fitting = (
+        tree.input(f"{name} Material", "Material", description=f"Material of {name.lower()} parts") for name in names
+    )
+
+    with tree.frame("Plinth, body and lid"):
+        foot = _block(tree, cabinet, 2.0 * _OVERHANG, -BURIED, _PLINTH)
+        walls = _block(tree, cabinet, _OVERHANG, _PLINTH, cabinet.height - _LID)
+        lid = _block(tree, cabinet, 0.0, cabinet.height - _LID, cabinet.height)
+        parts = [painted(foot, plinth), painted(op.join(walls, lid), body)]
+    with tree.frame("Doors"):
+        count = op.switch(cabinet.width >= _WIDE, 1, 2)
+        pitch = (cabinet.width - 2.0 * _OVERHANG) / count
+        tall = cabinet.height - (_PLINTH + _LID + 2.0 * _GAP)
+        middle = (cabinet.height + (_PLINTH - _LID)) * 0.5
+        front = cabinet.depth * -0.5 + (_OVERHANG - _DOOR * 0.5)
+        beside = (op.index(tree) - (count - 1.0) * 0.5) * pitch
+        door = box(tree, op.vector(tree, pitch - 2.0 * _GAP, _DOOR, tall))
+        parts.append(painted(put(row_of_points(tree, count), door, op.vector(tree, beside, front, middle)), body))
+    with tree.frame("Handles"):
+        handle = op.vector(tree, beside + pitch * 0.36, front - _DOOR * 0.5, middle)
+        parts.append(painted(put(row_of_points(tree, count), box(tree, (0.025, 0.01, 0.12)), handle), fitting))
+    with tree.frame("Slots for air, some at the top of each door"):
+        number = op.index(tree)
+        beside = ((number // _SLOTS) - (count - 1.0) * 0.5) * pitch
+        level = cabinet.height - (_LID + 0.08) - (number % _SLOTS) * 0.022
+        slot = box(tree, op.vector(tree, pitch * 0.6, 0.002, 0.007))
+        place = op.vector(tree, beside, front - _DOOR * 0.5, level)
+        parts.append(painted(put(row_of_points(tree, count * _SLOTS), slot, place), fitting))
+    with tree.frame("Put onto the points"):
+        mesh = standing.labelled(put_on(standing.places(), op.join(*parts)), class_id("utility"))
+    tree.output("Mesh", mesh, description="Cabinet")
+
+
+def _block(tree: Tree, cabinet: _Cabinet, inset: float, low: Value | float, high: Value | float) -> Value:
+    """Return a box between two heights, so much smaller than the cabinet all around."""
+    size = op.vector(tree, cabinet.width - 2.0 * inset, cabinet.depth - 2.0 * inset, high - low)
+    return box(tree, size, op.vector(tree, 0.0, 0.0, (high + low) * 0.5))

@@ -1,0 +1,99 @@
+"""SR Delineator: delineator posts (Leitpfosten) on given points."""
+
+from __future__ import annotations
+
+import bpy
+
+from ...base.classes import class_id
+from ...road.things.body_shapes import DELINEATOR
+from ..nodes import operations as op
+from ..nodes.builder import Tree, Value, node_group
+from ..nodes.standing import on_surface, put_on
+
+_SLANT = 0.6
+"""Rise of the top and of the black band away from the road, m/m."""
+# Rows of the body from below: z on the axis; the slant applies above the surface only.
+_LEVELS = (-0.3, 0.0, 0.64, 0.89, 0.964)
+_BAND = 2
+REFLECTOR = (0.04, 0.18)
+"""Width and height of the upright reflector, m."""
+_MIDDLE = 0.765
+"""Height of the reflectors' middle on a post of 1 m, m."""
+_UNDER, _PROUD = 0.001, 0.004
+"""How far reflectors reach into the post, and out of it, m."""
+
+
+def delineator_group() -> bpy.types.NodeTree:
+    """Return the group SR Delineator."""
+    return node_group("SR Delineator", _build)
+
+
+def _build(tree: Tree) -> None:
+    """A delineator post on each point; points carry ``heading``, ``elevation``, ``height`` and ``instance``."""
+    points = tree.input("Points", "Geometry", description="One point per post, at any height")
+    road = tree.input("Road", "Object", description="Surface that the posts stand on")
+    terrain = tree.input("Terrain", "Object", description="Surface beside the road")
+    names = ("White Material", "Black Material", "Reflector Material")
+    white, black, glass = (
+        tree.input(name, "Material", description="Material of this part") for name in names
+    )
+
+    with tree.frame("Body: white, with a slanted black band"):
+        body = _body(tree, white, black)
+    with tree.frame("Reflectors: an upright one in front, two round ones behind"):
+        body = op.join(body, _front(tree, glass), _behind(tree, glass, 0.07), _behind(tree, glass, -0.07))
+    with tree.frame("On the surface"):
+        places = on_surface(points, road, terrain)
+        tall = op.vector(tree, 1.0, 1.0, op.named(tree, "height"))
+        posts = put_on(places, body, tall)
+    with tree.frame("Labels"):
+        posts = op.store(posts, "class_id", class_id("warning_post"), "FACE")
+        posts = op.store(posts, "instance_id", op.named(tree, "instance", "INT"), "FACE")
+    tree.output("Mesh", posts, description="Posts; each face has its own post's instance number")
+
+
+def _set_material(mesh: Value, material: Value, selection: Value | bool = True) -> Value:
+    return mesh.tree.node("GeometryNodeSetMaterial", mesh, selection, material=material).value
+
+
+def _body(tree: Tree, white: Value, black: Value) -> Value:
+    rows = len(_LEVELS)
+    mesh, column, row = op.grid(tree, len(DELINEATOR) + 1, rows)
+    section = op.choose(column, [(x, y, 0.0) for x, y in (*DELINEATOR, DELINEATOR[0])])
+    level = op.component(op.choose(row, [(0.0, 0.0, z) for z in _LEVELS]), "Z")
+    slant = op.switch(row > 1, 0.0, op.component(section, "X") * _SLANT)
+    mesh = op.set_position(mesh, section + op.vector(tree, 0.0, 0.0, level + slant))
+    # Faces of a grid run column by column, rows - 1 of them each.
+    banded = (op.index(tree) % (rows - 1)).equals(_BAND)
+    mesh = _set_material(_set_material(mesh, white), black, banded)
+    lid = tree.node("GeometryNodeMeshCircle", vertices=len(DELINEATOR), fill_type="NGON").value
+    outline = op.choose(op.index(tree), [(x, y, _LEVELS[-1] + _SLANT * x) for x, y in DELINEATOR])
+    return op.join(mesh, _set_material(op.set_position(lid, outline), white))
+
+
+def _front(tree: Tree, material: Value) -> Value:
+    """Return the reflector on the face that approaching drivers see (-y)."""
+    mesh, column, row = op.grid(tree, 2, 2)
+    x = column * REFLECTOR[0] - REFLECTOR[0] / 2
+    place = op.vector(tree, x, -_flank(x), row * REFLECTOR[1] - REFLECTOR[1] / 2 + _MIDDLE)
+    return _raised(op.set_position(mesh, place), material)
+
+
+def _behind(tree: Tree, material: Value, above: float) -> Value:
+    """Return one of the round reflectors on the other face."""
+    disc = tree.node("GeometryNodeMeshCircle", vertices=16, radius=0.03, fill_type="NGON").value
+    place = op.position(tree)
+    x = op.component(place, "X")
+    place = op.vector(tree, -x, _flank(-x), op.component(place, "Y") + _MIDDLE + above)
+    return _raised(op.set_position(disc, place), material)
+
+
+def _flank(x: Value) -> Value:
+    """Return the y of the flank behind, which runs from (-0.045, 0.055) to (0.05, 0.014), just under its surface."""
+    return (x + 0.045) * (-0.041 / 0.095) + (0.055 - _UNDER)
+
+
+def _raised(face: Value, material: Value) -> Value:
+    """Return a reflector as thick as it stands out of the post."""
+    solid = face.tree.node("GeometryNodeExtrudeMesh", face, offset_scale=_UNDER + _PROUD, individual=False).value
+    return _set_material(solid, material)

@@ -1,0 +1,41 @@
+"""SR Gantry Sign: the face of a sign or display that hangs on a gantry."""
+
+from __future__ import annotations
+
+import math
+
+import bpy
+
+from ....base.classes import class_id
+from ...nodes import operations as op
+from ...nodes.builder import Tree, node_group
+from ...nodes.solids import moved, put
+from ...nodes.strip import INSTANCES
+from ..sign.face import declare_face, sign_face_group
+
+_BEFORE = 0.002
+"""Distance between a board and the back of its face, m."""
+
+
+def gantry_sign_group() -> bpy.types.NodeTree:
+    """Return the group SR Gantry Sign."""
+    return node_group("SR Gantry Sign", _build)
+
+
+def _build(tree: Tree) -> None:
+    """The face of one sign of a gantry, before its board."""
+    gantry = tree.input("Gantry", "Object", description="The gantry, whose points tell where its signs are")
+    number = tree.integer("Number", 1, (1, 100), description="Which of its signs, from 1 on")
+    face = declare_face(tree)
+    instance = tree.integer("Instance", 0, INSTANCES, description="Instance number of the faces")
+    with tree.frame("Middle of the sign"):
+        points = op.separate(op.object_geometry(gantry), op.named(tree, "number", "INT").equals(number))
+    with tree.frame("Face"):
+        plate = tree.call(sign_face_group(), instance=instance, **face).value
+        plate = moved(plate, op.vector(tree, 0.0, face["thickness"] * -1.0 - _BEFORE))
+        turned = op.turn(tree, z=op.switch(op.named(tree, "facing") > 0.0, math.pi, 0.0))
+        mesh = op.realize(put(points, plate, op.position(tree), 1.0, turned))
+    with tree.frame("Labels"):
+        mesh = op.store(mesh, "class_id", class_id("shield_gantry"), "FACE")
+        mesh = op.store(mesh, "instance_id", instance, "FACE")
+    tree.output("Mesh", mesh, description="The face")

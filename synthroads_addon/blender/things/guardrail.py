@@ -1,0 +1,209 @@
+"""SR Guardrail: a steel W-beam on posts, on one side or on both, ramped into the ground at its ends."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import bpy
+
+from ...base.classes import class_id
+from ...road.things.body_shapes import (
+    GUARDRAIL_BEAM,
+    GUARDRAIL_LOWEST_POST,
+    GUARDRAIL_POST,
+    GUARDRAIL_POST_TOP,
+    GUARDRAIL_TIP,
+)
+from ..nodes import operations as op
+from ..nodes.backbone import first_station, height_on, last_station, look_up, raised, station_ribbon
+from ..nodes.builder import Operand, Tree, Value, node_group
+from ..nodes.strip import INSTANCES
+
+_THICKNESS = 0.003
+BEAM_PROFILE = [(x, 0.0, z) for x, z in GUARDRAIL_BEAM]
+BEAM_PROFILE += [(x - _THICKNESS, 0.0, z) for x, z in reversed(GUARDRAIL_BEAM)]
+BEAM_PROFILE.append(BEAM_PROFILE[0])
+
+# Across the road, along it; open at its back.
+_HALF, _SIDE = GUARDRAIL_POST[0] / 2, GUARDRAIL_POST[1] / 2
+_POST = [(_HALF, -0.010), (_HALF, _SIDE), (-_HALF, _SIDE), (-_HALF, -_SIDE), (_HALF, -_SIDE)]
+POST_DEPTH = _HALF
+"""From a post's axis to the back of a beam that is bolted to it, m."""
+BURIED = 0.35
+"""Depth to which posts are modelled below the surface, m."""
+
+
+def guardrail_group() -> bpy.types.NodeTree:
+    """Return the group SR Guardrail."""
+    return node_group("SR Guardrail", _build)
+
+
+@dataclass(frozen=True)
+class Rail:
+    """The group's inputs, and where the rail's foot and top are at any station."""
+
+    tree: Tree
+    first: Value
+    last: Value
+    offset: Value
+    beams: dict[float, Value]
+    spacer: Value
+    height: Value
+    spacing: Value
+    terminal: Value
+    step: Value
+
+    def ramp(self) -> Value:
+        """Return the length of the ramp at either end."""
+        return op.minimum(self.terminal, (self.last - self.first) * 0.5)
+
+    def top_at(self, station: Value, ramp: Value) -> Value:
+        """Return the height of the beam's top edge above the surface."""
+        inside = op.minimum(station - self.first, self.last - station) / op.maximum(ramp, 1e-3)
+        share = op.switch(ramp > 1e-3, 1.0, op.minimum(inside, 1.0))
+        return self.height * share + GUARDRAIL_TIP * (1.0 - share)
+
+    def foot_at(self, station: Value, ribbon: Value, surfaces: tuple[Value, Value]) -> tuple[Value, Value]:
+        """Return the point on the surface under the posts' axis, and the vector to the left."""
+        left = look_up(ribbon, "left", station)
+        place = look_up(ribbon, "axis", station) + left * self.offset
+        rise = height_on(*surfaces, place) - op.component(place, "Z")
+        return raised(place, rise), left
+
+
+def _declare(tree: Tree) -> Rail:
+    def metres(name: str, default: float, limits: tuple[float, float], description: str) -> Value:
+        return tree.number(name, default, limits, unit="m", description=description)
+
+    return Rail(
+        tree,
+        first=metres("Start Station", 0.0, (0.0, 1e6), "Beginning, terminal included"),
+        last=metres("End Station", 100.0, (0.0, 1e6), "End, terminal included"),
+        offset=metres("Offset", 0.0, (-100.0, 100.0), "Offset of the posts' axis"),
+        beams={
+            1.0: tree.boolean("Left Beam", True, description="A beam on the left of the posts"),
+            -1.0: tree.boolean("Right Beam", True, description="A beam on the right of the posts"),
+        },
+        spacer=metres("Spacer", 0.0, (0.0, 0.5), "Distance between posts and beam"),
+        height=metres("Height", 0.75, (0.3, 1.5), "Top of the beam above the surface"),
+        spacing=metres("Post Spacing", 4.0, (0.5, 10.0), "Distance between posts"),
+        terminal=metres("Terminal Length", 12.0, (0.0, 50.0), "Length of the ramp at each end"),
+        step=metres("Beam Step", 2.0, (0.1, 8.0), "Largest length of a straight piece of beam"),
+    )
+
+
+def _build(tree: Tree) -> None:
+    """A steel guardrail along the road: W-beams, posts and spacers, with ramped terminals."""
+    backbone = tree.input("Backbone", "Object", description="Polyline along the axis with its attributes")
+    road = tree.input("Road", "Object", description="Surface that the guardrail stands on")
+    terrain = tree.input("Terrain", "Object", description="Surface beside the road")
+    rail = _declare(tree)
+    instance = tree.integer("Instance", 0, INSTANCES, description="Instance number of the faces")
+    material = tree.input("Material", "Material", description="Material of beams and posts")
+
+    with tree.frame("Geometry"):
+        axis = op.object_geometry(backbone)
+        surfaces = op.object_geometry(road), op.object_geometry(terrain)
+    ribbon = station_ribbon(axis)
+    with tree.frame("Rows of the beams: terminal, middle, terminal"):
+        ramp = rail.ramp()
+        begin, end = first_station(axis), last_station(axis)
+        line = _rows(tree, rail, ramp)
+        # What lies beyond the backbone's ends collapses there.
+        within = op.minimum(op.maximum(op.named(tree, "station"), begin), end)
+        line = op.store(line, "station", within)
+    with tree.frame("Line of the beams' top edge"):
+        station = op.named(tree, "station")
+        foot, left = rail.foot_at(station, ribbon, surfaces)
+        line = op.store(op.store(line, "left", left), "top", raised(foot, rail.top_at(station, ramp)))
+    parts = []
+    for side, wanted in rail.beams.items():
+        with tree.frame(f"{'Left' if side > 0 else 'Right'} beam"):
+            parts.append(op.only_if(wanted, _beam(tree, line, side, rail.spacer)))
+    with tree.frame("Posts from the start on, where the beam is high enough"):
+        posts = op.store(_post_rows(tree, rail), "tall", rail.top_at(station, ramp))
+        # A post on the end of a backbone beyond which the rail goes on is the next stretch's.
+        beyond = (station > end) | ((station > end - 1e-3) & (rail.last > end + 1e-3))
+        posts = op.delete_points(posts, beyond | (station < begin))
+        foot, left = rail.foot_at(station, ribbon, surfaces)
+        posts = op.set_position(op.store(posts, "left", left), foot)
+        posts = op.delete_points(posts, op.named(tree, "tall") < GUARDRAIL_LOWEST_POST)
+        parts += _instances(tree, posts, rail.spacer, rail.beams)
+    with tree.frame("Labels"):
+        mesh = op.label(op.realize(op.join(*parts)), class_id("guardrail"), instance, material)
+    tree.output("Mesh", mesh, description="Beams, posts and spacers")
+
+
+def _post_rows(tree: Tree, rail: Rail) -> Value:
+    """Return one point per post with its station."""
+    number = (rail.last - rail.first) / rail.spacing + 1e-4
+    count = tree.node("FunctionNodeFloatToInt", number, rounding_mode="FLOOR").value + 1
+    posts = tree.node("GeometryNodeMeshLine", count=count).value
+    return op.store(posts, "station", rail.first + op.index(tree) * rail.spacing)
+
+
+def _rows(tree: Tree, rail: Rail, ramp: Value) -> Value:
+    """Return points with their station: no piece is longer than the step, and the ramps end at a point.
+
+    Between the ramps the rows are whole parts of the post spacing from the start on, as the posts are.
+    """
+    first, last = rail.first, rail.last
+    step = rail.spacing / op.rounded_up(rail.spacing / rail.step - 1e-4)
+    outer = op.rounded_up(ramp / rail.step - 1e-4)
+    skipped = op.rounded_up(ramp / step + 1e-4)
+    middle = op.maximum(op.rounded_up((last - first - ramp) / step - 1e-4) - skipped, 0)
+    middle = tree.node("FunctionNodeFloatToInt", middle, rounding_mode="ROUND").value
+    # Those that lie on a ramp are left out; where it ends there is a row of its own.
+    line = tree.node("GeometryNodeMeshLine", count=outer * 2 + middle + 2).value
+    number = op.index(tree)
+    into = first + ramp * (number / op.maximum(outer, 1))
+    within = first + (number - outer + skipped - 1) * step
+    out_of = last - ramp + ramp * ((number - outer - middle - 1) / op.maximum(outer, 1))
+    within = op.minimum(op.maximum(within, first + ramp), last - ramp)
+    station = op.switch(number > outer, into, op.switch(number > outer + middle, within, out_of))
+    return op.store(line, "station", op.maximum(op.minimum(station, last), first))
+
+
+def _beam(tree: Tree, line: Value, side: float, spacer: Value) -> Value:
+    """Sweep the beam's profile along the line of its top edge."""
+    mesh, column, number = op.grid(tree, len(BEAM_PROFILE), op.point_count(line))
+    profile = op.choose(column, BEAM_PROFILE)
+    top = op.sample_index(line, op.named(tree, "top", "FLOAT_VECTOR"), number)
+    left = op.sample_index(line, op.named(tree, "left", "FLOAT_VECTOR"), number)
+    depth = (op.component(profile, "X") + spacer + POST_DEPTH) * side
+    place = top + left * depth + op.vector(tree, 0.0, 0.0, op.component(profile, "Z"))
+    mesh = op.without_degenerate(op.set_position(mesh, place))
+    # Seen along the rows the profile runs round clockwise on the right side: there its faces look outwards.
+    return tree.node("GeometryNodeFlipFaces", mesh).value if side > 0 else mesh
+
+
+def _instances(tree: Tree, posts: Value, spacer: Value, beams: dict[float, Value]) -> list[Value]:
+    """Put a post on every point, and beside it the spacers of the beams that there are."""
+    left, tall = op.named(tree, "left", "FLOAT_VECTOR"), op.named(tree, "tall")
+    upright = tree.node(
+        "FunctionNodeAxesToRotation", (0.0, 0.0, 1.0), left, primary_axis="Z", secondary_axis="X"
+    ).value
+
+    def on_posts(body: Value, height: Operand, scale: Operand) -> Value:
+        points = tree.node("GeometryNodeSetPosition", posts, offset=op.vector(tree, 0.0, 0.0, height)).value
+        return tree.node(
+            "GeometryNodeInstanceOnPoints", points, instance=body, rotation=upright, scale=scale
+        ).value
+
+    parts = [on_posts(_post(tree), -BURIED, op.vector(tree, 1.0, 1.0, tall + (BURIED - GUARDRAIL_POST_TOP)))]
+    for side, wanted in beams.items():
+        # A little shorter than the gap: faces that coincide with the post's or the beam's have no first hit.
+        box = tree.node("GeometryNodeMeshCube", size=(0.96, 0.1, 0.22)).value
+        middle = op.vector(tree, (spacer * 0.5 + POST_DEPTH) * side, 0.0, -0.155)
+        body = tree.node(
+            "GeometryNodeTransform", box, translation=middle, scale=op.vector(tree, spacer, 1.0, 1.0)
+        ).value
+        parts.append(op.only_if(wanted & (spacer > 1e-3), on_posts(body, tall, 1.0)))
+    return parts
+
+
+def _post(tree: Tree) -> Value:
+    """Return a post of height 1; x is across the road, y along it."""
+    mesh, column, number = op.grid(tree, len(_POST), 2)
+    section = op.choose(column, [(x, y, 0.0) for x, y in _POST])
+    return op.set_position(mesh, section + op.vector(tree, 0.0, 0.0, number))

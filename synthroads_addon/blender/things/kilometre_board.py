@@ -1,0 +1,54 @@
+"""SR Kilometre Board: a board with writing on both sides, on a post of its own."""
+
+from __future__ import annotations
+
+import math
+
+import bpy
+
+from ...base.classes import class_id
+from ...road.things.body_shapes import KILOMETRE_POST
+from ..nodes import operations as op
+from ..nodes.builder import Tree, node_group
+from ..nodes.solids import moved
+from ..nodes.standing import declare_standing, put_on
+from .sign.face import declare_face, sign_face_group
+from .sign.posts import sign_posts_group
+
+
+def kilometre_board_group() -> bpy.types.NodeTree:
+    """Return the group SR Kilometre Board."""
+    return node_group("SR Kilometre Board", _build)
+
+
+def _build(tree: Tree) -> None:
+    """A board on a post, read from both sides; points carry ``heading`` (rad) and ``elevation`` (m)."""
+    standing = declare_standing(tree)
+    face = declare_face(tree)
+    lower_edge = tree.number(
+        "Lower Edge", 1.2, (0.0, 10.0), unit="m", description="Lower edge of the board above the surface"
+    )
+    material = tree.input("Post Material", "Material", description="Material of the post")
+
+    with tree.frame("Two faces back to back around the post"):
+        plate = tree.call(sign_face_group(), instance=standing.instance, **face).value
+        front = moved(plate, op.vector(tree, 0.0, -face["thickness"]))
+        behind = tree.node("GeometryNodeTransform", front, rotation=(0.0, 0.0, math.pi)).value
+        middle = lower_edge + face["height"] * 0.5
+        board = moved(op.join(front, behind), op.vector(tree, 0.0, 0.0, middle))
+    with tree.frame("Put onto the points"):
+        places = standing.places()
+        mesh = put_on(places, board)
+    with tree.frame("Post, up into the board"):
+        post = tree.call(
+            sign_posts_group(),
+            points=places,
+            road=standing.road,
+            terrain=standing.terrain,
+            top=middle,
+            post_diameter=KILOMETRE_POST,
+            material=material,
+        ).value
+    with tree.frame("Labels"):
+        mesh = standing.labelled(op.join(mesh, post), class_id("road_sign"))
+    tree.output("Mesh", mesh, description="Board with its post")

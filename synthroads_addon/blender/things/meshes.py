@@ -1,0 +1,158 @@
+"""Meshes that Python hands to the node groups: the backbone, the ground, and points with attributes."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import bpy
+import numpy as np
+from numpy.typing import NDArray
+
+from ...base.stepper import aside
+from ...road.alignment import clip_offset
+from ...road.geometry import RoadGeometry
+from ...road.parameters import PointObject, Terrain
+from ...road.terrain import GROUND_MARGIN, ground_elevation
+from .road.layout import varying_widths
+
+Float = NDArray[np.float64]
+
+def backbone_mesh(geometry: RoadGeometry, station: Float, origin: Float, zero: float = 0.0) -> bpy.types.Mesh:
+    """Return a polyline with one vertex per station (N,) and the attributes that `nodes.backbone` lists.
+
+    Args:
+        geometry: the road.
+        station: (N,) m.
+        origin: (3,) local coordinates of the scene's origin, m.
+        zero: station (m) that the nodes count theirs from: as float32 they are exact near it only.
+    """
+    position, heading, curvature = geometry.alignment.frame(station)
+    elevation = geometry.profile.elevation(station)
+    values = {"station": station - zero, "curvature": curvature}
+    for side in ("left", "right"):
+        carriageway = geometry.parameters.carriageway(side)
+        values[f"crossfall_{side}"] = (
+            geometry.crossfall(carriageway, station) if carriageway else 0.0 * station
+        )
+    values |= varying_widths(geometry, station)
+    mesh = bpy.data.meshes.new("SR Backbone")
+    first = np.arange(len(station) - 1)
+    fill(mesh, np.column_stack([position, elevation]) - origin, edges=np.column_stack([first, first + 1]))
+    left = np.column_stack([-np.sin(heading), np.cos(heading), np.zeros(len(station))])
+    attribute(mesh, "left", left)
+    for name, value in values.items():
+        attribute(mesh, name, value)
+    return mesh
+
+
+def ground_mesh(
+    geometry: RoadGeometry, terrain: Terrain, tolerance: float, stretch: tuple[float, float], origin: Float
+) -> bpy.types.Mesh:
+    """Return the ground before the road was built: a grid of stations and offsets, wider than the terrain."""
+    vertices, faces = aside(lambda: _ground_grid(geometry, terrain, tolerance, stretch))
+    mesh = bpy.data.meshes.new("SR Ground")
+    fill(mesh, vertices - origin, faces=faces)
+    return mesh
+
+
+def _ground_grid(
+    geometry: RoadGeometry, terrain: Terrain, tolerance: float, stretch: tuple[float, float]
+) -> tuple[Float, NDArray[np.intp]]:
+    """Return the local vertices (V, 3) of the ground and its faces (F, 4)."""
+    bend = terrain.undulation * (2.0 * np.pi / terrain.wavelength) ** 2
+    spacing = float(np.clip(np.sqrt(8.0 * tolerance / max(bend, 1e-9)), 1.5, 4.0))
+
+    # Whole multiples of the spacing, so that a stretch of the road has the whole road's ground.
+    first, last = (stretch[0] - GROUND_MARGIN) // spacing, -((-stretch[1] - GROUND_MARGIN) // spacing)
+    ends = -GROUND_MARGIN, geometry.length + GROUND_MARGIN
+    station = np.clip(np.arange(first, last + 1) * spacing, *ends)
+    reach = terrain.half_width + GROUND_MARGIN
+    offset = np.linspace(-reach, reach, int(np.ceil(2.0 * reach / spacing)) + 1)
+    position, heading, curvature = geometry.alignment.frame(station)
+    offsets = clip_offset(offset[None, :], curvature[:, None])
+    left = np.stack([-np.sin(heading), np.cos(heading)], axis=-1)
+    plan = position[:, None, :] + offsets[:, :, None] * left[:, None, :]
+    stations = np.repeat(station, len(offset))
+    height = ground_elevation(geometry, terrain, stations, offsets.ravel())
+    corner = np.arange(len(station) - 1)[:, None] * len(offset) + np.arange(len(offset) - 1)
+    # Offsets grow to the left: forwards along the stations, then right, is seen from above against the clock.
+    faces = np.stack([corner, corner + len(offset), corner + len(offset) + 1, corner + 1], axis=-1)
+    return np.column_stack([plan.reshape(-1, 2), height]), faces.reshape(-1, 4)
+
+
+def points_mesh(
+    name: str,
+    geometry: RoadGeometry,
+    items: Sequence[PointObject],
+    attributes: Mapping[str, NDArray[Any]],
+    origin: Float,
+) -> bpy.types.Mesh:
+    """Return one vertex per object, exact in plan, at the axis's elevation, less the scene's origin (3,).
+
+    Attributes of its points: ``heading`` (rad, the turn about z of something that was made facing traffic along +y),
+    ``elevation`` (m above the surface), ``instance``, and those given: whole numbers, numbers, or vectors (N, 3).
+    """
+    mesh = bpy.data.meshes.new(f"SR {name}")
+    fill(mesh, on_plan(geometry, items) - origin)
+    heading = geometry.alignment.heading(np.array([item.station for item in items]))
+    turn = heading - np.pi / 2.0 + np.deg2rad([item.rotation_deg for item in items])
+    attribute(mesh, "heading", np.arctan2(np.sin(turn), np.cos(turn)))
+    attribute(mesh, "elevation", np.array([item.elevation for item in items]))
+    attribute(mesh, "instance", signed([item.instance for item in items]))
+    for key, values in attributes.items():
+        attribute(mesh, key, values)
+    return mesh
+
+
+def on_plan(geometry: RoadGeometry, items: Sequence[PointObject]) -> Float:
+    """Return the local places (N, 3) of point objects, exact in plan, at the axis's elevation."""
+    station = np.array([item.station for item in items])
+    offset = np.array([item.offset for item in items])
+    position, heading, _ = geometry.alignment.frame(station)
+    left = np.stack([-np.sin(heading), np.cos(heading)], axis=-1)
+    return np.column_stack([position + offset[:, None] * left, geometry.profile.elevation(station)])
+
+
+def signed(instances: Sequence[int]) -> NDArray[np.int32]:
+    """Return instance numbers as the nodes hold them: they have 32 bits and no sign, the nodes' numbers have one."""
+    return np.array(instances, dtype=np.uint32).astype(np.int32)
+
+
+def fill(
+    mesh: bpy.types.Mesh,
+    vertices: Float,
+    edges: NDArray[np.intp] | None = None,
+    faces: NDArray[np.intp] | None = None,
+) -> None:
+    """Give an empty mesh its vertices (V, 3) and edges (E, 2) or faces (F, 4)."""
+    mesh.vertices.add(len(vertices))
+    mesh.vertices.foreach_set("co", vertices.astype(np.float32).ravel())
+    if edges is not None:
+        mesh.edges.add(len(edges))
+        mesh.edges.foreach_set("vertices", edges.astype(np.int32).ravel())
+    if faces is not None:
+        _add_faces(mesh, faces.ravel(), np.full(len(faces), faces.shape[1]))
+
+
+def fill_polygons(mesh: bpy.types.Mesh, vertices: Float, sizes: Sequence[int]) -> None:
+    """Give an empty mesh vertices (V, 3) and the faces that they make one after the other, of these sizes."""
+    fill(mesh, vertices)
+    _add_faces(mesh, np.arange(len(vertices)), np.asarray(sizes))
+
+
+def _add_faces(mesh: bpy.types.Mesh, corners: NDArray[np.intp], sizes: NDArray[np.intp]) -> None:
+    mesh.loops.add(corners.size)
+    mesh.loops.foreach_set("vertex_index", corners.astype(np.int32))
+    mesh.polygons.add(len(sizes))
+    mesh.polygons.foreach_set("loop_start", (np.cumsum(sizes) - sizes).astype(np.int32))
+    mesh.update(calc_edges=True)
+
+
+def attribute(mesh: bpy.types.Mesh, name: str, values: NDArray[Any]) -> None:
+    """Store a value per point: whole numbers (N,), numbers (N,) or vectors (N, 3)."""
+    whole = np.issubdtype(values.dtype, np.integer)
+    kind = "FLOAT_VECTOR" if values.ndim == 2 else "INT" if whole else "FLOAT"
+    data = mesh.attributes.new(name, kind, "POINT").data
+    flat = values.astype(np.int32 if whole else np.float32).ravel()
+    data.foreach_set("vector" if kind == "FLOAT_VECTOR" else "value", flat)

@@ -1,0 +1,148 @@
+"""What the parts of a model are built with."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from functools import cached_property
+from typing import Any
+
+import bpy
+import numpy as np
+from numpy.typing import NDArray
+
+from ...base.stepper import aside, pause, rest
+from ...road.geometry import RoadGeometry
+from ...road.parameters import PointObject, RoadParameters
+from ...road.stretches import cut, frame_of
+from ...road.tessellation import sample_stations
+from ..compat import set_modifier_input
+from .meshes import points_mesh, signed
+
+ROLE = "synthroads_role"
+"""Custom property of the objects that `build_road` makes: what they are in the model."""
+SUPPORT = "synthroads_support"
+"""Custom property of objects that only other objects need: they are hidden and never scanned."""
+
+_ROOM = 5.0
+
+
+class ModelBuilder:
+    """Makes a model's objects one by one.
+
+    Attributes:
+        parameters: the road, with only those objects that stand on the stretch.
+        geometry: the whole road's analytic geometry.
+        stretch: stations between which it is built, two of those that the whole road's surface has.
+        stations: (N,) m, of the rows of the surface.
+        origin: (3,) local coordinates of the scene's origin: near the stretch, as the scene has float32.
+        zero: station (m) that the nodes count theirs from, for the same reason; a whole number.
+        tolerance: largest chord error of the road's surface, m.
+        detail: share of the vegetation's triangles, 0 to 1.
+        hidden: what is added now is only needed by other parts.
+        objects: what was added, by role.
+        at_once: how many objects may be added in one turn.
+    """
+
+    def __init__(
+        self,
+        parameters: RoadParameters,
+        collection: bpy.types.Collection,
+        tolerance: float,
+        detail: float,
+        stretch: tuple[float, float] | None = None,
+        geometry: RoadGeometry | None = None,
+    ) -> None:
+        self.geometry = geometry or RoadGeometry(parameters)
+        self._given = stretch or (0.0, self.geometry.length)
+        self.stations: NDArray[np.float64] = np.zeros(0)
+        self.stretch = self._given
+        self._whole = stretch is None
+        self.parameters = parameters
+        self.origin, self.zero = np.zeros(3), 0
+        self.tolerance = tolerance
+        self.detail = detail
+        self.hidden = False
+        self.objects: dict[str, bpy.types.Object] = {}
+        self.at_once = 1
+        self._unseen = 0
+        self._collection = collection
+
+    def lay_out(self) -> None:
+        """Find the rows of the surface, and with them what stands on the stretch; comes before everything else."""
+        self.stations = aside(lambda: sample_stations(self.geometry, self.tolerance, *self._given))
+        if not self._whole:
+            self.stretch = (float(self.stations[0]), float(self.stations[-1]))
+            self.parameters = cut(self.parameters, *self.stretch)
+            self.origin, self.zero = frame_of(self.geometry, *self.stretch)
+
+    @cached_property
+    def step(self) -> float:
+        """Longest straight piece (m) of what follows the road, so that it keeps the tolerance in the curves.
+
+        It is that of the whole road, 4 m halved as often as need be: pieces of a stretch are the whole road's.
+        """
+        bends = [max(abs(e.curvature_start), abs(e.curvature_end)) for e in self.geometry.alignment.elements]
+        wanted = np.sqrt(8.0 * self.tolerance / max(*bends, 1e-9))
+        return float(2.0 ** np.floor(np.log2(np.clip(wanted, 0.5, 4.0))))
+
+    @cached_property
+    def widest(self) -> float:
+        """A distance from the axis (m) that the whole road's verges don't reach, wider ones by hand included."""
+        sections, length = self.geometry.sections.values(), self.geometry.length
+        edges = [section.road_edge([0.0, *section.kinks(), length]).max() for section in sections]
+        return float(np.ceil(max(edges)) + _ROOM)
+
+    def along(self, station: float) -> float:
+        """Return a station as the nodes count it."""
+        return station - self.zero
+
+    def points(
+        self, name: str, items: Sequence[PointObject], attributes: Mapping[str, NDArray[Any]]
+    ) -> bpy.types.Mesh:
+        """Return a mesh with one vertex per point object, see `meshes.points_mesh`."""
+        return points_mesh(name, self.geometry, items, attributes, self.origin)
+
+    def surfaces(self, *more: str) -> dict[str, bpy.types.Object]:
+        """Return what objects stand on (inputs ``Road`` and ``Terrain``), and further objects by role."""
+        roles = ("Road", "Terrain", *more)
+        return {role: self.objects[role] for role in roles if role in self.objects}
+
+    def add(
+        self,
+        role: str,
+        mesh: bpy.types.Mesh,
+        group: bpy.types.NodeTree | None = None,
+        inputs: Mapping[str, Any] | None = None,
+        support: bool = False,
+    ) -> None:
+        """Add an object to the model, with its modifier if it has a group."""
+        item = bpy.data.objects.new(role, mesh)
+        mesh.name = f"SR {role}"
+        item[ROLE] = role
+        if support or self.hidden:
+            item[SUPPORT] = True
+            item.hide_viewport = item.hide_render = True
+        self._collection.objects.link(item)
+        if group is not None:
+            modifier = item.modifiers.new("SynthRoads", "NODES")
+            modifier.node_group = group
+            for name, value in (inputs or {}).items():
+                set_modifier_input(modifier, name, int(signed([value])[0]) if name.endswith("Instance") else value)
+        self._added(role, item)
+
+    def add_instance(self, role: str, collection: bpy.types.Collection) -> bpy.types.Object:
+        """Add an empty that shows a collection."""
+        item = bpy.data.objects.new(role, None)
+        item[ROLE] = role
+        item.instance_type, item.instance_collection = "COLLECTION", collection
+        self._collection.objects.link(item)
+        self._added(role, item)
+        return item
+
+    def _added(self, role: str, item: bpy.types.Object) -> None:
+        self.objects[role] = item
+        self._unseen += 1
+        if self._unseen >= self.at_once:
+            self._unseen = 0
+            rest()  # so that they are evaluated in a turn of their own
+        pause()

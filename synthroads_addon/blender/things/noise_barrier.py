@@ -1,0 +1,164 @@
+"""SR Noise Barrier: level panels between posts, which step down with the ground from post to post."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import bpy
+
+from ...base.classes import class_id
+from ...road.things.body_shapes import SHORTEST_ELEMENT
+from ..nodes import operations as op
+from ..nodes.backbone import first_station, last_station
+from ..nodes.builder import Tree, Value, node_group
+from ..nodes.foot import foot_at
+from ..nodes.noise_panel import noise_panel_group
+from ..nodes.solids import box, painted, put
+from ..nodes.strip import INSTANCES
+
+# Section of an HEA profile of width 1 (HEA 160: 152 mm across the wall, 160 mm along it).
+_FLANGE, _INSIDE, _WEB = 0.475, 0.42, 0.02
+BURIED = 0.4
+"""Depth of posts and plinths below the surface, m."""
+_PLINTH_SHARE, _HIGHEST_PLINTH = 0.25, 0.5
+_PLAY = 0.005  # m, between a panel and a post
+
+
+def noise_barrier_group() -> bpy.types.NodeTree:
+    """Return the group SR Noise Barrier."""
+    return node_group("SR Noise Barrier", _build)
+
+
+@dataclass(frozen=True)
+class _Wall:
+    first: Value
+    last: Value
+    offset: Value
+    height: Value
+    panel: Value
+    thickness: Value
+    spacing: Value
+    post_width: Value
+
+
+def _declare(tree: Tree) -> _Wall:
+    def metres(name: str, default: float, limits: tuple[float, float], description: str) -> Value:
+        return tree.number(name, default, limits, unit="m", description=description)
+
+    kinds = "Kind of the panels: 0 aluminium, 1 concrete, 2 wood, 3 glass"
+    return _Wall(
+        first=metres("Start Station", 0.0, (0.0, 1e6), "First post"),
+        last=metres("End Station", 100.0, (0.0, 1e6), "Last post"),
+        offset=metres("Offset", 0.0, (-100.0, 100.0), "Offset of the panels' middle"),
+        height=metres("Height", 4.0, (1.0, 12.0), "Top of the posts above the surface"),
+        panel=tree.integer("Panel", 0, (0, 3), description=kinds),
+        thickness=metres("Thickness", 0.15, (0.02, 0.6), "Thickness of the panels"),
+        spacing=metres("Post Spacing", 4.0, (1.0, 10.0), "Distance between posts"),
+        post_width=metres("Post Width", 0.16, (0.05, 0.5), "Width of a post"),
+    )
+
+
+def _build(tree: Tree) -> None:
+    """A noise barrier along the road: posts, and between them level panels on a plinth."""
+    backbone = tree.input("Backbone", "Object", description="Polyline along the axis with its attributes")
+    road = tree.input("Road", "Object", description="Surface that the wall stands on")
+    terrain = tree.input("Terrain", "Object", description="Surface beside the road")
+    wall = _declare(tree)
+    instance = tree.integer("Instance", 0, INSTANCES, description="Instance number of the faces")
+    names = {"Post": "the posts", "Panel": "the panels", "Frame": "frames and caps", "Plinth": "the plinth"}
+    steel, face, frame, concrete = (
+        tree.input(f"{name} Material", "Material", description=f"Material of {what}") for name, what in names.items()
+    )
+
+    with tree.frame("Geometry"):
+        axis = op.object_geometry(backbone)
+        surfaces = op.object_geometry(road), op.object_geometry(terrain)
+    with tree.frame("Number of bays"):
+        count = op.rounded_up(op.maximum((wall.last - wall.first) / wall.spacing - SHORTEST_ELEMENT, 1.0))
+    with tree.frame("Posts"):
+        posts = _posts(tree, wall, count, axis, surfaces)
+        posts = painted(op.realize(posts), steel)
+    with tree.frame("Bays: both ends' feet"):
+        bays = _bays(tree, wall, count, axis, surfaces)
+    with tree.frame("Plinths and panels"):
+        plinth = op.minimum(wall.height * _PLINTH_SHARE, _HIGHEST_PLINTH)
+        fits = wall.thickness < wall.post_width * (2.0 * _INSIDE)
+        gap = op.switch(fits, wall.post_width * 0.5, wall.post_width * _WEB) + _PLAY
+        panel = tree.call(
+            noise_panel_group(),
+            panel=wall.panel,
+            length=wall.spacing - gap * 2.0,
+            height=wall.height - plinth,
+            thickness=wall.thickness,
+            panel_material=face,
+            frame_material=frame,
+        ).value
+        walls = _filled(tree, wall, bays, (gap, plinth), (panel, painted(box(tree, 1.0), concrete)))
+    with tree.frame("Labels"):
+        mesh = op.join(posts, walls)
+        mesh = op.store(mesh, "class_id", class_id("noise_barrier"), "FACE")
+        mesh = op.store(mesh, "instance_id", instance, "FACE")
+    tree.output("Mesh", mesh, description="Posts, plinths and panels; a panel's points carry the number of its bay")
+
+
+def _posts(tree: Tree, wall: _Wall, count: Value, axis: Value, surfaces: tuple[Value, Value]) -> Value:
+    """Return the posts as instances; those beyond the backbone, and on an end that the wall passes, are left out."""
+    posts = tree.node("GeometryNodeMeshLine", count=count + 1).value
+    number = op.index(tree)
+    posts = op.store(posts, "station", op.switch(number < count, wall.last, wall.first + number * wall.spacing))
+    station, end = op.named(tree, "station"), last_station(axis)
+    passed = (station > end - 1e-3) & (wall.last > end + 1e-3)
+    posts = op.delete_points(posts, passed | (station < first_station(axis)))
+    foot, left = foot_at(axis, surfaces, station, wall.offset)
+    size = op.vector(tree, wall.post_width, wall.post_width, wall.height + BURIED)
+    upright = tree.node("FunctionNodeAxesToRotation", (0.0, 0.0, 1.0), left, primary_axis="Z", secondary_axis="X")
+    return put(posts, _post(tree), foot + (0.0, 0.0, -BURIED), size, upright.value)
+
+
+def _post(tree: Tree) -> Value:
+    """Return an HEA profile of width and height 1 on z = 0: x is across the wall, y along it."""
+    flange = (_FLANGE - _INSIDE, 1.0, 1.0)
+    beside = (_FLANGE + _INSIDE) / 2
+    web = box(tree, (2.0 * _INSIDE + 0.01, 2.0 * _WEB, 1.0), (0.0, 0.0, 0.5))
+    return op.join(web, *(box(tree, flange, (beside * side, 0.0, 0.5)) for side in (1.0, -1.0)))
+
+
+def _bays(tree: Tree, wall: _Wall, count: Value, axis: Value, surfaces: tuple[Value, Value]) -> Value:
+    """Return one point per bay with its number and the ``start`` and ``end`` of its foot, cut with the backbone."""
+    bays = tree.node("GeometryNodeMeshLine", count=count).value
+    number = op.index(tree)
+    start = wall.first + number * wall.spacing
+    end = op.switch(number < count - 1, wall.last, start + wall.spacing)
+    for name, station in {"from": start, "to": end}.items():
+        within = op.minimum(op.maximum(station, first_station(axis)), last_station(axis))
+        bays = op.store(bays, name, within)
+    bays = op.store(bays, "bay", number)
+    bays = op.delete_points(bays, op.named(tree, "to") - op.named(tree, "from") < 0.05)
+    for name, station_name in {"start": "from", "end": "to"}.items():
+        foot, _ = foot_at(axis, surfaces, op.named(tree, station_name), wall.offset)
+        bays = op.store(bays, name, foot)
+    return bays
+
+
+def _filled(tree: Tree, wall: _Wall, bays: Value, sizes: tuple[Value, Value], bodies: tuple[Value, Value]) -> Value:
+    """Put a panel, and a plinth below it, into every bay, level at the lower one of its posts."""
+    (gap, plinth), (panel, block) = sizes, bodies
+    start, end = (op.named(tree, name, "FLOAT_VECTOR") for name in ("start", "end"))
+    low = op.minimum(op.component(start, "Z"), op.component(end, "Z"))
+    along = tree.node("ShaderNodeVectorMath", end - start, (1.0, 1.0, 0.0), operation="MULTIPLY").value
+    length = op.maximum(tree.node("ShaderNodeVectorMath", along, operation="LENGTH")["Value"] - gap * 2.0, 0.02)
+    middle = (start + end) * 0.5
+    level = op.vector(tree, op.component(middle, "X"), op.component(middle, "Y"), low + plinth)
+    turned = tree.node("FunctionNodeAxesToRotation", (0.0, 0.0, 1.0), along, primary_axis="Z", secondary_axis="X").value
+    # The panels' face looks to -y, which is away from the road on its right side.
+    facing = tree.node(
+        "FunctionNodeRotateRotation",
+        turned,
+        op.turn(tree, z=op.switch(wall.offset < 0.0, 0.0, math.pi)),
+        rotation_space="LOCAL",
+    ).value
+    panels = put(bays, panel, level, op.vector(tree, length / (wall.spacing - gap * 2.0), 1.0, 1.0), facing)
+    deep = plinth + BURIED
+    below = level - op.vector(tree, 0.0, 0.0, deep * 0.5)
+    return op.realize(op.join(panels, put(bays, block, below, op.vector(tree, length, wall.thickness, deep), turned)))

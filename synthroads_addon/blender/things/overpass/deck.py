@@ -1,0 +1,92 @@
+"""SR Bridge Deck: a bridge's deck with two webs, the edge beams on it, the pavement and the railings."""
+
+from __future__ import annotations
+
+import bpy
+
+from ....road.things.body_shapes import BRIDGE_DECK
+from ...nodes import operations as op
+from ...nodes.builder import Tree, Value, node_group
+from ...nodes.solids import box, flipped, loft, moved, painted
+from .railing import bridge_railing_group
+
+WEB = BRIDGE_DECK[1][0], BRIDGE_DECK[2][0]
+"""Where the webs begin and end beside the middle, as shares of half the deck's width."""
+PAVEMENT = 0.05
+"""Thickness of the asphalt, m."""
+EDGE = 0.1
+"""Width of an edge beam as a share of the deck's."""
+# An edge beam: 1 for its inner side and 0 for the outer one; 1 for the back of its nose; 1 on top, 0 and -1 below.
+_BEAM = [(0.0, 0.0, -1.0), (0.0, 0.0, 1.0), (1.0, 0.0, 1.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 1.0, -1.0)]
+_CURB = 0.15
+"""Height of the edge beams above the pavement, m."""
+_NOSE = (0.3, 0.45)
+"""Thickness of the edge beam's outer face, and how far it hangs below the pavement, m."""
+_LOWEST_PARAPET = 0.5
+
+
+def bridge_deck_group() -> bpy.types.NodeTree:
+    """Return the group SR Bridge Deck."""
+    return node_group("SR Bridge Deck", _build)
+
+
+def _build(tree: Tree) -> None:
+    """A deck along x with its underside on z = 0; edge beams, pavement and railings go on over the wing walls."""
+
+    def metres(name: str, default: float, limits: tuple[float, float], description: str) -> Value:
+        return tree.number(name, default, limits, unit="m", description=description)
+
+    ends = (
+        metres("Deck Start", -20.0, (-300.0, 300.0), "x of the deck's left end"),
+        metres("Deck End", 20.0, (-300.0, 300.0), "x of its right end"),
+    )
+    start = metres("Start", -28.0, (-300.0, 300.0), "x of the edge beams' left end")
+    end = metres("End", 28.0, (-300.0, 300.0), "x of their right end")
+    width = metres("Width", 10.0, (2.0, 60.0), "Width")
+    height = metres("Thickness", 1.2, (0.3, 5.0), "Height from the underside to the pavement's top")
+    parapet = metres("Parapet Height", 1.1, (0.0, 3.0), "Top of the railings above the pavement; none below 0.5 m")
+    names = {"Concrete": "the deck", "Edge": "edge beams", "Steel": "railings", "Pavement": "the crossing road"}
+    concrete, edge, steel, asphalt = (
+        tree.input(f"{name} Material", "Material", description=f"Material of {what}") for name, what in names.items()
+    )
+    with tree.frame("Deck"):
+        deck = painted(_deck(tree, ends, width, height), concrete)
+    with tree.frame("Edge beam"):
+        beam = painted(_edge_beam(tree, (start, end), width, height), edge)
+        beams = op.join(beam, flipped(tree.node("GeometryNodeTransform", beam, scale=(1.0, -1.0, 1.0)).value))
+    with tree.frame("Pavement between the edge beams"):
+        size = op.vector(tree, end - start, width * (1.0 - 1.96 * EDGE), PAVEMENT)
+        road = box(tree, size, op.vector(tree, (start + end) * 0.5, 0.0, height - PAVEMENT / 2))
+    with tree.frame("Railings"):
+        railing = tree.call(bridge_railing_group(), length=end - start, height=parapet - _CURB).value
+        beside = width * 0.5 - 0.2
+        pair = [moved(railing, op.vector(tree, start, beside * side, height + _CURB)) for side in (1.0, -1.0)]
+        railings = op.only_if(parapet > _LOWEST_PARAPET, painted(op.join(*pair), steel))
+    with tree.frame("All"):
+        mesh = op.join(deck, beams, painted(road, asphalt), railings)
+    tree.output("Mesh", mesh, description="The deck")
+
+
+def _deck(tree: Tree, ends: tuple[Value, Value], width: Value, height: Value) -> Value:
+    half = [(0.0, y, z) for y, z in BRIDGE_DECK]
+    outline = half + [(x, -y, z) for x, y, z in reversed(half)]
+
+    def place(point: Value, row: Value) -> Value:
+        x = op.switch(row > 0, *ends)
+        y = op.component(point, "Y") * width * 0.5
+        return op.vector(tree, x, y, op.component(point, "Z") * (height - PAVEMENT * 0.5))
+
+    return loft(tree, lambda number: op.choose(number, outline), len(outline), 2, place)
+
+
+def _edge_beam(tree: Tree, ends: tuple[Value, Value], width: Value, height: Value) -> Value:
+    """Return the edge beam on the left of an observer who looks along x."""
+    hang = op.minimum(height * 0.6, _NOSE[1])
+
+    def place(point: Value, row: Value) -> Value:
+        inwards = op.component(point, "X") * (width * EDGE) + op.component(point, "Y") * _NOSE[0]
+        z = op.component(point, "Z")
+        rise = op.switch(z > 0.5, op.switch(z < -0.5, -PAVEMENT, -hang), _CURB)
+        return op.vector(tree, op.switch(row > 0, *ends), width * 0.5 - inwards, height + rise)
+
+    return loft(tree, lambda number: op.choose(number, _BEAM), len(_BEAM), 2, place)

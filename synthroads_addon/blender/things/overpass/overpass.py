@@ -1,0 +1,197 @@
+"""SR Overpass: a bridge over the road, with piers, abutments, wing walls and embankments."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import bpy
+
+from ....base.classes import class_id
+from ....road.things.body_shapes import BRIDGE_BEARING, BRIDGE_BURIED, BRIDGE_SEAT
+from ...nodes import operations as op
+from ...nodes.backbone import height_on
+from ...nodes.builder import Tree, Value, node_group
+from ...nodes.clearance import highest_below, pavement_near
+from ...nodes.solids import flipped, moved, put
+from ...nodes.strip import INSTANCES
+from .abutment import bridge_abutment_group
+from .deck import EDGE, bridge_deck_group
+from .embankment import bridge_embankment_group
+from .pier import bridge_pier_group
+
+_WINGS = (3.0, 12.0)
+"""Shortest and longest wing walls, m."""
+
+
+def overpass_group() -> bpy.types.NodeTree:
+    """Return the group SR Overpass."""
+    return node_group("SR Overpass", _build)
+
+
+@dataclass(frozen=True)
+class _Bridge:
+    """The group's inputs; faces and lengths of the approaches by side: -1 left (-x), +1 right."""
+
+    tree: Tree
+    faces: dict[float, Value]
+    approaches: dict[float, Value]
+    skew: Value
+    width: Value
+    clearance: Value
+    thickness: Value
+    parapet: Value
+    pier_width: Value
+    slope: Value
+    materials: dict[str, Value]
+
+
+def _declare(tree: Tree) -> _Bridge:
+    def metres(name: str, default: float, limits: tuple[float, float], description: str) -> Value:
+        return tree.number(name, default, limits, unit="m", description=description)
+
+    left = metres("Left Abutment", 20.0, (1.0, 300.0), "Face of the left abutment, left of the origin")
+    right = metres("Right Abutment", -20.0, (-300.0, -1.0), "Face of the right one, negative: right of the origin")
+    approaches = {
+        -1.0: metres("Left Approach Length", 40.0, (1.0, 500.0), "Embankment behind the left face"),
+        1.0: metres("Right Approach Length", 40.0, (1.0, 500.0), "Embankment behind the right face"),
+    }
+    names = {"Concrete": "deck, piers and walls", "Edge": "edge beams", "Steel": "railings and bearings"}
+    names |= {"Pavement": "the crossing road", "Ground": "the embankments"}
+    return _Bridge(
+        tree,
+        faces={-1.0: -left, 1.0: -right},
+        approaches=approaches,
+        skew=tree.number("Skew", 0.0, (-1.0, 1.0), unit="rad", description="Turn about the vertical"),
+        width=metres("Width", 10.0, (2.0, 60.0), "Width of the deck along the road"),
+        clearance=metres("Clearance", 4.9, (3.0, 20.0), "Underside above the pavement's highest point below it"),
+        thickness=metres("Deck Thickness", 1.2, (0.3, 5.0), "Height of the deck"),
+        parapet=metres("Parapet Height", 1.1, (0.0, 3.0), "Top of the railings above the deck; none below 0.5 m"),
+        pier_width=metres("Pier Width", 1.0, (0.2, 4.0), "Width of a pier across the road"),
+        slope=tree.number("Slope", 1.5, (0.5, 10.0), description="Run of the embankments per metre of height (m/m)"),
+        materials={
+            name: tree.input(f"{name} Material", "Material", description=f"Material of {what}")
+            for name, what in names.items()
+        },
+    )
+
+
+def _build(tree: Tree) -> None:
+    """A level bridge around the origin, which crosses along x; the road that it spans runs along y.
+
+    Piers are points, of which only x counts. The bridge is skewed by moving it along y: its faces stay parallel to y.
+    """
+    piers = tree.input("Piers", "Geometry", description="A point per pier, in the middle of the deck")
+    road = tree.input("Road", "Object", description="Surface with the pavement below")
+    terrain = tree.input("Terrain", "Object", description="Surface beside the road")
+    bridge = _declare(tree)
+    instance = tree.integer("Instance", 0, INSTANCES, description="Instance number of the faces")
+
+    with tree.frame("Surfaces and skew"):
+        surfaces = op.object_geometry(road), op.object_geometry(terrain)
+        shear = op.unary("TANGENT", bridge.skew)
+    with tree.frame("Underside, above the pavement's highest point"):
+        reach = op.maximum(bridge.faces[1.0], -bridge.faces[-1.0]) * 1.5 + bridge.width
+        paved = pavement_near(surfaces[0], reach)
+        edges = bridge.width * -0.5, bridge.width * 0.5
+        low = highest_below(paved, bridge.faces[-1.0], bridge.faces[1.0], edges, shear) + bridge.clearance
+    with tree.frame("Ground at the abutments, and wing walls"):
+        feet = {side: _lowest(bridge, surfaces, shear, face) for side, face in bridge.faces.items()}
+        wings = {side: _wing_length(bridge, low, foot) for side, foot in feet.items()}
+    with tree.frame("Deck and abutments, skewed"):
+        mesh = op.join(_deck(bridge, low, wings), *(_abutment(bridge, low, feet, wings, side) for side in (-1.0, 1.0)))
+        place = op.position(tree)
+        mesh = op.set_position(mesh, place + op.vector(tree, 0.0, op.component(place, "X") * shear))
+    with tree.frame("Piers, parallel to the road"):
+        mesh = op.join(mesh, _piers(bridge, piers, surfaces, shear, low))
+    with tree.frame("Embankments"):
+        ground = op.join(*surfaces)
+        banks = [_embankment(bridge, ground, low, wings[side], shear, side) for side in (-1.0, 1.0)]
+    with tree.frame("Labels"):
+        mesh = op.join(op.store(mesh, "class_id", class_id("bridge"), "FACE"), *banks)
+        mesh = op.store(mesh, "instance_id", instance, "FACE")
+    tree.output("Mesh", mesh, description="The bridge; its embankments' slopes are ground")
+
+
+def _lowest(bridge: _Bridge, surfaces: tuple[Value, Value], shear: Value, face: Value) -> Value:
+    """Return z of the lower end of the ground along an abutment's face."""
+    ends = [
+        height_on(*surfaces, op.vector(bridge.tree, face, bridge.width * half + face * shear)) for half in (0.5, -0.5)
+    ]
+    return op.minimum(*ends)
+
+
+def _wing_length(bridge: _Bridge, low: Value, foot: Value) -> Value:
+    """Return the length of the wing walls, so that the embankment's cones reach the abutment's face."""
+    wanted = (low + bridge.thickness - foot) * bridge.slope
+    return op.minimum(op.maximum(wanted, _WINGS[0]), _WINGS[1])
+
+
+def _deck(bridge: _Bridge, low: Value, wings: dict[float, Value]) -> Value:
+    left, right = bridge.faces[-1.0], bridge.faces[1.0]
+    deck = bridge.tree.call(
+        bridge_deck_group(),
+        deck_start=left - BRIDGE_SEAT,
+        deck_end=right + BRIDGE_SEAT,
+        start=left - wings[-1.0],
+        end=right + wings[1.0],
+        width=bridge.width,
+        thickness=bridge.thickness,
+        parapet_height=bridge.parapet,
+        concrete_material=bridge.materials["Concrete"],
+        edge_material=bridge.materials["Edge"],
+        steel_material=bridge.materials["Steel"],
+        pavement_material=bridge.materials["Pavement"],
+    ).value
+    return moved(deck, op.vector(bridge.tree, 0.0, 0.0, low))
+
+
+def _abutment(bridge: _Bridge, low: Value, feet: dict[float, Value], wings: dict[float, Value], side: float) -> Value:
+    tree = bridge.tree
+    made = tree.call(
+        bridge_abutment_group(),
+        width=bridge.width,
+        thickness=bridge.thickness,
+        foot=feet[side] - low - BRIDGE_BURIED,
+        wing_length=wings[side],
+        concrete_material=bridge.materials["Concrete"],
+        steel_material=bridge.materials["Steel"],
+    ).value
+    if side < 0.0:
+        made = flipped(tree.node("GeometryNodeTransform", made, scale=(-1.0, 1.0, 1.0)).value)
+    return moved(made, op.vector(tree, bridge.faces[side], 0.0, low))
+
+
+def _piers(bridge: _Bridge, points: Value, surfaces: tuple[Value, Value], shear: Value, low: Value) -> Value:
+    tree = bridge.tree
+    pier = tree.call(
+        bridge_pier_group(),
+        pier_width=bridge.pier_width,
+        width=bridge.width,
+        concrete_material=bridge.materials["Concrete"],
+        steel_material=bridge.materials["Steel"],
+    )
+    x = op.component(op.position(tree), "X")
+    plan = op.vector(tree, x, x * shear)
+    points = op.store(points, "foot", height_on(*surfaces, plan) - BRIDGE_BURIED)
+    tall = low - BRIDGE_BEARING - op.named(tree, "foot")
+    top = plan + op.vector(tree, 0.0, 0.0, low - BRIDGE_BEARING)
+    bodies = put(points, pier["Body"], top, op.vector(tree, 1.0, 1.0, tall))
+    return op.realize(op.join(bodies, put(points, pier["Bearings"], plan + op.vector(tree, 0.0, 0.0, low))))
+
+
+def _embankment(bridge: _Bridge, ground: Value, low: Value, wing: Value, shear: Value, side: float) -> Value:
+    return bridge.tree.call(
+        bridge_embankment_group(),
+        ground=ground,
+        face=bridge.faces[side],
+        side=side,
+        wing_length=wing,
+        length=op.maximum(bridge.approaches[side], wing + 1.0),
+        top=low + bridge.thickness,
+        width=bridge.width,
+        edge_width=bridge.width * EDGE,
+        shear=shear,
+        slope=bridge.slope,
+        pavement_material=bridge.materials["Pavement"],
+        ground_material=bridge.materials["Ground"],
+    ).value

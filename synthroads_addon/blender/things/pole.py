@@ -1,0 +1,133 @@
+"""SR Pole: a tapered mast with an arm, and at its end a street light, or cameras."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import bpy
+
+from ...base.classes import class_id
+from ..nodes import operations as op
+from ..nodes.builder import Tree, Value, node_group
+from ..nodes.solids import box, moved, painted, prism
+from ..nodes.standing import BURIED, declare_standing, put_on
+from ..nodes.tubes import cone, tube
+
+_TAPER = 0.45
+"""Diameter at the top as a share of that at the foot."""
+_TUBE, _SHORTEST_ARM = 0.03, 0.05
+"""Radius of the arm, and length from which there is one, m."""
+# Luminaire seen from above, and the glass under it: x from its mount on, y, m.
+_LUMINAIRE = [
+    (0.06, -0.04), (0.06, 0.04), (-0.12, 0.13), (-0.58, 0.13), (-0.66, 0.08), (-0.66, -0.08), (-0.58, -0.13),
+    (-0.12, -0.13),
+]  # fmt: skip
+_GLASS = [(-0.16, -0.1), (-0.16, 0.1), (-0.56, 0.1), (-0.56, -0.1)]
+_THICK = 0.09  # m
+_ARM_RISE = 0.12  # m per m of the arm
+_CAMERA = (0.13, 0.4, 0.12)  # m: across, along, high
+_DOME = 0.09  # radius, m
+
+
+@dataclass(frozen=True)
+class _Pole:
+    height: Value
+    diameter: Value
+    arm: Value
+    steel: Value
+    housing: Value
+    glass: Value
+
+
+def pole_group() -> bpy.types.NodeTree:
+    """Return the group SR Pole."""
+    return node_group("SR Pole", _build)
+
+
+def _build(tree: Tree) -> None:
+    """A pole, its arm to the left of those who drive along +y; points carry ``heading`` (rad) and ``elevation`` (m)."""
+    standing = declare_standing(tree)
+    cameras = tree.boolean("Surveillance", False, description="Carries cameras instead of a street light")
+    pole = _Pole(
+        height=tree.number("Height", 12.0, (1.0, 40.0), unit="m", description="Top above the surface"),
+        diameter=tree.number("Diameter", 0.18, (0.03, 1.0), unit="m", description="Diameter at the foot (m)"),
+        arm=tree.number("Arm Length", 1.5, (0.0, 10.0), unit="m", description="Length of the arm; 0 for none"),
+        steel=tree.input("Steel Material", "Material", description="Material of mast and arm"),
+        housing=tree.input("Housing Material", "Material", description="Material of luminaire and housings"),
+        glass=tree.input("Glass Material", "Material", description="Material of lamps and lenses"),
+    )
+
+    with tree.frame("Street light"):
+        mount = pole.height - _THICK * 0.5
+        light = op.join(_mast(tree, pole, mount - _rise(pole)), _arm(tree, pole, mount), _luminaire(tree, pole))
+    with tree.frame("Surveillance"):
+        mount = pole.height - 0.35
+        watch = op.join(_mast(tree, pole, pole.height), _arm(tree, pole, mount), _cameras(tree, pole, mount))
+    with tree.frame("Put onto the points"):
+        body = tree.node("GeometryNodeSwitch", input_type="GEOMETRY", switch=cameras, false=light, true=watch).value
+        mesh = standing.labelled(put_on(standing.places(), body), class_id("pole"))
+    tree.output("Mesh", mesh, description="Pole with what it carries")
+
+
+def _rise(pole: _Pole) -> Value:
+    return pole.arm * _ARM_RISE
+
+
+def _mast(tree: Tree, pole: _Pole, top: Value) -> Value:
+    """Return the mast with its foot below the surface and a door for the cables."""
+    radius = pole.diameter * 0.5
+    mast = cone(tree, radius, radius * _TAPER, top)
+    foot = moved(tube(tree, radius, BURIED, 16), (0.0, 0.0, -BURIED))
+    door = box(tree, op.vector(tree, radius * 0.9, 0.02, 0.35), op.vector(tree, 0.0, radius * -0.93, 0.8))
+    return painted(op.join(mast, foot, door), pole.steel)
+
+
+def _arm(tree: Tree, pole: _Pole, end: Value) -> Value:
+    """Return a quarter of an ellipse from the mast's axis to the left and up to its end's height."""
+    line = tree.node("GeometryNodeMeshLine", count=9).value
+    turn = op.index(tree) * (math.pi / 16.0)
+    across = (op.unary("COSINE", turn) - 1.0) * pole.arm
+    above = end - _rise(pole) * (1.0 - op.unary("SINE", turn))
+    line = op.set_position(line, op.vector(tree, across, 0.0, above))
+    profile = tree.node("GeometryNodeCurvePrimitiveCircle", resolution=8, radius=_TUBE).value
+    curve = tree.node("GeometryNodeMeshToCurve", line).value
+    pipe = tree.node("GeometryNodeCurveToMesh", curve, profile_curve=profile, fill_caps=True).value
+    pipe = tree.node("GeometryNodeSetShadeSmooth", pipe).value
+    return op.only_if(pole.arm > _SHORTEST_ARM, painted(pipe, pole.steel))
+
+
+def _luminaire(tree: Tree, pole: _Pole) -> Value:
+    """Return the street light at the end of the arm; its top is the pole's."""
+    body = painted(prism(tree, _LUMINAIRE, (1.0, 1.0, _THICK)), pole.housing)
+    glass = painted(prism(tree, _GLASS, (1.0, 1.0, 0.01)), pole.glass)
+    parts = op.join(body, moved(glass, (0.0, 0.0, -0.01)))
+    return moved(parts, op.vector(tree, -pole.arm, 0.0, pole.height - _THICK))
+
+
+def _cameras(tree: Tree, pole: _Pole, mount: Value) -> Value:
+    """Return a camera along the road either way, a dome camera at the end of the arm, and a cabinet on the mast."""
+    front = moved(_camera(tree, pole), op.vector(tree, 0.0, (pole.diameter + _CAMERA[1]) * -0.5))
+    behind = tree.node("GeometryNodeTransform", front, rotation=(0.0, 0.0, math.pi)).value
+    pair = moved(op.join(front, behind), op.vector(tree, 0.0, 0.0, mount - 0.3))
+    cap = painted(moved(tube(tree, _DOME, 0.14), (0.0, 0.0, -0.17)), pole.housing)
+    ball = tree.node("GeometryNodeMeshUVSphere", segments=12, rings=6, radius=_DOME * 0.9).value
+    ball = tree.node("GeometryNodeSetShadeSmooth", ball).value
+    dome = op.join(cap, painted(moved(ball, (0.0, 0.0, -0.18)), pole.glass))
+    dome = op.only_if(pole.arm > _SHORTEST_ARM, moved(dome, op.vector(tree, -pole.arm, 0.0, mount)))
+    cabinet = box(tree, (0.3, 0.22, 0.45), op.vector(tree, 0.0, pole.diameter * 0.5 + 0.1, 2.2))
+    return op.join(pair, dome, painted(cabinet, pole.housing))
+
+
+def _camera(tree: Tree, pole: _Pole) -> Value:
+    """Return a camera under its sunshield around the origin, looking along -y and down."""
+    across, along, high = _CAMERA
+    shield = box(tree, (across + 0.03, along + 0.08, 0.008), (0.0, -0.03, high / 2 + 0.012))
+    lens = tree.node(
+        "GeometryNodeTransform",
+        tube(tree, 0.045, 0.02),
+        translation=(0.0, 0.01 - along / 2, 0.0),
+        rotation=(math.pi / 2, 0.0, 0.0),
+    ).value
+    camera = op.join(painted(op.join(box(tree, _CAMERA), shield), pole.housing), painted(lens, pole.glass))
+    return tree.node("GeometryNodeTransform", camera, rotation=(math.radians(8.0), 0.0, 0.0)).value

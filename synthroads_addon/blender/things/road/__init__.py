@@ -1,0 +1,1 @@
+"""The road itself: strips, markings and their heights."""

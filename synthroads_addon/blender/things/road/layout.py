@@ -1,0 +1,230 @@
+"""What the nodes of SR Road depend on, and the values of its inputs and of the backbone's attributes."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ....road.damage import damage_columns, damage_depth, damaged_strips
+from ....road.geometry import RoadGeometry, sections_of
+from ....road.objects import AnyWidth, nominal_width, width_at
+from ....road.parameters import Carriageway, LineMarking, Median, RoadParameters, Turnout
+from ....road.section_geometry import CarriagewaySection
+from ....road.stretches import BEYOND
+from ....road.turnout_geometry import TURNOUT_STRIPS
+
+Float = NDArray[np.float64]
+
+TURNOUT_NAMES = tuple(kind.replace("_", " ").title() for kind in TURNOUT_STRIPS)
+"""Strips that turnouts make, from the hard shoulder outwards, as the inputs and attributes name them."""
+
+
+@dataclass(frozen=True)
+class MarkingLayout:
+    """What the nodes of a line marking depend on."""
+
+    name: str
+    kind: str
+    boundary: int = 0
+    varies: bool = False
+    yellow: bool = False
+
+
+@dataclass(frozen=True)
+class SideLayout:
+    """What the nodes of one carriageway depend on.
+
+    Attributes:
+        side: ``Left`` or ``Right``.
+        lanes: number of lanes.
+        markings: its line markings.
+        varying: names of the strips (and ``Inner Offset``) whose widths change along the road.
+        turnouts: ids of its turnouts.
+        detailed: names of the strips with damage.
+    """
+
+    side: str
+    lanes: int
+    markings: tuple[MarkingLayout, ...] = ()
+    varying: tuple[str, ...] = ()
+    turnouts: tuple[str, ...] = ()
+    detailed: tuple[str, ...] = ()
+
+    @property
+    def sign(self) -> float:
+        """Return the sign of the side's offsets."""
+        return 1.0 if self.side == "Left" else -1.0
+
+
+def road_layout(parameters: RoadParameters) -> tuple[SideLayout, ...]:
+    """Return what the group's nodes depend on, left side first."""
+    sides, sections = [], sections_of(parameters)
+    for name, carriageway in sorted(parameters.of_type(Carriageway).items(), key=lambda item: -item[1].sign):
+        lines = [(key, line) for key, line in parameters.of_type(LineMarking).items() if line.carriageway == name]
+        turnouts = tuple(key for key, item in parameters.of_type(Turnout).items() if item.carriageway == name)
+        section = sections[carriageway.side]
+        varying = {key for key, width in own_widths(carriageway) if isinstance(width, tuple)}
+        if turnouts:
+            varying.add("Hard Shoulder")
+        sides.append(
+            SideLayout(
+                carriageway.side.title(),
+                len(carriageway.lanes),
+                tuple(
+                    MarkingLayout(key, m.kind, m.boundary, isinstance(m.offset, tuple), m.color == "yellow")
+                    for key, m in lines
+                ),
+                tuple(sorted(varying)),
+                turnouts,
+                tuple(strip_names(section)[strip] for strip in damaged_strips(section)),
+            )
+        )
+    return tuple(sides)
+
+
+def own_widths(carriageway: Carriageway) -> Iterator[tuple[str, AnyWidth]]:
+    """Yield (name, width) of the inner offset and of the strips, from the median outwards."""
+    yield "Inner Offset", carriageway.inner_offset
+    yield "Inner Edge Strip", carriageway.inner_edge_strip_width
+    for number in range(len(carriageway.lanes), 0, -1):
+        yield f"Lane {number}", carriageway.lanes[number - 1].width
+    yield "Outer Edge Strip", carriageway.outer_edge_strip_width
+    yield "Hard Shoulder", carriageway.hard_shoulder_width
+    yield "Verge", carriageway.verge_width
+
+
+def input_name(side: str, strip: str) -> str:
+    """Return the name of the input that holds a strip's width."""
+    return f"{side} Inner Offset" if strip == "Inner Offset" else f"{side} {strip} Width"
+
+
+def attribute_name(side: str, strip: str) -> str:
+    """Return the name of the backbone's attribute that a strip's width changes with."""
+    return f"{side}_{strip}".lower().replace(" ", "_")
+
+
+def road_inputs(parameters: RoadParameters, zero: float = 0.0) -> dict[str, float | int | bool]:
+    """Return the values of the group's inputs, without objects and materials.
+
+    Args:
+        parameters: the road, or what of it is on a stretch.
+        zero: station that the nodes count theirs from, m.
+    """
+    inputs: dict[str, float | int | bool] = {}
+    for carriageway in parameters.of_type(Carriageway).values():
+        side = carriageway.side.title()
+        inputs |= {input_name(side, strip): nominal_width(width) for strip, width in own_widths(carriageway)}
+        inputs[f"{side} Verge Slope"] = carriageway.verge_slope_percent / 100.0
+        inputs[f"{side} Turns About Inner Edge"] = carriageway.rotation_axis == "inner_edge"
+        inputs[f"{side} Instance"] = carriageway.instance
+    for median in parameters.of_type(Median).values():
+        if len(parameters.of_type(Carriageway)) == 2:
+            inputs["Median Instance"] = median.instance
+    for section in sections_of(parameters).values():
+        for shape in section.turnouts:
+            name = next(key for key, item in parameters.objects.items() if item is shape.turnout)
+            low, high = shape.range()
+            inputs |= {f"{name} Start Station": low - zero, f"{name} End Station": high - zero}
+            inputs[f"{name} Instance"] = shape.turnout.instance
+    for name, line in parameters.of_type(LineMarking).items():
+        inputs |= _marking_inputs(name, line, zero)
+    return inputs
+
+
+def _marking_inputs(name: str, line: LineMarking, zero: float) -> dict[str, float | int | bool]:
+    inputs: dict[str, float | int | bool] = {
+        f"{name} Width": line.width,
+        f"{name} Dash": line.dash_length,
+        f"{name} Gap": line.gap_length,
+        f"{name} Start Station": line.start_station - zero,
+        f"{name} End Station": line.end_station - zero,
+        f"{name} Film Thickness": line.film_thickness,
+        f"{name} Instance": line.instance,
+    }
+    if line.kind == "free":
+        inputs[f"{name} Distance"] = nominal_width(line.offset)
+    return inputs
+
+
+def varying_widths(geometry: RoadGeometry, station: Float) -> dict[str, Float]:
+    """Return the backbone's attributes (N,) that widths change with at stations (N,).
+
+    A strip whose width changes has its share of the width that the input holds; the hard shoulder beside turnouts also
+    ``..._main``, the share without them. Turnouts' strips have their widths, and the verge its ``..._extra``.
+    """
+    values: dict[str, Float] = {}
+    for layout in road_layout(geometry.parameters):
+        section = geometry.sections["left" if layout.side == "Left" else "right"]
+        for strip, width in own_widths(section.carriageway):
+            if strip in layout.varying:
+                share = width_at(width, station) / max(nominal_width(width), 1e-9)
+                values[attribute_name(layout.side, strip)] = share
+        for marking in layout.markings:
+            line = geometry.parameters.objects[marking.name]
+            if marking.varies and isinstance(line, LineMarking):
+                share = width_at(line.offset, station) / max(nominal_width(line.offset), 1e-9)
+                values[attribute_name("marking", marking.name)] = share
+        if layout.turnouts:
+            values |= _turnout_widths(layout.side, section, station)
+    return values
+
+
+def _turnout_widths(side: str, section: CarriagewaySection, station: Float) -> dict[str, Float]:
+    shapes = [shape.widths(station) for shape in section.turnouts]
+    values = {
+        attribute_name(side, name): sum((shape.strips[kind] for shape in shapes), 0.0 * station)
+        for kind, name in zip(TURNOUT_STRIPS, TURNOUT_NAMES, strict=True)
+    }
+    own = section.carriageway.hard_shoulder_width
+    nominal = max(nominal_width(own), 1e-9)
+    values[attribute_name(side, "Hard Shoulder Main")] = width_at(own, station) / nominal
+    values[attribute_name(side, "Hard Shoulder")] = (
+        np.minimum.reduce([shape.hard_shoulder for shape in shapes]) / nominal
+    )
+    values[attribute_name(side, "Verge Extra")] = sum((shape.verge_extra for shape in shapes), 0.0 * station)
+    return values
+
+
+def detail_points(geometry: RoadGeometry, station: Float, tolerance: float) -> dict[str, tuple[Float, Float]]:
+    """Return share and depth of every point of the damaged strips' grids.
+
+    By the strips' names (``Right Lane 1``): both (columns * rows,), row by row within a column, columns from the left;
+    the rows are the stations (N,).
+    """
+    points = {}
+    for section in geometry.sections.values():
+        carriageway = section.carriageway
+        names, distances = strip_names(section), section.distances(station)
+        for strip in damaged_strips(section):
+            # That of a long road far away would cut all of the rest into slivers.
+            near = float(station[0]) - BEYOND, float(station[-1]) + BEYOND
+            outwards = damage_columns(section, strip, tolerance, *near)[:, None]
+            distance = distances[:, strip] * (1.0 - outwards) + distances[:, strip + 1] * outwards
+            offset = float(carriageway.sign) * distance
+            depth = damage_depth(section, np.tile(station, len(outwards)), offset.ravel()).reshape(offset.shape)
+            # Outwards is to the left on the left carriageway.
+            share = np.tile(outwards if carriageway.sign > 0 else 1.0 - outwards, len(station))
+            # In a step the faces lie so skew that rounding would turn narrow ones over: there are no columns inside.
+            steps = _steps(station, distances[:, strip : strip + 2])
+            share[1:-1, steps], depth[:, steps] = 0.0, 0.0
+            order = slice(None, None, -carriageway.sign)
+            points[f"{carriageway.side.title()} {names[strip]}"] = (share[order].ravel(), depth[order].ravel())
+    return points
+
+
+def _steps(station: Float, edges: Float) -> NDArray[np.bool_]:
+    """Return at which of the stations (N,) a strip with these edges (N, 2) steps to one side."""
+    skew = np.abs(np.diff(edges, axis=0)).max(axis=1) > np.diff(station)
+    return np.append(skew, False) | np.insert(skew, 0, False)
+
+
+def strip_names(section: CarriagewaySection) -> list[str]:
+    """Return the names that inputs and attributes give a section's strips, innermost first."""
+    names, lane = [], len(section.carriageway.lanes)
+    for kind in section.kinds:
+        names.append(f"Lane {lane}" if kind == "lane" else kind.replace("_", " ").title())
+        lane -= kind == "lane"
+    return names

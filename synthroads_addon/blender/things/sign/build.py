@@ -1,0 +1,35 @@
+"""Traffic signs."""
+
+from __future__ import annotations
+
+from ....road.parameters import TrafficSign
+from ...materials import material
+from ..model_builder import ModelBuilder
+from .looks import sign_face_inputs
+from .sign import sign_group
+
+_LARGE = 8.0
+"""Area of a board from which it stands on lattice posts, m2."""
+_LARGE_POST, _MOST_LATTICES = 0.15, 2
+"""Least diameter of lattice posts, m, and their number at most."""
+
+
+def build_signs(builder: ModelBuilder) -> None:
+    """Make one object per traffic sign."""
+    for name, sign in builder.parameters.of_type(TrafficSign).items():
+        inputs = {
+            **builder.surfaces(),
+            **sign_face_inputs(sign),
+            "Lower Edge": sign.lower_edge,
+            "Posts": sign.posts,
+            "Post Diameter": sign.post_diameter,
+            "Lattice": _stands_on_lattices(sign),
+            "Post Material": material("galvanised_steel"),
+            "Instance": sign.instance,
+        }
+        builder.add(name, builder.points(name, [sign], {}), sign_group(), inputs)
+
+
+def _stands_on_lattices(sign: TrafficSign) -> bool:
+    large = sign.width * sign.height >= _LARGE
+    return large and sign.post_diameter >= _LARGE_POST and sign.posts <= _MOST_LATTICES

@@ -1,0 +1,128 @@
+"""What a sign's face looks like: from its shape, colours, writing and pictogram to the inputs of SR Sign Face."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ....road.parameters import TrafficSign
+from ....road.things.signs import sign_type
+from ...materials import material
+from .outline import SHAPES
+from .pictograms import NAMES
+from .writing import LINES
+
+Box = tuple[float, float, float, float]
+"""Left, right, bottom and top as shares of the face."""
+
+
+@dataclass(frozen=True)
+class FaceStyle:
+    """What is on a face.
+
+    Attributes:
+        ground, border, writing: colours, as `presets/signs.json` names them.
+        pictogram: what is drawn, as `road.things.signs.Pictogram` names it.
+    """
+
+    ground: str
+    border: str
+    writing: str
+    pictogram: str = "none"
+
+
+_OF_SHAPE = {
+    "round": FaceStyle("white", "red", "black"),
+    "triangle": FaceStyle("white", "red", "black"),
+    "rectangle": FaceStyle("blue", "white", "white"),
+    "octagon": FaceStyle("red", "white", "white"),
+    "arrow": FaceStyle("blue", "white", "white", "arrow"),
+}
+"""Faces of signs that the catalogue doesn't have."""
+
+# Shares of the smaller side of a face, and a border's limits in m.
+_RING, _RIM, _LINE = 0.1, 0.012, 0.022
+_LINE_LIMITS = (0.008, 0.04)
+_CORNERS = {"round": 0.06, "triangle": 0.06, "rectangle": 0.05, "octagon": 0.03, "arrow": 0.04}
+_CORNER_LIMITS = (0.01, 0.1)
+"""Limits of a corner's radius, m."""
+
+_WHOLE: Box = (0.08, 0.92, 0.06, 0.94)
+_TEXT: dict[str, Box] = {
+    "round": (0.17, 0.83, 0.22, 0.78),
+    "triangle": (0.35, 0.65, 0.0, 0.72),
+    "rectangle": _WHOLE,
+    "octagon": (0.12, 0.88, 0.2, 0.8),
+    "arrow": (0.06, 0.82, 0.44, 0.96),
+}
+_DRAWING: dict[str, Box] = {
+    "round": (0.16, 0.84, 0.16, 0.84),
+    "triangle": (0.28, 0.72, 0.13, 0.64),
+    "rectangle": _WHOLE,
+    "octagon": _WHOLE,
+    "arrow": (0.36, 0.64, 0.1, 0.46),
+}
+# Pictograms that share a rectangular board with writing: the writing's box, and the pictogram's.
+_SHARED: dict[str, tuple[Box, Box]] = {
+    "exit_arrow": ((0.06, 0.68, 0.06, 0.94), (0.72, 0.95, 0.1, 0.9)),
+    **dict.fromkeys(("bars_1", "bars_2", "bars_3"), ((0.08, 0.92, 0.68, 0.97), (0.12, 0.88, 0.05, 0.66))),
+}
+_DESTINATIONS = ("449", "453")
+"""Signs with a list of places, which begins on the left."""
+_ACROSS: dict[str, Box] = {"end": (0.02, 0.98, 0.02, 0.98)}
+"""Pictograms that reach over the whole face."""
+
+
+def sign_face_inputs(sign: TrafficSign) -> dict[str, Any]:
+    """Return the face's inputs for a sign, by the catalogue if that has its code."""
+    known = sign_type(sign)
+    style = FaceStyle(known.ground, known.border, known.writing, known.pictogram) if known else _OF_SHAPE[sign.shape]
+    inputs = face_inputs(style, sign.shape, sign.width, sign.height, sign.text)
+    return inputs | {"Flush Left": sign.code in _DESTINATIONS}
+
+
+def face_inputs(style: FaceStyle, shape: str, width: float, height: float, text: Sequence[str]) -> dict[str, Any]:
+    """Return the inputs of a group with a face.
+
+    Args:
+        style: colours and pictogram.
+        shape: outline, one of `nodes.sign_outline.SHAPES`.
+        width, height: of the face, m.
+        text: lines of writing.
+    """
+    side = min(width, height)
+    ringed = style.border == "red"
+    line, corner = float(np.clip(_LINE * side, *_LINE_LIMITS)), float(np.clip(_CORNERS[shape] * side, *_CORNER_LIMITS))
+    writing, drawing = _boxes(style.pictogram, shape)
+    lines = [*text, *([""] * LINES)][:LINES]
+    return {
+        "Shape": SHAPES.index(shape),
+        "Width": width,
+        "Height": height,
+        "Corner Radius": corner,
+        "Edge Width": _RIM * side if ringed else 0.0,
+        "Border Width": _RING * side if ringed else line,
+        **{f"Line {number}": entry for number, entry in enumerate(lines, 1)},
+        **_box_inputs("Text", writing),
+        "Flush Left": False,
+        "Pictogram": NAMES.index(style.pictogram) if style.pictogram in NAMES else 0,
+        **_box_inputs("Pictogram", drawing),
+        "Ground Material": material(f"sheeting_{style.ground}"),
+        "Border Material": material(f"sheeting_{style.border}"),
+        "Edge Material": material("sheeting_white"),
+        "Writing Material": material(f"sheeting_{style.writing}"),
+        "Back Material": material("board_back"),
+    }
+
+
+def _boxes(pictogram: str, shape: str) -> tuple[Box, Box]:
+    if shape == "rectangle" and pictogram in _SHARED:
+        return _SHARED[pictogram]
+    return _TEXT[shape], _ACROSS.get(pictogram, _DRAWING[shape])
+
+
+def _box_inputs(prefix: str, box: Box) -> dict[str, float]:
+    return {f"{prefix} {side}": share for side, share in zip(("Left", "Right", "Bottom", "Top"), box, strict=True)}

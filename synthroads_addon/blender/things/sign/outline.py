@@ -1,0 +1,95 @@
+"""SR Sign Outline: the outline of a sign's face, or one inside of it at the same distance all around."""
+
+from __future__ import annotations
+
+import bpy
+
+from ....road.things.body_shapes import SIGN_OUTLINES
+from ...nodes import operations as op
+from ...nodes.builder import Tree, Value, node_group
+
+SHAPES = ("round", "triangle", "rectangle", "octagon", "arrow")
+"""Shapes by their number in the group's input."""
+_STEPS, _ROUND_STEPS = 5, 13
+"""Points per corner, and per quarter of a round sign."""
+_SHARPEST = 0.35
+"""Share of its radius that a corner keeps, however far inside."""
+
+
+def sign_outline_group() -> bpy.types.NodeTree:
+    """Return the group SR Sign Outline."""
+    return node_group("SR Sign Outline", _build)
+
+
+def _build(tree: Tree) -> None:
+    """A closed curve in the xy plane around the origin: the outline of a sign, or one inside of it."""
+    names = ", ".join(f"{i} {name}" for i, name in enumerate(SHAPES))
+
+    def metres(name: str, default: float, limits: tuple[float, float], description: str) -> Value:
+        return tree.number(name, default, limits, unit="m", description=description)
+
+    shape = tree.integer("Shape", 2, (0, len(SHAPES) - 1), description=names)
+    width = metres("Width", 1.0, (0.01, 20.0), "Width of the outline")
+    height = metres("Height", 1.0, (0.01, 20.0), "Height of the outline")
+    radius = metres("Corner Radius", 0.05, (0.001, 10.0), "Radius of its corners")
+    inset = metres("Inset", 0.0, (0.0, 1.0), "Distance inside of the outline, at most a quarter of its smaller side")
+
+    with tree.frame("Corners of the shape, and points on each"):
+        start, count, steps = _of_shape(tree, shape)
+        number = op.index(tree)
+        corner, step = number // steps, number % steps
+    with tree.frame("Radius; a round sign is nothing but corners"):
+        half = op.minimum(width, height) * 0.499
+        outer = op.minimum(op.switch(shape.equals(0), radius, half), half)
+        inner = op.maximum(outer - inset, outer * _SHARPEST)
+    with tree.frame("Middle of the corner's arc, and of those beside it"):
+        size = op.vector(tree, width - outer * 2.0, height - outer * 2.0)
+        before, middle, after = (
+            op.choose(start + (corner + count + beside) % count, _table()) * size for beside in (-1, 0, 1)
+        )
+    with tree.frame("Points on the arcs"):
+        outwards, inwards = _directions(tree, middle - before, after - middle, step / (steps - 1.0))
+        points = tree.node("GeometryNodeMeshCircle", vertices=count * steps).value
+        # Radii shrink with the distance; where none is left, the arc's middle moves inwards.
+        points = op.set_position(points, middle + inwards * (inset - outer + inner) + outwards * inner)
+        curve = tree.node("GeometryNodeMeshToCurve", points).value
+    tree.output("Curve", curve, description="Closed curve, anticlockwise")
+
+
+def _directions(tree: Tree, before: Value, after: Value, share: Value) -> tuple[Value, Value]:
+    """Return the outward direction on a share of the corner's arc, and how its middle moves per metre inwards.
+
+    `before` and `after` are the sides that meet there.
+    """
+    first, last = _normal(before), _normal(after)
+    cosine = op.dot(first, last)
+    turned = op.unary("ARCCOSINE", cosine) * share
+    outwards = tree.node(
+        "ShaderNodeVectorRotate", first, axis=(0.0, 0.0, 1.0), angle=turned, rotation_type="AXIS_ANGLE"
+    ).value
+    return outwards, (first + last) * (-1.0 / (1.0 + cosine))
+
+
+def _table() -> list[tuple[float, float, float]]:
+    return [(x, y, 0.0) for corners in SIGN_OUTLINES.values() for x, y in corners]
+
+
+def _of_shape(tree: Tree, shape: Value) -> tuple[Value, Value, Value]:
+    """Return where the shape's corners start in the table, their number, and the number of points on each."""
+    starts, total = {}, 0
+    for name, corners in SIGN_OUTLINES.items():
+        starts[name], total = total, total + len(corners)
+    rows = []
+    for name in SHAPES:
+        outline = "rectangle" if name == "round" else name
+        points = _ROUND_STEPS if name == "round" else _STEPS
+        rows.append((float(starts[outline]), float(len(SIGN_OUTLINES[outline])), float(points)))
+    row = op.choose(shape, rows)
+    start, count, steps = (op.rounded_up(op.component(row, axis)) for axis in "XYZ")
+    return start, count, steps
+
+
+def _normal(side: Value) -> Value:
+    """Return the unit normal on the right of a vector in the xy plane: outwards, seen along the outline."""
+    right = op.vector(side.tree, op.component(side, "Y"), -op.component(side, "X"))
+    return side.tree.node("ShaderNodeVectorMath", right, operation="NORMALIZE").value

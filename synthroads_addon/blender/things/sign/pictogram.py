@@ -1,0 +1,75 @@
+"""SR Pictogram: what is drawn on a traffic sign, fitted into a box."""
+
+from __future__ import annotations
+
+import bpy
+
+from ...nodes import operations as op
+from ...nodes.builder import Tree, Value, node_group
+from ...nodes.solids import painted
+from .pictograms import NAMES, PICTOGRAMS, RED
+
+Row = tuple[float, float, float]
+
+
+def pictogram_group() -> bpy.types.NodeTree:
+    """Return the group SR Pictogram."""
+    return node_group("SR Pictogram", _build)
+
+
+def _build(tree: Tree) -> None:
+    """A pictogram in the xy plane, as large as fits into a box."""
+    wanted = tree.integer(
+        "Pictogram", 0, (0, len(NAMES) - 1), description=", ".join(f"{i} {name}" for i, name in enumerate(NAMES))
+    )
+    low = tree.input("Low Corner", "Vector", description="Lower left corner of the box (m)")
+    high = tree.input("High Corner", "Vector", description="Upper right corner of the box (m)")
+    color = tree.input("Writing Material", "Material", description="Material of pictograms")
+    border = tree.input("Border Material", "Material", description="Material of those parts that are red")
+
+    ranges, corners = _tables()
+    with tree.frame("Corners of its polygons out of the table of all"):
+        first, count, others = (op.rounded_up(op.component(op.choose(wanted, ranges), axis)) for axis in "XYZ")
+        corner = op.choose(op.index(tree) + first, corners)
+        place = tree.node("ShaderNodeVectorMath", corner, (1.0, 1.0, 0.0), operation="MULTIPLY").value
+        points = tree.node("GeometryNodePoints", count=count, position=place).value
+        polygon = op.rounded_up(op.component(corner, "Z"))
+        curves = tree.node("GeometryNodePointsToCurves", points, curve_group_id=polygon).value
+        curves = tree.node("GeometryNodeSetSplineCyclic", curves, cyclic=True).value
+    with tree.frame("Filled one by one: the red ones come first"):
+        red = op.index(tree) < others
+        mesh = op.join(
+            painted(_filled(op.separate(curves, red, "CURVE")), border),
+            painted(_filled(op.separate(curves, ~red, "CURVE")), color),
+        )
+    with tree.frame("Fitted into the box"):
+        extent = tree.node("GeometryNodeBoundBox", mesh)
+        size, room = extent["Max"] - extent["Min"], high - low
+        scale = op.minimum(
+            op.component(room, "X") / op.maximum(op.component(size, "X"), 1e-3),
+            op.component(room, "Y") / op.maximum(op.component(size, "Y"), 1e-3),
+        )
+        middle = (low + high) * 0.5 - (extent["Max"] + extent["Min"]) * (scale * 0.5)
+        mesh = tree.node(
+            "GeometryNodeTransform", mesh, translation=middle, scale=op.vector(tree, scale, scale, 1.0)
+        ).value
+    tree.output("Mesh", mesh, description="Pictogram, facing +z")
+
+
+def _tables() -> tuple[list[Row], list[Row]]:
+    """Return per pictogram where its corners start, their number and that of its red polygons; and all corners.
+
+    A corner is x, y and the number of its polygon.
+    """
+    ranges: list[Row] = [(0.0, 0.0, 0.0)]
+    corners: list[Row] = []
+    for name, polygons in PICTOGRAMS.items():
+        rows = [(x, y, float(i)) for i, polygon in enumerate(polygons) for x, y in polygon]
+        ranges.append((float(len(corners)), float(len(rows)), float(RED.get(name, 0))))
+        corners += rows
+    return ranges, corners
+
+
+def _filled(curves: Value) -> Value:
+    """Return the areas of curves that may overlap."""
+    return curves.tree.node("GeometryNodeFillCurve", curves, group_id=op.index(curves.tree)).value

@@ -1,0 +1,79 @@
+"""SR Sign Writing: lines of writing as filled outlines, fitted into a box."""
+
+from __future__ import annotations
+
+import bpy
+
+from ...nodes import operations as op
+from ...nodes.builder import Tree, node_group
+from ...nodes.solids import moved
+
+LINES = 6
+"""Most lines of writing on one face."""
+CAPITAL = 0.682
+"""Height of a capital letter of Blender's own font at size 1."""
+LETTERS = 0.62
+"""Height of a capital letter as a share of its line's height."""
+_RESOLUTION = 3  # straight pieces per curve of a letter
+_SMALLEST = 0.02
+"""Letters lower than this (m) can't be read and are left out."""
+
+
+def sign_writing_group() -> bpy.types.NodeTree:
+    """Return the group SR Sign Writing."""
+    return node_group("SR Sign Writing", _build)
+
+
+def sign_line_group() -> bpy.types.NodeTree:
+    """Return the group SR Sign Line."""
+    return node_group("SR Sign Line", _build_line)
+
+
+def _build(tree: Tree) -> None:
+    """Lines of writing in the xy plane, one below the other, all of one size: as large as fits into the box."""
+    lines = [
+        tree.input(f"Line {number}", "String", description="Writing; empty lines take no room")
+        for number in range(1, LINES + 1)
+    ]
+    low = tree.input("Low Corner", "Vector", description="Lower left corner of the box (m)")
+    high = tree.input("High Corner", "Vector", description="Upper right corner of the box (m)")
+    flush = tree.boolean("Flush Left", False, description="Lines begin on the left, else they are centred")
+
+    with tree.frame("Letters of size 1, and the length of each line"):
+        written = [tree.call(sign_line_group(), writing=line) for line in lines]
+        longest = written[0]["Length"]
+        for line in written[1:]:
+            longest = op.maximum(longest, line["Length"])
+    with tree.frame("Height of a line, and size of the letters"):
+        above = [tree.node("FunctionNodeInputInt", integer=0).value]
+        for line in written:
+            above.append(above[-1] + op.rounded_up(op.minimum(line["Length"], 1.0)))
+        pitch = op.component(high - low, "Y") / op.maximum(above[-1], 1.0)
+        room = op.component(high - low, "X")
+        size = op.minimum(pitch * (LETTERS / CAPITAL), room / op.maximum(longest, 1e-3))
+    placed = []
+    for number, line in enumerate(written):
+        with tree.frame(f"Line {number + 1} in its place"):
+            left = op.component(low, "X") + op.switch(flush, (room - line["Length"] * size) * 0.5, 0.0)
+            base = op.component(high, "Y") - pitch * (above[number] + 0.5) - size * (CAPITAL / 2.0)
+            place, scale = op.vector(tree, left, base), op.vector(tree, size, size, 1.0)
+            placed.append(tree.node("GeometryNodeTransform", line.value, translation=place, scale=scale).value)
+    with tree.frame("Filled"):
+        mesh = op.realize(tree.node("GeometryNodeFillCurve", op.join(*placed)).value)
+        mesh = op.only_if(size * CAPITAL > _SMALLEST, mesh)
+    tree.output("Mesh", mesh, description="Letters, facing +z")
+
+
+def _build_line(tree: Tree) -> None:
+    """The outlines of one line's letters of size 1 in the xy plane, from x = 0 on."""
+    writing = tree.input("Writing", "String", description="What is written")
+    with tree.frame("Letters"):
+        curves = tree.node("GeometryNodeStringToCurves", writing, size=1.0).value
+        curves = tree.node("GeometryNodeSetSplineResolution", curves, resolution=_RESOLUTION).value
+    with tree.frame("From x = 0 on"):
+        # The bounds of instances would be those of each letter.
+        extent = tree.node("GeometryNodeBoundBox", op.realize(curves), use_radius=False)
+        first, last = op.component(extent["Min"], "X"), op.component(extent["Max"], "X")
+        curves = moved(curves, op.vector(tree, -first))
+    tree.output("Curves", curves, description="Outlines of the letters")
+    tree.output("Length", last - first, description="Length of the line (m)")

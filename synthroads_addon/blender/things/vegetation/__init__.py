@@ -1,0 +1,1 @@
+"""Plants: grass, shrubs and trees."""

@@ -1,0 +1,123 @@
+"""SR Grass: tufts of blades on the ground, the verges and the median."""
+
+from __future__ import annotations
+
+import bpy
+
+from ....base.classes import class_id
+from ...nodes import operations as op
+from ...nodes.builder import Tree, Value, node_group
+from .plants import declare_stand, one_high, planted, points_in_band, points_on
+
+_VARIANTS = 4
+_GOLDEN_ANGLE = 2.4
+# A blade is a triangle from a broad foot, a little in the ground, to its tip: out, across, up.
+_BLADE = [(0.0, -0.5, -0.04), (0.0, 0.5, -0.04), (0.0, 0.0, 1.0)]
+# A stalk is one face, creased between its widest places, which are its ear.
+_STALK = [(0.0, 0.0, -0.04), (0.10, -0.5, 0.78), (0.10, 0.5, 0.78), (0.2, 0.0, 1.0)]
+
+
+def grass_group() -> bpy.types.NodeTree:
+    """Return the group SR Grass."""
+    return node_group("SR Grass", _build)
+
+
+def _build(tree: Tree) -> None:
+    """Tufts of grass in a band beside the road, and shorter ones on its verges and median."""
+    stand = declare_stand(tree, 1.0, (0.1, 0.45), (0.0, 60.0))
+    beside = tree.number("Roadside Density", 1.0, (0.0, 50.0), description="Tufts per area of verge and median (1/m2)")
+    near = tree.number("Roadside Reach", 30.0, (1.0, 100.0), unit="m", description="Farthest verge from the axis")
+    about = "Height there, as a share of the height elsewhere"
+    short = tree.number("Roadside Height", 0.5, (0.0, 1.0), unit="share", description=about)
+    material = tree.input("Material", "Material", description="Material of the blades")
+    with tree.panel("Shape at height 1"):
+        shape = _declare_tuft(tree)
+
+    with tree.frame("Places on the terrain"):
+        points = points_in_band(tree, stand, stand.density * stand.detail)
+        points = op.store(points, "share", 1.0)
+    with tree.frame("Places on verges and median"):
+        roadside = op.named(tree, "class_id", "INT").equals(class_id("roadside"))
+        faces = op.separate(op.object_geometry(stand.road), roadside, "FACE")
+        mown = points_on(tree, stand, faces, beside * stand.detail, near, stand.seed + 7)
+        points = op.join(points, op.store(mown, "share", short))
+    with tree.frame("Kinds of tufts"):
+        variants = [tree.call(tuft_group(), **shape, seed=100 * n).value for n in range(_VARIANTS)]
+    with tree.frame("Tufts"):
+        share = op.named(tree, "share")
+        height = op.random(tree, stand.lowest, stand.tallest, stand.seed + 3) * share
+        # Low tufts are broad for their height. Fewer tufts are broader, so that they cover as much of the ground.
+        broad = (height + stand.tallest * share) * 0.65 / op.unary("SQRT", op.maximum(stand.detail, 0.05))
+        mesh = planted(tree, stand, points, variants, op.vector(tree, broad, broad, height), 0.12)
+        mesh = op.label(mesh, class_id("vegetation"), stand.instance, material)
+    tree.output("Mesh", mesh, description="Grass; only faces that scanner and camera can see")
+
+
+def _declare_tuft(tree: Tree) -> dict[str, Value]:
+    return {
+        "blades": tree.integer("Blades", 8, (1, 200), description="Blades of a tuft"),
+        "blade_width": tree.number(
+            "Blade Width", 0.11, (0.002, 1.0), unit="m", description="Width of a blade at its foot"
+        ),
+        "spread": tree.number("Spread", 0.4, (0.0, 2.0), unit="m", description="Radius of the tuft on the ground"),
+        "lean": tree.number(
+            "Lean", 0.8, (0.0, 1.5), unit="rad", description="Lean of the outermost blades from the vertical"
+        ),
+        "stalks": tree.integer("Stalks", 2, (1, 50), description="Stalks of a tuft, taller than its blades"),
+        "ear_width": tree.number("Ear Width", 0.07, (0.002, 1.0), unit="m", description="Width of a stalk's ear"),
+        "blade_height": tree.number(
+            "Blade Height", 0.75, (0.05, 1.0), unit="share", description="Length of the blades, of the stalks'"
+        ),
+    }
+
+
+def tuft_group() -> bpy.types.NodeTree:
+    """Return the group SR Grass Tuft."""
+    return node_group("SR Grass Tuft", _build_tuft)
+
+
+def _build_tuft(tree: Tree) -> None:
+    """One tuft of height 1: blades all around, and some stalks in the middle."""
+    shape = _declare_tuft(tree)
+    seed = tree.integer("Seed", 0, (0, 2**30), description="Seed of the blades")
+    with tree.frame("A blade"):
+        disc = tree.node("GeometryNodeMeshCircle", vertices=3, fill_type="NGON").value
+        blade = _shaped(disc, _BLADE, shape["blade_width"])
+    with tree.frame("Blades, the outer ones lean more"):
+        blades = _around(tree, blade, shape["blades"], shape["spread"], shape["lean"], seed)
+    with tree.frame("A stalk with its ear"):
+        face = tree.node("GeometryNodeMeshGrid", vertices_x=2, vertices_y=2).value
+        stalk = _shaped(face, _STALK, shape["ear_width"])
+    with tree.frame("Stalks"):
+        stalks = _around(tree, stalk, shape["stalks"], shape["spread"] * 0.6, shape["lean"] * 0.3, seed + 50)
+    with tree.frame("Blades of their height, all 1 high"):
+        low = op.vector(tree, 1.0, 1.0, shape["blade_height"])
+        place = tree.node("ShaderNodeVectorMath", op.position(tree), low, operation="MULTIPLY").value
+        blades = op.set_position(blades, place)
+        tuft = one_high(op.join(blades, stalks))
+    tree.output("Mesh", tuft, description="The tuft's blades")
+
+
+def _shaped(face: Value, outline: list[tuple[float, float, float]], width: Value) -> Value:
+    tree = face.tree
+    size = op.vector(tree, 1.0, width, 1.0)
+    place = tree.node("ShaderNodeVectorMath", op.choose(op.index(tree), outline), size, operation="MULTIPLY").value
+    return op.set_position(face, place)
+
+
+def _around(tree: Tree, blade: Value, count: Value, spread: Value, lean: Value, seed: Value) -> Value:
+    """Return blades on a disc, each turned to lean away from its middle, the more the further out."""
+    number = op.index(tree)
+    out = op.unary("SQRT", (number + 0.5) / (count * 1.0))
+    around = number * _GOLDEN_ANGLE + op.random(tree, -0.6, 0.6, seed)
+    place = op.vector(tree, op.unary("COSINE", around), op.unary("SINE", around)) * (out * spread)
+    points = tree.node("GeometryNodePoints", count=count).value
+    tilt = out * lean * op.random(tree, 0.5, 1.1, seed + 1)
+    blades = tree.node(
+        "GeometryNodeInstanceOnPoints",
+        op.set_position(points, place),
+        instance=blade,
+        rotation=op.turn(tree, y=tilt, z=around + op.random(tree, -0.9, 0.9, seed + 2)),
+        scale=op.random(tree, 0.7, 1.0, seed + 3),
+    ).value
+    return op.realize(blades)

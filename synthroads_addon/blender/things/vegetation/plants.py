@@ -1,0 +1,158 @@
+"""What grass and trees share: where plants grow, and how they are put there.
+
+A plant's place, size and turn follow from its seed and its number, and its number from the metre of road that it stands
+beside: a stretch of a road has the whole road's plants.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from ...nodes import operations as op
+from ...nodes.backbone import first_station, last_station, look_up, station_ribbon
+from ...nodes.builder import Operand, Tree, Value
+from ...nodes.strip import INSTANCES
+
+_SPARE = 1.5
+"""Places that are looked at for each one that is wanted: outside of curves and on slopes there is more ground to a
+metre of road. Where it were even more, plants would stand thinner."""
+_ABOVE = 1000.0
+"""Height from which the ground is looked for, m."""
+
+_NEEDED_NO_MORE = ("distance", "station", "offset", "edge", "share", "id")
+"""Attributes of the places that the plants' many points would only carry along."""
+
+
+@dataclass(frozen=True)
+class Stand:
+    """Inputs of a stand of plants, common to all kinds."""
+
+    backbone: Value
+    terrain: Value
+    road: Value
+    density: Value
+    start: Value
+    end: Value
+    lowest: Value
+    tallest: Value
+    reach: Value
+    first_metre: Value
+    zero: Value
+    seed: Value
+    detail: Value
+    instance: Value
+
+
+def declare_stand(tree: Tree, density: float, heights: tuple[float, float], band: tuple[float, float]) -> Stand:
+    """Declare the inputs common to all kinds of plants."""
+    metres = (0, 2**20)
+    return Stand(
+        backbone=tree.input("Backbone", "Object", description="Polyline along the axis with its attributes"),
+        terrain=tree.input("Terrain", "Object", description="Terrain whose points carry their distance"),
+        road=tree.input("Road", "Object", description="Road, for its verges and median"),
+        density=tree.number("Density", density, (0.0, 50.0), description="Plants per area (1/m2)"),
+        start=tree.number(
+            "Band Start", band[0], (-5.0, 1000.0), unit="m", description="From the outer edge of the verge"
+        ),
+        end=tree.number("Band End", band[1], (-5.0, 1000.0), unit="m", description="From the outer edge of the verge"),
+        lowest=tree.number("Smallest Height", heights[0], (0.01, 60.0), unit="m", description="Height of the smallest"),
+        tallest=tree.number("Largest Height", heights[1], (0.01, 60.0), unit="m", description="Height of the tallest"),
+        reach=tree.number("Reach", 60.0, (1.0, 1000.0), unit="m", description="Farthest ground from the axis"),
+        first_metre=tree.integer("First Metre", 0, metres, description="Whole metre of the road that it begins with"),
+        zero=tree.integer("Zero", 0, metres, description="Whole metre of the road that the stations count from"),
+        seed=tree.integer("Seed", 0, (0, 2**31 - 1), description="Seed of places, sizes and turns"),
+        detail=tree.number("Detail", 1.0, (0.0, 1.0), unit="share", description="Share of the triangles"),
+        instance=tree.integer("Instance", 0, INSTANCES, description="Instance number of the faces"),
+    )
+
+
+def points_in_band(tree: Tree, stand: Stand, density: Operand) -> Value:
+    """Return points spread at random over the terrain in the band."""
+    surface = op.object_geometry(stand.terrain)
+    return points_on(tree, stand, surface, density, stand.reach, stand.seed, (stand.start, stand.end))
+
+
+def points_on(
+    tree: Tree,
+    stand: Stand,
+    surface: Value,
+    density: Operand,
+    reach: Value,
+    seed: Value,
+    band: tuple[Value, Value] | None = None,
+) -> Value:
+    """Return points spread at random over a surface, as many per area of it everywhere.
+
+    Args:
+        surface: its points carry their ``distance``.
+        density: points per area, 1/m2.
+        reach: how far from the axis they are looked for, m.
+        seed: of their places.
+        band: limits of the distance, m; none if None.
+    """
+    axis = op.object_geometry(stand.backbone)
+    ribbon = station_ribbon(axis)
+    first = stand.first_metre - stand.zero
+    rows = _integer(op.rounded_up(last_station(axis)) - first, 0)
+    per_metre = reach * 2.0 * density
+    each = _integer(op.rounded_up(per_metre * _SPARE), 1)
+    points = tree.node("GeometryNodePoints", count=rows * each).value
+    number = op.index(tree)
+    metre = number // each
+    # A number of its own for every place on the road, however much of the road is here.
+    points = op.store(points, "id", (stand.first_metre + metre) * each + number % each)
+    own = op.named(tree, "id", "INT")
+    points = op.store(points, "station", (metre + first) + op.random(tree, 0.0, 1.0, seed + 11, own))
+    points = op.store(points, "offset", op.random(tree, -1.0, 1.0, seed + 12, own) * reach)
+    station, offset = op.named(tree, "station"), op.named(tree, "offset")
+    points = op.delete_points(points, (station < first_station(axis)) | (station > last_station(axis)))
+    above = look_up(ribbon, "axis", station) + look_up(ribbon, "left", station) * offset + (0.0, 0.0, _ABOVE)
+    points = op.set_position(points, above)
+    ray = tree.node(
+        "GeometryNodeRaycast",
+        target_geometry=surface,
+        attribute=op.named(tree, "distance"),
+        source_position=op.position(tree),
+        ray_length=2.0 * _ABOVE,
+    )
+    # Ground per metre of road and metre across it: longer outside of a curve, and on a slope.
+    ground = 1.0 - look_up(ribbon, "curvature", station) * offset
+    wanted = per_metre * ground / op.maximum(op.component(ray["Hit Normal"], "Z"), 0.1)
+    gone = ~ray["Is Hit"] | (op.random(tree, 0.0, 1.0, seed + 13, own) * each > wanted)
+    if band is not None:
+        gone = gone | (ray["Attribute"] < band[0]) | (ray["Attribute"] > band[1])
+    return op.set_position(op.delete_points(points, gone), ray["Hit Position"])
+
+
+def _integer(value: Value, least: int) -> Value:
+    """Return a whole number that is at least so large."""
+    return value.tree.node("FunctionNodeIntegerMath", value, least, operation="MAXIMUM").value
+
+
+def planted(tree: Tree, stand: Stand, points: Value, variants: list[Value], height: Value, lean: float) -> Value:
+    """Put one of the variants (of height 1) on each point, turned and leant at random, and make it real."""
+    bodies = op.join(*(tree.node("GeometryNodeGeometryToInstance", variant).value for variant in variants))
+    # A whole random number would be another one in Blender 5.
+    share = op.random(tree, 0.0, len(variants) - 0.001, stand.seed + 2)
+    pick = tree.node("FunctionNodeFloatToInt", share, rounding_mode="FLOOR").value
+    plants = tree.node(
+        "GeometryNodeInstanceOnPoints",
+        points,
+        instance=bodies,
+        pick_instance=True,
+        instance_index=pick,
+        rotation=op.random_turn(tree, (-lean, -lean, 0.0), (lean, lean, 6.2832), stand.seed + 1),
+        scale=height,
+    ).value
+    for name in _NEEDED_NO_MORE:
+        plants = tree.node("GeometryNodeRemoveAttribute", plants, name=name).value
+    return op.realize(plants)
+
+
+def one_high(plant: Value) -> Value:
+    """Return a plant scaled along z so that its top is at 1."""
+    tree = plant.tree
+    top = op.component(tree.node("GeometryNodeBoundBox", plant)["Max"], "Z")
+    size = op.vector(tree, 1.0, 1.0, 1.0 / top)
+    place = tree.node("ShaderNodeVectorMath", op.position(tree), size, operation="MULTIPLY").value
+    return op.set_position(plant, place)

@@ -1,0 +1,77 @@
+"""SR Shrub: shrubs of many stems that grow from the ground."""
+
+from __future__ import annotations
+
+import bpy
+
+from ....base.classes import class_id
+from ...nodes import operations as op
+from ...nodes.builder import Tree, Value, node_group
+from .crown import crown_group, declare_crown, declare_materials, declare_plant, grown
+from .plants import declare_stand, planted, points_in_band
+
+# Kinds of one species: seed, and a factor on the crown's radius.
+_KINDS = ((5, 1.0), (17, 0.82), (29, 1.15))
+_LEAN = 0.06
+_DEFAULTS = {
+    "crown_bottom": 0.05,
+    "crown_radius": 0.5,
+    "crown_fullness": 0.5,
+    "cluster_radius": 0.2,
+    "leafy_share": 0.5,
+    "leaf_length": 0.09,
+    "leaf_width": 0.09,
+    "branches": 14,
+    "leaves": 700,
+}
+
+
+def shrub_group() -> bpy.types.NodeTree:
+    """Return the group SR Shrub."""
+    return node_group("SR Shrub", _build)
+
+
+def _build(tree: Tree) -> None:
+    """Shrubs of one species in a band beside the road, of three kinds, with gaps between their leaves."""
+    stand = declare_stand(tree, 0.006, (0.5, 3.0), (2.0, 60.0))
+    with tree.panel("Shape at height 1"):
+        shape = declare_crown(tree, **_DEFAULTS) | {"stem_radius": _stem_radius(tree)}
+    with tree.panel("Materials"):
+        materials = declare_materials(tree)
+    with tree.frame("Places"):
+        points = points_in_band(tree, stand, stand.density)
+    with tree.frame("Kinds of shrubs"):
+        kinds = [_kind(tree, {**shape, **materials, "detail": stand.detail}, *kind) for kind in _KINDS]
+    with tree.frame("Shrubs"):
+        tall = op.random(tree, stand.lowest, stand.tallest, stand.seed + 3)
+        broad = op.random(tree, 0.85, 1.25, stand.seed + 4)
+        scale = op.vector(tree, tall * broad, tall * broad, tall)
+        mesh = planted(tree, stand, points, kinds, scale, _LEAN)
+        mesh = op.store(mesh, "class_id", class_id("vegetation"), "FACE")
+        mesh = op.store(mesh, "instance_id", stand.instance, "FACE")
+    tree.output("Mesh", mesh, description="Shrubs")
+
+
+def _stem_radius(tree: Tree) -> Value:
+    return tree.number("Stem Radius", 0.015, (0.0005, 0.2), unit="m", description="Radius of the thickest stem")
+
+
+def _kind(tree: Tree, inputs: dict[str, Value], seed: int, wider: float) -> Value:
+    return tree.call(shape_group(), **inputs | {"crown_radius": inputs["crown_radius"] * wider}, seed=seed).value
+
+
+def shape_group() -> bpy.types.NodeTree:
+    """Return the group SR Shrub Shape."""
+    return node_group("SR Shrub Shape", _build_shape)
+
+
+def _build_shape(tree: Tree) -> None:
+    """One shrub of height 1: stems and leaves."""
+    shape = declare_crown(tree, **_DEFAULTS)
+    radius = _stem_radius(tree)
+    plant = declare_plant(tree)
+    with tree.frame("Stems and leaves"):
+        shrub = tree.call(crown_group(), **shape, **plant, branch_radius=radius, from_ground=True).value
+    with tree.frame("Crooked, and 1 high"):
+        grown_up = grown(tree, shrub, plant["seed"])
+    tree.output("Mesh", grown_up, description="The shrub, upright on the origin")

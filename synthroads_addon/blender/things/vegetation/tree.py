@@ -1,0 +1,92 @@
+"""SR Tree: trees with a tapered trunk, and a crown of branches and leaves."""
+
+from __future__ import annotations
+
+import bpy
+
+from ....base.classes import class_id
+from ...nodes import operations as op
+from ...nodes.builder import Tree, Value, node_group
+from .crown import crown_group, declare_crown, declare_materials, declare_plant, grown
+from .plants import declare_stand, planted, points_in_band
+
+# Kinds of one species: seed, and factors on the crown's bottom and radius.
+_KINDS = ((11, 1.0, 1.0), (23, 0.85, 0.86), (37, 1.2, 1.12))
+_SIDES, _ROWS = 7, 5
+_FOOT = 0.02
+"""Depth of the trunk's foot in the ground, so that it shows no gap on a batter."""
+_LEAN = 0.04
+
+
+def tree_group() -> bpy.types.NodeTree:
+    """Return the group SR Tree."""
+    return node_group("SR Tree", _build)
+
+
+def _build(tree: Tree) -> None:
+    """Trees of one species in a band beside the road, of three kinds, with gaps between their leaves."""
+    stand = declare_stand(tree, 0.005, (5.0, 14.0), (12.0, 60.0))
+    with tree.panel("Shape at height 1"):
+        shape = declare_crown(tree) | {"trunk_radius": _trunk_radius(tree)}
+    with tree.panel("Materials"):
+        materials = declare_materials(tree)
+    with tree.frame("Places"):
+        points = points_in_band(tree, stand, stand.density)
+    with tree.frame("Kinds of trees"):
+        kinds = [_kind(tree, {**shape, **materials, "detail": stand.detail}, *kind) for kind in _KINDS]
+    with tree.frame("Trees"):
+        tall = op.random(tree, stand.lowest, stand.tallest, stand.seed + 3)
+        slender = op.random(tree, 0.9, 1.15, stand.seed + 4)
+        scale = op.vector(tree, tall * slender, tall * slender, tall)
+        mesh = planted(tree, stand, points, kinds, scale, _LEAN)
+        mesh = op.store(mesh, "class_id", class_id("vegetation"), "FACE")
+        mesh = op.store(mesh, "instance_id", stand.instance, "FACE")
+    tree.output("Mesh", mesh, description="Trees")
+
+
+def _trunk_radius(tree: Tree) -> Value:
+    about = "Radius of the trunk at its foot"
+    return tree.number("Trunk Radius", 0.02, (0.001, 0.2), unit="m", description=about)
+
+
+def _kind(tree: Tree, inputs: dict[str, Value], seed: int, lower: float, wider: float) -> Value:
+    own = {"crown_bottom": inputs["crown_bottom"] * lower, "crown_radius": inputs["crown_radius"] * wider}
+    return tree.call(shape_group(), **inputs | own, seed=seed).value
+
+
+def shape_group() -> bpy.types.NodeTree:
+    """Return the group SR Tree Shape."""
+    return node_group("SR Tree Shape", _build_shape)
+
+
+def _build_shape(tree: Tree) -> None:
+    """One tree of height 1: trunk, branches and leaves."""
+    shape = declare_crown(tree)
+    radius = _trunk_radius(tree)
+    plant = declare_plant(tree)
+    with tree.frame("Trunk, with a wider foot"):
+        trunk = _trunk(tree, radius)
+        trunk = tree.node("GeometryNodeSetMaterial", trunk, material=plant["bark_material"]).value
+    with tree.frame("Crown"):
+        crown = tree.call(crown_group(), **shape, **plant, branch_radius=radius * 0.4).value
+    with tree.frame("Crooked, and 1 high"):
+        grown_up = grown(tree, op.join(trunk, crown), plant["seed"])
+    tree.output("Mesh", grown_up, description="The tree, upright on the origin")
+
+
+def _trunk(tree: Tree, radius: Value) -> Value:
+    trunk = tree.node(
+        "GeometryNodeMeshCone",
+        fill_type="NONE",
+        vertices=_SIDES,
+        side_segments=_ROWS,
+        radius_bottom=radius,
+        radius_top=radius * 0.2,
+        depth=0.93 + _FOOT,
+    ).value
+    place = op.position(tree)
+    height = op.component(place, "Z")
+    wider = 1.0 + 0.45 * op.maximum(1.0 - height * 12.0, 0.0)
+    size = op.vector(tree, wider, wider, 1.0)
+    place = tree.node("ShaderNodeVectorMath", place, size, operation="MULTIPLY").value
+    return op.set_position(trunk, place - (0.0, 0.0, _FOOT))

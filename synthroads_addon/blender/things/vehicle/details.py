@@ -1,0 +1,187 @@
+"""What vehicles have beside their bodies: wheels, boxes such as lights and plates, and round parts."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+
+import bpy
+
+from ...nodes import operations as op
+from ...nodes.builder import Tree, Value, node_group
+from ...nodes.solids import Point, box, moved, painted, put
+
+MATERIALS = {
+    "paint": "Paint, in the vehicle's colour",
+    "glass": "Windows",
+    "rubber": "Tyres",
+    "chrome": "Rims and bright metal",
+    "black": "Bumpers, frames and other dark parts",
+    "white_light": "Headlights",
+    "red_light": "Tail lights",
+    "plate": "Number plates",
+    "cover": "Tarpaulin or box of a truck",
+}
+"""Materials of a vehicle, and what has them."""
+
+_SIDES = 16
+# Cross-section of a wheel from the hub outside to the hub inside: radius as a share of the wheel's, and place across as
+# a share of its width from the middle.
+_WHEEL = [(0.0, 0.30), (0.58, 0.30), (0.66, 0.46), (0.92, 0.5), (1.0, 0.38), (1.0, -0.38), (0.92, -0.5), (0.0, -0.4)]
+_RIM_FACES = 2
+_SHARP = math.radians(38.0)
+"""Faces that meet at a larger angle show an edge."""
+
+
+def declare_materials(tree: Tree) -> dict[str, Value]:
+    """Declare the material inputs."""
+    return {
+        key: tree.input(f"{key.replace('_', ' ').title()} Material", "Material", description=about)
+        for key, about in MATERIALS.items()
+    }
+
+
+def wheels(
+    tree: Tree, radius: float, width: float, places: Iterable[tuple[float, float]], materials: Mapping[str, Value]
+) -> Value:
+    """Return wheels that stand on z = 0, at places (x of their middles, y); they look away from x = 0."""
+    inputs = {"rubber_material": materials["rubber"], "chrome_material": materials["chrome"]}
+    wheel = tree.call(_wheel_group(), radius=radius, wheel_width=width, **inputs).value
+    stands = [(x, y, radius) for x, y in places]
+    points = tree.node("GeometryNodeMeshLine", count=len(stands)).value
+    place = op.choose(op.index(tree), stands)
+    turned = op.switch(op.component(place, "X") < 0.0, math.pi, 0.0)
+    return op.realize(put(points, wheel, place, rotation=op.turn(tree, z=turned)))
+
+
+def pair(x: float, y: float) -> list[tuple[float, float]]:
+    """Return the places of an axle's two wheels."""
+    return [(-x, y), (x, y)]
+
+
+def boxes(
+    tree: Tree, items: Iterable[tuple[str, Point, Point]], materials: Mapping[str, Value], mirrored: bool = False
+) -> Value:
+    """Return boxes: material, middle, size. Mirrored ones stand on both sides."""
+    group = _box_group()
+    parts = [
+        tree.call(group, middle=middle, size=size, both_sides=mirrored, material=materials[material]).value
+        for material, middle, size in items
+    ]
+    return op.join(*parts)
+
+
+def rod(
+    tree: Tree, start: Point, end: Point, radii: tuple[float, float], material: Value, mirrored: bool = False
+) -> Value:
+    """Return a round, tapered, closed rod between two places."""
+    radius, end_radius = radii
+    return tree.call(
+        _rod_group(),
+        start=start,
+        end=end,
+        start_radius=radius,
+        end_radius=end_radius,
+        both_sides=mirrored,
+        material=material,
+    ).value
+
+
+def ball(tree: Tree, middle: Point, size: Point, material: Value) -> Value:
+    """Return an ellipsoid of half axes `size`."""
+    sphere = tree.node("GeometryNodeMeshUVSphere", segments=12, rings=8, radius=1.0).value
+    return painted(tree.node("GeometryNodeTransform", sphere, translation=middle, scale=size).value, material)
+
+
+def smooth(vehicle: Value) -> Value:
+    """Return the vehicle, shaded smoothly but for its sharp edges."""
+    tree = vehicle.tree
+    angle = tree.node("GeometryNodeInputMeshEdgeAngle")["Unsigned Angle"]
+    rounded = tree.node("GeometryNodeSetShadeSmooth", vehicle, shade_smooth=True).value
+    return tree.node("GeometryNodeSetShadeSmooth", rounded, angle > _SHARP, False, domain="EDGE").value
+
+
+def _wheel_group() -> bpy.types.NodeTree:
+    return node_group("SR Wheel", _build_wheel)
+
+
+def _build_wheel(tree: Tree) -> None:
+    """A wheel around the origin, its axle along x, whose outer side looks to -x."""
+    radius = tree.number("Radius", 0.32, (0.05, 2.0), unit="m", description="Radius of the tyre")
+    width = tree.number("Wheel Width", 0.21, (0.02, 2.0), unit="m", description="Width of the tyre")
+    rubber = tree.input("Rubber Material", "Material", description="Material of the tyre")
+    chrome = tree.input("Chrome Material", "Material", description="Material of the rim")
+    with tree.frame("Profile, turned around the axle"):
+        mesh, column, row = op.grid(tree, _SIDES + 1, len(_WHEEL))
+        profile = op.choose(row, [(share, across, 0.0) for share, across in _WHEEL])
+        # The lowest point of the tread is a corner of the polygon.
+        angle = (column % _SIDES) * (2.0 * math.pi / _SIDES) + 0.5 * math.pi
+        out = op.component(profile, "X") * radius
+        across = op.component(profile, "Y") * width
+        turned = op.vector(tree, -across, op.unary("COSINE", angle) * out, op.unary("SINE", angle) * out)
+        wheel = op.without_degenerate(op.set_position(mesh, turned))
+    with tree.frame("Tyre and rim"):
+        wheel = painted(wheel, rubber)
+        rim = (op.index(tree) % (len(_WHEEL) - 1)) < _RIM_FACES
+        wheel = tree.node("GeometryNodeSetMaterial", wheel, rim, material=chrome).value
+    tree.output("Mesh", wheel, description="The wheel")
+
+
+def _box_group() -> bpy.types.NodeTree:
+    return node_group("SR Vehicle Box", _build_box)
+
+
+def _build_box(tree: Tree) -> None:
+    """A box, or one on each side of a vehicle."""
+    middle = tree.input("Middle", "Vector", description="Middle of the box (m)")
+    size = tree.input("Size", "Vector", description="Its size (m)")
+    both, material = _declare_sides(tree)
+    with tree.frame("Box"):
+        body = painted(moved(box(tree, size), middle), material)
+    with tree.frame("On the other side"):
+        other = moved(box(tree, size), _mirrored(middle))
+        body = op.join(body, op.only_if(both, painted(other, material)))
+    tree.output("Mesh", body, description="The box")
+
+
+def _rod_group() -> bpy.types.NodeTree:
+    return node_group("SR Vehicle Rod", _build_rod)
+
+
+def _build_rod(tree: Tree) -> None:
+    """A round, tapered rod between two places, or one on each side of a vehicle."""
+    start = tree.input("Start", "Vector", description="Middle of its first end (m)")
+    end = tree.input("End", "Vector", description="Middle of its other end (m)")
+    thick = tree.number("Start Radius", 0.05, (0.001, 5.0), unit="m", description="Radius at the first end")
+    thin = tree.number("End Radius", 0.05, (0.001, 5.0), unit="m", description="Radius at the other end")
+    both, material = _declare_sides(tree)
+
+    def between(first: Value, last: Value) -> Value:
+        way = last - first
+        length = tree.node("ShaderNodeVectorMath", way, operation="LENGTH")["Value"]
+        cone = tree.node(
+            "GeometryNodeMeshCone",
+            fill_type="NGON",
+            vertices=8,
+            radius_bottom=thick,
+            radius_top=thin,
+            depth=length,
+        ).value
+        turned = tree.node("FunctionNodeAlignRotationToVector", vector=way, axis="Z").value
+        body = tree.node("GeometryNodeTransform", cone, translation=first, rotation=turned).value
+        return painted(body, material)
+
+    with tree.frame("Rod"):
+        body = between(start, end)
+    with tree.frame("On the other side"):
+        body = op.join(body, op.only_if(both, between(_mirrored(start), _mirrored(end))))
+    tree.output("Mesh", body, description="The rod")
+
+
+def _declare_sides(tree: Tree) -> tuple[Value, Value]:
+    both = tree.boolean("Both Sides", False, description="Another one stands on the other side of x = 0")
+    return both, tree.input("Material", "Material", description="Material of the faces")
+
+
+def _mirrored(place: Value) -> Value:
+    return place.tree.node("ShaderNodeVectorMath", place, (-1.0, 1.0, 1.0), operation="MULTIPLY").value

@@ -1,0 +1,93 @@
+"""Vehicles that drive through a section of a road: their meshes in the frame that they move in, without a road."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import bpy
+import numpy as np
+
+from ....base.classes import class_id
+from ....road.parameters import Vehicle
+from ....scanning.scene.mesh import SceneMesh
+from ....scanning.scene.motion import Motion, MovingMesh, ScannedScene
+from ...compat import set_modifier_input
+from ...materials import material
+from ...scene.evaluated import scene_mesh
+from .build import MATERIALS
+from .models import model_group
+
+
+class VehicleMeshes:
+    """Meshes of vehicles by model, each made when it is first needed; must be used on Blender's main thread.
+
+    Materials have one number in all the scenes that one of these put together.
+    """
+
+    def __init__(self) -> None:
+        self._models: dict[str, SceneMesh] = {}
+        self._materials: dict[str, None] = {}
+
+    def with_traffic(
+        self, static: SceneMesh, vehicles: Mapping[str, Vehicle], motions: Mapping[str, Motion]
+    ) -> ScannedScene:
+        """Return what stands together with vehicles that drive.
+
+        Args:
+            static: what stands.
+            vehicles: by id.
+            motions: theirs, in the static mesh's frame.
+        """
+        models = {vehicle.model: self._model(vehicle.model) for vehicle in vehicles.values()}
+        for mesh in (static, *models.values()):
+            self._materials |= dict.fromkeys(mesh.materials)
+        names = tuple(self._materials)
+        meshes = {model: _with_materials(mesh, names) for model, mesh in models.items()}
+        moving = tuple(
+            MovingMesh(_numbered(meshes[vehicle.model], vehicle.instance), motions[name])
+            for name, vehicle in vehicles.items()
+        )
+        return ScannedScene(_with_materials(static, names), moving)
+
+    def _model(self, model: str) -> SceneMesh:
+        if model not in self._models:
+            self._models[model] = _own_frame(model)
+        return self._models[model]
+
+
+def _own_frame(model: str) -> SceneMesh:
+    """Return a model in the frame of `LaneMotion`: its middle at 0 on the road, x forward, y left, z up."""
+    item = bpy.data.objects.new("SR Vehicle", bpy.data.meshes.new("SR Vehicle"))
+    bpy.context.scene.collection.objects.link(item)
+    try:
+        modifier = item.modifiers.new("SynthRoads", "NODES")
+        modifier.node_group = model_group(model)
+        for key, entry in MATERIALS.items():
+            set_modifier_input(modifier, f"{key} Material", material(entry))
+        bpy.context.view_layer.update()
+        mesh = scene_mesh(objects=[item])
+    finally:
+        data = item.data
+        bpy.data.objects.remove(item)
+        bpy.data.meshes.remove(data)
+    # The group's model faces +y.
+    right, ahead, up = mesh.vertices.T
+    return replace(
+        mesh,
+        vertices=np.ascontiguousarray(np.stack([ahead, -right, up], axis=1)),
+        class_id=np.full(len(mesh), class_id("vehicle"), np.uint8),
+        origin=np.zeros(3),
+    )
+
+
+def _numbered(mesh: SceneMesh, instance: int) -> SceneMesh:
+    return replace(mesh, instance_id=np.full(len(mesh), instance, np.uint32))
+
+
+def _with_materials(mesh: SceneMesh, names: Sequence[str]) -> SceneMesh:
+    """Return a mesh whose materials are counted by names that hold all of its own."""
+    if mesh.materials == tuple(names):
+        return mesh
+    numbers = np.array([names.index(name) for name in mesh.materials], np.uint16)
+    return replace(mesh, material=numbers[mesh.material] if len(numbers) else mesh.material, materials=tuple(names))

@@ -1,0 +1,107 @@
+"""SR Vehicles: vehicles of one model on given points of the road."""
+
+from __future__ import annotations
+
+import bpy
+
+from ....base.classes import class_id
+from ....road.things.chassis import CHASSIS
+from ...nodes import operations as op
+from ...nodes.builder import Tree, Value, node_group
+from .details import declare_materials
+from .models import model_group
+
+COLOR = "vehicle_color"
+"""Attribute of the points, and of the vehicles that stand on them, that the paint's base colour is read from."""
+_POINTS = (
+    "One point per vehicle, below its middle, at any height, with heading (rad), grade of the road ahead (m/m), "
+    f"{COLOR} and instance"
+)
+
+
+def vehicle_group(model: str) -> bpy.types.NodeTree:
+    """Return the group that places vehicles of a model, e.g. SR Vehicles Car."""
+    description = f"A {model} on each point; points carry heading (rad), {COLOR} and instance"
+    return node_group(f"SR Vehicles {model.title()}", lambda tree: _build(tree, model), model, description=description)
+
+
+def _build(tree: Tree, model: str) -> None:
+    points = tree.input("Points", "Geometry", description=_POINTS)
+    road = tree.input("Road", "Object", description="Surface that they drive on")
+    materials = declare_materials(tree)
+    with tree.frame("Vehicle"):
+        body = tree.call(model_group(model), **{f"{key}_material": value for key, value in materials.items()}).value
+    with tree.frame("On the road"):
+        chassis = CHASSIS[model]
+        vehicles = tree.call(
+            _on_wheels_group(),
+            points=points,
+            vehicle=body,
+            road=op.object_geometry(road),
+            front_axle=chassis.front,
+            rear_axle=chassis.rear,
+            half_track=chassis.half_track,
+        ).value
+    tree.output("Mesh", vehicles, description="Vehicles; each face has its own vehicle's instance number")
+
+
+def _on_wheels_group() -> bpy.types.NodeTree:
+    return node_group("SR On Wheels", _build_on_wheels)
+
+
+def _build_on_wheels(tree: Tree) -> None:
+    """A vehicle on each point, pitched and rolled as the road below its axles."""
+    points = tree.input("Points", "Geometry", description=_POINTS)
+    vehicle = tree.input("Vehicle", "Geometry", description="The vehicle, its wheels on z = 0, facing along +y")
+    road = tree.input("Road", "Geometry", description="Surface that the vehicles drive on")
+    limits = (-20.0, 20.0)
+    front = tree.number(
+        "Front Axle", 1.3, limits, unit="m", description="Place of the middle of the front axles along y"
+    )
+    rear = tree.number("Rear Axle", -1.3, limits, unit="m", description="Place of the middle of the hind axles along y")
+    track = tree.number("Half Track", 0.8, (0.1, 3.0), unit="m", description="Distance of the wheels from x = 0")
+    with tree.frame("The road below the wheels"):
+        behind, across_behind = _axle(tree, road, rear, track)
+        ahead, across_ahead = _axle(tree, road, front, track)
+    with tree.frame("As the road is pitched and rolled"):
+        # Place and turn are evaluated where the points still are.
+        points = op.store(points, "vehicle_place", behind - (ahead - behind) * (rear / (front - rear)))
+        rotation = tree.node(
+            "FunctionNodeAxesToRotation",
+            ahead - behind,
+            across_behind + across_ahead,
+            primary_axis="Y",
+            secondary_axis="X",
+        ).value
+        vehicles = tree.node("GeometryNodeInstanceOnPoints", points, instance=vehicle, rotation=rotation).value
+        place = op.named(tree, "vehicle_place", "FLOAT_VECTOR")
+        vehicles = tree.node("GeometryNodeSetPosition", vehicles, position=place).value
+    with tree.frame("Labels"):
+        vehicles = op.store(vehicles, "vehicle_instance", op.named(tree, "instance", "INT"), "INSTANCE")
+        vehicles = op.store(op.realize(vehicles), "class_id", class_id("vehicle"), "FACE")
+        vehicles = op.store(vehicles, "instance_id", op.named(tree, "vehicle_instance", "INT"), "FACE")
+    tree.output("Mesh", vehicles, description="Vehicles; each face has its own vehicle's instance number")
+
+
+def _axle(tree: Tree, road: Value, along: Value, track: Value) -> tuple[Value, Value]:
+    """Return the middle between the road's points below an axle's wheels, and the way from the left to the right."""
+    heading = op.named(tree, "heading")
+    sine, cosine = op.unary("SINE", heading), op.unary("COSINE", heading)
+    way, right = op.vector(tree, -sine, cosine), op.vector(tree, cosine, sine)
+    left_wheel, right_wheel = (
+        _on_road(road, op.position(tree) + way * along + right * beside, way) for beside in (-track, track)
+    )
+    return (left_wheel + right_wheel) * 0.5, right_wheel - left_wheel
+
+
+def _on_road(road: Value, place: Value, way: Value) -> Value:
+    """Return the road's point above or below `place`; beyond its ends it goes on at the vehicle's grade."""
+    tree = road.tree
+    ray = tree.node(
+        "GeometryNodeRaycast", target_geometry=road, source_position=place + (0.0, 0.0, 500.0), ray_length=1000.0
+    )
+    nearest = op.sample_surface(road, op.position(tree), place)
+    beyond = op.component(nearest, "Z") + op.dot(place - nearest, way) * op.named(tree, "grade")
+    height = op.switch(ray["Is Hit"], beyond, op.component(ray["Hit Position"], "Z"))
+    flat = tree.node("ShaderNodeVectorMath", place, (1.0, 1.0, 0.0), operation="MULTIPLY").value
+    return flat + op.vector(tree, 0.0, 0.0, height)

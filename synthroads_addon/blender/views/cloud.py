@@ -1,0 +1,164 @@
+"""A cloud drawn over the 3D views: nothing is added to the file, so there is nothing to undo, save, scan or render.
+
+Points are drawn as points of some pixels whatever the viewport's shading, hidden by what stands in front of them. They
+are drawn a little nearer to the eye than they are: a cloud lies in the surfaces that it was scanned from. Where drawing
+all of them takes long, fewer are drawn while a view is turned, and all once it stands still.
+"""
+
+from __future__ import annotations
+
+from time import perf_counter
+
+import bpy
+import gpu
+import numpy as np
+from mathutils import Matrix, Vector
+from numpy.typing import NDArray
+
+from ...cloud.tools.display import ColourBy, DisplayCloud
+from ..model.build import ORIGIN
+
+_NEARER = 0.004
+"""By which share of their distance points are drawn nearer: at 50 m, 20 cm along the line of sight."""
+_FLUENT = 0.05
+"""Seconds that drawing may take while a view is turned."""
+_STILL = 0.3
+"""Seconds after which a view that isn't turned any more is drawn with all points."""
+
+
+def scene_origin(scene: bpy.types.Scene) -> NDArray[np.float64] | None:
+    """Return the map coordinates (3,) of the road's local origin in a scene; None without a road."""
+    for collection in scene.collection.children_recursive:
+        if ORIGIN in collection:
+            return np.array(collection[ORIGIN], dtype=np.float64)
+    return None
+
+
+class CloudView:
+    """The cloud that is drawn over the 3D views of one scene.
+
+    Attributes:
+        cloud: the points; None while there is nothing to draw.
+        by: what they are coloured by.
+        size: of a point, pixels.
+        visible: whether they are drawn.
+    """
+
+    def __init__(self) -> None:
+        self.cloud: DisplayCloud | None = None
+        self.by: ColourBy = "class"
+        self.size = 2.0
+        self.visible = True
+        self._scene = 0
+        self._handler: object | None = None
+        self._positions: gpu.types.GPUVertBuf | None = None
+        self._batch: tuple[ColourBy, gpu.types.GPUBatch] | None = None
+        self._pace = Pace()
+
+    def show(self, cloud: DisplayCloud, scene: bpy.types.Scene) -> None:
+        """Draw a cloud in a scene, in place of the one before."""
+        self.remove()
+        self.cloud, self._scene, self.visible, self._pace = cloud, scene.session_uid, True, Pace()
+        self._handler = bpy.types.SpaceView3D.draw_handler_add(self._draw, (), "WINDOW", "POST_VIEW")
+
+    def remove(self) -> None:
+        """Draw nothing any more, and free the memory."""
+        self.cloud = self._positions = self._batch = None
+        if self._handler is not None:
+            bpy.types.SpaceView3D.draw_handler_remove(self._handler, "WINDOW")
+            self._handler = None
+
+    def offset(self, scene: bpy.types.Scene) -> NDArray[np.float64]:
+        """Return what is added (3,) to the cloud's coordinates to have those of the scene, m.
+
+        That is 0 unless a road with another origin was built since the cloud was read.
+        """
+        origin = scene_origin(scene)
+        return np.zeros(3) if origin is None or self.cloud is None else self.cloud.origin - origin
+
+    def _draw(self) -> None:
+        context = bpy.context
+        if self.cloud is None or not self.visible or context.scene.session_uid != self._scene:
+            return
+        shader = gpu.shader.from_builtin("POINT_FLAT_COLOR")
+        batch = self._coloured(shader)
+        with gpu.matrix.push_pop():
+            gpu.matrix.load_matrix(_nearer(context.region_data) @ gpu.matrix.get_model_view_matrix())
+            gpu.matrix.translate(Vector(self.offset(context.scene)))
+            depth_test, depth_mask = gpu.state.depth_test_get(), gpu.state.depth_mask_get()
+            gpu.state.depth_test_set("LESS_EQUAL")
+            gpu.state.depth_mask_set(True)  # points hide each other
+            gpu.state.point_size_set(self.size * context.preferences.system.pixel_size)
+            count = self._pace.points(len(self.cloud), context.region, context.region_data.perspective_matrix)
+            begin = perf_counter()
+            batch.draw_range(shader, elem_start=0, elem_count=count)
+            self._pace.took(perf_counter() - begin, count)
+            gpu.state.point_size_set(1.0)
+            gpu.state.depth_test_set(depth_test)
+            gpu.state.depth_mask_set(depth_mask)
+
+    def _coloured(self, shader: gpu.types.GPUShader) -> gpu.types.GPUBatch:
+        """Return the points on the graphics card; they go there once, and four bytes of each when colours change."""
+        assert self.cloud
+        if self._batch and self._batch[0] == self.by:
+            return self._batch[1]
+        if self._positions is None:
+            layout = gpu.types.GPUVertFormat()
+            layout.attr_add(id="pos", comp_type="F32", len=3, fetch_mode="FLOAT")
+            self._positions = gpu.types.GPUVertBuf(layout, len(self.cloud))
+            self._positions.attr_fill("pos", np.ascontiguousarray(self.cloud.xyz))
+        layout = gpu.types.GPUVertFormat()
+        layout.attr_add(id="color", comp_type="U8", len=4, fetch_mode="INT_TO_FLOAT_UNIT")
+        colors = gpu.types.GPUVertBuf(layout, len(self.cloud))
+        colors.attr_fill("color", np.ascontiguousarray(self.cloud.colors(self.by)))
+        batch = gpu.types.GPUBatch(type="POINTS", buf=self._positions)
+        batch.vertbuf_add(colors)
+        self._batch = (self.by, batch)
+        return batch
+
+
+class Pace:
+    """How many points to draw, so that turning a view stays fluent however slow the graphics are.
+
+    Where the graphics card draws, handing over the points takes no time and all are drawn; software does the work at
+    once, and it is measured.
+    """
+
+    def __init__(self) -> None:
+        self._rate = 0.0
+        self._views: dict[int, Matrix] = {}
+        self._waiting: bpy.types.Region | None = None
+
+    def points(self, count: int, region: bpy.types.Region, view: Matrix) -> int:
+        """Return how many of ``count`` points to draw in a region whose view is this one."""
+        key, fluent = region.as_pointer(), int(_FLUENT * self._rate)
+        moved = key in self._views and self._views[key] != view
+        self._views[key] = view.copy()
+        if not moved or not 0 < fluent < count:
+            return count
+        self._draw_all_soon(region)
+        return max(fluent, min(count, 10_000))
+
+    def took(self, seconds: float, count: int) -> None:
+        """Learn how long drawing took."""
+        self._rate = count / max(seconds, 1e-6)
+
+    def _draw_all_soon(self, region: bpy.types.Region) -> None:
+        self._waiting = region
+        if bpy.app.timers.is_registered(self._draw_all):
+            bpy.app.timers.unregister(self._draw_all)
+        bpy.app.timers.register(self._draw_all, first_interval=_STILL)
+
+    def _draw_all(self) -> None:
+        try:
+            if self._waiting is not None:
+                self._waiting.tag_redraw()
+        except ReferenceError:
+            pass  # the area was closed meanwhile
+
+
+def _nearer(view: bpy.types.RegionView3D) -> Matrix:
+    """Return what brings points nearer to the eye without moving them in the picture."""
+    if view.is_perspective:
+        return Matrix.Diagonal((1.0 - _NEARER, 1.0 - _NEARER, 1.0 - _NEARER, 1.0))
+    return Matrix.Translation((0.0, 0.0, _NEARER * view.view_distance))

@@ -1,0 +1,260 @@
+"""The gallery: pictures of scenes, of every kind of object, and of every material with its layers."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import bpy
+import numpy as np
+from mathutils import Vector
+from numpy.typing import NDArray
+
+from ...base.files import PRESETS
+from ...base.schema import read_json
+from ...materials.table import materials
+from ...road.geometry import RoadGeometry
+from ...road.parameters import AlignmentObject, Carriageway, Environment, RoadParameters
+from ...sampling.road import sample_road
+from ...scanning.scene.mesh import SceneMesh
+from ...scenario.road import RoadScenario
+from ..files import empty_file
+from ..materials import material
+from ..materials.shading import LAYERS
+from ..model.build import build_road
+from ..scene.evaluated import scene_mesh
+from . import pictures
+
+PRESET = PRESETS / "gallery.json"
+EYE = 1.2
+"""Height of a driver's eyes, m."""
+_TOLERANCE = 0.005
+_NEAR = 5.0
+"""What of an object lies nearer than this to its middle is shown close up, m."""
+_PITCH = 1.6
+"""Distance of the materials' cubes from middle to middle, m."""
+_DAYLIGHT = Environment(sun_azimuth_deg=215.0, sun_elevation_deg=42.0)
+_NOT_SHOWN = ("Alignment", "Carriageway", "Median", "Terrain", "LineMarking")
+
+
+@dataclass(frozen=True)
+class Quality:
+    """Size and samples of the pictures."""
+
+    size: tuple[int, int] = (1280, 720)
+    samples: int = 48
+
+    def half(self) -> Quality:
+        """Return the quality of small pictures."""
+        return Quality((self.size[0] // 2, self.size[1] // 2), self.samples)
+
+
+def make_gallery(folder: Path, quality: Quality, only: str, say: Callable[[str], None]) -> list[Path]:
+    """Render all pictures whose name contains `only` into a folder; return their paths."""
+    preset = read_json(PRESET)
+    made: list[Path] = []
+    closed_up: set[str] = set()
+    for name, scene in preset["scenes"].items():
+        made += _scene_pictures(folder, name, scene, quality, only, say, closed_up)
+    for design_class, section in preset["design_classes"].items():
+        name = f"class-{design_class.lower()}"
+        if only in name:
+            road = {"design_class": design_class, "cross_section": section, "length": 800.0}
+            parameters = _built({"road": road, "seed": 2})
+            _aerial(parameters)
+            made.append(_render(folder / f"{name}.png", quality, say))
+    made += _material_pictures(folder, quality, only, say)
+    return made
+
+
+def _scene_pictures(
+    folder: Path,
+    name: str,
+    scene: dict[str, Any],
+    quality: Quality,
+    only: str,
+    say: Callable[[str], None],
+    closed_up: set[str],
+) -> list[Path]:
+    views = {"aerial": _aerial, "driver": _driver}
+    if only and not only.startswith("object") and not any(only in f"scene-{name}-{view}" for view in views):
+        return []
+    parameters = _built(scene)
+    made = []
+    for view, aim in views.items():
+        if only in f"scene-{name}-{view}":
+            aim(parameters)
+            made.append(_render(folder / f"scene-{name}-{view}.png", quality, say))
+    mesh = scene_mesh()
+    for kind, instance in _kinds(parameters):
+        picture = f"object-{kind}"
+        if kind not in closed_up and only in picture and _close_up(parameters, mesh, instance):
+            closed_up.add(kind)
+            made.append(_render(folder / f"{picture}.png", quality.half(), say))
+    return made
+
+
+def _built(scene: dict[str, Any]) -> RoadParameters:
+    empty_file()
+    parameters = sample_road(RoadScenario.from_dict(scene["road"]), scene["seed"])
+    build_road(parameters, _TOLERANCE)
+    pictures.light(_DAYLIGHT)
+    _far_ground()
+    return parameters
+
+
+def _far_ground() -> None:
+    """Add ground up to the horizon below the lowest point of ground and road, so that the pictures have one."""
+    corners = [corner for name in ("Ground", "Backbone") for corner in bpy.data.objects[name].bound_box]
+    bpy.ops.mesh.primitive_plane_add(size=20_000.0, location=(0.0, 0.0, min(z for _, _, z in corners) - 1.5))
+    bpy.context.object.data.materials.append(material("grass_ground"))
+
+
+def _place(parameters: RoadParameters, station: float, offset: float, height: float) -> NDArray[np.float64]:
+    """Return the place in the scene (3,) above the surface at a station and offset."""
+    geometry = RoadGeometry(parameters)
+    point = geometry.point(station, np.clip(offset, *_edges(geometry, station)))[0]
+    beside = geometry.alignment.frame(np.array([station]))
+    left = np.array([-np.sin(beside[1][0]), np.cos(beside[1][0])])
+    plan = beside[0][0] + offset * left
+    return np.array([*plan, point[2] + height])
+
+
+def _edges(geometry: RoadGeometry, station: float) -> tuple[float, float]:
+    offsets = geometry.offsets(station)[0]
+    return float(offsets[-1]), float(offsets[0])
+
+
+def _aerial(parameters: RoadParameters) -> None:
+    length = parameters.alignment.length
+    pictures.camera(
+        _place(parameters, 0.25 * length, -46.0, 26.0), _place(parameters, 0.25 * length + 95.0, 2.0, 0.0), 28.0
+    )
+
+
+def _driver(parameters: RoadParameters) -> None:
+    length = parameters.alignment.length
+    carriageway = parameters.carriageway("right") or next(iter(parameters.of_type(Carriageway).values()))
+    section = RoadGeometry(parameters).sections[carriageway.side]
+
+    def lane(station: float) -> float:
+        boundaries = section.lane_boundaries(station)[0]
+        return carriageway.sign * float(boundaries[:2].mean())
+
+    here, there = (0.3, 0.3 + 60.0 / length) if carriageway.traffic > 0 else (0.7, 0.7 - 60.0 / length)
+    pictures.camera(
+        _place(parameters, here * length, lane(here * length), EYE),
+        _place(parameters, there * length, lane(there * length), EYE + 0.6),
+        26.0,
+    )
+
+
+def _kinds(parameters: RoadParameters) -> Iterator[tuple[str, int]]:
+    """Yield (kind, instance) of what can be shown close up: the type, and what of it there are several kinds of."""
+    for item in parameters.objects.values():
+        if item.type in _NOT_SHOWN or isinstance(item, AlignmentObject):
+            continue
+        variant = next(
+            (
+                str(value)
+                for field in ("kind", "model", "species", "profile", "panel")
+                if isinstance(value := getattr(item, field, None), str)
+            ),
+            "",
+        )
+        species = getattr(item, "species", "")
+        yield "-".join(filter(None, (item.type.lower(), species or variant))), item.instance
+
+
+def _close_up(parameters: RoadParameters, mesh: SceneMesh, instance: int) -> bool:
+    """Aim at the faces of an instance from the road, at a distance that suits their size; False if it has none."""
+    corners = mesh.vertices[mesh.triangles[mesh.instance_id == instance]].reshape(-1, 3)
+    if not len(corners):
+        return False
+    geometry = RoadGeometry(parameters)
+    station, offset = geometry.alignment.project(corners[:, :2].astype(np.float64))
+    # Of what is long or scattered, a piece in its middle.
+    anchor = np.argmin(np.abs(station - np.median(station)))
+    near = np.linalg.norm(corners[:, :2] - corners[anchor, :2], axis=1) < _NEAR
+    part, middle, offset = corners[near], station[anchor], offset[near]
+    low, high = part.min(axis=0), part.max(axis=0)
+    centre = (low + high) / 2.0
+    # Far enough for what is long, and for what is tall in a flat picture.
+    away = max(2.2, 1.25 * min(float(np.linalg.norm(high - low)), 24.0), 2.4 * float(high[2] - low[2]))
+    heading = float(geometry.alignment.heading(np.array([middle]))[0])
+    side = -1.0 if np.median(offset) < 0.0 else 1.0
+    # Seen by approaching traffic: from before it, and from the road's side.
+    traffic = 1.0 if side < 0.0 else -1.0
+    along = Vector((math.cos(heading), math.sin(heading), 0.0))
+    across = Vector((-along.y, along.x, 0.0))
+    towards_road = -side if abs(np.median(offset)) > 1.5 else 1.0
+    eye = Vector(centre.tolist()) - along * (0.8 * traffic * away) + across * (0.6 * towards_road * away)
+    eye.z += 0.25 * away
+    pictures.camera(eye, centre.tolist(), 40.0)
+    return True
+
+
+def _material_pictures(folder: Path, quality: Quality, only: str, say: Callable[[str], None]) -> list[Path]:
+    """Render a cube of every material: lit, and each layer as a plain colour."""
+    wanted = [layer for layer in ("lit", *LAYERS) if only in f"materials-{layer}"]
+    if not wanted:
+        return []
+    empty_file()
+    pictures.light(_DAYLIGHT)
+    names = [name for name in materials() if name != "unknown"]
+    columns = math.ceil(math.sqrt(len(names) * 1.6))
+    for index, name in enumerate(names):
+        _cube(name, index % columns, index // columns)
+    rows = math.ceil(len(names) / columns)
+    middle = Vector((_PITCH * (columns - 1) / 2.0, 0.0, -_PITCH * (rows - 1) / 2.0 - 0.1))
+    bpy.ops.mesh.primitive_plane_add(size=200.0, location=(0.0, 2.0, 0.0), rotation=(math.pi / 2.0, 0.0, 0.0))
+    bpy.context.object.data.materials.append(material("unknown"))
+    # Far enough for the whole wall of cubes in a picture of 16 : 9.
+    away = 1.1 * _PITCH * max(columns, rows * 16.0 / 9.0) * 60.0 / 36.0
+    pictures.camera(middle + Vector((0.12 * away, -away, 0.14 * away)), middle, 60.0)
+    made = []
+    for layer in wanted:
+        if layer != "lit":
+            _show_layer(layer)
+        made.append(_render(folder / f"materials-{layer}.png", quality, say))
+    return made
+
+
+def _cube(name: str, column: int, row: int) -> None:
+    """Add a cube of one material with its name below it, all in one wall."""
+    place = Vector((_PITCH * column, 0.0, -_PITCH * row))
+    bpy.ops.mesh.primitive_cube_add(size=1.0, location=place)
+    bpy.context.object.data.materials.append(material(name))
+    below = place + Vector((-0.5, -0.5, -0.72))
+    bpy.ops.object.text_add(location=below, rotation=(math.pi / 2.0, 0.0, 0.0))
+    bpy.context.object.data.body, bpy.context.object.data.size = name.replace("_", " "), 0.15
+
+
+def _show_layer(layer: str) -> None:
+    """Let every material shine in the values of one of its layers."""
+    for name in materials():
+        for item in bpy.data.materials:
+            if item.name != f"SR {name}":
+                continue
+            nodes, links = item.node_tree.nodes, item.node_tree.links
+            source = next(node for node in nodes if node.type == "OUTPUT_AOV" and node.aov_name == layer)
+            socket = source.inputs["Color" if LAYERS[layer] == "COLOR" else "Value"]
+            shine = nodes.get("Layer") or nodes.new("ShaderNodeEmission")
+            shine.name = "Layer"
+            if socket.links:
+                links.new(socket.links[0].from_socket, shine.inputs["Color"])
+            elif LAYERS[layer] == "COLOR":
+                shine.inputs["Color"].default_value = socket.default_value
+            else:
+                shine.inputs["Color"].default_value = (*[socket.default_value] * 3, 1.0)
+            output = next(node for node in nodes if node.type == "OUTPUT_MATERIAL")
+            links.new(shine.outputs[0], output.inputs["Surface"])
+
+
+def _render(path: Path, quality: Quality, say: Callable[[str], None]) -> Path:
+    pictures.render(path, quality.size, quality.samples)
+    say(str(path))
+    return path

@@ -1,0 +1,1 @@
+"""Materials fitted to the intensities of a real cloud."""

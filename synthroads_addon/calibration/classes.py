@@ -1,0 +1,181 @@
+"""The points of a class in a real cloud: by the cloud's labels, or by where they lie beside an axis."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import laspy
+import numpy as np
+from numpy.typing import NDArray
+
+from ..base.classes import ClassScheme
+from ..base.errors import InputError, nearest_name
+from ..cloud.formats.reading import open_cloud
+from ..cloud.points import concatenate
+
+Float = NDArray[np.float64]
+Index = NDArray[np.intp]
+
+FEWEST = 200
+"""Points that a class must have for its quantiles to mean anything."""
+
+
+@dataclass(frozen=True)
+class RealCloud:
+    """What of a cloud the calibration needs; (N,) arrays.
+
+    Attributes:
+        xyz: (N, 3) map coordinates, m.
+        intensity: as stored in the file.
+        label: numbers that tell the classes apart.
+        scheme: what the numbers mean; None for an attribute of the file's own.
+        distance, incidence: m and rad; NaN where the file doesn't say.
+    """
+
+    xyz: Float
+    intensity: Float
+    label: NDArray[np.int64]
+    scheme: ClassScheme | None
+    distance: Float
+    incidence: Float
+
+
+@dataclass(frozen=True)
+class RealClass:
+    """The points of a class that have an intensity.
+
+    Attributes:
+        told: how they were told from the others, in words.
+        place: (N, 3) map coordinates, m.
+        intensity: (N,) as stored, above 0.
+        zeros: how many more there are whose intensity is 0: left out.
+        distance, incidence: (N,) m and rad; NaN where unknown.
+    """
+
+    told: str
+    place: Float
+    intensity: Float
+    zeros: int
+    distance: Float
+    incidence: Float
+
+
+def read_real(path: Path, attribute: str | None = None) -> RealCloud:
+    """Read a cloud.
+
+    Args:
+        path: of any format that is read here.
+        attribute: extra attribute of a LAS or LAZ file that holds the classes; the usual ones if None.
+
+    Raises:
+        InputError: the file can't be read, has no points, or lacks the attribute.
+    """
+    with open_cloud(path) as cloud:
+        header = cloud.header
+        blocks = list(cloud.blocks())
+    if not blocks:
+        raise InputError(str(path), 0, "has no points")
+    points = concatenate(blocks)
+    label = points.class_id.astype(np.int64) if attribute is None else _attribute(path, attribute)
+    return RealCloud(
+        xyz=points.xyz,
+        intensity=points.intensity * (header.intensity_scale or 1.0),
+        label=label,
+        scheme=header.scheme if attribute is None else None,
+        distance=points.range,
+        incidence=np.deg2rad(points.incidence_deg.astype(np.float64)),
+    )
+
+
+def _attribute(path: Path, name: str) -> NDArray[np.int64]:
+    """Return an extra attribute (N,) of a LAS file."""
+    if path.suffix.lower() not in (".las", ".laz"):
+        raise InputError("--class-field", name, f"needs a LAS or LAZ file, not {path.name}")
+    with laspy.open(path, read_evlrs=False) as file:
+        names = list(file.header.point_format.dimension_names)
+        if name not in names:
+            raise InputError("--class-field", name, f"must be one of {', '.join(names)}{nearest_name(name, names)}")
+        return np.asarray(file.read_points(file.header.point_count)[name]).astype(np.int64)
+
+
+def by_label(cloud: RealCloud, code: str) -> RealClass:
+    """Return the points of a class by its number or name.
+
+    Raises:
+        InputError: there is no such class, or fewer than `FEWEST` of its points have an intensity.
+    """
+    number, name = _number(cloud, code)
+    return points_of(cloud, np.flatnonzero(cloud.label == number), f"labelled {name} in the file")
+
+
+def _number(cloud: RealCloud, code: str) -> tuple[int, str]:
+    there = {int(value) for value in np.unique(cloud.label)}
+    if code.lstrip("-").isdigit():
+        number = int(code)
+        if number not in there:
+            known = ", ".join(str(value) for value in sorted(there)[:40])
+            raise InputError("--class", number, f"no point has it; the file has {known}")
+        return number, str(number)
+    names = {row.name: row.id for row in cloud.scheme.rows} if cloud.scheme else {}
+    named = {name: row for name, row in names.items() if row in there}
+    if code not in named:
+        allowed = ", ".join(sorted(named)) or "a number: the attribute has no names"
+        raise InputError("--class", code, f"must be one of {allowed}{nearest_name(code, named)}")
+    return named[code], f"{code} ({named[code]})"
+
+
+def points_of(cloud: RealCloud, chosen: Index, told: str) -> RealClass:
+    """Return chosen points of a cloud as a class; zeros are counted and left out."""
+    bright = chosen[cloud.intensity[chosen] > 0.0]
+    if len(bright) < FEWEST:
+        raise InputError("--real", told, f"{len(bright)} points have an intensity, at least {FEWEST} are needed")
+    return RealClass(
+        told=told,
+        place=cloud.xyz[bright],
+        intensity=cloud.intensity[bright],
+        zeros=len(chosen) - len(bright),
+        distance=cloud.distance[bright],
+        incidence=cloud.incidence[bright],
+    )
+
+
+def seen_from(real: RealClass, scanner: Float) -> tuple[Float, Float]:
+    """Return ranges (N,), m, and incidence angles (N,), rad, of points that a scanner at one place saw.
+
+    The surface's normal is that of the plane through the points of each square of `_CELL`; where those are few or in
+    line, it is upright.
+
+    Args:
+        real: the points.
+        scanner: (3,) map coordinates, m.
+    """
+    towards = np.asarray(scanner, dtype=np.float64) - real.place
+    distance = np.maximum(np.linalg.norm(towards, axis=1), 1e-6)
+    cosine = np.abs(np.einsum("ij,ij->i", _normals(real.place), towards)) / distance
+    return distance, np.arccos(np.minimum(cosine, 1.0))
+
+
+_CELL = 3.0
+"""m."""
+
+
+def _normals(place: Float) -> Float:
+    """Return unit normals (N, 3) of a ground-like surface through points (N, 3)."""
+    cell = np.floor(place[:, :2] / _CELL).astype(np.int64)
+    _, owner, count = np.unique(cell, axis=0, return_inverse=True, return_counts=True)
+    owner = owner.ravel()
+
+    def mean(values: NDArray[Any]) -> Float:
+        return np.asarray(np.bincount(owner, values) / count)
+
+    x, y, z = (place[:, i] - mean(place[:, i])[owner] for i in range(3))
+    xx, xy, yy, xz, yz = mean(x * x), mean(x * y), mean(y * y), mean(x * z), mean(y * z)
+    fit = xx * yy - xy * xy
+    flat: NDArray[np.bool_] = (count < 12) | (fit < 1e-2 * np.maximum(xx, yy) ** 2)
+    fit[flat] = np.inf  # upright
+    slope_x, slope_y = (xz * yy - yz * xy) / fit, (yz * xx - xz * xy) / fit
+    normal = np.stack([-slope_x, -slope_y, np.ones(len(count))], axis=1)
+    normal /= np.linalg.norm(normal, axis=1)[:, None]
+    return np.asarray(normal[owner])

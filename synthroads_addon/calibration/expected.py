@@ -1,0 +1,164 @@
+"""What intensities a material is expected to give, seen at given incidence angles and ranges.
+
+Everything that a scan does to a point's intensity is done here by the scanner's own functions: the surface
+(`scanning.surfaces.brightness_of`), its variation (`scanning.spread`), the footprint's rays (`scanning.beam`), distance
+and air (`scanning.radiometry.received`). Only the casting is left out: what is seen is a plane of the material, or a
+strip of it on another one. Linear intensities are as in `PointBlock`: a white target struck at a right angle at 1 m
+gives 1; `Receiver` says what a device writes into its files for that.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..base.random_streams import stream
+from ..materials.surfaces import Reflection, brightness_of, surfaces_of
+from ..materials.table import Material
+from ..materials.texture_spread import spread_factors
+from ..scanning.beam import RINGS, beam_pattern, beam_radii
+from ..scanning.radiometry import received
+from .texture import Texture
+
+Float = NDArray[np.float64]
+
+SAMPLES = 20_000
+"""Places that are looked at: they leave quantiles of a class uncertain by about 1 % of its interquartile range."""
+FULL_SCALE = 65_535.0
+"""Largest number that a file holds."""
+_RAYS = 61
+_FIELDS = 2000.0
+"""Side of the square over which places are spread, in wavelengths of the variation: far more than samples see."""
+_SEED = 1
+
+
+@dataclass(frozen=True)
+class Views:
+    """From where places are seen; (N,) arrays.
+
+    Attributes:
+        incidence: angle between beam and surface normal, rad.
+        distance: range, m.
+    """
+
+    incidence: Float
+    distance: Float
+
+
+@dataclass(frozen=True)
+class Receiver:
+    """What a device makes of the light that comes back.
+
+    Attributes:
+        divergence: full angles of the beam at 1/e^2, rad.
+        attenuation: of the air, 1/m of range.
+        range_corrected: whether the device takes the fall-off with the distance out of its intensities.
+        decibels: what the 16 bits of its files span, dB; None where they grow in proportion to the light.
+    """
+
+    divergence: tuple[float, float] = (0.0, 0.0)
+    attenuation: float = 0.0
+    range_corrected: bool = False
+    decibels: float | None = None
+
+    def arrived(self, brightness: Float, distance: Float) -> Float:
+        """Return linear intensities (N,) of surfaces' brightness at ranges (N,), m."""
+        if self.range_corrected:
+            return brightness
+        return received(brightness, distance, self.attenuation)
+
+    def stored(self, linear: Float) -> Float:
+        """Return what the device writes, without rounding, for linear intensities times its gain; -inf dB for 0."""
+        if self.decibels is None:
+            return linear
+        with np.errstate(divide="ignore"):
+            return FULL_SCALE / self.decibels * 10.0 * np.log10(linear)
+
+    def linear(self, stored: Float) -> Float:
+        """Return linear intensities times the gain: the inverse of `stored`."""
+        if self.decibels is None:
+            return stored
+        return np.asarray(10.0 ** (stored * self.decibels / (10.0 * FULL_SCALE)))
+
+
+class Expectation:
+    """The places of one class that are looked at; fixed, so that only the material makes a difference.
+
+    Args:
+        views: in an order of chance, again and again or only some of them: `SAMPLES` are taken.
+        receiver: the device.
+        reflection: as in a scenario.
+        texture: what the material's colour is like; None where the table's mean holds everywhere.
+        strip: width of the strip that the material covers, m; its places are seen with footprints that reach beyond
+            it. None for a plane of it.
+
+    Attributes:
+        incidence, distance: (`SAMPLES`,) rad, m.
+    """
+
+    def __init__(
+        self,
+        views: Views,
+        receiver: Receiver,
+        reflection: Reflection = "lambert",
+        texture: Texture | None = None,
+        strip: float | None = None,
+    ) -> None:
+        rng = stream(_SEED, "calibration")
+        order = np.resize(rng.permutation(len(views.incidence)), SAMPLES)
+        self.incidence, self.distance = views.incidence[order], views.distance[order]
+        self._cosine = np.cos(self.incidence)
+        self._receiver, self._reflection = receiver, reflection
+        self._place = np.column_stack([rng.random((SAMPLES, 2)), np.zeros(SAMPLES)]) * _FIELDS
+        self._across = rng.random(SAMPLES) - 0.5
+        self._share = None if strip is None else self._share_on(strip)
+        self._texture = None if texture is None else self._of_texture(texture, rng)
+
+    def linear(self, material: Material, beside: Material | None = None) -> Float:
+        """Return the linear intensities (`SAMPLES`,) that come back.
+
+        Args:
+            material: of the class.
+            beside: what lies beside its strip; not needed for a plane.
+        """
+        surfaces = surfaces_of([material] if beside is None else [material, beside], self._reflection)
+        own = np.zeros(SAMPLES, dtype=np.intp)
+        brightness = brightness_of(surfaces, own, self._cosine)
+        if self._texture is not None:
+            brightness = brightness * self._texture
+        if self._share is not None and beside is not None:
+            brightness = self._share * brightness + (1.0 - self._share) * brightness_of(surfaces, own + 1, self._cosine)
+        if surfaces.uneven[0]:
+            place = self._place * material.spread_wavelength
+            brightness = brightness * spread_factors(surfaces, own, place, _SEED)
+        return self._receiver.arrived(brightness * (1.0 - material.transmission), self.distance)
+
+    def _rays(self) -> tuple[Float, Float, Float]:
+        """Return where the footprint's rays (`SAMPLES`, K) fall, m: along the scan line, across it, and their shares.
+
+        The scan line runs across the strip, where a slanting beam's footprint is longest.
+        """
+        pattern = beam_pattern(RINGS[_RAYS])
+        radius = [np.asarray(r * self.distance)[:, None] for r in beam_radii(self._receiver.divergence)]
+        along = pattern.across[:, 0] * radius[0] / np.maximum(self._cosine, 0.05)[:, None]
+        return along, pattern.across[:, 1] * radius[1], pattern.weights
+
+    def _share_on(self, width: float) -> Float:
+        """Return the share of each pulse that falls on the strip, the pulses' middles being spread over its width."""
+        along, _, weight = self._rays()
+        inside = np.abs(along + width * self._across[:, None]) <= width / 2.0
+        return np.asarray((inside * weight).sum(axis=1))
+
+    def _of_texture(self, texture: Texture, rng: np.random.Generator) -> Float:
+        """Return the texture's factor on the brightness, its mean over each footprint."""
+        along, across, weight = self._rays()
+        middle = rng.random((2, SAMPLES, 1)) * np.array(texture.size)[:, None, None]
+        return np.asarray((texture.factor(middle[0] + along, middle[1] + across) * weight).sum(axis=1))
+
+
+def chosen_views(incidence_deg: tuple[float, ...], ranges: tuple[float, ...]) -> Views:
+    """Return views at every one of some incidence angles (deg) and ranges (m)."""
+    incidence, distance = np.meshgrid(np.deg2rad(incidence_deg), np.array(ranges, dtype=np.float64))
+    return Views(incidence.ravel(), distance.ravel())

@@ -1,0 +1,246 @@
+"""A material's parameters from a real class: brightness and spread by quantiles, facet slope by incidence angles, the
+wavelength of the variation by how alike neighbours are."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..base.errors import InputError
+from ..base.noise import field
+from ..materials.table import Material
+from ..materials.texture_spread import OCTAVES
+from ..scanning.radiometry import LUMINANCE, facet_terms
+from .expected import Expectation, Receiver
+
+Float = NDArray[np.float64]
+Function = Callable[[Float], Float]
+
+FITTED = (0.25, 0.5, 0.75, 0.9)
+"""Quantiles that a fit holds."""
+SHOWN = (0.05, 0.1, 0.25, 0.5, 0.75, 0.9, 0.95)
+"""Quantiles that a report shows: the others say how far the fit can be trusted beyond."""
+WAVELENGTHS = (0.25, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0)
+"""Wavelengths that are tried, m."""
+BRIGHTEST = 0.98
+"""Largest reflectivity that a material is given."""
+_SPREADS = (0.002, 1.5)
+_STEPS = 40
+_DONE = 1e-4
+_CELLS = (0.4, 1.0, 2.5, 6.0, 15.0, 40.0)
+"""Squares within which points are compared, m."""
+_FEWEST_PAIRS = 50
+
+
+@dataclass(frozen=True)
+class Fit:
+    """What fits a class.
+
+    Attributes:
+        level: factor on the material's linear intensities: the device's gain times the change of the brightness.
+        below, above: spreads, see `scanning.spread`.
+    """
+
+    level: float
+    below: float
+    above: float
+
+
+def interquartile(quantiles: Float) -> float:
+    """Return the interquartile range of `FITTED` quantiles (4,), at least a millionth of the median."""
+    return max(float(quantiles[2] - quantiles[0]), 1e-6 * abs(float(quantiles[1])), 1e-300)
+
+
+def fitted(
+    expectation: Expectation,
+    material: Material,
+    wanted: Float,
+    receiver: Receiver,
+    beside: tuple[Material, float] | None = None,
+    spread: bool = True,
+) -> Fit:
+    """Return level and spreads with which the expected quantiles come nearest to the wanted ones.
+
+    Levenberg and Marquardt's method on the differences over the interquartile range.
+
+    Args:
+        expectation: the places of the class.
+        material: to begin with.
+        wanted: (4,) `FITTED` quantiles as stored.
+        receiver: the device.
+        beside: for a strip, the material beside it and its level.
+        spread: whether the spreads are fitted as well; else they are the material's.
+    """
+    width = interquartile(wanted)
+
+    def miss(x: Float) -> Float:
+        got = np.quantile(receiver.stored(levelled(expectation, material, _fit(x, material), beside)), FITTED)
+        return np.asarray((got - wanted) / width)
+
+    start = float(np.median(expectation.linear(material, beside[0] if beside else None)))
+    if start <= 0.0:
+        raise InputError("material", material.to_dict(), "gives nothing back at these incidence angles and ranges")
+    level = np.log(float(receiver.linear(wanted[1:2])[0]) / start)
+    if not spread:
+        return _fit(_levenberg_marquardt(miss, np.array([level])), material)
+    linear = np.log(receiver.linear(wanted))
+    first = [max(0.02, abs(float(linear[1 + side] - linear[1])) / 0.6745) for side in (-1, 1)]
+    return _fit(_levenberg_marquardt(miss, np.array([level, *np.log(first)])), material)
+
+
+def levelled(
+    expectation: Expectation, material: Material, fit: Fit, beside: tuple[Material, float] | None
+) -> Float:
+    """Return linear intensities with a fit's spreads and level; what lies beside a strip keeps its own level."""
+    uneven = material.model_copy(update={"spread_below": fit.below, "spread_above": fit.above})
+    if beside is None:
+        return fit.level * expectation.linear(uneven)
+    return fit.level * expectation.linear(uneven, brightened(beside[0], beside[1] / fit.level, limited=False))
+
+
+def _fit(x: Float, material: Material) -> Fit:
+    level = float(np.exp(np.clip(x[0], -200.0, 200.0)))
+    if len(x) == 1:
+        return Fit(level, material.spread_below, material.spread_above)
+    low, high = np.exp(np.clip(x[1:], *np.log(_SPREADS)))
+    return Fit(level, float(low), float(high))
+
+
+def _levenberg_marquardt(miss: Function, x: Float) -> Float:
+    damping, error = 1e-3, miss(x)
+    for _ in range(_STEPS):
+        slope = np.column_stack([(miss(x + step) - miss(x - step)) / 2e-3 for step in 1e-3 * np.eye(len(x))])
+        normal = slope.T @ slope
+        scale = np.diag(np.maximum(np.diag(normal), 1e-9))
+        move = np.clip(np.linalg.solve(normal + damping * scale, -slope.T @ error), -1.0, 1.0)
+        tried = miss(x + move)
+        if tried @ tried < error @ error:
+            x, error, damping = x + move, tried, max(damping / 5.0, 1e-9)
+            if np.abs(move).max() < _DONE:
+                break
+        elif damping > 1e6:
+            break
+        else:
+            damping *= 5.0
+    return x
+
+
+def gain_of(
+    materials: Sequence[Material], levels: Sequence[float], hold: int | None = None, given: float | None = None
+) -> float:
+    """Return the one gain of the device that explains the levels of all classes.
+
+    The given one, or that of the held material; else the one that changes the materials' brightness least (the mean of
+    the levels' logarithms), but never so small that a material had to reflect more than `BRIGHTEST`.
+
+    Raises:
+        InputError: with the given gain or the held material another one had to reflect more than that.
+    """
+    least = max(level * row.reflectivity / BRIGHTEST for row, level in zip(materials, levels, strict=True))
+    wanted = levels[hold] if hold is not None else given
+    if wanted is None:
+        return max(float(np.exp(np.mean(np.log(levels)))), least)
+    if least > wanted * (1.0 + 1e-9):
+        allowed = f"a material would have to reflect {least / wanted * BRIGHTEST:.2f} of the light"
+        raise InputError("--gain" if hold is None else "--hold", wanted, allowed)
+    return wanted
+
+
+def brightened(material: Material, change: float, limited: bool = True) -> Material:
+    """Return a material that gives back ``change`` times as much: reflectivity and retro-reflection alike.
+
+    The base colour is what the camera sees: it stays as long as a specular share of 0 to 1 can make the reflectivity.
+
+    Args:
+        material: to be changed.
+        change: above 0.
+        limited: refuse a reflectivity above `BRIGHTEST`; else the result may be any, and serves to compute only.
+    """
+    wanted, metal = change * material.reflectivity, material.metallic
+    luminance = float(np.array(material.base_color) @ LUMINANCE)
+    specular = (wanted - metal * luminance) / max(1.0 - metal, 1e-9) - 0.5 * luminance
+    update: dict[str, Any] = {"specular": specular, "retroreflection": change * material.retroreflection}
+    if not limited:
+        return material.model_copy(update=update)
+    if wanted > BRIGHTEST * (1.0 + 1e-6):
+        raise InputError("reflectivity", round(wanted, 3), f"no material reflects more than {BRIGHTEST:g}")
+    if not 0.0 <= specular <= 1.0:
+        color = np.array(material.base_color) * change
+        if color.max() > 1.0 or change * material.specular > 1.0:
+            raise InputError("specular", round(specular, 3), "no base colour and specular of 0 to 1 make this material")
+        update |= {"base_color": tuple(color.tolist()), "specular": change * material.specular}
+    return material.model_copy(update=update)
+
+
+def fitted_slope(incidence: Float, linear: Float) -> float | None:
+    """Return the facet slope (rad) whose fall-off with the incidence angle is most like that of the medians of a class.
+
+    Args:
+        incidence: (N,) rad.
+        linear: (N,) linear intensities without the fall-off with the distance.
+
+    Returns:
+        The slope; None where most angles differ by less than 10 degrees, which says nothing about it.
+    """
+    edges = np.quantile(incidence, np.linspace(0.0, 1.0, 13))
+    if edges[-2] - edges[1] < np.deg2rad(10.0):
+        return None
+    owner = np.clip(np.searchsorted(edges, incidence, side="right") - 1, 0, 11)
+    angle = np.array([np.median(incidence[owner == number]) for number in range(12) if (owner == number).any()])
+    median = np.array([np.median(linear[owner == number]) for number in range(12) if (owner == number).any()])
+    slopes = np.linspace(0.0, 1.5, 76)
+    a, b = (terms[:, None] for terms in facet_terms(slopes))
+    model = a * np.cos(angle) + b * np.sin(angle) ** 2
+    apart = np.log(median / model)
+    return float(slopes[apart.std(axis=1).argmin()])
+
+
+def fitted_wavelength(place: Float, intensity: Float) -> float:
+    """Return the one of `WAVELENGTHS` whose field makes neighbours as alike as they are in a real class.
+
+    Intensities are taken by rank, as normal scores, so that no model of the distribution is needed. What is compared
+    are their variances within squares of several sizes, with the field's at the same places.
+
+    Args:
+        place: (N, 3) m.
+        intensity: (N,) in any unit.
+    """
+    squares = [_members(place, size) for size in _CELLS]
+    real = _within(_scores(intensity), squares)
+    apart = []
+    for wavelength in WAVELENGTHS:
+        own = field(place - place.min(axis=0), wavelength, 1, OCTAVES)
+        apart.append(float(np.nansum((_within(_scores(own), squares) - real) ** 2)))
+    return WAVELENGTHS[int(np.argmin(apart))]
+
+
+def _members(place: Float, size: float) -> NDArray[np.intp]:
+    cell = np.floor(place[:, :2] / size).astype(np.int64)
+    _, owner = np.unique(cell[:, 0] * 2_000_003 + cell[:, 1], return_inverse=True)
+    return np.asarray(owner.ravel(), dtype=np.intp)
+
+
+def _within(values: Float, squares: list[NDArray[np.intp]]) -> Float:
+    """Return the variance within squares of each size as a share of the whole; NaN where too few have two points."""
+    result = []
+    for owner in squares:
+        count = np.bincount(owner)
+        mean = np.bincount(owner, values) / np.maximum(count, 1)
+        rest = ((values - mean[owner]) ** 2)[count[owner] > 1].sum()
+        freedom = (count[count > 1] - 1).sum()
+        result.append(rest / freedom / values.var() if freedom >= _FEWEST_PAIRS else np.nan)
+    return np.array(result)
+
+
+def _scores(values: Float) -> Float:
+    """Return normal scores (N,) of values by their ranks, by a rational approximation (Abramowitz & Stegun 26.2.23)."""
+    rank = np.empty(len(values))
+    rank[np.argsort(values, kind="stable")] = (np.arange(len(values)) + 0.5) / len(values)
+    tail = np.sqrt(-2.0 * np.log(np.minimum(rank, 1.0 - rank)))
+    top = 2.515517 + tail * (0.802853 + tail * 0.010328)
+    bottom = 1.0 + tail * (1.432788 + tail * (0.189269 + tail * 0.001308))
+    return np.asarray(np.sign(rank - 0.5) * (tail - top / bottom))

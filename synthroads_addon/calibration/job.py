@@ -1,0 +1,443 @@
+"""A calibration from its inputs to its result: expected intensities beside a real cloud's, and a fit if asked for.
+
+`steps` yields the share that is done, so that the panel can show progress and stop it; `calibrate` runs it through.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Generator, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..base.errors import InputError, nearest_name
+from ..materials.surfaces import Reflection
+from ..materials.table import Material, materials, read_material_table, write_material_table
+from ..scanning.devices.device import load_device
+from .classes import RealClass, RealCloud, by_label, read_real, seen_from
+from .expected import Expectation, Receiver, Views, chosen_views
+from .fit import (
+    FITTED,
+    SHOWN,
+    Fit,
+    brightened,
+    fitted,
+    fitted_slope,
+    fitted_wavelength,
+    gain_of,
+    interquartile,
+    levelled,
+)
+from .pavement import RoadClasses, road_classes
+from .texture import Texture, read_texture
+
+Float = NDArray[np.float64]
+Part = Literal["spread", "wavelength", "slope"]
+PARTS: tuple[Part, ...] = ("spread", "wavelength", "slope")
+_ROAD = ("paved", "line")
+_MOST_VIEWS = 60
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """A material and the class that it is compared with.
+
+    Attributes:
+        material: name in the table.
+        told: number or name of a class in the cloud; ``paved`` or ``line`` beside an axis; None without a cloud.
+        texture: image of it; None for the table's constants.
+        texture_width: of the surface that the image shows, m.
+    """
+
+    material: str
+    told: str | None = None
+    texture: Path | Texture | None = None
+    texture_width: float = 1.0
+
+
+@dataclass(frozen=True)
+class CalibrationJob:
+    """What is to be compared, and how it was seen.
+
+    Attributes:
+        wanted: materials with their classes; a strip's is compared after the one that lies beside it.
+        table: the material table to begin with; None for the shipped one.
+        scene: materials of a scene, in place of the table's of the same names.
+        real: cloud to compare with; None for expected intensities alone.
+        class_field: extra attribute of the cloud that holds the classes.
+        road: where pavement and markings lie, for a cloud without labels.
+        device: preset or file, for the beam's divergence; a ray without.
+        incidence_deg, ranges: angles and ranges (m) at which places were seen, all combinations alike often.
+        scanner: map coordinates of the one place that it was seen from, instead of angles and ranges.
+        reflection: as in a scenario.
+        attenuation: of the air, 1/m of range.
+        range_corrected, decibels: see `Receiver`.
+        fit: whether materials and gain are fitted; else only the gain is, if there is a cloud.
+        parts: what is fitted besides the brightness.
+        hold: material whose brightness stays as it is.
+        gain: of the device, if it is known from another cloud; else it is free.
+    """
+
+    wanted: tuple[Wanted, ...]
+    table: Path | None = None
+    real: Path | None = None
+    class_field: str | None = None
+    road: RoadClasses | None = None
+    device: str | None = None
+    incidence_deg: tuple[float, ...] = (0.0,)
+    ranges: tuple[float, ...] = (60.0,)
+    scanner: tuple[float, float, float] | None = None
+    reflection: Reflection = "lambert"
+    attenuation: float = 0.0
+    range_corrected: bool = False
+    decibels: float | None = None
+    fit: bool = True
+    parts: frozenset[Part] = frozenset({"spread", "wavelength"})
+    hold: str | None = None
+    gain: float | None = None
+    scene: Mapping[str, Material] = field(default_factory=dict)
+
+    @property
+    def receiver(self) -> Receiver:
+        """Return the device."""
+        mrad = load_device(self.device).divergence_mrad if self.device else (0.0, 0.0)
+        return Receiver((mrad[0] * 1e-3, mrad[1] * 1e-3), self.attenuation, self.range_corrected, self.decibels)
+
+    def start(self) -> dict[str, Material]:
+        """Return the table to begin with."""
+        return {**materials(), **self.scene, **(read_material_table(self.table) if self.table else {})}
+
+
+@dataclass(frozen=True)
+class Compared:
+    """One material beside its class.
+
+    Attributes:
+        wanted: what was asked for.
+        before, after: the material; the same without a fit.
+        expected: (`SAMPLES`,) intensities as the device would store them.
+        incidence, distance: (`SAMPLES`,) rad and m, of these.
+        real: the class; None without a cloud.
+    """
+
+    wanted: Wanted
+    before: Material
+    after: Material
+    expected: Float
+    incidence: Float
+    distance: Float
+    real: RealClass | None
+
+    def errors(self) -> Float | None:
+        """Return the (4,) differences of the `FITTED` quantiles as shares of the real interquartile range."""
+        if self.real is None:
+            return None
+        real = np.quantile(self.real.intensity, FITTED)
+        return np.asarray((np.quantile(self.expected, FITTED) - real) / interquartile(real))
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the figures as JSON data."""
+        names = [f"{100 * share:g}" for share in SHOWN]
+
+        def quantiles(values: Float) -> dict[str, float]:
+            return {name: _short(value) for name, value in zip(names, np.quantile(values, SHOWN), strict=True)}
+
+        data: dict[str, Any] = {"material": self.wanted.material, "expected": quantiles(self.expected)}
+        errors = self.errors()
+        if self.real is not None and errors is not None:
+            data |= {
+                "told_by": self.real.told,
+                "points": len(self.real.intensity),
+                "zeros_left_out": self.real.zeros,
+                "real": quantiles(self.real.intensity),
+                "error_of_interquartile_range": {
+                    f"{100 * share:g}": round(float(error), 4) for share, error in zip(FITTED, errors, strict=True)
+                },
+                "largest_error": round(float(np.abs(errors).max()), 4),
+            }
+        data["incidence_deg"] = [round(float(np.rad2deg(a)), 1) for a in np.quantile(self.incidence, (0.05, 0.5, 0.95))]
+        data["views"] = self._by_view()
+        data |= {"before": self.before.to_dict(), "after": self.after.to_dict()}
+        return data | {"reflectivity": [_short(row.reflectivity) for row in (self.before, self.after)]}
+
+
+    def _by_view(self) -> list[dict[str, float]]:
+        """Return the expected quartiles at each incidence angle and range, where these are few."""
+        views, owner = np.unique(np.stack([self.incidence, self.distance]), axis=1, return_inverse=True)
+        if views.shape[1] > _MOST_VIEWS:
+            return []
+        rows = []
+        for number, (angle, distance) in enumerate(views.T):
+            low, middle, high = np.quantile(self.expected[owner.ravel() == number], (0.25, 0.5, 0.75))
+            row = {"incidence_deg": np.rad2deg(angle), "range": distance, "25": low, "50": middle, "75": high}
+            rows.append({name: _short(value) for name, value in row.items()})
+        return rows
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """The result.
+
+    Attributes:
+        job: what was asked for.
+        gain: the device's: stored intensities per linear one, or the factor before the decibels are taken.
+        compared: in the order of the job.
+        table: the table to begin with, with the fitted materials in it.
+    """
+
+    job: CalibrationJob
+    gain: float
+    compared: tuple[Compared, ...]
+    table: Mapping[str, Material] = field(default_factory=dict)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the figures as JSON data."""
+        job = self.job
+        return {
+            "type": "Calibration",
+            "real": job.real.name if job.real else None,
+            "fitted": bool(job.real and job.fit),
+            "gain": _short(self.gain),
+            "reflection": job.reflection,
+            "device": job.device,
+            "range_corrected": job.range_corrected,
+            "decibels": job.decibels,
+            "classes": [entry.to_dict() for entry in self.compared],
+        }
+
+
+def calibrate(job: CalibrationJob) -> Calibration:
+    """Compare, and fit if asked to, in one go; see `steps`."""
+    run = steps(job)
+    while True:
+        try:
+            next(run)
+        except StopIteration as end:
+            return end.value
+
+
+def steps(job: CalibrationJob) -> Generator[float, None, Calibration]:
+    """Compare, and fit if asked to; yield the share that is done, return the result.
+
+    The classes share one gain. With a fit each takes the level that its quantiles need, and the gain is what they have
+    in common, see `calibration_fit.gain_of`; without, it is the one with which the medians come nearest.
+
+    Raises:
+        InputError: an input is wrong, or the classes can't be explained by materials.
+    """
+    check(job)
+    table = job.start()
+    yield 0.02
+    real = _real_classes(job)
+    yield 0.4
+    started = [_start(job, wanted, table[wanted.material], own) for wanted, own in zip(job.wanted, real, strict=True)]
+    fits: list[Fit] = []
+    for number, item in enumerate(started):
+        beside = _beside(job, started, fits, number)
+        fits.append(_level(job, item, beside))
+        yield 0.4 + 0.5 * (number + 1) / len(started)
+    yield 0.95
+    return _result(job, table, started, fits)
+
+
+def save_fitted(result: Calibration, path: Path, overwrite: bool = False) -> None:
+    """Write the fitted materials into a table of one's own; what else the job's table holds is kept.
+
+    Raises:
+        InputError: nothing was fitted, or the file can't be written, see `write_material_table`.
+    """
+    if result.job.real is None or not result.job.fit:
+        raise InputError("--save", str(path), "needs a cloud that materials are fitted to")
+    own = dict(read_material_table(result.job.table)) if result.job.table else {}
+    own |= {entry.wanted.material: entry.after for entry in result.compared}
+    write_material_table(path, own, overwrite)
+
+
+def check(job: CalibrationJob) -> None:
+    """Refuse a job that can't be done, before any work."""
+    table = job.start()
+    if not job.wanted:
+        raise InputError("--material", None, "at least one is needed")
+    for wanted in job.wanted:
+        if wanted.material not in table:
+            hint = nearest_name(wanted.material, table)
+            raise InputError("--material", wanted.material, f"must be a material of the table{hint}")
+        if (wanted.told is None) != (job.real is None):
+            raise InputError("--material", wanted.material, "needs its class with a cloud (NAME=CLASS), none without")
+        if wanted.texture_width <= 0.0:
+            raise InputError("--texture", wanted.texture_width, "the width that it shows must be above 0 m")
+    names = [wanted.material for wanted in job.wanted]
+    if job.hold is not None and job.hold not in names:
+        raise InputError("--hold", job.hold, f"must be one of {', '.join(names)}")
+    if len(set(names)) < len(names):
+        raise InputError("--material", names, "each material once")
+    if job.gain is not None and (job.gain <= 0.0 or job.hold is not None):
+        raise InputError("--gain", job.gain, "must be above 0, and can't be given together with --hold")
+    _check_views(job)
+    if job.road is not None:
+        _check_road(job, job.road)
+    _ = job.receiver
+
+
+def _check_views(job: CalibrationJob) -> None:
+    if not job.incidence_deg or not all(0.0 <= angle < 90.0 for angle in job.incidence_deg):
+        raise InputError("--incidence-deg", list(job.incidence_deg), "must be 0 to below 90 degrees")
+    if not job.ranges or not all(0.0 < distance <= 20_000.0 for distance in job.ranges):
+        raise InputError("--range", list(job.ranges), "must be above 0, at most 20,000 m")
+    if job.decibels is not None and not 1.0 <= job.decibels <= 200.0:
+        raise InputError("--decibels", job.decibels, "must be 1 to 200 dB")
+    if job.scanner is not None and job.real is None:
+        raise InputError("--scanner", list(job.scanner), "needs a cloud")
+
+
+def _check_road(job: CalibrationJob, road: RoadClasses) -> None:
+    for wanted in job.wanted:
+        if wanted.told not in _ROAD:
+            raise InputError("--material", f"{wanted.material}={wanted.told}", "must be paved or line beside an axis")
+    if any(low >= high for low, high in road.paved):
+        raise InputError("--paved", [list(span) for span in road.paved], "must be FROM,TO, FROM being the smaller")
+    asked = {wanted.told for wanted in job.wanted}
+    for name, there, option in (("paved", road.paved, "--paved"), ("line", road.lines, "--line")):
+        if name in asked and not there:
+            raise InputError(option, None, f"is needed to tell what is {name}")
+    if not 0.02 <= road.line_width <= 2.0:
+        raise InputError("--line-width", road.line_width, "must be 0.02 to 2 m")
+
+
+@dataclass(frozen=True)
+class _Started:
+    """A class before its fit."""
+
+    wanted: Wanted
+    before: Material
+    material: Material
+    expectation: Expectation
+    real: RealClass | None
+    strip: bool
+
+
+def _real_classes(job: CalibrationJob) -> list[RealClass | None]:
+    if job.real is None:
+        return [None] * len(job.wanted)
+    cloud: RealCloud = read_real(job.real, job.class_field)
+    if job.road is not None:
+        found = road_classes(cloud, job.road)
+        return [found[str(wanted.told)] for wanted in job.wanted]
+    return [by_label(cloud, str(wanted.told)) for wanted in job.wanted]
+
+
+def _start(job: CalibrationJob, wanted: Wanted, before: Material, real: RealClass | None) -> _Started:
+    material, texture, receiver = before, None, job.receiver
+    if wanted.texture is not None:
+        given = wanted.texture
+        texture = given if isinstance(given, Texture) else read_texture(given, wanted.texture_width, before)
+        material = before.model_copy(update={"base_color": texture.mean_color})
+    views = _views(job, real)
+    if job.fit and real is not None:
+        material = _shaped(job, material, real, views)
+    strip = job.road.line_width if job.road is not None and wanted.told == "line" else None
+    expectation = Expectation(views, receiver, job.reflection, texture, strip)
+    return _Started(wanted, before, material, expectation, real, strip is not None)
+
+
+def _shaped(job: CalibrationJob, material: Material, real: RealClass, views: Views) -> Material:
+    """Return a material with the facet slope and the wavelength of the real class."""
+    update: dict[str, Any] = {}
+    if "wavelength" in job.parts:
+        update["spread_wavelength"] = fitted_wavelength(real.place, real.intensity)
+    scattering = job.reflection == "oren_nayar" and material.retroreflection == 0.0
+    if "slope" in job.parts and scattering and len(views.incidence) == len(real.intensity):
+        near = job.receiver.linear(real.intensity) * (1.0 if job.range_corrected else views.distance**2)
+        slope = fitted_slope(views.incidence, near)
+        update |= {} if slope is None else {"facet_slope": slope}
+    return material.model_copy(update=update)
+
+
+def _views(job: CalibrationJob, real: RealClass | None) -> Views:
+    """Return how a class was seen: as its points say, from the scanner's place, or as chosen."""
+    if real is not None and job.scanner is not None:
+        distance, incidence = seen_from(real, np.array(job.scanner))
+        return Views(incidence, distance)
+    if real is not None and np.isfinite(real.distance).all() and np.isfinite(real.incidence).all():
+        return Views(real.incidence, real.distance)
+    return chosen_views(job.incidence_deg, job.ranges)
+
+
+def _beside(
+    job: CalibrationJob, started: list[_Started], fits: list[Fit], number: int
+) -> tuple[Material, float] | None:
+    """Return the material beside a strip and its level: the pavement's, which must come first."""
+    if not started[number].strip:
+        return None
+    for item, fit in zip(started, fits, strict=False):
+        if item.wanted.told == "paved":
+            return item.material, fit.level
+    raise InputError("--material", started[number].wanted.material, "the material of the pavement must come before it")
+
+
+def _level(job: CalibrationJob, item: _Started, beside: tuple[Material, float] | None) -> Fit:
+    if item.real is None:
+        return Fit(1.0, item.material.spread_below, item.material.spread_above)
+    wanted = np.quantile(item.real.intensity, FITTED)
+    spread = job.fit and "spread" in job.parts
+    return fitted(item.expectation, item.material, wanted, job.receiver, beside, spread)
+
+
+def _result(
+    job: CalibrationJob, table: Mapping[str, Material], started: list[_Started], fits: list[Fit]
+) -> Calibration:
+    names = [item.wanted.material for item in started]
+    rows = [item.material for item in started]
+    hold = None if job.hold is None else names.index(job.hold)
+    fitting = job.fit and job.real is not None
+    gain = 1.0
+    if job.real is not None:
+        levels = [fit.level for fit in fits]
+        gain = gain_of(rows, levels, hold, job.gain) if fitting else job.gain or _mean(levels)
+    if fitting:
+        rows = [
+            brightened(row, fit.level / gain).model_copy(
+                update={"spread_below": round(fit.below, 4), "spread_above": round(fit.above, 4)}
+            )
+            for row, fit in zip(rows, fits, strict=True)
+        ]
+        rows = [_rounded(row) for row in rows]
+    compared = tuple(_compared(job, item, row, gain, rows, started) for item, row in zip(started, rows, strict=True))
+    return Calibration(job, gain, compared, {**table, **dict(zip(names, rows, strict=True))} if fitting else table)
+
+
+def _compared(
+    job: CalibrationJob, item: _Started, row: Material, gain: float, rows: list[Material], started: list[_Started]
+) -> Compared:
+    """Return a class with the intensities that its final material gives."""
+    beside = next((own for own, other in zip(rows, started, strict=True) if other.wanted.told == "paved"), None)
+    fit = Fit(gain, row.spread_below, row.spread_above)
+    seen = item.expectation
+    linear = levelled(seen, row, fit, (beside, gain) if item.strip and beside is not None else None)
+    return Compared(
+        item.wanted, item.before, row, job.receiver.stored(linear), seen.incidence, seen.distance, item.real
+    )
+
+
+def _rounded(row: Material) -> Material:
+    """Return a material with as many digits as a table holds; refused if a limit of the table is broken."""
+    data = row.to_dict()
+    for name in ("specular", "retroreflection", "facet_slope"):
+        if name in data:
+            data[name] = round(data[name], 5)
+    data["base_color"] = [round(value, 5) for value in data["base_color"]]
+    return Material.from_dict(data)
+
+
+def _mean(levels: list[float]) -> float:
+    return float(np.exp(np.mean(np.log(levels))))
+
+
+def _short(value: float) -> float:
+    """Return a number with six digits."""
+    return float(f"{value:.6g}")
+
+

@@ -1,0 +1,179 @@
+"""Pavement and markings of a cloud without labels, told apart by where they lie beside the road's axis.
+
+A marking is known by its line, never by a point's own intensity alone: its points would then be the bright ones by
+definition, and their distribution would say nothing. Of every line that the user names by its offset
+
+1. each stretch of `STRETCH` is shifted to where its points are brightest, at most `REACH` aside: axes are good to some
+   decimetres, lines are a decimetre wide;
+2. the points within half the line's width of it are its own;
+3. they are inside a dash where the *medians* of the line's points within `ALONG` before and within `ALONG` behind both
+   exceed Otsu's threshold of these medians: between dashes there is pavement, at their ends there is a bit of both.
+
+The pavement is what lies between given offsets, more than `CLEAR` from every line's nominal place.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..base.errors import InputError
+from ..fitting.read import read_axis
+from .classes import RealClass, RealCloud, points_of
+
+Float = NDArray[np.float64]
+Index = NDArray[np.intp]
+
+STRETCH = 20.0
+REACH = 0.6
+ALONG = 1.5
+CLEAR = 0.9
+"""m."""
+_CELL = 20.0
+_FARTHEST = 40.0
+"""Points farther from the axis than this, m, are not looked at."""
+_GAP = 5.0
+"""Axis points farther apart than this, m, are ends: what lies between them is not looked at."""
+_FEWEST_OF_LINE = 30
+
+
+@dataclass(frozen=True)
+class RoadClasses:
+    """Where pavement and markings lie.
+
+    Attributes:
+        axis: CSV or GeoJSON, in the cloud's coordinates.
+        paved: offsets (from, to) between which there is pavement, m, positive to the left.
+        lines: offsets of the markings' middles, m.
+        line_width: m.
+    """
+
+    axis: Path
+    paved: tuple[tuple[float, float], ...]
+    lines: tuple[float, ...]
+    line_width: float = 0.15
+
+
+def road_classes(cloud: RealCloud, road: RoadClasses) -> dict[str, RealClass]:
+    """Return the points of ``paved`` and of ``line``.
+
+    Raises:
+        InputError: the axis can't be read, or too few points lie where pavement or markings should be.
+    """
+    station, offset = beside_axis(cloud.xyz[:, :2], read_axis(road.axis)[:, :2])
+    free = np.isfinite(offset)
+    for line in road.lines:
+        free &= ~(np.abs(offset - line) < CLEAR)
+    on = np.zeros(len(offset), dtype=bool)
+    for low, high in road.paved:
+        on |= (offset > low) & (offset < high)
+    spans = " and ".join(f"{low:g} to {high:g}" for low, high in road.paved)
+    result = {}
+    if road.paved:
+        told = f"{spans} m beside the axis, more than {CLEAR:g} m from the lines" if road.lines else f"{spans} m"
+        result["paved"] = points_of(cloud, np.flatnonzero(on & free), told)
+    if road.lines:
+        chosen, threshold = _on_lines(cloud.intensity, station, offset, road)
+        told = (
+            f"within {road.line_width / 2:g} m of the lines at {', '.join(f'{line:g}' for line in road.lines)} m, "
+            f"each {STRETCH:g} m of them moved by up to {REACH:g} m to where it is brightest, where the "
+            f"median intensities of {ALONG:g} m of the line before and behind exceed {threshold:,.0f} (Otsu)"
+        )
+        result["line"] = points_of(cloud, chosen, told)
+    return result
+
+
+def _on_lines(intensity: Float, station: Float, offset: Float, road: RoadClasses) -> tuple[Index, float]:
+    """Return the points on dashes, and the threshold that tells dashes from gaps."""
+    half = road.line_width / 2.0
+    points, medians = [], []
+    for line in road.lines:
+        near = np.flatnonzero(np.abs(offset - line) < REACH + half)
+        stretch = np.floor(station[near] / STRETCH)
+        for number in np.unique(stretch):
+            own = near[stretch == number]
+            aside = offset[own] - line
+            shift = _brightest(aside, intensity[own], half)
+            own = own[np.abs(aside - shift) <= half]
+            if len(own) >= _FEWEST_OF_LINE // 2:
+                points.append(own)
+                medians.append(_median_along(station[own], intensity[own]))
+    if not points:
+        raise InputError("--line", list(road.lines), "no points lie there")
+    found, level = np.concatenate(points), np.concatenate(medians)
+    threshold = otsu(level)
+    return found[level > threshold], threshold
+
+
+def _brightest(aside: Float, intensity: Float, half: float) -> float:
+    """Return the shift of a line of half a width at which its points' mean intensity is largest."""
+    shifts = np.arange(-REACH, REACH + 1e-9, 0.02)
+    inside = np.abs(aside[:, None] - shifts) <= half
+    count = inside.sum(axis=0)
+    mean = (intensity[:, None] * inside).sum(axis=0) / np.maximum(count, 1)
+    return float(shifts[np.argmax(np.where(count >= max(5, count.max() // 3), mean, -np.inf))])
+
+
+def _median_along(station: Float, intensity: Float) -> Float:
+    """Return for each point (N,) the smaller of the medians of the points within `ALONG` before and behind it."""
+    order = np.argsort(station, kind="stable")
+    place, value = station[order], intensity[order]
+    begin, end = np.searchsorted(place, place - ALONG), np.searchsorted(place, place + ALONG, side="right")
+    result = np.empty(len(station))
+    spans = zip(begin, range(len(station)), end, strict=True)
+    result[order] = [min(np.median(value[a : i + 1]), np.median(value[i:b])) for a, i, b in spans]
+    return result
+
+
+def otsu(values: Float) -> float:
+    """Return Otsu's threshold (1979): the one with the largest variance between those below and those above it."""
+    count, edges = np.histogram(values, bins=256)
+    middle = (edges[:-1] + edges[1:]) / 2.0
+    below, moment = np.cumsum(count)[:-1], np.cumsum(count * middle)[:-1]
+    above = count.sum() - below
+    with np.errstate(divide="ignore", invalid="ignore"):
+        apart = (float((count * middle).sum()) - moment) / above - moment / below
+        between = np.where((below > 0) & (above > 0), below * above * apart**2, 0.0)
+    return float(edges[1:-1][np.argmax(between)])
+
+
+def beside_axis(points: Float, axis: Float) -> tuple[Float, Float]:
+    """Return stations and offsets (N,) of points (N, 2) beside a chain of axis points (M, 2), m; NaN beside none.
+
+    Each point belongs to the nearest of the segments whose ends it lies between, or to the corner of two.
+    """
+    step = np.diff(axis, axis=0)
+    length = np.hypot(step[:, 0], step[:, 1])
+    start = np.concatenate([[0.0], np.cumsum(length)[:-1]])
+    kept = np.flatnonzero((length > 1e-6) & (length <= _GAP))
+    begin, step, length, start = axis[:-1][kept], step[kept], length[kept], start[kept]
+    station, offset = np.full(len(points), np.nan), np.full(len(points), np.nan)
+    cell = np.floor(points / _CELL).astype(np.int64)
+    corners, owner = np.unique(cell, axis=0, return_inverse=True)
+    order = np.argsort(owner.ravel(), kind="stable")
+    groups = np.split(order, np.cumsum(np.bincount(owner.ravel(), minlength=len(corners)))[:-1])
+    for corner, own in zip(corners, groups, strict=True):
+        middle = (corner + 0.5) * _CELL
+        near = np.flatnonzero(np.abs(begin - middle).max(axis=1) < _CELL / 2.0 + _FARTHEST)
+        if len(near):
+            found = _nearest(points[own], begin[near], step[near], length[near])
+            station[own], offset[own] = start[near][found[0]] + found[1], found[2]
+    return station, offset
+
+
+def _nearest(points: Float, begin: Float, step: Float, length: Float) -> tuple[Index, Float, Float]:
+    """Return of each point (P,) the nearest segment, how far along it (m), and the offset; NaN beyond all ends."""
+    direction = step / length[:, None]
+    apart = points[:, None, :] - begin
+    along = np.einsum("psi,si->ps", apart, direction)
+    aside = direction[:, 0] * apart[:, :, 1] - direction[:, 1] * apart[:, :, 0]
+    beyond = along - np.clip(along, 0.0, length)
+    distance = np.hypot(aside, beyond)
+    best = distance.argmin(axis=1)
+    row = np.arange(len(points))
+    # In the wedge at a corner the foot is the corner itself; past an end there is none.
+    lost = (np.abs(beyond[row, best]) > 0.5) | (distance[row, best] > _FARTHEST)
+    return best, along[row, best], np.where(lost, np.nan, aside[row, best])

@@ -1,0 +1,1 @@
+"""Which rules of the guidelines a road breaks."""

@@ -1,0 +1,53 @@
+"""Which rules of the guidelines (RAA, RMS, RPS) a road breaks. It works on any parameter set, hand-made or sampled."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..road.parameters import RoadParameters
+from .rules import alignment as checker_alignment
+from .rules import barriers as checker_barriers
+from .rules import crossfall as checker_crossfall
+from .rules import furniture as checker_furniture
+from .rules import markings as checker_markings
+from .rules import section as checker_section
+from .rules import signs as checker_signs
+from .rules import traffic as checker_traffic
+from .rules import turnouts as checker_turnout
+from .rules.rule import Road, Rule, Violation
+
+__all__ = ["RULES", "Rule", "Violation", "check"]
+
+MODULES = (
+    checker_alignment,
+    checker_crossfall,
+    checker_section,
+    checker_turnout,
+    checker_markings,
+    checker_barriers,
+    checker_signs,
+    checker_furniture,
+    checker_traffic,
+)
+"""Where the rules are, in the order of their findings."""
+RULES: dict[str, Rule] = {rule.id: rule for module in MODULES for rule in module.RULES}
+"""All rules by id, in the order of their findings."""
+
+
+def check(parameters: RoadParameters) -> list[Violation]:
+    """Return every broken rule in the order of `RULES`, then along the road; none if the road keeps them all."""
+    violations: list[Violation] = []
+    with np.errstate(all="ignore"):
+        road = Road(parameters)
+        for rule in RULES.values():
+            found = [
+                Violation(rule.id, name, _finite(station), _finite(value), _finite(limit), rule.unit, text)
+                for name, station, value, limit, text in rule.find(road)
+            ]
+            violations += sorted(found, key=lambda violation: violation.station)
+    return violations
+
+
+def _finite(value: float) -> float:
+    """Return a number that JSON can hold: values that overflowed count as the largest one."""
+    return float(np.nan_to_num(value))

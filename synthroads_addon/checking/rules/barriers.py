@@ -1,0 +1,194 @@
+"""Rules for barriers (RPS): where they must stand, and how."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+
+from ...road.guidelines import (
+    BARRIER_DISTANCE,
+    BARRIER_GAP,
+    EMBANKMENT_HEIGHT,
+    EMBANKMENT_RUN,
+    LIMITS,
+    OBSTACLE_DISTANCE,
+    OBSTACLE_LEAD,
+    OBSTACLE_POST,
+    OBSTACLE_TAIL,
+    SHORTEST_BARRIER,
+    TIGHT_CURVE,
+)
+from ...road.surroundings import Vegetation
+from ...road.things.furniture import Gantry, NoiseBarrier, Overpass, Pole, TrafficSign
+from .edges import Edges
+from .obstacles import Spans
+from .rule import Finding, Road, Rule, above, below, gaps
+
+#: What is an obstacle in front of which a barrier must stand, for people.
+OBSTACLES: dict[type[Any], str] = {Gantry: "gantry's post", Overpass: "pier", Pole: "pole", TrafficSign: "sign's post"}
+
+
+def _ramps(edges: Edges) -> Spans:
+    """Return where no barrier is asked for: beside a ramp, which a barrier of one offset cannot follow."""
+    return [turnout.ramp_span for turnout in edges.turnouts if turnout.turnout.ramp]
+
+
+def _median_barrier(road: Road) -> Iterator[Finding]:
+    if len(road.sides) < 2:
+        return
+    barriers = road.barriers
+    middle = 0.5 * barriers.start + 0.5 * barriers.end
+    between = np.ones(len(barriers.offset), dtype=bool)
+    for edges in road.sides.values():
+        between &= edges.sign * barriers.offset <= edges.inner(middle)
+    for name, edges in road.sides.items():
+        spans = barriers.spans(between & barriers.faces[:, 0 if edges.sign > 0 else 1])
+        for start, end in gaps(spans, 0.0, road.length, BARRIER_GAP):
+            text = f"The median has no barrier towards this carriageway for {end - start:.1f} m (RPS)."
+            yield Finding(name, start, end - start, 0.0, text)
+
+
+def _embankment_barrier(road: Road) -> Iterator[Finding]:
+    terrain = road.terrain
+    if terrain is None or not above(terrain.embankment_height, EMBANKMENT_HEIGHT):
+        return
+    if not below(terrain.batter_slope, EMBANKMENT_RUN):
+        return
+    for name, edges in road.sides.items():
+        spans = road.barriers.spans(road.beside[edges.name].outer) + _ramps(edges)
+        for start, end in gaps(spans, 0.0, road.length, BARRIER_GAP):
+            text = (
+                f"The embankment is {terrain.embankment_height:.1f} m high and 1 : {terrain.batter_slope:g} steep, and "
+                f"{end - start:.1f} m beside it are without barrier (RPS)."
+            )
+            yield Finding(name, start, end - start, 0.0, text)
+
+
+def _curve_barrier(road: Road) -> Iterator[Finding]:
+    below_radius = TIGHT_CURVE * LIMITS[road.design_class].radius
+    for run in road.runs:
+        if run.straight or not below(run.radius, below_radius):
+            continue
+        for name, edges in road.sides.items():
+            if edges.sign * run.curvature > 0.0:
+                continue
+            spans = road.barriers.spans(road.beside[edges.name].outer) + _ramps(edges)
+            for start, end in gaps(spans, run.start, run.end, BARRIER_GAP):
+                text = (
+                    f"The curve's radius of {run.radius:.0f} m is below {below_radius:.0f} m, and {end - start:.1f} m "
+                    "of its outer side are without barrier (RPS)."
+                )
+                yield Finding(name, start, end - start, 0.0, text)
+
+
+def _obstacles(road: Road) -> Iterator[tuple[int, str]]:
+    """Yield (index of its body, what it is) of everything that a vehicle must not run into."""
+    signs = road.of(TrafficSign)
+    for kind, what in OBSTACLES.items():
+        for i in road.bodies.of(kind, part="foot"):
+            name = road.bodies.items[i].name
+            if name not in signs or above(signs[name].post_diameter, OBSTACLE_POST):
+                yield i, what
+
+
+def _unguarded(road: Road, edges: Edges, index: int, reach: tuple[float, float]) -> tuple[float, float] | None:
+    """Return (metres, first station) that barriers lack between a carriageway and a body beside it, or None.
+
+    Args:
+        road: the road.
+        edges: the carriageway.
+        index: which body.
+        reach: m that the barriers begin before it and end behind it, in the direction of traffic.
+    """
+    body, beside = road.bodies.items[index], road.beside[edges.name]
+    low, high = (body.low, body.high) if edges.sign > 0 else (-body.high, -body.low)
+    outside = road.around.outer[edges.name][index]
+    between = beside.outer & (beside.distance < low) if outside else beside.inner & (beside.distance > high)
+    before, behind = reach if edges.traffic > 0 else reach[::-1]
+    spans = road.barriers.spans(between) + _ramps(edges)
+    missing = list(gaps(spans, max(body.start - before, 0.0), min(body.end + behind, road.length), BARRIER_GAP))
+    return (math.fsum(end - start for start, end in missing), missing[0][0]) if missing else None
+
+
+def _obstacle_barrier(road: Road) -> Iterator[Finding]:
+    limit = OBSTACLE_DISTANCE[road.design_class]
+    for i, what in _obstacles(road):
+        for side, edges in road.sides.items():
+            distance = float(road.around.clearance[side][i])
+            if distance < 0.0 or not below(distance, limit):
+                continue
+            if lacking := _unguarded(road, edges, i, (OBSTACLE_LEAD, OBSTACLE_TAIL)):
+                text = (
+                    f"The {what} stands {distance:.2f} m from {side} and {lacking[0]:.1f} m of the barrier in front of "
+                    f"it are missing; nearer than {limit} m it is needed (RPS)."
+                )
+                yield Finding(road.bodies.items[i].name, lacking[1], lacking[0], 0.0, text)
+
+
+def _noise_barrier(road: Road) -> Iterator[Finding]:
+    limit = OBSTACLE_DISTANCE[road.design_class]
+    for i in road.bodies.of(NoiseBarrier, part="barrier"):
+        for side, edges in road.sides.items():
+            distance = float(road.around.clearance[side][i])
+            if distance < 0.0 or not road.around.outer[side][i]:
+                continue
+            reach = (OBSTACLE_LEAD, OBSTACLE_TAIL) if below(distance, limit) else (0.0, 0.0)
+            if lacking := _unguarded(road, edges, i, reach):
+                text = (
+                    f"The noise barrier stands {distance:.2f} m from {side} and {lacking[0]:.1f} m of the barrier in "
+                    "front of it are missing (RPS)."
+                )
+                yield Finding(road.bodies.items[i].name, lacking[1], lacking[0], 0.0, text)
+
+
+def _tree_distance(road: Road) -> Iterator[Finding]:
+    least = OBSTACLE_DISTANCE[road.design_class]
+    for name, plants in road.of(Vegetation).items():
+        if plants.kind != "tree" or plants.density == 0.0:
+            continue
+        for edges in road.sides.values():
+            distance = edges.verge + plants.band_start
+            if distance < 0.0 or not below(distance, least):
+                continue
+            beside = road.beside[edges.name]
+            near = beside.outer & (road.barriers.clearance < distance)
+            for start, _ in list(gaps(road.barriers.spans(near) + _ramps(edges), 0.0, road.length, BARRIER_GAP))[:1]:
+                text = (
+                    f"Trees stand {distance:.2f} m from the {edges.carriageway.side} paved edge with no barrier in "
+                    f"front; {least} m are needed (RPS)."
+                )
+                yield Finding(name, start, distance, least, text)
+
+
+def _barrier_distance(road: Road) -> Iterator[Finding]:
+    barriers = road.barriers
+    for i, name in enumerate(barriers.names):
+        distance = float(barriers.clearance[i])
+        if distance >= 0.0 and below(distance, BARRIER_DISTANCE):
+            text = f"The barrier stands {distance:.2f} m from the paved edge; {BARRIER_DISTANCE} m are needed (RPS)."
+            yield Finding(name, float(barriers.where[i]), distance, BARRIER_DISTANCE, text)
+
+
+def _barrier_length(road: Road) -> Iterator[Finding]:
+    barriers = road.barriers
+    for i, name in enumerate(barriers.names):
+        start, end = float(barriers.start[i]), float(barriers.end[i])
+        cut = start <= 0.0 or not below(end, road.length)
+        if below(end - start, SHORTEST_BARRIER) and not cut:
+            text = f"The barrier is {end - start:.1f} m long; {SHORTEST_BARRIER:.0f} m are needed (RPS)."
+            yield Finding(name, start, end - start, SHORTEST_BARRIER, text)
+
+
+RULES = (
+    Rule("median-barrier", "The median has a barrier throughout", "m", "RPS", "confirmed", _median_barrier),
+    Rule("embankment-barrier", "Embankments have barriers", "m", "RPS", "unconfirmed", _embankment_barrier),
+    Rule("curve-barrier", "Tight curves have barriers outside", "m", "RPS", "unconfirmed", _curve_barrier),
+    Rule("obstacle-barrier", "Obstacles have a barrier in front", "m", "RPS", "unconfirmed", _obstacle_barrier),
+    Rule("noise-barrier", "Noise barriers have a barrier in front", "m", "RPS", "confirmed", _noise_barrier),
+    Rule("tree-distance", "Trees keep clear of the pavement", "m", "RPS", "unconfirmed", _tree_distance),
+    Rule("barrier-distance", "Barriers keep clear of the pavement", "m", "RPS", "unconfirmed", _barrier_distance),
+    Rule("barrier-length", "Shortest barrier", "m", "RPS", "unconfirmed", _barrier_length),
+)

@@ -1,0 +1,234 @@
+"""Where the edges of a carriageway lie along the road: of its lanes, its pavement, its turnouts and their ramps.
+
+All distances are horizontal, from the centreline outwards, m: the carriageway's sign times them is the offset.
+"""
+
+from __future__ import annotations
+
+from itertools import accumulate
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...road.objects import AnyWidth
+from ...road.section import Carriageway, Turnout
+
+Float = NDArray[np.float64]
+
+#: At the nose the unpaved ground between hard shoulder and ramp is this wide (m), and the ramp goes on this far (m).
+NOSE_WIDTH, NOSE_BEFORE_END = 1.0, 10.0
+#: Stations that are looked at between two that matter, where a ramp bends away.
+BETWEEN = 3
+
+
+class WidthByStation:
+    """A width by station.
+
+    Attributes:
+        constant: whether it is the same all along the road.
+        station, width: (P,) its points, m; one of any station where it is constant.
+    """
+
+    def __init__(self, width: AnyWidth) -> None:
+        self.constant = not isinstance(width, tuple)
+        points = [(0.0, width)] if not isinstance(width, tuple) else [(p.station, p.width) for p in width]
+        self.station, self.width = np.array(points, dtype=np.float64).T
+
+    def __call__(self, station: Float) -> Float:
+        """Return the widths at stations, m."""
+        if self.constant:
+            return np.full(len(station), self.width[0])
+        return np.interp(station, self.station, self.width)
+
+
+class Across(NamedTuple):
+    """Distances at N stations, m.
+
+    Attributes:
+        inner: (N,) inner paved edge.
+        lanes: (N, lanes + 1) boundaries of the lanes, from the outermost lane's outer one inwards.
+        main: (N,) outer edge of the main road's pavement as if there were no turnouts.
+        outer: (N,) outer edge of all pavement.
+        gap_low, gap_high: (N,) edges of the unpaved ground between main road and ramp; both are `outer` without any.
+    """
+
+    inner: Float
+    lanes: Float
+    main: Float
+    outer: Float
+    gap_low: Float
+    gap_high: Float
+
+    @property
+    def middle(self) -> Float:
+        """Return the middle (N,) of the main road's pavement."""
+        return 0.5 * (self.inner + self.main)
+
+    def clearance(self, low: Float, high: Float) -> Float:
+        """Return how far (N,) what lies between two distances is from the pavement; negative over it."""
+        main = np.maximum(self.inner - high, low - self.gap_low)
+        ramp = np.maximum(self.gap_high - high, low - self.outer)
+        return np.minimum(main, ramp)
+
+
+class TurnoutEdges:
+    """What a turnout adds to its carriageway.
+
+    Along it counts w (m): for an exit from its beginning in the direction of traffic, for an entry backwards from its
+    end; so both begin with their taper and end with their ramp. For an emergency bay it counts as for an exit.
+
+    Attributes:
+        name, turnout: the turnout with its id.
+        taper, tip, nose, end: w where the lane has its full width, of the gore's tip (a bay's full width ends there),
+            of the nose and of the end.
+        natural_nose: where the nose would be were the ramp long enough, m behind the tip.
+    """
+
+    def __init__(self, name: str, turnout: Turnout, traffic: int, shoulder: WidthByStation) -> None:
+        self.name, self.turnout = name, turnout
+        ramp = turnout.ramp
+        self._forward = (traffic > 0) != (turnout.kind == "entry")
+        self.taper = turnout.taper_out_length if turnout.kind == "entry" else turnout.taper_in_length
+        self.tip = self.taper + turnout.lane_length
+        self.natural_nose = 0.0
+        self._apart = np.inf
+        if ramp is None:
+            self.nose = self.end = turnout.length
+            self._added = np.array([0.0, self.taper, self.tip, self.end]), turnout.lane_width * np.array([0.0, 1, 1, 0])
+            return
+        self.end = self.tip + ramp.length
+        self._apart = 6.0 * ramp.clothoid_parameter**2
+        full = float(shoulder(np.array([self.station(self.tip)]))[0])
+        self.natural_nose = float(np.cbrt(self._apart * (full + NOSE_WIDTH)))
+        self.nose = self.tip + min(self.natural_nose, ramp.length - NOSE_BEFORE_END)
+        lane = turnout.lane_width + turnout.edge_strip_width + turnout.shoulder_width
+        beyond = ramp.lane_width + 2.0 * ramp.edge_strip_width
+        marks = [0.0, self.taper, self.tip, self.nose, self.end]
+        self._added = np.array(marks), np.array([0.0, lane, lane, beyond, beyond])
+
+    def station(self, w: float) -> float:
+        """Return the station of a w, m."""
+        return self.turnout.start_station + w if self._forward else self.turnout.end_station - w
+
+    def span(self, first: float, last: float) -> tuple[float, float]:
+        """Return the lower and the higher station of two w, m."""
+        a, b = self.station(first), self.station(last)
+        return (a, b) if a <= b else (b, a)
+
+    @property
+    def ramp_span(self) -> tuple[float, float]:
+        """Stations of the gore's tip and the ramp's end, the lower one first, m; empty for a bay."""
+        return self.span(self.tip, self.end) if self.turnout.ramp else (np.inf, -np.inf)
+
+    def marks(self) -> Float:
+        """Return the stations at which the pavement's edge bends or steps, and some between where it is curved."""
+        w = list(self._added[0])
+        if self.turnout.ramp:
+            parts = ((self.tip, self.nose), (self.nose, self.end))
+            w += [a + (b - a) * i / (BETWEEN + 1) for a, b in parts for i in range(1, BETWEEN + 1)]
+        return np.array([self.station(at) for at in w])
+
+    def widen(self, station: Float, edges: _Sums) -> None:
+        """Add what it does to the sums of the carriageway's widths at N stations, in place."""
+        start, end = self.turnout.start_station, self.turnout.end_station
+        w = station - start if self._forward else end - station
+        inside = np.flatnonzero((w > 0.0) & (w <= self.end))
+        if not len(inside):
+            return
+        w, full = w[inside], edges.full[inside]
+        edges.added[inside] += np.interp(w, *self._added)
+        if self.turnout.ramp is None:
+            return
+        left = np.maximum(1.0 - w / self.taper, 0.0) * full
+        x = np.maximum(w - self.tip, 0.0)
+        wedge = x * x * x / self._apart
+        edges.left[inside] = np.minimum(edges.left[inside], left)
+        edges.wedge[inside] += wedge
+        edges.bare[inside] += np.where(w >= self.nose, np.maximum(wedge - full, 0.0), 0.0)
+
+
+class _Sums(NamedTuple):
+    """Widths (N,) at N stations, m.
+
+    Attributes:
+        full: of the hard shoulder as the carriageway has it.
+        left: of the hard shoulder that is left where it isn't part of the wedge.
+        wedge: between the main road and a ramp, hard shoulder included.
+        added: outside both.
+        bare: of the unpaved ground within the wedge.
+    """
+
+    full: Float
+    left: Float
+    wedge: Float
+    added: Float
+    bare: Float
+
+
+class Edges:
+    """The edges of a carriageway.
+
+    Attributes:
+        name, carriageway: the carriageway with its id.
+        sign, traffic: signs of its offsets, and of its traffic's direction along the stations.
+        turnouts: its exits, entries and bays.
+        lane_widths: of the lanes from outside to inside.
+        verge: the least width of the verge as the carriageway has it, m.
+        marks: (M,) increasing stations on the road at which an edge bends or steps, from its begin to its end.
+        at_marks: the edges there.
+    """
+
+    def __init__(self, name: str, carriageway: Carriageway, turnouts: dict[str, Turnout], length: float) -> None:
+        self.name, self.carriageway = name, carriageway
+        self.sign, self.traffic = carriageway.sign, carriageway.traffic
+        self._inner = WidthByStation(carriageway.inner_offset)
+        self._shoulder = WidthByStation(carriageway.hard_shoulder_width)
+        self._inner_strip = WidthByStation(carriageway.inner_edge_strip_width)
+        self._outer_strip = WidthByStation(carriageway.outer_edge_strip_width)
+        self.lane_widths = [WidthByStation(lane.width) for lane in carriageway.lanes]
+        self.verge = float(WidthByStation(carriageway.verge_width).width.min())
+        widths = (self._inner, self._shoulder, self._inner_strip, self._outer_strip, *self.lane_widths)
+        self.turnouts = [TurnoutEdges(key, item, self.traffic, self._shoulder) for key, item in turnouts.items()]
+        bends = [width.station for width in widths if not width.constant] + [t.marks() for t in self.turnouts]
+        inside = np.concatenate(bends) if bends else np.zeros(0)
+        inside = inside[(inside > 0.0) & (inside < length)]
+        self.marks = np.unique(np.concatenate(([0.0], inside, [length])))
+        self._constant = self._own(np.zeros(1)) if all(width.constant for width in widths) else None
+        self.at_marks = self.at(self.marks)
+
+    def at(self, station: Float) -> Across:
+        """Return the edges at N stations."""
+        count = len(station)
+        own = self._own(station) if self._constant is None else [np.repeat(x, count, axis=0) for x in self._constant]
+        inner, lanes, base, full = own
+        if not self.turnouts:
+            main = base + full
+            return Across(inner, lanes, main, main, main, main)
+        sums = _Sums(full, full.copy(), np.zeros(count), np.zeros(count), np.zeros(count))
+        for turnout in self.turnouts:
+            turnout.widen(station, sums)
+        high = base + sums.left + sums.wedge
+        outer, gap = high + sums.added, sums.bare > 0.0
+        gap_low, gap_high = np.where(gap, high - sums.bare, outer), np.where(gap, high, outer)
+        return Across(inner, lanes, base + full, outer, gap_low, gap_high)
+
+    def inner(self, station: Float) -> Float:
+        """Return the inner paved edge (N,) at N stations."""
+        return self._inner(station)
+
+    def between(self, start: float, end: float) -> Float:
+        """Return the stations of a begin and an end and of the marks between them, m."""
+        inside = self.marks[(self.marks > start) & (self.marks < end)]
+        return np.concatenate(([start], inside, [end]))
+
+    def distances(self, low: Float, high: Float) -> tuple[Float, Float]:
+        """Return the smaller and the larger distance of what lies between two offsets."""
+        return (low, high) if self.sign > 0 else (-high, -low)
+
+    def _own(self, station: Float) -> list[Float]:
+        """Return inner edge, lane boundaries, outer edge of the outer edge strip, width of the hard shoulder."""
+        inner = self._inner(station)
+        widths = [inner + self._inner_strip(station), *(width(station) for width in reversed(self.lane_widths))]
+        lanes = np.array(list(accumulate(widths))).T[:, ::-1]
+        return [inner, lanes, lanes[:, 0] + self._outer_strip(station), self._shoulder(station)]

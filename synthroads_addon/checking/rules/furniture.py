@@ -1,0 +1,215 @@
+"""Rules for what stands beside the road: delineators, boards, phones; and that bodies stand where they can."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import pairwise
+
+import numpy as np
+
+from ...road.guidelines import DELINEATOR_SPACING, EMERGENCY_PHONE_SPACING, KILOMETRE_BOARD_SPACING
+from ...road.objects import LineObject, PointObject
+from ...road.section import LineMarking
+from ...road.surroundings import Vegetation, Vehicle
+from ...road.things.furniture import Cabinet, ConstructionBeacon, Delineator, KilometreBoard
+from .edges import Edges, Float
+from .obstacles import DELINEATOR_REACH, Bodies, Bool
+from .rule import TOLERANCE, Finding, Road, Rule, below
+
+#: From the paved edge to a delineator's axis, m (HLB).
+DELINEATOR_DISTANCE = 0.5
+#: Posts, boards and phones may stand this much (m) farther apart: stations are rounded.
+SPACING_ROOM = 1e-3
+#: The kilometre that a board tells may be this far (m) from where it stands: boards have one decimal or more.
+KILOMETRE_ROOM = 5.0
+#: Bodies may reach this far (m) into each other: offsets are rounded.
+OVERLAP_ROOM = 1e-3
+
+
+def _posts(road: Road, edges: Edges) -> Float:
+    """Return the sorted stations of the delineators on a carriageway's outer side, m."""
+    index = np.array(road.bodies.of(Delineator, part="foot"), dtype=np.intp)
+    return np.sort(road.bodies.station[index[road.around.outer[edges.name][index]]])
+
+
+def _spacing(road: Road, borders: Float) -> Float:
+    """Return the largest spacing (m) allowed between each two of N stations, by the tightest curvature between them."""
+    stations = np.concatenate((road.starts[:-1], road.starts[1:]))
+    curvature = np.abs(np.concatenate((road.k0, road.k1)))
+    element = np.clip(np.searchsorted(road.starts, borders, side="right") - 1, 0, len(road.lengths) - 1)
+    share = (borders - road.starts[element]) / np.where(road.lengths[element] > 0.0, road.lengths[element], 1.0)
+    share = np.clip(share, 0.0, 1.0)
+    at = np.abs(road.k0[element] * (1.0 - share) + road.k1[element] * share)
+    tightest = np.maximum(at[:-1], at[1:])
+    inside = (stations > borders[0]) & (stations < borders[-1])
+    np.maximum.at(tightest, np.searchsorted(borders, stations[inside], side="left") - 1, curvature[inside])
+    radii, spacings = np.array(DELINEATOR_SPACING).T
+    return np.interp(1.0 / np.maximum(tightest, 1e-9), radii, spacings)
+
+
+def _delineator_missing(road: Road) -> Iterator[Finding]:
+    for name, edges in road.sides.items():
+        posts = _posts(road, edges)
+        first = float(posts[0]) if len(posts) else road.length
+        limit = float(_spacing(road, np.array([0.0, max(first, 0.0)]))[0]) / 2.0
+        if first > limit + SPACING_ROOM:
+            what = f"The first delineator stands at {first:.1f} m" if len(posts) else "There is no delineator"
+            text = f"{what} on the outer side; one is needed within {limit:.1f} m of the beginning (HLB)."
+            yield Finding(name, 0.0, first, limit, text)
+
+
+def _delineator_spacing(road: Road) -> Iterator[Finding]:
+    for name, edges in road.sides.items():
+        posts = _posts(road, edges)
+        if not len(posts):
+            continue
+        borders = np.append(posts, max(road.length, posts[-1]))
+        gap, limit = np.diff(borders), _spacing(road, borders)
+        for i in np.flatnonzero(gap > limit + SPACING_ROOM).tolist():
+            text = f"No delineator follows for {gap[i]:.1f} m; {limit[i]:.1f} m are allowed (HLB)."
+            yield Finding(name, float(posts[i]), float(gap[i]), float(limit[i]), text)
+
+
+def _delineator_distance(road: Road) -> Iterator[Finding]:
+    posts, clearance = road.of(Delineator), road.around.nearest
+    for i in np.flatnonzero((clearance >= 0.0) & (clearance < DELINEATOR_DISTANCE)).tolist():
+        body, distance = road.bodies.items[i], float(clearance[i]) + DELINEATOR_REACH
+        if body.name in posts and below(distance, DELINEATOR_DISTANCE):
+            text = (
+                f"The delineator stands {distance:.2f} m from the paved edge; {DELINEATOR_DISTANCE} m are needed (HLB)."
+            )
+            yield Finding(body.name, posts[body.name].station, distance, DELINEATOR_DISTANCE, text)
+
+
+def _by_side(road: Road, items: dict[str, KilometreBoard] | dict[str, Cabinet]) -> Iterator[list[tuple[str, float]]]:
+    """Yield the ids and stations of objects on either side of the centreline, in order."""
+    for sign in (1.0, -1.0):
+        own = [(name, item.station) for name, item in items.items() if sign * item.offset > 0.0]
+        yield sorted(own, key=lambda pair: pair[1])
+
+
+def _apart(road: Road, items: dict[str, KilometreBoard] | dict[str, Cabinet], limit: float) -> Iterator[Finding]:
+    for places in _by_side(road, items):
+        for (name, here), (_, there) in pairwise(places):
+            if there - here > limit + SPACING_ROOM:
+                text = f"The next one on this side stands {there - here:.1f} m on; {limit:.0f} m are allowed."
+                yield Finding(name, here, there - here, limit, text)
+
+
+def _kilometre_spacing(road: Road) -> Iterator[Finding]:
+    yield from _apart(road, road.of(KilometreBoard), KILOMETRE_BOARD_SPACING)
+
+
+def _phone_spacing(road: Road) -> Iterator[Finding]:
+    phones = {name: item for name, item in road.of(Cabinet).items() if item.kind == "emergency_phone"}
+    yield from _apart(road, phones, EMERGENCY_PHONE_SPACING)
+
+
+def _kilometre_text(road: Road) -> Iterator[Finding]:
+    """Compare each board with the others: kilometres rise or fall with the stations, from an unknown beginning."""
+    boards = road.of(KilometreBoard)
+    if not boards:
+        return
+    names, station = list(boards), np.array([board.station for board in boards.values()])
+    told = np.array([_metres(board.text) for board in boards.values()])
+    known = np.isfinite(told)
+    begins = [told - station, told + station] if known.any() else [told]
+    off = min((_off(begin, known) for begin in begins), key=lambda far: int(np.sum(far > KILOMETRE_ROOM)))
+    for i in np.flatnonzero(~(off <= KILOMETRE_ROOM)).tolist():
+        board = boards[names[i]]
+        value = float(np.nan_to_num(off[i], nan=road.length))
+        text = f"The board's '{board.text}' is {value:.0f} m from the kilometre that the other boards give its place."
+        yield Finding(names[i], board.station, value, KILOMETRE_ROOM, text)
+
+
+def _off(begin: Float, known: Bool) -> Float:
+    """Return how far (N,) the beginnings of the road that boards tell are from the middle one of those known, m."""
+    middle = np.sort(begin[known])[np.sum(known) // 2] if known.any() else np.nan
+    return np.abs(begin - middle)
+
+
+def _metres(text: str) -> float:
+    """Return the m that a board tells, or NaN where it is no number."""
+    whole, _, part = text.strip().replace(",", ".").partition(".")
+    digits = whole + part
+    return float(f"{whole}.{part}0") * 1000.0 if whole.isascii() and digits.isascii() and digits.isdigit() else np.nan
+
+
+def _object_range(road: Road) -> Iterator[Finding]:
+    for name, start, end in _ranges(road):
+        if end < start:
+            yield Finding(name, end, end, start, f"The object ends at {end:.3f} m before it begins at {start:.3f} m.")
+        elif end > road.length * (1.0 + TOLERANCE):
+            text = f"The object reaches {end:.3f} m; the road ends at {road.length:.3f} m."
+            yield Finding(name, end, end, road.length, text)
+
+
+def _ranges(road: Road) -> Iterator[tuple[str, float, float]]:
+    """Yield (id, start, end) of all that lies along the road, damage of the pavement included."""
+    for name, item in road.each(PointObject, Vehicle):
+        yield name, item.station, item.station
+    for name, item in road.each(LineObject, LineMarking):
+        yield name, item.start_station, item.end_station
+    for name, edges in road.sides.items():
+        for rut in edges.carriageway.pavement.ruts:
+            yield name, rut.start_station, rut.end_station
+        for pothole in edges.carriageway.pavement.potholes:
+            yield name, pothole.station, pothole.station
+
+
+def _object_on_pavement(road: Road) -> Iterator[Finding]:
+    allowed = road.of(ConstructionBeacon)
+    clearance, where = road.around.nearest, road.around.where
+    worst: dict[str, tuple[float, float]] = {}
+    for i in np.flatnonzero(clearance < -TOLERANCE).tolist():
+        body = road.bodies.items[i]
+        if body.part in ("foot", "barrier", "wall") and body.name not in allowed:
+            worst[body.name] = min(worst.get(body.name, (0.0, 0.0)), (float(clearance[i]), float(where[i])))
+    found = [(name, station, distance) for name, (distance, station) in worst.items()]
+    for name, plants in road.of(Vegetation).items():
+        verge = min(edges.verge for edges in road.sides.values())
+        if plants.density > 0.0 and verge + plants.band_start < -TOLERANCE:
+            found.append((name, 0.0, verge + plants.band_start))
+    for name, station, distance in found:
+        yield Finding(name, station, distance, 0.0, f"The object reaches {-distance:.2f} m over the pavement.")
+
+
+def _object_overlap(road: Road) -> Iterator[Finding]:
+    bodies = road.bodies
+    first, second = _near_pairs(bodies)
+    depth = np.full(len(first), np.inf)
+    for low, high in ((bodies.start, bodies.end), (bodies.low, bodies.high), (bodies.bottom, bodies.top)):
+        depth = np.minimum(depth, np.minimum(high[first], high[second]) - np.maximum(low[first], low[second]))
+    told = set()
+    for i in np.flatnonzero(depth > OVERLAP_ROOM).tolist():
+        a, b = bodies.items[first[i]], bodies.items[second[i]]
+        pair = (a.name, b.name)
+        if a.name == b.name or pair in told:
+            continue
+        told.add(pair)
+        text = f"The object and {a.name} reach {depth[i]:.2f} m into each other."
+        yield Finding(b.name, max(a.start, b.start), float(depth[i]), 0.0, text)
+
+
+def _near_pairs(bodies: Bodies) -> tuple[np.ndarray, np.ndarray]:
+    """Return the indices (P,), (P,) of all pairs of bodies whose stations overlap, in the order of the file."""
+    order = np.argsort(bodies.start, kind="stable")
+    until = np.searchsorted(bodies.start[order], bodies.end[order], side="left")
+    count = np.maximum(until - np.arange(len(order)) - 1, 0)
+    one = np.repeat(np.arange(len(order)), count)
+    other = one + 1 + np.arange(len(one)) - np.repeat(np.cumsum(count) - count, count)
+    one, other = order[one], order[other]
+    return np.minimum(one, other), np.maximum(one, other)
+
+
+RULES = (
+    Rule("delineator-missing", "Delineators begin at the beginning", "m", "HLB", "derived", _delineator_missing),
+    Rule("delineator-spacing", "Spacing of delineators", "m", "HLB", "confirmed", _delineator_spacing),
+    Rule("delineator-distance", "Delineators keep off the pavement", "m", "HLB", "confirmed", _delineator_distance),
+    Rule("kilometre-spacing", "Spacing of kilometre boards", "m", "", "confirmed", _kilometre_spacing),
+    Rule("kilometre-text", "Kilometre boards tell their place", "m", "", "definition", _kilometre_text),
+    Rule("phone-spacing", "Spacing of emergency phones", "m", "", "confirmed", _phone_spacing),
+    Rule("object-range", "Objects lie on the road's length", "m", "", "definition", _object_range),
+    Rule("object-on-pavement", "Nothing stands on the pavement", "m", "", "definition", _object_on_pavement),
+    Rule("object-overlap", "No two objects stand at one place", "m", "", "definition", _object_overlap),
+)

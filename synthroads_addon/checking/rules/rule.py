@@ -1,0 +1,315 @@
+"""What the checker's rules have in common: rule, finding, and the road as arrays.
+
+Nothing here or in the rules is shared with the sampler but the table of limits, so that an error in one shows in the
+other. Geometry is worked out anew from the parameter set, and no valid set makes a rule fail with an error: stations
+out of order, overlapping roundings and elements without length are findings.
+"""
+
+from __future__ import annotations
+
+import builtins
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...road.guidelines import LIMITS
+from ...road.objects import ObjectT
+from ...road.parameters import AlignmentObject, RoadParameters
+from ...road.section import Carriageway, Turnout
+from ...road.surroundings import Terrain
+from .edges import Edges, Float, TurnoutEdges
+from .obstacles import Around, Barriers, Beside, Bodies, Bool, Signs
+
+Sure = Literal["confirmed", "derived", "unconfirmed", "definition"]
+
+#: Values may miss a limit by this share of it: what is written exactly at a limit passes.
+TOLERANCE = 1e-6
+#: Curvatures that differ by less than this (1/m), or by `TOLERANCE` of them, are the same: files hold rounded numbers.
+SAME_CURVATURE = 1e-9
+#: Curvatures below this (1/m) are straight: a radius over 10 000 km.
+STRAIGHT = 1e-7
+#: Stations nearer than this (m) are the same.
+SAME_STATION = 1e-3
+#: Crossfalls that differ by less than this (%) don't run off.
+SAME_CROSSFALL = 1e-6
+
+
+class Finding(NamedTuple):
+    """What a rule found: `Violation` without what its rule knows."""
+
+    object: str
+    station: float
+    value: float
+    limit: float
+    text: str
+
+
+@dataclass(frozen=True)
+class Violation:
+    """A broken rule.
+
+    Attributes:
+        rule: stable id of the rule, e.g. ``radius-minimum``.
+        object: id of the object in the set.
+        station: where, m.
+        value, limit: what was found and what is allowed, in `unit`.
+        unit: unit of both.
+        text: one sentence for people, with the guideline.
+    """
+
+    rule: str
+    object: str
+    station: float
+    value: float
+    limit: float
+    unit: str
+    text: str
+
+
+@dataclass(frozen=True)
+class Rule:
+    """A rule of the checker.
+
+    Attributes:
+        id: short stable name.
+        title: what is required, for people.
+        unit: unit of value and limit.
+        source: guideline, or what else it follows from.
+        sure: ``confirmed`` (secondary sources print it), ``derived`` (computed from what they print),
+            ``unconfirmed`` (common knowledge, not found in print), ``definition`` (a set that breaks it is faulty).
+        find: function that yields the findings.
+    """
+
+    id: str
+    title: str
+    unit: str
+    source: str
+    sure: Sure
+    find: Callable[[Road], Iterable[Finding]]
+
+
+@dataclass(frozen=True)
+class Run:
+    """A stretch of constant curvature: neighbouring lines or arcs of the same curvature count as one.
+
+    Attributes:
+        start, end: stations, m.
+        curvature: 1/m, positive to the left.
+        first, last: indices of its elements.
+    """
+
+    start: float
+    end: float
+    curvature: float
+    first: int
+    last: int
+
+    @property
+    def straight(self) -> bool:
+        """Whether it is a straight."""
+        return abs(self.curvature) < STRAIGHT
+
+    @property
+    def radius(self) -> float:
+        """Return the radius, m; infinite on a straight."""
+        return 1.0 / abs(self.curvature) if self.curvature else np.inf
+
+
+class Road:
+    """A parameter set as arrays.
+
+    Attributes:
+        axis: id of the alignment.
+        terrain: the terrain, if there is one.
+        limits: limits of the design class.
+        guideline: the RAA with the design class, for people.
+        two_seconds: m travelled in two seconds at the class's speed.
+        lengths, k0, k1: (E,) lengths (m) and curvatures (1/m) at both ends of the horizontal elements.
+        starts: (E + 1,) stations of their borders; `length` is the last.
+        constant: (E,) whether an element is a line or an arc.
+        runs: stretches of constant curvature in order.
+        vertical: the profile.
+        sides: the carriageways' edges, by the carriageway's id.
+        marks: (M,) increasing stations at which an edge of the pavement bends or steps.
+    """
+
+    def __init__(self, parameters: RoadParameters) -> None:
+        self.parameters = parameters
+        self.design_class = parameters.design_class
+        self.limits = LIMITS[self.design_class]
+        self.guideline = f"RAA, {self.design_class.replace('EKA', 'EKA ')}"
+        self.two_seconds = self.limits.speed / 3.6 * 2.0
+        self._by_type: dict[builtins.type, dict[str, Any]] = {}
+        for name, item in parameters.objects.items():
+            self._by_type.setdefault(type(item), {})[name] = item
+        self.axis, alignment = next(iter(self.of(AlignmentObject).items()))
+        self.terrain = next(iter(self.of(Terrain).values()), None)
+        elements = alignment.horizontal
+        self.lengths = np.array([e.length for e in elements], dtype=np.float64)
+        self.k0 = np.array([e.curvature_start for e in elements], dtype=np.float64)
+        self.k1 = np.array([e.curvature_end for e in elements], dtype=np.float64)
+        self.starts = np.concatenate(([0.0], np.cumsum(np.maximum(self.lengths, 0.0))))
+        self.length = float(self.starts[-1])
+        self.constant: Bool = same_curvature(self.k0, self.k1)
+        self.runs = self._runs()
+        self.vertical = Vertical(alignment)
+        turnouts = self.of(Turnout)
+        self.sides: dict[str, Edges] = {}
+        for name, carriageway in self.of(Carriageway).items():
+            own = {key: turnout for key, turnout in turnouts.items() if turnout.carriageway == name}
+            self.sides[name] = Edges(name, carriageway, own, self.length)
+        self.marks = np.unique(np.concatenate([edges.marks for edges in self.sides.values()]))
+
+    def of(self, kind: builtins.type[ObjectT]) -> dict[str, ObjectT]:
+        """Return the objects of one class by id, in the order of the file."""
+        return self._by_type.get(kind, {})
+
+    def each(self, *kinds: builtins.type) -> Iterator[tuple[str, Any]]:
+        """Yield the objects, with their ids, whose class is one of some classes or derives from one."""
+        for kind, items in self._by_type.items():
+            if issubclass(kind, kinds):
+                yield from items.items()
+
+    @property
+    def turnouts(self) -> Iterator[tuple[Edges, TurnoutEdges]]:
+        """The turnouts with their carriageways."""
+        return ((edges, turnout) for edges in self.sides.values() for turnout in edges.turnouts)
+
+    @cached_property
+    def crossfalls(self) -> dict[str, Crossfall]:
+        """The carriageways' crossfall, by the carriageway's id."""
+        return {name: Crossfall(edges.carriageway, self.length) for name, edges in self.sides.items()}
+
+    @cached_property
+    def bodies(self) -> Bodies:
+        """What stands on the road as boxes."""
+        return Bodies(self.parameters)
+
+    @cached_property
+    def around(self) -> Around:
+        """Where the bodies are in relation to the carriageways."""
+        return Around(self.bodies, self.sides, self.marks)
+
+    @cached_property
+    def barriers(self) -> Barriers:
+        """The guardrails and concrete barriers."""
+        return Barriers(self.parameters, self.bodies, self.around)
+
+    @cached_property
+    def signs(self) -> Signs:
+        """The traffic signs, kilometre boards and traffic lights."""
+        return Signs(self.parameters, self.bodies, self.around)
+
+    @cached_property
+    def beside(self) -> dict[str, Beside]:
+        """Which of the barriers protect the traffic of each carriageway, by the carriageway's id."""
+        return {name: Beside(self.barriers, name, edges) for name, edges in self.sides.items()}
+
+    def _runs(self) -> list[Run]:
+        runs: list[Run] = []
+        for i in np.flatnonzero(self.constant).tolist():
+            curvature = float(0.5 * (self.k0[i] + self.k1[i]))
+            first = i
+            if runs and runs[-1].last == i - 1 and bool(same_curvature(self.k1[i - 1], self.k0[i])):
+                previous = runs.pop()
+                first, curvature = previous.first, previous.curvature
+            runs.append(Run(float(self.starts[first]), float(self.starts[i + 1]), curvature, first, i))
+        return runs
+
+    def cut(self, run: Run) -> bool:
+        """Return whether the road's begin or end cuts a run, so that its true length is unknown."""
+        return run.first == 0 or run.last == len(self.lengths) - 1
+
+
+class Vertical:
+    """The profile as arrays; points whose station isn't past all before them are left out (and found by a rule).
+
+    Attributes:
+        points: (P,) indices in the set of the points that are kept.
+        station, radius: (P,) m.
+        grades: (P + 1,) m/m before, between and after the points; the outer ones repeat their neighbour.
+        tangents: (P,) tangent lengths of the roundings, m.
+    """
+
+    def __init__(self, alignment: AlignmentObject) -> None:
+        points = alignment.vertical
+        station = np.array([p.station for p in points], dtype=np.float64)
+        elevation = np.array([p.elevation for p in points], dtype=np.float64)
+        self.points = increasing(station)
+        self.station = station[self.points]
+        self.radius = np.array([p.radius for p in points], dtype=np.float64)[self.points]
+        between = np.diff(elevation[self.points]) / np.diff(self.station)
+        self.grades = np.concatenate((between[:1], between, between[-1:])) if len(between) else np.zeros(2)
+        self.tangents = 0.5 * self.radius * np.abs(np.diff(self.grades))
+
+
+class Crossfall:
+    """A carriageway's crossfall on the road as arrays; points whose station isn't past all before are left out.
+
+    Attributes:
+        station: (N,) m: the road's begin, the points on it, its end.
+        percent: (N,) crossfall there.
+        runs_off: (N - 1,) whether it changes from one to the next.
+        slope: (N - 1,) % per m.
+    """
+
+    def __init__(self, carriageway: Carriageway, length: float) -> None:
+        points = np.array([(p.station, p.crossfall_percent) for p in carriageway.crossfall])
+        station, percent = points[increasing(points[:, 0])].T
+        inside = (station > 0.0) & (station < length)
+        self.station = np.concatenate(([0.0], station[inside], [length]))
+        self.percent = np.interp(self.station, station, percent)
+        change = np.diff(self.percent)
+        self.runs_off: Bool = np.abs(change) > SAME_CROSSFALL
+        self.slope = change / np.diff(self.station)
+
+
+def same_curvature(a: Float | float, b: Float | float) -> Bool:
+    """Return where two curvatures count as equal."""
+    room = SAME_CURVATURE + TOLERANCE * np.maximum(np.abs(a), np.abs(b))
+    return np.asarray(np.abs(np.subtract(a, b)) <= room)
+
+
+def increasing(station: Float) -> NDArray[np.intp]:
+    """Return the indices of the stations that lie past all stations before them."""
+    before = np.concatenate(([-np.inf], np.maximum.accumulate(station)[:-1]))
+    return np.flatnonzero(station > before)
+
+
+def out_of_order(station: Float) -> list[int]:
+    """Return the indices of the stations that don't lie past all stations before them."""
+    return sorted(set(range(len(station))) - set(increasing(station).tolist()))
+
+
+def below(value: float, limit: float) -> bool:
+    """Return whether a value falls short of a limit by more than the tolerance."""
+    return bool(value < limit - TOLERANCE * max(abs(limit), TOLERANCE))
+
+
+def above(value: float, limit: float) -> bool:
+    """Return whether a value exceeds a limit by more than the tolerance."""
+    return below(-value, -limit)
+
+
+def stretches(mask: Bool) -> Iterator[tuple[int, int]]:
+    """Yield (first, last) index of every run of neighbouring True values."""
+    if not mask.any():
+        return
+    edges = np.flatnonzero(np.diff(np.concatenate(([0], mask.astype(np.int8), [0]))))
+    for first, end in edges.reshape(-1, 2).tolist():
+        yield first, end - 1
+
+
+def gaps(
+    ranges: Iterable[tuple[float, float]], start: float, end: float, least: float = SAME_STATION
+) -> Iterator[tuple[float, float]]:
+    """Yield the parts of start..end (m) that no range covers and that are longer than `least`."""
+    reached = start
+    for low, high in [*sorted(ranges), (end, end)]:
+        if low > reached + least and reached < end - least:
+            yield reached, min(low, end)
+        reached = max(reached, high)

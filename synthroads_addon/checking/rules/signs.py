@@ -1,0 +1,126 @@
+"""Rules for signs, and for the clearance under what spans the pavement."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from ...road.guidelines import CLEARANCE, EXIT_SEQUENCE, EXIT_SIGN_ROOM, GORE_SIGN, SIGN_DISTANCE, SIGN_LOWER_EDGE
+from ...road.things.furniture import Gantry, Overpass, TrafficSign
+from .edges import Edges, TurnoutEdges
+from .rule import TOLERANCE, Finding, Road, Rule, above, below
+
+#: Signs may be turned away from their traffic by this angle, degrees.
+TURNED = 45.0
+#: Beacons before exits stand low.
+LOW_SIGNS = "450"
+
+
+def _sign_distance(road: Road) -> Iterator[Finding]:
+    clearance = road.around.nearest
+    for i in np.flatnonzero((clearance >= 0.0) & (clearance < SIGN_DISTANCE)).tolist():
+        body, distance = road.bodies.items[i], float(clearance[i])
+        if body.part == "face" and below(distance, SIGN_DISTANCE) and below(body.bottom, CLEARANCE):
+            text = f"The sign stands {distance:.2f} m from the paved edge; {SIGN_DISTANCE} m are needed (VwV-StVO)."
+            yield Finding(body.name, 0.5 * (body.start + body.end), distance, SIGN_DISTANCE, text)
+
+
+def _sign_lower_edge(road: Road) -> Iterator[Finding]:
+    for name, sign in road.of(TrafficSign).items():
+        if not sign.code.startswith(LOW_SIGNS) and below(sign.lower_edge, SIGN_LOWER_EDGE):
+            text = f"The sign's lower edge is {sign.lower_edge:.2f} m high; {SIGN_LOWER_EDGE} m are needed (VwV-StVO)."
+            yield Finding(name, sign.station, sign.lower_edge, SIGN_LOWER_EDGE, text)
+
+
+def _sign_facing(road: Road) -> Iterator[Finding]:
+    signs = road.signs
+    turned = np.full(len(signs.names), np.inf)
+    for name, edges in road.sides.items():
+        turned = np.where(signs.of[name], np.minimum(turned, signs.away(edges)), turned)
+    for i in np.flatnonzero(turned > TURNED).tolist():
+        text = f"It is turned {turned[i]:.0f} degrees away from its traffic; {TURNED:.0f} are allowed."
+        yield Finding(signs.names[i], float(signs.station[i]), float(turned[i]), TURNED, text)
+
+
+def _exits(road: Road) -> list[tuple[Edges, TurnoutEdges]]:
+    return [(edges, turnout) for edges, turnout in road.turnouts if turnout.turnout.kind == "exit"]
+
+
+def _exit_sign_missing(road: Road) -> Iterator[Finding]:
+    for edges, turnout in _exits(road):
+        signs, begin = road.signs, turnout.station(0.0)
+        for before, code in EXIT_SEQUENCE.items():
+            place = begin - edges.traffic * before
+            if not 0.0 <= place <= road.length:
+                continue
+            stations = signs.station[signs.seen(edges, code, TURNED)]
+            away = float(np.abs(stations - place).min(initial=road.length))
+            if above(away, EXIT_SIGN_ROOM):
+                text = (
+                    f"The nearest sign {code} is {away:.0f} m from its place {before:.0f} m before the exit; "
+                    f"{EXIT_SIGN_ROOM:.0f} m are allowed (StVO)."
+                )
+                yield Finding(turnout.name, place, away, EXIT_SIGN_ROOM, text)
+
+
+def _exit_sign_place(road: Road) -> Iterator[Finding]:
+    exits, signs = _exits(road), road.signs
+    for side in {edges.name: edges for edges, _ in exits}.values():
+        begins = np.array([turnout.station(0.0) for edges, turnout in exits if edges is side])
+        for before, code in EXIT_SEQUENCE.items():
+            for i in signs.seen(side, code, TURNED).tolist():
+                ahead = side.traffic * (begins - signs.station[i])
+                away = float(np.abs(ahead - before).min())
+                announces = np.any((ahead >= 0.0) & (ahead <= max(EXIT_SEQUENCE) + EXIT_SIGN_ROOM))
+                if announces and above(away, EXIT_SIGN_ROOM):
+                    text = (
+                        f"The sign {code} stands {away:.0f} m from where it belongs, {before:.0f} m before an exit; "
+                        f"{EXIT_SIGN_ROOM:.0f} m are allowed (StVO)."
+                    )
+                    yield Finding(signs.names[i], float(signs.station[i]), away, EXIT_SIGN_ROOM, text)
+
+
+def _gore_sign(road: Road) -> Iterator[Finding]:
+    for edges, turnout in _exits(road):
+        signs = road.signs
+        low, high = turnout.span(turnout.nose, turnout.end)
+        there = signs.bare[edges.name] & (signs.station >= low) & (signs.station <= high)
+        if not any(signs.codes[i].split("-")[0] == GORE_SIGN for i in np.flatnonzero(there).tolist()):
+            text = f"No sign {GORE_SIGN} stands in the exit's gore, behind its nose (StVO)."
+            yield Finding(turnout.name, turnout.station(turnout.nose), 0.0, 1.0, text)
+
+
+def _clearance(road: Road) -> Iterator[Finding]:
+    found = [(name, item.station, item.clearance) for name, item in road.of(Gantry).items()]
+    found += [(name, item.station, item.clearance) for name, item in road.of(Overpass).items()]
+    for i in np.flatnonzero(road.around.nearest < 0.0).tolist():
+        body = road.bodies.items[i]
+        if body.part == "face":
+            found.append((body.name, 0.5 * (body.start + body.end), body.bottom))
+    for name, station, value in found:
+        if below(value, CLEARANCE):
+            text = f"{value:.2f} m are clear below it; {CLEARANCE:.2f} m are needed over the pavement (RAA)."
+            yield Finding(name, station, value, CLEARANCE, text)
+
+
+def _gantry_sign(road: Road) -> Iterator[Finding]:
+    for name, gantry in road.of(Gantry).items():
+        for sign in gantry.signs:
+            half = sign.width / 2.0
+            beyond = max(sign.offset + half - gantry.left_offset, gantry.right_offset - sign.offset + half)
+            if beyond > TOLERANCE:
+                text = f"A sign reaches {beyond:.2f} m beyond the gantry's beam."
+                yield Finding(name, gantry.station, beyond, 0.0, text)
+
+
+RULES = (
+    Rule("sign-distance", "Signs keep off the pavement", "m", "VwV-StVO", "unconfirmed", _sign_distance),
+    Rule("sign-lower-edge", "Lower edge of signs", "m", "VwV-StVO", "unconfirmed", _sign_lower_edge),
+    Rule("sign-facing", "Signs face their traffic", "deg", "", "definition", _sign_facing),
+    Rule("exit-sign-missing", "Exits are announced", "m", "StVO", "confirmed", _exit_sign_missing),
+    Rule("exit-sign-place", "Exit signs stand in their order", "m", "StVO", "confirmed", _exit_sign_place),
+    Rule("gore-sign", "An exit board stands in the gore", "1", "StVO", "confirmed", _gore_sign),
+    Rule("gantry-sign", "Gantries' signs hang on their beams", "m", "", "definition", _gantry_sign),
+    Rule("clearance", "Clearance over the pavement", "m", "RAA", "confirmed", _clearance),
+)

@@ -1,0 +1,1 @@
+"""Points, their layers and their files."""

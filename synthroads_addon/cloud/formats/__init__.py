@@ -1,0 +1,1 @@
+"""Reading and writing clouds: LAS and LAZ, PLY, E57, NPZ."""

@@ -1,0 +1,212 @@
+"""E57 (ASTM E2807) through `pye57`'s binding of libE57, block by block.
+
+pye57's own writer takes whole clouds, in single precision, which at a northing of 5.6 million metres is half a metre.
+Here coordinates are scaled integers of 0.1 mm about a pose that carries the offset, so nothing is lost.
+"""
+
+from __future__ import annotations
+
+import json
+from contextlib import suppress
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...base.errors import InputError
+from ..layers import Column
+from ..points import PointBlock
+from .writing import CloudWriter
+
+SCALE = 1e-4
+"""Size of a coordinate's step, m."""
+EXTENSION = "synthroads"
+"""Prefix of the columns that the standard has no names for."""
+_EXTENSION_URI = "urn:synthroads:e57:1"
+NORMALS = {"NormalX": "nor:normalX", "NormalY": "nor:normalY", "NormalZ": "nor:normalZ"}
+"""Names of the normal's columns by the standard's extension for normals."""
+_NORMALS_URI = "http://www.libe57.org/E57_EXT_surface_normals.txt"
+_CAPACITY = 65_536
+"""Points that are handed to the library at a time."""
+_FIXED = {
+    **dict.fromkeys(("cartesianX", "cartesianY", "cartesianZ"), "i4"),
+    "intensity": "f4",
+    **dict.fromkeys(("colorRed", "colorGreen", "colorBlue"), "u1"),
+    "timeStamp": "f8",
+    **dict.fromkeys(("returnIndex", "returnCount"), "u1"),
+    f"{EXTENSION}:scan_angle": "f4",
+    f"{EXTENSION}:strip": "u2",
+}
+
+
+def library() -> Any:
+    """Return `pye57.libe57`; raise `InputError` if the package isn't installed."""
+    try:
+        from pye57 import libe57
+    except ModuleNotFoundError:
+        raise InputError("e57", None, "needs the package pye57: pip install 'synthroads[e57]'") from None
+    return libe57
+
+
+def e57_name(column: Column) -> str:
+    """Return what a column is called in E57."""
+    return NORMALS.get(column.name, f"{EXTENSION}:{column.name}")
+
+
+def _buffer_type(kind: str) -> Any:
+    """Return the type that pye57 takes for values of a type: of integers of 32 bits and more it knows ``q`` alone."""
+    return np.longlong if np.dtype(kind).kind in "iu" and np.dtype(kind).itemsize >= 4 else np.dtype(kind)
+
+
+class E57Writer(CloudWriter):
+    """Writes point blocks to an E57 file; see `CloudWriter`. Colours have 8 bits; intensity isn't clipped."""
+
+    def _open(self) -> None:
+        self._e57 = e57 = library()
+        self.faults = (OSError, e57.E57Exception)
+        with self._temporary.open("wb"):
+            pass  # the library's own complaint about a folder that can't be written says nothing
+        self._image = e57.ImageFile(str(self._temporary), "w")
+        self._low, self._high = np.full(3, np.inf), np.full(3, -np.inf)
+        self._dimmest, self._brightest = np.inf, -np.inf
+        self._held = 0
+        self._begin_root()
+        self._types = dict(_FIXED) | {e57_name(column): column.dtype for column in self.columns}
+        self._arrays = {name: np.zeros(_CAPACITY, dtype=_buffer_type(kind)) for name, kind in self._types.items()}
+        self._buffers = e57.VectorSourceDestBuffer()
+        for name, array in self._arrays.items():
+            self._buffers.append(e57.SourceDestBuffer(self._image, name, array, _CAPACITY, True, False))
+        points = e57.CompressedVectorNode(self._image, self._prototype(), e57.VectorNode(self._image, True))
+        self._scan.set("points", points)
+        self._points = points.writer(self._buffers)
+
+    def _append(self, block: PointBlock) -> None:
+        first = 0
+        while first < len(block):
+            part = block.select(slice(first, first + _CAPACITY - self._held))
+            for name, values in self._packed(part).items():
+                self._arrays[name][self._held : self._held + len(part)] = values
+            self._held += len(part)
+            first += len(part)
+            self._low = np.minimum(self._low, part.xyz.min(axis=0))
+            self._high = np.maximum(self._high, part.xyz.max(axis=0))
+            self._dimmest = min(self._dimmest, float(part.intensity.min()))
+            self._brightest = max(self._brightest, float(part.intensity.max()))
+            if self._held == _CAPACITY:
+                self._flush()
+
+    def _flush(self) -> None:
+        """Hand the held points on: always as many at a time, so that the file doesn't depend on how they came."""
+        if self._held:
+            self._points.write(self._held)
+            self._held = 0
+
+    def _finish(self) -> None:
+        self._flush()
+        self._points.close()
+        number = {True: self._e57.FloatNode, False: self._e57.IntegerNode}
+        bounds = self._e57.StructureNode(self._image)
+        if self.count:
+            low, high = np.round(self._low - self.offset, 4), np.round(self._high - self.offset, 4)
+            for axis, name in enumerate("xyz"):
+                bounds.set(f"{name}Minimum", number[True](self._image, float(low[axis])))
+                bounds.set(f"{name}Maximum", number[True](self._image, float(high[axis])))
+            self._scan.set("cartesianBounds", bounds)
+            limits = self._e57.StructureNode(self._image)
+            limits.set("intensityMinimum", number[True](self._image, self._dimmest))
+            limits.set("intensityMaximum", number[True](self._image, self._brightest))
+            self._scan.set("intensityLimits", limits)
+        colors = self._e57.StructureNode(self._image)
+        for channel in ("Red", "Green", "Blue"):
+            colors.set(f"color{channel}Minimum", number[False](self._image, 0))
+            colors.set(f"color{channel}Maximum", number[False](self._image, 255))
+        self._scan.set("colorLimits", colors)
+        for node, what in ((self._scan, "scan"), (self._image.root(), "file")):
+            digits = self.content_id(what, self._low.tolist(), self._high.tolist())
+            groups = (digits[:8], digits[8:12], digits[12:16], digits[16:20], digits[20:])
+            node.set("guid", self._text("{" + "-".join(groups) + "}"))
+        self._image.close()
+
+    def _abandon(self) -> None:
+        for open_thing in ("_points", "_image"):
+            with suppress(Exception):
+                getattr(self, open_thing).close()
+        with suppress(OSError):
+            self._temporary.unlink(missing_ok=True)
+
+    def _packed(self, part: PointBlock) -> dict[str, NDArray[Any]]:
+        """Return what is stored of at most `_CAPACITY` points, by name."""
+        local = part.xyz - self.offset
+        packed = {f"cartesian{'XYZ'[i]}": self.integers(local[:, i], "int32", "xyz", SCALE) for i in range(3)}
+        rgb = self.integers(part.rgb, "uint16", "rgb") >> 8
+        packed |= {f"color{name}": rgb[:, i] for i, name in enumerate(("Red", "Green", "Blue"))}
+        number = self.integers(part.return_number, "uint8", "return_number")
+        packed |= {
+            "intensity": self.finite(part.intensity, "intensity"),
+            "timeStamp": self.finite(part.gps_time, "gps_time"),
+            "returnIndex": np.maximum(number, 1) - 1,  # counts from 0
+            "returnCount": self.integers(part.number_of_returns, "uint8", "number_of_returns"),
+            f"{EXTENSION}:scan_angle": self.finite(part.scan_angle_deg, "scan_angle"),
+            f"{EXTENSION}:strip": self.integers(part.strip, "uint16", "strip"),
+        }
+        return packed | {e57_name(column): self.stored(column, part) for column in self.columns}
+
+    def _begin_root(self) -> None:
+        """Write what a file and its one scan are described by."""
+        e57, image = self._e57, self._image
+        image.extensionsAdd("", e57.E57_V1_0_URI)
+        image.extensionsAdd(EXTENSION, _EXTENSION_URI)
+        if "normal" in self.attributes:
+            image.extensionsAdd("nor", _NORMALS_URI)
+        root = image.root()
+        root.set("formatName", self._text("ASTM E57 3D Imaging Data File"))
+        root.set("versionMajor", e57.IntegerNode(image, e57.E57_FORMAT_MAJOR))
+        root.set("versionMinor", e57.IntegerNode(image, e57.E57_FORMAT_MINOR))
+        root.set("e57LibraryVersion", self._text(e57.E57_LIBRARY_ID))
+        root.set("coordinateMetadata", self._text(self.crs_text or ""))
+        root.set(f"{EXTENSION}:notes", self._text(self._notes()))
+        scans = e57.VectorNode(image, True)
+        root.set("data3D", scans)
+        root.set("images2D", e57.VectorNode(image, True))
+        self._scan = e57.StructureNode(image)
+        scans.append(self._scan)
+        self._scan.set("name", self._text("SynthRoads"))
+        pose = e57.StructureNode(image)
+        for part, values in (("rotation", (1.0, 0.0, 0.0, 0.0)), ("translation", self.offset)):
+            node = e57.StructureNode(image)
+            for name, value in zip("wxyz"[-len(values) :], values, strict=True):
+                node.set(name, e57.FloatNode(image, float(value)))
+            pose.set(part, node)
+        self._scan.set("pose", pose)
+
+    def _prototype(self) -> Any:
+        """Return the description of one point."""
+        e57, image = self._e57, self._image
+        prototype = e57.StructureNode(image)
+        scales = {e57_name(column): (column.scale, self._shift(column)) for column in self.columns}
+        scales |= {f"cartesian{axis}": (SCALE, 0.0) for axis in "XYZ"}
+        for name, kind in self._types.items():
+            scale, shift = scales.get(name, (None, 0.0))
+            if np.dtype(kind).kind == "f":
+                precision = e57.E57_SINGLE if kind == "f4" else e57.E57_DOUBLE
+                node = e57.FloatNode(image, 0.0, precision)
+                if kind == "f4":
+                    limit = float(np.finfo(np.float32).max)
+                    node = e57.FloatNode(image, 0.0, precision, -limit, limit)
+            else:
+                low, high = int(np.iinfo(kind).min), int(np.iinfo(kind).max)
+                if scale is None:
+                    node = e57.IntegerNode(image, 0, low, high)
+                else:
+                    node = e57.ScaledIntegerNode(image, 0, low, high, scale, shift)
+            prototype.set(name, node)
+        return prototype
+
+    def _shift(self, column: Column) -> float:
+        return float(self.offset[column.component]) if column.local and column.component is not None else 0.0
+
+    def _notes(self) -> str:
+        return json.dumps({**self.notes(), "offset": self.offset.tolist(), "crs": self.crs_text})
+
+    def _text(self, text: str) -> Any:
+        return self._e57.StringNode(self._image, text)

@@ -1,0 +1,223 @@
+"""NPZ: the arrays of `PointBlock` under their own names and types, and ``notes``, what the file says of itself as JSON.
+
+The arrays are gathered in a file each and put together at the end, so that no more than a block is held in memory.
+`numpy.load` reads the result, uncompressed.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import shutil
+import struct
+import tokenize
+import zipfile
+import zlib
+from collections.abc import Iterator
+from contextlib import suppress
+from dataclasses import MISSING, fields
+from pathlib import Path
+from typing import IO, Any
+
+import numpy as np
+from numpy.lib import format as npy
+from numpy.typing import NDArray
+
+from ...base.errors import InputError
+from ..layers import COLUMNS, columns, gather
+from ..points import PointBlock
+from .reading import BLOCK, CloudHeader, CloudReader, damaged, finite_coordinates, header_from_notes
+from .writing import CloudWriter
+
+_ALWAYS = {
+    "xyz": ("<f8", 3),
+    "intensity": ("<f8", 1),
+    "rgb": ("<u2", 3),
+    "class_id": ("|u1", 1),
+    "instance_id": ("<u4", 1),
+    "return_number": ("|u1", 1),
+    "number_of_returns": ("|u1", 1),
+    "gps_time": ("<f8", 1),
+    "scan_angle_deg": ("<f4", 1),
+    "strip": ("<u2", 1),
+}
+_ON_REQUEST = {
+    "range": ("<f8", 1),
+    "incidence_deg": ("<f4", 1),
+    "normal": ("<f4", 3),
+    "material": ("<u2", 1),
+    "scanner": ("<f8", 3),
+    "true_range": ("<f8", 1),
+    "true_xyz": ("<f8", 3),
+    "roughness": ("<f4", 1),
+    "metallic": ("<f4", 1),
+    "specular": ("<f4", 1),
+    "color_source": ("|u1", 1),
+}
+ARCHIVE_FAULTS = (
+    *(KeyError, ValueError, EOFError, OSError, RuntimeError, MemoryError, SyntaxError, OverflowError),
+    *(zipfile.BadZipFile, zlib.error, struct.error, tokenize.TokenError),
+)
+"""What reading a damaged archive may raise: encrypted or unknown members, broken headers, lengths of any size."""
+_LONGEST_NOTES = 1 << 26
+_TIME = (1980, 1, 1, 0, 0, 0)
+"""No wall clock in files."""
+
+
+class NpzWriter(CloudWriter):
+    """Writes point blocks to an NPZ file; see `CloudWriter`. Nothing is rounded or clipped."""
+
+    def _open(self) -> None:
+        wanted = {column.array for column in self.columns}
+        self._arrays = _ALWAYS | {name: kind for name, kind in _ON_REQUEST.items() if name in wanted}
+        self._parts = self.path.with_name(f".{self.path.name}.parts")
+        self._files: dict[str, IO[bytes]] = {}
+        shutil.rmtree(self._parts, ignore_errors=True)
+        self._parts.mkdir()
+        for name in self._arrays:
+            self._files[name] = (self._parts / name).open("wb")
+
+    def _append(self, block: PointBlock) -> None:
+        for name, (kind, _) in self._arrays.items():
+            values = self.own_class_ids(block) if name == "class_id" else getattr(block, name)
+            if np.dtype(kind).kind == "u":
+                values = self.integers(values, kind, name)
+            self._files[name].write(np.ascontiguousarray(self.finite(values, name), dtype=kind).data)
+
+    def _finish(self) -> None:
+        for file in self._files.values():
+            file.close()
+        notes = {**self.notes(), "offset": self.offset.tolist(), "crs": self.crs_text}
+        with zipfile.ZipFile(self._temporary, "w", zipfile.ZIP_STORED, allowZip64=True) as archive:
+            for name, (kind, width) in self._arrays.items():
+                shape = (self.count, width) if width > 1 else (self.count,)
+                with archive.open(zipfile.ZipInfo(f"{name}.npy", _TIME), "w", force_zip64=True) as member:
+                    npy.write_array_header_1_0(member, {"descr": kind, "fortran_order": False, "shape": shape})
+                    with (self._parts / name).open("rb") as part:
+                        shutil.copyfileobj(part, member, 1 << 22)
+                (self._parts / name).unlink()
+            with archive.open(zipfile.ZipInfo("notes.npy", _TIME), "w") as member:
+                npy.write_array(member, np.array(json.dumps(notes)), allow_pickle=False)
+        self._parts.rmdir()
+
+    def _abandon(self) -> None:
+        for file in getattr(self, "_files", {}).values():
+            with suppress(OSError):
+                file.close()
+        shutil.rmtree(self.path.with_name(f".{self.path.name}.parts"), ignore_errors=True)
+        with suppress(OSError):
+            self._temporary.unlink(missing_ok=True)
+
+
+class NpzReader(CloudReader):
+    """Reads NPZ files with arrays named as those of `PointBlock`; ``xyz`` is needed.
+
+    Args:
+        path: an existing file.
+
+    Raises:
+        InputError: it is no such file, or truncated, or its arrays differ in length.
+    """
+
+    def __init__(self, path: Path) -> None:
+        try:
+            self._archive = zipfile.ZipFile(path)
+        except ARCHIVE_FAULTS:
+            raise InputError(str(path), None, "is not an NPZ file, or truncated") from None
+        try:
+            self._kinds = self._read_kinds(path)
+            notes = self._read_notes()
+        except ARCHIVE_FAULTS as problem:
+            self.close()
+            raise InputError(str(path), None, f"is not an NPZ file that can be read ({problem})") from None
+        except InputError:
+            self.close()
+            raise
+        arrays = set(self._kinds)
+        names = {c.name for group in COLUMNS.values() for c in group if c.array in arrays}
+        header = header_from_notes(path, "NPZ", self._kinds["xyz"][0][0], names, notes)
+        others = {name.removesuffix(".npy") for name in self._archive.namelist()} - arrays - {"notes"}
+        self.header = CloudHeader(
+            **{**header.__dict__, "has_color": "rgb" in arrays, "left_out": tuple(sorted(others))}
+        )
+
+    def blocks(self, size: int = BLOCK) -> Iterator[PointBlock]:
+        """See `CloudReader`."""
+        members = {name: self._archive.open(f"{name}.npy") for name in self._kinds}
+        try:
+            for member in members.values():
+                _npy_header(member)
+            for done in range(0, self.header.count, size):
+                wanted = min(size, self.header.count - done)
+                try:
+                    arrays = {name: self._rows(members[name], name, wanted) for name in members}
+                except ARCHIVE_FAULTS:
+                    raise damaged(self.header.path, done, self.header.count) from None
+                finite_coordinates(self.header.path, done, arrays["xyz"])
+                yield self._block(arrays, wanted)
+        finally:
+            for member in members.values():
+                member.close()
+
+    def close(self) -> None:
+        """Close the file."""
+        self._archive.close()
+
+    def _rows(self, member: IO[bytes], name: str, wanted: int) -> NDArray[Any]:
+        shape, kind = self._kinds[name]
+        rows = (wanted, *shape[1:])
+        data = np.frombuffer(member.read(int(np.prod(rows)) * kind.itemsize), dtype=kind)
+        return data.reshape(rows)
+
+    def _block(self, arrays: dict[str, NDArray[Any]], count: int) -> PointBlock:
+        own = columns(self.header.attributes)
+        parts = {
+            c.name: arrays[c.array] if c.component is None else arrays[c.array][:, c.component]
+            for c in own
+            if c.array in arrays
+        }
+        found = gather(parts, self.header.attributes, count)
+        for name, (kind, width) in _ALWAYS.items():
+            if name not in ("class_id", "instance_id"):
+                shape = (count, width) if width > 1 else (count,)
+                found[name] = arrays[name].astype(kind) if name in arrays else np.zeros(shape, dtype=kind)
+        return PointBlock(**found)
+
+    def _read_kinds(self, path: Path) -> dict[str, tuple[tuple[int, ...], np.dtype[Any]]]:
+        """Return shape and type of each array that is known here."""
+        kinds = {}
+        names = [field.name for field in fields(PointBlock) if field.default is MISSING or field.default is None]
+        for name in names:
+            if f"{name}.npy" in self._archive.namelist():
+                with self._archive.open(f"{name}.npy") as member:
+                    kinds[name] = _npy_header(member)
+        if "xyz" not in kinds:
+            raise InputError(str(path), None, "has no array xyz")
+        count = kinds["xyz"][0][0] if kinds["xyz"][0] else 0
+        for name, (shape, kind) in kinds.items():
+            width = (_ALWAYS | _ON_REQUEST)[name][1]
+            if shape != ((count, width) if width > 1 else (count,)) or kind.kind not in "fiub":
+                wanted = f"({count}, {width})" if width > 1 else f"({count},)"
+                raise InputError(f"{path}: {name}", shape, f"must be numbers of shape {wanted}")
+        return kinds
+
+    def _read_notes(self) -> Any:
+        if "notes.npy" not in self._archive.namelist():
+            return None
+        if self._archive.getinfo("notes.npy").file_size > _LONGEST_NOTES:
+            raise ValueError("its notes are too long")
+        with self._archive.open("notes.npy") as member:
+            if math.prod(_npy_header(member)[0]) != 1:
+                raise ValueError("its notes are no text")
+        with self._archive.open("notes.npy") as member:
+            return json.loads(str(npy.read_array(member, allow_pickle=False)))
+
+
+def _npy_header(member: IO[bytes]) -> tuple[tuple[int, ...], np.dtype[Any]]:
+    """Read the header of an array; return its shape and type."""
+    version = npy.read_magic(member)
+    read = npy.read_array_header_1_0 if version == (1, 0) else npy.read_array_header_2_0
+    shape, fortran_order, kind = read(member)
+    if fortran_order and len(shape) > 1:
+        raise ValueError("arrays must be in C order")
+    return shape, kind

@@ -1,0 +1,251 @@
+"""PLY, binary little endian, with coordinates in double precision: own code, since none that streams is about.
+
+The number of points stands in the header and is known at the end only: the header is written again then, with a comment
+that shrinks as the number grows. What the file says of itself stands as JSON in comments ``synthroads``, in pieces,
+because common readers take lines of 1023 characters at most.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from contextlib import suppress
+from pathlib import Path
+from typing import Any, BinaryIO
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...base.errors import InputError
+from ..layers import COLUMNS, Column, columns, gather
+from ..points import PointBlock
+from .reading import BLOCK, CloudHeader, CloudReader, damaged, finite_coordinates, header_from_notes
+from .writing import CloudWriter
+
+_NAMES = {"NormalX": "nx", "NormalY": "ny", "NormalZ": "nz"}
+"""Columns that PLY has names of its own for."""
+_WORDS = {
+    "i1": ("char", "int8"),
+    "u1": ("uchar", "uint8"),
+    "<i2": ("short", "int16"),
+    "<u2": ("ushort", "uint16"),
+    "<i4": ("int", "int32"),
+    "<u4": ("uint", "uint32"),
+    "<f4": ("float", "float32"),
+    "<f8": ("double", "float64"),
+}
+_TYPES = {word: kind for kind, words in _WORDS.items() for word in words}
+"""Types by their names in headers, of which there are two."""
+_FIXED = (
+    *(("x", "<f8"), ("y", "<f8"), ("z", "<f8"), ("red", "u1"), ("green", "u1"), ("blue", "u1"), ("intensity", "<f4")),
+    *(("return_number", "u1"), ("number_of_returns", "u1"), ("gps_time", "<f8"), ("scan_angle", "<f4")),
+    ("strip", "<u2"),
+)
+_CLASS_NAMES = ("classification", "class", "label", "scalar_Classification", "scalar_Label")
+"""Where others keep classes."""
+_PIECE = 160
+_LONGEST_LINE = 1 << 16
+_MOST_DIGITS = 18
+
+
+def ply_name(column: Column) -> str:
+    """Return what a column is called in PLY."""
+    return _NAMES.get(column.name, column.name)
+
+
+def _ply_type(column: Column) -> str:
+    if column.scale is None:
+        return {"uint8": "u1", "uint16": "<u2", "uint32": "<u4"}[column.dtype]
+    return "<f8" if column.unit == "m" else "<f4"
+
+
+class PlyWriter(CloudWriter):
+    """Writes point blocks to a PLY file; see `CloudWriter`. Colours have 8 bits; intensity isn't clipped."""
+
+    def _open(self) -> None:
+        self._fields = [*_FIXED, *((ply_name(column), _ply_type(column)) for column in self.columns)]
+        self._type = np.dtype(self._fields)
+        self._file = self._temporary.open("wb")
+        self._file.write(self._header(0))
+
+    def _append(self, block: PointBlock) -> None:
+        record = np.zeros(len(block), dtype=self._type)
+        record["x"], record["y"], record["z"] = self.finite(block.xyz, "xyz").T
+        for name, channel in zip(("red", "green", "blue"), block.rgb.T, strict=True):
+            record[name] = self.integers(channel, "uint16", name) >> 8
+        record["intensity"] = self.finite(block.intensity, "intensity")
+        record["return_number"] = self.integers(block.return_number, "uint8", "return_number")
+        record["number_of_returns"] = self.integers(block.number_of_returns, "uint8", "number_of_returns")
+        record["gps_time"] = self.finite(block.gps_time, "gps_time")
+        record["scan_angle"] = self.finite(block.scan_angle_deg, "scan_angle")
+        record["strip"] = self.integers(block.strip, "uint16", "strip")
+        for column in self.columns:
+            if column.array == "class_id":
+                record["class_id"] = self.own_class_ids(block)
+            else:
+                values = self.finite(column.of(block), column.name)
+                record[ply_name(column)] = self.integers(values, column.dtype, column.name) if column.whole else values
+        self._file.write(record)  # type: ignore[arg-type]
+
+    def _finish(self) -> None:
+        self._file.seek(0)
+        self._file.write(self._header(self.count))
+        self._file.close()
+
+    def _abandon(self) -> None:
+        with suppress(AttributeError, OSError):
+            self._file.close()
+        with suppress(OSError):
+            self._temporary.unlink(missing_ok=True)
+
+    def _header(self, count: int) -> bytes:
+        """Return the header, which has the same length for any number of points."""
+        notes = json.dumps(
+            {**self.notes(), "offset": self.offset.tolist(), "crs": self.crs_text}, separators=(",", ":")
+        )
+        lines = [
+            "ply",
+            "format binary_little_endian 1.0",
+            "comment " + "-" * (20 - len(str(count))),
+            *(f"comment synthroads {notes[at : at + _PIECE]}" for at in range(0, len(notes), _PIECE)),
+            f"element vertex {count}",
+            *(f"property {_WORDS[kind][0]} {name}" for name, kind in self._fields),
+            "end_header",
+        ]
+        return ("\n".join(lines) + "\n").encode("ascii")
+
+
+class PlyReader(CloudReader):
+    """Reads binary little-endian PLY files whose points are scalars, the project's own and others'.
+
+    Args:
+        path: an existing file.
+
+    Raises:
+        InputError: it is no such file, or it is truncated.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self._file = path.open("rb")
+        try:
+            count, self._type, notes = _read_header(path, self._file)
+            self._names = set(self._type.names or ())
+            if not {"x", "y", "z"} <= self._names:
+                raise InputError(str(path), None, "has no x, y, z")
+            self._start = self._file.tell()
+            there = (path.stat().st_size - self._start) // self._type.itemsize
+            if there < count:
+                raise damaged(path, max(0, there), count)
+        except BaseException:
+            self._file.close()
+            raise
+        own = {column.name for group in COLUMNS.values() for column in group if ply_name(column) in self._names}
+        header = header_from_notes(path, "PLY", count, own, notes)
+        read = {name for name, _ in _FIXED} | {ply_name(c) for c in columns(header.attributes)} | {*_CLASS_NAMES}
+        self.header = CloudHeader(
+            **{
+                **header.__dict__,
+                "has_color": {"red", "green", "blue"} <= self._names,
+                "left_out": tuple(sorted(self._names - read)),
+            }
+        )
+
+    def blocks(self, size: int = BLOCK) -> Iterator[PointBlock]:
+        """See `CloudReader`."""
+        self._file.seek(self._start)
+        for done in range(0, self.header.count, size):
+            wanted = min(size, self.header.count - done)
+            data = self._file.read(wanted * self._type.itemsize)
+            if len(data) != wanted * self._type.itemsize:
+                raise damaged(self.header.path, done, self.header.count)
+            yield self._block(np.frombuffer(data, dtype=self._type), done)
+
+    def close(self) -> None:
+        """Close the file."""
+        self._file.close()
+
+    def _block(self, record: NDArray[Any], done: int) -> PointBlock:
+        count = len(record)
+
+        def values(name: str, kind: Any) -> NDArray[Any]:
+            return record[name].astype(kind) if name in self._names else np.zeros(count, dtype=kind)
+
+        def channel(name: str) -> NDArray[np.uint16]:
+            return _sixteen_bits(record[name]) if name in self._names else np.zeros(count, dtype=np.uint16)
+
+        own = columns(self.header.attributes)
+        found = {c.name: record[ply_name(c)] for c in own if ply_name(c) in self._names}
+        if not self.header.labelled:
+            name = next((name for name in _CLASS_NAMES if name in self._names), "")
+            found["class_id"] = values(name, np.uint8)
+        arrays = gather(found, self.header.attributes, count)
+        return PointBlock(
+            xyz=finite_coordinates(
+                self.header.path, done, np.stack([values(name, np.float64) for name in "xyz"], axis=1)
+            ),
+            intensity=values("intensity", np.float64),
+            rgb=np.stack([channel(name) for name in ("red", "green", "blue")], axis=1),
+            return_number=values("return_number", np.uint8),
+            number_of_returns=values("number_of_returns", np.uint8),
+            gps_time=values("gps_time", np.float64),
+            scan_angle_deg=values("scan_angle", np.float32),
+            strip=values("strip", np.uint16),
+            **arrays,
+        )
+
+
+def _sixteen_bits(channel: NDArray[Any]) -> NDArray[np.uint16]:
+    """Return a colour channel of 8 bits, 16 bits, or 0 to 1, in 16 bits."""
+    if channel.dtype.kind == "f":
+        return np.rint(np.clip(channel, 0, 1) * 65535).astype(np.uint16)
+    return channel.astype(np.uint16) * np.uint16(257 if channel.dtype.itemsize == 1 else 1)
+
+
+def _read_header(path: Path, file: BinaryIO) -> tuple[int, np.dtype[Any], Any]:
+    """Return number and type of the points and the project's notes (None if there are none)."""
+    if file.readline(8).strip() != b"ply":
+        raise InputError(str(path), None, "is not a PLY file")
+    fields: list[tuple[str, str]] = []
+    count, element, notes = -1, "", ""
+    for line in _header_lines(path, file):
+        words = line.split()
+        if line.startswith("comment synthroads "):
+            notes += line[len("comment synthroads ") :]
+        elif words[:1] == ["format"] and words[1:2] != ["binary_little_endian"]:
+            raise InputError(str(path), " ".join(words[1:2]), "must be a PLY file of the kind binary_little_endian")
+        elif words[:1] == ["element"] and len(words) == 3:
+            element = words[1]
+            if count < 0:
+                count = _number_of_points(path, words)
+        elif words[:1] == ["property"] and element == "vertex":
+            if len(words) != 3 or words[1] not in _TYPES:
+                raise InputError(str(path), line, "properties of points must be numbers")
+            fields.append((words[2], _TYPES[words[1]]))
+    if count < 0 or not fields or len({name for name, _ in fields}) != len(fields):
+        raise InputError(str(path), None, "is a PLY file without points")
+    return count, np.dtype(fields), _notes(path, notes)
+
+
+def _header_lines(path: Path, file: BinaryIO) -> Iterator[str]:
+    """Yield the lines before ``end_header``."""
+    while raw := file.readline(_LONGEST_LINE):
+        line = raw.decode("ascii", errors="replace").rstrip("\r\n")
+        if line.strip() == "end_header":
+            return
+        yield line
+    raise InputError(str(path), None, "is a PLY file that ends within its header")
+
+
+def _number_of_points(path: Path, words: list[str]) -> int:
+    if words[1] != "vertex":
+        raise InputError(str(path), words[1], "must begin with the element vertex")
+    if not words[2].isdecimal() or len(words[2]) > _MOST_DIGITS:
+        raise InputError(str(path), words[2], "must be a number of points")
+    return int(words[2])
+
+
+def _notes(path: Path, text: str) -> Any:
+    try:
+        return json.loads(text) if text else None
+    except (ValueError, RecursionError):
+        raise InputError(str(path), None, "its comments synthroads are damaged") from None

@@ -1,0 +1,1 @@
+"""Tools for clouds: converting, thinning, statistics, pictures."""

@@ -1,0 +1,308 @@
+"""What can be done with a cloud's file: convert, thin out, map intensities, draw. All in memory that stays the same."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...base.classes import ClassScheme, class_scheme
+from ...base.errors import InputError, OutputError
+from ...base.files import output_folder
+from ...base.progress import Progress, silent
+from ..formats.reading import BLOCK, CloudReader, open_cloud
+from ..formats.writing import CloudWriter, check_ending, open_writer
+from ..points import PointBlock, concatenate
+from .previews import CrossSection, TopView
+from .quantile_mapping import IntensityMapping, steps_per_unit
+from .subsample import GridSubsampler
+
+PREVIEWS = ("preview_class.png", "preview_intensity.png", "preview_rgb.png", "preview_section.png")
+"""Names of the pictures that `draw_previews` writes."""
+
+
+def convert(
+    source: Path,
+    output: Path,
+    classes: str | None = None,
+    overwrite: bool = False,
+    progress: Progress = silent,
+    block: int = BLOCK,
+) -> dict[str, Any]:
+    """Write a cloud in the format of another ending, or with merged classes; return what was done as JSON data.
+
+    Args:
+        classes: scheme for `class_scheme`; the cloud's own if None.
+        block: points that are read at a time; the output doesn't depend on it.
+
+    Raises:
+        InputError: a file can't be read, or the scheme is unknown or doesn't suit the cloud.
+        OutputError: the output is there already or can't be written.
+    """
+    _check_output(source, output, overwrite)
+    with open_cloud(source) as cloud:
+        scheme = _scheme_of(cloud, classes)
+        with _writer_like(cloud, output, scheme) as writer:
+            for points in _watched(cloud.blocks(block), cloud.header.count, progress, "convert"):
+                writer.write(points)
+        return _done(cloud, writer)
+
+
+def subsample(
+    source: Path,
+    output: Path,
+    cell: float,
+    classes: str | None = None,
+    overwrite: bool = False,
+    progress: Progress = silent,
+    block: int = BLOCK,
+) -> dict[str, Any]:
+    """Write one point per occupied cell of a cubic grid; see `GridSubsampler` and `convert`."""
+    _check_output(source, output, overwrite)
+    with open_cloud(source) as cloud, GridSubsampler(cell, output.parent) as grid:
+        scheme = _scheme_of(cloud, classes)
+        for points in _watched(cloud.blocks(block), cloud.header.count, progress, "read"):
+            grid.add(points)
+        with _writer_like(cloud, output, scheme) as writer:
+            for points in grid.blocks():
+                writer.write(points)
+        return _done(cloud, writer) | {"grid": cell, "points_read": grid.taken}
+
+
+def map_intensity(
+    source: Path,
+    target: Path,
+    output: Path,
+    per_class: bool = False,
+    overwrite: bool = False,
+    progress: Progress = silent,
+) -> dict[str, Any]:
+    """Write a cloud with its intensities mapped on another's; see `IntensityMapping` and `convert`."""
+    _check_output(source, output, overwrite)
+    _check_output(target, output, overwrite)
+    with open_cloud(source) as cloud, open_cloud(target) as other:
+        mapping = IntensityMapping(cloud, other, per_class)
+        with _writer_like(cloud, output, _scheme_of(cloud, None), mapping.scale) as writer:
+            for block in _watched(mapping.blocks(cloud), cloud.header.count, progress, "map"):
+                writer.write(block)
+        result = _done(cloud, writer) | {
+            "target": other.header.path.name,
+            "distance_before": mapping.distance_before(),
+            "distance_after": mapping.distance_after(),
+        }
+        if per_class:
+            names = cloud.header.scheme.names()
+            distances = {names.get(label, str(label)): gap for label, gap in mapping.class_distances().items()}
+            result |= {"class_distances": distances, "classes_mapped_together": mapping.alone}
+        return result
+
+
+def draw_previews(
+    source: Path,
+    folder: Path,
+    line: tuple[float, float, float, float] | None = None,
+    station: float | None = None,
+    centerline: NDArray[np.float64] | None = None,
+    depth: float = 1.0,
+    overwrite: bool = False,
+) -> dict[str, Any]:
+    """Draw a cloud from above and a cross-section of it.
+
+    Args:
+        folder: for the pictures (`PREVIEWS`; the coloured one only if the cloud has colours).
+        line: x, y of the ends of the cut, from left to right; across the cloud's long axis if not given.
+        station: where to cut, m along the centreline or the long axis; in its middle if not given.
+        centerline: (N, 2) map coordinates that stations count along.
+        depth: thickness of the slab that is cut out, m.
+
+    Raises:
+        InputError: the cloud can't be read or has no points, or the cut lies outside of it.
+        OutputError: a picture is there already or can't be written.
+    """
+    with open_cloud(source) as cloud:
+        extent = _Extent(cloud)
+        start, end = (extent.start, extent.end) if centerline is None else (centerline[0], centerline[-1])
+        low, high = extent.across(start, end)
+        view = TopView(start, end, low, high, cloud.header.scheme)
+        path = extent.axis() if centerline is None else centerline
+        middle, right, reach = _cut(line, station, path, max(1.0, (high - low) / 2), extent)
+        slab: list[PointBlock] = []
+        for block in cloud.blocks():
+            view.add(block)
+            away = (block.xyz[:, :2] - middle) @ np.array([-right[1], right[0]])
+            slab.append(block.select(np.abs(away) <= depth / 2))
+        cut = concatenate(slab)
+        if len(cut) == 0:
+            raise InputError("--line" if line else "--station", line or station, "cuts no points of the cloud")
+        heights = float(cut.xyz[:, 2].min()), float(cut.xyz[:, 2].max())
+        if line is None:
+            reach = 1.02 * float(np.abs((cut.xyz[:, :2] - middle) @ right).max()) + 0.5
+        by_class = len(np.unique(cut.class_id)) > 1
+        section = CrossSection(middle, right, reach, depth, heights, cloud.header.scheme, by_class)
+        section.add(cut)
+        with output_folder(folder, PREVIEWS, overwrite) as temporary:
+            paths = view.save(temporary, cloud.header.epsg, cloud.header.has_color)
+            paths.append(section.save(temporary / PREVIEWS[3], "cross-section"))
+            names = [path.name for path in paths]
+    return {"file": source.name, "points": int(view.raster.count.sum()), "pictures": names, "section_points": len(cut)}
+
+
+def read_centerline(path: Path) -> NDArray[np.float64]:
+    """Return the points (N, 2) of the first line of a GeoJSON file, as `synthroads generate` writes one."""
+    from ...base.schema import read_json
+
+    data = read_json(path)
+    try:
+        shapes = [feature["geometry"] for feature in data["features"]] if "features" in data else [data]
+        line = next(shape["coordinates"] for shape in shapes if shape["type"] == "LineString")
+        points = np.array([point[:2] for point in line], dtype=np.float64)
+    except (KeyError, TypeError, ValueError, IndexError, StopIteration):
+        raise InputError(str(path), None, "must be GeoJSON with a LineString") from None
+    if len(points) < 2 or np.ptp(points, axis=0).max() == 0:
+        raise InputError(str(path), None, "must have a line of some length")
+    return points
+
+
+class _Extent:
+    """Where a cloud lies: its middle, its long axis in the plane, and its reach in any direction.
+
+    One look at the points is enough: of each block the outermost points in 48 directions are kept, between which
+    nothing reaches out by more than 0.3 % of the cloud's radius.
+    """
+
+    _SLACK = 0.003
+
+    def __init__(self, cloud: CloudReader) -> None:
+        angle = np.arange(24) * (np.pi / 24)
+        directions = np.stack([np.cos(angle), np.sin(angle)])
+        count, origin = 0, np.zeros(2)
+        total, products = np.zeros(2), np.zeros((2, 2))
+        outermost = []
+        for block in cloud.blocks():
+            origin = origin if count else block.xyz[0, :2].copy()
+            local = block.xyz[:, :2] - origin
+            count += len(local)
+            total += local.sum(axis=0)
+            products += local.T @ local
+            along = local @ directions
+            outermost.append(local[np.r_[along.argmin(axis=0), along.argmax(axis=0)]])
+        if count == 0:
+            raise InputError(str(cloud.header.path), None, "has no points")
+        self._outermost = np.concatenate(outermost) + origin
+        self.middle = origin + total / count
+        spread = products / count - np.outer(total / count, total / count)
+        axis = np.linalg.eigh(spread)[1][:, 1]
+        self.along: NDArray[np.float64] = axis if axis[0] >= 0 else -axis
+        low, high = self._reach(self.middle, self.along)
+        self.start, self.end = self.middle + low * self.along, self.middle + high * self.along
+
+    def across(self, start: NDArray[np.float64], end: NDArray[np.float64]) -> tuple[float, float]:
+        """Return the reach to the right (negative) and to the left of a line."""
+        along = np.asarray(end) - np.asarray(start)
+        length = float(np.hypot(*along))
+        along = along / length if length else np.array([1.0, 0.0])
+        low, high = self._reach(np.asarray(start), np.array([-along[1], along[0]]))
+        return low - 1.0, high + 1.0
+
+    def axis(self) -> NDArray[np.float64]:
+        """Return the long axis as a line (2, 2)."""
+        return np.stack([self.start, self.end])
+
+    def _reach(self, origin: NDArray[np.float64], direction: NDArray[np.float64]) -> tuple[float, float]:
+        along = (self._outermost - origin) @ direction
+        slack = self._SLACK * float(np.ptp(self._outermost, axis=0).max())
+        return float(along.min()) - slack, float(along.max()) + slack
+
+
+def _cut(
+    line: tuple[float, float, float, float] | None,
+    station: float | None,
+    path: NDArray[np.float64],
+    reach: float,
+    extent: _Extent,
+) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
+    """Return middle, direction (to the right) and reach to either side of a cut."""
+    if line is not None:
+        left, right = np.array(line[:2]), np.array(line[2:])
+        length = float(np.hypot(*(right - left)))
+        if not 0 < length < np.inf:
+            raise InputError("--line", list(line), "must be two different points x y x y")
+        return (left + right) / 2, (right - left) / length, length / 2
+    steps = np.hypot(*np.diff(path, axis=0).T)
+    stations = np.r_[0.0, np.cumsum(steps)]
+    length = float(stations[-1])
+    if length == 0:
+        return extent.middle, np.array([0.0, -1.0]), reach
+    wanted = length / 2 if station is None else station
+    if not 0 <= wanted <= length:
+        raise InputError("--station", station, f"must be 0 to {length:.1f} m")
+    at = int(np.clip(np.searchsorted(stations, wanted, side="right") - 1, 0, len(steps) - 1))
+    while steps[at] == 0:
+        at -= 1
+    along = (path[at + 1] - path[at]) / steps[at]
+    return path[at] + along * (wanted - stations[at]), np.array([along[1], -along[0]]), reach
+
+
+def _scheme_of(cloud: CloudReader, classes: str | None) -> ClassScheme:
+    """Return the scheme to write a cloud's points with."""
+    header = cloud.header
+    if classes is None or (header.labelled and classes == header.scheme.name):
+        return header.scheme.as_stored()
+    scheme = class_scheme(classes)
+    if not header.labelled or header.scheme.name != "17":
+        held = f"the classes {header.scheme.name}" if header.labelled else "LAS codes only"
+        raise InputError(str(header.path), None, f"holds {held}: only the 17 classes can be merged into {classes}")
+    return scheme
+
+
+def _writer_like(
+    cloud: CloudReader, output: Path, scheme: ClassScheme, intensity_scale: float | None = None
+) -> CloudWriter:
+    header, offset = cloud.header, cloud.header.offset
+    if not header.labelled and not np.any(offset):
+        first = next((block.xyz[0] for block in cloud.blocks(1)), None)
+        offset = offset if first is None else first
+    scale = steps_per_unit(cloud) if intensity_scale is None else intensity_scale
+    crs = None if header.crs_text else header.epsg
+    return open_writer(output, crs, offset, scale, header.attributes, scheme, header.crs_text)
+
+
+def _done(cloud: CloudReader, writer: CloudWriter) -> dict[str, Any]:
+    return {
+        "file": cloud.header.path.name,
+        "output": str(writer.path),
+        "points": writer.count,
+        "intensity_clipped": writer.clipped,
+        "class_scheme": writer.scheme.name,
+        "left_out": list(cloud.header.left_out),
+    }
+
+
+def _check_output(source: Path, output: Path, overwrite: bool) -> None:
+    """Refuse an output that can't be, before any work."""
+    check_ending(output, "--output")
+    check_ending(source)
+    if output.exists() and source.exists() and source.samefile(output):
+        raise OutputError("--output", str(output), "must be another file than the input")
+    if output.is_dir():
+        raise OutputError("--output", str(output), "is a folder")
+    if output.exists() and not overwrite:
+        raise OutputError("--output", str(output), "is there already; --overwrite replaces it")
+    if not output.parent.is_dir():
+        raise OutputError("--output", str(output), f"there is no folder {output.parent}")
+    if not os.access(output.parent, os.W_OK):
+        raise OutputError("--output", str(output), "cannot be written (Permission denied)")
+
+
+def _watched(blocks: Iterable[PointBlock], count: int, progress: Progress, stage: str) -> Iterator[PointBlock]:
+    done = 0
+    for block in blocks:
+        yield block
+        done += len(block)
+        progress(stage, done / max(count, 1))
+
+

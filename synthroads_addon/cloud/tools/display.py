@@ -1,0 +1,197 @@
+"""A cloud thinned out to be looked at: a stated number of points, read block by block, with colours by what is asked.
+
+Of a cloud of N points B are kept: the file's points are cut into B runs of N/B neighbours, and of each run the one that
+a keyed random number picks stays. So the number is exact, the same file gives the same points however it is read, every
+strip keeps its share, and no pattern of lines arises as it would from every n-th point. They are shuffled
+so that the first of them, however many, are an even choice as well: as many as can be drawn while a view is turned.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Literal, get_args
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...base.classes import ClassScheme, PointClass
+from ...base.errors import InputError
+from ...base.random_streams import stream
+from ..formats.reading import CloudHeader, open_cloud
+from .picture import gray
+from .previews import Brightness
+
+ColourBy = Literal["class", "intensity", "rgb", "height"]
+COLOURINGS: tuple[ColourBy, ...] = get_args(ColourBy)
+BLOCK = 50_000
+"""Points that are read at a time, those of one chunk of LAZ: some hundredths of a second on one core, so that a window
+stays alive beside it."""
+
+_HEIGHT_STOPS = ("#440154", "#472d7b", "#3b528b", "#2c728e", "#21918c", "#28ae80", "#5ec962", "#addc30", "#fde725")
+"""Viridis at equal steps: even in brightness, and told apart by the colour-blind (S. van der Walt, N. Smith, 2015)."""
+
+
+@dataclass
+class DisplayCloud:
+    """N points of a cloud, to be drawn, in random order.
+
+    Attributes:
+        header: what the file says of itself.
+        origin: (3,) map coordinates that `xyz` counts from, m.
+        xyz: (N, 3) float32 coordinates less the origin, subtracted in float64, m.
+        class_id: (N,) uint8 classes of the header's scheme.
+        rgb: (N, 3) uint8 sRGB.
+        brightness: (N,) float32, see `Brightness`.
+        brightness_text: what that is.
+        counts: (256,) points of each class in the whole file.
+    """
+
+    header: CloudHeader
+    origin: NDArray[np.float64]
+    xyz: NDArray[np.float32]
+    class_id: NDArray[np.uint8]
+    rgb: NDArray[np.uint8]
+    brightness: NDArray[np.float32]
+    brightness_text: str
+    counts: NDArray[np.int64]
+    _colors: dict[str, NDArray[np.uint8]] = field(default_factory=dict, repr=False)
+    _limits: dict[str, tuple[float, float]] = field(default_factory=dict, repr=False)
+
+    def __len__(self) -> int:
+        return len(self.xyz)
+
+    @property
+    def total(self) -> int:
+        """Return how many points the file has."""
+        return int(self.counts.sum())
+
+    def colorings(self) -> tuple[ColourBy, ...]:
+        """Return what the points can be coloured by: a file without colours has no ``rgb``."""
+        return tuple(name for name in COLOURINGS if name != "rgb" or self.header.has_color)
+
+    def classes(self) -> list[tuple[PointClass, int]]:
+        """Return the classes that the file has points of, with their number, in the order of their ids."""
+        scheme: ClassScheme = self.header.scheme
+        rows = {row.id: row for row in scheme.rows}
+        return [
+            (rows.get(i) or PointClass(i, scheme.names().get(i, f"class {i}"), i, _rgb_of(scheme, i)), int(n))
+            for i, n in enumerate(self.counts)
+            if n
+        ]
+
+    def limits(self, by: ColourBy) -> tuple[float, float]:
+        """Return the values of the first and last colour of ``intensity`` or ``height`` (map m)."""
+        if by not in self._limits:
+            values, shift = (self.brightness, 0.0) if by == "intensity" else (self.xyz[:, 2], self.origin[2])
+            low, high = np.quantile(values, [0.005, 0.995])
+            self._limits[by] = (float(low + shift), float(high + shift))
+        return self._limits[by]
+
+    def colors(self, by: ColourBy) -> NDArray[np.uint8]:
+        """Return the points' colours (N, 4), sRGB and opaque; worked out once for each ``by``."""
+        if by not in self._colors:
+            self._colors[by] = np.column_stack([self._rgb_by(by), np.full(len(self), 255, np.uint8)])
+        return self._colors[by]
+
+    def _rgb_by(self, by: ColourBy) -> NDArray[np.uint8]:
+        if by == "class":
+            return self.header.scheme.colors()[self.class_id]
+        if by == "rgb":
+            return self.rgb
+        if by == "intensity":
+            shades, _ = gray(self.brightness.astype(np.float64), np.ones(len(self), dtype=bool), self.brightness_text)
+            return shades.astype(np.uint8)
+        low, high = (value - self.origin[2] for value in self.limits("height"))
+        share = np.clip((self.xyz[:, 2] - low) / max(high - low, 1e-9), 0.0, 1.0)
+        return height_colors()[np.nan_to_num(share * 255.0).astype(np.uint8)]
+
+
+def height_colors() -> NDArray[np.uint8]:
+    """Return a (256, 3) table of sRGB colours from low to high."""
+    stops = np.array([[int(stop[i : i + 2], 16) for i in (1, 3, 5)] for stop in _HEIGHT_STOPS], dtype=np.float64)
+    at = np.linspace(0.0, len(stops) - 1.0, 256)
+    return np.column_stack([np.interp(at, np.arange(len(stops)), stops[:, i]) for i in range(3)]).astype(np.uint8)
+
+
+def chosen_points(count: int, budget: int, seed: int = 0) -> NDArray[np.int64]:
+    """Return the increasing indices (min(count, budget),) of the points that stay of ``count``."""
+    if count <= budget:
+        return np.arange(count, dtype=np.int64)
+    edges = np.arange(budget + 1, dtype=np.int64) * count // budget
+    picks = stream(seed, "display", count, budget).random(budget)
+    return edges[:-1] + (picks * np.diff(edges)).astype(np.int64)
+
+
+def drawing_places(count: int, seed: int = 0) -> NDArray[np.int64]:
+    """Return for each of the chosen points (count,), in the file's order, where it stands in the drawing's."""
+    return stream(seed, "drawing order", count).permutation(count)
+
+
+def read_display(
+    path: Path,
+    budget: int,
+    origin: NDArray[np.float64] | None = None,
+    progress: Callable[[float], None] = lambda share: None,
+    block: int = BLOCK,
+) -> DisplayCloud:
+    """Return a cloud to be drawn.
+
+    Memory is that of ``budget`` points (20 bytes each and 4 for each colouring; 22 more while the file is read) and
+    one block.
+
+    Args:
+        path: LAS, LAZ, PLY, E57 or NPZ.
+        budget: largest number of points that are kept.
+        origin: (3,) map coordinates of the frame that the points are drawn in; near the first point if None.
+        progress: called with the share that is read after each block; what it raises ends the reading.
+        block: points that are read at a time; the result doesn't depend on it.
+
+    Raises:
+        MissingFileError: there is no such file, or it can't be read.
+        InputError: it is no cloud, damaged, or has no points; or the budget is below 1.
+    """
+    if budget < 1:
+        raise InputError("points", budget, "must be at least 1")
+    with open_cloud(path) as cloud:
+        chosen = chosen_points(cloud.header.count, budget)
+        if len(chosen) == 0:
+            raise InputError(str(path), None, "has no points")
+        result = _empty(cloud.header, len(chosen), origin)
+        places, rgb = drawing_places(len(chosen)), np.empty((len(chosen), 3), dtype=np.uint16)
+        measure, done, kept = Brightness(), 0, 0
+        for points in cloud.blocks(block):
+            if origin is None:
+                result.origin = origin = np.floor(points.xyz[0])
+            result.counts += np.bincount(points.class_id, minlength=256)
+            last = int(np.searchsorted(chosen, done + len(points)))
+            here, into = chosen[kept:last] - done, places[kept:last]
+            result.xyz[into] = points.xyz[here] - origin
+            result.class_id[into] = points.class_id[here]
+            rgb[into] = points.rgb[here]
+            result.brightness[into] = np.nan_to_num(measure.of(points)[here])
+            done, kept = done + len(points), last
+            progress(done / cloud.header.count)
+        result.brightness_text = measure.text
+        # Colours have 16 bits; some programs write 8 into them all the same.
+        result.rgb[:] = rgb if rgb.max() < 256 else rgb >> 8
+        return result
+
+
+def _empty(header: CloudHeader, size: int, origin: NDArray[np.float64] | None) -> DisplayCloud:
+    return DisplayCloud(
+        header=header,
+        origin=np.zeros(3) if origin is None else np.asarray(origin, dtype=np.float64),
+        xyz=np.empty((size, 3), dtype=np.float32),
+        class_id=np.empty(size, dtype=np.uint8),
+        rgb=np.empty((size, 3), dtype=np.uint8),
+        brightness=np.empty(size, dtype=np.float32),
+        brightness_text="",
+        counts=np.zeros(256, dtype=np.int64),
+    )
+
+
+def _rgb_of(scheme: ClassScheme, number: int) -> tuple[int, int, int]:
+    red, green, blue = (int(value) for value in scheme.colors()[number])
+    return red, green, blue

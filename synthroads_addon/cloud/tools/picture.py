@@ -1,0 +1,182 @@
+"""The frame of a preview: title, legend, scale, north, axes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image, ImageDraw, ImageFont
+
+from ...base.classes import PointClass
+
+PAPER, INK = (226, 231, 238), (40, 40, 44)
+_MARGIN, _LINE, _SMALL = 14, 26, 15
+_GRID = (200, 206, 214)
+
+Color = tuple[int, int, int]
+
+
+@dataclass(frozen=True)
+class GrayBar:
+    """What black and white stand for.
+
+    Attributes:
+        low, high: values of black and white.
+        text: of what.
+    """
+
+    low: float
+    high: float
+    text: str
+
+
+@dataclass(frozen=True)
+class Axes:
+    """Coordinates along the picture's edges.
+
+    Attributes:
+        left, low: of the lower left corner, m.
+        across, up: of a pixel, m.
+    """
+
+    left: float
+    low: float
+    across: float
+    up: float
+
+
+def class_legend(rows: Sequence[PointClass], labels: NDArray[np.uint8]) -> list[tuple[str, Color]]:
+    """Return names and colours of the classes that occur among labels, unlabelled points included."""
+    seen = set(np.unique(labels).tolist())
+    return [(row.name.replace("_", " "), row.color) for row in rows if row.id in seen]
+
+
+def gray(values: NDArray[np.float64], filled: NDArray[np.bool_], text: str) -> tuple[NDArray[np.float64], GrayBar]:
+    """Return values (N,) as grays (N, 3), the darkest and brightest half percent cut, with their legend."""
+    low, high = np.quantile(values[filled], [0.005, 0.995]) if filled.any() else (0.0, 1.0)
+    shade = np.clip((values - low) / max(high - low, 1e-300), 0, 1) * 255
+    return np.repeat(shade[:, None], 3, axis=1), GrayBar(float(low), float(high), text)
+
+
+def framed(
+    pixels: NDArray[np.uint8],
+    title: str,
+    legend: Sequence[tuple[str, Color]] | GrayBar | None,
+    axes: Axes,
+    north: tuple[float, float] | None = None,
+    ticks: bool = False,
+) -> Image.Image:
+    """Return a picture (height, width, 3) with its frame.
+
+    Args:
+        axes: the picture's coordinates; of its scale, and of its ticks if there are to be any.
+        north: direction of the north in picture axes (right, up), for an arrow.
+        ticks: mark heights and distances at the edges, in place of the scale.
+    """
+    height, width = pixels.shape[:2]
+    left = _MARGIN + (52 if ticks else 0)
+    size = (max(width + left, 900) + _MARGIN, height + 2 * _MARGIN + (_LINE if ticks else 0))
+    lines = _wrapped(legend, size[0] - 2 * _MARGIN) if isinstance(legend, Sequence) else [[]] if legend else []
+    picture = Image.new("RGB", (size[0], size[1] + _LINE * (1 + len(lines)) + 10), PAPER)
+    picture.paste(Image.fromarray(pixels), (left, _MARGIN))
+    draw = ImageDraw.Draw(picture)
+    y = float(size[1])
+    if ticks:
+        _draw_ticks(draw, axes, (left, _MARGIN, width, height))
+        x = float(left)
+    else:
+        x = _draw_scale(draw, axes.across, width, (_MARGIN, y))
+    if north is not None:
+        _draw_north(draw, north, (x + 20, y + 12))
+        x += 62
+    draw.text((x, y + 2), title, fill=INK, font=_font(17))
+    y += _LINE + 2
+    if isinstance(legend, GrayBar):
+        _draw_bar(draw, legend, (_MARGIN, y))
+    for number, line in enumerate(lines):
+        _draw_swatches(draw, line, y + number * _LINE)
+    return picture
+
+
+def nice_step(reach: float) -> float:
+    """Return the largest of 1, 2, 5 times a power of ten that isn't above ``reach``."""
+    power = 10.0 ** np.floor(np.log10(reach))
+    return float(max(factor * power for factor in (1, 2, 5) if factor * power <= reach * (1 + 1e-9)))
+
+
+def _font(size: int) -> ImageFont.FreeTypeFont | ImageFont.ImageFont:
+    return ImageFont.load_default(size=size)
+
+
+def _wrapped(legend: Sequence[tuple[str, Color]], width: float) -> list[list[tuple[str, Color]]]:
+    """Return the legend's entries in lines that fit."""
+    lines: list[list[tuple[str, Color]]] = []
+    used = np.inf
+    for entry in legend:
+        needed = 40 + _font(_SMALL).getlength(entry[0])
+        if used + needed > width:
+            lines.append([])
+            used = 0.0
+        lines[-1].append(entry)
+        used += needed
+    return lines
+
+
+def _draw_swatches(draw: ImageDraw.ImageDraw, entries: list[tuple[str, Color]], y: float) -> None:
+    x = float(_MARGIN)
+    for text, color in entries:
+        draw.rectangle([x, y + 2, x + 16, y + 18], fill=color, outline=INK)
+        draw.text((x + 22, y + 2), text, fill=INK, font=_font(_SMALL))
+        x += 40 + draw.textlength(text, font=_font(_SMALL))
+
+
+def _draw_bar(draw: ImageDraw.ImageDraw, bar: GrayBar, corner: tuple[float, float]) -> None:
+    x, y = corner
+    low, high = (f"{value:,.0f}" if abs(value) >= 1000 else f"{value:.3g}" for value in (bar.low, bar.high))
+    draw.text((x, y + 2), low, fill=INK, font=_font(_SMALL))
+    x += draw.textlength(low, font=_font(_SMALL)) + 8
+    for step in range(160):
+        shade = round(step / 159 * 255)
+        draw.line([(x + step, y + 3), (x + step, y + 18)], fill=(shade, shade, shade))
+    draw.rectangle([x - 1, y + 2, x + 160, y + 19], outline=INK)
+    draw.text((x + 168, y + 2), f"{high}   {bar.text}", fill=INK, font=_font(_SMALL))
+
+
+def _draw_scale(draw: ImageDraw.ImageDraw, pixel: float, width: int, corner: tuple[float, float]) -> float:
+    """Draw a scale bar; return where it ends."""
+    x, y = corner
+    step = nice_step(pixel * min(max(width, 40), 160))
+    draw.rectangle([x, y + 8, x + step / pixel, y + 13], fill=INK)
+    text = f"{step:g} m" if step < 1000 else f"{step / 1000:g} km"
+    x += step / pixel + 8
+    draw.text((x, y + 2), text, fill=INK, font=_font(_SMALL))
+    return x + draw.textlength(text, font=_font(_SMALL)) + 24
+
+
+def _draw_north(draw: ImageDraw.ImageDraw, north: tuple[float, float], centre: tuple[float, float]) -> None:
+    """Draw an arrow to the north: the picture is turned by the road's direction."""
+    right, up = north
+    x, y = centre
+    tip = (x + 13 * right, y - 13 * up)
+    draw.line([(x - 13 * right, y + 13 * up), tip], fill=INK, width=2)
+    for side in (-1, 1):
+        draw.line([tip, (x + 5 * right + side * 5 * up, y - 5 * up + side * 5 * right)], fill=INK, width=2)
+    draw.text((x + 26, y), "N", fill=INK, font=_font(_SMALL), anchor="mm")
+
+
+def _draw_ticks(draw: ImageDraw.ImageDraw, axes: Axes, box: tuple[int, int, int, int]) -> None:
+    """Mark distances below and heights to the left of the picture, which lies in ``box`` (x, y, width, height)."""
+    x0, y0, width, height = box
+    draw.rectangle([x0 - 1, y0 - 1, x0 + width, y0 + height], outline=_GRID)
+    step = nice_step(width * axes.across / 6)
+    for number in range(int(np.ceil(axes.left / step)), int(axes.left / step + width * axes.across / step) + 1):
+        x = x0 + (number * step - axes.left) / axes.across
+        draw.line([(x, y0 + height), (x, y0 + height + 5)], fill=INK)
+        draw.text((x, y0 + height + 7), f"{number * step:g} m", fill=INK, font=_font(13), anchor="ma")
+    step = nice_step(max(height * axes.up / 3, 1e-6))
+    for number in range(int(np.ceil(axes.low / step)), int(axes.low / step + height * axes.up / step) + 1):
+        y = y0 + height - (number * step - axes.low) / axes.up
+        draw.line([(x0 - 5, y), (x0, y)], fill=INK)
+        draw.text((x0 - 8, y), f"{number * step:g}", fill=INK, font=_font(13), anchor="rm")

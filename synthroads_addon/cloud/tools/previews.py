@@ -1,0 +1,164 @@
+"""Pictures of a cloud, gathered block by block: from above by class, intensity and colour, and a cross-section."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...base.classes import ClassScheme, class_scheme
+from ..points import PointBlock
+from .picture import PAPER, Axes, GrayBar, class_legend, framed, gray, nice_step
+from .raster import Raster
+
+WIDTH = 1800
+"""Width of the pictures, pixels."""
+_LOWEST = 320
+"""Height (pixels), more or less, that a cross-section is exaggerated to, if it is lower."""
+_MOST_PIXELS = 1600
+_SECTION_PAPER = (172, 187, 204)
+"""White markings and dark pavement, both only points here, stand out from it."""
+
+
+class TopView:
+    """A raster over the cloud, turned so that the road runs from left to right.
+
+    Args:
+        start, end: (2,) map coordinates of the road's ends.
+        low, high: reach to the right and to the left of the line between them, m; what lies beyond is left out.
+        scheme: what the points' classes are; the 17 if not given.
+    """
+
+    def __init__(
+        self,
+        start: NDArray[np.float64],
+        end: NDArray[np.float64],
+        low: float,
+        high: float,
+        scheme: ClassScheme | None = None,
+    ) -> None:
+        chord = np.asarray(end) - np.asarray(start)
+        length = max(float(np.hypot(*chord)), 1.0)
+        self.along = chord / length if length > 1.0 else np.array([1.0, 0.0])
+        self.start = np.asarray(start, dtype=np.float64)
+        self.scheme = scheme or class_scheme("17")
+        border = 0.02 * length + 1.0
+        pixel = max(length + 2 * border, high - low) / WIDTH
+        size = (max(1, int(np.ceil((length + 2 * border) / pixel))), max(1, int(np.ceil((high - low) / pixel))))
+        self.raster = Raster(-border, low, size, pixel, pixel)
+        self.pixel = pixel
+        # A line is thinner than a pixel: let it win over the pavement.
+        self._lift = np.zeros(256)
+        self._lift[[row.id for row in self.scheme.rows if row.name == "road_marking"]] = 0.3
+        self._measure = Brightness()
+
+    def add(self, block: PointBlock) -> None:
+        """Add a block's points."""
+        relative = block.xyz[:, :2] - self.start
+        across = relative @ np.array([-self.along[1], self.along[0]])
+        height = block.xyz[:, 2] + self._lift[block.class_id]
+        self.raster.add(block, (relative @ self.along, across), height, self._measure.of(block))
+
+    def save(self, folder: Path, epsg: int | None, has_color: bool = True) -> list[Path]:
+        """Write ``preview_class.png``, ``preview_intensity.png`` and ``preview_rgb.png``; return their paths."""
+        raster = self.raster
+        filled = raster.count > 0
+        shades, bar = gray(raster.intensity(), filled, self._measure.text)
+        pictures: dict[str, tuple[NDArray[Any], list | GrayBar | None]] = {
+            "class": (self.scheme.colors()[raster.label], class_legend(self.scheme.rows, raster.label[filled])),
+            "intensity": (shades, bar),
+        }
+        if has_color:
+            pictures["rgb"] = (raster.rgb(), None)
+        system = f"   EPSG:{epsg}" if epsg else ""
+        axes = Axes(raster.left, raster.low, self.pixel, self.pixel)
+        north = (float(self.along[1]), float(self.along[0]))
+        paths = []
+        for name, (colors, legend) in pictures.items():
+            title = f"{name}   {int(raster.count.sum()):,} points{system}   pixel {self.pixel:.3g} m"
+            paths.append(folder / f"preview_{name}.png")
+            framed(raster.picture(colors, PAPER), title, legend, axes, north).save(paths[-1])
+        return paths
+
+
+class CrossSection:
+    """A cut through the cloud, seen along the road: distances from the cut's middle, to the left negative.
+
+    Args:
+        middle: (2,) map coordinates of the cut's middle.
+        right: (2,) direction of the cut, to the right as one looks along the road.
+        reach: length of the cut to either side, m.
+        depth: thickness of the slab whose points are drawn, m.
+        heights: lowest and highest height, m.
+        scheme: what the points' classes are; the 17 if not given.
+        by_class: colour by class, else by intensity.
+    """
+
+    def __init__(
+        self,
+        middle: NDArray[np.float64],
+        right: NDArray[np.float64],
+        reach: float,
+        depth: float,
+        heights: tuple[float, float],
+        scheme: ClassScheme | None = None,
+        by_class: bool = True,
+    ) -> None:
+        self.middle = np.asarray(middle, dtype=np.float64)
+        self.right = np.asarray(right, dtype=np.float64) / np.hypot(*right)
+        self.depth = depth
+        self.scheme = scheme or class_scheme("17")
+        self.by_class = by_class
+        pixel = 2 * reach / WIDTH
+        low, high = heights[0] - 0.5, heights[1] + 0.5
+        wanted = _LOWEST * pixel / (high - low)
+        self.exaggeration = 1.0 if wanted <= 1 else min(10.0, nice_step(1.4 * wanted))
+        up = max(pixel / self.exaggeration, (high - low) / _MOST_PIXELS)
+        self.exaggeration = pixel / up
+        self.raster = Raster(-reach, low, (WIDTH, max(1, int(np.ceil((high - low) / up)))), pixel, up)
+        self._measure = Brightness()
+
+    def add(self, block: PointBlock) -> None:
+        """Add a block's points; those outside the slab are left out."""
+        relative = block.xyz[:, :2] - self.middle
+        away = np.abs(relative @ np.array([-self.right[1], self.right[0]]))
+        inside = np.flatnonzero(away <= self.depth / 2)
+        if len(inside):
+            part = block.select(inside)
+            place = (relative[inside] @ self.right, part.xyz[:, 2])
+            self.raster.add(part, place, -away[inside], self._measure.of(part))
+
+    def save(self, path: Path, what: str = "cross-section") -> Path:
+        """Write the picture; ``what`` begins its title."""
+        raster = self.raster
+        filled = raster.count > 0
+        legend: list | GrayBar
+        colors: NDArray[Any]
+        if self.by_class:
+            colors, legend = self.scheme.colors()[raster.label], class_legend(self.scheme.rows, raster.label[filled])
+        else:
+            colors, legend = gray(raster.intensity(), filled, self._measure.text)
+        scale = "" if abs(self.exaggeration - 1) < 0.01 else f"   heights x {self.exaggeration:.3g}"
+        title = f"{what}   {int(raster.count.sum()):,} points in {self.depth:g} m{scale}"
+        axes = Axes(raster.left, raster.low, raster.across, raster.up)
+        framed(raster.picture(colors, _SECTION_PAPER), title, legend, axes, ticks=True).save(path)
+        return path
+
+
+class Brightness:
+    """What is drawn as intensity: times the squared range where the points have one, so that nearness doesn't show.
+
+    Attributes:
+        text: what it is.
+    """
+
+    text = "intensity as stored"
+
+    def of(self, block: PointBlock) -> NDArray[np.float64]:
+        """Return a block's values (N,)."""
+        if not len(block) or np.isnan(block.range[0]):
+            return block.intensity
+        self.text = "intensity x squared range (white target = 1)"
+        return block.intensity * block.range**2

@@ -1,0 +1,177 @@
+"""Intensities of one cloud mapped onto the distribution of another: quantile on quantile, keeping their order.
+
+Intensities are taken in the 65,536 steps of 16 bits, so that two histograms hold all that there is to know and memory
+stays the same for clouds of any size.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...base.errors import InputError
+from ..formats.reading import CloudReader
+from ..points import PointBlock
+
+LEVELS = 65_536
+_GOLDEN = 0.6180339887498949
+
+
+def steps_per_unit(cloud: CloudReader) -> float:
+    """Return the 16-bit steps per unit of a cloud's intensity; where it says none, those of the brightest point."""
+    header = cloud.header
+    if header.intensity_scale is not None:
+        return header.intensity_scale
+    if header.kind.startswith("LAS"):
+        return 1.0
+    brightest = max((float(block.intensity.max()) for block in cloud.blocks()), default=0.0)
+    return (LEVELS - 1) / brightest if brightest > 0 else 1.0
+
+
+def levels(intensity: NDArray[np.float64], scale: float) -> NDArray[np.intp]:
+    """Return intensities (N,) as 16-bit steps; what is brighter is the brightest."""
+    return np.clip(np.rint(intensity * scale), 0, LEVELS - 1).astype(np.intp)
+
+
+def histograms(cloud: CloudReader, scale: float) -> dict[int, NDArray[np.int64]]:
+    """Return the number of points on each level (65536,) by class."""
+    result: dict[int, NDArray[np.int64]] = {}
+    for block in cloud.blocks():
+        level = levels(block.intensity, scale)
+        for label in np.unique(block.class_id):
+            counts = np.bincount(level[block.class_id == label], minlength=LEVELS)
+            result[int(label)] = result.get(int(label), np.zeros(LEVELS, dtype=np.int64)) + counts
+    return result
+
+
+def largest_gap(a: NDArray[np.int64], b: NDArray[np.int64]) -> float:
+    """Return the Kolmogorov-Smirnov distance of two histograms: the largest gap between their distributions."""
+    return float(np.abs(np.cumsum(a) / max(a.sum(), 1) - np.cumsum(b) / max(b.sum(), 1)).max())
+
+
+class QuantileMap:
+    """Maps levels onto a target's distribution, monotonically.
+
+    Points of one level are spread over the target's levels of their share: the k-th of them in the cloud's order takes
+    the fraction k x golden section (mod 1) of that share, which fills it evenly, without chance and however the points
+    come in blocks.
+
+    Args:
+        source, target: (65536,) histograms; neither is empty.
+
+    Attributes:
+        mapped: (65536,) histogram of what has been mapped so far.
+    """
+
+    def __init__(self, source: NDArray[np.int64], target: NDArray[np.int64]) -> None:
+        if source.sum() == 0 or target.sum() == 0:
+            raise ValueError("both histograms must hold points")
+        ends = np.cumsum(source)
+        self._begin = (ends - source) / ends[-1]
+        self._share = source / ends[-1]
+        self._target = np.cumsum(target) / target.sum()
+        self._last = int(np.flatnonzero(target)[-1])
+        self._seen = np.zeros(LEVELS, dtype=np.int64)
+        self.mapped = np.zeros(LEVELS, dtype=np.int64)
+
+    def map(self, level: NDArray[np.intp]) -> NDArray[np.intp]:
+        """Return the levels (N,) that points of given levels, in the cloud's order, are mapped to."""
+        turn = self._seen[level] + _occurrence(level)
+        self._seen += np.bincount(level, minlength=LEVELS)
+        quantile = self._begin[level] + self._share[level] * ((turn + 0.5) * _GOLDEN % 1.0)
+        result = np.minimum(np.searchsorted(self._target, quantile, side="right"), self._last)
+        self.mapped += np.bincount(result, minlength=LEVELS)
+        return result
+
+
+class IntensityMapping:
+    """The mapping of a whole cloud, of all its points at once or class by class.
+
+    Args:
+        source, target: the clouds.
+        per_class: map each class on the target's class of the same name; classes that the target lacks are mapped
+            together, on all its points.
+
+    Attributes:
+        scale: 16-bit steps per unit of the mapped intensities: the target's.
+        alone: names of the classes that the target lacks; empty unless ``per_class``.
+
+    Raises:
+        InputError: one of the clouds has no points.
+    """
+
+    def __init__(self, source: CloudReader, target: CloudReader, per_class: bool = False) -> None:
+        self._steps, self.scale = steps_per_unit(source), steps_per_unit(target)
+        have, want = histograms(source, self._steps), histograms(target, self.scale)
+        for cloud, found in ((source, have), (target, want)):
+            if not found:
+                raise InputError(str(cloud.header.path), None, "has no points")
+        self._have, self._want = _total(have), _total(want)
+        self.alone: list[str] = []
+        self._class_targets: dict[int, NDArray[np.int64]] = {}
+        if per_class:
+            self._maps = self._class_maps(source, target, have, want)
+        else:
+            whole = QuantileMap(self._have, self._want)
+            self._maps = dict.fromkeys(have, whole)
+
+    def blocks(self, source: CloudReader) -> Iterator[PointBlock]:
+        """Yield the source's points with mapped intensities."""
+        for block in source.blocks():
+            level = levels(block.intensity, self._steps)
+            mapped = np.zeros(len(level), dtype=np.intp)
+            for table in {id(table): table for table in self._maps.values()}.values():
+                labels = [label for label, used in self._maps.items() if used is table]
+                chosen = np.isin(block.class_id, labels)
+                mapped[chosen] = table.map(level[chosen])
+            yield replace(block, intensity=mapped / self.scale)
+
+    def distance_before(self) -> float:
+        """Return the Kolmogorov-Smirnov distance of the clouds' levels as they were."""
+        return largest_gap(self._have, self._want)
+
+    def distance_after(self) -> float:
+        """Return the same of what has been mapped."""
+        tables = {id(table): table for table in self._maps.values()}.values()
+        return largest_gap(_total({i: table.mapped for i, table in enumerate(tables)}), self._want)
+
+    def class_distances(self) -> dict[int, float]:
+        """Return the distances after mapping of the classes that have a map of their own, by the source's ids."""
+        return {label: largest_gap(self._maps[label].mapped, want) for label, want in self._class_targets.items()}
+
+    def _class_maps(
+        self,
+        source: CloudReader,
+        target: CloudReader,
+        have: dict[int, NDArray[np.int64]],
+        want: dict[int, NDArray[np.int64]],
+    ) -> dict[int, QuantileMap]:
+        theirs = {name: label for label, name in target.header.scheme.names().items() if label in want}
+        names = source.header.scheme.names()
+        pairs = {label: theirs.get(names.get(label, "")) for label in have}
+        self._class_targets = {label: want[other] for label, other in pairs.items() if other is not None}
+        maps = {label: QuantileMap(have[label], wanted) for label, wanted in self._class_targets.items()}
+        rest = [label for label in have if label not in maps]
+        self.alone = [names.get(label, str(label)) for label in rest]
+        if rest:
+            together = QuantileMap(_total({label: have[label] for label in rest}), self._want)
+            maps |= dict.fromkeys(rest, together)
+        return maps
+
+
+def _total(parts: dict[int, NDArray[np.int64]]) -> NDArray[np.int64]:
+    return np.sum(list(parts.values()), axis=0)
+
+
+def _occurrence(values: NDArray[np.intp]) -> NDArray[np.intp]:
+    """Return for each value (N,) how many equal ones stand before it."""
+    order = np.argsort(values, kind="stable")
+    ordered = values[order]
+    starts = np.flatnonzero(np.r_[True, ordered[1:] != ordered[:-1]]) if len(values) else np.zeros(0, dtype=np.intp)
+    lengths = np.diff(np.r_[starts, len(values)])
+    result = np.empty(len(values), dtype=np.intp)
+    result[order] = np.arange(len(values)) - np.repeat(starts, lengths)
+    return result

@@ -1,0 +1,107 @@
+"""Points gathered into the cells of a picture, block by block."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..points import PointBlock
+
+
+class Raster:
+    """A picture's cells, row 0 at the top: mean intensity and colour of each, and the class of its foremost point.
+
+    Args:
+        left, low: coordinates of the lower left corner, m.
+        width, height: number of cells.
+        across, up: size of a cell, m.
+
+    Attributes:
+        count: (cells,) points in each cell.
+        label: (cells,) class of the foremost point; 255 where there is none.
+    """
+
+    def __init__(self, left: float, low: float, size: tuple[int, int], across: float, up: float) -> None:
+        self.left, self.low, self.across, self.up = left, low, across, up
+        self.width, self.height = size
+        cells = self.width * self.height
+        self.count = np.zeros(cells)
+        self.label = np.full(cells, 255, dtype=np.uint8)
+        self._intensity = np.zeros(cells)
+        self._rgb = np.zeros((3, cells))
+        self._front = np.full(cells, -np.inf)
+
+    def add(
+        self,
+        block: PointBlock,
+        place: tuple[NDArray[np.float64], NDArray[np.float64]],
+        depth: NDArray[np.float64],
+        brightness: NDArray[np.float64],
+    ) -> None:
+        """Add a block's points.
+
+        Args:
+            block: N points.
+            place: their two coordinates (N,) in the picture, m; what lies outside is left out.
+            depth: (N,) the larger, the further in front.
+            brightness: (N,) what the mean intensity is of.
+        """
+        column = np.floor((place[0] - self.left) / self.across)
+        row = self.height - 1 - np.floor((place[1] - self.low) / self.up)
+        inside = np.flatnonzero((column >= 0) & (column < self.width) & (row >= 0) & (row < self.height))
+        if len(inside) == 0:
+            return
+        cell = (row[inside] * self.width + column[inside]).astype(np.intp)
+        first, last = int(cell.min()), int(cell.max()) + 1
+        window, size, within = slice(first, last), last - first, cell - first
+        self.count[window] += np.bincount(within, minlength=size)
+        self._intensity[window] += np.bincount(within, brightness[inside], size)
+        for channel in range(3):
+            self._rgb[channel, window] += np.bincount(within, block.rgb[inside, channel], size)
+        self._keep_foremost(cell, depth[inside], block.class_id[inside])
+
+    def intensity(self) -> NDArray[np.float64]:
+        """Return the mean intensity (cells,); 0 where there are no points."""
+        return self._intensity / np.maximum(self.count, 1)
+
+    def rgb(self) -> NDArray[np.float64]:
+        """Return the mean colour (cells, 3), 0 to 255."""
+        return (self._rgb / np.maximum(self.count, 1) / 257.0).T
+
+    def picture(self, colors: NDArray[Any], paper: tuple[int, int, int]) -> NDArray[np.uint8]:
+        """Return colours (cells, 3) as a picture (height, width, 3), with larger dots the fewer cells are filled."""
+        shape = (self.height, self.width)
+        filled = (self.count > 0).reshape(shape)
+        result = np.where(self.count[:, None] > 0, colors, paper).astype(np.uint8).reshape(*shape, 3)
+        for _ in range(self._dot_growth(filled)):
+            result, filled = _grown(result, filled)
+        return result
+
+    def _dot_growth(self, filled: NDArray[np.bool_]) -> int:
+        """Return by how many cells dots are to grow: by none where most cells between points are filled."""
+        rows, columns = filled.any(axis=1), filled.any(axis=0)
+        used = filled[rows][:, columns]
+        share = float(used.mean()) if used.size else 1.0
+        neighbours = float((used[:, 1:] & used[:, :-1]).sum() / max(1, used.sum())) if used.size else 1.0
+        return 0 if share > 0.35 or neighbours > 0.8 else 1 if neighbours > 0.4 else 2
+
+    def _keep_foremost(self, cell: NDArray[np.intp], depth: NDArray[np.float64], label: NDArray[np.uint8]) -> None:
+        np.maximum.at(self._front, cell, depth)
+        foremost = depth == self._front[cell]
+        self.label[cell[foremost]] = label[foremost]
+
+
+def _grown(picture: NDArray[np.uint8], filled: NDArray[np.bool_]) -> tuple[NDArray[np.uint8], NDArray[np.bool_]]:
+    """Fill empty cells beside filled ones with their colours."""
+    result, done = picture.copy(), filled.copy()
+    for axis, step in ((1, 1), (1, -1), (0, 1), (0, -1)):
+        near, color = np.roll(filled, step, axis), np.roll(picture, step, axis)
+        edge: list[slice | int] = [slice(None), slice(None)]
+        edge[axis] = 0 if step == 1 else -1
+        near[tuple(edge)] = False  # nothing comes round from the other side
+        new = near & ~done
+        result[new] = color[new]
+        done |= new
+    return result, done

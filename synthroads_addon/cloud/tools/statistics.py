@@ -1,0 +1,293 @@
+"""Figures that describe a cloud, gathered block by block: for comparing synthetic scans with real ones."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..formats.reading import CloudReader
+from ..points import PointBlock
+
+AREA_CELL = 1.0
+"""Edge of the cells whose occupied ones are a cloud's area, m."""
+RADIUS = 0.5
+"""Radius of the neighbourhood that roughness is of, m."""
+SAMPLES = 5000
+"""Points of each class whose roughness is measured."""
+_FEWEST_NEIGHBOURS = 8
+_MOST_PAIRS = 3e8
+_PAIRS_AT_ONCE = 4_000_000
+
+
+def luminance(rgb: NDArray[np.uint16]) -> NDArray[np.float64]:
+    """Return 0.3 r + 0.59 g + 0.11 b (N,), 0 to 1, of colours (N, 3) as they are stored."""
+    return rgb @ np.array([0.30, 0.59, 0.11]) / 65535.0
+
+
+def cloud_statistics(cloud: CloudReader, radius: float = RADIUS, samples: int = SAMPLES) -> dict[str, Any]:
+    """Return a cloud's figures as JSON data, of all points and of each class; the cloud is read twice.
+
+    ``density`` is points per m2 of the 1 m cells that hold any; ``roughness`` the mean surface variation
+    l0 / (l0 + l1 + l2), l0 the smallest eigenvalue of the covariance of the points within ``radius`` (Pauly et al.
+    2002), of ``samples`` points per class; intensity is a share of 16 bits where the file has those or says its scale.
+    None stands where the file doesn't hold what a figure needs.
+    """
+    first = _FirstPass(cloud, samples)
+    for block in cloud.blocks():
+        first.add(block)
+    header = cloud.header
+    result: dict[str, Any] = {
+        "file": header.path.name,
+        "kind": header.kind,
+        "points": header.count,
+        "epsg": header.epsg,
+        "attributes": list(header.attributes),
+        "left_out": list(header.left_out),
+        "class_scheme": header.scheme.name,
+        "roughness_radius": radius,
+    }
+    if first.moments.count.sum() == 0:
+        return result | {"bounds": None, "all": None, "classes": {}}
+    spread = _Roughness(first.samples(radius), radius)
+    if radius > 0 and samples > 0:
+        for block in cloud.blocks():
+            spread.add(block.xyz)
+    names = header.scheme.names()
+    rough = spread.by_class()
+    present = np.flatnonzero(first.moments.count)
+    table = {names.get(int(c), f"class_{c}"): first.figures([int(c)], rough) for c in present}
+    bounds = {"low": np.round(first.low, 4).tolist(), "high": np.round(first.high, 4).tolist()}
+    return result | {"bounds": bounds, "all": first.figures([int(c) for c in present], rough), "classes": table}
+
+
+class Moments:
+    """Number, mean and sum of squared deviations of several quantities by class, without loss in large numbers.
+
+    Args:
+        width: number of quantities.
+    """
+
+    def __init__(self, width: int) -> None:
+        self.count = np.zeros(256, dtype=np.int64)
+        self.mean = np.zeros((width, 256))
+        self.squares = np.zeros((width, 256))
+
+    def add(self, label: NDArray[np.uint8], values: Iterable[NDArray[np.float64]]) -> None:
+        """Add points by label (N,) and their quantities, each (N,) (Chan, Golub and LeVeque 1979)."""
+        count = np.bincount(label, minlength=256)
+        some = np.maximum(count, 1)
+        together = np.maximum(self.count + count, 1)
+        for row, value in enumerate(values):
+            mean = np.bincount(label, value, 256) / some
+            squares = np.bincount(label, (value - mean[label]) ** 2, 256)
+            step = np.where(count > 0, mean - self.mean[row], 0.0)
+            self.squares[row] += squares + step**2 * self.count * count / together
+            self.mean[row] += step * count / together
+        self.count += count
+
+    def of(self, row: int, labels: list[int]) -> tuple[float, float]:
+        """Return mean and standard deviation of a quantity over the points of some labels."""
+        count = self.count[labels]
+        mean = float(np.average(self.mean[row, labels], weights=count))
+        squares = float((self.squares[row, labels] + count * (self.mean[row, labels] - mean) ** 2).sum())
+        return mean, float(np.sqrt(squares / count.sum()))
+
+
+class _FirstPass:
+    """What one look at each point gives: moments, bounds, area, and the points to measure roughness at."""
+
+    def __init__(self, cloud: CloudReader, samples: int) -> None:
+        header = cloud.header
+        self.moments = Moments(3)
+        self.low, self.high = np.full(3, np.inf), np.full(3, -np.inf)
+        self.has_color = header.has_color
+        self.full_scale = header.intensity_scale or 1.0
+        if header.intensity_scale is not None or header.kind.startswith("LAS"):
+            self.full_scale /= 65535.0
+        self._cells = _Cells()
+        self._samples = {label: _Sample(samples) for label in range(256)}
+
+    def add(self, block: PointBlock) -> None:
+        values = (block.xyz[:, 2], block.intensity * self.full_scale, luminance(block.rgb))
+        self.moments.add(block.class_id, values)
+        self.low = np.minimum(self.low, block.xyz.min(axis=0))
+        self.high = np.maximum(self.high, block.xyz.max(axis=0))
+        self._cells.add(block.xyz, block.class_id)
+        ranks = scattered(block.xyz)
+        for label in np.unique(block.class_id):
+            chosen = block.class_id == label
+            self._samples[int(label)].add(block.xyz[chosen], ranks[chosen])
+
+    def samples(self, radius: float) -> dict[int, NDArray[np.float64]]:
+        """Return the places (S, 3) to measure roughness at, by class: so few that it takes bounded time."""
+        places = {label: sample.xyz for label, sample in self._samples.items() if len(sample.xyz)}
+        density = self.moments.count.sum() / max(1.0, self._cells.area(None))
+        pairs = sum(map(len, places.values())) * density * 9 * radius**2
+        share = min(1.0, _MOST_PAIRS / max(pairs, 1.0))
+        return {label: xyz[: max(1, int(len(xyz) * share))] for label, xyz in places.items()}
+
+    def figures(self, labels: list[int], rough: dict[int, tuple[float, int]]) -> dict[str, Any]:
+        """Return the figures of the points of some classes together."""
+        count = int(self.moments.count[labels].sum())
+        area = self._cells.area(labels)
+        height, intensity, light = (self.moments.of(row, labels) for row in range(3))
+        colored = self.has_color and light != (0.0, 0.0)  # point formats with colours are used without them
+        known = [label for label in labels if label in rough]
+        weights = self.moments.count[known]
+        return {
+            "points": count,
+            "area_m2": area,
+            "density": count / area,
+            "height_mean": height[0],
+            "height_std": height[1],
+            "roughness": float(np.average([rough[c][0] for c in known], weights=weights)) if known else None,
+            "roughness_samples": sum(rough[c][1] for c in known),
+            "intensity_mean": intensity[0],
+            "intensity_std": intensity[1],
+            "luminance_mean": light[0] if colored else None,
+            "luminance_std": light[1] if colored else None,
+        }
+
+
+class _Cells:
+    """The occupied cells of the ground, by class."""
+
+    def __init__(self) -> None:
+        self._keys = np.zeros(0, dtype=np.int64)
+        self._new: list[NDArray[np.int64]] = []
+        self._pending = 0
+
+    def add(self, xyz: NDArray[np.float64], label: NDArray[np.uint8]) -> None:
+        column = np.clip(np.floor(xyz[:, :2] / AREA_CELL), -(2**25), 2**25 - 1).astype(np.int64) + 2**25
+        self._new.append(np.unique(((column[:, 0] << 26 | column[:, 1]) << 8) | label))
+        self._pending += len(self._new[-1])
+        if self._pending > len(self._keys) + 1_000_000:
+            self._settle()
+
+    def area(self, labels: list[int] | None) -> float:
+        """Return the area (m2) that points of some classes (None: all) occupy."""
+        self._settle()
+        keys = self._keys if labels is None else self._keys[np.isin(self._keys & 255, labels)]
+        return float(len(np.unique(keys >> 8))) * AREA_CELL**2
+
+    def _settle(self) -> None:
+        self._keys = np.unique(np.concatenate([self._keys, *self._new]))
+        self._new, self._pending = [], 0
+
+
+class _Sample:
+    """The points of lowest rank: a sample that doesn't depend on the points' order."""
+
+    def __init__(self, size: int) -> None:
+        self._size = size
+        self.xyz = np.zeros((0, 3))
+        self._ranks = np.zeros(0, dtype=np.uint64)
+
+    def add(self, xyz: NDArray[np.float64], ranks: NDArray[np.uint64]) -> None:
+        if len(self._ranks) >= self._size:
+            low = ranks < self._ranks[-1] if self._size else np.zeros(len(ranks), dtype=bool)
+            xyz, ranks = xyz[low], ranks[low]
+        ranks = np.concatenate([self._ranks, ranks])
+        order = np.argsort(ranks, kind="stable")[: self._size]
+        self.xyz, self._ranks = np.concatenate([self.xyz, xyz])[order], ranks[order]
+
+
+def scattered(xyz: NDArray[np.float64]) -> NDArray[np.uint64]:
+    """Return a well-mixed number (N,) of each position (N, 3), rounded to 0.1 mm (SplitMix64, Steele et al. 2014)."""
+    mixed = np.zeros(len(xyz), dtype=np.uint64)
+    for axis in range(3):
+        mixed += np.rint(xyz[:, axis] * 1e4).astype(np.int64).view(np.uint64) + np.uint64(0x9E3779B97F4A7C15)
+        mixed = (mixed ^ (mixed >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
+        mixed = (mixed ^ (mixed >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
+        mixed ^= mixed >> np.uint64(31)
+    return mixed
+
+
+class _Roughness:
+    """Covariances of the points around given places, gathered block by block.
+
+    Args:
+        places: (S, 3) map coordinates by class.
+        radius: of the neighbourhood, m.
+    """
+
+    def __init__(self, places: dict[int, NDArray[np.float64]], radius: float) -> None:
+        self._radius = radius
+        self._places = np.concatenate(list(places.values())) if places else np.zeros((0, 3))
+        self._label = np.repeat(list(places), [len(xyz) for xyz in places.values()]).astype(np.intp)
+        self._sums = np.zeros((10, len(self._places)))
+        # A place is entered under the nine columns of the ground around it: each point then looks into its own only.
+        self._corner = self._places[:, :2].min(axis=0) - 2 * radius if len(self._places) else np.zeros(2)
+        around = np.array([(i, j) for i in (-1, 0, 1) for j in (-1, 0, 1)])
+        columns = (self._column(self._places)[:, None, :] + around).reshape(-1, 2)
+        keys = columns[:, 0] << 31 | columns[:, 1]
+        order = np.argsort(keys, kind="stable")
+        self._entries = order // len(around)
+        self._keys, self._starts = np.unique(keys[order], return_index=True)
+        self._counts = np.diff(np.r_[self._starts, len(order)])
+
+    def add(self, xyz: NDArray[np.float64]) -> None:
+        """Add a block's points (N, 3)."""
+        if not len(self._keys):
+            return
+        column = self._column(xyz)
+        inside = np.flatnonzero(np.all((column >= 0) & (column < 2**31), axis=1))
+        key = column[inside, 0] << 31 | column[inside, 1]
+        slot = np.minimum(np.searchsorted(self._keys, key), len(self._keys) - 1)
+        found = self._keys[slot] == key
+        inside, slot = inside[found], slot[found]
+        for part in _parts(self._counts[slot]):
+            counts = self._counts[slot[part]]
+            point = np.repeat(inside[part], counts)
+            within = np.arange(len(point)) - np.repeat(np.cumsum(counts) - counts, counts)
+            place = self._entries[np.repeat(self._starts[slot[part]], counts) + within]
+            self._gather(xyz[point] - self._places[place], place)
+
+    def by_class(self) -> dict[int, tuple[float, int]]:
+        """Return mean surface variation and the number of places that it is of, by class."""
+        count = self._sums[0]
+        enough = count >= _FEWEST_NEIGHBOURS
+        number = np.maximum(count, 1)
+        mean = self._sums[1:4] / number
+        second = self._sums[4:] / number
+        covariance = np.empty((len(count), 3, 3))
+        for row, (i, j) in enumerate(_PAIRS):
+            covariance[:, i, j] = covariance[:, j, i] = second[row] - mean[i] * mean[j]
+        values = np.maximum(np.linalg.eigvalsh(covariance), 0.0)
+        total = values.sum(axis=1)
+        variation = values[:, 0] / np.where(total > 0, total, 1.0)
+        result = {}
+        for label in np.unique(self._label[enough]):
+            chosen = enough & (self._label == label)
+            result[int(label)] = float(variation[chosen].mean()), int(chosen.sum())
+        return result
+
+    def _column(self, xyz: NDArray[np.float64]) -> NDArray[np.int64]:
+        return np.floor((xyz[:, :2] - self._corner) / max(self._radius, 1e-9)).astype(np.int64)
+
+    def _gather(self, step: NDArray[np.float64], place: NDArray[np.intp]) -> None:
+        near = (step**2).sum(axis=1) <= self._radius**2
+        step, place = step[near], place[near]
+        size = len(self._places)
+        self._sums[0] += np.bincount(place, minlength=size)
+        for axis in range(3):
+            self._sums[1 + axis] += np.bincount(place, step[:, axis], size)
+        for row, (i, j) in enumerate(_PAIRS):
+            self._sums[4 + row] += np.bincount(place, step[:, i] * step[:, j], size)
+
+
+_PAIRS = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))
+
+
+def _parts(counts: NDArray[np.intp]) -> Iterator[slice]:
+    """Yield slices over points of which each stands for so many pairs that they fit into memory."""
+    ends = np.cumsum(counts)
+    first = 0
+    while first < len(counts):
+        done = ends[first - 1] if first else 0
+        last = max(first + 1, int(np.searchsorted(ends, done + _PAIRS_AT_ONCE)))
+        yield slice(first, last)
+        first = last

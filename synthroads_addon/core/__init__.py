@@ -1,1 +1,0 @@
-"""Functions and data that need no Blender: plain Python and NumPy."""

@@ -1,1 +1,0 @@
-"""Points and their files: container, classes, LAS, previews."""

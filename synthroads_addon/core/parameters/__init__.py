@@ -1,1 +1,0 @@
-"""What a road is: parameter set, analytic geometry, limits, sampler, placement."""

@@ -1,1 +1,0 @@
-"""What a scanner does: devices, patterns, path, beam, returns, radiometry."""

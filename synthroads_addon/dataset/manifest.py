@@ -1,0 +1,125 @@
+"""The manifest of a data set: each scene's state and the checksum of every file, the same bytes however it was made."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any, Literal
+
+from pydantic import Field
+
+from ..base.errors import InputError
+from ..base.schema import canonical_json, quantity, read_json
+from ..scenario.road import ScenarioModel
+
+MANIFEST = "manifest.json"
+PUBLISHED = ("scenes/*", "pointcept/*/*/*", "semantickitti/*/sequences/*")
+"""Folders of a scene that are published whole: its own, its tiles and its sequence."""
+_BLOCK = 1 << 20
+
+
+class FileEntry(ScenarioModel):
+    """One file of a scene."""
+
+    bytes: int = quantity(ge=0, unit="B", description="Size.")
+    sha256: str = Field(pattern=r"^[0-9a-f]{64}$", description="Checksum.")
+
+
+class SceneEntry(ScenarioModel):
+    """One scene."""
+
+    name: str = Field(description="Name.")
+    split: str = Field(description="Split.")
+    seed: int = quantity(ge=0, le=2**63 - 1, unit="1", description="Seed.")
+    status: Literal["done", "failed"] = Field(description="Whether it was made.")
+    error: str | None = Field(None, description="What went wrong, in one line.")
+    points: int | None = quantity(None, ge=0, unit="1", description="Points of its cloud.")
+    length: float | None = quantity(None, ge=0, unit="m", description="Length of its road.")
+    classes: dict[str, int] | None = Field(None, description="Points by class.")
+    files: dict[str, FileEntry] | None = Field(None, description="Its files, by path in the data set.")
+    folders: tuple[str, ...] | None = Field(None, description="Its folders in the data set.")
+
+
+class Manifest(ScenarioModel):
+    """All scenes that were made or tried, in the recipe's order."""
+
+    type: Literal["Manifest"] = "Manifest"
+    version: Literal["1.0"] = "1.0"
+    title: str = Field(description="The recipe's title.")
+    generator: str = Field(description="Program and version that made the set.")
+    recipe_sha256: str = Field(description="Checksum of recipe.json.")
+    complete: bool = Field(description="Whether every scene of the recipe is done.")
+    scenes: tuple[SceneEntry, ...] = Field((), description="Scenes.")
+
+
+def read_manifest(folder: Path) -> Manifest:
+    """Return the manifest of a data set; raise `InputError` if there is none or it is damaged."""
+    return Manifest.from_dict(read_json(folder / MANIFEST), source=str(folder / MANIFEST))
+
+
+def write_atomically(path: Path, text: str) -> None:
+    """Write a text file so that it is there wholly or not at all, even after a power cut."""
+    temporary = path.with_name(f".{path.name}.part")
+    with temporary.open("w", encoding="utf-8", newline="\n") as file:
+        file.write(text)
+        file.flush()
+        os.fsync(file.fileno())
+    temporary.replace(path)
+
+
+def checksum(path: Path) -> str:
+    """Return the SHA-256 of a file, read in blocks."""
+    digest = hashlib.sha256()
+    with path.open("rb") as file:
+        while block := file.read(_BLOCK):
+            digest.update(block)
+    return digest.hexdigest()
+
+
+def file_entries(folder: Path) -> dict[str, dict[str, Any]]:
+    """Return size and checksum of every file below a folder, by path relative to it, sorted."""
+    files = sorted(path for path in folder.rglob("*") if path.is_file())
+    return {
+        path.relative_to(folder).as_posix(): {"bytes": path.stat().st_size, "sha256": checksum(path)} for path in files
+    }
+
+
+def faults(folder: Path, scenes: Iterable[SceneEntry], checksums: bool = True) -> list[str]:
+    """Return what is wrong with the files of scenes: missing, of another size, or (if asked) another checksum."""
+    found = []
+    for scene in scenes:
+        for name, entry in (scene.files or {}).items():
+            path = folder / name
+            if not path.is_file():
+                found.append(f"{name} is missing")
+            elif path.stat().st_size != entry.bytes:
+                found.append(f"{name} has {path.stat().st_size:,} bytes, not {entry.bytes:,}")
+            elif checksums and checksum(path) != entry.sha256:
+                found.append(f"{name} has another checksum")
+    return found
+
+
+def check_same_recipe(folder: Path, recipe_text: str, generator: str) -> Manifest:
+    """Return the manifest of a set to be continued; raise `InputError` if it was made from anything else."""
+    manifest = read_manifest(folder)
+    if manifest.recipe_sha256 != hashlib.sha256(recipe_text.encode()).hexdigest():
+        raise InputError("--resume", str(folder), "was begun with another recipe; choose another folder")
+    if manifest.generator != generator:
+        made = f"was begun with {manifest.generator}; this is {generator}"
+        raise InputError("--resume", str(folder), f"{made}: the same bytes come from the same version only")
+    return manifest
+
+
+def manifest_text(title: str, generator: str, recipe_text: str, scenes: Iterable[SceneEntry], expected: int) -> str:
+    """Return the manifest's text."""
+    entries = tuple(scenes)
+    manifest = Manifest(
+        title=title,
+        generator=generator,
+        recipe_sha256=hashlib.sha256(recipe_text.encode()).hexdigest(),
+        complete=len(entries) == expected and all(entry.status == "done" for entry in entries),
+        scenes=entries,
+    )
+    return canonical_json(manifest.to_dict())

@@ -1,0 +1,1 @@
+"""A measured axis as an alignment of lines, arcs and clothoids."""

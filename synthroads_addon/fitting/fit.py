@@ -1,0 +1,324 @@
+"""A measured axis becomes an alignment of lines, arcs and clothoids and a vertical profile, within a tolerance.
+
+The axis is smoothed, cut into many elements of linear curvature (in height: of linear grade), and these are thinned,
+moved and snapped to lines and arcs while the tolerance holds (`axis_search`). Data without noise, such as points on
+another alignment, give its elements back. Long axes are fitted in overlapping windows: each begins with the pose and
+curvature at which the one before was left, so time and memory stay proportional to the length.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import ClassVar, Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..base.errors import InputError
+from ..road.alignment import Alignment, Element, FloatArray, IntArray, finite_array
+from ..road.profile import IntersectionPoint, Profile
+from .chain import FREE, Chain, Data, Fit, Heights, Plan, elevations, refine
+from .read import read_axis
+from .search import Goal, descent, improved, independent
+from .start import Start, start_heights, start_plan
+
+__all__ = ["AxisFit", "fit_axis", "read_axis"]
+
+_WINDOW = 1200.0  # m
+_TAIL = 300.0  # m at a window's end that only steady what lies before
+_MOST_POINTS = 3000  # in a window; denser data are thinned for the search, not for the figures reported
+_HEIGHT_SHARE = 0.6  # of the tolerance that the heights' rms may use
+_EXACT = 1e-6  # m: rms up to which data lie on a chain of elements (no smooth curve comes so near with few of them),
+_ROUNDED = 3.5e-4  # m: or on one whose coordinates were rounded to 1 mm, where residuals are random
+_RANDOM = 0.5  # correlation of neighbouring residuals that still passes for random
+_GAP = 100.0  # m between points from which the chord between them is given some weight
+_CHORD_WEIGHT = 1e-3
+_NEAR = 40.0  # m that feet are looked for around where they should be
+_SPACING = 20.0  # m between knots at first
+_MARGIN = 0.98  # of the tolerance that the search aims at: it may see thinned points only
+_NEGLIGIBLE = 0.3  # of the tolerance: residuals below it are worth no element
+_FINER_HELPS = 0.8  # of the rms at most must be left by knots half as far apart: else the rest is noise
+_RELAXED = 1.5  # times what dense knots reach is aimed at where the tolerance cannot be had: less would fit noise
+
+
+@dataclass(frozen=True)
+class AxisFit:
+    """A fitted axis and how far the points are from it.
+
+    Attributes:
+        alignment: starts at the foot of the first point and ends at that of the last.
+        profile: elevation over the alignment's stations.
+        rms, p95, worst: of the points' horizontal distances from the alignment, m.
+        worst_station: where the worst is, m.
+        height_rms, height_p95, height_worst, height_worst_station: the same for the heights.
+        points: how many were used, i.e. without consecutive duplicates.
+    """
+
+    alignment: Alignment
+    profile: Profile
+    rms: float
+    p95: float
+    worst: float
+    worst_station: float
+    height_rms: float
+    height_p95: float
+    height_worst: float
+    height_worst_station: float
+    points: int
+
+
+def fit_axis(points: ArrayLike, tolerance: float = 0.05) -> AxisFit:
+    """Fit an alignment and a profile to the points of an axis.
+
+    Args:
+        points: (N, 3) map position and elevation, m, in the axis' order; (N, 2) is taken as elevation 0.
+        tolerance: m; the fit aims at an rms of the lateral distances up to it and 95 % within twice it (heights: 0.6
+            of both) with as few elements as that takes. What is reached is reported: axes that no alignment of
+            elements of a few metres follows (corners, jumps) are not refused.
+
+    Raises:
+        InputError: wrong shape, a value that isn't finite, fewer than two distinct points, a tolerance not above 0.
+    """
+    given = _checked(points)
+    if not (np.isfinite(tolerance) and tolerance > 0):
+        raise InputError("tolerance", tolerance, "a finite length above 0 m is needed")
+    origin = np.append(np.round(given[:, :2].mean(axis=0)), 0.0)
+    local, weights = _bridged(given - origin)
+    alignment, near = _fit_plan(local[:, :2], weights, _MARGIN * tolerance)
+    reach = max(_NEAR, 5.0 * float(np.median(np.diff(near))))
+    station, _ = alignment.project_near(local[:, :2], near, reach)
+    across = np.hypot(*(local[:, :2] - alignment.position(station)).T)
+    profile = _fit_heights(station, local[:, 2], weights, alignment.length, _HEIGHT_SHARE * tolerance)
+    heading = alignment.start_heading
+    placed = Alignment(alignment.elements, alignment.x + origin[0], alignment.y + origin[1], heading)
+    real = weights == 1.0
+    station, above = station[real], local[real, 2] - profile.elevation(station[real])
+    return AxisFit(placed, profile, *_figures(station, across[real]), *_figures(station, above), points=len(given))
+
+
+def _checked(points: ArrayLike) -> FloatArray:
+    """Return (N, 3) finite points without consecutive duplicates in plan, N >= 2."""
+    array = finite_array("points", points)
+    if array.ndim != 2 or array.shape[1] not in (2, 3):
+        raise InputError("points", array.shape, "an array of shape (N, 3) or (N, 2) is needed")
+    if array.shape[1] == 2:
+        array = np.column_stack((array, np.zeros(len(array))))
+    if len(array):
+        step = np.hypot(*np.diff(array[:, :2], axis=0).T)
+        array = array[np.concatenate(([True], step > 1e-6))]
+    if len(array) < 2:
+        raise InputError("points", len(array), "at least two distinct points are needed")
+    return array
+
+
+def _bridged(points: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return points (M, 3) with some added on the chord of every long gap, and weights (M,).
+
+    A polyline with dense points on its curves only would leave the fit without a hold on the straights between. The
+    added points weigh next to nothing, so a curve across a gap is still bridged as a curve.
+    """
+    step = np.hypot(*np.diff(points[:, :2], axis=0).T)
+    usual = float(np.median(step))
+    added = np.where(step > max(_GAP, 5.0 * usual), np.ceil(step / max(_SPACING, 2.0 * usual)) - 1.0, 0.0)
+    owner = np.repeat(np.arange(len(step)), added.astype(np.int64) + 1)
+    nth = np.arange(len(owner)) - np.searchsorted(owner, owner)
+    share = (nth / (added[owner] + 1.0))[:, None]
+    dense = points[owner] + share * (points[owner + 1] - points[owner])
+    return np.vstack((dense, points[-1:])), np.append(np.where(nth == 0, 1.0, _CHORD_WEIGHT), 1.0)
+
+
+def _figures(station: FloatArray, distance: FloatArray) -> tuple[float, float, float, float]:
+    """Return rms, 95th percentile and maximum of the absolute distances, and the maximum's station."""
+    size = np.abs(distance)
+    worst = int(size.argmax())
+    return float(np.sqrt((size**2).mean())), float(np.percentile(size, 95)), float(size[worst]), float(station[worst])
+
+
+@dataclass(frozen=True)
+class _Spacing:
+    """Distances of the knots that a search begins with, m."""
+
+    exact: float  # for data without noise: close enough to tell short elements apart
+    first: float
+    finest: float  # where the first ones cannot keep the tolerance
+
+
+class _Part(Protocol):
+    """One of both problems, as the windows see it."""
+
+    spacing: ClassVar[_Spacing]
+
+    def begin(self, chosen: IntArray, spacing: float, start: Start | None, origin: float) -> tuple[Data, Fit]:
+        """Return the points' data and their fit by fixed knots `spacing` apart."""
+
+    def leave(self, chain: Chain, cut: float) -> Start:
+        """Return pose and value at a station of the chain."""
+
+
+@dataclass(frozen=True)
+class _PlanPart:
+    points: FloatArray
+    weights: FloatArray
+    spacing: ClassVar[_Spacing] = _Spacing(7.0, _SPACING, 5.0)
+
+    def begin(self, chosen: IntArray, spacing: float, start: Start | None, origin: float) -> tuple[Data, Fit]:
+        data = Plan(self.points[chosen], self.weights[chosen], 0.4 * spacing, max(_NEAR, 2.0 * spacing))
+        chain, station = start_plan(data.points, spacing, start)
+        return data, refine(data, chain, station, False, 8)
+
+    def leave(self, chain: Chain, cut: float) -> Start:
+        position, heading, value = chain.alignment.frame(cut)
+        return np.append(position, heading), float(value)
+
+
+@dataclass(frozen=True)
+class _HeightPart:
+    station: FloatArray
+    heights: FloatArray
+    weights: FloatArray
+    spacing: ClassVar[_Spacing] = _Spacing(20.0, 40.0, 40.0)
+
+    def begin(self, chosen: IntArray, spacing: float, start: Start | None, origin: float) -> tuple[Data, Fit]:
+        data = Heights(self.heights[chosen], self.weights[chosen], 0.8 * spacing)
+        station = self.station[chosen] - origin
+        return data, refine(data, start_heights(station, data.heights, spacing, start), station, False, 8)
+
+    def leave(self, chain: Chain, cut: float) -> Start:
+        return elevations(chain, np.array([cut])), float(np.interp(cut, chain.knots, chain.values))
+
+
+def _fit_plan(points: FloatArray, weights: FloatArray, tolerance: float) -> tuple[Alignment, FloatArray]:
+    """Return the alignment from the first point's foot to the last one's, and all points' stations, roughly."""
+    run = np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))))
+    chain, station = _walk(_PlanPart(points, weights), run, tolerance)
+    return _trimmed(chain, float(station[0]), float(station[-1])), station - station[0]
+
+
+def _fit_heights(
+    station: FloatArray, heights: FloatArray, weights: FloatArray, length: float, tolerance: float
+) -> Profile:
+    order = np.argsort(station, kind="stable")
+    station = np.clip(station[order], 0.0, length)
+    return _profile(_walk(_HeightPart(station, heights[order], weights[order]), station, tolerance)[0])
+
+
+def _walk(part: _Part, run: FloatArray, tolerance: float) -> tuple[Chain, FloatArray]:
+    """Fit window after window; return the whole chain and the stations (N,) of all points on it, roughly.
+
+    `run` (N) tells how far along the points are, roughly as well.
+    """
+    step = float(np.median(np.diff(run)))
+    window, tail = max(_WINDOW, 60.0 * step), max(_TAIL, 15.0 * step)
+    pieces: list[Chain] = []
+    start: Start | None = None
+    first, origin = 0, 0.0
+    station = np.empty(len(run))
+    while True:
+        whole = run[-1] - run[first] <= window + tail
+        end = len(run) if whole else int(np.searchsorted(run, run[first] + window))
+        end = max(end, min(first + 8, len(run)))
+        every = -(-(end - first) // _MOST_POINTS)
+        chosen = np.unique(np.append(np.arange(first, end, every), end - 1))
+        fit = _solve(part, chosen, start, origin, float(run[end - 1] - run[first]), tolerance)
+        station[first:end] = origin + np.interp(np.arange(first, end), chosen, fit.stations)
+        if end == len(run):
+            return _joined([*pieces, fit.chain]), station
+        cut = _cut(fit.chain, tail)
+        start = part.leave(fit.chain, cut)
+        pieces.append(_head(fit.chain, cut))
+        first, origin = int(chosen[np.argmax(fit.stations >= cut)]), origin + cut
+
+
+def _solve(part: _Part, chosen: IntArray, start: Start | None, origin: float, length: float, tolerance: float) -> Fit:
+    """Fit one window: as exact data if they are, else with knots as dense as the tolerance needs."""
+    scale = 2.5 * length / len(chosen)  # knots need data between them
+    count = independent(length, len(chosen))
+    exact = Goal(tolerance, 2.0 * tolerance, _EXACT, count, int(length / 15.0) + 5)
+    data, rich = part.begin(chosen, max(part.spacing.exact, scale), start, origin)
+    if rich.rms < 3.0 * _ROUNDED:
+        best = min(descent(data, rich, exact), key=exact.rank)
+        if _exactly(best) and exact.rank(best)[:2] == (False, False):
+            return best
+    goal = Goal(tolerance, 2.0 * tolerance, _NEGLIGIBLE * tolerance, count, int(max(5.0, length / 30.0 - 0.01)))
+    spacing = max(part.spacing.first, scale)
+    data, rich = part.begin(chosen, spacing, start, origin)
+    while not goal.met(rich) and 0.5 * spacing >= max(part.spacing.finest, scale):
+        spacing *= 0.5
+        finer_data, finer = part.begin(chosen, spacing, start, origin)
+        if finer.rms > _FINER_HELPS * rich.rms:
+            break
+        data, rich = finer_data, finer
+    if not goal.met(rich):
+        goal = replace(goal, rms=max(goal.rms, _RELAXED * rich.rms), p95=max(goal.p95, _RELAXED * rich.p95))
+    return improved(data, min(descent(data, rich, goal), key=goal.rank), goal)
+
+
+def _exactly(fit: Fit) -> bool:
+    """Tell whether nothing but rounding is left of the residuals."""
+    r = fit.residuals
+    return fit.rms < _EXACT or (fit.rms < _ROUNDED and float(r[1:] @ r[:-1]) < _RANDOM * fit.square)
+
+
+def _cut(chain: Chain, tail: float) -> float:
+    """Return where to leave a window: at its last knot before the tail, or within a long element."""
+    latest = max(chain.knots[-1] - tail, 0.5 * chain.knots[-1])  # points that turn back make a short chain
+    good = chain.knots[(chain.knots <= latest) & (chain.knots >= 0.4 * latest)]
+    return float(good[-1]) if len(good) else float(latest)
+
+
+def _head(chain: Chain, cut: float) -> Chain:
+    """Return the chain up to a station."""
+    count = int(np.searchsorted(chain.knots, cut - 1e-9))  # elements that begin before the cut
+    knots = np.append(chain.knots[:count], cut)
+    values = np.append(chain.values[:count], np.interp(cut, chain.knots, chain.values))
+    return replace(chain, knots=knots, values=values, kinds=chain.kinds[:count])
+
+
+def _joined(pieces: list[Chain]) -> Chain:
+    """Return the pieces as one chain; lines, arcs and constant grades that a cut went through become one again."""
+    knots, values = [0.0], [float(pieces[0].values[0])]
+    kinds: list[int] = []
+    offset = 0.0
+    for piece in pieces:
+        for e, kind in enumerate(piece.kinds):
+            same = bool(kinds) and e == 0 and kind != FREE and kinds[-1] != FREE and piece.values[0] == values[-1]
+            if same:
+                knots[-1] = offset + piece.knots[1]
+                continue
+            kinds.append(int(kind))
+            knots.append(offset + piece.knots[e + 1])
+            values.append(float(piece.values[e + 1]))
+        offset += piece.knots[-1]
+    return Chain(pieces[0].pose, np.array(knots), np.array(values), np.array(kinds))
+
+
+def _trimmed(chain: Chain, first: float, last: float) -> Alignment:
+    """Return the alignment from the first point's foot to the last one's, the outer elements cut or prolonged."""
+    knots, values = chain.knots.copy(), chain.values.copy()
+    heading, (x, y) = float(chain.pose[2]), chain.pose[:2]
+    slope = chain.slopes
+    if first < knots[1]:
+        value = values[0] + slope[0] * first
+        turn = 0.5 * first * (values[0] + value)
+        # A prolongation of centimetres: the chord's direction is its mean heading.
+        x, y = x + first * np.cos(heading + 0.5 * turn), y + first * np.sin(heading + 0.5 * turn)
+        heading, knots[0], values[0] = heading + turn, first, value
+    if last > knots[-2]:
+        values[-1] += slope[-1] * (last - knots[-1])
+        knots[-1] = last
+    rows = zip(np.diff(knots), values[:-1], values[1:], strict=True)
+    return Alignment([Element(float(n), float(a), float(b)) for n, a, b in rows], x, y, heading)
+
+
+def _profile(chain: Chain) -> Profile:
+    """Return the profile whose grade is the chain: every parabola's intersection lies at its middle."""
+    middle = 0.5 * (chain.knots[1:] + chain.knots[:-1])
+    gap, change = np.diff(chain.knots), np.diff(chain.values)
+    level = elevations(chain, chain.knots)
+    points = [IntersectionPoint(0.0, float(level[0]))]
+    for e in range(chain.size):
+        if abs(change[e]) * gap[e] > 1e-7:  # less is no kink that anything could show
+            elevation = level[e] + 0.5 * gap[e] * chain.values[e]
+            points.append(IntersectionPoint(float(middle[e]), float(elevation), float(gap[e] / abs(change[e]))))
+    points.append(IntersectionPoint(float(chain.knots[-1]), float(level[-1])))
+    return Profile(points)

@@ -1,0 +1,373 @@
+"""Which elements an axis is made of: knots and kinds of a chain, found by trying, scored, and refined at every step.
+
+Starting from more knots than needed, `search` takes away what the data can spare (a knot; the freedom of an element to
+be no arc, or no line), first with the knots where they are, then with knots that move. What a removal costs is foreseen
+by the linearised problem, in which all other parameters give way, and then measured by a refinement. From the best
+chain found on the way down it goes on in both directions until nothing helps.
+
+A chain is scored by the Bayesian information criterion, with one independent observation per `_CORRELATED` metres
+(errors of measured axes hang together) and a floor under the residual: what lies far below the tolerance is not worth
+an element, unless the data are exact.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+
+from ..road.alignment import FloatArray, IntArray
+from .chain import (
+    EQUAL,
+    FREE,
+    ZERO,
+    Chain,
+    Data,
+    Fit,
+    column_scale,
+    knot_penalty,
+    least_squares,
+    refine,
+    stepped,
+)
+
+_CORRELATED = 20.0  # m
+_TRIALS = 3  # refinements per decision
+_PARTS = 4  # an element is split at one of the inner borders of so many parts
+_WORTH = 0.05  # least gain of score
+_HOPELESS = 10.0  # times the bound at which a descent ends
+
+
+@dataclass(frozen=True)
+class Edit:
+    """One simplification: take knot `index` away, or snap element `index` to a kind."""
+
+    kind: Literal["merge"] | int
+    index: int
+
+    @property
+    def span(self) -> tuple[int, int]:
+        """First and last element concerned."""
+        return (self.index - 1, self.index) if self.kind == "merge" else (self.index, self.index)
+
+
+#: An edit, the linear conditions (C, P) that it imposes on the free parameters, and how far they are from true (C,).
+Condition = tuple[Edit, FloatArray, FloatArray]
+
+
+@dataclass(frozen=True)
+class Goal:
+    """What the search is after.
+
+    Attributes:
+        rms, p95: bounds of the residuals, m.
+        floor: residual below which nothing is worth an element, m.
+        count: observations that the score counts as independent.
+        most: elements wanted at most.
+    """
+
+    rms: float
+    p95: float
+    floor: float
+    count: float
+    most: int
+
+    def met(self, fit: Fit) -> bool:
+        return fit.rms <= self.rms and fit.p95 <= self.p95
+
+    def score(self, fit: Fit) -> float:
+        return self.expected(fit.square, fit.chain, len(fit.residuals))
+
+    def expected(self, square: float, chain: Chain, points: int) -> float:
+        """Score of a chain with a sum of squares; an element costs half a parameter beyond its own."""
+        misfit = np.log(max(square, 0.0) / points + self.floor**2)
+        return self.count * misfit + (chain.freedom() + 0.5 * chain.size) * np.log(self.count)
+
+    def rank(self, fit: Fit) -> tuple[bool, bool, float]:
+        """Key that is least for the best fit: bounds first, then the number of elements, then the score."""
+        return (not self.met(fit), fit.chain.size > self.most, self.score(fit))
+
+
+def independent(length: float, points: int) -> float:
+    """Return the number of observations that count, at least 4."""
+    return max(4.0, min(float(points), max(10.0, length / _CORRELATED)))
+
+
+def edited(chain: Chain, edits: Sequence[Edit]) -> tuple[Chain, list[int]]:
+    """Return the chain's structure after edits, with its values as they are, and the knots that stay.
+
+    Constant elements that come to lie side by side are one.
+    """
+    gone = {edit.index for edit in edits if edit.kind == "merge"}
+    snapped = {edit.index: edit.kind for edit in edits if edit.kind != "merge"}
+    keep, found = [0], set()
+    kinds: list[int] = []
+    for e, kind in enumerate(chain.kinds.tolist()):
+        found.add(snapped.get(e, kind))
+        if e + 1 in gone:
+            continue
+        new = found.pop() if len(found) == 1 else FREE
+        found = set()
+        if new != FREE and kinds and kinds[-1] != FREE:
+            kinds[-1] = max(new, kinds[-1])  # a line beside an arc is one with it
+            keep[-1] = e + 1
+        else:
+            kinds.append(new)
+            keep.append(e + 1)
+    return replace(chain, knots=chain.knots[keep], values=chain.values[keep], kinds=np.array(kinds)), keep
+
+
+def _interpolation(chain: Chain, keep: list[int]) -> tuple[FloatArray, FloatArray]:
+    """Return old values (M + 1) as a linear function of the kept ones (M + 1, K) and of the knots (M + 1, M + 1)."""
+    weights = np.zeros((chain.size + 1, len(keep)))
+    weights[keep, np.arange(len(keep))] = 1.0
+    shifts = np.zeros((chain.size + 1, chain.size + 1))
+    for i in set(range(chain.size + 1)) - set(keep):
+        j = int(np.searchsorted(keep, i))
+        a, b = keep[j - 1], keep[j]
+        length = chain.knots[b] - chain.knots[a]
+        share, change = (chain.knots[i] - chain.knots[a]) / length, chain.values[b] - chain.values[a]
+        weights[i, j - 1], weights[i, j] = 1.0 - share, share
+        shifts[i, a], shifts[i, b] = -change * (1.0 - share) / length, -change * share / length
+    return weights, shifts
+
+
+def _lift(chain: Chain, new: Chain, keep: list[int]) -> FloatArray:
+    """Return all parameters of the chain as a linear function of those of the edited one."""
+    weights, shifts = _interpolation(chain, keep)
+    inner = [i for i in keep if 0 < i < chain.size]
+    old_knots, new_knots = chain.value_columns.stop, new.value_columns.stop
+    lift = np.zeros((old_knots + chain.size - 1, new_knots + new.size - 1))
+    lift[: chain.turns, : chain.turns] = np.eye(chain.turns)
+    lift[chain.value_columns, new.value_columns] = weights
+    lift[chain.value_columns, new_knots:] = shifts[:, inner]
+    lift[[old_knots + i - 1 for i in inner], range(new_knots, new_knots + len(inner))] = 1.0
+    return lift
+
+
+def foresee(data: Data, fit: Fit, edits: Sequence[Edit], free_knots: bool, goal: Goal) -> tuple[Chain, float]:
+    """Return the edited chain at the optimum of the linearised problem, and the sum of squares expected there."""
+    new, keep = edited(fit.chain, edits)
+    new = new.tied()
+    basis, lift = new.basis(free_knots), _lift(fit.chain, new, keep)
+    start = np.zeros(len(lift))  # the jump to the new chain's values
+    values = fit.chain.value_columns
+    start[values] = lift[values, new.value_columns] @ new.values - fit.chain.values
+    r, projected = fit.linear(data)
+    matrix, wanted = r @ (lift @ basis), -(projected + r @ start)
+    held = _allowance(fit, goal) * knot_penalty(data, new, basis.shape[1]) if free_knots else matrix[:0]
+    scale = column_scale(matrix)
+    rows = np.vstack((matrix / scale, held / scale, 1e-6 * np.eye(len(scale))))
+    scaled = least_squares(rows, np.concatenate((wanted, np.zeros(len(rows) - len(wanted)))))
+    rest = rows @ scaled
+    rest[: len(wanted)] -= wanted
+    square = float(rest @ rest) - float(projected @ projected) + fit.square
+    return stepped(data, new, basis @ (scaled / scale)), square
+
+
+def _allowance(fit: Fit, goal: Goal) -> float:
+    """Return what a knot's step over its whole room costs, m: as much as all residuals."""
+    return float(np.sqrt(fit.square + len(fit.residuals) * goal.floor**2))
+
+
+def _covariance_root(data: Data, fit: Fit, free_knots: bool, goal: Goal) -> FloatArray:
+    """Return W with W.T @ W the free parameters' covariance for unit noise."""
+    basis = fit.chain.basis(free_knots)
+    rows = fit.linear(data)[0] @ basis
+    if free_knots:
+        rows = np.vstack((rows, _allowance(fit, goal) * knot_penalty(data, fit.chain, basis.shape[1])))
+    scale = column_scale(rows)
+    root = np.linalg.qr(np.vstack((rows / scale, 1e-6 * np.eye(len(scale)))), mode="r")
+    return np.linalg.solve(root, np.eye(len(scale))).T / scale
+
+
+def options(data: Data, fit: Fit, free_knots: bool, goal: Goal) -> list[tuple[float, Edit]]:
+    """Return (expected change of score, edit), cheapest first, by each edit's own Wald statistic."""
+    chain, present = fit.chain, goal.score(fit)
+    root = _covariance_root(data, fit, free_knots, goal)
+    basis = chain.basis(free_knots)
+    conditions = list(_merges(chain, basis, free_knots))
+    if free_knots:
+        conditions += _snaps(data, chain, basis)
+    result = []
+    for edit, rows, violation in conditions:
+        spread = root @ rows.T
+        if edit.kind == "merge" and free_knots:  # the knot itself stays where it is until it is gone
+            own = root[:, basis.shape[1] - chain.size + edit.index]
+            spread = spread - own[:, None] * (own @ spread) / (own @ own)
+        square = spread.T @ spread
+        square[np.diag_indices(len(square))] *= 1.0 + 1e-9
+        if (np.diag(square) > 0).all():
+            cost = float(violation @ np.linalg.solve(square, violation))
+            score = goal.expected(fit.square + cost, edited(chain, [edit])[0], len(fit.residuals))
+            result.append((score - present, edit))
+    return sorted(result, key=lambda pair: pair[0])
+
+
+def _merges(chain: Chain, basis: FloatArray, free_knots: bool) -> Iterator[Condition]:
+    """Yield for each inner knot that its value is that of the straight between its neighbours."""
+    rows, knots, values = basis[chain.value_columns], chain.knots, chain.values
+    first = basis.shape[1] - chain.size  # + i: the column of inner knot i
+    for i in range(1, chain.size):
+        length, change = knots[i + 1] - knots[i - 1], values[i + 1] - values[i - 1]
+        share = (knots[i] - knots[i - 1]) / length
+        condition = rows[i] - (1.0 - share) * rows[i - 1] - share * rows[i + 1]
+        if free_knots and i > 1:
+            condition[first + i - 1] += change * (1.0 - share) / length
+        if free_knots and i < chain.size - 1:
+            condition[first + i + 1] += change * share / length
+        if condition.any():
+            yield Edit("merge", i), condition[None], np.array([values[i] - values[i - 1] - share * change])
+
+
+def _snaps(data: Data, chain: Chain, basis: FloatArray) -> Iterator[Condition]:
+    """Yield for each element that its ends' values are equal, and that they are zero."""
+    rows = basis[chain.value_columns]
+    for e, kind in enumerate(chain.kinds):
+        pair, ends = rows[[e, e + 1]], chain.values[[e, e + 1]]
+        tied = kind != FREE or bool((pair[0] == pair[1]).all())
+        if EQUAL in data.snaps and not tied:
+            yield Edit(EQUAL, e), pair[1:] - pair[:1], ends[1:] - ends[:1]
+        if ZERO in data.snaps and kind != ZERO:
+            free = pair.any(axis=1)
+            if tied:
+                free[1] = False  # one condition says it all
+            given = ends[~pair.any(axis=1)]  # zero already, or pinned
+            if free.any() and not given.any():
+                yield Edit(ZERO, e), pair[free], ends[free]
+
+
+def _several(options_: list[tuple[float, Edit]], most: int, gain: float) -> list[tuple[float, Edit]]:
+    """Return edits that pay and don't touch each other, cheapest first."""
+    taken: set[int] = set()
+    chosen: list[tuple[float, Edit]] = []
+    for change, edit in options_:
+        low, high = edit.span
+        if len(chosen) >= most or change > -gain:
+            break
+        if taken.isdisjoint(range(low - 1, high + 2)):
+            taken.update(range(low, high + 1))
+            chosen.append((change, edit))
+    return chosen
+
+
+def _refined(data: Data, fit: Fit, chain: Chain, free_knots: bool) -> Fit:
+    return refine(data, chain, fit.stations, free_knots, 12)
+
+
+def simplified(data: Data, fit: Fit, free_knots: bool, goal: Goal) -> Fit | None:
+    """Return the fit after the edit, or the edits at once, that cost least; None if there is nothing to take away."""
+    ways = options(data, fit, free_knots, goal)
+    batch = _several(ways, max(1, fit.chain.size // 3), 0.5 * np.log(goal.count))
+    present = goal.score(fit)
+    while len(batch) > 1:
+        chain, _ = foresee(data, fit, [edit for _, edit in batch], free_knots, goal)
+        trial = _refined(data, fit, chain, free_knots)
+        if goal.score(trial) - present <= 0.5 * math.fsum(change for change, _ in batch):
+            return trial
+        batch = batch[: len(batch) // 2]
+    trials = []
+    for trial in _trials(data, fit, [edit for _, edit in ways[: 3 * _TRIALS]], free_knots, goal):
+        if goal.score(trial) < present:
+            return trial
+        trials.append(trial)
+    return min(trials, key=goal.score, default=None)
+
+
+def _trials(data: Data, fit: Fit, edits: list[Edit], free_knots: bool, goal: Goal) -> Iterator[Fit]:
+    """Foresee every edit and refine the most promising ones, best first."""
+    foreseen = [foresee(data, fit, [edit], free_knots, goal) for edit in edits]
+    scores = [goal.expected(square, chain, len(fit.residuals)) for chain, square in foreseen]
+    for i in np.argsort(scores, kind="stable")[:_TRIALS]:
+        yield _refined(data, fit, foreseen[i][0], free_knots)
+
+
+def descent(data: Data, fit: Fit, goal: Goal) -> list[Fit]:
+    """Return all fits from a rich chain down to few elements: first with fixed knots, then with free ones.
+
+    It goes on past the bounds, since a poor removal may be made good by the next, but not hopelessly far.
+    """
+    path, free_knots = [fit], False
+    while fit.rms < _HOPELESS * max(goal.rms, path[0].rms):
+        trial = simplified(data, fit, free_knots, goal)
+        if not free_knots and (trial is None or goal.score(trial) > goal.score(fit)):
+            free_knots = True
+            trial = refine(data, fit.chain, fit.stations, True, 20)
+        elif trial is None:
+            return path
+        fit = trial
+        path.append(fit)
+    return path
+
+
+def splits(data: Data, fit: Fit) -> list[Chain]:
+    """Return chains with one element more, or one freer, the one that would help most first."""
+    chain = fit.chain
+    cuts = np.linspace(0.0, 1.0, _PARTS + 1)[:-1]
+    fine = np.append((chain.knots[:-1, None] + np.diff(chain.knots)[:, None] * cuts).ravel(), chain.knots[-1])
+    dense = replace(chain, knots=fine, values=np.interp(fine, chain.knots, chain.values))
+    dense = replace(dense, kinds=np.full(len(fine) - 1, FREE))
+    hats = data.jacobian(dense, fit.stations)[:, dense.value_columns]
+    full = data.jacobian(chain, fit.stations)
+    matrix = full @ chain.basis(True)
+    q, _ = np.linalg.qr(matrix / column_scale(matrix))
+    rest = fit.residuals - q @ (q.T @ fit.residuals)
+    ways = []
+    for e, kind in enumerate(chain.kinds):
+        freed = chain.kinds.copy()
+        freed[e] = FREE
+        ends = [] if kind == FREE else list(full[:, chain.value_columns][:, e : e + 2].T)
+        if ends:
+            ways.append((_gain(ends, q, rest), replace(chain, kinds=freed)))
+        for knot in fine[e * _PARTS + 1 : (e + 1) * _PARTS]:
+            if min(knot - chain.knots[e], chain.knots[e + 1] - knot) >= data.least:
+                hat = hats @ np.interp(fine, [chain.knots[e], knot, chain.knots[e + 1]], [0.0, 1.0, 0.0])
+                ways.append((_gain([hat, *ends], q, rest), _split(chain, freed, e, knot)))
+    return [new for _, new in sorted(ways, key=lambda way: -way[0])]
+
+
+def _split(chain: Chain, freed: IntArray, e: int, knot: float) -> Chain:
+    """Return the chain with a knot in element e, both parts of which are free."""
+    values = np.insert(chain.values, e + 1, np.interp(knot, chain.knots, chain.values))
+    return replace(chain, knots=np.insert(chain.knots, e + 1, knot), values=values, kinds=np.insert(freed, e, FREE))
+
+
+def _gain(columns: list[FloatArray], q: FloatArray, rest: FloatArray) -> float:
+    """Return by how much new columns, beside the old ones q, would lower the sum of squares."""
+    new = np.stack(columns, axis=1)
+    new = new - q @ (q.T @ new)
+    new /= column_scale(new)
+    solution = np.linalg.lstsq(new, rest, rcond=1e-6)[0]
+    return float(rest @ (new @ solution))
+
+
+def improved(data: Data, fit: Fit, goal: Goal, steps: int = 60) -> Fit:
+    """Return a fit that no single edit improves: grown until the bounds are met, then changed while the rank falls."""
+    for _ in range(steps):
+        while goal.met(fit):
+            ways = [edit for _, edit in options(data, fit, True, goal)[: 3 * _TRIALS]]
+            best = min(_trials(data, fit, ways, True, goal), key=goal.rank, default=None)
+            if best is None or not _better(best, fit, goal):
+                break
+            fit = best
+        grown = [_refined(data, fit, chain, True) for chain in splits(data, fit)[:_TRIALS]]
+        best = min(grown, key=goal.score, default=None)
+        if best is None:
+            return fit
+        if goal.met(fit) and not _better(best, fit, goal):
+            # A split may pay only together with the removal that it makes possible.
+            ways = [edit for _, edit in options(data, best, True, goal)[: 3 * _TRIALS]]
+            best = min(_trials(data, best, ways, True, goal), key=goal.rank, default=None)
+            if best is None or not _better(best, fit, goal):
+                return fit
+        fit = best
+    return fit
+
+
+def _better(new: Fit, old: Fit, goal: Goal) -> bool:
+    """Tell whether a fit beats another: by its bounds or number of elements, or by a score worth it."""
+    coarse_new, coarse_old = goal.rank(new)[:2], goal.rank(old)[:2]
+    return coarse_new < coarse_old or (coarse_new == coarse_old and goal.score(new) < goal.score(old) - _WORTH)

@@ -1,0 +1,1 @@
+"""The jobs: they join scenario, Blender and scanner."""

@@ -1,0 +1,1 @@
+"""Choosing settings by a tolerance or a time."""

@@ -1,0 +1,1 @@
+"""Measuring speed and errors: the trade-off and the benchmark."""

@@ -1,0 +1,195 @@
+"""The demo job, each stage beside its floor: bare Embree, lazrs and Cycles on the same rays, points and images.
+
+A process measures one number of cores: those that it may use.
+"""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import ExitStack
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import laspy
+import numpy as np
+from numpy.typing import NDArray
+
+from ...base.machine import available_cores
+from ...base.progress import StageTimer, peak_memory_mb
+from ...blender.cameras import layer_source
+from ...blender.cameras.benchmark import panel_edit, rendering, seconds_of
+from ...blender.casters.measure import bare_rate
+from ...blender.files import empty_file
+from ...blender.model.build import build_road
+from ...blender.scene.evaluated import scanned_scene
+from ...road.geometry import RoadGeometry
+from ...sampling.road import sample_road
+from ...scanning.beam import RINGS
+from ...scanning.colour.colour import LayerSource
+from ...scanning.scan import Scan, scan_block
+from ...scanning.scene.caster import Caster
+from ...scenario.scenario import Scenario
+from ..generate import write_texts
+from ..scan.files import ScanToFiles, colour_job, make_scan, road_path, scan_blocks
+
+_CAST_BLOCKS, _WRITTEN_BLOCKS = 48, 96
+"""Blocks, spread over the scan, on which casting and writing are measured beside their floors: so many that what is
+left over for one core at the end doesn't count."""
+_RAYS = (1, 7, 19, 61)
+_TURNS = 4
+"""Measurements of each rate, of which the best counts, as other work on the machine only slows."""
+_VIEWS = 4
+"""Images that are rendered bare."""
+
+Rate = dict[str, Any]
+
+
+def measure_demo(scenario: Scenario) -> dict[str, Any]:
+    """Do the demo job and measure its stages and their floors; the open file is lost.
+
+    Returns:
+        ``cores``; ``stages`` with seconds and peak memory; ``lines`` by the names of `jobs.measure.benchmark_table.LIMITS`;
+        ``floors``: name, unit, ours and floor.
+    """
+    timer, settings = StageTimer(), scenario.settings()
+    empty_file()
+    with tempfile.TemporaryDirectory(prefix="synthroads-") as text:
+        folder = Path(text)
+        with timer.stage("parameters"):
+            parameters = sample_road(scenario.road, scenario.seed, scenario.title)
+            geometry = RoadGeometry(parameters)
+            write_texts(folder, scenario.outputs, parameters, geometry, scenario)
+        with timer.stage("model"):
+            model = build_road(parameters, settings.tolerance, settings.vegetation_detail)
+        with timer.stage("scene mesh"):
+            scene = scanned_scene(geometry=geometry, speed_factor=scenario.scan.traffic_speed_factor)
+        with timer.stage("caster"):
+            path = road_path(scenario, geometry)
+            scan = make_scan(scenario, scene, path, parameters.environment, variation=parameters.materials)
+        job = colour_job(scenario, scan, scene, parameters.environment)
+        with ExitStack() as stack:
+            with timer.stage("images"):
+                source = stack.enter_context(layer_source(job))
+            with timer.stage("scan and files"):
+                task = ScanToFiles(scenario, scan, source, folder, parameters.metadata.epsg)
+                for _ in task.run():
+                    pass
+            seconds, memory = timer.seconds, peak_memory_mb()
+            floors = [*_casting(scan), _writing(scan, source, task, folder)]
+        if job.scenario.source != "material":
+            floors.append(rendering(job, _VIEWS))
+    own = next(row for row in floors if row["rays"] == scan.rays_per_pulse)
+    writing = next(row for row in floors if row["name"].startswith("writing"))
+    lines = {
+        "points": task.counts.points / 1e6,
+        "seconds": seconds,
+        "memory_mb": memory,
+        "parameters": timer.stages["parameters"]["seconds"],
+        "model": timer.stages["model"]["seconds"],
+        "panel_edit": panel_edit(model, parameters),
+        "casting": 100.0 * own["ours"] / own["floor"],
+        "writing": writing["ours"],
+    }
+    for row in floors:
+        row.pop("rays", None)
+    return {"cores": available_cores(), "stages": timer.stages, "lines": lines, "floors": floors}
+
+
+def _spread(scan: Scan, count: int) -> list[Any]:
+    """Return so many whole blocks, spread over a scan."""
+    blocks = scan.blocks()
+    return [blocks[i] for i in np.unique(np.linspace(0, len(blocks) - 1, count + 2).astype(int)[1:-1])]
+
+
+class _KeptRays:
+    """A caster that keeps the rays that it is given."""
+
+    main_thread_only = False
+
+    def __init__(self, caster: Caster) -> None:
+        self._caster, self.name = caster, caster.name
+        self.origins: list[NDArray[np.float32]] = []
+        self.directions: list[NDArray[np.float32]] = []
+
+    def cast(
+        self, origins: NDArray[np.float32], directions: NDArray[np.float32], maximum_range: float
+    ) -> NDArray[np.int32]:
+        """Cast, and keep the rays."""
+        self.origins.append(origins.copy())
+        self.directions.append(directions.copy())
+        return self._caster.cast(origins, directions, maximum_range)
+
+
+def _casting(scan: Scan) -> Iterator[Rate]:
+    """Yield casting and radiometry beside the bare caster on the same rays, for several numbers of rays per pulse."""
+    for rays in _RAYS:
+        # The scene, its caster and the materials are the same.
+        yield _cast_beside(replace(scan, rings=RINGS[rays], targets=False, wanted=frozenset()))
+
+
+def _cast_beside(scan: Scan) -> Rate:
+    threads, blocks = available_cores(), _spread(scan, _CAST_BLOCKS)
+    part = scan.target._parts[0]
+    caster, kept = part.caster, _KeptRays(part.caster)
+    object.__setattr__(part, "caster", kept)
+    try:
+        for block in blocks:
+            scan_block(scan, *block)
+    finally:
+        object.__setattr__(part, "caster", caster)
+    origins, directions = np.concatenate(kept.origins), np.concatenate(kept.directions)
+    few = replace(scan, only=tuple(blocks))
+
+    def ours() -> float:
+        return len(origins) / seconds_of(lambda: _exhaust(scan_blocks(few, threads)))
+
+    def floor() -> float:
+        limit = scan.setting.maximum_range
+        return bare_rate(caster, origins, directions, limit, threads, repeats=1).rays_per_second
+
+    return {
+        "name": f"casting and radiometry, {scan.rays_per_pulse} rays per pulse; Embree",
+        "unit": "million rays/s",
+        **_best_of_both(ours, floor),
+        "rays": scan.rays_per_pulse,
+    }
+
+
+def _best_of_both(ours: Callable[[], float], floor: Callable[[], float]) -> dict[str, float]:
+    """Return the best rates, in millions, of two works that take turns: what disturbs one disturbs the other."""
+    rates = [(ours(), floor()) for _ in range(_TURNS)]
+    return {"ours": max(own for own, _ in rates) / 1e6, "floor": max(bare for _, bare in rates) / 1e6}
+
+
+def _writing(scan: Scan, source: LayerSource, task: ScanToFiles, folder: Path) -> Rate:
+    """Return the writing of LAZ beside the mere compression of the same records by lazrs through laspy."""
+    from ...cloud.formats.writing import open_writer
+
+    few = replace(scan, only=tuple(_spread(scan, _WRITTEN_BLOCKS)))
+    blocks = [result.points for result in scan_blocks(few, 0, task.finish)]
+    count = sum(len(block) for block in blocks)
+    scenario = task.files.scenario
+    options = (None, scan.target.origin, task.files.intensity_scale, scenario.cloud.attributes, scenario.cloud.scheme())
+
+    def ours() -> None:
+        with open_writer(folder / "ours.laz", *options) as writer:
+            for block in blocks:
+                writer.write(block)
+
+    ours()
+    written = laspy.read(folder / "ours.laz")
+
+    def floor() -> None:
+        backend = laspy.LazBackend.LazrsParallel
+        with laspy.open(folder / "bare.laz", "w", header=written.header, laz_backend=backend) as writer:
+            writer.point_writer.write_points(written.points)  # without laspy's bookkeeping
+
+    rates = _best_of_both(lambda: count / seconds_of(ours), lambda: count / seconds_of(floor))
+    return {"name": "writing LAZ; lazrs alone", "unit": "million points/s", **rates, "rays": 0}
+
+
+def _exhaust(items: Iterable[object]) -> None:
+    for _ in items:
+        pass

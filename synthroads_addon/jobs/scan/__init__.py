@@ -1,0 +1,1 @@
+"""Scanning a road into files, whole or by section."""

@@ -1,0 +1,232 @@
+"""The job "scan a scene": what others made -> triangles with classes -> scan -> cloud and previews.
+
+The scene is only read: nothing is added to it, and its file isn't written.
+"""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..base.class_mapping import ClassMapping
+from ..base.crs import wkt
+from ..base.errors import InputError
+from ..base.files import output_folder
+from ..base.progress import Progress, StageTimer, silent
+from ..base.schema import canonical_json, read_json
+from ..cloud.tools.previews import TopView
+from ..fitting.read import read_axis
+from ..road.geometry import RoadGeometry
+from ..road.parameters import RoadParameters
+from ..scanning.devices.device import scanner_setting
+from ..scanning.platforms.path import USUAL, PolylineGuide, RoadGuide, make_path
+from ..scanning.platforms.path import Path as ScanPath
+from ..scanning.platforms.positions import PositionsPath
+from ..scanning.platforms.trajectory_file import read_trajectory
+from ..scanning.scene.extent import bounds, elevation_at, middle_line
+from ..scanning.scene.mesh import SceneMesh
+from ..scanning.scene.motion import ScannedScene
+from ..scenario.scenario import Output, Scenario
+from .generate import closing, file_names, opening
+from .scan.files import colour_job, make_scan, scan_to_files, top_view
+
+if TYPE_CHECKING:
+    from ..blender.scene.foreign import UpAxis
+
+OUTPUTS: tuple[Output, ...] = ("cloud", "previews")
+"""What a scan of a scene writes beside ``report.json``, as far as the scenario asks for it."""
+_BORDER = 2.0  # m, of the previews
+
+
+@dataclass(frozen=True)
+class SceneScan:
+    """What `scan_scene` is asked for.
+
+    Attributes:
+        scenario: scan, fidelity and seed; its road is not looked at.
+        output: folder for the files.
+        scene: file to open, or the scene that is open if None.
+        path: CSV or GeoJSON of a line that the platform follows, in map coordinates.
+        tripods: positions (x, y) or (x, y, z) of a tripod in map coordinates; z is that of the scanner itself.
+        classes: JSON file with classes by name, see `ClassMapping`.
+        epsg: of the map; that of the scene's road, or unknown, if None.
+        origin: map coordinates of the scene's own origin, m; those of the scene's road, or 0, if None.
+        up: see `blender.foreign.open_scene`.
+        overwrite: replace files that are already there.
+        begun: when the job began, by `time.perf_counter`, for a time budget; when `scan_scene` is called if None.
+    """
+
+    scenario: Scenario
+    output: Path
+    scene: Path | None = None
+    path: Path | None = None
+    tripods: tuple[tuple[float, ...], ...] = ()
+    classes: Path | None = None
+    epsg: int | None = None
+    origin: tuple[float, float, float] | None = None
+    up: UpAxis | None = None
+    overwrite: bool = False
+    begun: float | None = None
+
+
+@dataclass(frozen=True)
+class _Read:
+    """What was read of a scene."""
+
+    scene: ScannedScene
+    road: RoadParameters | None
+    warnings: list[str]
+
+
+def scan_scene(job: SceneScan, progress: Progress = silent) -> dict[str, Any]:
+    """Scan a scene; return the report that is also written to ``report.json``.
+
+    Raises:
+        InputError: an input is wrong or the output can't be written; nothing is left half-written.
+    """
+    from .choose.pilot import Air
+    from .choose.search import decide
+    from .choose.sites import SceneSite
+
+    begun = time.perf_counter()
+    mapping = check_scene_scan(job)
+    scenario = job.scenario
+    wanted = tuple(name for name in OUTPUTS if name in scenario.outputs)
+    names = file_names(scenario, wanted)
+    timer = StageTimer(progress)
+    report = opening()
+    with output_folder(job.output, names, job.overwrite) as folder:
+        with timer.stage("scene"):
+            _open(job)
+        with timer.stage("scene mesh"):
+            found = _read(job, mapping)
+        static = found.scene.static
+        geometry = RoadGeometry(found.road) if found.road else None
+        path = scene_path(job, static, geometry)
+        air, variation = (found.road.environment, found.road.materials) if found.road else (None, None)
+        if scenario.chooses:
+            with timer.stage("choice"):
+                site = SceneSite(found.scene, path, Air(air, variation))
+                decision = decide(scenario, site, job.begun or begun)
+                scenario, report["choice"] = decision.scenario, decision.report
+        with timer.stage("caster"):
+            scan = make_scan(scenario, found.scene, path, air, variation=variation)
+        epsg = found.road.metadata.epsg if found.road and job.epsg is None else job.epsg
+        view = None if "previews" not in wanted else top_view(geometry) if geometry else scene_view(static)
+        cameras = colour_job(scenario, scan, found.scene, found.road.environment if found.road else None)
+        counts = scan_to_files(scenario, scan, cameras, folder, epsg, view, timer)
+        report |= {"scene": job.scene.name if job.scene else None, "counts": counts}
+        report["warnings"] = found.warnings + _of_counts(counts)
+        report |= closing(scenario, timer)
+        report["scenario"] = {name: value for name, value in report["scenario"].items() if name != "road"}
+        (folder / "report.json").write_text(canonical_json(report), encoding="utf-8")
+    return report
+
+
+def check_scene_scan(job: SceneScan) -> ClassMapping | None:
+    """Refuse a job that can't be done before any work starts; return the classes by name."""
+    from ..blender.scene.foreign import check_scene_file
+    from .choose import search as choosing
+
+    choosing.check(job.scenario, foreign=True)
+    platform = job.scenario.scan.platform
+    if job.scene is not None:
+        check_scene_file(job.scene, job.up)
+    if not set(job.scenario.outputs) & set(OUTPUTS):
+        raise InputError("outputs", list(job.scenario.outputs), f"must name at least one of {', '.join(OUTPUTS)}")
+    if job.tripods and platform.kind != "tripod":
+        raise InputError("scan.platform.kind", platform.kind, "must be tripod where its positions are given")
+    if job.path and (job.tripods or platform.kind == "trajectory"):
+        raise InputError("--path", str(job.path), "can't be given together with a trajectory or a tripod's positions")
+    if job.path:
+        read_axis(job.path)
+    if platform.kind == "trajectory" and platform.file:
+        read_trajectory(platform.file)
+    if platform.height is not None and any(len(place) == 3 for place in job.tripods):
+        raise InputError("--height", platform.height, "can't be given with a tripod whose z is the scanner's own")
+    scanner_setting(job.scenario.scan)
+    job.scenario.own_materials()
+    if job.epsg is not None:
+        wkt(job.epsg)
+    if job.classes is None:
+        return None
+    return ClassMapping.from_dict(read_json(job.classes), source=str(job.classes))
+
+
+def _open(job: SceneScan) -> None:
+    from ..blender.scene.foreign import open_scene
+
+    if job.scene is not None:
+        open_scene(job.scene, job.up)
+
+
+def _read(job: SceneScan, mapping: ClassMapping | None) -> _Read:
+    """Return the open scene's triangles and road; refuse a scene in which there is nothing to scan."""
+    from ..blender.model.store import open_road
+    from ..blender.scene.evaluated import scanned_scene
+    from ..blender.scene.foreign import open_scene_warnings
+
+    road = open_road()
+    if road and job.origin is not None:
+        raise InputError("--origin", list(job.origin), "can't be given: the road in the scene has one of its own")
+    factor = job.scenario.scan.traffic_speed_factor
+    geometry = RoadGeometry(road) if road else None
+    scene = scanned_scene(classes=mapping, geometry=geometry, speed_factor=factor, number_objects=True)
+    if not len(scene.static) and not scene.moving:
+        name = str(job.scene) if job.scene else "open scene"
+        raise InputError(name, None, "holds nothing visible with faces that could be scanned")
+    if job.origin is not None:
+        scene = replace(scene, static=replace(scene.static, origin=np.array(job.origin, dtype=np.float64)))
+    unused = [f"{job.classes}: nothing in the scene is named as in {entry}" for entry in scene.unmatched]
+    return _Read(scene, road, open_scene_warnings() + unused)
+
+
+def scene_path(job: SceneScan, mesh: SceneMesh, geometry: RoadGeometry | None) -> ScanPath:
+    """Return the scanner's path: given, along the scene's road, or straight over its middle.
+
+    A path of one's own or over the middle has one strip unless the platform has lateral offsets.
+    """
+    platform, origin = job.scenario.scan.platform, mesh.origin.tolist()
+    if job.tripods:
+        return PositionsPath(platform, [_scanner_place(job, place, mesh) for place in job.tripods])
+    if geometry and not job.path:
+        return make_path(platform, RoadGuide(geometry))
+    if platform.lateral_offsets is None and platform.kind in ("uav", "airborne"):
+        platform = platform.model_copy(update={"lateral_offsets": (0.0,)})
+    guide = PolylineGuide.read(job.path, origin) if job.path else PolylineGuide(middle_line(mesh), origin)
+    return make_path(platform, guide, origin)
+
+
+def _scanner_place(job: SceneScan, place: tuple[float, ...], mesh: SceneMesh) -> list[float]:
+    """Return the local place (3,) of a tripod's scanner: above the highest surface unless it has a z."""
+    local = [value - base for value, base in zip(place, mesh.origin, strict=False)]
+    if len(local) == 3:
+        return local
+    ground = elevation_at(mesh, *local)
+    if ground is None:
+        shown = ",".join(f"{value:g}" for value in place)
+        raise InputError("--tripod", shown, "there is no surface below: give the scanner's elevation, X,Y,Z")
+    height = job.scenario.scan.platform.height
+    return [*local, ground + (USUAL["tripod"].height if height is None else height)]
+
+
+def scene_view(mesh: SceneMesh) -> TopView:
+    """Return a raster that holds the scene, its longer side from left to right."""
+    low, high = bounds(mesh)
+    start, end = (low + mesh.origin)[:2], (high + mesh.origin)[:2]
+    axis = int(np.argmax(end - start))
+    reach = float((end - start)[1 - axis]) / 2.0 + _BORDER
+    middle = (start + end)[1 - axis] / 2.0
+    start[1 - axis] = end[1 - axis] = middle
+    return TopView(start, end, -reach, reach)
+
+
+def _of_counts(counts: dict[str, Any]) -> list[str]:
+    if not counts["points"]:
+        return ["not one pulse came back: is the scene within the scanner's range and field of view?"]
+    unlabelled = int(counts["points_by_class"].get("unlabelled", 0))
+    return [f"{unlabelled:,} points have no class"] if unlabelled else []

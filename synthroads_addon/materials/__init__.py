@@ -1,0 +1,1 @@
+"""Materials: the table, how it varies, and how it reflects."""

@@ -1,0 +1,132 @@
+"""Constant materials as the scanner's loop reads them: one array per property."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..scanning.radiometry import facet_terms, reflectivity, returned_share
+from .table import Material
+from .texture_spread import mean_over_median
+
+Float = NDArray[np.float64]
+Index = NDArray[np.integer]
+Reflection = Literal["lambert", "oren_nayar"]
+
+
+@dataclass(frozen=True)
+class Surfaces:
+    """Materials in the order of the scene mesh's: (M,) arrays, ``base_color`` (M, 3).
+
+    Attributes:
+        base_color: linear RGB.
+        roughness, metallic, specular: 0 to 1.
+        transmission: share of the light that goes on through, 0 to 1.
+        slope: of the facets, rad; 0 reflects as Lambert says.
+        retro: effective reflectance of the retro-reflection at a right angle.
+        lobe: angle at which it has fallen to 1/e, rad.
+        spread_below, spread_above: one sigma of the brightness's logarithm below and above its median.
+        spread_wavelength: longest wavelength of its variation, m.
+
+    The rest follows from these: reflectivity R, Oren and Nayar's A and B, the lobe as 1/rad^2, which materials retro-
+    reflect (``shining``), let light through (``pervious``) or vary (``uneven``), the factor that makes
+    the mean of their variation 1 (``spread_scale``), and whether any does, or is rough.
+    """
+
+    base_color: Float
+    roughness: Float
+    metallic: Float
+    specular: Float
+    transmission: Float
+    slope: Float
+    retro: Float
+    lobe: Float
+    spread_below: Float
+    spread_above: Float
+    spread_wavelength: Float
+    reflectivity: Float = field(init=False)
+    facet_a: Float = field(init=False)
+    facet_b: Float = field(init=False)
+    inverse_lobe_squared: Float = field(init=False)
+    shining: NDArray[np.bool_] = field(init=False)
+    pervious: NDArray[np.bool_] = field(init=False)
+    permeable: bool = field(init=False)
+    retroreflective: bool = field(init=False)
+    rough: bool = field(init=False)
+    uneven: NDArray[np.bool_] = field(init=False)
+    spread_scale: Float = field(init=False)
+    varying: bool = field(init=False)
+
+    def __post_init__(self) -> None:
+        a, b = facet_terms(self.slope)
+        uneven = (self.spread_below > 0.0) | (self.spread_above > 0.0)
+        derived = {
+            "reflectivity": reflectivity(self.base_color, self.metallic, self.specular),
+            "facet_a": a,
+            "facet_b": b,
+            "inverse_lobe_squared": 1.0 / np.maximum(self.lobe, 1e-3) ** 2,
+            "shining": self.retro > 0.0,
+            "pervious": self.transmission > 0.0,
+            "permeable": bool((self.transmission > 0.0).any()),
+            "rough": bool((np.asarray(self.slope) > 0.0).any()),
+            "retroreflective": bool((self.retro > 0.0).any()),
+            "uneven": uneven,
+            "spread_scale": 1.0 / mean_over_median(self.spread_below, self.spread_above),
+            "varying": bool(uneven.any()),
+        }
+        for name, value in derived.items():
+            object.__setattr__(self, name, value)
+
+
+def surfaces_of(
+    rows: Iterable[Material], reflection: Reflection = "lambert", spread: bool = True
+) -> Surfaces:
+    """Return the constants of materials; with Lambert's model no surface has facets, without spread none varies."""
+    rows = list(rows)
+
+    def column(name: str) -> Float:
+        return np.array([getattr(row, name) for row in rows], dtype=np.float64)
+
+    slope = np.zeros(len(rows)) if reflection == "lambert" else column("slope")
+    return Surfaces(
+        base_color=np.array([row.base_color for row in rows], dtype=np.float64).reshape(-1, 3),
+        roughness=column("roughness"),
+        metallic=column("metallic"),
+        specular=column("specular"),
+        transmission=column("transmission"),
+        slope=slope,
+        retro=column("retroreflection"),
+        lobe=np.deg2rad(column("retro_lobe_deg")),
+        spread_below=column("spread_below") * spread,
+        spread_above=column("spread_above") * spread,
+        spread_wavelength=column("spread_wavelength"),
+    )
+
+
+def brightness_of(surfaces: Surfaces, material: Index, cosine: Float) -> Float:
+    """Return the brightness (N,) of surfaces before distance and attenuation, see `radiometry.returned_share`.
+
+    Args:
+        surfaces: the materials.
+        material: (N,) indices; any of a ray that hits nothing.
+        cosine: (N,) of the incidence angle.
+    """
+    reflectance = np.take(surfaces.reflectivity, material)
+    facets = (np.take(surfaces.facet_a, material), np.take(surfaces.facet_b, material)) if surfaces.rough else ()
+    result = returned_share(cosine, reflectance, *facets)
+    if surfaces.retroreflective:
+        shining = np.flatnonzero(np.take(surfaces.shining, material))
+        own = material[shining]
+        result[shining] = returned_share(
+            cosine[shining],
+            reflectance[shining],
+            surfaces.facet_a[own],
+            surfaces.facet_b[own],
+            surfaces.retro[own],
+            surfaces.inverse_lobe_squared[own],
+        )
+    return result

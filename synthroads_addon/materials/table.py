@@ -1,0 +1,146 @@
+"""The material table (`presets/materials.json`): the means that renderer and scanner share.
+
+The speculars are calibrated for a laser of 905 nm: with them `Material.reflectivity` gives measured
+reflectances (asphalt 0.18, paint 0.65, grass and leaves 0.5), though leaves are dark in visible light.
+
+What only the scanner reads is assumed as follows; `docs/radiometry.md` has the reasons and the sources.
+
+- **Transmission** is what goes on through a surface *and comes back* through it, since a scanner's light does both. A
+  leaf or a blade is a flat that stands for a twig's leaves or a few blades, with gaps; the light comes back through the
+  gap that it went through, so the share of gaps counts once: 0.2 for leaves, 0.3 for needles, 0.1 for grass. What a
+  leaf's tissue lets through is scattered and lost. Panes take their share twice: 0.85 squared for windows, 0.92 squared
+  for acrylic glass. `reflectivity` is of the light that doesn't go through.
+- **Facet slopes** are given where a renderer's roughness says little about the texture that a laser meets (pavement,
+  paint, steel); else they follow from the roughness.
+- **Retro-reflection** is the effective reflectance of the retro term alone, pi times the coefficient of
+  retro-reflection (cd/lx/m2) at a right angle; a perfect diffuser has 1.
+- **Spread** says how the brightness differs from place to place of one material, see `scanning.spread`. The shipped
+  table has none; `synthroads calibrate` fits it to real clouds.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Mapping
+from functools import cache
+from pathlib import Path
+from typing import Annotated
+
+from pydantic import Field
+
+from ..base.errors import InputError
+from ..base.files import PRESETS, write_file
+from ..base.schema import Model, quantity, read_json
+from ..scanning.radiometry import facet_slope, reflectivity
+
+UNKNOWN = "unknown"
+"""Material of faces that have none."""
+
+_Share = Annotated[float, Field(strict=True, ge=0.0, le=1.0)]
+
+
+class Material(Model):
+    """Mean properties of one material."""
+
+    base_color: tuple[_Share, _Share, _Share] = Field(description="Linear red, green, blue.")
+    roughness: float = quantity(ge=0, le=1, unit="1", description="Roughness as a renderer means it.")
+    metallic: float = quantity(0.0, ge=0, le=1, unit="1", description="Share of metal.")
+    specular: float = quantity(ge=0, le=1, unit="1", description="Specular share of the reflectivity.")
+    transmission: float = quantity(
+        0.0, ge=0, lt=1, unit="1", description="Share of the laser's light that goes on through and comes back."
+    )
+    facet_slope: float | None = quantity(
+        None, ge=0, le=1.5, unit="rad", description="Facets' slope (one sigma); the roughness's if not given."
+    )
+    retroreflection: float = quantity(
+        0.0, ge=0, le=10_000, unit="1", description="Effective reflectance of the retro-reflection at a right angle."
+    )
+    retro_lobe_deg: float = quantity(
+        45.0, gt=0, le=180, unit="deg", description="Entrance angle at which it has fallen to 1/e."
+    )
+    spread_below: float = quantity(
+        0.0, ge=0, le=2, unit="1", description="Spread (one sigma of the logarithm) of the brightness below its median."
+    )
+    spread_above: float = quantity(
+        0.0, ge=0, le=2, unit="1", description="Spread (one sigma of the logarithm) of the brightness above its median."
+    )
+    spread_wavelength: float = quantity(
+        1.0, ge=0.01, le=1000, unit="m", description="Longest wavelength of the brightness's variation."
+    )
+
+    @property
+    def reflectivity(self) -> float:
+        """Return R, see `radiometry.reflectivity`; of the light that doesn't go through."""
+        return float(reflectivity(self.base_color, self.metallic, self.specular))
+
+    @property
+    def slope(self) -> float:
+        """Return the standard deviation of the facets' slope, rad: the given one, else that of the roughness."""
+        return float(facet_slope(self.roughness)) if self.facet_slope is None else self.facet_slope
+
+
+class MaterialTable(Model):
+    """The file's content."""
+
+    materials: dict[str, Material] = Field(description="Materials by name.")
+
+
+@cache
+def materials() -> dict[str, Material]:
+    """Return the shipped table by name."""
+    path = PRESETS / "materials.json"
+    return MaterialTable.from_dict(read_json(path), source=str(path)).materials
+
+
+def material_table_path(name_or_file: str) -> Path:
+    """Return the file of a shipped table of materials (``shifted``), or the one named.
+
+    Raises:
+        InputError: it is neither a shipped table's name nor ends in ``.json``.
+    """
+    if Path(name_or_file).suffix.lower() == ".json":
+        return Path(name_or_file)
+    shipped = sorted(path.stem for path in (PRESETS / "material_tables").glob("*.json"))
+    if name_or_file not in shipped:
+        known = ", ".join(shipped)
+        raise InputError("materials_table", name_or_file, f"must be a .json file or one of {known}")
+    return PRESETS / "material_tables" / f"{name_or_file}.json"
+
+
+def read_material_table(path: str | os.PathLike[str]) -> dict[str, Material]:
+    """Return the materials of a table of one's own by name; what it doesn't name stays the shipped table's.
+
+    Raises:
+        MissingFileError: there is no such file, or it can't be read.
+        InputError: it isn't a material table.
+    """
+    return MaterialTable.from_dict(read_json(Path(path)), source=os.fspath(path)).materials
+
+
+def write_material_table(path: Path, rows: Mapping[str, Material], overwrite: bool = False) -> None:
+    """Write a material table, a line per material, under a temporary name first; the same rows give the same bytes.
+
+    Args:
+        path: ends in ``.json``; its folder is there.
+        rows: materials by name.
+        overwrite: whether the file may be replaced.
+
+    Raises:
+        OutputError: it is there already, or can't be written.
+        InputError: the name doesn't end in ``.json``.
+    """
+    if path.suffix != ".json":
+        raise InputError("--save", str(path), "must end in .json")
+    lines = ",\n".join(f"  {json.dumps(name)}: {_line(row)}" for name, row in rows.items())
+    write_file(path, f'{{\n "materials": {{\n{lines}\n }}\n}}\n'.encode(), "--save", overwrite)
+
+
+def _line(row: Material) -> str:
+    """Return a material as one line: what it must have, and what differs from the defaults."""
+    told = {
+        name: value
+        for name, value in row.to_dict().items()
+        if name not in Material.model_fields or value != Material.model_fields[name].default
+    }
+    return json.dumps(told)

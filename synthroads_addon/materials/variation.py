@@ -1,0 +1,106 @@
+"""One road's materials: the table's means, changed by age, wear, dryness and rain.
+
+The table holds the means of a road with the default `MaterialVariation`. Base colour and specular change together, so
+that what the camera sees and what the laser measures change alike. Facets and retro-reflection change with them: worn
+paint has lost its beads with its film, and beads under water retro-reflect little.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from ..road.surroundings import Environment, MaterialVariation
+from .table import Material, materials
+
+ASPHALT_OF_AGE = (0.6, 1.6)
+"""Factor on new and on old asphalt: binder is black, bare aggregate bright."""
+DRY_GRASS = (0.27, 0.22, 0.11)
+WET_BASE, WET_SPECULAR, WET_ROUGHNESS = 0.45, 0.5, 0.6
+"""Share that water takes of a porous surface's base colour, of what it reflects at 905 nm, and of its roughness."""
+WET_RETROREFLECTION = 0.8
+"""Share that water takes of the beads' retro-reflection: markings of class R4 (EN 1436) are RW2 when wet."""
+
+_PAINTS = ("paint_white", "paint_yellow")
+_GRASSES = ("verge", "median", "grass_ground", "grass", "meadow", "ryegrass", "reed")
+_POROUS = ("asphalt", "concrete", "soil", "verge", *_PAINTS)
+_DEFAULT = MaterialVariation()
+
+
+def varied(
+    name: str, variation: MaterialVariation, environment: Environment, own: Mapping[str, Material] | None = None
+) -> Material:
+    """Return a material of the table as a road with this variation and weather has it; KeyError for other names.
+
+    Args:
+        name: of the material.
+        variation, environment: the road's.
+        own: materials that take the place of the shipped table's, or stand beside them.
+    """
+    result = _aged(name, {**materials(), **(own or {})}, variation)
+    if environment.wetness > 0.0 and name in _POROUS:
+        result = _wet(result, environment.wetness)
+    return result
+
+
+def _wet(dry: Material, wet: float) -> Material:
+    """Return a porous material under a film of water; its facets get flatter as the roughness's would."""
+    smoother = 1.0 - WET_ROUGHNESS * wet
+    result = _scaled(dry, 1.0 - WET_BASE * wet, 1.0 - WET_SPECULAR * wet)
+    return result.model_copy(
+        update={
+            "roughness": dry.roughness * smoother,
+            "facet_slope": None if dry.facet_slope is None else dry.facet_slope * smoother**2,
+            "retroreflection": dry.retroreflection * (1.0 - WET_RETROREFLECTION * wet),
+        }
+    )
+
+
+def _aged(name: str, table: Mapping[str, Material], variation: MaterialVariation) -> Material:
+    mean = table[name]
+    if name == "asphalt":
+        return _scaled(mean, variation.asphalt_brightness * _of_age(variation) / _of_age(_DEFAULT))
+    if name == "concrete":
+        return _scaled(mean, variation.concrete_brightness)
+    if name == "soil":
+        return _scaled(mean, variation.soil_brightness)
+    if name in _PAINTS:
+        worn = (variation.paint_wear - _DEFAULT.paint_wear) / (1.0 - _DEFAULT.paint_wear)
+        return _mixed(mean, table["asphalt"], worn)
+    if name in _GRASSES:
+        dry = (variation.grass_dryness - _DEFAULT.grass_dryness) / (1.0 - _DEFAULT.grass_dryness)
+        return _mixed(mean, mean.model_copy(update={"base_color": DRY_GRASS}), dry)
+    return mean
+
+
+def _of_age(variation: MaterialVariation) -> float:
+    new, old = ASPHALT_OF_AGE
+    return new + (old - new) * variation.asphalt_age
+
+
+def _scaled(mean: Material, factor: float, specular: float | None = None) -> Material:
+    color = np.clip(np.array(mean.base_color) * factor, 0.0, 1.0)
+    reflected = float(np.clip(mean.specular * (factor if specular is None else specular), 0.0, 1.0))
+    return mean.model_copy(update={"base_color": tuple(color.tolist()), "specular": reflected})
+
+
+def _mixed(mean: Material, other: Material, share: float) -> Material:
+    """Return a material between two; a negative share goes beyond the first, away from the other.
+
+    Roughness, transmission, spread and the lobe of the retro-reflection stay the first's.
+    """
+
+    def between(name: str) -> float:
+        return float((1.0 - share) * getattr(mean, name) + share * getattr(other, name))
+
+    color = np.clip(np.array(mean.base_color) * (1.0 - share) + np.array(other.base_color) * share, 0.0, 1.0)
+    slope = None if mean.facet_slope is None else max(0.0, between("slope"))
+    return mean.model_copy(
+        update={
+            "base_color": tuple(color.tolist()),
+            "specular": min(1.0, max(0.0, between("specular"))),
+            "facet_slope": slope,
+            "retroreflection": max(0.0, between("retroreflection")),
+        }
+    )

@@ -1,0 +1,204 @@
+"""How far a reconstructed road is from the true one: for tests and figures, never for the reconstruction itself."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import linear_sum_assignment
+from scipy.spatial.distance import cdist
+
+from ..road.geometry import RoadGeometry
+from ..road.objects import width_at
+from ..road.parameters import (
+    ConcreteBarrier,
+    Delineator,
+    Guardrail,
+    LineObject,
+    NoiseBarrier,
+    RoadParameters,
+)
+from ..road.things.furniture import Side
+
+Float = NDArray[np.float64]
+
+BARRIER_DISTANCE, POST_DISTANCE = 0.5, 1.0
+"""Barriers and delineators within so far of each other are the same, m."""
+_STEP = 1.0
+_LANE_THERE = 1.0
+_FAR = 1e3
+_BARRIERS = (Guardrail, ConcreteBarrier, NoiseBarrier)
+
+
+def compare(found: RoadParameters, truth: RoadParameters) -> dict[str, Any]:
+    """Return the differences of a reconstructed road from the true one as JSON data, m.
+
+    Stations are the true ones, each metre; a place of the true road that the found one doesn't reach counts for
+    ``covered`` alone. Barriers are compared metre by metre, delineators one to one.
+    """
+    there, here = RoadGeometry(truth), RoadGeometry(found)
+    station = np.arange(0.0, there.length, _STEP)
+    point = there.alignment.position(station) + _apart(truth, found)
+    at, offset = here.alignment.project(point)
+    covered = (at > 0.0) & (at < here.length)
+    turn = here.alignment.heading(at) - there.alignment.heading(station)
+    same = bool(np.median(np.cos(turn[covered] if covered.any() else turn)) > 0.0)
+    height = here.profile.elevation(at) + found.transform.translate[2]
+    height = height - there.profile.elevation(station) - truth.transform.translate[2]
+    return {
+        "covered": round(float(covered.mean()), 4),
+        "centreline": _figures(offset[covered]),
+        "profile": _figures(height[covered]),
+        "carriageways": {
+            side: _carriageway(there, here, side, same, station[covered], at[covered]) for side in there.sections
+        },
+        "surface": _figures(_surface(there, here, station[covered], truth, found)),
+        "barriers": _barriers(there, here, _apart(truth, found)),
+        "delineators": _posts(there, here, _apart(truth, found)),
+    }
+
+
+def compare_axis(found: RoadParameters, axis: Float) -> dict[str, Any]:
+    """Return how far a reconstructed road's line passes from a known one's points (N, 3), m in map coordinates.
+
+    As in `compare`: signed offsets of the points that the found road reaches, and their share as ``covered``.
+    Elevations are left aside: lines of road networks often have none.
+    """
+    here = RoadGeometry(found)
+    at, offset = here.alignment.project(axis[:, :2] - np.array(found.transform.translate[:2]))
+    covered = (at > 0.0) & (at < here.length)
+    return {"covered": round(float(covered.mean()), 4), "centreline": _figures(offset[covered])}
+
+
+def _apart(truth: RoadParameters, found: RoadParameters) -> Float:
+    """Return what turns local plan coordinates of the true set into those of the found one."""
+    return np.array(truth.transform.translate[:2]) - np.array(found.transform.translate[:2])
+
+
+def _figures(difference: Float) -> dict[str, float]:
+    if not len(difference):
+        return {}
+    size = np.abs(difference)
+    return {
+        "mean": round(float(difference.mean()), 4),
+        "mae": round(float(size.mean()), 4),
+        "rms": round(float(np.sqrt((size**2).mean())), 4),
+        "p95": round(float(np.percentile(size, 95)), 4),
+        "largest": round(float(size.max()), 4),
+    }
+
+
+def _carriageway(
+    there: RoadGeometry, here: RoadGeometry, side: Side, same: bool, station: Float, at: Float
+) -> dict[str, Any]:
+    """Return lane counts and widths of a true carriageway against the one on the same side of the road."""
+    other: Side = side if same else ("left" if side == "right" else "right")
+    if other not in here.sections:
+        return {"found": False}
+    true, mine = there.sections[side], here.sections[other]
+    lanes = [
+        sum((width_at(lane.width, where) >= _LANE_THERE).astype(int) for lane in section.carriageway.lanes)
+        for section, where in ((true, station), (mine, at))
+    ]
+    width = [
+        section.main_edge(where) - width_at(section.carriageway.inner_offset, where)
+        for section, where in ((true, station), (mine, at))
+    ]
+    inner = [width_at(section.carriageway.inner_offset, where) for section, where in ((true, station), (mine, at))]
+    return {
+        "found": True,
+        "lanes": [int(np.median(count)) for count in lanes],
+        "lanes_right": round(float(np.mean(lanes[0] == lanes[1])), 4),
+        "width": _figures(width[1] - width[0]),
+        "inner_offset": _figures(inner[1] - inner[0]),
+    }
+
+
+def _surface(
+    there: RoadGeometry, here: RoadGeometry, station: Float, truth: RoadParameters, found: RoadParameters
+) -> Float:
+    """Return the differences of the heights (N,) of both surfaces, m, at places on the true pavement."""
+    result = []
+    for side in there.sections.values():
+        for share in (0.1, 0.3, 0.5, 0.7, 0.9):
+            bounds = side.distances(station)
+            offset = float(side.carriageway.sign) * (bounds[:, 0] + share * (side.main_edge(station) - bounds[:, 0]))
+            at, beside = here.alignment.project(_place(there, station, offset) + _apart(truth, found))
+            high = here.elevation(at, beside) + found.transform.translate[2]
+            result.append(high - there.elevation(station, offset) - truth.transform.translate[2])
+    difference = np.concatenate(result)
+    return difference[np.isfinite(difference)]
+
+
+def _barriers(there: RoadGeometry, here: RoadGeometry, apart: Float) -> dict[str, Any]:
+    """Return length, recall and precision of all barriers: shares of their metres with one of the other set near."""
+    true = [item for item in there.parameters.objects.values() if isinstance(item, _BARRIERS)]
+    mine = [item for item in here.parameters.objects.values() if isinstance(item, _BARRIERS)]
+    recalled, error = _matched(there, true, here, mine, apart)
+    precise, _ = _matched(here, mine, there, true, -apart)
+    return {
+        "true_length": round(float(len(recalled)), 1),
+        "found_length": round(float(len(precise)), 1),
+        "recall": _share(recalled),
+        "precision": _share(precise),
+        "offset": _figures(error),
+    }
+
+
+def _matched(
+    one: RoadGeometry, items: list[Any], other: RoadGeometry, others: list[Any], apart: Float
+) -> tuple[NDArray[np.bool_], Float]:
+    """Return of each metre of some barriers whether one of the others stands there, and how far beside (m)."""
+    hit: list[Float] = []
+    for item in items:
+        point = _along(one, item) + apart
+        station, offset = other.alignment.project(point)
+        distance = np.full(len(point), _FAR)
+        for rival in others:
+            beside = np.abs(offset - rival.offset)
+            inside = (station >= rival.start_station - _STEP) & (station <= rival.end_station + _STEP)
+            distance = np.where(inside & (beside < distance), beside, distance)
+        hit.append(distance)
+    distance = np.concatenate(hit) if hit else np.empty(0)
+    near = distance <= BARRIER_DISTANCE
+    return near, distance[near]
+
+
+def _along(road: RoadGeometry, item: LineObject) -> Float:
+    end = min(item.end_station, road.length)
+    station = np.arange(item.start_station, max(end, item.start_station + 1e-6), _STEP)
+    return _place(road, station, np.full(len(station), item.offset))
+
+
+def _posts(there: RoadGeometry, here: RoadGeometry, apart: Float) -> dict[str, Any]:
+    """Return count, recall and precision of delineators, matched one to one so that the distances add up to least."""
+    points = []
+    for road in (there, here):
+        items = [item for item in road.parameters.of_type(Delineator).values() if item.station <= road.length]
+        points.append(_place(road, np.array([i.station for i in items]), np.array([i.offset for i in items])))
+    true, mine = points[0] + apart, points[1]
+    if not len(true) or not len(mine):
+        return {"true": len(true), "found": len(mine), "recall": 0.0 if len(true) else None, "precision": None}
+    distance = cdist(true, mine)
+    rows, columns = linear_sum_assignment(np.minimum(distance, 10.0 * POST_DISTANCE))
+    matched = distance[rows, columns]
+    matched = matched[matched <= POST_DISTANCE]
+    return {
+        "true": len(true),
+        "found": len(mine),
+        "recall": round(len(matched) / len(true), 4),
+        "precision": round(len(matched) / len(mine), 4),
+        "distance": _figures(matched),
+    }
+
+
+def _place(road: RoadGeometry, station: Float, offset: Float) -> Float:
+    if not len(station):
+        return np.empty((0, 2))
+    position, heading, _ = road.alignment.frame(station)
+    return position + offset[:, None] * np.column_stack([-np.sin(heading), np.cos(heading)])
+
+
+def _share(hits: NDArray[np.bool_]) -> float | None:
+    return round(float(hits.mean()), 4) if len(hits) else None

@@ -1,0 +1,252 @@
+"""Which lines belong together: carriageways, their lanes, and the median; found from lines and pavement."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from itertools import pairwise
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import ndimage
+
+from ..base.errors import InputError
+from ..calibration.pavement import otsu
+from .edges import paved_edge, stretch_middles
+from .lines import USUAL, WAVELENGTH, Line
+from .path import SPACING
+from .profiles import ACROSS, STRETCH, Grid, Profiles
+from .smoothing import smooth
+
+Float = NDArray[np.float64]
+Kind = Literal["dual", "single"]
+
+_SEEN = 0.5  # of the road's length: what is seen on less belongs to a turnout or is a fault
+_SEEN_RURAL = 0.3
+_NARROWEST_BAND, _NARROWEST_MEDIAN, _WIDEST_MEDIAN = 3.0, 0.8, 30.0  # m
+_UNMARKED_CARRIAGEWAY = 7.0  # m: so wide a strip of pavement is a carriageway even if its lines aren't seen
+_IN_THE_MIDDLE = 0.15  # of a carriageway's width from its middle
+_NEAR_EDGE = 4.5  # m: an outermost line lies within a hard shoulder's width of the edge
+_BESIDE = 3.0  # m beyond a strip's usual edge that its edge is looked for
+_BAND_MARGIN = 0.5  # m: an edge line may lie so far outside of what passes for pavement
+_NARROWEST_LANE, _WIDEST_LANE, _USUAL_LANE = 2.3, 5.2, 3.6  # m
+_AROUND_DASHES = (0.4, 1.4)  # m beside a lane line: pavement for sure
+_LIKE = 4.0  # times the pavement's own spread of brightness, at least, that other ground is off
+_BLUR = (6.0, 1.0)  # bins along and across
+_PAINT = 9  # bins: brighter strips of up to this width are paint
+
+
+@dataclass(frozen=True)
+class Band:
+    """One carriageway as it lies in the profiles.
+
+    Attributes:
+        low, high: offsets of its pavement's edges, m, from right to left.
+        lines: its lines from right to left.
+        edges: its pavement's right and left edge as if they were lines, for want of lines.
+        missing: offsets of lines that must be between its lines but aren't seen, m.
+    """
+
+    low: float
+    high: float
+    lines: list[Line]
+    edges: tuple[Line, Line]
+    missing: list[float] = field(default_factory=list)
+
+    @property
+    def width(self) -> float:
+        """Return its width, m."""
+        return self.high - self.low
+
+    @property
+    def middle(self) -> Line | None:
+        """Return the line in its middle, the most painted one if there are several; None if there is none."""
+        middle = 0.5 * (self.low + self.high)
+        near = [line for line in self.lines if abs(line.offset - middle) < _IN_THE_MIDDLE * self.width]
+        return max(near, key=lambda line: line.length * line.width, default=None)
+
+    def guide(self, sign: int) -> Line:
+        """Return its outermost line to the right (-1) or left (+1), or its edge there if it has no line near it."""
+        edge = self.edges[0 if sign < 0 else 1]
+        line = self.lines[0 if sign < 0 else -1] if self.lines else None
+        return line if line is not None and abs(line.offset - edge.offset) < _NEAR_EDGE else edge
+
+
+@dataclass(frozen=True)
+class Layout:
+    """What kind of road it is.
+
+    Attributes:
+        kind: dual carriageway, or a single one.
+        bands: from right to left: two of a dual carriageway, one of a single one.
+        paved: (S, U) share of pavement, from classes or from brightness.
+        notes: what was left out, in words.
+    """
+
+    kind: Kind
+    bands: tuple[Band, ...]
+    paved: Grid
+    notes: tuple[str, ...]
+
+
+def find_layout(profiles: Profiles, lines: list[Line], wanted: Kind | None = None) -> Layout:
+    """Return the layout of profiles with lines.
+
+    Args:
+        profiles: along a path parallel to the road.
+        lines: all that were found.
+        wanted: the kind of road, where it is known.
+
+    Raises:
+        InputError: no carriageway can be made out.
+    """
+    paved = profiles.paved if profiles.paved is not None else paved_by_brightness(profiles, lines)
+    seen = covered(profiles)
+    main = [line for line in lines if line.length >= _SEEN * seen]
+    notes = []
+    spans = paved_bands(profiles, paved)
+    if len(spans) == 1 or wanted == "single":  # rural roads have gaps in their lines, and no turnouts
+        main = [line for line in lines if line.length >= _SEEN_RURAL * seen]
+    if len(main) < len(lines):
+        notes.append(f"{len(lines) - len(main)} lines were seen on a small part of the road and left out")
+    bands = [_band(profiles, paved, span, main) for span in spans]
+    if not bands:
+        raise InputError("road", None, "no carriageway can be made out in the cloud")
+    pair = None if wanted == "single" else _pair(bands)
+    if pair is None and wanted == "dual":
+        raise InputError("--road", "dual", "only one carriageway can be made out in the cloud")
+    chosen = pair or (max(bands, key=lambda band: (len(band.lines), band.width)),)
+    if len(bands) > len(chosen):
+        notes.append(f"{len(bands) - len(chosen)} other strips of pavement were left out")
+    return Layout("dual" if pair else "single", chosen, paved, tuple(notes))
+
+
+def covered(profiles: Profiles) -> float:
+    """Return the length (m) on which the profiles have points."""
+    return float((profiles.count.sum(axis=1) > 0).sum())
+
+
+def paved_bands(profiles: Profiles, paved: Grid) -> list[tuple[float, float]]:
+    """Return (low, high) offsets, m, of what is paved along most of the road where it was seen."""
+    known = np.isfinite(paved)
+    rows = known.sum(axis=0)
+    share = np.where(known, paved, 0.0).sum(axis=0) / np.maximum(rows, 1)
+    on = (share > 0.5) & (rows > 0.3 * covered(profiles))
+    on = ndimage.binary_closing(on, iterations=round(0.3 / ACROSS))
+    label, count = ndimage.label(on)
+    spans = []
+    for number in range(1, count + 1):
+        columns = np.flatnonzero(label == number)
+        low, high = profiles.offsets[columns[0]] - ACROSS / 2, profiles.offsets[columns[-1]] + ACROSS / 2
+        if high - low >= _NARROWEST_BAND:
+            spans.append((float(low), float(high)))
+    return spans
+
+
+def paved_by_brightness(profiles: Profiles, lines: list[Line]) -> Grid:
+    """Return the share of pavement (S, U), 0 or 1, of a cloud without classes; NaN without points.
+
+    Pavement is what is about as bright as the strips on both sides of the lane lines, after a blur of some metres:
+    grass, soil and gravel are mostly brighter. Otsu's threshold parts the differences from that brightness, if there
+    are two kinds of them; if not, all is pavement.
+    """
+    brightness = _blurred(profiles.brightness)
+    known = np.isfinite(brightness)
+    sure = np.zeros(brightness.shape, dtype=bool)
+    rows = np.arange(len(profiles.stations))
+    for line in _lane_lines(lines):
+        place = np.interp(profiles.stations, line.stations, line.offsets, left=np.nan, right=np.nan)
+        for low, high in ((-_AROUND_DASHES[1], -_AROUND_DASHES[0]), _AROUND_DASHES):
+            for shift in np.arange(low, high + 1e-9, ACROSS):
+                column = np.rint((place + shift - profiles.offsets[0]) / ACROSS)
+                inside = np.isfinite(column) & (column >= 0) & (column < len(profiles.offsets))
+                sure[rows[inside], column[inside].astype(np.int64)] = True
+    sure &= known
+    if not sure.any():
+        return np.where(known, 1.0, np.nan).astype(np.float32)
+    counts = np.maximum(sure.sum(axis=1), 1)
+    level = np.where(sure, brightness, 0.0).sum(axis=1) / counts
+    level = np.interp(rows, rows[sure.any(axis=1)], level[sure.any(axis=1)])
+    level = ndimage.gaussian_filter1d(level, 10.0, mode="nearest")
+    apart = np.abs(brightness - level[:, None])
+    spread = 1.4826 * float(np.median(apart[sure]))
+    reach = otsu(np.asarray(apart[known], dtype=np.float64))
+    below, above = float(np.median(apart[known & (apart <= reach)])), float(np.median(apart[known & (apart > reach)]))
+    if above - below < _LIKE * spread:
+        return np.where(known, 1.0, np.nan).astype(np.float32)
+    paved = ndimage.grey_closing(np.where(known, apart <= reach, 0.0), size=(1, _PAINT))  # paint lies on pavement
+    return np.where(known, paved, np.nan).astype(np.float32)
+
+
+def _lane_lines(lines: list[Line]) -> list[Line]:
+    """Return dashed lines, or the longest lines if none is dashed."""
+    dashed = [line for line in lines if not line.solid and line.dash < 10.0]
+    longest = max((line.length for line in dashed), default=0.0)
+    return [line for line in dashed if line.length > 0.5 * longest] or sorted(lines, key=lambda item: -item.length)[:1]
+
+
+def _blurred(values: Grid) -> Grid:
+    known = np.isfinite(values)
+    weight = ndimage.gaussian_filter(known.astype(np.float32), _BLUR)
+    mean = ndimage.gaussian_filter(np.where(known, values, 0.0).astype(np.float32), _BLUR)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        return np.where(weight > 0.05, mean / weight, np.nan)
+
+
+def _band(profiles: Profiles, paved: Grid, span: tuple[float, float], lines: list[Line]) -> Band:
+    """Return a strip of pavement with its lines: of two too near for a lane the longer one, the more painted."""
+    low, high = span
+    inside = [line for line in lines if low - _BAND_MARGIN < line.offset < high + _BAND_MARGIN]
+    kept: list[Line] = []
+    for line in sorted(inside, key=lambda item: -item.length * (0.2 + item.width)):
+        if all(abs(line.offset - other.offset) >= _NARROWEST_LANE for other in kept):
+            kept.append(line)
+    kept.sort(key=lambda line: line.offset)
+    missing = []
+    for right, left in pairwise(kept):
+        apart = left.offset - right.offset
+        if apart > _WIDEST_LANE:
+            count = round(apart / _USUAL_LANE)
+            missing += [right.offset + apart * (i + 1) / count for i in range(count - 1)]
+    return Band(low, high, kept, (_edge_line(profiles, paved, span, -1), _edge_line(profiles, paved, span, 1)), missing)
+
+
+def _edge_line(profiles: Profiles, paved: Grid, span: tuple[float, float], sign: int) -> Line:
+    """Return one edge of a strip of pavement as if it were a line."""
+    low, high = span
+    stations = stretch_middles(profiles)
+    begin = np.full(len(stations), 0.5 * (low + high))
+    edge = paved_edge(profiles, paved, begin, sign, 0.5 * (high - low) + _BESIDE)
+    weights = np.isfinite(edge.offsets).astype(np.float64)
+    smoothed = smooth(edge.offsets, weights, STRETCH * SPACING, WAVELENGTH, usual=USUAL)
+    return Line(
+        stations=stations,
+        measured=edge.offsets,
+        offsets=smoothed.values if weights.any() else np.full(len(stations), high if sign > 0 else low),
+        std=smoothed.std,
+        apart=edge.apart,
+        cover=np.zeros(len(stations)),
+        start=float(stations[0]),
+        end=float(stations[-1]),
+        width=0.0,
+        width_std=0.0,
+        painted=0.0,
+        dash=0.0,
+        gap=0.0,
+        first_dash=0.0,
+    )
+
+
+def _pair(bands: list[Band]) -> tuple[Band, Band] | None:
+    """Return the two neighbouring bands with the most lines that a median can lie between."""
+    pairs = [
+        (right, left)
+        for right, left in pairwise(bands)
+        if _NARROWEST_MEDIAN <= left.low - right.high <= _WIDEST_MEDIAN and _whole(right) and _whole(left)
+    ]
+    return max(pairs, key=lambda pair: len(pair[0].lines) + len(pair[1].lines)) if pairs else None
+
+
+def _whole(band: Band) -> bool:
+    """Return whether a band can be a direction's carriageway."""
+    return len(band.lines) >= 2 or band.width >= _UNMARKED_CARRIAGEWAY

@@ -1,0 +1,231 @@
+"""What stands along the road: barriers as linear clusters, delineators as small ones. Their classes say what; if the
+class only says that something stands there, its shape does."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import ndimage
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
+
+from ..road.things.body_shapes import GUARDRAIL_BEAM, GUARDRAIL_POST, GUARDRAIL_SPACER
+from .cloud import Kind
+from .smoothing import mean_with_std
+
+Float = NDArray[np.float64]
+BarrierKind = Literal["guardrail", "concrete", "noise"]
+
+CELL_ALONG, CELL_ACROSS = 1.0, 0.1
+"""Cells in which barriers are looked for, m."""
+SHORTEST_BARRIER = 8.0
+"""Shorter linear clusters, m, are no barriers."""
+_HOLE = 8  # cells along a barrier that may be empty (hidden behind a lorry, say)
+_JOIN = 0.15  # m across that the cells of one barrier may lie apart
+_STEP = 0.25  # m: a barrier whose offset changes by more goes on as another one
+_STRETCH = 5.0  # m
+_FEWEST_OF_BARRIER = 10
+_POST_APART = 0.4  # m: points nearer than this belong to one post
+_FEWEST_OF_POST = 2
+_POST_WIDEST = 0.7  # m, of a post's points from side to side, position errors of strips included
+_POST_HEIGHTS = {Kind.POST: (0.1, 2.0), Kind.FURNITURE: (0.45, 1.3)}
+USUAL_POST = 1.0
+"""Height of a delineator, m: the highest of a few points on it lies lower."""
+_BARRIER_HEIGHTS = (0.25, 1.6)
+_NOISE_FROM = 1.6  # m: higher walls are noise barriers, where the class doesn't tell
+_ALONE = 0.8  # m around a post of unknown class in which nothing else may stand
+_BEAM = GUARDRAIL_POST[0] / 2.0 + 0.5 * max(point[0] for point in GUARDRAIL_BEAM)
+
+
+@dataclass(frozen=True)
+class Standing:
+    """Points of what stands, in the road's frame.
+
+    Attributes:
+        station, offset: (N,) m.
+        height: (N,) above the road's surface or the ground, m.
+        kind: (N,) of `Kind`.
+    """
+
+    station: Float
+    offset: Float
+    height: Float
+    kind: NDArray[np.uint8]
+
+    def chosen(self, mask: NDArray[np.bool_] | NDArray[np.intp]) -> Standing:
+        """Return some of the points."""
+        return Standing(self.station[mask], self.offset[mask], self.height[mask], self.kind[mask])
+
+
+@dataclass(frozen=True)
+class FoundBarrier:
+    """A barrier: kind, stations, offset of its axis, height (m), the side that a guardrail's beam is on, deviations."""
+
+    kind: BarrierKind
+    start: float
+    end: float
+    offset: float
+    height: float
+    faces: Literal["left", "right", "both"]
+    offset_std: float
+    points: int
+
+
+@dataclass(frozen=True)
+class FoundPost:
+    """A delineator: station, offset, height (m), and standard deviations of station and offset."""
+
+    station: float
+    offset: float
+    height: float
+    std: float
+    points: int
+
+
+def find_barriers(standing: Standing) -> tuple[list[FoundBarrier], NDArray[np.bool_]]:
+    """Return the barriers along the road, and which points (N,) belong to one."""
+    found: list[FoundBarrier] = []
+    used = np.zeros(len(standing.station), dtype=bool)
+    for kind in (Kind.GUARDRAIL, Kind.BARRIER, Kind.NOISE_BARRIER, Kind.FURNITURE):
+        own = np.flatnonzero(standing.kind == kind)
+        for members in _linear(standing.station[own], standing.offset[own]):
+            part = standing.chosen(own[members])
+            for piece in _pieces(part):
+                barrier = _barrier(part.chosen(piece), kind)
+                if barrier is not None:
+                    found.append(barrier)
+                    used[own[members][piece]] = True
+    return sorted(found, key=lambda item: (item.start, item.offset)), used
+
+
+def _linear(station: Float, offset: Float) -> list[NDArray[np.intp]]:
+    """Return the points of each cluster that is long enough: connected cells, small holes along the road filled."""
+    if len(station) < _FEWEST_OF_BARRIER:
+        return []
+    row = np.floor((station - station.min()) / CELL_ALONG).astype(np.int64)
+    column = np.floor((offset - offset.min()) / CELL_ACROSS).astype(np.int64)
+    reach = round(_JOIN / CELL_ACROSS)
+    filled = np.zeros((row.max() + 2 * _HOLE + 1, column.max() + 2 * reach + 1), dtype=bool)
+    filled[row + _HOLE, column + reach] = True
+    filled = ndimage.binary_dilation(filled, np.ones((1, 2 * reach + 1)))
+    filled = ndimage.binary_closing(filled, np.ones((_HOLE, 1)))
+    label, count = ndimage.label(filled, np.ones((3, 3)))
+    own = label[row + _HOLE, column + reach]
+    groups = [np.flatnonzero(own == number) for number in range(1, count + 1)]
+    return [g for g in groups if len(g) >= _FEWEST_OF_BARRIER and np.ptp(station[g]) >= SHORTEST_BARRIER]
+
+
+def _pieces(part: Standing) -> list[NDArray[np.bool_]]:
+    """Return masks of the pieces of a linear cluster along which its offset stays the same."""
+    index = np.floor((part.station - part.station.min()) / _STRETCH).astype(np.int64)
+    order = np.argsort(index, kind="stable")
+    begins = np.searchsorted(index[order], np.arange(index.max() + 1))
+    middles = [np.median(part.offset[o]) if len(o) else np.nan for o in np.split(order, begins[1:])]
+    owner = np.zeros(len(middles), dtype=np.int64)
+    members: list[float] = []
+    for number, middle in enumerate(middles):
+        if members and np.isfinite(middle) and abs(middle - np.median(members)) > _STEP:
+            members, owner[number:] = [], owner[number - 1] + 1
+        if np.isfinite(middle):
+            members.append(float(middle))
+    return [owner[index] == piece for piece in range(int(owner.max()) + 1)]
+
+
+def _barrier(part: Standing, kind: Kind) -> FoundBarrier | None:
+    """Return the barrier of some points; None where they are too few, too short, or shaped otherwise."""
+    count = len(part.station)
+    if count < _FEWEST_OF_BARRIER:
+        return None
+    start, end = np.percentile(part.station, [0.2, 99.8]) if count > 1000 else (part.station.min(), part.station.max())
+    height = float(np.percentile(part.height, 95))
+    if end - start < SHORTEST_BARRIER or not 0.2 < height < 12.0:
+        return None
+    index = np.floor((part.station - start) / _STRETCH).astype(np.int64)
+    upper = part.height > 0.4 * height
+    middles = np.array([np.median(part.offset[upper & (index == i)]) for i in np.unique(index[upper])])
+    offset, std = mean_with_std(middles)
+    told: BarrierKind = {Kind.BARRIER: "concrete", Kind.NOISE_BARRIER: "noise"}.get(kind, "guardrail")  # type: ignore[assignment]
+    if kind == Kind.FURNITURE:
+        if not _BARRIER_HEIGHTS[0] < height or np.std(part.offset[upper]) > 0.35:
+            return None
+        told = "noise" if height > _NOISE_FROM else "guardrail"
+    return FoundBarrier(told, float(start), float(end), offset, height, "both", std, count)
+
+
+def facing(barrier: FoundBarrier, side: Literal["left", "right", "both"]) -> FoundBarrier:
+    """Return a guardrail whose beam is on a side: its axis, that of the posts, lies behind the beam that is seen."""
+    if barrier.kind != "guardrail" or side == "both":
+        return barrier
+    behind = -1.0 if side == "left" else 1.0
+    shift = behind * (_BEAM + GUARDRAIL_SPACER[side])
+    return FoundBarrier(
+        barrier.kind,
+        barrier.start,
+        barrier.end,
+        barrier.offset + shift,
+        barrier.height,
+        side,
+        barrier.offset_std,
+        barrier.points,
+    )
+
+
+def find_posts(standing: Standing, barrier_points: NDArray[np.bool_]) -> list[FoundPost]:
+    """Return the delineators: small clusters of their class, or lone ones of their height where the class is unknown.
+
+    Args:
+        standing: N points.
+        barrier_points: (N,) which of them belong to barriers.
+    """
+    posts: list[FoundPost] = []
+    for kind in (Kind.POST, Kind.FURNITURE):
+        own = np.flatnonzero((standing.kind == kind) & ~barrier_points)
+        part = standing.chosen(np.isin(np.arange(len(standing.kind)), own))
+        clusters = _clusters(part)
+        tree = cKDTree(np.column_stack([standing.station, standing.offset])) if kind == Kind.FURNITURE else None
+        for members in clusters:
+            post = _post(part.chosen(members), kind)
+            if post is not None and (tree is None or _stands_alone(tree, post, int(members.sum()))):
+                posts.append(post)
+    return sorted(posts, key=lambda item: (item.station, item.offset))
+
+
+def _clusters(part: Standing) -> list[NDArray[np.bool_]]:
+    """Return masks of the clusters of points that hang together."""
+    if not len(part.station):
+        return []
+    pairs = cKDTree(np.column_stack([part.station, part.offset])).query_pairs(_POST_APART, output_type="ndarray")
+    count = len(part.station)
+    graph = coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(count, count))
+    number, label = connected_components(graph, directed=False)
+    order = np.argsort(label, kind="stable")
+    groups = np.split(order, np.searchsorted(label[order], np.arange(1, number)))
+    masks = []
+    for group in groups:
+        mask = np.zeros(count, dtype=bool)
+        mask[group] = True
+        masks.append(mask)
+    return masks
+
+
+def _post(part: Standing, kind: Kind) -> FoundPost | None:
+    """Return the post of a cluster, or None if it is no post's size."""
+    count = len(part.station)
+    top = float(part.height.max())
+    low, high = _POST_HEIGHTS[kind]
+    if count < _FEWEST_OF_POST or not low < top < high:
+        return None
+    if max(np.ptp(part.station), np.ptp(part.offset)) > _POST_WIDEST:
+        return None
+    spread = float(np.hypot(part.station.std(), part.offset.std())) / np.sqrt(2.0)
+    std = float(np.hypot(spread / np.sqrt(count), 0.02))  # what is seen of a post is one side of it
+    return FoundPost(float(np.median(part.station)), float(np.median(part.offset)), max(top, USUAL_POST), std, count)
+
+
+def _stands_alone(tree: cKDTree, post: FoundPost, count: int) -> bool:
+    around = tree.query_ball_point([post.station, post.offset], _ALONE, return_length=True)
+    return bool(around <= count)

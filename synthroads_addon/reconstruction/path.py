@@ -1,0 +1,231 @@
+"""A path along the road, the frame that all is measured in: first from the cloud alone, at last the alignment."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.spatial import cKDTree
+
+from ..base.errors import InputError
+from ..road.alignment import Alignment
+from .smoothing import smooth
+
+Float = NDArray[np.float64]
+
+SPACING = 1.0
+"""Distance of a path's points, m."""
+_ROUNDS = 3
+_CELL = 4.0  # m
+_BLOCK = 500_000
+_STEP = 10.0  # m, of the march
+_REACH = 40.0  # m to either side that the road's surface is looked for at first
+_MARGIN = 3.0  # m that it may become wider from one step to the next
+_GAP = 90.0  # m without any surface that are crossed
+_FEWEST_CELLS = 8  # of surface in a step
+_START_RADII = (60.0, 120.0, 240.0)  # m: at the smallest within which the surface is longish the march begins
+_LONGISH = 2.0
+_WAVELENGTH = 120.0  # m: shorter swings of the first path are smoothed away
+SHORTEST = 50.0
+"""A shorter path than this, m, cannot be told from a square."""
+
+
+@dataclass(frozen=True)
+class Path:
+    """A line by running length, with a point each metre.
+
+    Attributes:
+        points: (M, 2) m.
+        heading: (M,) rad, counted on through full turns.
+        start: station of the first point, m.
+    """
+
+    points: Float
+    heading: Float
+    start: float = 0.0
+
+    @property
+    def stations(self) -> Float:
+        """Return the (M,) stations of the points."""
+        return self.start + SPACING * np.arange(len(self.points))
+
+    @property
+    def length(self) -> float:
+        """Return the distance from the first to the last point, m."""
+        return SPACING * (len(self.points) - 1)
+
+    def frame(self, station: ArrayLike) -> tuple[Float, Float]:
+        """Return positions (N, 2) and headings (N,) at stations (N,), straight on beyond the ends."""
+        station = np.asarray(station, dtype=np.float64)
+        place = (station - self.start) / SPACING
+        at = np.clip(place.astype(np.int64), 0, len(self.points) - 2)
+        share = (place - at)[:, None]
+        position = self.points[at] + share * (self.points[at + 1] - self.points[at])
+        return position, np.interp(place, np.arange(len(self.heading)), self.heading)
+
+    def place(self, station: ArrayLike, offset: ArrayLike) -> Float:
+        """Return points (N, 2) at stations and offsets (N,), the offset positive to the left."""
+        position, heading = self.frame(station)
+        left = np.column_stack([-np.sin(heading), np.cos(heading)])
+        return np.asarray(position + np.asarray(offset, dtype=np.float64)[:, None] * left)
+
+    def project(self, points: Float) -> tuple[Float, Float]:
+        """Return stations and offsets (N,) of points (N, 2); stations beyond the ends are those of the tangents."""
+        frames = np.column_stack([self.points, self.heading])
+        station, offset = np.empty(len(points)), np.empty(len(points))
+        for begin in range(0, len(points), _BLOCK):
+            block = slice(begin, begin + _BLOCK)
+            station[block], offset[block] = _project(frames, points[block], self._near(points[block]))
+        return self.start + station, offset
+
+    def within(self, points: Float, distance: float) -> NDArray[np.bool_]:
+        """Return which points (N, 2) lie within a distance (m) of the path, to the nearest cell of 4 m."""
+        middles, owner = _cells(points)
+        away, _ = cKDTree(self.points).query(middles)
+        return np.asarray((away < distance + _CELL)[owner])
+
+    def _near(self, points: Float) -> Float:
+        """Return distances (N,) along the path near those of points (N, 2): of each cell of 4 m that of its middle."""
+        middles, owner = _cells(points)
+        _, nearest = cKDTree(self.points).query(middles)
+        return np.asarray(SPACING * nearest[owner].astype(np.float64))
+
+    def moved(self, offset: Float) -> Path:
+        """Return the path through what lies an offset (M,) to the left of each point."""
+        return path_through(self.place(self.stations, offset))
+
+    def cut(self, low: float, high: float) -> Path:
+        """Return the part between two stations, beginning at station 0."""
+        kept = (self.stations >= low - 1e-9) & (self.stations <= high + 1e-9)
+        return Path(self.points[kept], self.heading[kept])
+
+
+def _cells(points: Float) -> tuple[Float, NDArray[np.intp]]:
+    """Return the middles (C, 2) of the cells of 4 m that points (N, 2) lie in, and each point's cell."""
+    cell = np.floor(points / _CELL).astype(np.int64)
+    low = cell.min(axis=0)
+    key = (cell[:, 0] - low[0]) * (cell[:, 1].max() - low[1] + 1) + (cell[:, 1] - low[1])
+    _, first, owner = np.unique(key, return_index=True, return_inverse=True)
+    return (cell[first] + 0.5) * _CELL, owner
+
+
+def _project(frames: Float, points: Float, along: Float) -> tuple[Float, Float]:
+    """Return distances along a path of frames (M, 3: x, y, heading) and offsets (N,) of points near given distances."""
+    last = len(frames) - 2
+    offset = np.empty(0)
+    for round_ in range(_ROUNDS):
+        place = along / SPACING
+        at = np.clip(place.astype(np.int64), 0, last)
+        share = np.clip(place - at, 0.0, 1.0)
+        low = frames[at]
+        change = frames[at + 1] - low
+        heading = low[:, 2] + share * change[:, 2]
+        beyond = (place - at)[:, None]
+        apart = points - low[:, :2] - beyond * change[:, :2]
+        cos, sin = np.cos(heading), np.sin(heading)
+        offset = apart[:, 1] * cos - apart[:, 0] * sin
+        if round_ < _ROUNDS - 1:
+            # On the inside of a curve a step along the path is a shorter one beside it.
+            shorter = np.maximum(1.0 - offset * change[:, 2] / SPACING, 0.2)
+            along = along + (apart[:, 0] * cos + apart[:, 1] * sin) / shorter
+    return along, offset
+
+
+def path_through(points: Float) -> Path:
+    """Return a path through a polyline (K, 2), a point each metre.
+
+    Raises:
+        InputError: it is shorter than `SHORTEST`.
+    """
+    step = np.hypot(*np.diff(points, axis=0).T)
+    kept = np.append(True, step > 1e-6)
+    points, step = points[kept], step[kept[1:]]
+    run = np.append(0.0, np.cumsum(step))
+    if run[-1] < SHORTEST:
+        raise InputError("road", round(float(run[-1]), 1), f"at least {SHORTEST:g} m of road are needed in the cloud")
+    station = np.arange(0.0, run[-1], SPACING)
+    even = np.column_stack([np.interp(station, run, points[:, i]) for i in range(2)])
+    change = np.gradient(even, axis=0)
+    return Path(even, np.unwrap(np.arctan2(change[:, 1], change[:, 0])))
+
+
+def alignment_path(alignment: Alignment) -> Path:
+    """Return an alignment as a path, with the alignment's own stations; the last point may lie just beyond its end."""
+    station = np.arange(0.0, np.ceil(alignment.length) + 0.5, SPACING)
+    position, heading, _ = alignment.frame(station)
+    return Path(position, heading)
+
+
+def first_path(xy: Float) -> Path:
+    """Return a path along the middle of a surface of which there are points (N, 2), in any order.
+
+    Metre cells, not points, count, so that neither density nor overlapping strips pull the path. It begins in the
+    middle of the surface in its longest direction and is marched both ways in steps of 10 m; gaps of less than 90 m are
+    crossed in the direction that the road had before. It runs towards the east (or due north).
+
+    Raises:
+        InputError: the surface is nowhere longer than wide, or too short.
+    """
+    cells = np.unique(np.floor(xy).astype(np.int64), axis=0) + 0.5
+    tree = cKDTree(cells)
+    start, direction, half = _begin(cells, tree)
+    ahead = _march(cells, tree, start, direction, half)
+    back = _march(cells, tree, start, direction + np.pi, half)
+    line = np.array([*back[::-1], *ahead[1:]])
+    if (line[-1] - line[0]) @ (np.cos(0.01), np.sin(0.01)) < 0.0:
+        line = line[::-1]
+    return smoothed_path(path_through(line), _WAVELENGTH)
+
+
+def smoothed_path(path: Path, wavelength: float) -> Path:
+    """Return a path without its swings that are shorter than a wavelength (m)."""
+    kept = path.points[::5]
+    weights = np.ones(len(kept))
+    smoothed = [smooth(kept[:, i], weights, 5.0 * SPACING, wavelength).values for i in range(2)]
+    return path_through(np.column_stack(smoothed))
+
+
+def _begin(cells: Float, tree: cKDTree) -> tuple[Float, float, float]:
+    """Return the point that the march begins at, its direction (rad), and the surface's half width there (m)."""
+    _, middle = tree.query(np.median(cells, axis=0))
+    for radius in _START_RADII:
+        near = cells[tree.query_ball_point(cells[middle], radius)]
+        centre = near.mean(axis=0)
+        spread, axes = np.linalg.eigh(np.cov((near - centre).T)) if len(near) > 2 else (np.ones(2), np.eye(2))
+        if np.sqrt(spread[1]) > _LONGISH * np.sqrt(max(spread[0], 1e-9)):
+            half = float(np.percentile(np.abs((near - centre) @ axes[:, 0]), 98))
+            return centre, float(np.arctan2(axes[1, 1], axes[0, 1])), min(half + _MARGIN, _REACH)
+    raise InputError(
+        "road", None, "its surface in the cloud is nowhere longer than wide: --path gives its course"
+    )
+
+
+def _march(cells: Float, tree: cKDTree, start: Float, direction: float, half: float) -> list[Float]:
+    """Return the points of a march from a start in a direction, until the surface ends."""
+    line, at, missing = [start], start, 0.0
+    while missing <= _GAP:
+        forward = np.array([np.cos(direction), np.sin(direction)])
+        ahead = at + _STEP * forward
+        near = cells[tree.query_ball_point(ahead, np.hypot(half, _STEP))] - ahead
+        along, across = near @ forward, near @ (-forward[1], forward[0])
+        inside = (np.abs(along) <= _STEP) & (np.abs(across) <= half)
+        at = ahead
+        if inside.sum() < _FEWEST_CELLS:
+            missing += _STEP
+            continue
+        missing = 0.0
+        low, high = np.percentile(across[inside], [3, 97])
+        at = ahead + 0.5 * (low + high) * np.array([-forward[1], forward[0]])
+        half = min(0.5 * (high - low) + _MARGIN, _REACH)
+        line.append(at)
+        direction = _direction(line, direction)
+    return line
+
+
+def _direction(line: list[Float], before: float) -> float:
+    """Return the direction of the last 50 m of a march, which turns by no more than a road does in a step."""
+    last = np.array(line[-6:])
+    chord = last[-1] - last[max(0, len(last) - 4)] if len(last) > 2 else last[-1] - last[0]
+    turn = float(np.angle(np.exp(1j * (np.arctan2(chord[1], chord[0]) - before))))
+    return before + float(np.clip(turn, -0.12, 0.12))

@@ -1,0 +1,146 @@
+"""A picture of a reconstruction: the road's lines over the cloud seen from above, a cross-section, and the heights."""
+
+from __future__ import annotations
+
+from pathlib import Path as FilePath
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import ndimage
+
+from ..road.geometry import RoadGeometry
+from ..road.objects import LineObject
+from ..road.parameters import Delineator, LineMarking
+from .cloud import RoadCloud
+from .profiles import Profiles
+from .reconstruct import Reconstruction
+
+Float = NDArray[np.float64]
+
+AXIS, EDGE, MARK, BARRIER, POST = "#d1006b", "#ff8c00", "#00a2ff", "#7a3cff", "#00b050"
+_SIZE = (13.0, 9.0)  # inches
+_DPI = 110
+_STRETCH = 150.0  # m of the road that are shown large
+_BEYOND = 6.0  # m outside of the pavement
+
+
+def draw(found: Reconstruction, cloud: RoadCloud, path: FilePath) -> None:
+    """Write the picture (PNG)."""
+    import matplotlib
+
+    matplotlib.use("Agg")
+    import matplotlib.pyplot as plt
+
+    figure = plt.figure(figsize=_SIZE, dpi=_DPI, layout="constrained")
+    grid = figure.add_gridspec(3, 2, height_ratios=(1.3, 1.3, 1.0))
+    geometry = RoadGeometry(found.parameters)
+    plan(figure.add_subplot(grid[0, :]), found, geometry, (0.0, geometry.length))
+    middle = max(0.0, 0.5 * geometry.length - _STRETCH / 2.0)
+    plan(figure.add_subplot(grid[1, :]), found, geometry, (middle, min(geometry.length, middle + _STRETCH)))
+    across(figure.add_subplot(grid[2, 0]), found, geometry)
+    heights(figure.add_subplot(grid[2, 1]), found, geometry)
+    figure.suptitle(f"{found.parameters.metadata.title}: {cloud.read:,} points", fontsize=10)
+    figure.savefig(path, metadata={"Software": None})
+    plt.close(figure)
+
+
+def plan(axes: Any, found: Reconstruction, geometry: RoadGeometry, span: tuple[float, float]) -> None:
+    """Draw the road unrolled: offset over station, the cloud's brightness behind what was reconstructed."""
+    profiles = found.profiles
+    low, high = _reach(geometry)
+    axes.imshow(
+        _brightness(profiles).T,
+        origin="lower",
+        aspect="auto",
+        cmap="gray",
+        extent=(profiles.stations[0], profiles.stations[-1], profiles.offsets[0], profiles.offsets[-1]),
+        interpolation="nearest",
+    )
+    station = np.linspace(*span, 400)
+    axes.plot(station, np.zeros_like(station), color=AXIS, lw=1.0, label="axis")
+    for number, side in enumerate(geometry.sections.values()):
+        bounds = side.carriageway.sign * side.distances(station)
+        for column in (0, bounds.shape[1] - 2):
+            label = "pavement's edges" if number == 0 == column else None
+            axes.plot(station, bounds[:, column], color=EDGE, lw=0.9, label=label)
+    _markings(axes, geometry, span)
+    _objects(axes, geometry)
+    axes.set(xlim=span, ylim=(low, high), xlabel="station, m", ylabel="offset, m")
+    axes.legend(loc="upper right", fontsize=7, ncols=5)
+
+
+def across(axes: Any, found: Reconstruction, geometry: RoadGeometry) -> None:
+    """Draw heights across the road in its middle: the cloud's bins and the reconstructed surface."""
+    profiles = found.profiles
+    row = len(profiles.stations) // 2
+    rows = slice(max(0, row - 5), row + 5)
+    station = profiles.stations[rows]
+    height = profiles.height[rows].astype(np.float64)
+    level = geometry.profile.elevation(station)
+    axes.plot(profiles.offsets, (height - level[:, None]).T, ".", ms=1.5, color="0.55")
+    low, high = _reach(geometry)
+    offset = np.linspace(low, high, 600)
+    model = geometry.elevation(np.full_like(offset, profiles.stations[row]), offset) - geometry.profile.elevation(
+        profiles.stations[row]
+    )
+    axes.plot(offset, model, color=AXIS, lw=1.2)
+    seen = model[np.isfinite(model)]
+    axes.set(
+        xlim=(low, high),
+        ylim=(seen.min() - 0.6, seen.max() + 0.6),
+        xlabel="offset, m",
+        ylabel="height above the profile, m",
+        title=f"cross-section at {profiles.stations[row]:.0f} m",
+    )
+
+
+def heights(axes: Any, found: Reconstruction, geometry: RoadGeometry) -> None:
+    """Draw what was measured of both carriageways' heights against the profile."""
+    stations = found.measured.stations
+    level = geometry.profile.elevation(stations)
+    for name, surface in found.surfaces.items():
+        axes.plot(stations, 100.0 * (surface.height - level), ".", ms=3, label=f"{name} carriageway")
+    axes.axhline(0.0, color=AXIS, lw=1.0, label="profile")
+    axes.set(xlabel="station, m", ylabel="height above the profile, cm", title="pavement at its pivot line")
+    axes.legend(fontsize=7)
+
+
+def _brightness(profiles: Profiles) -> Float:
+    """Return brightness from 0 to 1, so that even shares of the picture are dark and bright; NaN far from any point."""
+    known = np.isfinite(profiles.brightness)
+    weight = ndimage.gaussian_filter(known.astype(np.float64), (0.3, 1.0))
+    mean = ndimage.gaussian_filter(np.where(known, profiles.brightness, 0.0).astype(np.float64), (0.3, 1.0))
+    with np.errstate(invalid="ignore", divide="ignore"):
+        blurred = np.where(weight > 0.02, mean / weight, np.nan)
+    levels = np.nanpercentile(blurred, [1, 20, 40, 60, 80, 90, 95, 98, 99.5])
+    return np.asarray(np.interp(blurred, np.maximum.accumulate(levels), np.linspace(0.1, 1.0, len(levels))))
+
+
+def _reach(geometry: RoadGeometry) -> tuple[float, float]:
+    offsets = geometry.offsets(np.linspace(0.0, geometry.length, 50))
+    return float(offsets.min()) - _BEYOND, float(offsets.max()) + _BEYOND
+
+
+def _markings(axes: Any, geometry: RoadGeometry, span: tuple[float, float]) -> None:
+    label: str | None = "markings"
+    for line in geometry.parameters.of_type(LineMarking).values():
+        for start, end in geometry.dashes(line):
+            if end < span[0] or start > span[1]:
+                continue
+            station = np.linspace(start, end, 2 if end - start < 20.0 else 100)
+            left, right = geometry.marking_edges(line, station)
+            axes.plot(station, 0.5 * (left + right), color=MARK, lw=1.2, label=label)
+            label = None
+
+
+def _objects(axes: Any, geometry: RoadGeometry) -> None:
+    label: str | None = "barriers"
+    for item in geometry.parameters.objects.values():
+        if isinstance(item, LineObject):
+            axes.plot([item.start_station, item.end_station], [item.offset] * 2, color=BARRIER, lw=1.6, label=label)
+            label = None
+    posts = list(geometry.parameters.of_type(Delineator).values())
+    if posts:
+        place = [post.station for post in posts], [post.offset for post in posts]
+        axes.plot(*place, "^", ms=5, color=POST, mec="white", mew=0.5, label="delineators")

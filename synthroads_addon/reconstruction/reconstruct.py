@@ -1,0 +1,285 @@
+"""The whole way from a cloud to a parameter set, step by step."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..base.errors import InputError
+from ..base.progress import Progress, silent
+from ..fitting.fit import AxisFit, fit_axis
+from ..road.parameters import RoadParameters
+from .assemble import Measured, RotationAxis, assembled
+from .axis import Centre, centre_of
+from .cloud import Kind, RoadCloud
+from .edges import Surface, paved_edge, stretch_middles, surface
+from .layout import Kind as RoadKind
+from .layout import Layout, find_layout
+from .lines import find_lines
+from .objects import find_barriers, find_posts
+from .path import SPACING, Path, alignment_path, first_path, path_through
+from .profiles import STRETCH, Profiles, make_profiles
+from .registration import registered
+from .section import Section, Side, SideSection, measure_section, snapped
+from .smoothing import smooth
+from .surroundings import faced, measure_ground, standing_points
+
+Float = NDArray[np.float64]
+Predictor = Callable[[RoadCloud, Path], tuple[Float, Float]]
+"""Returns offset and standard deviation (M,) of the axis at each point of a path; NaN where it knows none."""
+
+_HALF_WIDTHS = (12.0, 45.0)  # m: least and largest reach of profiles
+_MARGIN = 8.0  # m of it outside of the surface that the first path was made from
+_AROUND = 12.0  # m beyond that reach in which barriers may stand
+_REGISTRATIONS = 2
+_SIDES: tuple[Side, ...] = ("right", "left")
+
+
+@dataclass(frozen=True)
+class Options:
+    """What can be asked for.
+
+    Attributes:
+        road: dual or single carriageway, where it is known.
+        tolerance: of the alignment's fit to the axis, m (`fit_axis`).
+        path: course of the road in local coordinates (K, 2), where the cloud alone doesn't show it.
+        predictor: tells the axis in place of the lines.
+        snap: take the standard cross-section's widths where the measured ones are near enough.
+        title: of the parameter set.
+    """
+
+    road: RoadKind | None = None
+    tolerance: float = 0.03
+    path: Float | None = None
+    predictor: Predictor | None = None
+    snap: bool = False
+    title: str = ""
+
+
+@dataclass(frozen=True)
+class Reconstruction:
+    """A road, and everything that it was made from.
+
+    Attributes:
+        parameters: the parameter set.
+        measured: the same in numbers with standard deviations.
+        centre: the axis as it was measured, along ``path``.
+        path: parallel to the road, along which the lines were found.
+        profiles, layout: along the alignment.
+        surfaces: by side, along the alignment.
+        notes: what a reader must know.
+    """
+
+    parameters: RoadParameters
+    measured: Measured
+    centre: Centre
+    path: Path
+    profiles: Profiles
+    layout: Layout
+    surfaces: dict[Side, Surface]
+    notes: list[str] = field(default_factory=list)
+
+
+def reconstruct(cloud: RoadCloud, options: Options | None = None, progress: Progress = silent) -> Reconstruction:
+    """Return the road in a cloud.
+
+    Raises:
+        InputError: no road can be made out in it.
+    """
+    options = options or Options()
+    progress("path", 0.0)
+    path, half = straightened(cloud, options)
+    whole, cloud = cloud, cloud.near(path, half + _AROUND)
+    progress("lines", 0.3)
+    profiles, layout, centre = _axis(cloud, path, half, options)
+    path = path.moved(np.interp(path.stations, centre.stations, centre.offsets))
+    profiles, layout, centre = _axis(cloud, path, half, options)  # a straight line is smoothed better than a bent one
+    progress("alignment", 0.5)
+    fit, rotation = fitted(profiles, layout, centre, options.tolerance)
+    progress("section", 0.6)
+    along = alignment_path(fit.alignment)
+    profiles = make_profiles(cloud, along, half, exact=True)
+    layout = find_layout(profiles, find_lines(profiles), layout.kind)
+    section = measure_section(profiles, layout, cloud.marked)
+    if options.snap:
+        section = snapped(section)
+    surfaces = {side: _surface(profiles, section, side, rotation) for side in _SIDES}
+    progress("objects", 0.8)
+    ground = measure_ground(whole, along, section, fit.profile.elevation(along.stations))
+    standing = standing_points(cloud, along, profiles, section)
+    barriers, used = find_barriers(standing)
+    measured = Measured(
+        fit=fit,
+        origin=cloud.origin,
+        epsg=cloud.epsg,
+        section=section,
+        stations=stretch_middles(profiles),
+        crossfall={side: _smooth_fall(surfaces[side]) for side in _SIDES},
+        rotation=rotation,
+        barriers=faced(barriers, section),
+        posts=find_posts(standing, used),
+        ground=ground,
+        marked=cloud.marked,
+        title=options.title,
+    )
+    parameters = assembled(measured)
+    notes = [*layout.notes, *_notes(cloud, section, measured)]
+    return Reconstruction(parameters, measured, centre, path, profiles, layout, surfaces, notes)
+
+
+def straightened(cloud: RoadCloud, options: Options) -> tuple[Path, float]:
+    """Return a path parallel to the road, and how far to either side of it there is something to see (m)."""
+    xy = cloud.xyz[cloud.of(Kind.PAVEMENT, Kind.MARKING) if cloud.labelled else cloud.surface, :2]
+    path = path_through(options.path) if options.path is not None else first_path(xy)
+    _, offset = path.project(xy[:: max(1, len(xy) // 200_000)])
+    near = np.abs(offset)[np.abs(offset) < _HALF_WIDTHS[1]]
+    if not len(near):
+        raise InputError("--path", None, "no point of the road lies within 45 m of it")
+    half = float(np.clip(np.percentile(near, 99) + _MARGIN, *_HALF_WIDTHS))
+    for _ in range(_REGISTRATIONS):
+        path = registered(path, make_profiles(cloud, path, half))
+    return path, half
+
+
+def _axis(cloud: RoadCloud, path: Path, half: float, options: Options) -> tuple[Profiles, Layout, Centre]:
+    """Return profiles along a path, which lines they show, and where the axis lies."""
+    profiles = make_profiles(cloud, path, half, exact=True)
+    layout = find_layout(profiles, find_lines(profiles), options.road)
+    return profiles, layout, _centre(cloud, profiles, layout, options)
+
+
+def _centre(cloud: RoadCloud, profiles: Profiles, layout: Layout, options: Options) -> Centre:
+    """Return the axis along the path: from the lines, or from a learned predictor."""
+    by_lines = centre_of(layout)
+    if options.predictor is None:
+        return by_lines
+    offset, std = options.predictor(cloud, profiles.path)
+    along = profiles.path.stations
+    known = np.isfinite(offset)
+    if not known.any():
+        raise InputError("--run", None, "the model tells the axis nowhere in this cloud")
+    stations = by_lines.stations
+    inside = np.isfinite(by_lines.raw)
+    raw = np.interp(stations, along[known], offset[known])
+    deviation = np.interp(stations, along[known], std[known])
+    weights = np.where(inside, 1.0 / np.maximum(deviation, 0.01) ** 2, 0.0)
+    smoothed = smooth(np.where(inside, raw, np.nan), weights, STRETCH * SPACING, 60.0)
+    return Centre(stations, smoothed.values, smoothed.std, np.where(inside, raw, np.nan))
+
+
+def fitted(profiles: Profiles, layout: Layout, centre: Centre, tolerance: float) -> tuple[AxisFit, RotationAxis]:
+    """Return alignment and profile through the axis, and the line about which the crossfall turns.
+
+    The profile is the height of that line, the same for both carriageways: of the two lines that a parameter set can
+    name, the one at which the carriageways' heights differ less.
+    """
+    heights = {name: _heights(profiles, layout, centre, name) for name in ("carriageway_axis", "inner_edge")}
+    rotation: RotationAxis = "carriageway_axis"
+    if _apart(heights["inner_edge"]) < 0.5 * _apart(heights["carriageway_axis"]) - 0.002:
+        rotation = "inner_edge"
+    right, left = heights[rotation]
+    height = np.where(np.isfinite(left) & np.isfinite(right), 0.5 * (left + right), np.fmin(left, right))
+    known = np.isfinite(centre.raw)
+    first, last = np.flatnonzero(known)[[0, -1]]
+    kept = slice(int(first), int(last) + 1)
+    if not np.isfinite(height[kept]).any():
+        raise InputError("road", None, "too few points of the road's surface to tell its height")
+    smoothed = smooth(height, np.isfinite(height).astype(np.float64), STRETCH * SPACING, 30.0)
+    offset = _as_measured(centre.raw, centre.offsets)[kept]
+    plan = profiles.path.place(centre.stations[kept], offset)
+    return fit_axis(np.column_stack([plan, _as_measured(height, smoothed.values)[kept]]), tolerance), rotation
+
+
+def _as_measured(raw: Float, smoothed: Float) -> Float:
+    """Return measured values (K,), the smoothed ones in place of those that are missing or faults.
+
+    The fit smooths by itself: values that are smooth already would pass for exact and get an element for every bend.
+    """
+    apart = np.abs(raw - smoothed)
+    usual = 1.4826 * float(np.nanmedian(apart))
+    return np.where(np.isfinite(raw) & (apart <= 4.0 * max(usual, 1e-3)), raw, smoothed)
+
+
+def _heights(profiles: Profiles, layout: Layout, centre: Centre, rotation: str) -> tuple[Float, Float]:
+    """Return the heights (K,) of the right and left carriageway at the line that the crossfall turns about."""
+    result = []
+    axis = centre.offsets
+    for name, sign in (("right", -1), ("left", 1)):
+        band = layout.bands[0] if name == "right" or layout.kind == "single" else layout.bands[1]
+        outermost = sign * (band.guide(sign).offset - float(np.median(axis)))
+        begin = axis + sign * max(outermost, 1.0)
+        outer = paved_edge(profiles, layout.paved, begin, sign).offsets
+        outer = axis + float(np.nanmedian(np.append(outer - axis, begin - axis if np.isnan(outer).all() else [])))
+        inner = axis.copy()
+        if layout.kind == "dual":
+            innermost = sign * (band.guide(-sign).offset - float(np.median(axis)))
+            edge = paved_edge(profiles, layout.paved, axis + sign * innermost, -sign, innermost).offsets
+            inner = axis + (float(np.nanmedian(edge - axis)) if np.isfinite(edge).any() else sign * innermost)
+        low, high = (inner, outer) if sign > 0 else (outer, inner)
+        pivot = inner if rotation == "inner_edge" else 0.5 * (inner + outer)
+        result.append(surface(profiles, low, high, pivot).height)
+    return result[0], result[1]
+
+
+def _apart(heights: tuple[Float, Float]) -> float:
+    """Return the median difference of the heights of both carriageways, m."""
+    difference = np.abs(heights[1] - heights[0])
+    return float(np.nanmedian(difference)) if np.isfinite(difference).any() else 0.0
+
+
+def _surface(profiles: Profiles, section: Section, side: Side, rotation: RotationAxis) -> Surface:
+    """Return one carriageway's surface along the alignment."""
+    own = section.sides[side]
+    count = len(own.usual)
+    inner = np.full(count, own.inner_offset.value)
+    outer = inner + own.paved_width.value
+    pivot = inner if rotation == "inner_edge" else 0.5 * (inner + outer)
+    low, high = (inner, outer) if own.sign > 0 else (-outer, -inner)
+    return surface(profiles, low, high, float(own.sign) * pivot)
+
+
+def _smooth_fall(measured: Surface) -> Float:
+    """Return the crossfall (K,) without the noise of single stretches."""
+    known = np.isfinite(measured.fall)
+    if known.sum() < 5:
+        return measured.fall
+    return smooth(measured.fall, known.astype(np.float64), STRETCH * SPACING, 15.0, order=2, usual=0.002).values
+
+
+def _notes(cloud: RoadCloud, section: Section, measured: Measured) -> list[str]:
+    """Return what a reader of the parameter set must know."""
+    notes = []
+    if cloud.epsg is None:
+        notes.append("the cloud doesn't say its map system: EPSG:25832 was written")
+    if not cloud.labelled:
+        notes.append("pavement was told from ground by brightness, as the cloud has no such classes")
+    if not cloud.marked:
+        notes.append("paint was told from pavement by brightness: lines have the usual widths")
+    if section.kind == "single":
+        notes.append(
+            "a single carriageway: written as two carriageways that meet in the middle line, one per direction"
+        )
+    if not measured.ground.verge_seen:
+        notes.append("the verge's width is the usual one, as the cloud has no such class")
+    for side in section.sides.values():
+        notes += _notes_on(side)
+    return notes
+
+
+def _notes_on(side: SideSection) -> list[str]:
+    """Return what a reader must know of one direction."""
+    notes = []
+    if not side.edge_seen:
+        notes.append(f"{side.side}: the pavement's outer edge isn't in the cloud: 0.5 m beyond the outermost line")
+    if not side.closed:
+        notes.append(f"{side.side}: the outermost line is dashed: there may be further lanes beyond the cloud")
+    if side.assumed:
+        notes.append(f"{side.side}: lines weren't seen: the lanes are those of {side.assumed}, about as wide as it")
+    elif side.mirrored:
+        notes.append(f"{side.side}: the edge line was seen on the other side only and is taken to be as far away")
+    elif any(line is None for line in side.lines[1:-1]):
+        notes.append(f"{side.side}: a lane line isn't seen where it must be")
+    return notes

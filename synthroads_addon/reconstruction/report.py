@@ -1,0 +1,214 @@
+"""What `reconstruction.json` says: where the cloud is from the reconstructed road, and how sure each number is."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..checking.checker import check
+from ..road.geometry import RoadGeometry
+from ..road.parameters import LineMarking
+from .cloud import Kind, RoadCloud
+from .reconstruct import Reconstruction
+from .section import Section, SideSection, standard_section
+
+Float = NDArray[np.float64]
+
+_MOST_POINTS = 400_000
+_FROM_EDGES = 0.1  # m: nearer to an edge of the pavement than this a point may lie beside it
+_FAULT = 0.5  # m: a point farther from the surface is none of it
+_WIDER = 1.0  # m beyond the usual edge, for so long:
+_LONG = 30.0  # m
+
+
+def report(found: Reconstruction, cloud: RoadCloud) -> dict[str, Any]:
+    """Return the report as JSON data; lengths in m, crossfall in percent."""
+    geometry = RoadGeometry(found.parameters)
+    section = found.measured.section
+    violations = check(found.parameters)
+    return {
+        "cloud": _cloud(cloud),
+        "road": section.kind,
+        "length": round(geometry.length, 3),
+        "centreline": _centreline(found),
+        "section": section_report(section),
+        "surface": _surface(found, cloud, geometry),
+        "edges": {name: _edges(side, found, geometry) for name, side in section.sides.items()},
+        "lines": _lines(found, geometry),
+        "crossfall": {
+            name: _figures(100.0 * (_fall(found, name) - _model_fall(geometry, name, found.measured.stations)))
+            for name in section.sides
+        },
+        "widenings": {name: _widenings(side, found.measured.stations) for name, side in section.sides.items()},
+        "objects": _objects(found),
+        "rules_broken": [asdict(violation) for violation in violations],
+        "notes": found.notes,
+    }
+
+
+def _cloud(cloud: RoadCloud) -> dict[str, Any]:
+    return {
+        "points": cloud.read,
+        "classes": cloud.classes,
+        "pavement_by": "class" if cloud.labelled else "brightness",
+        "markings_by": "class" if cloud.marked else "brightness",
+    }
+
+
+def _centreline(found: Reconstruction) -> dict[str, Any]:
+    """Return how far the measured axis is from the alignment, and how sure it is."""
+    fit, std = found.measured.fit, found.centre.std[np.isfinite(found.centre.raw)]
+    return {
+        "elements": len(fit.alignment.elements),
+        "from_alignment": {
+            "rms": round(fit.rms, 4),
+            "p95": round(fit.p95, 4),
+            "largest": round(fit.worst, 4),
+            "largest_station": round(fit.worst_station, 1),
+        },
+        "height_from_profile": {
+            "rms": round(fit.height_rms, 4),
+            "p95": round(fit.height_p95, 4),
+            "largest": round(fit.height_worst, 4),
+            "largest_station": round(fit.height_worst_station, 1),
+        },
+        "std": {"mean": round(float(std.mean()), 4), "largest": round(float(std.max()), 4)},
+        "seen": round(float(np.isfinite(found.centre.raw).mean()), 4),
+    }
+
+
+def section_report(section: Section) -> dict[str, Any]:
+    """Return the cross-section's widths with their standard deviations."""
+    median = section.median
+    return {
+        "standard": standard_section(section),
+        "median": median.to_dict() if median else None,
+        "sides": {name: _side(side) for name, side in section.sides.items()},
+    }
+
+
+def _side(side: SideSection) -> dict[str, Any]:
+    return {
+        "lanes": [lane.to_dict() for lane in reversed(side.lanes)],
+        "inner_offset": side.inner_offset.to_dict(),
+        "inner_edge_strip": side.inner_strip.to_dict(),
+        "outside_of_lanes": side.outer_width.to_dict(),
+        "outer_edge_strip": side.strip.to_dict(),
+        "hard_shoulder": side.shoulder.to_dict(),
+        "paved_width": side.paved_width.to_dict(),
+        "outer_edge_seen": side.edge_seen,
+        "outermost_line_is_edge": side.closed,
+    }
+
+
+def _surface(found: Reconstruction, cloud: RoadCloud, geometry: RoadGeometry) -> dict[str, Any]:
+    """Return how far the pavement's points are above the reconstructed surface, by side."""
+    chosen = np.flatnonzero(cloud.of(Kind.PAVEMENT, Kind.MARKING)) if cloud.labelled else cloud.surface
+    chosen = chosen[:: max(1, len(chosen) // _MOST_POINTS)]
+    station, offset = geometry.alignment.project(cloud.xyz[chosen, :2])
+    result: dict[str, Any] = {}
+    for name, section in geometry.sections.items():
+        inside = (station > 0.0) & (station < geometry.length) & (offset * section.carriageway.sign > 0.0)
+        own = np.flatnonzero(inside)
+        distance, bounds = np.abs(offset[own]), section.distances(station[own])
+        own = own[(distance > bounds[:, 0] + _FROM_EDGES) & (distance < bounds[:, -2] - _FROM_EDGES)]
+        above = cloud.xyz[chosen[own], 2] - geometry.elevation(station[own], offset[own])
+        result[name] = {"points": len(own), **_figures(above[np.abs(above) < _FAULT])}
+    return result
+
+
+def _edges(side: SideSection, found: Reconstruction, geometry: RoadGeometry) -> dict[str, Any]:
+    """Return how far the edges seen in each stretch are outside of the reconstructed ones."""
+    stations = found.measured.stations
+    section = geometry.sections[side.side]
+    outer = np.where(side.usual, side.outer_edge.offsets - section.main_edge(stations), np.nan)
+    inner = side.inner_edge.offsets - section.distances(stations)[:, 0]
+    return {"outer": _figures(outer), "inner": _figures(inner) if found.measured.section.kind == "dual" else {}}
+
+
+def _lines(found: Reconstruction, geometry: RoadGeometry) -> dict[str, Any]:
+    """Return how far each line's middle is to the left of the reconstructed one, and its own scatter."""
+    stations = found.measured.stations
+    result: dict[str, Any] = {}
+    section = found.measured.section
+    for name, marking in found.parameters.of_type(LineMarking).items():
+        side = section.sides["left" if marking.carriageway.endswith("left") else "right"]
+        line = section.middle if marking.kind == "free" else side.lines[len(side.lines) - 1 - marking.boundary]
+        if line is None:
+            continue
+        left, right = geometry.marking_edges(marking, stations)
+        result[name] = {
+            **_figures(line.measured - 0.5 * (left + right)),
+            "std": round(float(np.nanmean(line.std)), 4),
+            "width": {"value": round(line.width, 3), "std": round(line.width_std, 4)},
+            "painted": round(line.painted, 3),
+        }
+    return result
+
+
+def _fall(found: Reconstruction, name: Any) -> Float:
+    return found.surfaces[name].fall
+
+
+def _model_fall(geometry: RoadGeometry, name: Any, stations: Float) -> Float:
+    return geometry.crossfall(geometry.sections[name].carriageway, stations)
+
+
+def _widenings(side: SideSection, stations: Float) -> list[dict[str, float]]:
+    """Return stretches where the pavement is wider than usual: exits, entries, bays, which aren't reconstructed."""
+    edge = side.outer_edge.offsets
+    usual = float(np.nanmedian(np.where(side.usual, edge, np.nan))) if side.usual.any() else np.nan
+    wide = np.isfinite(edge) & (edge > usual + _WIDER)
+    result = []
+    for part in np.split(np.arange(len(wide)), np.flatnonzero(np.diff(wide)) + 1):
+        if len(part) and wide[part[0]] and stations[part[-1]] - stations[part[0]] >= _LONG:
+            extra = float(np.median(edge[part]) - usual)
+            result.append(
+                {
+                    "start": round(float(stations[part[0]]), 1),
+                    "end": round(float(stations[part[-1]]), 1),
+                    "wider_by": round(extra, 2),
+                }
+            )
+    return result
+
+
+def _objects(found: Reconstruction) -> dict[str, Any]:
+    measured = found.measured
+    return {
+        "barriers": [
+            {
+                "kind": item.kind,
+                "start_station": round(item.start, 2),
+                "end_station": round(item.end, 2),
+                "offset": {"value": round(item.offset, 3), "std": round(item.offset_std, 4)},
+                "height": round(item.height, 2),
+                "points": item.points,
+            }
+            for item in measured.barriers
+        ],
+        "delineators": [
+            {
+                "station": round(item.station, 2),
+                "offset": round(item.offset, 3),
+                "std": round(item.std, 3),
+                "points": item.points,
+            }
+            for item in measured.posts
+        ],
+    }
+
+
+def _figures(difference: Float) -> dict[str, Any]:
+    """Return the usual figures of differences (N,), m; NaN are left out."""
+    known = difference[np.isfinite(difference)]
+    if not len(known):
+        return {}
+    return {
+        "mean": round(float(known.mean()), 4),
+        "rms": round(float(np.sqrt((known**2).mean())), 4),
+        "p95": round(float(np.percentile(np.abs(known), 95)), 4),
+    }

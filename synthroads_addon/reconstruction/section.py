@@ -1,0 +1,422 @@
+"""The cross-section in numbers, each with its standard deviation: lanes, strips, shoulders, median."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import ndimage
+
+from ..road.guidelines import STANDARD_CROSS_SECTIONS, StandardCrossSection
+from .edges import Edge, paved_edge, stretch_count
+from .layout import Band, Kind, Layout
+from .lines import Line
+from .profiles import Profiles
+from .smoothing import mean_with_std
+
+Float = NDArray[np.float64]
+Side = Literal["left", "right"]
+
+EDGE_LINE, NARROW_LINE = 0.30, 0.15
+"""Widths of outer edge lines and of all others on motorways, m (RMS)."""
+_RURAL_EDGE_LINE, _RURAL_LINE = 0.25, 0.12  # on other roads (RMS)
+_LINE_TOLERANCE = 0.05  # m: a measured width so near to a usual one is that
+_WIDEST_STRIP = 1.25  # m: pavement beyond the outermost lane that is wider has a hard shoulder
+_USUAL_STRIP = 0.5
+_FEWEST_EDGES = 0.2  # of the stretches must show an edge
+_AROUND, _SOLID = 7, 0.8  # stretches around one, and their share of paint: along a dashed line it is less
+_FEWEST_STRETCHES = 6
+_MODE = 0.4  # m about the most common width
+_NARROWEST, _WIDEST_LANE, _WIDEST_HALF = 2.3, 5.2, 8.0  # m from a single carriageway's axis to lines and edges
+_WIDEST = 6.0  # m that a strip or shoulder can be
+STANDARD_TOLERANCE = 0.15
+"""A cross-section all of whose widths are this near (m; half of it per lane) to a standard one's passes for it."""
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """A number that was measured: its value and standard deviation, in the same unit."""
+
+    value: float
+    std: float
+
+    @classmethod
+    def of(cls, values: Float, apart: Float | None = None) -> Estimate:
+        """Return the robust mean of values (K,) in order along the road, see `mean_with_std`."""
+        return cls(*mean_with_std(values, apart))
+
+    def to_dict(self, digits: int = 4) -> dict[str, float | None]:
+        """Return it as JSON data; what isn't finite is null."""
+        return {"value": _finite(self.value, digits), "std": _finite(self.std, digits)}
+
+
+@dataclass(frozen=True)
+class SideSection:
+    """One carriageway, measured outwards from the axis.
+
+    Attributes:
+        side: of the axis.
+        lines: its lines from inside to outside; those of a single carriageway without the middle one. None where a
+            line must be but wasn't seen.
+        boundaries: (K, lanes + 1) distances of the lanes' boundaries from the axis, innermost first, m.
+        apart: (K, lanes + 1) distances of the points that the boundaries lie between, m.
+        inner_edge, outer_edge: of the pavement, as distances from the axis; NaN where not seen.
+        usual: (K,) where the outer edge is that of the road and not of a turnout.
+        inner_offset, inner_strip, outer_width, strip, shoulder: widths, m; ``outer_width`` is that of all pavement
+            outside of the lanes, which ``strip`` and ``shoulder`` share.
+        lanes: widths from inside to outside, m.
+        edge_seen: whether the pavement's outer edge was seen.
+        closed: whether the outermost line is an edge line: else there may be further lanes outside.
+        assumed: name of the standard cross-section that the lanes were taken from, as their lines weren't seen.
+        mirrored: whether the edge line was only seen on the other side of a single carriageway.
+    """
+
+    side: Side
+    lines: list[Line | None]
+    boundaries: Float
+    apart: Float
+    inner_edge: Edge
+    outer_edge: Edge
+    usual: NDArray[np.bool_]
+    inner_offset: Estimate
+    inner_strip: Estimate
+    lanes: list[Estimate]
+    outer_width: Estimate
+    strip: Estimate
+    shoulder: Estimate
+    edge_seen: bool
+    closed: bool
+    assumed: str | None = None
+    mirrored: bool = False
+
+    @property
+    def sign(self) -> int:
+        """Return the sign of the side's offsets."""
+        return 1 if self.side == "left" else -1
+
+    @property
+    def paved_width(self) -> Estimate:
+        """Return the width of the pavement, edge to edge, m."""
+        ends = (self.inner_edge.apart, self.outer_edge.apart)
+        width = np.where(self.usual, self.outer_edge.offsets - self.inner_edge.offsets, np.nan)
+        if self.edge_seen and np.isfinite(width).any():
+            return Estimate.of(width, np.hypot(*ends))
+        parts = [self.inner_strip, *self.lanes, self.outer_width]
+        return Estimate(sum(p.value for p in parts), float(np.sqrt(sum(p.std**2 for p in parts))))
+
+
+@dataclass(frozen=True)
+class Section:
+    """The road's cross-section.
+
+    Attributes:
+        kind: dual or single carriageway.
+        sides: by name.
+        middle: the middle line of a single carriageway.
+        standard: name of the standard cross-section that it passes for, or None.
+        distance: largest difference (m) from the nearest standard one, whose name is ``nearest``.
+        nearest: see ``distance``.
+    """
+
+    kind: Kind
+    sides: dict[Side, SideSection]
+    middle: Line | None
+    standard: str | None
+    nearest: str
+    distance: float
+
+    @property
+    def median(self) -> Estimate | None:
+        """Return the width between the carriageways' inner edges, m; None for a single carriageway."""
+        if self.kind == "single":
+            return None
+        left, right = self.sides["left"].inner_offset, self.sides["right"].inner_offset
+        return Estimate(left.value + right.value, float(np.hypot(left.std, right.std)))
+
+
+def measure_section(profiles: Profiles, layout: Layout, marked: bool) -> Section:
+    """Return the cross-section of profiles along the alignment.
+
+    Args:
+        profiles: along the alignment, so that offset 0 is the axis.
+        layout: of these profiles.
+        marked: whether paint is known by class; if not, lines look wider than they are and get the usual widths.
+    """
+    names: tuple[Side, ...] = ("right", "left")
+    if layout.kind == "single":
+        (band,) = layout.bands
+        sides = {name: _half(profiles, layout, band, name, marked) for name in names}
+        return Section("single", sides, band.middle, None, "", np.inf)
+    sides = {name: _side(profiles, layout, band, name, marked) for name, band in zip(names, layout.bands, strict=True)}
+    nearest, distance = nearest_standard(sides)
+    standard = nearest if distance <= STANDARD_TOLERANCE else None
+    return Section(layout.kind, sides, None, standard, nearest, distance)
+
+
+def line_width(line: Line | None, kind: Literal["edge", "lane", "inner"], road: Kind, marked: bool) -> float:
+    """Return the width (m) that a line is taken to have: measured, or the usual one if it is near to that."""
+    usual = EDGE_LINE if kind == "edge" else NARROW_LINE
+    if road == "single":
+        usual = _RURAL_EDGE_LINE if kind == "edge" else _RURAL_LINE
+    if line is None or not marked:
+        return usual
+    known = (_RURAL_LINE, NARROW_LINE, _RURAL_EDGE_LINE, EDGE_LINE)
+    near = min(known, key=lambda width: abs(width - line.width))
+    if abs(usual - line.width) <= _LINE_TOLERANCE:
+        return usual
+    return near if abs(near - line.width) <= _LINE_TOLERANCE else float(np.clip(round(line.width, 2), 0.05, 1.0))
+
+
+def _side(profiles: Profiles, layout: Layout, band: Band, name: Side, marked: bool) -> SideSection:
+    """Return one carriageway of a dual one."""
+    sign = 1 if name == "left" else -1
+    if len(band.lines) < 2:
+        return _by_width(profiles, layout, band, name)
+    lines, distances, apart = _ordered(band, sign)
+    distances[:, 0] += 0.5 * line_width(lines[0], "inner", "dual", marked)
+    outer = _outwards(paved_edge(profiles, layout.paved, sign * _everywhere(distances[:, -1]), sign), sign)
+    if not _open(lines[-1], outer):
+        distances[:, -1] -= 0.5 * line_width(lines[-1], "edge", "dual", marked)
+    first = _everywhere(distances[:, 0])
+    inner = _outwards(paved_edge(profiles, layout.paved, sign * first, -sign, first), sign)
+    return _summarised(name, lines, (distances, apart), inner, outer)
+
+
+def _half(profiles: Profiles, layout: Layout, band: Band, name: Side, marked: bool) -> SideSection:
+    """Return one direction of a single carriageway, from the axis outwards."""
+    sign = 1 if name == "left" else -1
+    count = stretch_count(profiles)
+    beside = {s: _beside(band, s, marked) for s in (1, -1)}
+    lines: list[Line | None] = [band.middle, *beside[sign]]
+    columns = [np.zeros(count), *(sign * line.offsets for line in lines[1:] if line is not None)]
+    apart = [np.zeros(count), *(line.apart for line in lines[1:] if line is not None)]
+    outer = _outwards(paved_edge(profiles, layout.paved, np.full(count, sign * _NARROWEST), sign, _WIDEST_HALF), sign)
+    mirrored = len(lines) == 1 and bool(beside[-sign])
+    if len(lines) > 1:
+        columns[-1] = columns[-1] - 0.5 * line_width(lines[-1], "edge", "single", marked)
+    elif mirrored:
+        other = min(abs(line.offset) for line in beside[-sign])
+        columns.append(np.full(count, other - 0.5 * line_width(None, "edge", "single", marked)))
+        apart.append(np.zeros(count))
+        lines.append(None)
+    else:  # no edge line at all: the lane reaches to the pavement's edge
+        edge = outer.offsets if np.isfinite(outer.offsets).any() else np.full(count, 0.5 * band.width)
+        columns.append(edge)
+        apart.append(outer.apart)
+        lines.append(None)
+    inner = Edge(np.zeros(count), np.zeros(count))
+    found = _summarised(name, lines, (np.column_stack(columns), np.column_stack(apart)), inner, outer)
+    nothing = Estimate(0.0, 0.0)
+    return replace(found, inner_offset=nothing, inner_strip=nothing, mirrored=mirrored)
+
+
+def _beside(band: Band, sign: int, marked: bool) -> list[Line]:
+    """Return the lines of one half of a single carriageway from inside to outside.
+
+    Where brightness tells paint, seams and verges pass for lines too: only the best in a lane's distance counts.
+    """
+    lines = sorted(
+        (line for line in band.lines if sign * line.offset > _NARROWEST), key=lambda line: sign * line.offset
+    )
+    if marked:
+        return lines
+    near = [line for line in lines if sign * line.offset < _WIDEST_LANE]
+    return [max(near, key=lambda line: line.length * line.width)] if near else []
+
+
+def _by_width(profiles: Profiles, layout: Layout, band: Band, name: Side) -> SideSection:
+    """Return a carriageway whose lines aren't seen: with the lanes of the standard cross-section of about its width."""
+    sign = 1 if name == "left" else -1
+    middle = np.full(stretch_count(profiles), 0.5 * (band.low + band.high))
+    reach = 0.5 * band.width + _WIDEST
+    outer = _outwards(paved_edge(profiles, layout.paved, middle, sign, reach), sign)
+    inner = _outwards(paved_edge(profiles, layout.paved, middle, -sign, np.abs(middle)), sign)
+    width = mean_with_std(outer.offsets - inner.offsets)[0]
+    width = width if np.isfinite(width) else band.width
+    name_of = min(STANDARD_CROSS_SECTIONS, key=lambda key: abs(STANDARD_CROSS_SECTIONS[key].paved_width - width))
+    row = STANDARD_CROSS_SECTIONS[name_of]
+    first = inner.offsets + row.inner_edge_strip
+    columns = [first + sum(row.lanes[::-1][:i]) for i in range(len(row.lanes) + 1)]
+    lines: list[Line | None] = [None] * len(columns)
+    apart = np.tile(inner.apart[:, None], len(columns))
+    found = _summarised(name, lines, (np.column_stack(columns), apart), inner, outer)
+    lanes = [Estimate(lane, np.inf) for lane in reversed(row.lanes)]
+    return replace(found, lanes=lanes, inner_strip=Estimate(row.inner_edge_strip, np.inf), assumed=name_of)
+
+
+def _open(line: Line | None, outer: Edge) -> bool:
+    """Return whether the outermost line parts lanes, the outer one of which the cloud doesn't show."""
+    return line is not None and not line.solid and not _seen(outer)
+
+
+def _seen(edge: Edge) -> bool:
+    return bool(np.isfinite(edge.offsets).mean() > _FEWEST_EDGES)
+
+
+def _everywhere(distance: Float) -> Float:
+    """Return distances (K,) with the median where they aren't known."""
+    return np.where(np.isfinite(distance), distance, np.nanmedian(distance))
+
+
+def _outwards(edge: Edge, sign: int) -> Edge:
+    return Edge(sign * edge.offsets, edge.apart)
+
+
+def _summarised(
+    name: Side, lines: list[Line | None], boundaries: tuple[Float, Float], inner: Edge, outer: Edge
+) -> SideSection:
+    """Return a side's widths from what was measured stretch by stretch."""
+    distance, apart = boundaries
+    lanes = [
+        Estimate.of(distance[:, i + 1] - distance[:, i], np.hypot(apart[:, i], apart[:, i + 1]))
+        for i in range(distance.shape[1] - 1)
+    ]
+    edge_seen = _seen(outer)
+    usual = _usual(outer.offsets - distance[:, -1], lines[-1])
+    outside = Estimate(_USUAL_STRIP, np.inf)
+    if edge_seen:
+        width = np.where(usual, outer.offsets - distance[:, -1], np.nan)
+        outside = Estimate.of(width, np.hypot(outer.apart, apart[:, -1]))
+    outside = Estimate(float(np.clip(outside.value, 0.0, 2.0 + _WIDEST)), outside.std)
+    strip, shoulder = _shared(outside)
+    inner_offset, inner_strip = _inside(distance[:, 0], apart[:, 0], inner)
+    return SideSection(
+        side=name,
+        lines=lines,
+        boundaries=distance,
+        apart=apart,
+        inner_edge=inner,
+        outer_edge=outer,
+        usual=usual,
+        inner_offset=inner_offset,
+        inner_strip=inner_strip,
+        lanes=lanes,
+        outer_width=outside,
+        strip=strip,
+        shoulder=shoulder,
+        edge_seen=edge_seen,
+        closed=not _open(lines[-1], outer),
+    )
+
+
+def _inside(first: Float, apart: Float, inner: Edge) -> tuple[Estimate, Estimate]:
+    """Return the distance of the pavement's inner edge from the axis, and the width of the strip up to the lanes."""
+    if _seen(inner):
+        offset = Estimate.of(inner.offsets, inner.apart)
+        strip = Estimate.of(first - inner.offsets, np.hypot(apart, inner.apart))
+    else:
+        offset = Estimate(Estimate.of(first).value - _USUAL_STRIP, np.inf)
+        strip = Estimate(_USUAL_STRIP, np.inf)
+    return (
+        Estimate(max(0.0, offset.value), offset.std),
+        Estimate(float(np.clip(strip.value, 0.0, 2.0)), strip.std),
+    )
+
+
+def _usual(outside: Float, line: Line | None) -> NDArray[np.bool_]:
+    """Return where (K,) the pavement outside of the lanes (K,), m, is that of the road itself.
+
+    Beside exits and entries the edge line is a dashed one; beside an emergency bay the pavement is wider.
+    """
+    usual = np.isfinite(outside)
+    if line is not None and line.solid:
+        cover = np.where(np.isfinite(line.cover), line.cover, 0.0)
+        solid = ndimage.uniform_filter1d(cover, _AROUND, mode="nearest") > _SOLID
+        usual &= solid if (solid & usual).sum() >= _FEWEST_STRETCHES else usual
+    if not usual.any():
+        return usual
+    count, edges = np.histogram(outside[usual], np.arange(-1.0, 10.0, 0.1))
+    peak = int(ndimage.uniform_filter1d(count.astype(np.float64), 3).argmax())
+    return usual & (np.abs(outside - edges[peak] - 0.05) < _MODE)
+
+
+def _ordered(band: Band, sign: int) -> tuple[list[Line | None], Float, Float]:
+    """Return the lines of one side from inside to outside, their distances (K, lines) from the axis, and how far apart
+    the points are that these lie between."""
+    seen: list[tuple[float, Line | None]] = [(sign * line.offset, line) for line in band.lines]
+    seen += [(sign * offset, None) for offset in band.missing]
+    seen.sort(key=lambda item: item[0])
+    lines = [line for _, line in seen]
+    count = len(band.lines[0].offsets)
+    nowhere, together = np.full(count, np.nan), np.zeros(count)
+    distances = np.column_stack([sign * line.offsets if line is not None else nowhere for line in lines])
+    apart = np.column_stack([line.apart if line is not None else together for line in lines])
+    for number, line in enumerate(lines):
+        if line is None:  # evenly between its neighbours
+            before = max(i for i in range(number) if lines[i] is not None)
+            after = min(i for i in range(number, len(lines)) if lines[i] is not None)
+            share = (number - before) / (after - before)
+            distances[:, number] = (1.0 - share) * distances[:, before] + share * distances[:, after]
+    return lines, distances, apart
+
+
+def _shared(outside: Estimate) -> tuple[Estimate, Estimate]:
+    """Return the edge strip and hard shoulder that share the pavement outside of the lanes.
+
+    Nothing on the road parts them: the strip is as wide as that of the standard cross-section which fits best.
+    """
+    if outside.value <= _WIDEST_STRIP:
+        return outside, Estimate(0.0, 0.0)
+    rows = STANDARD_CROSS_SECTIONS.values()
+    best = min(rows, key=lambda row: abs(row.hard_shoulder + row.outer_edge_strip - outside.value))
+    strip = best.outer_edge_strip
+    return Estimate(strip, 0.0), Estimate(min(outside.value - strip, _WIDEST), outside.std)
+
+
+def nearest_standard(sides: dict[Side, SideSection]) -> tuple[str, float]:
+    """Return the standard cross-section that both carriageways are nearest to, and the largest difference (m)."""
+    distances = {
+        name: max(_distance(side, row) for side in sides.values()) for name, row in STANDARD_CROSS_SECTIONS.items()
+    }
+    best = min(distances, key=lambda name: distances[name])
+    return best, distances[best]
+
+
+def _distance(side: SideSection, row: StandardCrossSection) -> float:
+    """Return the largest difference of a width, m; infinite for another number of lanes. A lane's counts twice."""
+    if len(side.lanes) != len(row.lanes):
+        return float("inf")
+    apart = [2.0 * abs(lane.value - width) for lane, width in zip(side.lanes, reversed(row.lanes), strict=True)]
+    apart.append(abs(side.inner_offset.value - row.median / 2.0))
+    apart.append(abs(side.inner_strip.value - row.inner_edge_strip))
+    if side.edge_seen:
+        apart.append(abs(side.outer_width.value - row.hard_shoulder - row.outer_edge_strip))
+    return max(apart)
+
+
+def snapped(section: Section) -> Section:
+    """Return a cross-section with the widths of the standard one that it passes for, else as it is."""
+    if section.standard is None:
+        return section
+    row = STANDARD_CROSS_SECTIONS[section.standard]
+
+    def exact(value: float, measured: Estimate) -> Estimate:
+        return Estimate(value, measured.std)
+
+    sides = {
+        name: replace(
+            side,
+            inner_offset=exact(row.median / 2.0, side.inner_offset),
+            inner_strip=exact(row.inner_edge_strip, side.inner_strip),
+            lanes=[exact(width, lane) for width, lane in zip(reversed(row.lanes), side.lanes, strict=True)],
+            outer_width=exact(row.hard_shoulder + row.outer_edge_strip, side.outer_width),
+            strip=exact(row.outer_edge_strip, side.strip),
+            shoulder=exact(row.hard_shoulder, side.shoulder),
+        )
+        for name, side in section.sides.items()
+    }
+    return replace(section, sides=sides)
+
+
+def standard_section(section: Section) -> dict[str, Any] | None:
+    """Return what the report says of the nearest standard cross-section; None for a single carriageway."""
+    if section.kind == "single":
+        return None
+    distance = _finite(section.distance, 3)
+    return {"name": section.nearest, "largest_difference": distance, "within_tolerance": section.standard is not None}
+
+
+def _finite(value: float, digits: int) -> float | None:
+    return round(float(value), digits) if np.isfinite(value) else None

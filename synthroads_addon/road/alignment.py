@@ -1,0 +1,402 @@
+"""Horizontal alignment: lines, arcs and clothoids chained from a start point and heading.
+
+Everything is parameterised by curvature, which varies linearly along an element, so that a line, an arc, a clothoid
+and anything nearly one of them are the same case. The heading is then a quadratic of the station and exact; the
+position is its integral, for which no closed form is stable. Each element is cut into pieces that turn by at most
+0.25 rad. On a piece z(v) = x + iy is a power series in v = u / h, u the station from the piece's middle and h half its
+length: with K = k h and C = k' h^2 the direction w = exp(i (K v + C v^2 / 2)) obeys w' = i (K + C v) w, hence
+
+    w[n+1] = i (K w[n] + C w[n-1]) / (n + 1),        z[n+1] = h w[n] / (n + 1).
+
+Twelve terms leave less than 1e-14 of the piece's length. Nothing is divided by a radius or by a difference of
+curvatures, so infinity and nearly equal radii need no branch.
+
+Beyond its ends an alignment goes on straight along its end tangents.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..base.errors import InputError
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+Kind = Literal["line", "arc", "clothoid"]
+
+#: A change of curvature times length below this (rad) is an arc or a line: a clothoid so flat breaks other programs'
+#: formulas (IFC readers divide by the difference), and the arc through it is less than 1e-7 of its length away.
+FLAT_CLOTHOID = 1e-6
+#: A turn below this (rad) is a line: 0.1 mm of deviation on the longest straight the rules allow, 2 km.
+FLAT_ARC = 1e-7
+#: Curvatures beyond this (1/m) are refused: no road has a radius under a metre, but a radius typed as a curvature is.
+CURVATURE_LIMIT = 1.0
+
+_PIECE_TURN = 0.25  # rad
+_TERMS = 12
+_NODE_SPACING = 20.0  # m, of the coarse nodes that start a projection
+_LEAF = 4096  # points projected at a time: their temporaries stay in the cache
+_PAIRS = 1_000_000  # distances held at a time
+_BLOCK = 65_536  # stations evaluated at a time
+
+
+@dataclass(frozen=True)
+class Element:
+    """One horizontal element; its curvature varies linearly with the station.
+
+    Attributes:
+        length: m, > 0.
+        curvature_start: 1/m at its start, positive in a left curve.
+        curvature_end: 1/m at its end.
+
+    Raises:
+        InputError: a value is not a finite number or out of range.
+    """
+
+    length: float
+    curvature_start: float
+    curvature_end: float
+
+    def __post_init__(self) -> None:
+        finite_array("element.length", self.length)
+        if self.length <= 0:
+            raise InputError("element.length", self.length, "a length above 0 m is needed")
+        for name in ("curvature_start", "curvature_end"):
+            value = getattr(self, name)
+            finite_array(f"element.{name}", value)
+            if abs(value) > CURVATURE_LIMIT:
+                raise InputError(f"element.{name}", value, f"from -{CURVATURE_LIMIT:g} to {CURVATURE_LIMIT:g} 1/m")
+
+    @property
+    def kind(self) -> Kind:
+        """What the element is, told by angles (`FLAT_CLOTHOID`, `FLAT_ARC`), so that it doesn't depend on scale.
+
+        What is no clothoid is well represented by `mean_curvature`, which is not zero where the kind is "arc".
+        """
+        if abs(self.curvature_end - self.curvature_start) * self.length >= FLAT_CLOTHOID:
+            return "clothoid"
+        return "arc" if abs(self.turn) >= FLAT_ARC else "line"
+
+    @property
+    def mean_curvature(self) -> float:
+        """Mean of both curvatures, 1/m."""
+        return 0.5 * (self.curvature_start + self.curvature_end)
+
+    @property
+    def turn(self) -> float:
+        """Change of heading along the element, rad."""
+        return self.mean_curvature * self.length
+
+
+class Alignment:
+    """A chain of elements with a start; evaluated in float64 at any station, and inverted.
+
+    Stations are metres along the axis in the map plane, 0 at the start. At an element's border curvature is that of
+    the element which begins there; at the very end that of the last one; beyond the ends it is 0.
+
+    Attributes:
+        elements: tuple of E elements.
+        element_starts: (E + 1,) stations of their borders, the last one the length.
+        length: m.
+        x, y: map position of the start, m.
+        start_heading: rad, counter-clockwise from +x (east).
+    """
+
+    def __init__(self, elements: Sequence[Element], x: float = 0.0, y: float = 0.0, heading: float = 0.0) -> None:
+        """Raise InputError without elements, or where x, y or heading is not a finite number."""
+        for name, value in (("x", x), ("y", y), ("heading", heading)):
+            finite_array(f"alignment.{name}", value)
+        if not elements:
+            raise InputError("alignment.elements", None, "at least one element is needed")
+        self.elements = tuple(elements)
+        self.x, self.y, self.start_heading = float(x), float(y), float(heading)
+        lengths = [element.length for element in self.elements]
+        self.element_starts = running_sum(lengths)
+        self.length = float(self.element_starts[-1])
+        headings = self.start_heading + running_sum([element.turn for element in self.elements])
+        self._build_pieces(np.asarray(lengths), headings)
+        self._nodes = self._build_nodes()
+
+    def _build_pieces(self, lengths: FloatArray, headings: FloatArray) -> None:
+        """Tabulate the pieces' series; the first and last piece are the tangents beyond the ends."""
+        k_start = np.array([element.curvature_start for element in self.elements])
+        k_change = np.array([element.curvature_end for element in self.elements]) - k_start
+        sharpest = np.maximum(np.abs(k_start), np.abs(k_start + k_change))
+        count = np.maximum(1, np.ceil(sharpest * lengths / _PIECE_TURN)).astype(np.int64)
+        owner = np.repeat(np.arange(len(count)), count)
+        first = np.cumsum(count) - count
+        nth = np.arange(len(owner)) - first[owner]
+        middle = (nth + 0.5) / count[owner]  # as a share of the element
+        half = 0.5 * lengths[owner] / count[owner]
+        heading = headings[owner] + lengths[owner] * middle * (k_start[owner] + 0.5 * middle * k_change[owner])
+        bend = k_start[owner] + middle * k_change[owner]
+        slope = k_change[owner] / lengths[owner]
+        series = _series(bend * half, slope * half**2) * (half * np.exp(1j * heading))
+        odd = 2.0 * series[1::2].sum(axis=0)  # from one end of the piece to the other
+        start = np.concatenate(([0.0], np.cumsum(odd)))
+        series[0] = start[:-1] - (series[2::2].sum(axis=0) - series[1::2].sum(axis=0))
+        tangents = np.zeros((_TERMS + 1, 2), complex)
+        tangents[0] = 0.0, start[-1]
+        tangents[1] = np.exp(1j * headings[[0, -1]])
+
+        def framed(before: float, inner: FloatArray, after: float) -> FloatArray:
+            return np.concatenate(([before], inner, [after]))
+
+        series = np.concatenate((tangents[:, :1], series, tangents[:, 1:]), axis=1)
+        self._series_x, self._series_y = np.ascontiguousarray(series.real), np.ascontiguousarray(series.imag)
+        self._middles = framed(0.0, self.element_starts[:-1][owner] + middle * lengths[owner], self.length)
+        self._halves = framed(1.0, half, 1.0)
+        self._headings = framed(headings[0], heading, headings[-1])
+        self._bends, self._slopes = framed(0.0, bend, 0.0), framed(0.0, slope, 0.0)
+        borders = self.element_starts[:-1][owner] + lengths[owner] * nth / count[owner]
+        # The end itself belongs to the last element.
+        self._borders = np.concatenate((borders, [np.nextafter(self.length, np.inf)]))
+
+    def _build_nodes(self) -> FloatArray:
+        """Return (M, 3) station, x, y of coarse nodes, both ends included, at most `_NODE_SPACING` apart."""
+        borders = np.concatenate((self._borders[:-1], [self.length]))
+        count = np.maximum(1, np.ceil(np.diff(borders) / _NODE_SPACING)).astype(np.int64)
+        owner = np.repeat(np.arange(len(count)), count)
+        nth = np.arange(len(owner)) - (np.cumsum(count) - count)[owner]
+        station = np.append(borders[owner] + np.diff(borders)[owner] * nth / count[owner], self.length)
+        x, y, _, _ = self._evaluate(station)
+        return np.column_stack((station, x, y))
+
+    def _evaluate(self, station: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+        """Return x, y from the start, heading and curvature at flat stations."""
+        piece = np.searchsorted(self._borders, station, side="right")
+        u = station - self._middles[piece]
+        v = u / self._halves[piece]
+        x, y = self._series_x[_TERMS][piece], self._series_y[_TERMS][piece]
+        for n in range(_TERMS - 1, -1, -1):
+            x *= v
+            x += self._series_x[n][piece]
+            y *= v
+            y += self._series_y[n][piece]
+        bend, slope = self._bends[piece], self._slopes[piece] * u
+        return x, y, self._headings[piece] + u * (bend + 0.5 * slope), bend + slope
+
+    def frame(self, station: ArrayLike) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return position (..., 2) m, heading (...) rad and curvature (...) 1/m at stations of any shape.
+
+        The heading is not wrapped: it goes on counting through full turns. InputError for stations that aren't finite.
+        """
+        wanted = finite_array("station", station)
+        flat = wanted.ravel()
+        out = np.empty((4, flat.size))
+        for start in range(0, flat.size, _BLOCK):
+            block = slice(start, start + _BLOCK)
+            out[:, block] = self._evaluate(flat[block])
+        position = np.stack((out[0] + self.x, out[1] + self.y), axis=-1).reshape(*wanted.shape, 2)
+        return position, out[2].reshape(wanted.shape)[()], out[3].reshape(wanted.shape)[()]
+
+    def position(self, station: ArrayLike) -> FloatArray:
+        """Return the map position (..., 2), m."""
+        return self.frame(station)[0]
+
+    def heading(self, station: ArrayLike) -> FloatArray:
+        """Return the heading (...), rad, counter-clockwise from +x."""
+        return self.frame(station)[1]
+
+    def curvature(self, station: ArrayLike) -> FloatArray:
+        """Return the curvature (...), 1/m, positive in a left curve."""
+        return self.frame(station)[2]
+
+    def project(self, points: ArrayLike) -> tuple[FloatArray, FloatArray]:
+        """Return station (N,) and offset (N,) of map points (N, 2); the offset is positive to the left.
+
+        The foot is the road's nearest point. The tangents beyond the ends serve the points whose nearest point of the
+        road is an end (the nearer tangent, if both would do), so a road that bends round and crosses its own
+        prolongation is measured on the road.
+        Memory beyond the result is bounded. InputError for a wrong shape or points that aren't finite.
+        """
+        wanted = finite_array("points", points)
+        if wanted.ndim != 2 or wanted.shape[1] != 2:
+            raise InputError("points", wanted.shape, "an array of shape (N, 2) is needed")
+        station, offset = np.empty(len(wanted)), np.empty(len(wanted))
+        for chosen, x, y, nodes in self._leaves(wanted[:, 0] - self.x, wanted[:, 1] - self.y):
+            station[chosen], offset[chosen] = self._project_leaf(x, y, nodes)
+        return station, offset
+
+    def project_near(self, points: ArrayLike, station: ArrayLike, reach: float) -> tuple[FloatArray, FloatArray]:
+        """Return station (N,) and offset (N,) of points (N, 2) whose stations are known to within `reach` metres.
+
+        Faster than `project`, it cannot stray to another branch of a road that crosses itself, and it takes the
+        tangents beyond the ends like the road. A foot farther away is replaced by the end of the reach.
+        """
+        guess, wanted = finite_array("station", station), finite_array("points", points)
+        if wanted.shape != (*guess.shape, 2) or guess.ndim != 1:
+            raise InputError("points", wanted.shape, f"the shape ({guess.size}, 2) is needed, one point per station")
+        x, y = wanted[:, 0] - self.x, wanted[:, 1] - self.y
+        found, _, offset = self._find_feet(x, y, guess, guess - reach, guess + reach)
+        return found, offset
+
+    def _leaves(self, x: FloatArray, y: FloatArray) -> Iterator[tuple[IntArray, FloatArray, FloatArray, IntArray]]:
+        """Halve the points along their longer extent until few are left, near few nodes; yield both.
+
+        Points in any order thus fall into compact boxes, and each box meets only the nodes around it.
+        """
+        stack = [(np.arange(len(x)), x, y)] if len(x) else []
+        while stack:
+            chosen, x, y = stack.pop()
+            low, high = np.array([x.min(), y.min()]), np.array([x.max(), y.max()])
+            if len(chosen) <= _LEAF:
+                nodes = self._nodes_near(low, high)
+                if len(chosen) * len(nodes) <= _PAIRS or len(chosen) <= 16:
+                    yield chosen, x, y, nodes
+                    continue
+            half = len(chosen) // 2
+            order = np.argpartition(x if high[0] - low[0] > high[1] - low[1] else y, half)
+            stack += [(chosen[part], x[part], y[part]) for part in (order[:half], order[half:])]
+
+    def _nodes_near(self, low: FloatArray, high: FloatArray) -> IntArray:
+        """Return indices of every node that may be next to the nearest point of something in the box.
+
+        The nearest node of a point is at most half a spacing farther than its foot, hence the margin.
+        """
+        nodes = self._nodes[:, 1:]
+        nearest = np.hypot(*np.maximum(np.maximum(low - nodes, nodes - high), 0.0).T)
+        farthest = np.hypot(*np.maximum(nodes - low, high - nodes).T)
+        return np.flatnonzero(nearest <= farthest.min() + _NODE_SPACING)
+
+    def _project_leaf(self, x: FloatArray, y: FloatArray, nodes: IntArray) -> tuple[FloatArray, FloatArray]:
+        """Start from every node that is a local minimum of the distance and near the least; keep the best foot."""
+        owner, column = _rivals(x, y, self._nodes[nodes, 1], self._nodes[nodes, 2])
+        start = nodes[column]
+        stations = self._nodes[:, 0]
+        low = stations[np.maximum(start - 1, 0)]
+        high = stations[np.minimum(start + 1, len(stations) - 1)]
+        station, along, offset = self._find_feet(x[owner], y[owner], stations[start], low, high)
+        if len(owner) > len(x):
+            order = np.lexsort((np.hypot(along, offset), owner))
+            best = order[np.searchsorted(owner, np.arange(len(x)))]  # owner is sorted, so its first is the best
+            station, along, offset = station[best], along[best], offset[best]
+        beyond = ((station <= 0.0) & (along < 0.0)) | ((station >= self.length) & (along > 0.0))
+        if beyond.any():
+            station[beyond], offset[beyond] = self._on_tangents(x[beyond], y[beyond])
+        return station, offset
+
+    def _on_tangents(self, x: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return station and offset on the nearer of both tangents, of points that lie beyond an end."""
+        feet = []
+        for end, side in ((0.0, -1.0), (self.length, 1.0)):
+            px, py, heading, _ = (float(value[0]) for value in self._evaluate(np.array([end])))
+            along = (x - px) * np.cos(heading) + (y - py) * np.sin(heading)
+            offset = (y - py) * np.cos(heading) - (x - px) * np.sin(heading)
+            feet.append((end + along, offset, np.where(along * side > 0.0, np.abs(offset), np.inf)))
+        (station_0, offset_0, distance_0), (station_1, offset_1, distance_1) = feet
+        later = distance_1 < distance_0
+        return np.where(later, station_1, station_0), np.where(later, offset_1, offset_0)
+
+    def _find_feet(
+        self, x: FloatArray, y: FloatArray, station: FloatArray, low: FloatArray, high: FloatArray
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Improve stations between low and high until the tangent there is square to the point.
+
+        The step is exact on a circle: with g along and d across, the angle at its centre is atan2(k g, 1 - k d). A
+        step that leaves the bracket, which narrows by the sign of g, is replaced by bisection.
+        Returns station, the rest g along the tangent (0 but at the road's ends) and the offset d.
+        """
+        station, low, high = station.copy(), low.copy(), high.copy()
+        along, offset = np.empty_like(station), np.empty_like(station)
+        active = np.arange(len(station))
+        for _ in range(60):
+            s = station[active]
+            px, py, heading, bend = self._evaluate(s)
+            dx, dy, cos, sin = x[active] - px, y[active] - py, np.cos(heading), np.sin(heading)
+            g, d = dx * cos + dy * sin, dy * cos - dx * sin
+            along[active], offset[active] = g, d
+            low[active] = left = np.where(g > 0, s, low[active])
+            high[active] = right = np.where(g < 0, s, high[active])
+            target = s + _step(g, d, bend)
+            outside = ~((target >= left) & (target <= right))
+            # At the road's end the bracket closes at once; elsewhere its middle is a safe guess.
+            target[outside] = 0.5 * (left + right)[outside]
+            station[active] = target
+            active = active[np.abs(target - s) > 1e-7]
+            if not len(active):
+                break
+        return station, along, offset
+
+
+def _series(bend: FloatArray, slope: FloatArray) -> NDArray[np.complex128]:
+    """Return (terms + 1, P) coefficients of the position for unit half length; the constant is left 0."""
+    w = np.zeros((_TERMS + 1, len(bend)), complex)
+    z = np.zeros_like(w)
+    w[0] = 1.0
+    for n in range(_TERMS):
+        z[n + 1] = w[n] / (n + 1)
+        w[n + 1] = 1j * (bend * w[n] + (slope * w[n - 1] if n else 0.0)) / (n + 1)
+    return z
+
+
+def _step(along: FloatArray, offset: FloatArray, bend: FloatArray) -> FloatArray:
+    """Return the arc length to the foot on the circle of curvature, for a straight the distance along."""
+    turn, lever = bend * along, 1.0 - bend * offset
+    curved = np.abs(turn) > 1e-9
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.where(curved, np.arctan2(turn, lever) / np.where(curved, bend, 1.0), along / lever)
+
+
+def _rivals(x: FloatArray, y: FloatArray, node_x: FloatArray, node_y: FloatArray) -> tuple[IntArray, IntArray]:
+    """Return (point, node) index pairs, sorted by point: nodes whose distance is a local minimum near the least."""
+    centre_x, centre_y = node_x.mean(), node_y.mean()  # cancellation then stays far below a node spacing
+    p = np.column_stack((x - centre_x, y - centre_y))
+    q = np.stack((node_x - centre_x, node_y - centre_y))
+    # Squared distance less the point's own part, which is the same for all nodes.
+    square = p @ (-2.0 * q) + (q**2).sum(axis=0)
+    own = p[:, 0] ** 2 + p[:, 1] ** 2
+    bound = (np.sqrt(np.maximum(square.min(axis=1) + own, 0.0)) + _NODE_SPACING) ** 2 - own
+    least = square <= bound[:, None]
+    falls = square[:, 1:] < square[:, :-1]
+    least[:, 1:] &= falls
+    least[:, :-1] &= ~falls
+    owner, column = np.divmod(np.flatnonzero(least), least.shape[1])
+    return owner, column
+
+
+def clip_offset(offset: ArrayLike, curvature: ArrayLike, share: float = 0.98) -> FloatArray:
+    """Return the offset cut where its curve would fold, so that 1 - curvature x offset >= 1 - share.
+
+    Args:
+        offset: m, positive to the left; broadcast against `curvature`.
+        curvature: 1/m of the axis, positive in a left curve.
+        share: of the radius that may be used, from 0 up to but not 1.
+
+    Raises:
+        InputError: `share` out of range, or a value that isn't finite.
+    """
+    if not 0.0 <= share < 1.0:
+        raise InputError("share", share, "from 0 up to but not including 1")
+    wanted, bend = np.broadcast_arrays(finite_array("offset", offset), finite_array("curvature", curvature))
+    folds = wanted * bend > share
+    return np.where(folds, share / np.where(folds, bend, 1.0), wanted)[()]
+
+
+def running_sum(values: Sequence[float]) -> FloatArray:
+    """Return (N + 1,) sums of the first 0, 1, ... N values, compensated (Neumaier), so that they don't drift."""
+    total, lost, sums = 0.0, 0.0, [0.0]
+    for value in values:
+        new = total + value
+        lost += (total - new) + value if abs(total) >= abs(value) else (value - new) + total
+        total = new
+        sums.append(total + lost)
+    return np.array(sums)
+
+
+def finite_array(name: str, values: ArrayLike) -> FloatArray:
+    """Return the values as float64, or raise InputError naming the first that is not a finite number."""
+    try:
+        array = np.asarray(values, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise InputError(name, values, "numbers are needed") from None
+    if not np.isfinite(array).all():
+        place = tuple(int(i) for i in np.argwhere(~np.isfinite(array))[0])
+        where = "".join(f"[{i}]" for i in place)
+        raise InputError(f"{name}{where}", float(array[place]), "a finite number is needed")
+    return array

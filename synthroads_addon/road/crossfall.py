@@ -1,0 +1,100 @@
+"""Crossfall along the road: which it must be, and how it runs off from one to the next (RAA)."""
+
+from __future__ import annotations
+
+import math
+
+from ..base.schema import rounded
+from .guidelines import LEAST_CROSSFALL_PERCENT, LIMITS, curve_crossfall_percent
+from .parameters import CrossfallPoint, HorizontalElement
+
+LEAST_RUN_OFF = 0.1
+"""Least slope (%) of the pavement's edge per metre of its distance from the rotation axis, while water could stand."""
+NARROW, NARROW_RUN_OFF = 4.0, 0.225
+"""Where the edge is nearer than this (m) to the rotation axis, its largest slope (%) per metre of that distance."""
+
+
+def run_off_length(design_class: str, half_width: float, start: float, end: float) -> float:
+    """Return the least length (m) in which both carriageways' crossfall can change between two curvatures (1/m)."""
+    lengths = []
+    slowest = steepest_percent(design_class, half_width)
+    for side in ("left", "right"):
+        a, b = wanted_percent(design_class, side, start), wanted_percent(design_class, side, end)
+        if a * b >= 0.0:
+            lengths.append(half_width * abs(b - a) / slowest)
+        else:
+            outside = abs(a) + abs(b) - 2.0 * LEAST_CROSSFALL_PERCENT
+            lengths.append(crossing_length(design_class, half_width) + half_width * outside / slowest)
+    return max(lengths)
+
+
+def steepest_percent(design_class: str, half_width: float) -> float:
+    """Return the largest slope (%) of the pavement's edge, ``half_width`` (m) from its rotation axis, in a run-off."""
+    return LIMITS[design_class].run_off_percent if half_width >= NARROW else NARROW_RUN_OFF * half_width
+
+
+def crossing_length(design_class: str, half_width: float) -> float:
+    """Return the length (m) in which the crossfall goes from 2.5 % one way to 2.5 % the other way.
+
+    Not so short that the edge is steeper than allowed, not so long that water stands; where both can't be had (more
+    than 9 m from the axis to the edge) the latter decides.
+    """
+    change = 2.0 * LEAST_CROSSFALL_PERCENT
+    longest = change / LEAST_RUN_OFF
+    return 0.5 * (longest + min(longest, half_width * change / steepest_percent(design_class, half_width)))
+
+
+def wanted_percent(design_class: str, side: str, curvature: float) -> float:
+    """Return the crossfall (%, positive to the right) of a carriageway on a curvature (1/m).
+
+    Outwards on straights and in curves wide enough for it, else to the inside of the curve.
+    """
+    if abs(curvature) * LIMITS[design_class].radius_outwards < 1.0:
+        return LEAST_CROSSFALL_PERCENT if side == "right" else -LEAST_CROSSFALL_PERCENT
+    return -math.copysign(curve_crossfall_percent(design_class, curvature), curvature)
+
+
+def crossfall_points(
+    design_class: str, side: str, half_width: float, elements: tuple[HorizontalElement, ...]
+) -> tuple[CrossfallPoint, ...]:
+    """Return a carriageway's crossfall along the elements: constant on straights and arcs, run off on clothoids.
+
+    Where it changes its sign it does so in `crossing_length`, so that the part without enough crossfall is short.
+    """
+    corners: list[tuple[float, float]] = []
+    station, from_station, from_percent = 0.0, 0.0, wanted_percent(design_class, side, elements[0].curvature_start)
+    corners.append((station, from_percent))
+    for element in elements:
+        end = station + element.length
+        if element.kind != "clothoid":
+            percent = wanted_percent(design_class, side, element.curvature_start)
+            corners += _run_off(design_class, half_width, (from_station, from_percent), (station, percent))
+            corners.append((end, percent))
+            from_station, from_percent = end, percent
+        station = end
+    if from_station < station:
+        percent = wanted_percent(design_class, side, elements[-1].curvature_end)
+        corners += _run_off(design_class, half_width, (from_station, from_percent), (station, percent))
+    points: list[CrossfallPoint] = []
+    for at, percent in corners:
+        if not points or rounded(at) > points[-1].station:
+            points.append(CrossfallPoint(station=rounded(at), crossfall_percent=rounded(percent)))
+    return tuple(points)
+
+
+def _run_off(
+    design_class: str, half_width: float, begin: tuple[float, float], end: tuple[float, float]
+) -> list[tuple[float, float]]:
+    """Return (station, percent) at the corners after ``begin`` up to ``end``."""
+    (s0, a), (s1, b) = begin, end
+    if a * b >= 0.0 or s1 <= s0:
+        return [end]
+    length = min(s1 - s0, crossing_length(design_class, half_width))
+    before, after = abs(a) - LEAST_CROSSFALL_PERCENT, abs(b) - LEAST_CROSSFALL_PERCENT
+    share = before / (before + after) if before + after > 0.0 else 0.5
+    middle = s0 + (s1 - s0 - length) * share
+    return [
+        (middle, math.copysign(LEAST_CROSSFALL_PERCENT, a)),
+        (middle + length, math.copysign(LEAST_CROSSFALL_PERCENT, b)),
+        end,
+    ]

@@ -1,0 +1,139 @@
+"""Damage of a pavement as exact geometry: how deep the surface lies below the undamaged one."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .section import Pothole, Rut
+from .section_geometry import CarriagewaySection
+
+Float = NDArray[np.float64]
+
+_SLIVER = 2e-4
+"""Columns of a mesh are at least this share of a strip's width apart: below a millimetre."""
+
+
+def damage_depth(section: CarriagewaySection, station: Float, offset: Float) -> Float:
+    """Return the depth (N,) of ruts and potholes at stations and offsets (N,), m; where both are, the deeper one."""
+    pavement = section.carriageway.pavement
+    depth = np.zeros(station.shape)
+    for rut in pavement.ruts:
+        near = (station > rut.start_station) & (station < rut.end_station)
+        if near.any():
+            depth[near] = np.maximum(depth[near], _rut_depth(section, rut, station[near], offset[near]))
+    for pothole in pavement.potholes:
+        near = np.abs(station - pothole.station) < pothole.length / 2.0
+        if near.any():
+            depth[near] = np.maximum(depth[near], _pothole_depth(pothole, station[near], offset[near]))
+    return depth
+
+
+def _rut_depth(section: CarriagewaySection, rut: Rut, station: Float, offset: Float) -> Float:
+    if not _has_lane(section, rut):
+        return np.zeros(station.shape)
+    boundaries = section.lane_boundaries(station)
+    middle = (boundaries[:, rut.lane] + boundaries[:, rut.lane + 1]) / 2.0
+    across = np.abs(section.carriageway.sign * offset - middle)
+    from_track = np.minimum(np.abs(across - rut.track / 2.0), rut.width / 2.0)
+    grown = np.minimum(station - rut.start_station, rut.end_station - station) / rut.ramp_length
+    share = 0.5 - 0.5 * np.cos(np.pi * np.clip(grown, 0.0, 1.0))
+    return rut.depth * share * np.cos(np.pi * from_track / rut.width) ** 2
+
+
+def _pothole_depth(pothole: Pothole, station: Float, offset: Float) -> Float:
+    along = (station - pothole.station) / (pothole.length / 2.0)
+    across = (offset - pothole.offset) / (pothole.width / 2.0)
+    return pothole.depth * np.maximum(1.0 - along**2 - across**2, 0.0)
+
+
+def damaged_strips(section: CarriagewaySection) -> list[int]:
+    """Return the indices (into ``section.kinds``) of the strips that damage lies in, in order."""
+    first, lanes = section.kinds.index("lane"), len(section.carriageway.lanes)
+    found = {first + lanes - 1 - rut.lane for rut in section.carriageway.pavement.ruts if rut.lane < lanes}
+    for pothole in section.carriageway.pavement.potholes:
+        low, high = _across(section, pothole)
+        distances = section.distances(pothole.station)[0]
+        found |= set(np.flatnonzero((distances[:-1] < high) & (distances[1:] > low)).tolist())
+    return sorted(found)
+
+
+def damage_rows(section: CarriagewaySection, tolerance: float) -> list[float]:
+    """Return the stations at which a mesh needs rows to follow the damage within the tolerance (m)."""
+    rows: list[float] = []
+    for rut in section.carriageway.pavement.ruts:
+        ramp = min(rut.ramp_length, (rut.end_station - rut.start_station) / 2.0)
+        steps = np.linspace(0.0, ramp, 2 + _cells_of_cosine(rut.depth, tolerance))
+        rows += [*(rut.start_station + steps), *(rut.end_station - steps)]
+    for pothole in section.carriageway.pavement.potholes:
+        half = pothole.length / 2.0
+        rows += list(pothole.station + np.linspace(-half, half, 1 + _cells_of_bowl(pothole.depth, tolerance)))
+    return rows
+
+
+def damage_columns(
+    section: CarriagewaySection, strip: int, tolerance: float, start: float = -np.inf, end: float = np.inf
+) -> Float:
+    """Return the (K,) shares of a strip's width, from 0 at its inner to 1 at its outer edge, that a mesh needs.
+
+    Args:
+        section: of a carriageway.
+        strip: index into ``section.kinds``.
+        tolerance: largest distance from the surface, m.
+        start, end: stations (m) between which damage counts.
+    """
+    shares = [np.array([0.0, 1.0])]
+    for rut in section.carriageway.pavement.ruts:
+        if rut.start_station > end or rut.end_station < start:
+            continue
+        at = (rut.start_station + rut.end_station) / 2.0
+        middle = section.lane_boundaries(at)[0, rut.lane : rut.lane + 2].mean() if _has_lane(section, rut) else 0.0
+        across = np.linspace(-0.5, 0.5, 1 + 2 * _cells_of_cosine(rut.depth, tolerance)) * rut.width
+        for track in (-rut.track / 2.0, rut.track / 2.0):
+            shares.append(_shares(section, strip, at, middle + track + across))
+    for pothole in section.carriageway.pavement.potholes:
+        if not start <= pothole.station <= end:
+            continue
+        low, high = _across(section, pothole)
+        cells = _cells_of_bowl(pothole.depth, tolerance)
+        shares.append(_shares(section, strip, pothole.station, np.linspace(low, high, cells + 1)))
+    together = np.unique(np.concatenate(shares))
+    inside = together[(together >= 0.0) & (together <= 1.0)]
+    return spaced(inside)
+
+
+def spaced(shares: Float) -> Float:
+    """Return sorted shares (K,) of a strip's width, both ends included, without those that only make slivers."""
+    kept = [shares[0]]
+    for share in shares[1:-1].tolist():
+        if min(share - kept[-1], shares[-1] - share) > _SLIVER:
+            kept.append(share)
+    return np.array([*kept, shares[-1]])
+
+
+def _shares(section: CarriagewaySection, strip: int, station: float, distance: Float) -> Float:
+    inner, outer = section.distances(station)[0, strip : strip + 2]
+    return (distance - inner) / max(outer - inner, 1e-9)
+
+
+def _across(section: CarriagewaySection, pothole: Pothole) -> tuple[float, float]:
+    """Return the distances of a pothole's inner and outer edge."""
+    middle = section.carriageway.sign * pothole.offset
+    return middle - pothole.width / 2.0, middle + pothole.width / 2.0
+
+
+def _has_lane(section: CarriagewaySection, rut: Rut) -> bool:
+    return rut.lane < len(section.carriageway.lanes)
+
+
+def _cells_of_cosine(depth: float, tolerance: float) -> int:
+    """Return into how many chords half a wave of a cosine of this height is cut: depth pi^2 / (16 n^2) off at most."""
+    return int(np.ceil(np.pi / 4.0 * np.sqrt(depth / (0.5 * tolerance)))) + 1
+
+
+def _cells_of_bowl(depth: float, tolerance: float) -> int:
+    """Return into how many cells a bowl's diameter is cut.
+
+    Its slope jumps at the rim by 4 depth / diameter, and cells of a side h across the rim are h / 4 times that off.
+    """
+    return int(np.ceil(depth / (0.5 * tolerance))) + 2

@@ -1,0 +1,430 @@
+"""A digital elevation model: heights of the ground on a grid over the map, from a GeoTIFF or an ESRI ASCII grid.
+
+Rasters are read through `rasterio`, and of them only the tiles that a road comes near to, so that a short road can lie
+on the fine model of a whole country. Every fault is one line that names the file and what is wrong with it.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+import warnings
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NoReturn
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..base.errors import InputError, MissingFileError
+from .alignment import Alignment
+
+if TYPE_CHECKING:
+    from rasterio.crs import CRS
+    from rasterio.io import DatasetReader
+
+Float = NDArray[np.float64]
+Cells = NDArray[np.int64]
+"""Cells (2, ...): their rows and columns."""
+
+LOWEST, HIGHEST = -500.0, 9000.0
+"""Heights beyond these (m) are no ground: mostly nodata that the file doesn't declare."""
+HOLES_SHARE = 0.01
+"""Share of the cells beneath a road that may be without height."""
+HOLE_REACH = 5
+"""A cell without height up to this far (cells) from one that has one is filled: holes of up to 10 cells across."""
+
+_TILE = 256
+_MOST_TILES = 2048  # 1 GiB
+_MOST_CELLS = 2**42
+"""Cells of a raster, read or not: a table of its tiles is held."""
+_MOST_CELLS_OF_A_BLOCK = 2**26
+"""Cells that a raster may store in one piece, as they must be unpacked together."""
+_CELLS = (0.01, 10_000.0)
+"""Shortest and longest side of a cell, m."""
+_FARTHEST = 1e8
+_METRES = ("", "m", "metre", "metres", "meter", "meters")
+_AROUND = np.array([(row, column) for row in (-1, 0, 1) for column in (-1, 0, 1) if (row, column) != (0, 0)]).T
+_BESIDE = np.array([(-1, 1, 0, 0), (0, 0, -1, 1)])
+_STILL, _MOST_ROUNDS = 1e-7, 2000  # of the membrane over a hole: m, rounds
+
+
+@dataclass(frozen=True)
+class Grid:
+    """Where the cells of a raster lie.
+
+    Attributes:
+        east, north: map coordinates of the first cell's centre, m.
+        step_east, step_north: from one column, and from one row, to the next, m; rows mostly run southwards.
+        columns, rows: how many there are.
+    """
+
+    east: float
+    north: float
+    step_east: float
+    step_north: float
+    columns: int
+    rows: int
+
+    @property
+    def cell(self) -> float:
+        """Longer side of a cell, m."""
+        return max(abs(self.step_east), abs(self.step_north))
+
+    def bounds(self) -> tuple[Float, Float]:
+        """Return the least and the greatest (east, north) of the cells' centres, m."""
+        corners = self.position(np.array([(0, self.rows - 1), (0, self.columns - 1)]))
+        return corners.min(axis=1), corners.max(axis=1)
+
+    def position(self, cells: Cells) -> Float:
+        """Return east and north (2, ...) of the centres of cells (2, ...), m."""
+        row, column = cells
+        return np.stack([self.east + column * self.step_east, self.north + row * self.step_north])
+
+    def locate(self, east: Float, north: Float) -> Float:
+        """Return rows and columns with fractions (2, ...) of map coordinates (...), m."""
+        return np.stack([(north - self.north) / self.step_north, (east - self.east) / self.step_east])
+
+    def between_centres(self, located: Float) -> NDArray[np.bool_]:
+        """Return whether rows and columns (2, ...) lie between the centres of the outermost cells."""
+        row, column = located
+        room = 1e-6  # of a cell, for rounding
+        inside = (row >= -room) & (row <= self.rows - 1 + room)
+        return inside & (column >= -room) & (column <= self.columns - 1 + room)
+
+    def first_of_four(self, located: Float) -> Cells:
+        """Return the first of the four cells (2, ...) around rows and columns (2, ...), which may not be NaN."""
+        row, column = np.floor(located).astype(np.int64)
+        return np.stack([np.clip(row, 0, self.rows - 2), np.clip(column, 0, self.columns - 2)])
+
+
+@dataclass(frozen=True)
+class Corridor:
+    """The ground that a road needs.
+
+    Attributes:
+        alignment: centreline in local coordinates.
+        east, north: map coordinates of the local origin, m.
+        reach: to all sides of the centreline, m.
+    """
+
+    alignment: Alignment
+    east: float
+    north: float
+    reach: float
+
+    def points(self, cell: float) -> Iterator[Float]:
+        """Yield east and north (2, N) of map points, half a cell (m) apart or less, up to a cell beyond the reach.
+
+        So each cell that a height within the reach is interpolated from is one of the four around some point.
+        """
+        reach, step = self.reach + cell, cell / 2.0
+        across = np.linspace(-reach, reach, math.ceil(2.0 * reach / step) + 1)
+        bend = max(max(abs(e.curvature_start), abs(e.curvature_end)) for e in self.alignment.elements)
+        length = self.alignment.length + 2.0 * reach
+        stations = np.linspace(-reach, length - reach, math.ceil(length * (1.0 + reach * bend) / step) + 1)
+        for block in np.array_split(stations, math.ceil(len(stations) * len(across) / 250_000)):
+            position, heading, _ = self.alignment.frame(block)
+            east = self.east + position[:, :1] - np.sin(heading)[:, None] * across
+            north = self.north + position[:, 1:] + np.cos(heading)[:, None] * across
+            yield np.stack([east.ravel(), north.ravel()])
+
+
+class ElevationModel:
+    """Heights of the ground in memory, interpolated bilinearly between the centres of the cells.
+
+    Attributes:
+        path: file that it was read from.
+        grid: where its cells lie.
+    """
+
+    def __init__(self, path: str, grid: Grid) -> None:
+        self.path = path
+        self.grid = grid
+        # Tile 0 has no heights: it stands for all that isn't loaded.
+        self._tiles = np.full((1, _TILE, _TILE), np.nan)
+        self._number = np.zeros((-(-grid.rows // _TILE), -(-grid.columns // _TILE)), dtype=np.int64)
+
+    def elevation(self, x: ArrayLike, y: ArrayLike) -> Float:
+        """Return the ground's height (m) at map coordinates (m, east and north) of any shape, same shape.
+
+        NaN outside the centres of the outermost cells, beside cells without height, and where nothing was loaded.
+        """
+        x, y = np.broadcast_arrays(np.asarray(x, dtype=np.float64), np.asarray(y, dtype=np.float64))
+        located = self.grid.locate(x, y)
+        inside = self.grid.between_centres(located)
+        located = np.where(inside, located, 0.0)
+        row, column = first = self.grid.first_of_four(located)
+        down, right = located - first
+        upper = self.at((row, column)) * (1.0 - right) + self.at((row, column + 1)) * right
+        lower = self.at((row + 1, column)) * (1.0 - right) + self.at((row + 1, column + 1)) * right
+        return np.where(inside, upper * (1.0 - down) + lower * down, np.nan)
+
+    def at(self, cells: Cells | tuple[Cells, Cells]) -> Float:
+        """Return the heights (...) of cells (2, ...), m; NaN where there is none."""
+        row, column = cells
+        there = (row >= 0) & (row < self.grid.rows) & (column >= 0) & (column < self.grid.columns)
+        row, column = np.where(there, row, 0), np.where(there, column, 0)
+        number = np.where(there, self._number[row // _TILE, column // _TILE], 0)
+        return self._tiles[number, row % _TILE, column % _TILE]
+
+    def set(self, cells: Cells, heights: Float) -> None:
+        """Give loaded cells (2, N) heights (N,), m."""
+        row, column = cells
+        self._tiles[self._number[row // _TILE, column // _TILE], row % _TILE, column % _TILE] = heights
+
+    def load(self, dataset: DatasetReader, cells: Cells | None) -> None:
+        """Read the tiles that hold cells (2, N), or all.
+
+        Raises:
+            InputError: that is more than fits into memory.
+            rasterio.errors.RasterioIOError: the file is truncated or damaged.
+        """
+        from rasterio.windows import Window
+
+        wanted = np.ones(self._number.shape, dtype=bool) if cells is None else np.zeros(self._number.shape, dtype=bool)
+        if cells is not None:
+            wanted[tuple(cells // _TILE)] = True
+        tiles = np.argwhere(wanted)
+        if len(tiles) > _MOST_TILES:
+            raise _too_fine(self.path)
+        scale, offset = dataset.scales[0], dataset.offsets[0]
+        self._tiles = np.full((len(tiles) + 1, _TILE, _TILE), np.nan)
+        self._number[wanted] = np.arange(1, len(tiles) + 1)
+        for number, (row, column) in enumerate((tiles * _TILE).tolist(), 1):
+            height, width = min(_TILE, self.grid.rows - row), min(_TILE, self.grid.columns - column)
+            values = dataset.read(1, window=Window(column, row, width, height), masked=True)
+            self._tiles[number, :height, :width] = values.astype(np.float64).filled(np.nan) * scale + offset
+
+    def extremes(self) -> Cells:
+        """Return a lowest and a highest of the loaded cells, as (2, 2); none, (2, 0), if none has a height."""
+        if np.isnan(self._tiles).all():
+            return np.empty((2, 0), dtype=np.int64)
+        flat = np.nanargmin(self._tiles), np.nanargmax(self._tiles)
+        number, row, column = np.unravel_index(np.array(flat), self._tiles.shape)
+        tiles = np.array([np.argwhere(self._number == n)[0] for n in number]).T
+        return tiles * _TILE + np.stack([row, column])
+
+
+def read_elevation_model(path: str | os.PathLike[str], epsg: int, corridor: Corridor | None = None) -> ElevationModel:
+    """Return the heights of a GeoTIFF or ESRI ASCII grid.
+
+    Args:
+        path: the file. An ASCII grid without ``.prj`` beside it is taken to be in the map coordinates of ``epsg``.
+        epsg: map coordinate system that it must be in. Of a vertical system only the unit is looked at.
+        corridor: read only what this road needs, and see that nothing is missing: small holes (`HOLES_SHARE`,
+            `HOLE_REACH`) are filled from around them. Without it all is read, and holes stay NaN.
+
+    Raises:
+        MissingFileError: the file doesn't exist or cannot be read.
+        InputError: it is no such raster, or truncated; it has another coordinate system, a rotation, several bands,
+            heights in feet or beyond all mountains; or it doesn't cover the corridor, or has larger holes there.
+    """
+    name = os.fspath(path)
+    try:
+        with Path(name).open("rb"):
+            pass
+    except (OSError, ValueError) as error:  # ValueError: a null byte is in the name
+        reason = getattr(error, "strerror", None) or error
+        raise MissingFileError(name, None, f"an elevation model is needed here ({reason})") from None
+    try:
+        import rasterio
+        from rasterio.errors import CRSError, RasterioError
+    except ImportError as error:
+        missing = isinstance(error, ModuleNotFoundError)
+        wanted = "in Blender install the extension SynthRoads Elevation Models" if missing else "it doesn't load here"
+        raise InputError(name, None, f"an elevation model needs rasterio: {wanted} ({error})") from None
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # what it warns of is refused below
+            with rasterio.open(name) as dataset:
+                _check_kind(name, dataset)
+                _check_system(name, dataset, epsg)
+                model = ElevationModel(name, _grid(name, dataset))
+                cells = _cells_needed(model, corridor) if corridor else None
+                model.load(dataset, cells)
+    except CRSError as error:
+        raise InputError(name, None, f"its coordinate system cannot be read ({_reason(error)})") from None
+    except (RasterioError, OSError) as error:
+        allowed = f"must be a GeoTIFF or ESRI ASCII grid, and complete ({_reason(error)})"
+        raise InputError(name, None, allowed) from None
+    _check_heights(model, model.extremes() if cells is None else cells)
+    if cells is not None:
+        _fill_holes(model, cells)
+    return model
+
+
+def _reason(error: BaseException) -> str:
+    """Return the text of an error's first cause, which says most, in one line."""
+    while error.__cause__ is not None:
+        error = error.__cause__
+    return " ".join(str(error).split())
+
+
+def _check_kind(name: str, dataset: DatasetReader) -> None:
+    """Refuse what is no single band of heights in metres."""
+    if dataset.driver not in ("GTiff", "AAIGrid"):
+        raise InputError(f"{name}: format", dataset.driver, "a GeoTIFF or ESRI ASCII grid is needed")
+    if dataset.count != 1:
+        raise InputError(f"{name}: bands", dataset.count, "exactly one is needed, of heights")
+    if np.dtype(dataset.dtypes[0]).kind not in "iuf":
+        raise InputError(f"{name}: type of number", dataset.dtypes[0], "integers or floats are needed, of heights")
+    _check_unit(name, "heights", dataset.units[0] or "")
+    scale, offset = dataset.scales[0], dataset.offsets[0]
+    if not (math.isfinite(scale) and scale != 0.0 and math.isfinite(offset)):
+        raise InputError(f"{name}: scale and offset", (scale, offset), "finite numbers are needed, the scale not 0")
+
+
+def _check_unit(name: str, what: str, unit: str) -> None:
+    if unit.lower() not in _METRES:
+        raise InputError(f"{name}: unit of {what}", unit, "metres are needed")
+
+
+def _check_system(name: str, dataset: DatasetReader, epsg: int) -> None:
+    """Refuse another map coordinate system than the road's, and feet."""
+    from rasterio.crs import CRS
+    from rasterio.errors import CRSError
+
+    described = Path(name).with_suffix(".prj")
+    if dataset.crs is None and dataset.driver == "AAIGrid" and not described.exists():
+        return
+    if dataset.crs is None:
+        what = f"{described.name} isn't understood" if described.exists() else "the file names none"
+        raise InputError(f"{name}: coordinate system", None, f"{what}; EPSG:{epsg} is needed")
+    own, unit = _horizontal(dataset.crs)
+    try:
+        needed, _ = _horizontal(CRS.from_epsg(epsg))
+    except CRSError:
+        raise InputError("road.epsg", epsg, "must be the EPSG code of a coordinate system") from None
+    code = own.to_epsg()
+    if code is None or code != needed.to_epsg():
+        shown = f"EPSG:{code}" if code else own.to_dict(projjson=True).get("name", "unknown")
+        raise InputError(f"{name}: coordinate system", shown, f"EPSG:{epsg} is needed, the road's own (road.epsg)")
+    _check_unit(name, "coordinates", own.linear_units)
+    _check_unit(name, "heights", unit)
+
+
+def _horizontal(system: CRS) -> tuple[CRS, str]:
+    """Return the horizontal part of a coordinate system, and the unit of its vertical part, if it has one."""
+    parts: list[dict[str, Any]] = system.to_dict(projjson=True).get("components", [])
+    if not parts:
+        return system, ""
+    unit = parts[1]["coordinate_system"]["axis"][0]["unit"]
+    return type(system).from_dict(parts[0]), unit if isinstance(unit, str) else unit["name"]
+
+
+def _grid(name: str, dataset: DatasetReader) -> Grid:
+    transform = dataset.transform
+    if transform.is_identity:
+        raise InputError(f"{name}: georeference", None, "the file has none: it doesn't say where its cells lie")
+    if transform.b != 0.0 or transform.d != 0.0:
+        turned = (transform.b, transform.d)
+        raise InputError(f"{name}: rotation", turned, "rows must run along the east axis, columns along the north axis")
+    if min(dataset.width, dataset.height) < 2:
+        raise InputError(f"{name}: size", (dataset.width, dataset.height), "at least 2 by 2 cells are needed")
+    sides = (abs(transform.a), abs(transform.e))
+    if not (min(sides) >= _CELLS[0] and max(sides) <= _CELLS[1]):
+        raise InputError(f"{name}: sides of a cell", sides, f"from {_CELLS[0]:g} to {_CELLS[1]:g} m are needed")
+    if dataset.width * dataset.height > _MOST_CELLS:
+        size = (dataset.width, dataset.height)
+        raise InputError(f"{name}: size", size, f"at most {_MOST_CELLS / 1e12:.1f} million million cells are possible")
+    if math.prod(dataset.block_shapes[0]) > _MOST_CELLS_OF_A_BLOCK:
+        allowed = f"at most {_MOST_CELLS_OF_A_BLOCK / 1e6:.0f} million cells; store the raster in tiles"
+        raise InputError(f"{name}: size of its blocks", dataset.block_shapes[0], allowed)
+    east, north = transform.c + transform.a / 2.0, transform.f + transform.e / 2.0
+    if not max(abs(east), abs(north)) <= _FARTHEST:
+        raise InputError(f"{name}: place", (east, north), f"must lie within {_FARTHEST:g} m of the map's origin")
+    return Grid(east, north, transform.a, transform.e, dataset.width, dataset.height)
+
+
+def _cells_needed(model: ElevationModel, corridor: Corridor) -> Cells:
+    """Return the cells (2, N) that the corridor's heights are interpolated from; InputError if some aren't there."""
+    grid, missing = model.grid, False
+    area = 2.0 * corridor.reach * (corridor.alignment.length + 2.0 * corridor.reach)
+    if area / abs(grid.step_east * grid.step_north) > _MOST_TILES * _TILE**2:
+        raise _too_fine(model.path)
+    low, high = np.full(2, np.inf), np.full(2, -np.inf)
+    numbers = []
+    for points in corridor.points(grid.cell):
+        located = grid.locate(*points)
+        missing = missing or not grid.between_centres(located).all()
+        low, high = np.minimum(low, points.min(axis=1)), np.maximum(high, points.max(axis=1))
+        row, column = _four_around(grid.first_of_four(located))
+        numbers.append(row * grid.columns + column)
+    if missing:
+        have = _area(*grid.bounds())
+        raise InputError(f"{model.path}: area", None, f"{have} are covered; the road needs {_area(low, high)}")
+    return np.stack(np.divmod(np.unique(np.concatenate(numbers)), grid.columns))
+
+
+def _too_fine(path: str) -> InputError:
+    most = _MOST_TILES * _TILE**2 / 1e6
+    return InputError(f"{path}: size", None, f"at most {most:.0f} million cells; a coarser model is needed")
+
+
+def _four_around(first: Cells) -> Cells:
+    """Return the cells (2, M), each once, that are one of four whose first is among some (2, N)."""
+    corner = first.min(axis=1, keepdims=True)
+    seen = np.zeros(first.max(axis=1) - corner[:, 0] + 2, dtype=bool)
+    seen[tuple(first - corner)] = True
+    seen[1:] |= seen[:-1].copy()
+    seen[:, 1:] |= seen[:, :-1].copy()
+    return np.stack(np.nonzero(seen)) + corner
+
+
+def _area(low: Float, high: Float) -> str:
+    return f"x {low[0]:.1f} to {high[0]:.1f} m, y {low[1]:.1f} to {high[1]:.1f} m"
+
+
+def _check_heights(model: ElevationModel, cells: Cells) -> None:
+    """Refuse cells (2, N) that lie too high or too low."""
+    heights = model.at(cells)
+    wrong = np.flatnonzero((heights < LOWEST) | (heights > HIGHEST))
+    if len(wrong):
+        allowed = f"must be from {LOWEST:g} to {HIGHEST:g} m; is it a nodata value that the file doesn't declare?"
+        raise InputError(f"{model.path}: {_place(model, cells[:, wrong[0]])}", float(heights[wrong[0]]), allowed)
+
+
+def _fill_holes(model: ElevationModel, cells: Cells) -> None:
+    """Fill those of the cells (2, N) that have no height, from around them; InputError where they are too many."""
+    needed = cells.shape[1]
+    cells = cells[:, np.isnan(model.at(cells))]
+    if cells.shape[1] > HOLES_SHARE * needed:
+        share = 100.0 * cells.shape[1] / needed
+        _refuse(model, cells, f"no height, and {share:.3g} % of the cells beneath the road have none")
+    left = cells
+    for _ in range(HOLE_REACH):
+        around = model.at(left[:, :, None] + _AROUND[:, None])
+        known = ~np.isnan(around)
+        count = known.sum(axis=1)
+        rim = count > 0
+        model.set(left[:, rim], np.where(known, around, 0.0)[rim].sum(axis=1) / count[rim])
+        left = left[:, ~rim]
+    if left.size:
+        _refuse(model, left, "no height, and the hole there is too large")
+    _stretch(model, cells)
+
+
+def _stretch(model: ElevationModel, cells: Cells) -> None:
+    """Stretch a membrane over filled cells (2, N), which carries a plane on: each is the mean of those beside it.
+
+    Laplace's equation, by Jacobi's rounds.
+    """
+    heights = model.at(cells)
+    for _ in range(_MOST_ROUNDS):
+        mean = np.nanmean(model.at(cells[:, :, None] + _BESIDE[:, None]), axis=1)
+        model.set(cells, mean)
+        moved, heights = np.abs(mean - heights).max(initial=0.0), mean
+        if moved < _STILL:
+            return
+
+
+def _refuse(model: ElevationModel, holes: Cells, what: str) -> NoReturn:
+    allowed = f"holes of up to {100.0 * HOLES_SHARE:g} % of the cells and {2 * HOLE_REACH} cells across are filled"
+    raise InputError(f"{model.path}: {_place(model, holes[:, holes.shape[1] // 2])}", None, f"{what}; {allowed}")
+
+
+def _place(model: ElevationModel, cell: Cells) -> str:
+    east, north = model.grid.position(cell)
+    return f"height at x {east:.1f} m, y {north:.1f} m"

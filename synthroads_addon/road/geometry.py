@@ -1,0 +1,216 @@
+"""The analytic road: where every strip's boundaries run and how high they lie, at any station, in float64.
+
+This is the truth that the mesh, the cloud and the twin are measured against. The surface is ruled: along one station it
+is a polyline through the boundaries; between stations it follows the alignment, the profile and the crossfall.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from .alignment import Alignment, Element
+from .damage import damage_depth
+from .objects import width_at
+from .parameters import Carriageway, LineMarking, Median, RoadParameters, Turnout
+from .profile import IntersectionPoint, Profile
+from .section_geometry import CarriagewaySection
+from .things.furniture import Side
+from .turnout_geometry import TURNOUT_STRIPS
+
+Float = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Strip:
+    """A lengthwise strip of the road between two neighbouring boundaries.
+
+    Attributes:
+        kind: ``median``, or one of `CarriagewaySection.kinds`.
+        class_name: semantic class of its surface.
+        material: name in the material table.
+        instance: instance number of the object that it belongs to; a strip of turnouts has theirs beside them
+            (`RoadGeometry.instances`).
+        side: carriageway that it belongs to; None for the median.
+    """
+
+    kind: str
+    class_name: str
+    material: str
+    instance: int
+    side: Side | None
+
+
+_SURFACES = {"verge": ("roadside", "verge"), "island": ("roadside", "verge"), "median": ("roadside", "median")}
+_SIDES: tuple[Side, ...] = ("left", "right")
+
+
+class RoadGeometry:
+    """A parameter set's geometry, evaluated analytically in local coordinates.
+
+    Attributes:
+        alignment: the horizontal alignment in the local frame.
+        profile: the vertical profile in local elevation.
+        sections: the carriageways' cross-sections by side.
+        strips: the M strips from left to right.
+    """
+
+    def __init__(self, parameters: RoadParameters) -> None:
+        self.parameters = parameters
+        axis = parameters.alignment
+        self.alignment = Alignment(
+            [Element(e.length, e.curvature_start, e.curvature_end) for e in axis.horizontal],
+            axis.start_x,
+            axis.start_y,
+            np.deg2rad(axis.start_heading_deg),
+        )
+        self.profile = Profile([IntersectionPoint(p.station, p.elevation, p.radius) for p in axis.vertical])
+        self.sections = sections_of(parameters)
+        left, right = self.sections.get("left"), self.sections.get("right")
+        strips: list[Strip] = []
+        if left:
+            strips += _strips(left)[::-1]
+        if left and right:
+            median = next(iter(parameters.of_type(Median).values()), left.carriageway)
+            strips.append(Strip("median", *_SURFACES["median"], median.instance, None))
+        if right:
+            strips += _strips(right)
+        self.strips: tuple[Strip, ...] = tuple(strips)
+
+    @property
+    def length(self) -> float:
+        """Return the length of the centreline, m."""
+        return self.alignment.length
+
+    def crossfall(self, carriageway: Carriageway, station: ArrayLike) -> Float:
+        """Return the crossfall (m/m, positive where the surface falls to the right) at the stations, same shape."""
+        points = carriageway.crossfall
+        return (
+            np.interp(
+                np.asarray(station, dtype=np.float64),
+                [p.station for p in points],
+                [p.crossfall_percent for p in points],
+            )
+            / 100.0
+        )
+
+    def offsets(self, station: ArrayLike) -> Float:
+        """Return the (N, M + 1) offsets of the strips' boundaries at N stations, from left (largest) to right, m."""
+        return self._across({side: section.distances(station) for side, section in self.sections.items()}, True)
+
+    def boundary_elevations(self, station: ArrayLike) -> Float:
+        """Return the (N, M + 1) local elevations of the strips' boundaries at N stations, without damage."""
+        station = np.atleast_1d(np.asarray(station, dtype=np.float64))
+        relative = {
+            side: section.elevations(station, self.crossfall(section.carriageway, station))
+            for side, section in self.sections.items()
+        }
+        return self.profile.elevation(station)[:, None] + self._across(relative, False)
+
+    def elevation(self, station: ArrayLike, offset: ArrayLike) -> Float:
+        """Return the surface's local elevation (N,), damage included; NaN outside the outermost boundaries."""
+        station, offset = _pairs(station, offset)
+        strip = self.strip_index(station, offset)
+        inside = np.flatnonzero(strip >= 0)
+        result = np.full(offset.shape, np.nan)
+        heights, offsets = self.boundary_elevations(station[inside]), self.offsets(station[inside])
+        index, row = strip[inside], np.arange(len(inside))
+        left, right = offsets[row, index], offsets[row, index + 1]
+        share = (left - offset[inside]) / np.maximum(left - right, 1e-300)
+        result[inside] = heights[row, index] * (1.0 - share) + heights[row, index + 1] * share
+        for section in self.sections.values():
+            if section.carriageway.pavement.ruts or section.carriageway.pavement.potholes:
+                result -= damage_depth(section, station, offset)
+        return result
+
+    def strip_index(self, station: ArrayLike, offset: ArrayLike) -> NDArray[np.intp]:
+        """Return the index into `strips` of stations and offsets (N,); -1 outside."""
+        station, offset = _pairs(station, offset)
+        boundaries = self.offsets(station)
+        index = np.count_nonzero(boundaries >= offset[:, None], axis=1) - 1
+        last = len(self.strips) - 1
+        # The right-most boundary belongs to the right-most strip that has a width.
+        at_end = offset == boundaries[:, -1]
+        widest_last = last - np.argmax(np.diff(boundaries, axis=1)[:, ::-1] < 0.0, axis=1)
+        index = np.where(at_end, widest_last, index)
+        return np.where((index < 0) | (index > last), -1, index)
+
+    def instances(self, strip: Strip, station: ArrayLike) -> NDArray[np.int64]:
+        """Return the instance numbers (N,) that a strip's surface has at stations (N,)."""
+        station = np.atleast_1d(np.asarray(station, dtype=np.float64))
+        result = np.full(station.shape, strip.instance, dtype=np.int64)
+        if strip.side and strip.kind in TURNOUT_STRIPS:
+            for shape in self.sections[strip.side].turnouts:
+                low, high = shape.range()
+                result[(station >= low) & (station <= high)] = shape.turnout.instance
+        return result
+
+    def point(self, station: ArrayLike, offset: ArrayLike) -> Float:
+        """Return local points (N, 3) of the surface; z is NaN outside the road."""
+        station, offset = _pairs(station, offset)
+        position, heading, _ = self.alignment.frame(station)
+        left = np.stack([-np.sin(heading), np.cos(heading)], axis=1)
+        return np.column_stack([position + offset[:, None] * left, self.elevation(station, offset)])
+
+    def marking_edges(self, line: LineMarking, station: ArrayLike) -> tuple[Float, Float]:
+        """Return the left and right edge offsets (N,) of a line marking at stations (N,).
+
+        A line between lanes is centred on the boundary; an edge line lies on the edge strip, so that the lane keeps
+        its full width (RMS).
+        """
+        carriageway = self.parameters.objects[line.carriageway]
+        assert isinstance(carriageway, Carriageway)
+        section = self.sections[carriageway.side]
+        outwards = {"outer_edge": 0.5, "block": 0.5, "turnout_edge": 0.5, "inner_edge": -0.5, "gore_edge": -0.5}
+        if line.kind == "free":
+            beside = width_at(line.offset, np.atleast_1d(station))
+        elif line.kind in ("turnout_edge", "gore_edge"):
+            inner, outer = section.boundaries_of("turnout_lane", station)
+            beside = outer if line.kind == "turnout_edge" else inner
+        else:
+            beside = section.lane_boundaries(station)[:, line.boundary]
+        centre = carriageway.sign * (beside + outwards.get(line.kind, 0.0) * line.width)
+        return centre + line.width / 2, centre - line.width / 2
+
+    def dashes(self, line: LineMarking) -> Float:
+        """Return the (D, 2) start and end stations of a marking's dashes, clipped to the road and to its own range."""
+        start, end = line.start_station, min(line.end_station, self.length)
+        if line.dash_length == 0:
+            return np.array([[start, end]]) if end > start else np.empty((0, 2))
+        period = line.dash_length + line.gap_length
+        first = start + period * np.arange(max(0, int(np.ceil((end - start) / period))))
+        return np.column_stack([first, np.minimum(first + line.dash_length, end)])
+
+    def _across(self, by_side: dict[Side, Float], signed: bool) -> Float:
+        """Return (N, B) values of both sides, innermost first, as one row from left to right."""
+        parts = []
+        for side in _SIDES:
+            if side in by_side:
+                values = by_side[side] * (self.sections[side].carriageway.sign if signed else 1.0)
+                parts.append(values[:, ::-1] if side == "left" else values)
+        return np.hstack(parts)
+
+
+def sections_of(parameters: RoadParameters) -> dict[Side, CarriagewaySection]:
+    """Return the cross-section of every carriageway, its turnouts included."""
+    turnouts = parameters.of_type(Turnout).values()
+    return {
+        item.side: CarriagewaySection(item, [turnout for turnout in turnouts if turnout.carriageway == name])
+        for name, item in parameters.of_type(Carriageway).items()
+    }
+
+
+def _strips(section: CarriagewaySection) -> list[Strip]:
+    """Return one carriageway's strips, innermost first."""
+    paved = ("road", section.carriageway.pavement.kind)
+    instance, side = section.carriageway.instance, section.carriageway.side
+    return [Strip(kind, *_SURFACES.get(kind, paved), instance, side) for kind in section.kinds]
+
+
+def _pairs(station: ArrayLike, offset: ArrayLike) -> tuple[Float, Float]:
+    pair = np.broadcast_arrays(
+        np.asarray(station, dtype=np.float64).ravel(), np.asarray(offset, dtype=np.float64).ravel()
+    )
+    return pair[0], pair[1]

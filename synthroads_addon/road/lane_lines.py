@@ -1,0 +1,173 @@
+"""The line that a lane's traffic follows: its centre in plan by the distance driven, and the surface below it."""
+
+from __future__ import annotations
+
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..base.errors import InputError
+from .alignment import clip_offset, running_sum
+from .damage import damage_depth
+from .geometry import RoadGeometry
+from .objects import width_at, width_kinks
+from .section import Carriageway
+from .section_geometry import CarriagewaySection
+from .surroundings import Vehicle
+from .things.vehicles import VEHICLE_LANE_WIDTH
+
+Float = NDArray[np.float64]
+
+_PANEL = 5.0
+"""Longest piece (m) over which the distance driven is integrated at once."""
+_GAUSS = np.polynomial.legendre.leggauss(5)
+
+
+class LaneLine:
+    """The centre of a lane: half way between its boundaries, on the undamaged pavement or in its ruts.
+
+    Distances are measured in plan along the lane's own line, from the road's beginning, and grow with the station.
+    Potholes aren't part of the surface here: a tyre at speed leaves them before the body follows.
+
+    Attributes:
+        geometry, carriageway, lane: what it belongs to; lanes count from outside.
+    """
+
+    def __init__(self, geometry: RoadGeometry, carriageway: Carriageway, lane: int) -> None:
+        self.geometry = geometry
+        self.carriageway = carriageway
+        self.lane = lane
+        pavement = carriageway.pavement.model_copy(update={"potholes": ()})
+        self._section = CarriagewaySection(carriageway.model_copy(update={"pavement": pavement}))
+        inside = [carriageway.inner_offset, carriageway.inner_edge_strip_width]
+        self._width = carriageway.lanes[lane].width
+        self._inside = [*inside, *(item.width for item in carriageway.lanes[lane + 1 :])]
+
+    def offset(self, station: Float) -> Float:
+        """Return the offset of the lane's centre at stations of any shape, m."""
+        distance = sum((width_at(width, station) for width in self._inside), width_at(self._width, station) / 2.0)
+        return np.asarray(self.carriageway.sign * distance)
+
+    def turn(self, station: Float, reach: float) -> Float:
+        """Return the angle (N,) from the centreline's heading to the lane's, rad; it is 0 where no width changes.
+
+        It is that of the chord between the lane's places ``reach`` (m) before and behind: a vehicle that passes a
+        point from which on its lane widens turns as its axles pass it, and not at once.
+        """
+        across = self.offset(station + reach) - self.offset(station - reach)
+        bend = self.geometry.alignment.curvature(station)
+        along = 2.0 * reach * (1.0 - bend * clip_offset(self.offset(station), bend))
+        return np.arctan2(across, along)
+
+    def height(self, station: Float, offset: Float) -> Float:
+        """Return the surface's local elevation (N,) at stations and offsets (N,) on the carriageway's pavement.
+
+        The pavement's plane goes on beyond its edges.
+        """
+        rise = self.carriageway.sign * self.geometry.crossfall(self.carriageway, station)
+        across = self.carriageway.sign * offset - self._pivot(station)
+        height = self.geometry.profile.elevation(station) + rise * across
+        if self.carriageway.pavement.ruts:
+            height -= damage_depth(self._section, station, offset)
+        return np.asarray(height)
+
+    def range_at(self, station: float) -> tuple[float, float]:
+        """Return the stations between which the lane can be driven on, around the one given.
+
+        It ends where the lane becomes narrower than `VEHICLE_LANE_WIDTH`, or than it is at the station itself.
+        """
+        inside = {s for s in width_kinks(self._width) if 0.0 < s < self.geometry.length}
+        kinks = np.array(sorted({0.0, self.geometry.length, *inside}))
+        least = min(VEHICLE_LANE_WIDTH, float(width_at(self._width, station)))
+        spare = width_at(self._width, kinks) - least + 1e-9
+        crossed = np.flatnonzero(spare[:-1] * spare[1:] < 0.0)
+        share = spare[crossed] / (spare[crossed] - spare[crossed + 1])
+        ends = kinks[crossed] + share * np.diff(kinks)[crossed]
+        low, high = ends[ends <= station], ends[ends > station]
+        return float(low[-1]) if len(low) else 0.0, float(high[0]) if len(high) else self.geometry.length
+
+    def distance(self, station: Float) -> Float:
+        """Return the distances (N,) along the line at stations (N,), m."""
+        knots, distances, _ = self._table
+        panel = _panel(knots, station)
+        begin = knots[panel]
+        return np.asarray(distances[panel] + self._length(begin, station - begin))
+
+    def station(self, distance: Float) -> Float:
+        """Return the stations (N,) at distances (N,) along the line, m.
+
+        In each panel it is the cubic with the right ends and rates there, which is less than 1e-6 m off; beyond the
+        road's ends the line goes on with the rate that it has there.
+        """
+        knots, distances, rates = self._table
+        panel = _panel(distances, distance)
+        length, step = np.diff(distances)[panel], np.diff(knots)[panel]
+        u = (distance - distances[panel]) / length
+        first, last = length / rates[0][panel], length / rates[1][panel]
+        cubic = u * (first + u * (3.0 * step - 2.0 * first - last + u * (first + last - 2.0 * step)))
+        within = knots[panel] + np.where(u < 0.0, u * first, np.where(u > 1.0, step + (u - 1.0) * last, cubic))
+        return np.asarray(within)
+
+    def _pivot(self, station: Float) -> Float:
+        if self._constant_pivot is not None:
+            return np.full(station.shape, self._constant_pivot)
+        return self._section.pivot(station)
+
+    @cached_property
+    def _constant_pivot(self) -> float | None:
+        return None if self._section.kinks() else float(self._section.pivot(np.zeros(1))[0])
+
+    @cached_property
+    def _table(self) -> tuple[Float, Float, tuple[Float, Float]]:
+        """Stations of the panels' borders (P + 1,), distances there, and metres per station at both ends of each."""
+        road = self.geometry
+        kinks = [s for width in (self._width, *self._inside) for s in width_kinks(width)]
+        borders = np.clip(np.concatenate([road.alignment.element_starts, kinks, [0.0, road.length]]), 0.0, road.length)
+        borders = np.unique(borders)
+        borders = borders[np.append(True, np.diff(borders) > 1e-6)]
+        borders[-1] = road.length
+        count = np.maximum(1, np.ceil(np.diff(borders) / _PANEL)).astype(int)
+        owner = np.repeat(np.arange(len(count)), count)
+        nth = np.arange(len(owner)) - np.repeat(np.cumsum(count) - count, count)
+        knots = np.append(borders[owner] + nth * (np.diff(borders) / count)[owner], road.length)
+        step = np.diff(knots)
+        distances = running_sum(self._length(knots[:-1], step).tolist())
+        return knots, distances, (self._rate(knots[:-1], step, 0.0), self._rate(knots[:-1], step, 1.0))
+
+    def _length(self, begin: Float, step: Float) -> Float:
+        """Return the line's lengths (N,) from stations on, over steps (N,) within one panel each."""
+        shares, weights = (_GAUSS[0] + 1.0) / 2.0, _GAUSS[1] / 2.0
+        rates = (weight * self._rate(begin, step, share) for share, weight in zip(shares, weights, strict=True))
+        return np.asarray(step * sum(rates))
+
+    def _rate(self, begin: Float, step: Float, share: float) -> Float:
+        """Return the metres along the line per metre of station (N,), at a share of each step.
+
+        Within a panel curvature and offset are linear; both are read inside of it, as they may jump or bend at its
+        ends.
+        """
+        near, far = begin + 0.25 * step, begin + 0.75 * step
+        offsets, bends = (self.offset(near), self.offset(far)), self.geometry.alignment.curvature(np.stack([near, far]))
+        along = 2.0 * share - 0.5
+        bend = bends[0] + along * (bends[1] - bends[0])
+        offset = offsets[0] + along * (offsets[1] - offsets[0])
+        across = (offsets[1] - offsets[0]) / np.where(step == 0.0, 1.0, 0.5 * step)
+        return np.asarray(np.hypot(1.0 - bend * clip_offset(offset, bend), across))
+
+
+def lane_of(geometry: RoadGeometry, vehicle: Vehicle) -> LaneLine:
+    """Return the line that a vehicle follows.
+
+    Raises:
+        InputError: its carriageway has no such lane.
+    """
+    carriageway = geometry.parameters.objects[vehicle.carriageway]
+    assert isinstance(carriageway, Carriageway)
+    if vehicle.lane >= len(carriageway.lanes):
+        raise InputError("vehicle: lane", vehicle.lane, f"must be less than {len(carriageway.lanes)}")
+    return LaneLine(geometry, carriageway, vehicle.lane)
+
+
+def _panel(borders: Float, value: Float) -> NDArray[np.intp]:
+    return np.clip(np.searchsorted(borders, value, side="right") - 1, 0, len(borders) - 2)

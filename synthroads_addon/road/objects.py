@@ -1,0 +1,103 @@
+"""What the objects of a parameter set have in common: instance number, place along the road, width by station."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import pairwise
+from typing import Annotated, Any, ClassVar, TypeVar
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from pydantic import AfterValidator, Discriminator, Field, Tag
+
+from ..base.schema import Model, quantity
+
+StrictFinite = Annotated[float, Field(strict=True, ge=-1e8, le=1e8)]
+
+
+class RoadObject(Model):
+    """Base of everything in ``objects``: each has a type and a number that its points carry."""
+
+    conditions: ClassVar[Sequence[dict[str, Any]]] = ({"required": ["type"]},)
+
+    instance: int = quantity(
+        ge=1, le=2**32 - 1, unit="1", description="Number that the object's faces and points carry."
+    )
+
+
+ObjectT = TypeVar("ObjectT", bound=RoadObject)
+
+
+class PointObject(RoadObject):
+    """Base of what stands at one place, after the logic of IfcLinearPlacement."""
+
+    station: float = quantity(ge=0, unit="m", description="Station of its axis.")
+    offset: float = quantity(ge=-100, le=100, unit="m", description="Offset of its axis.")
+    elevation: float = quantity(
+        0.0, ge=-20, le=50, unit="m", description="Height of its foot above the surface (road or ground) below it."
+    )
+    rotation_deg: float = quantity(
+        0.0, ge=-360, le=360, unit="deg", description="About the vertical; 0 faces traffic with the stations."
+    )
+
+
+class LineObject(RoadObject):
+    """Base of what runs along the road at one offset."""
+
+    start_station: float = quantity(ge=0, unit="m", description="Beginning, terminal included.")
+    end_station: float = quantity(ge=0, unit="m", description="End, terminal included.")
+    offset: float = quantity(ge=-100, le=100, unit="m", description="Offset of its axis.")
+
+
+class WidthPoint(Model):
+    """A width at a station."""
+
+    station: float = quantity(unit="m", description="Where the width holds.")
+    width: float = quantity(ge=0, le=50, unit="m", description="The width there.")
+
+
+def _in_order(points: tuple[WidthPoint, ...]) -> tuple[WidthPoint, ...]:
+    for before, after in pairwise(points):
+        if after.station <= before.station:
+            raise ValueError(f"station {after.station} must be greater than the one before, {before.station}")
+    return points
+
+
+def _form(width: object) -> str | None:
+    """Return which of its two forms a width has: only that form's faults are worth telling."""
+    if isinstance(width, list | tuple):
+        return "points"
+    return "number" if isinstance(width, int | float) and not isinstance(width, bool) else None
+
+
+_FORM = Discriminator(_form, "width_type", "must be a number or points {station, width}")
+WidthPoints = Annotated[
+    tuple[WidthPoint, ...],
+    Field(min_length=2, description="Linear in between, constant before the first point and after the last."),
+    AfterValidator(_in_order),
+    Tag("points"),
+]
+AnyWidth = float | tuple[WidthPoint, ...]
+"""A width (m), or points of it along the road."""
+Width = Annotated[Annotated[float, Field(strict=True, ge=0, le=50), Tag("number")] | WidthPoints, _FORM]
+LaneWidth = Annotated[Annotated[float, Field(strict=True, ge=2, le=6), Tag("number")] | WidthPoints, _FORM]
+ShoulderWidth = Annotated[Annotated[float, Field(strict=True, ge=0, le=6), Tag("number")] | WidthPoints, _FORM]
+StripWidth = Annotated[Annotated[float, Field(strict=True, ge=0, le=2), Tag("number")] | WidthPoints, _FORM]
+
+
+def width_at(width: AnyWidth, station: ArrayLike) -> NDArray[np.float64]:
+    """Return a width (m) at stations of any shape, same shape."""
+    station = np.asarray(station, dtype=np.float64)
+    if isinstance(width, tuple):
+        return np.interp(station, [p.station for p in width], [p.width for p in width])
+    return np.full(station.shape, width)
+
+
+def width_kinks(width: AnyWidth) -> list[float]:
+    """Return the stations (m) at which a width's change changes."""
+    return [point.station for point in width] if isinstance(width, tuple) else []
+
+
+def nominal_width(width: AnyWidth) -> float:
+    """Return the largest width along the road, m: what the cross-section says where nothing is left out."""
+    return max(point.width for point in width) if isinstance(width, tuple) else width

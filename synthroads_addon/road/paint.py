@@ -1,0 +1,145 @@
+"""Outlines of painted areas (gore hatching, arrows) in stations and offsets."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .geometry import RoadGeometry
+from .parameters import Arrow, Hatching, Turnout
+from .section_geometry import CarriagewaySection
+from .turnout_geometry import TurnoutShape
+
+Float = NDArray[np.float64]
+
+_EDGE_LINE = 0.3
+"""The hatching keeps clear of the lines along both sides of the gore, m."""
+_NARROWEST = 0.4
+"""The hatching begins where the gore between those lines is this wide, m."""
+_STEPS = 6
+
+# Arrows of length 1 that point along +x (with the traffic), y to the left, as triangles and quadrilaterals (RMS's
+# shapes, straightened); widths are shares of the length.
+_SHAFT = [(0.0, -0.03), (0.62, -0.03), (0.62, 0.03), (0.0, 0.03)]
+_HEAD = [(0.6, -0.11), (1.0, 0.0), (0.6, 0.11)]
+_TURN_SHAFT = [(0.30, -0.03), (0.52, -0.17), (0.56, -0.12), (0.36, 0.03)]
+_TURN_HEAD = [(0.46, -0.20), (0.78, -0.30), (0.60, -0.02)]
+_MERGE_SHAFT = [(0.0, -0.03), (0.35, -0.03), (0.35, 0.03), (0.0, 0.03)]
+
+
+def _mirrored(shape: list[tuple[float, float]]) -> list[tuple[float, float]]:
+    return [(x, -y) for x, y in reversed(shape)]
+
+
+_LONG_SHAFT = [(0.0, -0.03), (0.33, -0.03), (0.33, 0.03), (0.0, 0.03)]
+ARROWS: dict[str, list[list[tuple[float, float]]]] = {
+    "straight": [_SHAFT, _HEAD],
+    "right": [_LONG_SHAFT, _TURN_SHAFT, _TURN_HEAD],
+    "straight_right": [_SHAFT, _HEAD, _TURN_SHAFT, _TURN_HEAD],
+    "merge_right": [_MERGE_SHAFT, _TURN_SHAFT, _TURN_HEAD],
+}
+ARROWS |= {
+    name.replace("right", "left"): [_mirrored(shape) for shape in shapes]
+    for name, shapes in list(ARROWS.items())
+    if "right" in name
+}
+"""Kind of arrow -> its convex parts."""
+
+
+def hatching_outlines(geometry: RoadGeometry, hatching: Hatching) -> list[Float]:
+    """Return the stripes of a gore's hatching, each as (4, 2) stations and offsets, counter-clockwise from above.
+
+    The stripes lead traffic away from the gore: seen in the direction of travel towards a diverging gore they run from
+    its middle outwards and back.
+    """
+    turnout = geometry.parameters.objects[hatching.turnout]
+    assert isinstance(turnout, Turnout)
+    section, shape = _shape(geometry, turnout)
+    tip, nose = shape.gore_tip(), shape.nose_station()
+    forward = 1.0 if nose > tip else -1.0
+    stations = np.linspace(tip, nose, 400)
+    inner, outer = _between(section, stations)
+    wide = np.flatnonzero(outer - inner >= _NARROWEST)
+    if not len(wide):
+        return []
+    pitch = hatching.stripe_width + hatching.gap_width
+    first = stations[wide[0]]
+    count = int(abs(nose - first) // pitch)
+    lean = 1.0 / np.tan(np.radians(hatching.angle_deg))
+    middle = first + forward * (pitch * np.arange(count) + hatching.stripe_width / 2.0)
+    edges = []
+    for shift in (-hatching.stripe_width / 2.0, hatching.stripe_width / 2.0):
+        for outside in (False, True):
+            edges.append(_meet(section, middle + shift, forward * lean, outside, (tip, nose)))
+    corners = np.stack([edges[0], edges[2], edges[3], edges[1]], axis=1)
+    corners[:, :, 1] *= section.carriageway.sign
+    keep = (corners[:, :, 0] * forward).max(axis=1) < nose * forward - 0.2
+    return [_counter_clockwise(corner) for corner in corners[keep]]
+
+
+def arrow_outlines(arrow: Arrow) -> list[Float]:
+    """Return the convex parts (K, 2) of an arrow in stations and offsets, counter-clockwise from above."""
+    turn = np.radians(arrow.rotation_deg)
+    along = np.array([np.cos(turn), np.sin(turn)])
+    rotation = np.column_stack([along, [-along[1], along[0]]])
+    parts = [(np.array(part) - (0.5, 0.0)) * arrow.length @ rotation.T for part in ARROWS[arrow.kind]]
+    return [_counter_clockwise(part + (arrow.station, arrow.offset)) for part in parts]
+
+
+def pieces(outline: Float, cuts: Float) -> Iterator[Float]:
+    """Yield a convex outline (K, 2) cut across the road into pieces between one station and the next (m)."""
+    for first, last in pairwise(cuts):
+        piece = _clipped(_clipped(outline, first, 1.0), last, -1.0)
+        if len(piece) > 2:
+            yield piece
+
+
+def _clipped(outline: Float, station: float, keep: float) -> Float:
+    """Return the part of a convex outline beyond (``keep`` 1) or before (-1) a station."""
+    inside = (outline[:, 0] - station) * keep >= 0.0
+    corners = []
+    for i, corner in enumerate(outline):
+        previous = outline[i - 1]
+        if inside[i] != inside[i - 1]:
+            share = (station - previous[0]) / (corner[0] - previous[0])
+            corners.append(previous + share * (corner - previous))
+        if inside[i]:
+            corners.append(corner)
+    return np.array(corners).reshape(-1, 2)
+
+
+def _shape(geometry: RoadGeometry, turnout: Turnout) -> tuple[CarriagewaySection, TurnoutShape]:
+    for section in geometry.sections.values():
+        for shape in section.turnouts:
+            if shape.turnout is turnout:
+                return section, shape
+    raise KeyError(turnout.carriageway)
+
+
+def _between(section: CarriagewaySection, station: Float) -> tuple[Float, Float]:
+    """Return the distances (N,) between which a gore is hatched."""
+    inner = section.lane_boundaries(station)[:, 0] + _EDGE_LINE
+    lane, _ = section.boundaries_of("turnout_lane", station)
+    return inner, lane - _EDGE_LINE
+
+
+def _meet(
+    section: CarriagewaySection, station: Float, lean: float, outside: bool, limits: tuple[float, float]
+) -> Float:
+    """Return where (N, 2: station, distance) slanting lines through a gore's middle at stations (N,) meet its edge."""
+    inner, outer = _between(section, station)
+    middle, at = (inner + outer) / 2.0, station
+    for _ in range(_STEPS):
+        edge = _between(section, at)[1 if outside else 0]
+        at = np.clip(station + lean * (edge - middle), min(limits), max(limits))
+    return np.column_stack([at, _between(section, at)[1 if outside else 0]])
+
+
+def _counter_clockwise(outline: Float) -> Float:
+    """Return an outline seen from above against the clock: offsets grow to the left of the stations."""
+    x, y = outline.T
+    area = np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y)
+    return outline if area > 0.0 else outline[::-1]

@@ -1,0 +1,326 @@
+"""`RoadParameters`: what a road is. The single source of truth of a scene; everything else is derived from it.
+
+Conventions: lengths in metres, stations and offsets as horizontal distances along and across the centreline (offset
+positive to the left), slopes in percent, angles in degrees in JSON (`_deg`). Coordinates are local; adding
+``transform.translate`` (float64) gives map coordinates. Crossfall is positive where the surface falls to the right.
+"""
+
+from __future__ import annotations
+
+import builtins
+import math
+import re
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import Field, model_validator
+
+from ..base.errors import InputError
+from ..base.schema import Model, canonical_json, quantity, read_json, when
+from .objects import LineObject, ObjectT, PointObject, RoadObject, StrictFinite, WidthPoint
+from .section import (
+    Arrow,
+    Carriageway,
+    CrossfallPoint,
+    Hatching,
+    Lane,
+    LineMarking,
+    Median,
+    Pavement,
+    Pothole,
+    Ramp,
+    Rut,
+    Turnout,
+)
+from .surroundings import Environment, MaterialVariation, Terrain, Vegetation, Vehicle
+from .things.furniture import (
+    Asset,
+    Cabinet,
+    ConcreteBarrier,
+    ConstructionBeacon,
+    Delineator,
+    Gantry,
+    GantrySign,
+    Guardrail,
+    KilometreBoard,
+    NoiseBarrier,
+    Overpass,
+    Pole,
+    TemporaryBarrier,
+    TrafficLight,
+    TrafficSign,
+)
+
+__all__ = [
+    "DESIGN_CLASSES",
+    "EPSG_URI",
+    "SCHEMA_VERSION",
+    "AlignmentObject",
+    "AnyObject",
+    "Arrow",
+    "Asset",
+    "Cabinet",
+    "Carriageway",
+    "ConcreteBarrier",
+    "ConstructionBeacon",
+    "CrossfallPoint",
+    "Delineator",
+    "Environment",
+    "Gantry",
+    "GantrySign",
+    "Guardrail",
+    "Hatching",
+    "HorizontalElement",
+    "KilometreBoard",
+    "Lane",
+    "LineMarking",
+    "LineObject",
+    "MaterialVariation",
+    "Median",
+    "Metadata",
+    "NoiseBarrier",
+    "Overpass",
+    "Pavement",
+    "PointObject",
+    "Pole",
+    "Pothole",
+    "Ramp",
+    "RoadObject",
+    "RoadParameters",
+    "Rut",
+    "TemporaryBarrier",
+    "Terrain",
+    "TrafficLight",
+    "TrafficSign",
+    "Transform",
+    "Turnout",
+    "Vegetation",
+    "Vehicle",
+    "VerticalPoint",
+    "WidthPoint",
+    "parameters_schema",
+    "read_parameters",
+    "write_schema",
+]
+
+SCHEMA_VERSION: Literal["1.0"] = "1.0"
+EPSG_URI = "https://www.opengis.net/def/crs/EPSG/0/{}"
+LONGEST_ROAD = 1e6
+"""Longest alignment, m: its tables grow with its length, so that a slip in a number would fill the memory."""
+DESIGN_CLASSES = ("EKA1A", "EKA1B", "EKA2", "EKA3")
+
+
+class Metadata(Model):
+    """Who made the set, and in which coordinates it stands."""
+
+    identifier: str = Field(description="Unique name of the set, used in file names.")
+    title: str = Field("", description="Title for people.")
+    seed: int = quantity(0, ge=0, le=2**63 - 1, unit="1", description="Seed that the set was sampled from.")
+    generator: str = Field(description="Program and version that wrote the set.")
+    referenceSystem: str = Field(  # noqa: N815 (CityJSON's spelling)
+        pattern=r"^https://www\.opengis\.net/def/crs/EPSG/0/[0-9]{4,8}$",
+        description="URI of the map coordinate system.",
+    )
+
+    @property
+    def epsg(self) -> int:
+        """Return the EPSG code of the map coordinate system."""
+        return int(self.referenceSystem.rsplit("/", 1)[1])
+
+
+class Transform(Model):
+    """The local frame's origin on the map."""
+
+    translate: tuple[StrictFinite, StrictFinite, StrictFinite] = Field(
+        description="Map coordinates (east, north, elevation) of the local origin, m.",
+        json_schema_extra={"unit": "m"},
+    )
+
+
+class HorizontalElement(Model):
+    """A line, arc or clothoid; the curvature changes linearly with the station."""
+
+    conditions = (when({"kind": {"const": "line"}}, {"curvature_start": {"const": 0}, "curvature_end": {"const": 0}}),)
+    kind: Literal["line", "arc", "clothoid"] = Field(description="What the two curvatures make it.")
+    length: float = quantity(gt=0, le=LONGEST_ROAD, unit="m", description="Length along the centreline.")
+    curvature_start: float = quantity(ge=-0.1, le=0.1, unit="1/m", description="Positive to the left.")
+    curvature_end: float = quantity(ge=-0.1, le=0.1, unit="1/m", description="Positive to the left.")
+
+    @model_validator(mode="after")
+    def _kind_fits(self) -> HorizontalElement:
+        straight = self.curvature_start == 0.0 == self.curvature_end
+        fits = {"line": straight, "arc": self.curvature_start == self.curvature_end and not straight}
+        if not fits.get(self.kind, self.curvature_start != self.curvature_end):
+            raise ValueError(f"kind '{self.kind}' contradicts its curvatures")
+        return self
+
+    @classmethod
+    def between(cls, length: float, curvature_start: float, curvature_end: float) -> HorizontalElement:
+        """Return the element of these curvatures (1/m), whatever kind that makes it."""
+        same = curvature_start == curvature_end
+        kind: Literal["line", "arc", "clothoid"] = "clothoid" if not same else "arc" if curvature_start else "line"
+        return cls(kind=kind, length=length, curvature_start=curvature_start, curvature_end=curvature_end)
+
+
+class VerticalPoint(Model):
+    """A point of vertical intersection with its parabolic rounding."""
+
+    station: float = quantity(unit="m", description="Where the two tangents intersect.")
+    elevation: float = quantity(ge=-500, le=9000, unit="m", description="Local elevation of the intersection.")
+    radius: float = quantity(0.0, ge=0, unit="m", description="Radius of the crest or sag; 0 leaves a kink.")
+
+
+class AlignmentObject(RoadObject):
+    """The centreline: horizontal elements and vertical profile."""
+
+    type: Literal["Alignment"] = "Alignment"
+    start_x: float = quantity(unit="m", description="Local x of station 0.")
+    start_y: float = quantity(unit="m", description="Local y of station 0.")
+    start_heading_deg: float = quantity(
+        ge=-360, le=360, unit="deg", description="Direction at station 0, counter-clockwise from east."
+    )
+    horizontal: tuple[HorizontalElement, ...] = Field(min_length=1, description="Elements in order.")
+    vertical: tuple[VerticalPoint, ...] = Field(min_length=1, description="Intersection points in order.")
+
+    @model_validator(mode="after")
+    def _no_longer_than_any_road(self) -> AlignmentObject:
+        if self.length > LONGEST_ROAD:
+            raise ValueError(f"horizontal elements must be at most {LONGEST_ROAD:g} m long together")
+        return self
+
+    @property
+    def length(self) -> float:
+        """Return the length of the centreline, m."""
+        return math.fsum(element.length for element in self.horizontal)
+
+
+AnyObject = Annotated[
+    AlignmentObject
+    | Carriageway
+    | Median
+    | Turnout
+    | LineMarking
+    | Hatching
+    | Arrow
+    | Guardrail
+    | ConcreteBarrier
+    | NoiseBarrier
+    | TemporaryBarrier
+    | Delineator
+    | TrafficSign
+    | Gantry
+    | Pole
+    | TrafficLight
+    | KilometreBoard
+    | Cabinet
+    | ConstructionBeacon
+    | Overpass
+    | Asset
+    | Terrain
+    | Vegetation
+    | Vehicle,
+    Field(discriminator="type"),
+]
+
+
+OBJECT_ID = r"[A-Za-z0-9_.-]{1,64}"
+
+
+def _at_least_one(kind: str) -> dict[str, Any]:
+    """Return what JSON Schema says of a dictionary with an object of a type: not all are of another."""
+    return {"not": {"additionalProperties": {"properties": {"type": {"not": {"const": kind}}}}}}
+
+
+class RoadParameters(Model):
+    """One road. ``objects`` maps ids to objects; exactly one is the alignment."""
+
+    type: Literal["RoadParameters"] = "RoadParameters"
+    version: Literal["1.0"] = SCHEMA_VERSION
+    metadata: Metadata
+    transform: Transform
+    design_class: Literal["EKA1A", "EKA1B", "EKA2", "EKA3"] = Field(description="Design class of the RAA.")
+    environment: Environment = Field(Environment(), description="Light and weather.")
+    materials: MaterialVariation = Field(MaterialVariation(), description="How the materials differ from the mean.")
+    objects: dict[str, AnyObject] = Field(
+        description="Objects by id.",
+        json_schema_extra={
+            "propertyNames": {"pattern": f"^{OBJECT_ID}$"},
+            "allOf": [_at_least_one("Alignment"), _at_least_one("Carriageway")],
+        },
+    )
+
+    @model_validator(mode="after")
+    def _consistent(self) -> RoadParameters:
+        for name in self.objects:
+            if not re.fullmatch(OBJECT_ID, name):
+                raise ValueError(f"object id {name!r}: letters, digits, '_', '-' and '.' are allowed, at most 64")
+        numbers = [item.instance for item in self.objects.values()]
+        if len(set(numbers)) != len(numbers):
+            raise ValueError("two objects have the same instance number")
+        if len(self.of_type(AlignmentObject)) != 1:
+            raise ValueError("objects must contain exactly one Alignment")
+        for kind in (Median, Terrain):
+            if len(self.of_type(kind)) > 1:
+                raise ValueError(f"objects may contain one {kind.__name__} at most")
+        sides = [item.side for item in self.of_type(Carriageway).values()]
+        if len(set(sides)) != len(sides) or not sides:
+            raise ValueError("objects must contain one Carriageway per side at most, and at least one")
+        for name, item in self.objects.items():
+            if fault := self._dangling(item):
+                raise ValueError(f"objects.{name}: {fault}")
+        return self
+
+    def _dangling(self, item: RoadObject) -> str:
+        """Return what an object names that isn't there, or an empty string."""
+        if isinstance(item, LineMarking | Arrow | Vehicle | Turnout):
+            carriageway = self.objects.get(item.carriageway)
+            if not isinstance(carriageway, Carriageway):
+                return f"carriageway '{item.carriageway}' must name a Carriageway"
+            if isinstance(item, LineMarking) and item.boundary > len(carriageway.lanes):
+                return "carriageway and boundary must name a lane boundary that exists"
+            if isinstance(item, Vehicle) and item.lane >= len(carriageway.lanes):
+                return f"lane {item.lane} must be less than the number of lanes, {len(carriageway.lanes)}"
+        if isinstance(item, LineMarking | Hatching) and item.turnout is not None:
+            turnout = self.objects.get(item.turnout)
+            if not isinstance(turnout, Turnout) or turnout.ramp is None:
+                return f"turnout '{item.turnout}' must name an exit or entry"
+        return ""
+
+    def of_type(self, kind: builtins.type[ObjectT]) -> dict[str, ObjectT]:
+        """Return the objects of one class by id, in the order of the file."""
+        return {name: item for name, item in self.objects.items() if isinstance(item, kind)}
+
+    @property
+    def alignment(self) -> AlignmentObject:
+        """Return the alignment object."""
+        return next(iter(self.of_type(AlignmentObject).values()))
+
+    @property
+    def terrain(self) -> Terrain | None:
+        """Return the terrain, if the road has one."""
+        return next(iter(self.of_type(Terrain).values()), None)
+
+    def carriageway(self, side: Literal["left", "right"]) -> Carriageway | None:
+        """Return the carriageway of one side, if there is one."""
+        return next((c for c in self.of_type(Carriageway).values() if c.side == side), None)
+
+
+def read_parameters(path: Path | str) -> RoadParameters:
+    """Read a parameter set from a file; raise `InputError` naming file, field, value and what is allowed."""
+    data = read_json(path)
+    if isinstance(data, dict) and data.get("type") not in (None, "RoadParameters"):
+        raise InputError(f"{path}: type", data["type"], "must be 'RoadParameters'")
+    if isinstance(data, dict) and data.get("version") not in (None, SCHEMA_VERSION):
+        raise InputError(f"{path}: version", data["version"], f"this program reads version '{SCHEMA_VERSION}'")
+    return RoadParameters.from_dict(data, source=str(path))
+
+
+def parameters_schema() -> dict[str, Any]:
+    """Return the JSON Schema (draft 2020-12) of a parameter set."""
+    schema = RoadParameters.model_json_schema()
+    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **schema}
+
+
+def write_schema(path: Path) -> None:
+    """Write the JSON Schema in the canonical layout."""
+    path.write_text(canonical_json(parameters_schema()), encoding="utf-8")

@@ -1,0 +1,140 @@
+"""Vertical profile: constant grades between points of vertical intersection, rounded by parabolas.
+
+With the grades g1 before and g2 after a point and the rounding's radius H, the parabola reaches T = ``H |g2 - g1| / 2``
+to either side and has the constant curvature d2z/ds2 = sign(g2 - g1) / H: a sag is positive, a crest
+negative. Stations are those of the horizontal alignment, so lengths are horizontal.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..base.errors import InputError
+from .alignment import FloatArray, finite_array
+
+#: Roundings may overlap by this much (m) and are then taken as touching: stations in files are rounded.
+TOUCH = 1e-6
+#: A rounding with a tangent up to this (m) is none; its curvature could exceed all numbers.
+NO_ROUNDING = 1e-9
+
+
+@dataclass(frozen=True)
+class IntersectionPoint:
+    """A point where two grades meet.
+
+    Attributes:
+        station: m.
+        elevation: of the intersection, m; a rounded profile passes above it in a sag and below it on a crest.
+        radius: of the rounding, m, >= 0; 0 leaves the kink. Crest or sag follows from the grades.
+
+    Raises:
+        InputError: a value is not a finite number, or the radius is negative.
+    """
+
+    station: float
+    elevation: float
+    radius: float = 0.0
+
+    def __post_init__(self) -> None:
+        for name in ("station", "elevation", "radius"):
+            finite_array(f"intersection_point.{name}", getattr(self, name))
+        if self.radius < 0:
+            raise InputError("intersection_point.radius", self.radius, "0 m or more (the grades tell crest from sag)")
+
+
+class Profile:
+    """Elevation, grade and vertical curvature over the station, vectorised.
+
+    The first and last grade go on beyond the ends; a single point makes a level profile. The first and last point have
+    only one grade, so their radius has no effect.
+
+    Attributes:
+        points: tuple of P intersection points.
+        grades: (P + 1,) m/m before, between and after the points.
+        tangent_lengths: (P,) T of every rounding, m; 0 where there is none.
+        breakpoints: sorted stations where the curvature jumps (both ends of a rounding) or the grade does (an
+            intersection without rounding), m.
+    """
+
+    def __init__(self, points: Sequence[IntersectionPoint]) -> None:
+        """Raise InputError without points, with stations that don't increase, or where roundings overlap."""
+        if not points:
+            raise InputError("profile.points", None, "at least one point of vertical intersection is needed")
+        self.points = tuple(points)
+        station = np.array([point.station for point in self.points], dtype=np.float64)
+        elevation = np.array([point.elevation for point in self.points], dtype=np.float64)
+        gap = np.diff(station)
+        if (gap <= 0).any():
+            place = int(np.argmax(gap <= 0)) + 1
+            allowed = f"stations must increase: more than {station[place - 1]!r} m"
+            raise InputError(f"profile.points[{place}].station", float(station[place]), allowed)
+        self.grades = _grades(gap, np.diff(elevation))
+        change = np.diff(self.grades)
+        radius = np.array([point.radius for point in self.points], dtype=np.float64)
+        tangent = 0.5 * radius * np.abs(change)
+        self.tangent_lengths = np.where(tangent > NO_ROUNDING, tangent, 0.0)
+        self._refuse_overlap(gap)
+        rounded = self.tangent_lengths > 0
+        self._build_pieces(station, elevation, np.where(rounded, np.sign(change) / np.where(rounded, radius, 1.0), 0.0))
+        kinked = ~rounded & (change != 0)
+        ends = np.concatenate((station - self.tangent_lengths, station + self.tangent_lengths))
+        self.breakpoints = np.unique(np.concatenate((ends[np.tile(rounded, 2)], station[kinked])))
+
+    def _refuse_overlap(self, gap: FloatArray) -> None:
+        reach = self.tangent_lengths[:-1] + self.tangent_lengths[1:]
+        over = reach > gap + TOUCH
+        if over.any():
+            place = int(np.argmax(over))
+            allowed = (
+                f"the tangents of points {place} and {place + 1} need {reach[place]:.6g} m and have {gap[place]:.6g} m:"
+                " smaller radii or more distance are needed"
+            )
+            raise InputError(f"profile.points[{place + 1}].radius", self.points[place + 1].radius, allowed)
+
+    def _build_pieces(self, station: FloatArray, elevation: FloatArray, curvature: FloatArray) -> None:
+        """Tabulate quadratics z + u (g + c u / 2): the first grade, then a rounding and a grade for each point.
+
+        A grade is measured from its point, a rounding from its start: nothing is carried along the road.
+        """
+        tangent, before, after = self.tangent_lengths, self.grades[:-1], self.grades[1:]
+
+        def interleaved(first: float, rounding: FloatArray, grade: FloatArray) -> FloatArray:
+            return np.concatenate(([first], np.column_stack((rounding, grade)).ravel()))
+
+        borders = interleaved(-np.inf, station - tangent, station + tangent)
+        self._borders = np.maximum.accumulate(borders)[1:]  # touching roundings may cross by a rounding error
+        self._bases = interleaved(station[0], station - tangent, station)
+        self._elevations = interleaved(elevation[0], elevation - before * tangent, elevation)
+        self._grades = interleaved(before[0], before, after)
+        self._curvatures = interleaved(0.0, curvature, np.zeros_like(curvature))
+
+    def _evaluate(self, station: ArrayLike) -> tuple[FloatArray, FloatArray, FloatArray]:
+        wanted = finite_array("station", station)
+        piece = np.searchsorted(self._borders, wanted, side="right")
+        u, grade, curvature = wanted - self._bases[piece], self._grades[piece], self._curvatures[piece]
+        elevation = self._elevations[piece] + u * (grade + 0.5 * curvature * u)
+        return elevation[()], (grade + curvature * u)[()], curvature[()]
+
+    def elevation(self, station: ArrayLike) -> FloatArray:
+        """Return the elevation, m, at stations of any shape; InputError for stations that aren't finite."""
+        return self._evaluate(station)[0]
+
+    def grade(self, station: ArrayLike) -> FloatArray:
+        """Return the grade dz/ds, m/m, rising positive; at a kink that of the side after it."""
+        return self._evaluate(station)[1]
+
+    def curvature(self, station: ArrayLike) -> FloatArray:
+        """Return d2z/ds2, 1/m, positive in a sag; at a border that of the side after it."""
+        return self._evaluate(station)[2]
+
+
+def _grades(gap: FloatArray, rise: FloatArray) -> FloatArray:
+    """Return the grades with the first and last repeated outwards; one point is level."""
+    if not len(gap):
+        return np.zeros(2)
+    grades = rise / gap
+    return np.concatenate((grades[:1], grades, grades[-1:]))

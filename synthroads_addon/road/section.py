@@ -1,0 +1,260 @@
+"""The road itself: carriageways with their lanes and pavement, the median, turnouts, and markings."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from pydantic import Field, model_validator
+
+from ..base.schema import Model, quantity, when
+from .objects import LaneWidth, PointObject, RoadObject, ShoulderWidth, StripWidth, Width
+
+
+class Lane(Model):
+    """One lane. A width of 0 along a stretch is a lane that isn't there: dropped, or not gained yet."""
+
+    width: LaneWidth = Field(
+        description="Width between the lane's boundaries, or points of it.", json_schema_extra={"unit": "m"}
+    )
+    kind: Literal["through", "climbing"] = Field("through", description="Use of the lane.")
+
+
+class CrossfallPoint(Model):
+    """Crossfall at a station; linear in between, constant before the first and after the last."""
+
+    station: float = quantity(unit="m", description="Where the value holds.")
+    crossfall_percent: float = quantity(
+        ge=-12, le=12, unit="%", description="Positive where the surface falls to the right."
+    )
+
+
+class Rut(Model):
+    """Rutting of one lane: two wheel tracks, each a trough of depth * cos^2(pi * distance / width) across.
+
+    Over the first and last ``ramp_length`` the depth grows from 0 as a half cosine.
+    """
+
+    lane: int = quantity(ge=0, le=7, unit="1", description="Lane, counted from outside, 0 the outermost.")
+    start_station: float = quantity(ge=0, unit="m", description="Beginning.")
+    end_station: float = quantity(ge=0, unit="m", description="End.")
+    depth: float = quantity(gt=0, le=0.1, unit="m", description="Greatest depth below the undamaged pavement.")
+    width: float = quantity(0.8, ge=0.2, le=1.6, unit="m", description="Width of either wheel track.")
+    track: float = quantity(1.8, ge=1.0, le=2.6, unit="m", description="Distance between the two wheel tracks.")
+    ramp_length: float = quantity(10.0, gt=0, le=200, unit="m", description="Length over which it begins and ends.")
+
+
+class Pothole(Model):
+    """Spalling or a pothole: an elliptic bowl, depth * (1 - r^2) below the undamaged pavement within its edge."""
+
+    station: float = quantity(ge=0, unit="m", description="Station of its centre.")
+    offset: float = quantity(ge=-100, le=100, unit="m", description="Offset of its centre.")
+    length: float = quantity(gt=0, le=5, unit="m", description="Diameter along the road.")
+    width: float = quantity(gt=0, le=5, unit="m", description="Diameter across the road.")
+    depth: float = quantity(gt=0, le=0.3, unit="m", description="Depth at the centre.")
+
+
+class Pavement(Model):
+    """What a carriageway is paved with, and its damage, which is exact geometry."""
+
+    kind: Literal["asphalt", "concrete"] = Field("asphalt", description="Surface course.")
+    slab_length: float = quantity(5.0, ge=2, le=20, unit="m", description="Distance of a concrete pavement's joints.")
+    ruts: tuple[Rut, ...] = Field((), description="Rutting.")
+    potholes: tuple[Pothole, ...] = Field((), description="Spalling and potholes.")
+
+
+class Carriageway(RoadObject):
+    """One direction's paved surface with its verge. Every width is a number, or points of it along the road."""
+
+    type: Literal["Carriageway"] = "Carriageway"
+    side: Literal["left", "right"] = Field(description="Side of the centreline.")
+    inner_offset: Width = Field(
+        description="Distance of the inner paved edge from the centreline.", json_schema_extra={"unit": "m"}
+    )
+    hard_shoulder_width: ShoulderWidth = Field(description="0 where there is none.", json_schema_extra={"unit": "m"})
+    outer_edge_strip_width: StripWidth = Field(
+        description="Outside the outermost lane.", json_schema_extra={"unit": "m"}
+    )
+    lanes: tuple[Lane, ...] = Field(min_length=1, max_length=8, description="Lanes from outside to inside.")
+    inner_edge_strip_width: StripWidth = Field(
+        description="Inside the innermost lane.", json_schema_extra={"unit": "m"}
+    )
+    verge_width: ShoulderWidth = Field(
+        description="Unpaved strip outside the pavement.", json_schema_extra={"unit": "m"}
+    )
+    verge_slope_percent: float = quantity(
+        8.0, ge=0, le=15, unit="%", description="Fall of the verge away from the pavement."
+    )
+    crossfall: tuple[CrossfallPoint, ...] = Field(min_length=1, description="Crossfall by station.")
+    rotation_axis: Literal["carriageway_axis", "inner_edge"] = Field(
+        "carriageway_axis", description="Line that keeps the profile's elevation while the crossfall changes."
+    )
+    pavement: Pavement = Field(Pavement(), description="Surface course and damage.")
+
+    @property
+    def sign(self) -> int:
+        """Return +1 for the left, -1 for the right carriageway: the sign of its offsets."""
+        return 1 if self.side == "left" else -1
+
+    @property
+    def traffic(self) -> int:
+        """Return +1 where traffic runs with the stations (right carriageway), -1 where against them."""
+        return -self.sign
+
+
+class Median(RoadObject):
+    """The strip between the carriageways' inner edges, straight from one to the other."""
+
+    type: Literal["Median"] = "Median"
+
+
+class Ramp(Model):
+    """The first part of an exit ramp or the last of an entry ramp: in plan a clothoid away from the main road.
+
+    At the distance x (m, along the centreline) from the gore's tip its inner edge has moved x^3 / (6 A^2) away.
+    """
+
+    length: float = quantity(85.0, ge=10, le=400, unit="m", description="Along the centreline, from the gore's tip.")
+    clothoid_parameter: float = quantity(90.0, ge=30, le=500, unit="m", description="A of the clothoid.")
+    lane_width: float = quantity(4.5, ge=3, le=8, unit="m", description="Width of the ramp's lane.")
+    edge_strip_width: float = quantity(0.75, ge=0, le=2, unit="m", description="Width of either edge strip.")
+
+
+class Turnout(RoadObject):
+    """A widening of the pavement on the outer side: emergency bay, exit with its lane and ramp, or entry.
+
+    It takes taper_in_length + lane_length + taper_out_length (+ ramp.length) along the centreline, named in the
+    direction of traffic, from its lowest station on. An exit has no taper_out, an entry no taper_in: their ramps are in
+    its place. Beside an exit's or entry's lane the hard shoulder gives way to ``shoulder_width``; an emergency bay lies
+    outside the hard shoulder.
+    """
+
+    conditions = tuple(
+        when(
+            {"kind": {"const": kind}},
+            {
+                "ramp": {"type": "null" if kind == "emergency_bay" else "object"},
+                "taper_in_length": {"const": 0} if kind == "entry" else {"exclusiveMinimum": 0},
+                "taper_out_length": {"const": 0} if kind == "exit" else {"exclusiveMinimum": 0},
+            },
+        )
+        for kind in ("emergency_bay", "exit", "entry")
+    )
+    type: Literal["Turnout"] = "Turnout"
+    carriageway: str = Field(description="Id of the carriageway that it widens.")
+    kind: Literal["emergency_bay", "exit", "entry"] = Field(description="What it is for.")
+    start_station: float = quantity(unit="m", description="Its lowest station.")
+    taper_in_length: float = quantity(0.0, ge=0, le=200, unit="m", description="Over which the width opens.")
+    lane_length: float = quantity(ge=5, le=1000, unit="m", description="Length at full width.")
+    taper_out_length: float = quantity(0.0, ge=0, le=200, unit="m", description="Over which the width closes.")
+    lane_width: float = quantity(ge=2, le=6, unit="m", description="Width of the additional lane or bay.")
+    edge_strip_width: float = quantity(
+        0.5, ge=0, le=2, unit="m", description="Outside the additional lane; a bay has none."
+    )
+    shoulder_width: float = quantity(0.0, ge=0, le=4, unit="m", description="Hard shoulder beside the additional lane.")
+    ramp: Ramp | None = Field(None, description="Ramp of an exit or entry.")
+
+    @model_validator(mode="after")
+    def _parts_fit(self) -> Turnout:
+        if (self.ramp is None) != (self.kind == "emergency_bay"):
+            raise ValueError("ramp must be given for an exit or entry, and only there")
+        tapers = {"emergency_bay": (True, True), "exit": (True, False), "entry": (False, True)}[self.kind]
+        if (self.taper_in_length > 0, self.taper_out_length > 0) != tapers:
+            needed = {"emergency_bay": "both tapers", "exit": "taper_in only", "entry": "taper_out only"}[self.kind]
+            raise ValueError(f"taper_in_length and taper_out_length: an {self.kind} has {needed}")
+        return self
+
+    @property
+    def length(self) -> float:
+        """Return its whole length along the centreline, m."""
+        own = self.taper_in_length + self.lane_length + self.taper_out_length
+        return own + (self.ramp.length if self.ramp else 0.0)
+
+    @property
+    def end_station(self) -> float:
+        """Return its highest station, m."""
+        return self.start_station + self.length
+
+
+class Marking(Model):
+    """What every marking has: its colour and the thickness of its film."""
+
+    color: Literal["white", "yellow"] = Field("white", description="Yellow is temporary and overrides white (RMS).")
+    film_thickness: float = quantity(
+        0.003, ge=0.0005, le=0.006, unit="m", description="Height of the film above the pavement."
+    )
+
+
+SHORTEST_DASH = 0.05
+"""Shortest dash and gap, m: a road has a row of faces for each."""
+
+
+class LineMarking(Marking, RoadObject):
+    """A marking that follows a boundary. It lies on the pavement with the thickness of its film.
+
+    ``outer_edge`` and ``block`` lie on the outer edge strip beside lane boundary 0, ``inner_edge`` on the inner one,
+    ``lane`` is centred on its boundary; ``turnout_edge`` lies on the edge strip outside a turnout's lane and ramp,
+    ``gore_edge`` on the ramp's inner edge strip. ``free`` is centred on ``offset``.
+    """
+
+    conditions = (
+        when(
+            {"dash_length": {"const": 0}},
+            {"gap_length": {"const": 0}},
+            otherwise={"dash_length": {"minimum": SHORTEST_DASH}, "gap_length": {"minimum": SHORTEST_DASH}},
+        ),
+        when(
+            {"kind": {"enum": ["turnout_edge", "gore_edge"]}},
+            {"turnout": {"type": "string"}},
+            otherwise={"turnout": {"type": "null"}},
+        ),
+    )
+    type: Literal["LineMarking"] = "LineMarking"
+    carriageway: str = Field(description="Id of the carriageway that it lies on.")
+    kind: Literal["outer_edge", "lane", "inner_edge", "block", "turnout_edge", "gore_edge", "free"] = Field(
+        description="What the line separates."
+    )
+    boundary: int = quantity(
+        0, ge=0, le=8, unit="1", description="Lane boundary, counted from the outer edge of the outermost lane."
+    )
+    turnout: str | None = Field(None, description="Id of the turnout, for turnout_edge and gore_edge.")
+    offset: Width = Field(
+        0.0,
+        description="Distance of the line's axis from the centreline, for free lines only.",
+        json_schema_extra={"unit": "m"},
+    )
+    width: float = quantity(ge=0.05, le=1.0, unit="m", description="Width of the line.")
+    dash_length: float = quantity(ge=0, le=100, unit="m", description="Length of a dash; 0 for a solid line.")
+    gap_length: float = quantity(ge=0, le=100, unit="m", description="Length of a gap; 0 for a solid line.")
+    start_station: float = quantity(ge=0, unit="m", description="Beginning of the first dash.")
+    end_station: float = quantity(ge=0, unit="m", description="End of the line.")
+
+    @model_validator(mode="after")
+    def _dashes_fit(self) -> LineMarking:
+        if (self.dash_length == 0) != (self.gap_length == 0):
+            raise ValueError("dash_length and gap_length must both be 0 (solid) or both be positive")
+        if 0 < min(self.dash_length, self.gap_length) < SHORTEST_DASH:
+            raise ValueError(f"dash_length and gap_length must be 0 (solid) or at least {SHORTEST_DASH:g} m")
+        if (self.turnout is not None) != (self.kind in ("turnout_edge", "gore_edge")):
+            raise ValueError("turnout must be given for turnout_edge and gore_edge, and only there")
+        return self
+
+
+class Hatching(Marking, RoadObject):
+    """The hatched area of a gore (Sperrflaeche): stripes across the pavement between main road and ramp."""
+
+    type: Literal["Hatching"] = "Hatching"
+    turnout: str = Field(description="Id of the turnout whose gore it fills.")
+    stripe_width: float = quantity(1.0, ge=0.2, le=3, unit="m", description="Width of a stripe along the road.")
+    gap_width: float = quantity(2.0, ge=0.2, le=6, unit="m", description="Gap between stripes along the road.")
+    angle_deg: float = quantity(63.0, ge=15, le=90, unit="deg", description="Of the stripes against the centreline.")
+
+
+class Arrow(Marking, PointObject):
+    """An arrow on a lane. Its rotation is 0 where it points with the stations."""
+
+    type: Literal["Arrow"] = "Arrow"
+    carriageway: str = Field(description="Id of the carriageway that it lies on.")
+    kind: Literal["straight", "left", "right", "straight_left", "straight_right", "merge_left", "merge_right"] = Field(
+        description="Where it points."
+    )
+    length: float = quantity(5.0, ge=1, le=10, unit="m", description="Length of the arrow.")

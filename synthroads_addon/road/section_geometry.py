@@ -1,0 +1,132 @@
+"""One carriageway's cross-section at any station: its strips and how far from the centreline their boundaries lie."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from .objects import nominal_width, width_at, width_kinks
+from .section import Carriageway, Turnout
+from .turnout_geometry import TURNOUT_STRIPS, TurnoutShape
+
+Float = NDArray[np.float64]
+
+
+class CarriagewaySection:
+    """A carriageway with its turnouts, as strips whose widths follow the station.
+
+    Distances are horizontal, from the centreline outwards, so that ``carriageway.sign * distance`` is the offset.
+
+    Attributes:
+        carriageway: the carriageway.
+        turnouts: the shapes of its turnouts.
+        kinds: kinds of its strips, innermost first. Strips that are nowhere wider than 0 are left out.
+    """
+
+    def __init__(self, carriageway: Carriageway, turnouts: Iterable[Turnout] = ()) -> None:
+        self.carriageway = carriageway
+        self.turnouts = tuple(TurnoutShape(turnout, carriageway) for turnout in turnouts)
+        own = [
+            ("inner_edge_strip", carriageway.inner_edge_strip_width),
+            *(("lane", lane.width) for lane in reversed(carriageway.lanes)),
+            ("outer_edge_strip", carriageway.outer_edge_strip_width),
+            ("hard_shoulder", carriageway.hard_shoulder_width),
+            *((kind, 1.0 if self.turnouts else 0.0) for kind in TURNOUT_STRIPS),
+            ("verge", carriageway.verge_width),
+        ]
+        self._widths = [(kind, width) for kind, width in own if nominal_width(width) > 0.0 or kind == "verge"]
+        self.kinds = tuple(kind for kind, _ in self._widths)
+        self._varies = bool(self.turnouts or self.kinks())
+        self._constant = None if self._varies else self._distances(np.zeros(1))
+
+    def distances(self, station: ArrayLike) -> Float:
+        """Return the (N, B) distances of the boundaries at N stations, innermost first, m."""
+        station = np.atleast_1d(np.asarray(station, dtype=np.float64))
+        if self._constant is not None:
+            return np.repeat(self._constant, len(station), axis=0)
+        return self._distances(station)
+
+    def paved_edge(self, station: ArrayLike) -> Float:
+        """Return the (N,) distances of the pavement's outer edge, a ramp's and a bay's included, m."""
+        return self.distances(station)[:, -2]
+
+    def road_edge(self, station: ArrayLike) -> Float:
+        """Return the (N,) distances of the verge's outer edge, m."""
+        return self.distances(station)[:, -1]
+
+    def main_edge(self, station: ArrayLike) -> Float:
+        """Return the (N,) distances of the outer edge of the main road's pavement, as if it had no turnouts, m."""
+        station = np.atleast_1d(np.asarray(station, dtype=np.float64))
+        inner = width_at(self.carriageway.inner_offset, station)
+        own = [width for kind, width in self._widths if kind not in TURNOUT_STRIPS and kind != "verge"]
+        return inner + sum(width_at(width, station) for width in own)
+
+    def pivot(self, station: ArrayLike) -> Float:
+        """Return the (N,) distances of the line about which the crossfall turns, m."""
+        inner = width_at(self.carriageway.inner_offset, np.atleast_1d(station))
+        if self.carriageway.rotation_axis == "inner_edge":
+            return inner
+        return (inner + self.main_edge(station)) / 2.0
+
+    def plane_edge(self, station: ArrayLike) -> Float:
+        """Return the (N,) distances up to which the surface lies in the pavement's plane; beyond it the verge falls.
+
+        Only behind a ramp's end is it not the pavement's edge.
+        """
+        station = np.atleast_1d(np.asarray(station, dtype=np.float64))
+        extra = sum((shape.widths(station).verge_extra for shape in self.turnouts), np.zeros(station.shape))
+        return self.paved_edge(station) + extra
+
+    def lane_boundaries(self, station: ArrayLike) -> Float:
+        """Return the (N, lanes + 1) distances of the lanes' boundaries, outermost first, m."""
+        first = self.kinds.index("lane")
+        return self.distances(station)[:, first : first + len(self.carriageway.lanes) + 1][:, ::-1]
+
+    def boundaries_of(self, kind: str, station: ArrayLike) -> tuple[Float, Float]:
+        """Return the (N,) inner and outer distances of the one strip of a kind, m."""
+        at, distances = self.kinds.index(kind), self.distances(station)
+        return distances[:, at], distances[:, at + 1]
+
+    def elevations(self, station: ArrayLike, crossfall: Float) -> Float:
+        """Return the (N, B) heights of the boundaries above the axis, innermost first, m.
+
+        Args:
+            station: (N,) stations, m.
+            crossfall: (N,) crossfall there, m/m, positive where the surface falls to the right.
+        """
+        distances, pivot = self.distances(station), self.pivot(station)
+        plane = np.minimum(distances, self.plane_edge(station)[:, None])
+        # A surface that falls to the right rises with the offset, and the offset is sign * distance outwards.
+        rise = self.carriageway.sign * crossfall[:, None]
+        verge_fall = (distances - plane) * self.carriageway.verge_slope_percent / 100.0
+        return rise * (plane - pivot[:, None]) - verge_fall
+
+    def kinks(self) -> list[float]:
+        """Return the stations at which a width's change changes."""
+        own = [width_kinks(width) for width in (self.carriageway.inner_offset, *(w for _, w in self._widths))]
+        return [s for stations in (*own, *(shape.kinks() for shape in self.turnouts)) for s in stations]
+
+    def steps(self) -> list[tuple[float, float]]:
+        """Return lowest and highest station of the centimetres along which the pavement changes at once."""
+        return [step for shape in self.turnouts for step in shape.steps()]
+
+    def bend(self, station: Float) -> Float:
+        """Return the largest second derivative (N,) of a boundary's distance by station, 1/m."""
+        return sum((shape.bend(station) for shape in self.turnouts), np.zeros(station.shape))
+
+    def _distances(self, station: Float) -> Float:
+        shapes = [shape.widths(station) for shape in self.turnouts]
+        columns = [width_at(self.carriageway.inner_offset, station)]
+        for kind, width in self._widths:
+            if kind in TURNOUT_STRIPS:
+                columns.append(sum((shape.strips[kind] for shape in shapes), np.zeros(station.shape)))
+                continue
+            own = width_at(width, station)
+            if kind == "hard_shoulder":
+                own = np.minimum.reduce([own, *(shape.hard_shoulder for shape in shapes)])
+            elif kind == "verge":
+                own = sum((shape.verge_extra for shape in shapes), own)
+            columns.append(own)
+        return np.cumsum(np.column_stack(columns), axis=1)

@@ -1,0 +1,93 @@
+"""Stretches of a long road: what of a parameter set lies between two stations, and the frame that it is built in.
+
+A stretch is the whole road's piece: its surface has the whole road's rows, what is periodic (posts, dashes, plants) its
+rhythm. Only the float32 numbers of Blender's scene depend on the frame, by their rounding, and the frames of stretches
+near the local origin are the whole road's own.
+"""
+
+from __future__ import annotations
+
+import math
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .geometry import RoadGeometry
+from .objects import RoadObject
+from .parameters import LineMarking, LineObject, PointObject, RoadParameters, TemporaryBarrier, Vehicle
+
+LONGEST = 500.0
+"""Length of a stretch unless something else is asked for, m."""
+BEYOND = 1000.0
+"""What runs along the road is cut so far (m) outside of a stretch, so that no terminal is made up inside of it."""
+FRAME = 1000.0
+"""Places and stations of frames are whole multiples of this, m. Within the stretch and its frame float32 numbers are
+then rounded by less than 0.1 mm, wherever it lies; stretches of one kilometre share a frame."""
+
+_BEFORE = 1200.0
+"""A stretch begins at least so far (m) after the station that its nodes count from, if that isn't 0: no input of what
+is cut `BEYOND` it is negative."""
+_BARRIER_PERIOD = 4.0
+"""Longest piece of a barrier without posts, m: see `ModelBuilder.step`."""
+
+
+def stretches(length: float, longest: float = LONGEST) -> list[tuple[float, float]]:
+    """Return the (start, end) stations of a road's stretches: as few as can be, equally long, none above `longest`."""
+    count = max(1, math.ceil(length / longest - 1e-9))
+    borders = [length * i / count for i in range(count + 1)]
+    return list(pairwise(borders))
+
+
+def frame_of(geometry: RoadGeometry, start: float, end: float) -> tuple[NDArray[np.float64], int]:
+    """Return the frame in which a stretch is built.
+
+    Args:
+        geometry: the whole road's.
+        start, end: stations, m.
+
+    Returns:
+        the local coordinates (3,) of the scene's origin, and the station that the nodes count theirs from, m.
+    """
+    middle = np.array([(start + end) / 2.0])
+    place = np.array([*geometry.alignment.position(middle)[0], *geometry.profile.elevation(middle)])
+    origin = FRAME * np.round(place / FRAME) + 0.0  # no negative zero
+    return origin, int(max(0.0, FRAME * math.floor((start - _BEFORE) / FRAME)))
+
+
+def cut(parameters: RoadParameters, start: float, end: float) -> RoadParameters:
+    """Return a set with only what stands between two stations (the end is the next stretch's, but for the last one).
+
+    The road itself stays whole, and so do plants, which are cut with its surface, and what runs obliquely. What is
+    periodic (posts, dashes) is cut in its rhythm.
+    """
+    last = end >= parameters.alignment.length
+    objects: dict[str, RoadObject] = {}
+    for name, item in parameters.objects.items():
+        if isinstance(item, PointObject | Vehicle):
+            if start <= item.station < end or (last and item.station >= end):
+                objects[name] = item
+        elif isinstance(item, LineObject | LineMarking):
+            if item.end_station > start and item.start_station < end:
+                objects[name] = item if isinstance(item, TemporaryBarrier) else _cut(item, start, end)
+        else:
+            objects[name] = item
+    return parameters.model_copy(update={"objects": objects})
+
+
+def _cut(item: LineObject | LineMarking, start: float, end: float) -> RoadObject:
+    """Return a line object that begins and ends near a stretch; its beginning moves by whole periods."""
+    low, high = start - BEYOND, end + BEYOND
+    update: dict[str, float] = {}
+    if item.start_station < low:
+        period = _period(item)
+        update["start_station"] = item.start_station + period * math.floor((low - item.start_station) / period)
+    if item.end_station > high:
+        update["end_station"] = high
+    return item.model_copy(update=update) if update else item
+
+
+def _period(item: LineObject | LineMarking) -> float:
+    if isinstance(item, LineMarking):
+        return item.dash_length + item.gap_length or 1.0
+    return float(getattr(item, "post_spacing", 0.0) or _BARRIER_PERIOD)

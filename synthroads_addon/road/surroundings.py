@@ -1,0 +1,124 @@
+"""What surrounds the road: terrain, vegetation, vehicles; and the light, weather and materials of the scene."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from pydantic import Field, model_validator
+
+from ..base.schema import Model, quantity, when
+from .objects import RoadObject
+from .things.furniture import Color
+
+TREES = ("maple", "birch", "poplar", "spruce", "pine")
+SHRUBS = ("hawthorn", "hazel", "blackthorn")
+GRASSES = ("meadow", "ryegrass", "reed")
+SPECIES = {"tree": TREES, "shrub": SHRUBS, "grass": GRASSES}
+"""Kind of vegetation -> its species."""
+
+
+class Terrain(RoadObject):
+    """The ground beside the road, which the batter meets: generated undulation, or a digital elevation model."""
+
+    type: Literal["Terrain"] = "Terrain"
+    half_width: float = quantity(ge=5, le=1000, unit="m", description="Reach to either side of the centreline.")
+    embankment_height: float = quantity(
+        ge=-20, le=20, unit="m", description="Mean height of the centreline above the ground; negative in a cutting."
+    )
+    undulation: float = quantity(ge=0, le=20, unit="m", description="Standard deviation of the ground's height.")
+    wavelength: float = quantity(
+        ge=10, le=2000, unit="m", description="Shortest wavelength of the ground's undulation."
+    )
+    batter_slope: float = quantity(
+        1.5, ge=0.5, le=10, unit="m/m", description="Horizontal run of the batter per metre of height."
+    )
+    seed: int = quantity(ge=0, le=2**63 - 1, unit="1", description="Seed of the undulation.")
+    elevation_model: str | None = Field(
+        None, description="File of a digital elevation model that takes the undulation's place."
+    )
+
+
+class Vegetation(RoadObject):
+    """Plants of one species in a band on both sides of the road, measured from the outer edge of the verge."""
+
+    conditions = tuple(when({"kind": {"const": k}}, {"species": {"enum": list(s)}}) for k, s in SPECIES.items())
+
+    type: Literal["Vegetation"] = "Vegetation"
+    kind: Literal["grass", "shrub", "tree"] = Field(description="What grows.")
+    species: Literal[
+        "maple",
+        "birch",
+        "poplar",
+        "spruce",
+        "pine",
+        "hawthorn",
+        "hazel",
+        "blackthorn",
+        "meadow",
+        "ryegrass",
+        "reed",
+    ] = Field(description="Species, which must be of the kind.")
+    density: float = quantity(ge=0, le=50, unit="1/m2", description="Plants (tufts of grass, trees) per area.")
+    band_start: float = quantity(ge=-5, le=1000, unit="m", description="Beginning of the band.")
+    band_end: float = quantity(ge=-5, le=1000, unit="m", description="End of the band.")
+    height_min: float = quantity(gt=0, le=60, unit="m", description="Height of the smallest plant.")
+    height_max: float = quantity(gt=0, le=60, unit="m", description="Height of the tallest plant.")
+    seed: int = quantity(ge=0, le=2**63 - 1, unit="1", description="Seed of places, sizes and turns.")
+
+    @model_validator(mode="after")
+    def _fits(self) -> Vegetation:
+        if self.band_end < self.band_start or self.height_max < self.height_min:
+            raise ValueError("band_end and height_max must not be less than band_start and height_min")
+        if self.species not in SPECIES[self.kind]:
+            raise ValueError(f"species '{self.species}' is no {self.kind}: {', '.join(SPECIES[self.kind])} are")
+        return self
+
+
+class Vehicle(RoadObject):
+    """A vehicle on the centre of a lane. It drives with its carriageway's traffic."""
+
+    type: Literal["Vehicle"] = "Vehicle"
+    model: Literal["car", "estate", "van", "truck", "semitrailer", "bus", "motorcycle"] = Field(
+        description="Type of vehicle."
+    )
+    carriageway: str = Field(description="Id of the carriageway that it drives on.")
+    lane: int = quantity(ge=0, le=7, unit="1", description="Lane, counted from outside, 0 the outermost.")
+    station: float = quantity(ge=0, unit="m", description="Station of its middle at the time 0.")
+    speed: float = quantity(ge=0, le=80, unit="m/s", description="Speed along its lane; 0 stands.")
+    color: Color = (0.4, 0.4, 0.4)
+
+
+class Environment(Model):
+    """Light and weather."""
+
+    sun_azimuth_deg: float = quantity(
+        180.0, ge=0, le=360, unit="deg", description="Direction of the sun, clockwise from north."
+    )
+    sun_elevation_deg: float = quantity(45.0, ge=0, le=90, unit="deg", description="Height of the sun.")
+    sun_strength: float = quantity(1.0, ge=0, le=2, unit="1", description="Strength of the sunlight; 1 on a clear day.")
+    cloud_cover: float = quantity(0.0, ge=0, le=1, unit="1", description="Share of the ground in clouds' shadow.")
+    cloud_size: float = quantity(120.0, ge=10, le=2000, unit="m", description="Size of a cloud's shadow.")
+    cloud_speed: float = quantity(5.0, ge=0, le=50, unit="m/s", description="Speed at which the shadows drift.")
+    cloud_direction_deg: float = quantity(
+        90.0, ge=0, le=360, unit="deg", description="Where the shadows drift to, clockwise from north."
+    )
+    wetness: float = quantity(0.0, ge=0, le=1, unit="1", description="0 dry, 1 wet.")
+    weather: Literal["clear", "haze", "fog", "rain", "snow", "dust"] = Field(
+        "clear", description="Weather, for the attenuation of the beam."
+    )
+    visibility: float = quantity(23_000.0, ge=20, le=100_000, unit="m", description="Meteorological visibility.")
+
+
+class MaterialVariation(Model):
+    """How this road's materials differ from the mean ones."""
+
+    asphalt_age: float = quantity(0.4, ge=0, le=1, unit="1", description="0 new and black, 1 old and bright.")
+    asphalt_brightness: float = quantity(1.0, ge=0.5, le=2, unit="1", description="Factor on the base colour.")
+    patch_density: float = quantity(0.0, ge=0, le=20, unit="1/100 m", description="Repaired patches per 100 m of road.")
+    crack_density: float = quantity(0.2, ge=0, le=1, unit="1", description="0 no cracks, 1 cracked all over.")
+    wheel_track_polish: float = quantity(0.3, ge=0, le=1, unit="1", description="Polish of the wheel tracks.")
+    concrete_brightness: float = quantity(1.0, ge=0.5, le=2, unit="1", description="Factor on the base colour.")
+    paint_wear: float = quantity(0.2, ge=0, le=1, unit="1", description="Share of the markings' film worn off.")
+    grass_dryness: float = quantity(0.3, ge=0, le=1, unit="1", description="0 green, 1 dry.")
+    soil_brightness: float = quantity(1.0, ge=0.5, le=2, unit="1", description="Factor on the base colour.")
+    seed: int = quantity(0, ge=0, le=2**63 - 1, unit="1", description="Seed of the materials' patterns.")

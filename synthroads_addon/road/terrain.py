@@ -1,0 +1,131 @@
+"""The ground beside the road before the batter meets it: generated, or a digital elevation model."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..base.files import stamp
+from ..base.random_streams import stream
+from ..base.schema import rounded
+from ..scenario.road import RoadScenario
+from .alignment import Alignment, Element
+from .elevation_model import Corridor, ElevationModel, read_elevation_model
+from .geometry import RoadGeometry
+from .parameters import AlignmentObject, Terrain
+from .profile import IntersectionPoint, Profile
+
+Float = NDArray[np.float64]
+
+GROUND_MARGIN = 12.0
+"""Heights of the ground are wanted this far (m) beyond the terrain's half width and the road's ends."""
+
+_WAVES = 24
+_OCTAVES = 3.0
+_FIT_SPACING = 1.0  # m, of the stations at which a road's height above the ground is averaged
+
+
+def ground_elevation(geometry: RoadGeometry, terrain: Terrain, station: Float, offset: Float) -> Float:
+    """Return the ground's local elevation (N,) at stations and offsets (N,), without batter.
+
+    Generated ground follows the profile at ``embankment_height`` below it and undulates. A digital elevation model is
+    the ground itself; farther than `GROUND_MARGIN` beyond the terrain's reach the result can be NaN.
+
+    Raises:
+        InputError: the elevation model is missing, unreadable or unfit for this road.
+    """
+    position, heading, _ = geometry.alignment.frame(station)
+    left = np.stack([-np.sin(heading), np.cos(heading)], axis=-1)
+    plan = position + offset[:, None] * left
+    if terrain.elevation_model is None:
+        return geometry.profile.elevation(station) - terrain.embankment_height + undulation(terrain, plan)
+    parameters = geometry.parameters
+    east, north, height = parameters.transform.translate
+    model = road_elevation_model(
+        terrain.elevation_model, parameters.metadata.epsg, parameters.alignment, (east, north), terrain.half_width
+    )
+    return model.elevation(plan[:, 0] + east, plan[:, 1] + north) - height
+
+
+def undulation(terrain: Terrain, plan: Float) -> Float:
+    """Return the generated ground's height (N,) above its mean at local points (N, 2), m.
+
+    A sum of seeded plane waves over the plan, whose wavelengths spread over three octaves above ``wavelength`` and
+    whose heights have the standard deviation ``undulation``.
+    """
+    rng = stream(terrain.seed, "terrain undulation")
+    octave = rng.uniform(0.0, _OCTAVES, _WAVES)
+    direction = rng.uniform(0.0, 2.0 * np.pi, _WAVES)
+    phase = rng.uniform(0.0, 2.0 * np.pi, _WAVES)
+    # Longer waves are higher; a wave of amplitude a has the variance a^2 / 2.
+    weight = 2.0**octave
+    amplitude = terrain.undulation * weight * np.sqrt(2.0 / np.sum(weight**2))
+    number = 2.0 * np.pi / (terrain.wavelength * weight)
+    vectors = number * np.stack([np.cos(direction), np.sin(direction)])
+    return np.sin(plan @ vectors + phase) @ amplitude
+
+
+def road_elevation_model(
+    path: str, epsg: int, axis: AlignmentObject, origin: tuple[float, float], half_width: float
+) -> ElevationModel:
+    """Return the elevation model beneath a road; the last ones are kept as long as their files don't change.
+
+    Args:
+        path: GeoTIFF or ESRI ASCII grid; if relative, from the working directory.
+        epsg: the road's map coordinate system.
+        axis: its centreline.
+        origin: map coordinates (east, north) of the local origin, m.
+        half_width: the terrain's, m.
+
+    Raises:
+        InputError: as `read_elevation_model`.
+    """
+    found = stamp(path, "an elevation model is needed here")
+    return _read(path, found, epsg, axis, origin, half_width + GROUND_MARGIN)
+
+
+@lru_cache(maxsize=2)
+def _read(
+    path: str, _stamp: tuple[int, int], epsg: int, axis: AlignmentObject, origin: tuple[float, float], reach: float
+) -> ElevationModel:
+    return read_elevation_model(path, epsg, Corridor(_alignment(axis), *origin, reach))
+
+
+def origin_on_ground(scenario: RoadScenario, axis: AlignmentObject, terrain: Terrain) -> tuple[float, float, float]:
+    """Return the map coordinates of a sampled road's local origin, m: the scenario's, or its elevation model's height.
+
+    Raises:
+        InputError: the elevation model is missing, unreadable or unfit for this road.
+    """
+    east, north, height = scenario.map_origin
+    if terrain.elevation_model is None:
+        return east, north, height
+    model = road_elevation_model(terrain.elevation_model, scenario.epsg, axis, (east, north), terrain.half_width)
+    return fit_to_ground(axis, (east, north), model, terrain.embankment_height)
+
+
+def fit_to_ground(
+    axis: AlignmentObject, origin: tuple[float, float], model: ElevationModel, embankment_height: float
+) -> tuple[float, float, float]:
+    """Return the local origin's map coordinates, m, that put a road at its height above the ground.
+
+    Args:
+        axis: centreline and profile, local.
+        origin: map coordinates (east, north) of the local origin, m; they are kept.
+        model: the ground, all along the centreline.
+        embankment_height: mean height (m) of the centreline above the ground, which the third coordinate gives it.
+    """
+    alignment, (east, north) = _alignment(axis), origin
+    count = int(np.ceil(alignment.length / _FIT_SPACING))
+    station = (np.arange(count) + 0.5) * (alignment.length / count)
+    plan = alignment.position(station)
+    profile = Profile([IntersectionPoint(p.station, p.elevation, p.radius) for p in axis.vertical])
+    above = profile.elevation(station) - model.elevation(plan[:, 0] + east, plan[:, 1] + north)
+    return east, north, rounded(embankment_height - float(np.mean(above)))
+
+
+def _alignment(axis: AlignmentObject) -> Alignment:
+    elements = [Element(e.length, e.curvature_start, e.curvature_end) for e in axis.horizontal]
+    return Alignment(elements, axis.start_x, axis.start_y, np.deg2rad(axis.start_heading_deg))

@@ -1,0 +1,98 @@
+"""Where the analytic road is sampled: as few stations as keep the mesh within the geometric tolerance."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .damage import damage_rows
+from .geometry import RoadGeometry
+from .parameters import LineMarking
+from .turnout_geometry import STEP
+
+MAXIMUM_SPACING = 8.0
+"""No two stations lie farther apart than this (m), so that the terrain's undulation is followed on straights."""
+
+_SHARE = 0.57
+"""Share of the tolerance given to each of the horizontal chord, the vertical chord and the twist of a strip, whose
+root sum of squares stays below the whole."""
+
+
+def sample_stations(
+    geometry: RoadGeometry, tolerance: float, start: float = 0.0, end: float = np.inf
+) -> NDArray[np.float64]:
+    """Return the (N,) increasing stations at which the road is sampled.
+
+    Every kink (element, rounding, crossfall point, end of a dash) is a station of its own. Between two kinks the
+    spacing is even and keeps the chord's sagitta ds^2 k / 8 and the twist of the widest strip within the tolerance.
+    A stretch has the whole road's stations, from the last one that is not after its start to the last one that is not
+    after its end: stretches that follow one another join, and a road doesn't depend on how it is cut.
+
+    Args:
+        geometry: the analytic road.
+        tolerance: largest distance (m) between the mesh and the analytic surface, > 0.
+        start, end: stations (m) of the stretch that is wanted.
+    """
+    end = min(end, geometry.length)
+    kinks = _around(_kinks(geometry, tolerance), start, end)
+    spacing = np.minimum(_chord_spacing(geometry, kinks, tolerance), _twist_spacing(geometry, kinks, tolerance))
+    # Between the two ends of a step there is nothing to follow.
+    spacing = np.where(np.diff(kinks) <= 2.0 * STEP, np.inf, np.minimum(spacing, MAXIMUM_SPACING))
+    counts = np.maximum(1, np.ceil(np.diff(kinks) / spacing - 1e-9)).astype(int)
+    first = np.repeat(kinks[:-1], counts)
+    step = np.repeat(np.diff(kinks) / counts, counts)
+    within = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
+    stations = np.append(first + within * step, kinks[-1])
+    low, high = (int(np.searchsorted(stations, place, side="right")) - 1 for place in (start, end))
+    low = max(low, 0)
+    return stations[low : max(high, low + 1) + 1]
+
+
+def _kinks(geometry: RoadGeometry, tolerance: float) -> NDArray[np.float64]:
+    parameters, end = geometry.parameters, geometry.length
+    stations = [geometry.alignment.element_starts, np.asarray(geometry.profile.breakpoints), [0.0, end]]
+    for section in geometry.sections.values():
+        stations.append([point.station for point in section.carriageway.crossfall])
+        stations += [section.kinks(), damage_rows(section, tolerance)]
+    stations += [geometry.dashes(line).ravel() for line in parameters.of_type(LineMarking).values()]
+    inside = np.clip(np.concatenate([np.asarray(s, dtype=np.float64) for s in stations]), 0.0, end)
+    kinks = np.unique(inside)
+    # Kinks closer than a tenth of a millimetre are one: they would only make faces without area.
+    keep = np.append(np.diff(kinks) > 1e-4, True)
+    keep[0] = True
+    return kinks[keep] if len(kinks) > 2 else kinks
+
+
+def _around(kinks: NDArray[np.float64], start: float, end: float) -> NDArray[np.float64]:
+    """Return those of the sorted kinks that the spacing between two stations depends on: at least two."""
+    low = int(np.clip(np.searchsorted(kinks, start, side="right") - 1, 0, len(kinks) - 2))
+    high = int(np.searchsorted(kinks, end, side="left"))
+    return kinks[low : max(high, low + 1) + 1]
+
+
+def _chord_spacing(geometry: RoadGeometry, kinks: NDArray[np.float64], tolerance: float) -> NDArray[np.float64]:
+    """Return the largest spacing (K,) whose horizontal and vertical sagitta keep their share of the tolerance."""
+    samples = np.linspace(kinks[:-1] + 1e-6, kinks[1:] - 1e-6, 5)
+    widest = np.abs(geometry.offsets(kinks)).max(axis=1)
+    reach = np.maximum(widest[:-1], widest[1:])
+    bend = np.abs(geometry.alignment.curvature(samples)).max(axis=0)
+    for section in geometry.sections.values():
+        bend = bend + section.bend(samples.ravel()).reshape(samples.shape).max(axis=0)
+    horizontal = bend * (1.0 + bend * reach)
+    vertical = np.abs(geometry.profile.curvature(samples)).max(axis=0)
+    return np.sqrt(8.0 * _SHARE * tolerance / np.maximum(np.maximum(horizontal, vertical), 1e-12))
+
+
+def _twist_spacing(geometry: RoadGeometry, kinks: NDArray[np.float64], tolerance: float) -> NDArray[np.float64]:
+    """Return the largest spacing (K,) at which two triangles stay close to a strip whose crossfall changes.
+
+    The middle of a twisted quad of width w and length ds lies w ds (dq/ds) / 4 off its diagonal.
+    """
+    widths = -np.diff(geometry.offsets(kinks), axis=1)
+    heights = np.diff(geometry.boundary_elevations(kinks), axis=1)
+    # A strip without width lies in no plane; one that opens from 0 has the slope that it opens to.
+    slopes = np.where(widths > 1e-6, heights / np.maximum(widths, 1e-6), np.nan)
+    change = np.nan_to_num(np.abs(np.diff(slopes, axis=0)))
+    widest = np.maximum(widths[:-1], widths[1:])
+    twist = (change * widest).max(axis=1) / np.diff(kinks)
+    return 4.0 * _SHARE * tolerance / np.maximum(twist, 1e-12)

@@ -1,0 +1,1 @@
+"""The things of a road as parameters: furniture, signs, vehicles, assets."""

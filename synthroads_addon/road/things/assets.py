@@ -1,0 +1,242 @@
+"""Libraries of free assets: objects out of .blend, .glb and .obj files, with their class and where they are placed."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from functools import lru_cache
+from pathlib import Path, PurePosixPath
+from typing import Annotated, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field, field_validator, model_validator
+
+from ...base.classes import classes
+from ...base.errors import InputError, MissingFileError, nearest_name
+from ...base.files import PRESETS, stamp
+from ...base.schema import quantity, read_json, rounded
+from ...sampling.placing.site import Site
+from ...scenario.road import Interval, ScenarioModel, interval
+from ..section_geometry import CarriagewaySection
+from .furniture import Asset
+
+Float = NDArray[np.float64]
+
+SUFFIXES = (".blend", ".glb", ".obj")
+LIBRARIES = PRESETS / "assets"
+FARTHEST = 100.0
+"""Largest offset of an object, m."""
+
+_ALLOWED = {"distance": (0.0, 1000.0), "spacing": (0.5, 1e6), "per_km": (0.0, 1e4), "rotation_deg": (-360.0, 360.0)}
+
+
+class AssetPlacement(ScenarioModel):
+    """Where copies of an asset stand."""
+
+    side: Literal["left", "right", "both", "median"] = Field(description="Side of the road, or in the median.")
+    distance: Interval = Field(
+        description="Behind the verge's outer edge; in the median from the pavement's inner edge.",
+        json_schema_extra={"unit": "m"},
+    )
+    spacing: Interval | None = Field(
+        None, description="Between one and the next along the road.", json_schema_extra={"unit": "m"}
+    )
+    per_km: Interval | None = Field(
+        None, description="How many, at random along the road, instead.", json_schema_extra={"unit": "1/km"}
+    )
+    start_station: float = quantity(0.0, ge=0, unit="m", description="Where they begin.")
+    end_station: float | None = quantity(
+        None, ge=0, unit="m", description="Where they end; the road's end if not given."
+    )
+    rotation_deg: Interval = interval(0.0, 0.0, "deg", "About the vertical; at 0 it faces its side's traffic.")
+
+    @model_validator(mode="after")
+    def _can_be_placed(self) -> AssetPlacement:
+        if (self.spacing is None) == (self.per_km is None):
+            raise ValueError("either spacing or per_km is needed, and not both")
+        for name, (least, most) in _ALLOWED.items():
+            limits = getattr(self, name)
+            if limits and (limits.minimum < least or limits.maximum > most):
+                raise ValueError(f"{name} is {limits.minimum:g} to {limits.maximum:g}: must be {least:g} to {most:g}")
+        if self.end_station is not None and self.end_station < self.start_station:
+            raise ValueError(f"end_station is {self.end_station:g}: must not be less than {self.start_station:g}")
+        return self
+
+
+class LibraryAsset(ScenarioModel):
+    """One asset: its file, its semantic class, and how it is placed."""
+
+    file: str = Field(description="File (.blend, .glb, .obj), relative to the library's folder, with / in between.")
+    object: str | None = Field(
+        None, description="Name of the object in a .blend file; all of its objects if not given."
+    )
+    class_name: str = Field(description="Semantic class of its faces.")
+    scale: float = quantity(1.0, gt=0, le=100, unit="1", description="Scale.")
+    placement: AssetPlacement
+
+    @field_validator("file")
+    @classmethod
+    def _inside(cls, file: str) -> str:
+        path = PurePosixPath(file)
+        if path.suffix.lower() not in SUFFIXES:
+            raise ValueError(f"'{file}' must be one of {', '.join(SUFFIXES)}")
+        if path.is_absolute() or "\\" in file or ":" in file or ".." in path.parts:
+            raise ValueError(f"'{file}' must lie in the library's folder: a relative path with / and without ..")
+        return file
+
+    @field_validator("class_name")
+    @classmethod
+    def _known(cls, name: str) -> str:
+        known = [row.name for row in classes()]
+        if name not in known:
+            raise ValueError(f"'{name}' must be one of {', '.join(known)}{nearest_name(name, known)}")
+        return name
+
+    @model_validator(mode="after")
+    def _object_in_blend(self) -> LibraryAsset:
+        if self.object is not None and not self.file.lower().endswith(".blend"):
+            raise ValueError(f"object is '{self.object}': only a .blend file has named objects to choose from")
+        return self
+
+
+class AssetLibrary(ScenarioModel):
+    """Assets by name."""
+
+    type: Literal["AssetLibrary"] = "AssetLibrary"
+    version: Literal["1.0"] = "1.0"
+    assets: dict[Annotated[str, Field(pattern=r"^[A-Za-z0-9_.-]{1,64}$")], LibraryAsset] = Field(
+        min_length=1, description="Assets by name."
+    )
+
+
+def library_names() -> list[str]:
+    """Return the names of the built-in libraries."""
+    return sorted(path.parent.name for path in LIBRARIES.glob("*/library.json"))
+
+
+def library_file(name_or_file: str) -> Path:
+    """Return the file of a built-in library, or of one's own."""
+    return LIBRARIES / name_or_file / "library.json" if name_or_file in library_names() else Path(name_or_file)
+
+
+def read_asset_library(name_or_file: str | os.PathLike[str]) -> AssetLibrary:
+    """Read a library and see that its assets' files are there; the last ones read are kept until they change.
+
+    Raises:
+        MissingFileError: the library, or a file that it names, doesn't exist or cannot be read.
+        InputError: a field is unknown or wrong.
+    """
+    name = str(library_file(os.fspath(name_or_file)))
+    library = _read(name, stamp(name, "an asset library (JSON) is needed here"))
+    for key, asset in library.assets.items():
+        _check_file(Path(name).parent / asset.file, f"{name}: assets.{key}.file", asset.file)
+    return library
+
+
+@lru_cache(maxsize=8)
+def _read(path: str, _stamp: tuple[int, int]) -> AssetLibrary:
+    return AssetLibrary.from_dict(read_json(path), source=path)
+
+
+def _check_file(path: Path, field: str, shown: str) -> None:
+    try:
+        with path.open("rb") as file:
+            empty = not file.read(1)
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or error
+        raise MissingFileError(field, shown, f"cannot be read ({reason})") from None
+    if empty:
+        raise InputError(field, shown, "the file is empty")
+
+
+# --- placing ---------------------------------------------------------------------------------------------------------
+
+
+def sample_assets(site: Site) -> Iterator[tuple[str, Asset]]:
+    """Yield the assets of the scenario's libraries by id, placed by their rules; their instance numbers are 1.
+
+    Where the road leaves no room for one, there is none.
+
+    Raises:
+        InputError: a library is faulty, or the road leaves no room for an asset anywhere.
+    """
+    count = 0
+    for number, path in enumerate(site.scenario.assets):
+        for name, asset in read_asset_library(path).assets.items():
+            field = f"{path}: assets.{name}.placement.distance"
+            for station, offset, rotation in _places(site, asset.placement, field, ("assets", number, name)):
+                count += 1
+                placed = Asset(
+                    instance=1,
+                    station=rounded(station),
+                    offset=rounded(offset),
+                    rotation_deg=rounded(rotation),
+                    library=path,
+                    name=name,
+                    class_name=asset.class_name,
+                    scale=asset.scale,
+                )
+                yield f"asset-{count}", placed
+
+
+def _places(
+    site: Site, placement: AssetPlacement, field: str, purpose: tuple[str | int, ...]
+) -> Iterator[tuple[float, float, float]]:
+    """Yield station (m), offset (m) and rotation (deg) of an asset's copies. In the median each takes either half."""
+    in_median = placement.side == "median"
+    sides = [side for side in site.sections if in_median or placement.side in (side, "both")]
+    for group in [sides] if in_median else [[side] for side in sides]:
+        rng = site.stream(*purpose, *group)
+        stations = _stations(rng, placement, site.length)
+        half = rng.integers(len(group), size=len(stations))
+        for number, side in enumerate(group):
+            section, own = site.sections[side], stations[half == number]
+            edge, room = _room(site, section, in_median, own, field, placement.distance.minimum)
+            distance = _drawn(rng, placement.distance, len(own), np.minimum(placement.distance.maximum, room))
+            away = edge - distance if in_median else edge + distance
+            turn = _drawn(rng, placement.rotation_deg, len(own), placement.rotation_deg.maximum)
+            turn += 0.0 if section.carriageway.traffic > 0 else 180.0
+            there = room >= placement.distance.minimum
+            offset = section.carriageway.sign * away
+            yield from zip(own[there], offset[there], ((turn + 180.0) % 360.0 - 180.0)[there], strict=True)
+
+
+def _drawn(rng: np.random.Generator, limits: Interval, number: int, highest: Float | float) -> Float:
+    return limits.minimum + (highest - limits.minimum) * rng.random(number)
+
+
+def _stations(rng: np.random.Generator, placement: AssetPlacement, length: float) -> Float:
+    """Return the stations (N,) of an asset's copies along one side, m."""
+    start = placement.start_station
+    end = length if placement.end_station is None else min(placement.end_station, length)
+    if end <= start:
+        return np.empty(0)
+    if placement.per_km is not None:
+        per_km = float(_drawn(rng, placement.per_km, 1, placement.per_km.maximum)[0])
+        return np.sort(rng.uniform(start, end, int(per_km * (end - start) / 1000.0 + rng.random())))
+    assert placement.spacing is not None
+    number = int((end - start) / placement.spacing.minimum) + 1
+    steps = _drawn(rng, placement.spacing, number, placement.spacing.maximum)
+    steps[0] *= rng.random()  # the first stands anywhere within a spacing
+    stations = start + np.cumsum(steps)
+    return stations[stations <= end]
+
+
+def _room(
+    site: Site, section: CarriagewaySection, in_median: bool, stations: Float, field: str, needed: float
+) -> tuple[Float, Float]:
+    """Return the distance (N,) of the edge that an asset's distance counts from, and the room beyond it there, m."""
+
+    def beside(at: Float) -> tuple[Float, Float]:
+        if in_median:
+            inner = section.distances(at)[:, 0]
+            return inner, inner
+        edge = section.road_edge(at)
+        return edge, min(site.terrain.half_width, FARTHEST) - edge
+
+    widest = float(beside(np.array([0.0, *section.kinks(), site.length]))[1].max())
+    if widest < needed:
+        where = "in this half of the median" if in_median else "between the verge and road.half_width"
+        raise InputError(field, needed, f"there are at most {max(widest, 0.0):g} m {where}")
+    return beside(stations)

@@ -1,0 +1,90 @@
+"""The catalogue of traffic signs (`presets/signs.json`): what stands on which sign, and in which colours."""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import Any, Literal
+
+from pydantic import Field, model_validator
+
+from ...base.files import PRESETS
+from ...base.schema import Model, quantity, read_json
+from .furniture import Color, TrafficSign
+
+Pictogram = Literal[
+    "none",
+    "number",
+    "end",
+    "arrow",
+    "exit_arrow",
+    "curve_left",
+    "curve_right",
+    "double_curve_left",
+    "double_curve_right",
+    "narrow_left",
+    "narrow_right",
+    "works",
+    "no_overtaking",
+    "bars_1",
+    "bars_2",
+    "bars_3",
+]
+
+
+class SignType(Model):
+    """One sign of the catalogue (VzKat), at the size that motorways have (size 3)."""
+
+    description: str = Field(description="What it tells, for people.")
+    class_name: str = Field("road_sign", alias="class", description="Semantic class of its faces.")
+    shape: Literal["round", "triangle", "rectangle", "octagon", "arrow"] = Field(description="Outline of its face.")
+    width: float = quantity(gt=0, le=12, unit="m", description="Width of the face.")
+    height: float = quantity(gt=0, le=8, unit="m", description="Height of the face.")
+    lower_edge: float = quantity(2.0, ge=0.3, le=8, unit="m", description="Lower edge of the face above the surface.")
+    posts: int = quantity(1, ge=1, le=4, unit="1", description="Number of posts.")
+    post_diameter: float = quantity(0.076, ge=0.03, le=0.4, unit="m", description="Diameter of a post.")
+    ground: str = Field(description="Colour of the face, by its name in the file.")
+    border: str = Field(description="Colour of its border.")
+    writing: str = Field(description="Colour of writing and pictogram.")
+    pictogram: Pictogram = Field(description="What is drawn on it; a number is its first line of text.")
+    text: tuple[str, ...] = Field(
+        (), max_length=6, description="Lines of writing; {exit}, {number}, {near}, {middle} and {far} are filled in."
+    )
+
+    def fields(self) -> dict[str, Any]:
+        """Return the fields of a `TrafficSign` of this type, but its code, text and place."""
+        return {
+            "shape": self.shape,
+            "width": self.width,
+            "height": self.height,
+            "lower_edge": self.lower_edge,
+            "posts": self.posts,
+            "post_diameter": self.post_diameter,
+        }
+
+
+class SignCatalogue(Model):
+    """The file's content."""
+
+    colors: dict[str, Color] = Field(description="Colours by name.")
+    signs: dict[str, SignType] = Field(description="Signs by their number in the catalogue (VzKat).")
+    destinations: tuple[str, ...] = Field(min_length=4, description="Names of places for destination boards.")
+
+    @model_validator(mode="after")
+    def _colors_known(self) -> SignCatalogue:
+        for code, sign in self.signs.items():
+            for name in (sign.ground, sign.border, sign.writing):
+                if name not in self.colors:
+                    raise ValueError(f"signs.{code}: colour '{name}' must be one of {', '.join(self.colors)}")
+        return self
+
+
+@cache
+def sign_catalogue() -> SignCatalogue:
+    """Return the shipped catalogue."""
+    path = PRESETS / "signs.json"
+    return SignCatalogue.from_dict(read_json(path), source=str(path))
+
+
+def sign_type(sign: TrafficSign) -> SignType | None:
+    """Return what the catalogue says of a sign, or None if it doesn't have its code."""
+    return sign_catalogue().signs.get(sign.code)

@@ -1,0 +1,163 @@
+"""How a turnout changes the widths of its carriageway's strips along the road."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .objects import width_at
+from .section import Carriageway, Ramp, Turnout
+
+Float = NDArray[np.float64]
+
+STEP = 0.05
+"""What changes at once (pavement at the nose and at a ramp's end) does so over this length, m.
+
+Long enough that coordinates of 32 bits don't turn the faces over: they lie skew, some metres to one side."""
+NOSE_WIDTH = 1.0
+"""Unpaved ground between hard shoulder and ramp at the nose, m."""
+NOSE_BEFORE_END = 10.0
+"""The nose lies at least this far before the ramp's end, m."""
+BLEND = 30.0
+"""Length behind a ramp's end over which the verge comes back beside the main road, m."""
+
+TURNOUT_STRIPS = (
+    "island",
+    "gore",
+    "ramp_inner_strip",
+    "turnout_lane",
+    "turnout_edge_strip",
+    "turnout_shoulder",
+    "bay",
+)
+"""Strips between hard shoulder and verge that turnouts make, from the hard shoulder outwards."""
+
+
+@dataclass(frozen=True)
+class TurnoutWidths:
+    """Widths (N,) that a turnout gives its strips, m.
+
+    Attributes:
+        strips: by kind, of `TURNOUT_STRIPS`.
+        hard_shoulder: what is left of the main road's.
+        verge_extra: what the verge has in addition behind a ramp's end.
+    """
+
+    strips: dict[str, Float]
+    hard_shoulder: Float
+    verge_extra: Float
+
+
+class TurnoutShape:
+    """The widths of one turnout by station.
+
+    Along it counts w (m): for an exit from its beginning in the direction of traffic, for an entry backwards from its
+    end; so both begin with their taper and end with their ramp. x counts from the gore's tip.
+
+    Attributes:
+        turnout, carriageway: the turnout, and what it widens.
+        nose: x of the nose, m; infinite for an emergency bay.
+    """
+
+    def __init__(self, turnout: Turnout, carriageway: Carriageway) -> None:
+        self.turnout = turnout
+        self.carriageway = carriageway
+        self._forward = (carriageway.traffic > 0) != (turnout.kind == "entry")
+        self._taper = turnout.taper_out_length if turnout.kind == "entry" else turnout.taper_in_length
+        self.nose = np.inf
+        if turnout.ramp:
+            full = float(width_at(carriageway.hard_shoulder_width, self.station(self._taper + turnout.lane_length)))
+            apart = 6.0 * turnout.ramp.clothoid_parameter**2 * (full + NOSE_WIDTH)
+            self.nose = max(min(apart ** (1.0 / 3.0), turnout.ramp.length - NOSE_BEFORE_END), STEP)
+
+    def station(self, w: float) -> float:
+        """Return the station of a w (both m)."""
+        return self.turnout.start_station + w if self._forward else self.turnout.end_station - w
+
+    def kinks(self) -> list[float]:
+        """Return the stations at which a width bends or steps, in no order."""
+        turnout, taper, tip = self.turnout, self._taper, self._taper + self.turnout.lane_length
+        if turnout.ramp is None:
+            marks = [0.0, taper, tip, turnout.length]
+        else:
+            end = tip + turnout.ramp.length
+            marks = [0.0, taper, tip, end + STEP + BLEND, *(w for step in self._steps() for w in step)]
+        return [self.station(w) for w in marks]
+
+    def steps(self) -> list[tuple[float, float]]:
+        """Return lowest and highest station of each `STEP` along which the pavement changes at once."""
+        found = [sorted(map(self.station, step)) for step in self._steps()]
+        return [(low, high) for low, high in found]
+
+    def _steps(self) -> list[tuple[float, float]]:
+        """Return the w of each step's two ends."""
+        if self.turnout.ramp is None:
+            return []
+        tip = self._taper + self.turnout.lane_length
+        return [(tip + x, tip + x + STEP) for x in (self.nose, self.turnout.ramp.length)]
+
+    def range(self) -> tuple[float, float]:
+        """Return the lowest and the highest station at which it changes anything."""
+        marks = self.kinks()
+        return min(marks), max(marks)
+
+    def gore_tip(self) -> float:
+        """Return the station of the gore's tip; only exits and entries have one."""
+        return self.station(self._taper + self.turnout.lane_length)
+
+    def nose_station(self) -> float:
+        """Return the station of the nose; only exits and entries have one."""
+        return self.station(self._taper + self.turnout.lane_length + self.nose)
+
+    def bend(self, station: Float) -> Float:
+        """Return the second derivative (1/m) of the ramp's offset by station (N,)."""
+        ramp = self.turnout.ramp
+        if ramp is None:
+            return np.zeros(station.shape)
+        x = self._x(station)
+        return np.where((x > 0.0) & (x < ramp.length), x / ramp.clothoid_parameter**2, 0.0)
+
+    def widths(self, station: Float) -> TurnoutWidths:
+        """Return the widths at stations (N,)."""
+        full = width_at(self.carriageway.hard_shoulder_width, station)
+        strips = {kind: np.zeros(station.shape) for kind in TURNOUT_STRIPS}
+        turnout, w = self.turnout, self._w(station)
+        if turnout.ramp is None:
+            opened = np.minimum(w / turnout.taper_in_length, (turnout.length - w) / turnout.taper_out_length)
+            strips["bay"] = turnout.lane_width * np.clip(opened, 0.0, 1.0)
+            return TurnoutWidths(strips, full, np.zeros(station.shape))
+        return self._with_ramp(turnout.ramp, w, full, strips)
+
+    def _with_ramp(self, ramp: Ramp, w: Float, full: Float, strips: dict[str, Float]) -> TurnoutWidths:
+        turnout, x = self.turnout, w - self._taper - self.turnout.lane_length
+        opened = np.clip(w / self._taper, 0.0, 1.0)
+        to_ramp = np.clip(x / self.nose, 0.0, 1.0)
+        behind_nose = np.clip((x - self.nose) / STEP, 0.0, 1.0)
+        there = 1.0 - np.clip((x - ramp.length) / STEP, 0.0, 1.0)
+        wedge = np.clip(x, 0.0, ramp.length) ** 3 / (6.0 * ramp.clothoid_parameter**2)
+
+        def between(lane: float, of_ramp: float) -> Float:
+            return there * (opened * lane * (1.0 - to_ramp) + of_ramp * to_ramp)
+
+        shoulder = np.minimum(full, wedge)
+        strips["island"] = there * behind_nose * (wedge - shoulder)
+        strips["gore"] = there * (1.0 - behind_nose) * wedge
+        strips["ramp_inner_strip"] = between(0.0, ramp.edge_strip_width)
+        strips["turnout_lane"] = between(turnout.lane_width, ramp.lane_width)
+        strips["turnout_edge_strip"] = between(turnout.edge_strip_width, ramp.edge_strip_width)
+        strips["turnout_shoulder"] = between(turnout.shoulder_width, 0.0)
+        before = full * (1.0 - opened) * (1.0 - behind_nose)
+        hard_shoulder = there * (before + behind_nose * shoulder) + (1.0 - there) * full
+        blend = np.clip(1.0 - (x - ramp.length - STEP) / BLEND, 0.0, 1.0)
+        at_end = wedge - shoulder + ramp.lane_width + 2.0 * ramp.edge_strip_width
+        return TurnoutWidths(strips, hard_shoulder, (1.0 - there) * blend * at_end)
+
+    def _w(self, station: Float) -> Float:
+        return station - self.turnout.start_station if self._forward else self.turnout.end_station - station
+
+    def _x(self, station: Float) -> Float:
+        return self._w(station) - self._taper - self.turnout.lane_length
+
+

@@ -1,0 +1,1 @@
+"""Roads drawn from a seed within limits."""

@@ -1,0 +1,268 @@
+"""Limits of a scenario that contradict each other or the guidelines, found before anything is drawn.
+
+Each function yields sentences, one for each limit that can't be kept. The sampler can make a road of every scenario for
+which there is none.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from functools import lru_cache
+
+from ..base.errors import InputError
+from ..base.schema import Model
+from ..road.guidelines import (
+    CLEARANCE,
+    EMERGENCY_BAY_LENGTH,
+    EMERGENCY_BAY_TAPER,
+    EMERGENCY_BAY_WIDTH,
+    LANE_TAPER_LENGTH,
+    LIMITS,
+    SECTIONS_OF_CLASS,
+    STANDARD_CROSS_SECTIONS,
+    TURNOUT_GAP,
+    TURNOUT_LANE_LENGTH,
+    TURNOUT_LANE_WIDTH,
+    TURNOUT_TAPER,
+)
+from ..road.parameters import (
+    Environment,
+    Guardrail,
+    MaterialVariation,
+    NoiseBarrier,
+    Overpass,
+    Pole,
+    Pothole,
+    Ramp,
+    Rut,
+    Terrain,
+    Turnout,
+    Vegetation,
+    Vehicle,
+)
+from ..road.section import Marking
+from ..scenario.road import EnvironmentLimits, Interval, MaterialLimits, RoadScenario, ScenarioModel
+from .placing.construction import SHORTEST_ALONG, TAPER_OUT, TAPERS_IN
+from .section import cross_section_of
+from .turnouts import RampLimits, features_of, may_change_lanes
+
+LEAST_MEDIAN = min(section.median for section in STANDARD_CROSS_SECTIONS.values())
+"""Narrowest median of the standard cross-sections, m."""
+WIDEST_RADIUS = 100_000.0
+"""A curve of a larger radius (m) is a straight."""
+STEADY_CLIMB = 250.0
+"""Height (m) that the gentlest of the grades may climb over half of the road."""
+
+_FIELDS: dict[str, tuple[type[Model], str]] = {
+    "turnouts.taper_length": (Turnout, "taper_in_length"),
+    "turnouts.lane_length": (Turnout, "lane_length"),
+    "turnouts.lane_width": (Turnout, "lane_width"),
+    "turnouts.shoulder_width": (Turnout, "shoulder_width"),
+    "turnouts.ramp_length": (Ramp, "length"),
+    "turnouts.ramp_clothoid": (Ramp, "clothoid_parameter"),
+    "turnouts.bay_length": (Turnout, "lane_length"),
+    "turnouts.bay_taper_length": (Turnout, "taper_in_length"),
+    "turnouts.bay_width": (Turnout, "lane_width"),
+    "pavement.rut_depth": (Rut, "depth"),
+    "pavement.rut_width": (Rut, "width"),
+    "pavement.pothole_size": (Pothole, "width"),
+    "pavement.pothole_depth": (Pothole, "depth"),
+    "markings.film_thickness": (Marking, "film_thickness"),
+    "barriers.guardrail_height": (Guardrail, "height"),
+    "barriers.noise_barrier_height": (NoiseBarrier, "height"),
+    "furniture.lighting_height": (Pole, "height"),
+    "furniture.surveillance_height": (Pole, "height"),
+    "furniture.overpass_width": (Overpass, "width"),
+    "vehicles.speed": (Vehicle, "speed"),
+    "embankment_height": (Terrain, "embankment_height"),
+    "undulation": (Terrain, "undulation"),
+    "wavelength": (Terrain, "wavelength"),
+    "batter_slope": (Terrain, "batter_slope"),
+    "vegetation.tree_height": (Vegetation, "height_min"),
+    "vegetation.shrub_height": (Vegetation, "height_min"),
+    "vegetation.grass_height": (Vegetation, "height_min"),
+    **{f"environment.{n}": (Environment, n) for n in EnvironmentLimits.model_fields if n in Environment.model_fields},
+    **{f"materials.{name}": (MaterialVariation, name) for name in MaterialLimits.model_fields},
+}
+"""Interval of the scenario -> the field of the parameter set whose limits it must keep to."""
+_PLAIN = {
+    "lane_changes.taper_length": (0.0, 1e4),
+    "pavement.potholes_per_km": (0.0, 1e4),
+    "barriers.noise_barrier_length": (0.0, 1e6),
+    "furniture.gantry_clearance": (CLEARANCE, 10.0),
+    "furniture.lighting_spacing": (1.0, 1e4),
+    "furniture.cabinets_per_km": (0.0, 1e3),
+    "furniture.overpass_clearance": (CLEARANCE, 20.0),
+    "furniture.construction_length": (0.0, 1e6),
+    "vehicles.per_km": (0.0, 1e3),
+    "vehicles.trucks": (0.0, 1.0),
+}
+"""Interval of the scenario -> its limits, where they are no field's."""
+_ABOVE = 1e-6  # what must be greater than a number is so by this much, at least
+
+
+_SHARES = {
+    "exit": "turnouts.exits",
+    "entry": "turnouts.entries",
+    "emergency_bay": "turnouts.emergency_bays",
+    "lane_change": "lane_changes.share",
+}
+
+
+def check_conflicts(scenario: RoadScenario, with_axis: bool = False) -> None:
+    """Raise one `InputError` that names every limit of a scenario that can't be kept.
+
+    Args:
+        scenario: the limits.
+        with_axis: the road has an axis of its own, so that limits of the alignment don't matter.
+    """
+    found = conflicts(scenario, with_axis)
+    if found:
+        raise InputError("road", None, f"limits conflict: {'; '.join(found)}")
+
+
+@lru_cache(maxsize=16)
+def conflicts(scenario: RoadScenario, with_axis: bool = False) -> tuple[str, ...]:
+    """Return a sentence for each limit of a scenario that can't be kept."""
+    kinds: list[Callable[[RoadScenario], Iterator[str]]] = [_ranges, _cross_section, _lane_changes, _turnouts, _lengths]
+    if not with_axis:
+        kinds.insert(1, _alignment)
+    return tuple(f"road.{sentence}" for kind in kinds for sentence in kind(scenario))
+
+
+def _ranges(scenario: RoadScenario) -> Iterator[str]:
+    """Yield intervals that reach beyond what a parameter set may hold."""
+    for path, (low, high) in _ALLOWED.items():
+        limits = _interval(scenario, path)
+        if limits.minimum < low:
+            yield f"{path}.minimum is {limits.minimum:g}, {low:g} is the least"
+        if limits.maximum > high:
+            yield f"{path}.maximum is {limits.maximum:g}, {high:g} is the most"
+
+
+def _alignment(scenario: RoadScenario) -> Iterator[str]:
+    limits, name = LIMITS[scenario.design_class], scenario.design_class
+    if scenario.radius and scenario.radius.minimum < limits.radius:
+        yield f"radius.minimum is {scenario.radius.minimum:g} m, {name} needs {limits.radius:g} m"
+    if scenario.radius and scenario.radius.maximum > WIDEST_RADIUS:
+        yield f"radius.maximum is {scenario.radius.maximum:g} m, {WIDEST_RADIUS:g} m are allowed"
+    if not (grades := scenario.grade_percent):
+        return
+    for end, grade in (("minimum", grades.minimum), ("maximum", grades.maximum)):
+        if abs(grade) > limits.grade_percent:
+            yield f"grade_percent.{end} is {grade:g} %, {name} allows {limits.grade_percent:g} %"
+    gentlest = max(grades.minimum, -grades.maximum, 0.0)
+    climb = gentlest / 100.0 * scenario.length / 2.0
+    if climb > STEADY_CLIMB:
+        yield (
+            f"grade_percent is {gentlest:g} % or more one way, over half of length {scenario.length:g} m that is "
+            f"{climb:.0f} m of height, {STEADY_CLIMB:g} m are allowed"
+        )
+
+
+def _cross_section(scenario: RoadScenario) -> Iterator[str]:
+    section, name = cross_section_of(scenario), scenario.cross_section
+    if isinstance(name, str):
+        standard = STANDARD_CROSS_SECTIONS[name]
+        width = 2.0 * (section.paved_width + section.verge) + section.median
+        allowed = 2.0 * (standard.paved_width + standard.verge) + standard.median
+        if len(section.lanes) > len(standard.lanes):
+            yield f"lanes is {len(section.lanes)}, {name} has {len(standard.lanes)} per direction"
+        if width > allowed + 1e-9:
+            asked = [field for field in ("lanes", "lane_width", "median_width") if getattr(scenario, field) is not None]
+            yield f"{' and '.join(asked)} make the road {width:g} m wide, {name} is {allowed:g} m wide"
+    least = min(min(STANDARD_CROSS_SECTIONS[each].lanes) for each in SECTIONS_OF_CLASS[scenario.design_class])
+    if min(section.lanes) < least:
+        field = "cross_section.lanes" if scenario.lane_width is None else "lane_width"
+        yield f"{field} is {min(section.lanes):g} m, {scenario.design_class} needs {least:g} m"
+    if section.median < LEAST_MEDIAN:
+        field = "cross_section.median" if scenario.median_width is None else "median_width"
+        yield f"{field} is {section.median:g} m, {LEAST_MEDIAN:g} m are needed"
+    edge = section.median / 2.0 + section.paved_width + section.verge
+    if scenario.half_width < edge:
+        yield f"half_width is {scenario.half_width:g} m, the road alone reaches {edge:g} m"
+
+
+def _lane_changes(scenario: RoadScenario) -> Iterator[str]:
+    limits, least = scenario.lane_changes, LANE_TAPER_LENGTH[scenario.design_class]
+    if limits.share > 0.0 and may_change_lanes(scenario, cross_section_of(scenario)):
+        yield from _short("lane_changes.taper_length", limits.taper_length, least, scenario.design_class)
+
+
+def _turnouts(scenario: RoadScenario) -> Iterator[str]:
+    """Yield limits that no turnout can keep to, where turnouts are wanted."""
+    limits, name = scenario.turnouts, scenario.design_class
+    if limits.exits > 0.0 or limits.entries > 0.0:
+        yield from _short("turnouts.lane_length", limits.lane_length, TURNOUT_LANE_LENGTH[name], name)
+        yield from _short("turnouts.lane_width", limits.lane_width, TURNOUT_LANE_WIDTH, "a turnout")
+        yield from _short("turnouts.taper_length", limits.taper_length, TURNOUT_TAPER, "a turnout")
+        ramps = RampLimits(scenario, cross_section_of(scenario))
+        yield from _short("turnouts.ramp_length", limits.ramp_length, ramps.shortest, "a ramp to 10 m behind its nose")
+    if limits.emergency_bays > 0.0:
+        yield from _short("turnouts.bay_length", limits.bay_length, EMERGENCY_BAY_LENGTH, "an emergency bay")
+        yield from _short("turnouts.bay_taper_length", limits.bay_taper_length, EMERGENCY_BAY_TAPER, "an emergency bay")
+        yield from _short("turnouts.bay_width", limits.bay_width, EMERGENCY_BAY_WIDTH, "an emergency bay")
+
+
+def _lengths(scenario: RoadScenario) -> Iterator[str]:
+    """Yield what must be there, but doesn't fit in the road."""
+    yield from _features(scenario)
+    furniture, barriers, length = scenario.furniture, scenario.barriers, scenario.length
+    if furniture.gantry_spacing is not None and furniture.gantry_spacing > length:
+        yield f"furniture.gantry_spacing is {furniture.gantry_spacing:g} m, length is {length:g} m"
+    zone = TAPERS_IN[0] + SHORTEST_ALONG + TAPER_OUT
+    if furniture.construction_zone > 0.0:
+        yield from _short("furniture.construction_length", furniture.construction_length, zone, "a construction zone")
+    for field, share, least in (
+        ("furniture.construction_zone", furniture.construction_zone, max(furniture.construction_length.minimum, zone)),
+        ("furniture.overpass", furniture.overpass, furniture.overpass_width.minimum),
+        ("barriers.noise_barrier", barriers.noise_barrier, barriers.noise_barrier_length.minimum),
+    ):
+        if share >= 1.0 and least > length:
+            yield f"{field} is 1, it needs {least:g} m and length is {length:g} m"
+
+
+def _features(scenario: RoadScenario) -> Iterator[str]:
+    """Yield turnouts and lane changes that must be there, but don't fit in the road or beside it."""
+    limits, section = scenario.turnouts, cross_section_of(scenario)
+    ramps = RampLimits(scenario, section)
+    narrow = f"is 1, within half_width {scenario.half_width:g} m there is no room for it"
+    if ramps.lengths[0] > ramps.lengths[1] and ramps.shortest <= limits.ramp_length.maximum:
+        yield from (f"turnouts.{name} {narrow}" for name in ("exits", "entries") if getattr(limits, name) >= 1.0)
+    if limits.emergency_bays >= 1.0 and not ramps.room_for_bay:
+        yield f"turnouts.emergency_bays {narrow}"
+    certain = [feature for feature in features_of(scenario, section, ramps) if feature.share >= 1.0]
+    need = math.fsum(feature.least for feature in certain) + TURNOUT_GAP * (len(certain) - 1)
+    if certain and need > scenario.length:
+        fields = " and ".join(f"{_SHARES[feature.kind]} is 1" for feature in certain)
+        yield f"{fields}, {need:.0f} m are needed and length is {scenario.length:g} m"
+
+
+def _short(path: str, limits: Interval, least: float, what: str) -> Iterator[str]:
+    if limits.maximum < least:
+        yield f"{path}.maximum is {limits.maximum:g} m, {what} needs {least:g} m"
+
+
+def _interval(scenario: ScenarioModel, path: str) -> Interval:
+    value: object = scenario
+    for name in path.split("."):
+        value = getattr(value, name)
+    assert isinstance(value, Interval)
+    return value
+
+
+def _allowed(model: type[Model], name: str) -> tuple[float, float]:
+    """Return the least and the largest value of a field."""
+    low, high = -1e8, 1e8
+    for limit in model.model_fields[name].metadata:
+        if hasattr(limit, "ge"):
+            low = limit.ge
+        elif hasattr(limit, "gt"):
+            low = limit.gt + _ABOVE
+        elif hasattr(limit, "le"):
+            high = limit.le
+    return low, high
+
+
+_ALLOWED = {path: _allowed(*field) for path, field in _FIELDS.items()} | _PLAIN

@@ -1,0 +1,168 @@
+"""Line markings, hatching and arrows as the cross-section and the turnouts ask for them (RMS)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+
+from ..base.schema import rounded
+from ..road.guidelines import LIMITS
+from ..road.objects import AnyWidth
+from ..road.section import Arrow, Carriageway, Hatching, LineMarking, Turnout
+from ..road.things.furniture import Side
+from ..road.turnout_geometry import TurnoutShape
+from .placing.site import Site
+
+NARROW, BROAD = 0.15, 0.30
+LANE_DASH, LANE_GAP = 6.0, 12.0
+BLOCK_DASH = BLOCK_GAP = 6.0
+SOLID_BEFORE_GORE = 30.0
+"""The line beside a turnout's lane is solid for so long before (exit) or behind (entry) the gore's tip, m."""
+LANE_THERE = 1.0
+"""Where a lane is as wide as this (m) or wider, a line parts it from its neighbour."""
+ARROW_SPACING = 60.0
+_ARROWS_AT_LEAST = 3
+_FIRST_MERGE_ARROW = 20.0  # from the beginning of the taper, m
+
+_Span = tuple[float, float]
+
+
+def place_markings(site: Site) -> Iterator[tuple[str, LineMarking | Hatching | Arrow]]:
+    """Yield (id, marking) of everything painted on a road, with instance 1. All has films of one thickness."""
+    limits = site.scenario.markings.film_thickness
+    film = rounded(site.stream("film").uniform(limits.minimum, limits.maximum))
+    for side, carriageway in site.carriageways.items():
+        sampler = _Painter(site, side, carriageway, film)
+        yield from sampler.lines()
+        for name, turnout in site.turnouts_of(side).items():
+            if turnout.ramp:
+                yield from sampler.turnout(name, turnout)
+        yield from sampler.merge_arrows()
+
+
+class _Painter:
+    """Makes the markings of one carriageway."""
+
+    def __init__(self, site: Site, side: Side, carriageway: Carriageway, film: float) -> None:
+        self.site, self.carriageway, self.film = site, carriageway, film
+        self.name = f"carriageway-{side}"
+        self.section = site.sections[side]
+        self.length = rounded(site.length)
+        self.arrow_length = 7.5 if LIMITS[site.design_class].speed > 80.0 else 5.0
+
+    def lines(self) -> Iterator[tuple[str, LineMarking]]:
+        """Yield the lines along lane boundaries: solid at the edges, dashed between lanes."""
+        lanes, wanted = self.carriageway.lanes, self.site.scenario.markings
+        dash, gap = wanted.lane_dash or LANE_DASH, wanted.lane_gap or LANE_GAP
+        blocks = sorted(_block_span(shape) for shape in self.section.turnouts if shape.turnout.ramp)
+        for number, span in enumerate(_between(blocks, self.length)):
+            name = f"{self.name}-line-0" + (f"-{number + 1}" if number else "")
+            yield name, self._line("outer_edge", span, boundary=0, width=BROAD)
+        for boundary in range(1, len(lanes)):
+            # Only an outermost or innermost lane ends: one of the two beside a boundary.
+            span = _overlap(*(_there(lane.width, self.length) for lane in lanes[boundary - 1 : boundary + 1]))
+            line = self._line("lane", span, boundary=boundary, dash_length=dash, gap_length=gap)
+            yield f"{self.name}-line-{boundary}", line
+        span = (0.0, self.length)
+        yield f"{self.name}-line-{len(lanes)}", self._line("inner_edge", span, boundary=len(lanes))
+
+    def turnout(self, name: str, turnout: Turnout) -> Iterator[tuple[str, LineMarking | Hatching | Arrow]]:
+        """Yield what an exit or entry has: block marking, edge lines, hatching, and arrows where traffic leaves."""
+        shape = self.site.shape(turnout)
+        assert turnout.ramp is not None
+        dashes = {"dash_length": BLOCK_DASH, "gap_length": BLOCK_GAP}
+        yield f"{name}-block", self._line("block", _block_span(shape), width=BROAD, **dashes)
+        taper, lane = turnout.taper_in_length + turnout.taper_out_length, turnout.lane_length
+        # The edge line begins where its strip has become as wide as the line.
+        begin = taper * min(1.0, BROAD / max(turnout.edge_strip_width, BROAD))
+        edge = _stations(shape, begin, turnout.length)
+        yield f"{name}-edge", self._line("turnout_edge", edge, turnout=name, width=BROAD)
+        gore = _stations(shape, taper + lane, turnout.length)
+        yield f"{name}-gore-edge", self._line("gore_edge", gore, turnout=name, width=BROAD)
+        yield f"{name}-hatching", Hatching(instance=1, turnout=name, film_thickness=self.film)
+        if turnout.kind == "exit":
+            count = max(_ARROWS_AT_LEAST, round(lane / ARROW_SPACING))
+            stations = [shape.station(taper + lane * (i + 0.5) / count) for i in range(count)]
+            inner, outer = self.section.boundaries_of("turnout_lane", stations)
+            yield from self._arrows(f"{name}-arrow", "straight_right", stations, (inner + outer) / 2.0)
+
+    def merge_arrows(self) -> Iterator[tuple[str, Arrow]]:
+        """Yield the arrows on a lane that ends, in front of its taper."""
+        lanes, ahead = self.carriageway.lanes, self.carriageway.traffic
+        for index, lane in enumerate(lanes):
+            if not isinstance(lane.width, tuple):
+                continue
+            before, start, _, after = lane.width if ahead > 0 else lane.width[::-1]
+            if before.width < after.width:
+                continue
+            first = start.station - ahead * _FIRST_MERGE_ARROW
+            stations = [first - ahead * ARROW_SPACING * i for i in range(_ARROWS_AT_LEAST)]
+            room = self.arrow_length / 2.0
+            stations = [s for s in stations if room <= s <= self.length - room]
+            boundaries = self.section.lane_boundaries(stations)
+            kind = "merge_left" if index == 0 else "merge_right"
+            middle = boundaries[:, index : index + 2].mean(axis=1)
+            yield from self._arrows(f"{self.name}-merge-arrow", kind, stations, middle)
+
+    def _line(self, kind: Any, span: _Span, **values: Any) -> LineMarking:
+        given = {"width": NARROW, "dash_length": 0.0, "gap_length": 0.0, "film_thickness": self.film} | values
+        start, end = span
+        return LineMarking(instance=1, carriageway=self.name, kind=kind, start_station=start, end_station=end, **given)
+
+    def _arrows(
+        self, name: str, kind: Any, stations: list[float], distances: np.ndarray
+    ) -> Iterator[tuple[str, Arrow]]:
+        for number, (station, distance) in enumerate(zip(stations, distances.tolist(), strict=True)):
+            yield (
+                f"{name}-{number + 1}",
+                Arrow(
+                    instance=1,
+                    carriageway=self.name,
+                    kind=kind,
+                    station=rounded(station),
+                    offset=rounded(self.carriageway.sign * distance),
+                    rotation_deg=0.0 if self.carriageway.traffic > 0 else 180.0,
+                    length=self.arrow_length,
+                    film_thickness=self.film,
+                ),
+            )
+
+
+def _stations(shape: TurnoutShape, begin: float, end: float) -> _Span:
+    """Return the stations (m), the lower one first, of a stretch between two distances along a turnout."""
+    low, high = sorted((shape.station(begin), shape.station(end)))
+    return max(0.0, rounded(low)), rounded(high)
+
+
+def _block_span(shape: TurnoutShape) -> _Span:
+    """Return the stations (m) between which an exit's or entry's lane is parted from the road by a block marking."""
+    turnout = shape.turnout
+    taper = turnout.taper_in_length + turnout.taper_out_length
+    return _stations(shape, 0.0, taper + max(0.0, turnout.lane_length - SOLID_BEFORE_GORE))
+
+
+def _between(spans: list[_Span], length: float) -> Iterator[_Span]:
+    """Yield what sorted spans leave of a length, m."""
+    reached = 0.0
+    for start, end in spans:
+        if start > reached:
+            yield reached, start
+        reached = end
+    if length > reached:
+        yield reached, length
+
+
+def _there(width: AnyWidth, length: float) -> _Span:
+    """Return the stations (m) between which a lane that at most begins or ends once is there."""
+    if not isinstance(width, tuple):
+        return 0.0, length
+    widths, stations = [p.width for p in width], [p.station for p in width]
+    if widths[0] < widths[-1]:
+        return rounded(float(np.interp(LANE_THERE, widths, stations))), length
+    return 0.0, rounded(float(np.interp(LANE_THERE, widths[::-1], stations[::-1])))
+
+
+def _overlap(first: _Span, second: _Span) -> _Span:
+    return max(first[0], second[0]), min(first[1], second[1])

@@ -1,0 +1,1 @@
+"""Placing what stands on and beside a sampled road."""

@@ -1,0 +1,246 @@
+"""Barriers: in the median, beside the road by the safety rules (RPS) and elsewhere, and noise barriers."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from ...base.schema import rounded
+from ...road.guidelines import BARRIER_DISTANCE, EMBANKMENT_HEIGHT, EMBANKMENT_RUN, OBSTACLE_LEAD, SHORTEST_BARRIER
+from ...road.objects import LineObject
+from ...road.things.furniture import ConcreteBarrier, Guardrail, NoiseBarrier
+from ...scenario.road import BarrierLimits
+from .draw import draw, pick
+from .edge import STEP_OF_BARRIERS, Segment
+from .layout import BARRIER_AXIS, FAR_ZONE, Layout, Piece, Roadside
+from .ranges import Range, draw_start, free_ranges, lengthened, merged
+
+POST_SPACINGS = (4.0, 2.0, 1.33)
+"""Distances between posts of the guardrail systems, m."""
+TERMINAL, SHORT_TERMINAL = 12.0, 4.0
+"""Lengths over which guardrails are ramped down: at their free ends, and where another line of barriers goes on, m."""
+Profile = tuple[Literal["new_jersey", "step"], float, float]
+CONCRETE_PROFILES: tuple[Profile, ...] = (("step", 0.9, 0.54), ("new_jersey", 0.8, 0.56))
+"""Profile, height and width of the foot of concrete barriers, m."""
+PANELS: tuple[tuple[Literal["aluminium", "concrete", "wood", "glass"], float], ...] = (
+    ("aluminium", 0.12),
+    ("concrete", 0.2),
+    ("wood", 0.14),
+    ("glass", 0.06),
+)
+"""Kinds of noise barriers' panels and their thickness, m."""
+NOISE_POST_WIDTH = 0.16
+_BEAM_REACH = 0.2  # m, from the posts' axis to the face of a beam
+_NARROWEST_FOOT = 0.3  # m, of a concrete barrier
+_JOIN = 2.0 * TERMINAL  # m: barriers nearer than this along the road become one
+_FROM_BORDER = OBSTACLE_LEAD + 5.0  # m
+_SLOT = 1500.0  # m: at random, a barrier more or none in each
+_IN_SLOT = 0.6  # share of the slots that get one
+
+
+@dataclass(frozen=True)
+class BarrierSystem:
+    """What one side's barriers are: concrete, or steel of one system.
+
+    Attributes:
+        concrete: profile, height and width of its foot (m); None for guardrails.
+        height, post_spacing: of guardrails, m.
+    """
+
+    concrete: Profile | None
+    height: float
+    post_spacing: float
+
+    @classmethod
+    def draw(cls, rng: np.random.Generator, limits: BarrierLimits, concrete_share: float) -> BarrierSystem:
+        """Return the system of a side or of the median."""
+        profile = pick(rng, CONCRETE_PROFILES)
+        concrete = profile if rng.random() < concrete_share else None
+        return cls(concrete, draw(rng, limits.guardrail_height), pick(rng, POST_SPACINGS))
+
+    @property
+    def name(self) -> str:
+        """Return the first part of its barriers' ids."""
+        return "concrete-barrier" if self.concrete else "guardrail"
+
+    def beside(self, roadside: Roadside, piece: Piece, terminal: float) -> LineObject:
+        """Return a barrier of a piece; its nearest part stands 0.5 m from the base."""
+        terminal = rounded(min(terminal, (piece.end - piece.start) / 4.0))
+        start, end = rounded(piece.start), rounded(piece.end)
+        if self.concrete:
+            axis = piece.base + BARRIER_DISTANCE + self.concrete[2] / 2.0
+            return _concrete(self.concrete, (start, end), roadside.sign * axis, terminal)
+        return Guardrail(
+            instance=1,
+            start_station=start,
+            end_station=end,
+            offset=rounded(roadside.sign * (piece.base + BARRIER_AXIS)),
+            faces=roadside.towards_road,
+            height=self.height,
+            post_spacing=self.post_spacing,
+            terminal_length=terminal,
+        )
+
+
+def median_barriers(layout: Layout, rng: np.random.Generator) -> Iterator[tuple[str, LineObject]]:
+    """Yield the barriers of the median, which go on beyond both ends of the road; none where 0.5 m can't be kept."""
+    limits, median = layout.site.scenario.barriers, layout.median
+    system = BarrierSystem.draw(rng, limits, limits.concrete_median)
+    if not limits.median or len(median.inner) < 2:
+        return
+    span = (0.0, rounded(layout.length))
+    if median.has_obstacles:
+        for side, inner in median.inner.items():
+            sign = layout.sides[side].sign
+            yield f"guardrail-median-{side}", _rail(system, span, sign * (inner - BARRIER_AXIS), side)
+        return
+    profile, height, foot = system.concrete or CONCRETE_PROFILES[0]
+    foot = min(foot, 2.0 * (median.half_width - BARRIER_DISTANCE))
+    steel_fits = median.half_width >= _BEAM_REACH + BARRIER_DISTANCE
+    if foot >= _NARROWEST_FOOT and (system.concrete or not steel_fits):
+        yield "concrete-barrier-median", _concrete((profile, height, foot), span, 0.0, 0.0)
+    elif steel_fits:
+        yield "guardrail-median", _rail(system, span, 0.0, "both")
+
+
+def roadside_barriers(layout: Layout, roadside: Roadside, rng: np.random.Generator) -> Iterator[tuple[str, LineObject]]:
+    """Yield the barriers of one side: where something needs them, and at random elsewhere."""
+    limits, length = layout.site.scenario.barriers, roadside.length
+    system = BarrierSystem.draw(rng, limits, limits.concrete_roadside)
+    if not limits.roadside:
+        return
+    wanted = [*roadside.protected, *_by_the_road(layout, roadside), *_elsewhere(roadside, rng)]
+    roadside.pieces = list(_pieces(roadside, merged(wanted, _JOIN)))
+    borders = {segment.end for segment in roadside.edge.segments[:-1]}
+    for number, piece in enumerate(roadside.pieces, start=1):
+        terminal = SHORT_TERMINAL if borders & {piece.start, piece.end} else TERMINAL
+        if piece.start <= 0.0 and piece.end >= length:
+            terminal = 0.0
+        yield f"{system.name}-{roadside.side}-{number}", system.beside(roadside, piece, terminal)
+
+
+def plan_noise_barrier(layout: Layout, roadside: Roadside, rng: np.random.Generator) -> NoiseBarrier | None:
+    """Return a side's noise barrier, if it gets one, its place reserved and a barrier before it asked for.
+
+    It stands where the edge runs straight on for long enough, away from turnouts, large boards and overpasses.
+    """
+    limits = layout.site.scenario.barriers
+    if rng.random() >= limits.noise_barrier:
+        return None
+    free = [
+        stretch
+        for segment in roadside.edge.segments
+        for stretch in free_ranges(*_inner(roadside, segment), roadside.far, roadside.crossed, roadside.restless)
+    ]
+    longest = max((end - start for start, end in free), default=0.0)
+    least, most = limits.noise_barrier_length.minimum, min(limits.noise_barrier_length.maximum, longest)
+    length = rounded(least + max(0.0, most - least) * rng.random())
+    panel, thickness = pick(rng, PANELS)
+    start = draw_start(rng, free, length)
+    if start is None:
+        return None
+    roadside.far.add(start, start + length)
+    roadside.protect(start, start + length)
+    base = roadside.edge.base_at(start + length)
+    return NoiseBarrier(
+        instance=1,
+        start_station=rounded(start),
+        end_station=rounded(start + length),
+        offset=rounded(roadside.sign * (base + FAR_ZONE + NOISE_POST_WIDTH / 2.0)),
+        height=draw(rng, limits.noise_barrier_height),
+        panel=panel,
+        thickness=thickness,
+        post_width=NOISE_POST_WIDTH,
+    )
+
+
+def _by_the_road(layout: Layout, roadside: Roadside) -> Iterator[Range]:
+    """Yield where embankment or curves need a barrier."""
+    terrain = layout.site.terrain
+    if terrain.embankment_height > EMBANKMENT_HEIGHT and terrain.batter_slope < EMBANKMENT_RUN:
+        yield 0.0, roadside.length
+    for start, end, curvature in layout.tight_arcs:
+        # A left curve's outer side is the right one, whose sign is -1.
+        if curvature * roadside.sign < 0.0:
+            yield start, end
+
+
+def _elsewhere(roadside: Roadside, rng: np.random.Generator) -> Iterator[Range]:
+    """Yield stretches without a reason that the parameters know of, away from turnouts."""
+    slots = math.ceil(roadside.length / _SLOT)
+    for slot in range(slots):
+        if rng.random() >= _IN_SLOT:
+            continue
+        low, high = roadside.length * slot / slots, roadside.length * (slot + 1) / slots
+        free = free_ranges(low, high, roadside.restless)
+        longest = max((end - start for start, end in free), default=0.0)
+        length = SHORTEST_BARRIER + max(0.0, longest - SHORTEST_BARRIER) * rng.random()
+        start = draw_start(rng, free, length)
+        if start is not None:
+            yield start, start + length
+
+
+def _inner(roadside: Roadside, segment: Segment) -> Range:
+    """Return the part of a segment that neither a neighbour's barriers nor what stands behind those reach."""
+    start = segment.start + _FROM_BORDER if segment.start > 0.0 else 0.0
+    return start, segment.end - _FROM_BORDER if segment.end < roadside.length else segment.end
+
+
+def _pieces(roadside: Roadside, stretches: list[Range]) -> Iterator[Piece]:
+    """Yield the barriers of stretches: one in each segment of the edge, long enough where there is room."""
+    for segment in roadside.edge.segments:
+        inside = [
+            lengthened(max(start, segment.start), min(end, segment.end), SHORTEST_BARRIER, segment.start, segment.end)
+            for start, end in stretches
+            if start < segment.end and end > segment.start
+        ]
+        for start, end in merged(inside, _JOIN):
+            piece = _prolonged(roadside, segment, Piece(start, end, segment.base, segment.ramp))
+            # Beside a gore no rule asks for a barrier: rather none than a stump.
+            if not segment.ramp or piece.end - piece.start >= SHORTEST_BARRIER:
+                yield piece
+
+
+def _prolonged(roadside: Roadside, segment: Segment, piece: Piece) -> Piece:
+    """Return a piece that fills a short segment made longer beside a neighbour that stands nearer to the road."""
+    lack = SHORTEST_BARRIER - (piece.end - piece.start)
+    if lack <= 0.0:
+        return piece
+    for longer in (piece._replace(start=max(0.0, piece.start - lack)), piece._replace(end=piece.end + lack)):
+        beside = [s for s in roadside.edge.segments if s != segment and s.start < longer.end and s.end > longer.start]
+        beyond = (longer.start, piece.start) if longer.start < piece.start else (piece.end, longer.end)
+        clear = roadside.edge.largest_paved(*beyond) <= segment.base
+        if clear and all(s.base <= segment.base - STEP_OF_BARRIERS for s in beside):
+            return longer._replace(end=min(longer.end, roadside.length))
+    return piece
+
+
+def _rail(system: BarrierSystem, span: Range, offset: float, faces: Literal["left", "right", "both"]) -> Guardrail:
+    return Guardrail(
+        instance=1,
+        start_station=span[0],
+        end_station=span[1],
+        offset=rounded(offset),
+        faces=faces,
+        height=system.height,
+        post_spacing=system.post_spacing,
+        terminal_length=0.0,
+    )
+
+
+def _concrete(shape: Profile, span: Range, offset: float, terminal: float) -> ConcreteBarrier:
+    profile, height, foot = shape
+    return ConcreteBarrier(
+        instance=1,
+        start_station=span[0],
+        end_station=span[1],
+        offset=rounded(offset),
+        profile=profile,
+        height=height,
+        base_width=rounded(foot),
+        terminal_length=terminal,
+    )

@@ -1,0 +1,179 @@
+"""Construction zones: beacons that close the outermost lane, movable barriers behind them, yellow lines before them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...base.schema import rounded
+from ...road.guidelines import CONSTRUCTION_LANE_WIDTH
+from ...road.objects import RoadObject, WidthPoint, width_kinks
+from ...road.section import Carriageway, LineMarking
+from ...road.things.furniture import ConstructionBeacon, Side, TemporaryBarrier
+from .draw import draw, pick
+from .layout import Layout, Roadside
+from .ranges import Range, Taken, draw_start, free_ranges
+from .site import Site
+
+TAPERS_IN, TAPER_OUT = (60.0, 70.0, 80.0), 20.0
+"""Lengths over which the lane is closed and opened again, m."""
+SHORTEST_ALONG = 30.0
+"""Shortest length between both tapers, m."""
+SPACING, SPACING_TAPER = 16.0, 8.0
+"""Largest spacing of beacons by stations, m: a little less than the limits, which hold on a curve's outer side too."""
+BEACON_DISTANCE, LINE_DISTANCE, BARRIER_DISTANCE = 0.55, 0.2, 1.35
+"""Into the closed lane, from its inner boundary to beacons, yellow line and movable barrier, m."""
+EDGE_DISTANCE = 0.4
+"""From the paved edge to the first and last beacon, m."""
+LINE_WIDTH, FARTHEST_LINE = 0.15, 50.0
+"""Width of the yellow line, and the distance from the centreline that a parameter set allows it, m."""
+SHORTEST_TEMPORARY_BARRIER, BARRIER_SETBACK = 40.0, 10.0
+"""Shortest movable barrier, and how far from the tapers it stands, m."""
+_CLOSED_LANE = 2.0  # m; what is narrower is a lane that begins or ends
+_TURNOUT_ROOM = 20.0  # m along the road between a zone and a turnout
+
+
+class Zone(NamedTuple):
+    """A construction zone.
+
+    Attributes:
+        stations: (4,) where its tapers begin and end, in the order of stations, m.
+        boundary: distance of the closed lane's inner boundary from the centreline, m.
+        edge: distance of the paved edge, m.
+    """
+
+    stations: tuple[float, float, float, float]
+    boundary: float
+    edge: float
+
+    def distance(self, station: NDArray[np.float64], depth: float) -> NDArray[np.float64]:
+        """Return the distance (N,) of a line so deep (m) in the closed lane, which the tapers lead from the edge."""
+        outer, inner = self.edge - EDGE_DISTANCE - (BEACON_DISTANCE - depth), self.boundary + depth
+        return np.interp(station, self.stations, (outer, inner, inner, outer))
+
+
+def construction_zones(layout: Layout, rng: np.random.Generator) -> tuple[dict[Side, Range], dict[str, RoadObject]]:
+    """Return the carriageways' construction zones (lowest and highest station, m), and what stands in them by id."""
+    limits = layout.site.scenario.furniture
+    zones: dict[Side, Range] = {}
+    objects: dict[str, RoadObject] = {}
+    for side, roadside in layout.sides.items():
+        if rng.random() >= limits.construction_zone:
+            continue
+        zone = _zone(layout, roadside, rng)
+        if zone:
+            zones[side] = zone.stations[0], zone.stations[3]
+            objects |= dict(_equipment(layout, roadside, zone, rng))
+    return zones, objects
+
+
+def closed_lanes(objects: Iterable[RoadObject], site: Site) -> dict[Side, tuple[int, float, float]]:
+    """Return the lane that a construction zone closes, and from where to where (m), by side."""
+    beacons = [item for item in objects if isinstance(item, ConstructionBeacon)]
+    found: dict[Side, tuple[int, float, float]] = {}
+    for side, section in site.sections.items():
+        own = [beacon for beacon in beacons if beacon.offset * section.carriageway.sign > 0.0]
+        if own:
+            innermost = min(own, key=lambda beacon: abs(beacon.offset))
+            boundaries = section.lane_boundaries(innermost.station)[0]
+            lane = int(np.count_nonzero(boundaries > abs(innermost.offset))) - 1
+            stations = [beacon.station for beacon in own]
+            found[side] = lane, min(stations), max(stations)
+    return found
+
+
+def _zone(layout: Layout, roadside: Roadside, rng: np.random.Generator) -> Zone | None:
+    """Return a zone where the carriageway is wide enough, has no turnouts and keeps its widths; None without room."""
+    limits, length = layout.site.scenario.furniture.construction_length, roadside.length
+    section = layout.site.sections[roadside.side]
+    turnouts = ((start - _TURNOUT_ROOM, end + _TURNOUT_ROOM) for start, end in roadside.turnouts.all())
+    free = free_ranges(0.0, length, Taken(turnouts), Taken(_changes(section.carriageway)))
+    longest = max((end - start for start, end in free), default=0.0)
+    least = max(TAPERS_IN[0] + SHORTEST_ALONG + TAPER_OUT, limits.minimum)
+    most = min(longest, limits.maximum)
+    if most < least:
+        return None
+    reach = rounded(least + (most - least) * rng.random())
+    start = draw_start(rng, free, reach)
+    if start is None:
+        return None
+    boundaries = section.lane_boundaries(start + reach / 2.0)[0].tolist()
+    widths = [outer - inner for outer, inner in pairwise(boundaries)]
+    lane = next((i for i, width in enumerate(widths) if width >= _CLOSED_LANE), len(widths))
+    edge = roadside.edge.largest_main(start, start)
+    if max(widths[lane + 1 :], default=0.0) < CONSTRUCTION_LANE_WIDTH or edge > FARTHEST_LINE:
+        return None
+    taper = min(pick(rng, TAPERS_IN), reach - SHORTEST_ALONG - TAPER_OUT)
+    tapers = (taper, TAPER_OUT) if roadside.traffic > 0 else (TAPER_OUT, taper)
+    end = start + reach
+    stations = (start, start + tapers[0], end - tapers[1], end)
+    return Zone(stations, boundaries[lane + 1], edge)
+
+
+def _changes(carriageway: Carriageway) -> Iterator[Range]:
+    """Yield stretches along which a width of the carriageway changes."""
+    own = (carriageway.inner_offset, carriageway.inner_edge_strip_width, *(lane.width for lane in carriageway.lanes))
+    for width in (*own, carriageway.outer_edge_strip_width, carriageway.hard_shoulder_width):
+        marks = width_kinks(width)
+        if marks:
+            yield min(marks), max(marks)
+
+
+def _equipment(
+    layout: Layout, roadside: Roadside, zone: Zone, rng: np.random.Generator
+) -> Iterator[tuple[str, RoadObject]]:
+    """Yield (id, object) of a zone's beacons, movable barrier and yellow line."""
+    side, sign, marks = roadside.side, roadside.sign, zone.stations
+    stations = _beacon_stations(marks)
+    places = zip(stations.tolist(), zone.distance(stations, BEACON_DISTANCE).tolist(), strict=True)
+    for number, (station, distance) in enumerate(places, start=1):
+        yield (
+            f"beacon-{side}-{number:03d}",
+            ConstructionBeacon(
+                instance=1,
+                station=rounded(station),
+                offset=rounded(sign * distance),
+                rotation_deg=roadside.facing,
+                pass_side="left" if sign < 0 else "right",
+            ),
+        )
+    if marks[2] - marks[1] >= SHORTEST_TEMPORARY_BARRIER + 2.0 * BARRIER_SETBACK:
+        offset = rounded(sign * (zone.boundary + BARRIER_DISTANCE))
+        low, high = rounded(marks[1] + BARRIER_SETBACK), rounded(marks[2] - BARRIER_SETBACK)
+        yield (
+            f"temporary-barrier-{side}",
+            TemporaryBarrier(instance=1, start_station=low, end_station=high, offset=offset, end_offset=offset),
+        )
+    yield f"marking-construction-{side}", _line(side, zone, draw(rng, layout.site.scenario.markings.film_thickness))
+
+
+def _beacon_stations(marks: tuple[float, float, float, float]) -> NDArray[np.float64]:
+    """Return the stations of beacons, one at each end of the tapers."""
+    parts = []
+    for (low, high), spacing in zip(pairwise(marks), (SPACING_TAPER, SPACING, SPACING_TAPER), strict=True):
+        parts.append(np.linspace(low, high, math.ceil((high - low) / spacing), endpoint=False))
+    return np.append(np.concatenate(parts), marks[3])
+
+
+def _line(side: Side, zone: Zone, film_thickness: float) -> LineMarking:
+    """Return the yellow line along the beacons."""
+    distances = zone.distance(np.array(zone.stations), LINE_DISTANCE).tolist()
+    points = [WidthPoint(station=rounded(s), width=rounded(d)) for s, d in zip(zone.stations, distances, strict=True)]
+    return LineMarking(
+        instance=1,
+        carriageway=f"carriageway-{side}",
+        kind="free",
+        offset=tuple(points),
+        width=LINE_WIDTH,
+        color="yellow",
+        film_thickness=film_thickness,
+        dash_length=0.0,
+        gap_length=0.0,
+        start_station=points[0].station,
+        end_station=points[-1].station,
+    )

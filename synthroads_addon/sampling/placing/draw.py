@@ -1,0 +1,23 @@
+"""The two draws of the placement: a number from an interval of the scenario, and one of several choices."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TypeVar
+
+import numpy as np
+
+from ...base.schema import rounded
+from ...scenario.road import Interval
+
+T = TypeVar("T")
+
+
+def draw(rng: np.random.Generator, limits: Interval) -> float:
+    """Return a number within limits, each with the same chance."""
+    return rounded(limits.minimum + (limits.maximum - limits.minimum) * rng.random())
+
+
+def pick(rng: np.random.Generator, options: Sequence[T]) -> T:
+    """Return one of several options, each with the same chance."""
+    return options[int(rng.random() * len(options))]

@@ -1,0 +1,202 @@
+"""The pavement's edge along one carriageway, made ready for the many questions of the placement."""
+
+from __future__ import annotations
+
+from bisect import bisect_left, bisect_right
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...road.guidelines import SHORTEST_BARRIER
+from ...road.objects import width_at
+from ...road.section import Ramp
+from ...road.section_geometry import CarriagewaySection
+from ...road.turnout_geometry import STEP, TurnoutShape
+
+Float = NDArray[np.float64]
+
+ISLAND_ROOM = 3.2
+"""Where the island between main road and ramp is wider than this, barriers and delineators leave the ramp's outer
+side for the main road's (m)."""
+STEP_OF_BARRIERS = 0.8
+"""Barriers stand on one line where the lines differ by less, and may overlap along the road where by more, m."""
+_RAMP_GRID = 5.0  # m; the wedge beside a ramp is convex, so that what is linear in between never lies inside it
+_BEHIND_RAMP = 0.0005  # m: the pavement ends with the ramp, over `STEP` only to have a finite slope
+_LEVEL = 1e-6  # m; edges that differ by less run parallel
+
+
+class Segment(NamedTuple):
+    """A stretch of road along which a barrier may stand at one distance.
+
+    Attributes:
+        start, end: stations, m.
+        base: the largest distance of the edge from the centreline along it, m.
+        ramp: it lies beside a gore, where the edge moves away from the road.
+    """
+
+    start: float
+    end: float
+    base: float
+    ramp: bool = False
+
+
+class EdgeProfile:
+    """Distances (m) from the centreline at stations, linear in between.
+
+    Attributes:
+        stations: (K,) m.
+        paved: (K,) outer edge of the pavement, of ramps and bays too.
+        main: (K,) outer edge of the main road's pavement.
+        line: (K,) what barriers and delineators follow: the pavement's edge, but the main road's beside a wide island.
+        island: (K,) width of the island between main road and ramp.
+        segments: where a barrier may stand at one distance, in order, from the road's begin to its end.
+    """
+
+    def __init__(self, section: CarriagewaySection, length: float) -> None:
+        self._constant = not section.turnouts and not section.kinks()
+        if self._constant:
+            edge = float(section.paved_edge(0.0)[0])
+            self.stations, self.paved, self.island = [0.0, length], [edge, edge], [0.0, 0.0]
+            self.main = self.line = self.paved
+            self.segments = [Segment(0.0, length, edge)]
+            return
+        marks, besides = [np.array([0.0, length, *section.kinks()])], []
+        for shape in section.turnouts:
+            if shape.turnout.ramp:
+                grid, beside_island = _ramp_marks(shape, shape.turnout.ramp)
+                marks.append(grid)
+                besides.append(beside_island)
+        at = np.unique(np.clip(np.concatenate(marks), 0.0, length))
+        distances, main, island = section.distances(at), section.main_edge(at), np.zeros(at.shape)
+        paved = distances[:, -2]
+        line = paved.copy()
+        if besides:
+            island = np.diff(distances, axis=1)[:, section.kinds.index("island")]
+        for start, end in besides:
+            beside = (at > start) & (at < end)
+            line[beside] = main[beside]
+        self.stations, self.paved, self.main = at.tolist(), paved.tolist(), main.tolist()
+        self.line, self.island = line.tolist(), island.tolist()
+        self.segments = _segments(at, line, paved)
+
+    def largest_paved(self, start: float, end: float) -> float:
+        """Return the largest distance of the paved edge between two stations, m."""
+        return self.paved[0] if self._constant else max(self._values(self.paved, start, end))
+
+    def largest_main(self, start: float, end: float) -> float:
+        """Return the largest distance of the main road's paved edge between two stations, m."""
+        return self.main[0] if self._constant else max(self._values(self.main, start, end))
+
+    def is_clear_beside_main(self, start: float, end: float, room: float) -> bool:
+        """Return whether nothing is paved within so much room (m) outside of the main road between two stations."""
+        if self._constant:
+            return True
+        profiles = (self.paved, self.main, self.island)
+        points = zip(*(self._values(values, start, end) for values in profiles), strict=True)
+        return all(paved - main < _LEVEL or island >= room for paved, main, island in points)
+
+    def line_beside(self, station: Float, reach: float) -> Float:
+        """Return the largest distance (N,) of the line within a reach of stations (N,), all m.
+
+        Where the line passes from the ramp's outer side to the main road's, it is the ramp's.
+        """
+        if self._constant:
+            return np.full(station.shape, self.line[0])
+        at = np.stack([station - reach, station, station + reach])
+        line, paved, main = (np.interp(at, self.stations, values) for values in (self.line, self.paved, self.main))
+        outside = (line > main + _LEVEL).any(axis=0)
+        return np.where(outside, paved.max(axis=0), line.max(axis=0))
+
+    def base_at(self, station: float) -> float:
+        """Return the base of the segment at a station, m."""
+        return next((s.base for s in self.segments if station <= s.end), self.segments[-1].base)
+
+    def _values(self, values: list[float], start: float, end: float) -> list[float]:
+        first, last = bisect_right(self.stations, start), bisect_left(self.stations, end)
+        return [self._at(values, start), *values[first:last], self._at(values, end)]
+
+    def _at(self, values: list[float], station: float) -> float:
+        after = bisect_right(self.stations, station)
+        if after == 0 or after == len(values):
+            return values[min(after, len(values) - 1)]
+        low, high = self.stations[after - 1 : after + 1]
+        share = (station - low) / (high - low)
+        return values[after - 1] * (1.0 - share) + values[after] * share
+
+
+def ramp_station(shape: TurnoutShape, x: float) -> float:
+    """Return the station at a distance x (m) from the gore's tip, away from the turnout's lane."""
+    ahead = shape.carriageway.traffic if shape.turnout.kind == "exit" else -shape.carriageway.traffic
+    return shape.gore_tip() + ahead * x
+
+
+def island_begin(shape: TurnoutShape, ramp: Ramp, room: float) -> float:
+    """Return the distance x (m) from the gore's tip at which the island becomes so wide (m)."""
+    hard_shoulder = float(width_at(shape.carriageway.hard_shoulder_width, shape.gore_tip()))
+    return float((6.0 * ramp.clothoid_parameter**2 * (hard_shoulder + room)) ** (1.0 / 3.0))
+
+
+def _ramp_marks(shape: TurnoutShape, ramp: Ramp) -> tuple[Float, tuple[float, float]]:
+    """Return the stations that follow a ramp's bend, and the range in which its island is wide enough."""
+    leaves = min(max(island_begin(shape, ramp, ISLAND_ROOM), shape.nose + STEP), ramp.length)
+    distances = np.concatenate([np.arange(0.0, ramp.length, _RAMP_GRID), [leaves, leaves + STEP]])
+    tip, ahead = ramp_station(shape, 0.0), ramp_station(shape, 1.0) - ramp_station(shape, 0.0)
+    border = (ramp_station(shape, leaves), ramp_station(shape, ramp.length + STEP))
+    return tip + ahead * distances, (min(border), max(border))
+
+
+def _segments(stations: Float, line: Float, paved: Float) -> list[Segment]:
+    """Return the stretches of one base: where the line runs level, and where it lies farther out than beside both."""
+    level = np.abs(np.diff(line)) < _LEVEL
+    # Where the line leaves a ramp's outer side, the ramp goes on to move away.
+    in_island = line < paved - _LEVEL
+    leaves = ~level & (in_island[1:] != in_island[:-1])
+    edge = np.where(np.append(leaves, False) | np.append(False, leaves), paved, line)
+    base = np.where(leaves, np.maximum(edge[:-1], edge[1:]), np.maximum(line[:-1], line[1:]))
+    begins = np.append(True, (level[1:] != level[:-1]) | (level[1:] & (np.abs(np.diff(base)) > _LEVEL)))
+    first = np.flatnonzero(begins)
+    borders = [*stations[first].tolist(), float(stations[-1])]
+    bases, levels = np.maximum.reduceat(base, first).tolist(), level[first].tolist()
+    runs = [Segment(borders[i], borders[i + 1], bases[i], not levels[i]) for i in range(len(bases))]
+    # A taper belongs to its wider side; what is wider than both sides lies beside a gore.
+    around = [-np.inf, *bases, -np.inf]
+    found = [
+        run._replace(ramp=run.ramp and run.base > max(around[i], around[i + 2]) + _LEVEL) for i, run in enumerate(runs)
+    ]
+    return _joined(_raised(_joined(found), stations[in_island].tolist()))
+
+
+def _joined(segments: list[Segment]) -> list[Segment]:
+    """Join neighbours whose bases differ too little for two lines of barriers."""
+    found: list[Segment] = []
+    for segment in segments:
+        found.append(segment)
+        while len(found) > 1 and _in_line(*found[-2:]):
+            after, before = found.pop(), found.pop()
+            ramp = before.ramp and after.ramp
+            found.append(Segment(before.start, after.end, max(before.base, after.base), ramp))
+    return found
+
+
+def _in_line(before: Segment, after: Segment) -> bool:
+    return before.end == after.start and abs(before.base - after.base) < STEP_OF_BARRIERS
+
+
+def _raised(segments: list[Segment], beside_island: list[float]) -> list[Segment]:
+    """Return the segments, those too short for a barrier between two wider ones at the base of the less wide one.
+
+    Beside an island (stations, m) a barrier can't stand farther out: that part of the segment falls away.
+    """
+    found = segments[:1]
+    for before, segment, after in zip(segments, segments[1:], segments[2:], strict=False):
+        wider = [s.base for s in (before, after) if not s.ramp]
+        short = segment.end - segment.start < SHORTEST_BARRIER and segment.base < min(before.base, after.base)
+        if short and wider and not segment.ramp:
+            inside = [s for s in beside_island if segment.start <= s <= segment.end]
+            start = max(inside) + _BEHIND_RAMP if inside and before.ramp else segment.start
+            end = min(inside) - _BEHIND_RAMP if inside and after.ramp else segment.end
+            found.append(Segment(start, max(start, end), min(wider)))
+        else:
+            found.append(segment)
+    return [*found, *segments[1:][-1:]]

@@ -1,0 +1,179 @@
+"""Shield gantries. They are planned first and built when the barriers stand."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from ...base.schema import rounded
+from ...road.things.furniture import Gantry, GantrySign, Side
+from ...road.things.signs import sign_catalogue
+from .draw import draw, pick
+from .layout import SMALL_ZONE, Layout, Roadside
+from .ranges import Taken, draw_start, free_ranges
+
+Kind = Literal["one_sided", "two_sided", "cantilever"]
+BEAMS: tuple[tuple[Literal["box", "truss", "tube"], float, float], ...] = (
+    ("box", 0.8, 0.6),
+    ("box", 1.1, 0.8),
+    ("truss", 1.4, 1.0),
+    ("tube", 0.6, 0.6),
+)
+"""Shapes of beams with their height and depth, m."""
+SHADES = (0.15, 0.3, 0.45, 0.6, 0.75)
+"""Base colours of the steel, from dark paint to bright zinc."""
+POST_WIDTHS, LEAST_POST_WIDTH = (0.4, 0.5, 0.6), 0.3
+"""Widths of posts, and the least of one in a narrow median, m."""
+DISPLAY_SIZE, DISPLAY_TEXTS = 1.35, ("60", "80", "100", "120", "")
+"""Side of a variable display (m), and what it may show."""
+DESTINATION_HEIGHTS = (2.0, 2.5, 3.0)
+"""Heights of destination signs, m."""
+LANES_OF_CANTILEVER = 2
+"""A cantilever reaches over so many lanes."""
+_HALF = 0.75  # m that a gantry takes to either side along the road
+_BESIDE_SIGN = 0.15  # m between a sign and its lane's boundaries
+_NARROWEST_LANE = 2.0  # m; what is narrower is a lane that begins or ends
+
+
+@dataclass(frozen=True)
+class GantryPlan:
+    """A gantry whose place along the road is reserved.
+
+    Attributes:
+        kind: as in `Gantry`.
+        station: m.
+        sides: carriageways that it spans.
+    """
+
+    kind: Kind
+    station: float
+    sides: tuple[Side, ...]
+
+
+def plan_gantries(layout: Layout, rng: np.random.Generator) -> list[GantryPlan]:
+    """Return the gantries: all along at a spacing where one is given, else one or none."""
+    limits = layout.site.scenario.furniture
+    spacing = limits.gantry_spacing
+    if spacing is not None:
+        stations = spacing * (0.5 + np.arange(int(layout.length / spacing + 0.5)))
+        half = min(_HALF, spacing / 2.0)
+        plans = (_at(layout, rng, station, half) for station in stations.tolist())
+        return [plan for plan in plans if plan]
+    if rng.random() >= limits.gantries:
+        return []
+    kind, sides = _kind(layout, rng)
+    start = draw_start(rng, free_ranges(0.0, layout.length, *_in_the_way(layout, kind, sides)), 2.0 * _HALF)
+    return [] if start is None else [_reserved(layout, GantryPlan(kind, start + _HALF, sides), _HALF)]
+
+
+def gantries(layout: Layout, plans: list[GantryPlan], rng: np.random.Generator) -> Iterator[tuple[str, Gantry]]:
+    """Yield (id, gantry) of planned gantries."""
+    limits = layout.site.scenario.furniture
+    for number, plan in enumerate(plans, start=1):
+        beam, height, depth = pick(rng, BEAMS)
+        post = pick(rng, POST_WIDTHS)
+        if plan.kind != "cantilever":
+            post = min(post, layout.median.obstacle_half)
+        reaches = {side: _reach(layout, plan, layout.sides[side], post) for side in plan.sides}
+        ends = [layout.sides[side].sign * distance for side in plan.sides for distance in reaches[side]]
+        displays = bool(rng.random() < 0.5)
+        left, right = rounded(max(ends)), rounded(min(ends))
+        yield (
+            f"gantry-{number}",
+            Gantry(
+                instance=1,
+                station=rounded(plan.station),
+                offset=rounded((left + right) / 2.0),
+                kind=plan.kind,
+                left_offset=left,
+                right_offset=right,
+                post_side=plan.sides[0],
+                clearance=draw(rng, limits.gantry_clearance),
+                beam=beam,
+                beam_height=height,
+                beam_depth=rounded(min(depth, 0.6 * (limits.gantry_spacing or 10.0))),
+                post_width=rounded(post),
+                shade=pick(rng, SHADES),
+                signs=tuple(s for side in plan.sides for s in _signs(layout, plan, side, reaches[side], displays, rng)),
+            ),
+        )
+
+
+def _kind(layout: Layout, rng: np.random.Generator) -> tuple[Kind, tuple[Side, ...]]:
+    """Return a kind that the road has room for, and the carriageways that it spans."""
+    sides: tuple[Side, ...] = tuple(layout.sides)
+    kinds: tuple[Kind, ...] = ("cantilever", "one_sided", "two_sided")
+    if layout.median.obstacle_half < LEAST_POST_WIDTH:
+        kinds = ("cantilever",)
+    kind, side = pick(rng, kinds), pick(rng, sides)
+    return kind, sides if kind == "two_sided" else (side,)
+
+
+def _in_the_way(layout: Layout, kind: Kind, sides: tuple[Side, ...]) -> list[Taken]:
+    """Return what a gantry has to keep clear of."""
+    found = [] if kind == "cantilever" else [layout.median.taken]
+    for roadside in (layout.sides[side] for side in sides):
+        found += [roadside.near, roadside.crossed, roadside.restless]
+    return found
+
+
+def _at(layout: Layout, rng: np.random.Generator, station: float, half: float) -> GantryPlan | None:
+    """Return the gantry at a station (m), its place reserved, or None where something is in the way."""
+    kind, sides = _kind(layout, rng)
+    if all(item.is_free(station - half, station + half) for item in _in_the_way(layout, kind, sides)):
+        return _reserved(layout, GantryPlan(kind, station, sides), half)
+    return None
+
+
+def _reserved(layout: Layout, plan: GantryPlan, half: float) -> GantryPlan:
+    low, high = plan.station - half, plan.station + half
+    for roadside in (layout.sides[side] for side in plan.sides):
+        roadside.near.add(low, high)
+        roadside.protect(low, high)
+    if plan.kind != "cantilever":
+        layout.median.taken.add(low, high)
+        layout.median.has_obstacles = True
+    return plan
+
+
+def _reach(layout: Layout, plan: GantryPlan, roadside: Roadside, post: float) -> tuple[float, float]:
+    """Return the distances (m) from the centreline between which the beam hangs over a carriageway."""
+    front = roadside.front_of_obstacle(plan.station - _HALF, plan.station + _HALF, SMALL_ZONE + post)
+    outer = front + SMALL_ZONE + post
+    if plan.kind != "cantilever":
+        return 0.0, outer
+    lanes = _lanes(layout, plan, roadside.side)[:LANES_OF_CANTILEVER]
+    return lanes[-1][0], outer
+
+
+def _lanes(layout: Layout, plan: GantryPlan, side: Side) -> list[tuple[float, float]]:
+    """Return the inner and outer distances (m) of a carriageway's lanes, outermost first."""
+    boundaries = layout.site.sections[side].lane_boundaries(plan.station)[0].tolist()
+    lanes = list(zip(boundaries[1:], boundaries[:-1], strict=True))
+    return [lane for lane in lanes if lane[1] - lane[0] >= _NARROWEST_LANE] or lanes
+
+
+def _signs(
+    layout: Layout,
+    plan: GantryPlan,
+    side: Side,
+    reach: tuple[float, float],
+    displays: bool,
+    rng: np.random.Generator,
+) -> Iterator[GantrySign]:
+    """Yield a display or a destination sign over each lane below the beam."""
+    names = sign_catalogue().destinations
+    for inner, outer in _lanes(layout, plan, side):
+        if inner < reach[0]:
+            continue
+        width = min(DISPLAY_SIZE, outer - inner) if displays else outer - inner - 2.0 * _BESIDE_SIGN
+        yield GantrySign(
+            offset=rounded(layout.sides[side].sign * (inner + outer) / 2.0),
+            width=rounded(width),
+            height=DISPLAY_SIZE if displays else pick(rng, DESTINATION_HEIGHTS),
+            kind="display" if displays else "destination",
+            text=(pick(rng, DISPLAY_TEXTS),) if displays else (pick(rng, names), pick(rng, names)),
+        )

@@ -1,0 +1,243 @@
+"""Who stands where beside a road: lateral zones, reserved stretches, and barriers that others have to stand behind.
+
+Outwards from the pavement's edge follow a zone of barriers and delineators, one of small things (signs, posts,
+cabinets) and one of noise barriers. Things of different zones cannot meet; things of one zone keep apart along the
+road by reserving their stretches before they are built. A thing's distance is known last, when the barriers stand.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any, NamedTuple
+
+from ...base.schema import rounded
+from ...road.guidelines import OBSTACLE_LEAD, OBSTACLE_TAIL, TIGHT_CURVE
+from ...road.objects import AnyWidth, PointObject
+from ...road.things.furniture import Side, TrafficSign
+from .edge import EdgeProfile
+from .ranges import Range, Taken
+from .site import Site
+
+BARRIER_AXIS = 0.70
+"""From the paved edge to the axis of a guardrail's posts: its face then stands 0.5 m from the pavement, m."""
+MEDIAN_BARRIER_HALF = 0.3
+"""From the centreline to the sides of the median's single barrier, m at most."""
+MEDIAN_OBSTACLE = 0.85
+"""From the paved edge to what stands in the median behind a guardrail, m."""
+SMALL_ZONE = 1.25
+"""From the paved edge to the nearest part of small things, m: behind barriers and delineators."""
+FAR_ZONE = 3.0
+"""From the paved edge to the nearest part of noise barriers, m: behind the small things."""
+_MARGIN = 1.0  # m along the road: barriers reach so much farther than they need to
+_CALM = OBSTACLE_LEAD + 2.0 * _MARGIN  # m along the road: nearer to a turnout, an obstacle's barrier might meet it
+_BESIDE_BARRIER = 0.5  # m along the road: what stands so near a barrier's end stands behind it
+_ISLAND_MARGIN = 0.6  # m: to a ramp's inner edge beyond what lies in the island
+
+
+class Piece(NamedTuple):
+    """A barrier that stands.
+
+    Attributes:
+        start, end: stations, m.
+        base: distance from the centreline from which its place was counted, m; no pavement beside it reaches beyond.
+        ramp: it stands beside a gore.
+    """
+
+    start: float
+    end: float
+    base: float
+    ramp: bool = False
+
+
+@dataclass(frozen=True)
+class Spot:
+    """A thing of the small zone whose distance isn't known yet.
+
+    Attributes:
+        name: first part of its id.
+        make: its class.
+        station: of its axis, m.
+        half: what it takes to either side along the road, m.
+        width: what it takes across the road, m.
+        fields: its fields but its place.
+        shift: how much farther out than it has to it stands, m.
+        outer: it stands outside of a ramp, never in the island beside it.
+        obstacle: it needs a barrier before it.
+        distance: of its axis from the centreline, where that is known, m.
+    """
+
+    name: str
+    make: type[PointObject]
+    station: float
+    half: float
+    width: float
+    fields: dict[str, Any] = field(default_factory=dict)
+    shift: float = 0.0
+    outer: bool = False
+    obstacle: bool = False
+    distance: float | None = None
+
+
+class Roadside:
+    """The outer side of one carriageway while it is furnished.
+
+    Attributes:
+        side, sign, traffic: as in `Carriageway`.
+        length: of the road, m.
+        edge: the pavement's edge.
+        near, far: stretches taken in the zones of small things and of noise barriers.
+        crossed: stretches that an overpass crosses: no place for what is high.
+        turnouts: stretches of turnouts.
+        restless: stretches where an obstacle's barrier would meet a turnout.
+        spots: things of the small zone.
+        protected: stretches that need a barrier.
+        pieces: the barriers that stand, in order.
+    """
+
+    def __init__(self, site: Site, side: Side) -> None:
+        carriageway, section = site.carriageways[side], site.sections[side]
+        self.side, self.sign, self.traffic = side, carriageway.sign, carriageway.traffic
+        self.length = site.length
+        self.edge = EdgeProfile(section, self.length)
+        self.near, self.far, self.crossed = Taken(), Taken(), Taken()
+        self.turnouts = Taken(shape.range() for shape in section.turnouts)
+        self.restless = Taken((start - _CALM, end + _CALM) for start, end in self.turnouts.all())
+        self.spots: list[Spot] = []
+        self.protected: list[Range] = []
+        self.pieces: list[Piece] = []
+
+    @property
+    def facing(self) -> float:
+        """Return the rotation (deg) of what faces this carriageway's traffic."""
+        return 0.0 if self.traffic > 0 else 180.0
+
+    @property
+    def towards_road(self) -> Side:
+        """Return the side on which a barrier faces this carriageway."""
+        return "right" if self.sign > 0 else "left"
+
+    def ahead(self, station: float, distance: float) -> float:
+        """Return the station a distance (m) ahead in the direction of traffic."""
+        return station + self.traffic * distance
+
+    def protect(self, start: float, end: float) -> None:
+        """Ask for a barrier before an obstacle that stands between two stations."""
+        self.protected.append(self._protected(start, end))
+
+    def put(self, spot: Spot) -> None:
+        """Put a thing into the small zone, and ask for its barrier."""
+        low, high = spot.station - spot.half, spot.station + spot.half
+        self.near.add(low, high)
+        if spot.obstacle:
+            self.protect(low, high)
+        self.spots.append(spot)
+
+    def front(self, start: float, end: float, depth: float, outer: bool = False) -> float:
+        """Return the distance (m) from which zones are counted between two stations.
+
+        It is the largest of the paved edge and of the barriers' bases; beside an island that is deep enough (m) for the
+        thing, the main road's.
+        """
+        near = [p for p in self.pieces if p.start - _BESIDE_BARRIER < end and p.end + _BESIDE_BARRIER > start]
+        if not outer:
+            main = self.edge.largest_main(start, end)
+            beside_main = max(main, *(p.base for p in near if not p.ramp), 0.0)
+            if self.edge.is_clear_beside_main(start, end, beside_main - main + depth + _ISLAND_MARGIN):
+                return beside_main
+        return max(self.edge.largest_paved(start, end), *(p.base for p in near), 0.0)
+
+    def front_of_obstacle(self, start: float, end: float, depth: float) -> float:
+        """Return the distance (m) from which zones are counted for an obstacle: behind all of the barrier before it."""
+        first, last = self._protected(start, end)
+        along = [p.base for p in self.pieces if p.start < last and p.end > first and not p.ramp]
+        return max(self.front(start, end, depth), *along, 0.0)
+
+    def stand(self) -> Iterator[tuple[str, PointObject]]:
+        """Yield (id, object) of the spots in the order of their stations."""
+        counts: Counter[str] = Counter()
+        for spot in sorted(self.spots, key=lambda item: item.station):
+            counts[spot.name] += 1
+            yield (
+                f"{spot.name}-{self.side}-{counts[spot.name]:03d}",
+                spot.make(
+                    instance=1,
+                    station=rounded(spot.station),
+                    offset=rounded(self.sign * self._distance(spot)),
+                    rotation_deg=self.facing,
+                    **spot.fields,
+                ),
+            )
+
+    def _distance(self, spot: Spot) -> float:
+        """Return the distance (m) of a spot's axis from the centreline."""
+        if spot.distance is not None:
+            return spot.distance
+        reach = max(spot.half, 1.0)
+        low, high, depth = spot.station - reach, spot.station + reach, SMALL_ZONE + spot.width + spot.shift
+        front = self.front_of_obstacle(low, high, depth) if spot.obstacle else self.front(low, high, depth, spot.outer)
+        return front + SMALL_ZONE + spot.width / 2.0 + spot.shift
+
+    def _protected(self, start: float, end: float) -> Range:
+        """Return the stretch of the barrier before an obstacle that stands between two stations."""
+        lead, tail = OBSTACLE_LEAD + _MARGIN, OBSTACLE_TAIL + _MARGIN
+        return (start - lead, end + tail) if self.traffic > 0 else (start - tail, end + lead)
+
+
+@dataclass
+class MedianStrip:
+    """The median while it is furnished.
+
+    Attributes:
+        inner: distances of the carriageways' inner edges from the centreline by side, the smallest along the road, m.
+        taken: stretches taken by posts, piers and signs.
+        has_obstacles: something stands in it that needs a barrier on either side.
+        signs: the signs in it.
+    """
+
+    inner: dict[Side, float]
+    taken: Taken = field(default_factory=Taken)
+    has_obstacles: bool = False
+    signs: list[TrafficSign] = field(default_factory=list)
+
+    @property
+    def half_width(self) -> float:
+        """Return the distance of the nearer edge from the centreline, m."""
+        return min(self.inner.values())
+
+    @property
+    def obstacle_half(self) -> float:
+        """Return half the width (m) of what may stand on the centreline between guardrails; below 0 if nothing may."""
+        return self.half_width - MEDIAN_OBSTACLE if len(self.inner) > 1 else -1.0
+
+
+class Layout:
+    """A road while it is furnished.
+
+    Attributes:
+        site: the road.
+        sides: the outer sides of its carriageways.
+        median: its median.
+    """
+
+    def __init__(self, site: Site) -> None:
+        self.site = site
+        self.length = site.length
+        self.sides: dict[Side, Roadside] = {side: Roadside(site, side) for side in site.carriageways}
+        self.median = MedianStrip({side: _least(c.inner_offset) for side, c in site.carriageways.items()})
+
+    @cached_property
+    def tight_arcs(self) -> list[tuple[float, float, float]]:
+        """Start and end (m) and curvature (1/m) of the arcs that are tight for the design class."""
+        found, start, tight = [], 0.0, 1.0 / (TIGHT_CURVE * self.site.limits.radius)
+        for element in self.site.alignment.horizontal:
+            if element.kind == "arc" and abs(element.curvature_start) > tight:
+                found.append((start, start + element.length, element.curvature_start))
+            start += element.length
+        return found
+
+
+def _least(width: AnyWidth) -> float:
+    return min(point.width for point in width) if isinstance(width, tuple) else width

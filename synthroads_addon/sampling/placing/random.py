@@ -1,0 +1,138 @@
+"""Furniture at random: the kinds that the rules place, at random stations and distances, and where they ask for none.
+
+Nothing stands on the pavement or in another thing's place: barriers and delineators share one zone, small things the
+next, as by the rules.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from ...base.schema import rounded
+from ...road.objects import LineObject
+from ...road.things.furniture import Delineator, Guardrail, TrafficLight
+from ...road.things.signs import sign_catalogue
+from .barriers import TERMINAL, BarrierSystem
+from .draw import pick
+from .equipment import LARGEST_KILOMETRE, LIGHT_WIDTH, put_kilometre_board, put_phone
+from .layout import BARRIER_AXIS, Layout, Piece, Roadside, Spot
+from .ranges import Taken, draw_start, free_ranges
+from .signs import destination_values, stand
+
+SIGNS_PER_KM, BOARDS_PER_KM, PHONES_PER_KM, DELINEATORS_PER_KM, BARRIERS_PER_KM = 5.0, 2.0, 0.5, 20.0, 2.0
+"""How many there are of each beside a carriageway on average, about as many as by the rules."""
+BARRIER_LENGTHS = (8.0, 200.0)
+"""Shortest and longest barrier, m."""
+SHIFTS, BARRIER_SHIFTS = (0.0, 0.1, 0.2, 0.3, 0.4), (0.0, 0.05, 0.1, 0.15)
+"""What small things, and barriers, stand farther out than they must, within their zones, m."""
+DELINEATOR_DISTANCES = (0.2, 0.35, 0.5, 0.7, 0.9, 1.1)
+"""From the paved edge to delineators, m."""
+_HALF = 0.5  # m that a small thing takes to either side along the road
+_DELINEATOR_HALF = 0.5  # m
+
+
+def plan_random_signs(layout: Layout, rng: np.random.Generator) -> None:
+    """Put signs of any kind."""
+    codes = list(sign_catalogue().signs)
+    for roadside in layout.sides.values():
+        for _ in range(_count(SIGNS_PER_KM, layout, rng)):
+            station = layout.length * rng.random()
+            stand(roadside, pick(rng, codes), station, layout.length, destination_values(rng), pick(rng, SHIFTS))
+
+
+def plan_random_equipment(layout: Layout, rng: np.random.Generator) -> None:
+    """Put kilometre boards of any kilometre, emergency phones and traffic lights."""
+    furniture = layout.site.scenario.furniture
+    for roadside in layout.sides.values():
+        for station in _stations(roadside, BOARDS_PER_KM if furniture.kilometre_boards else 0.0, layout, rng):
+            put_kilometre_board(roadside, station, int(rng.random() * 2 * LARGEST_KILOMETRE))
+        for station in _stations(roadside, PHONES_PER_KM if furniture.emergency_phones else 0.0, layout, rng):
+            put_phone(roadside, station)
+        if rng.random() < furniture.traffic_lights:
+            for station in _stations(roadside, PHONES_PER_KM, layout, rng):
+                shift = pick(rng, SHIFTS)
+                roadside.put(Spot("traffic-light", TrafficLight, station, _HALF, LIGHT_WIDTH, shift=shift))
+
+
+def random_median_barrier(layout: Layout, rng: np.random.Generator) -> Iterator[tuple[str, LineObject]]:
+    """Yield a barrier somewhere in the median, where that is wide enough."""
+    limits, median = layout.site.scenario.barriers, layout.median
+    system = BarrierSystem.draw(rng, limits, limits.concrete_median)
+    room = median.half_width - BARRIER_AXIS
+    span = _stretch(free_ranges(0.0, layout.length, median.taken), rng)
+    if limits.median and len(median.inner) > 1 and room >= 0.0 and span:
+        yield (
+            "guardrail-median",
+            Guardrail(
+                instance=1,
+                start_station=rounded(span[0]),
+                end_station=rounded(span[1]),
+                offset=rounded(room * pick(rng, (-1.0, -0.5, 0.0, 0.5, 1.0))),
+                faces="both",
+                height=system.height,
+                post_spacing=system.post_spacing,
+                terminal_length=rounded(min(TERMINAL, (span[1] - span[0]) / 4.0)),
+            ),
+        )
+
+
+def random_front(
+    layout: Layout, roadside: Roadside, rng: np.random.Generator
+) -> Iterator[tuple[str, LineObject | Delineator]]:
+    """Yield the barriers and delineators of one side."""
+    limits, taken = layout.site.scenario.barriers, Taken()
+    system = BarrierSystem.draw(rng, limits, limits.concrete_roadside)
+    for _ in range(_count(BARRIERS_PER_KM, layout, rng) if limits.roadside else 0):
+        segment = pick(rng, roadside.edge.segments)
+        span = _stretch(free_ranges(segment.start, segment.end, taken), rng)
+        if span:
+            taken.add(*span)
+            roadside.pieces.append(Piece(*span, segment.base, segment.ramp))
+    for number, piece in enumerate(roadside.pieces, start=1):
+        moved = piece._replace(base=piece.base + pick(rng, BARRIER_SHIFTS))
+        yield f"{system.name}-{roadside.side}-{number}", system.beside(roadside, moved, TERMINAL)
+    if layout.site.scenario.furniture.delineators:
+        yield from _delineators(layout, roadside, taken, rng)
+
+
+def _delineators(
+    layout: Layout, roadside: Roadside, taken: Taken, rng: np.random.Generator
+) -> Iterator[tuple[str, Delineator]]:
+    for number in range(1, _count(DELINEATORS_PER_KM, layout, rng) + 1):
+        start = draw_start(rng, free_ranges(0.0, layout.length, taken), 2.0 * _DELINEATOR_HALF)
+        if start is None:
+            return
+        taken.add(start, start + 2.0 * _DELINEATOR_HALF)
+        station = start + _DELINEATOR_HALF
+        edge = roadside.edge.line_beside(np.array([station]), _DELINEATOR_HALF)[0]
+        yield (
+            f"delineator-{roadside.side}-{number:04d}",
+            Delineator(
+                instance=1,
+                station=rounded(station),
+                offset=rounded(roadside.sign * (edge + pick(rng, DELINEATOR_DISTANCES))),
+                rotation_deg=roadside.facing,
+            ),
+        )
+
+
+def _stations(roadside: Roadside, per_km: float, layout: Layout, rng: np.random.Generator) -> Iterator[float]:
+    """Yield stations at which a small thing has room; each must be taken before the next."""
+    for _ in range(_count(per_km, layout, rng)):
+        start = draw_start(rng, free_ranges(0.0, layout.length, roadside.near), 2.0 * _HALF)
+        if start is not None:
+            yield start + _HALF
+
+
+def _stretch(ranges: list[tuple[float, float]], rng: np.random.Generator) -> tuple[float, float] | None:
+    """Return a stretch of random length for a barrier, or None without room."""
+    longest = min(BARRIER_LENGTHS[1], max((end - start for start, end in ranges), default=0.0))
+    length = BARRIER_LENGTHS[0] + (longest - BARRIER_LENGTHS[0]) * rng.random()
+    start = draw_start(rng, ranges, length) if longest >= BARRIER_LENGTHS[0] else None
+    return None if start is None else (start, start + length)
+
+
+def _count(per_km: float, layout: Layout, rng: np.random.Generator) -> int:
+    return int(per_km * layout.length / 1000.0 + rng.random())

@@ -1,0 +1,205 @@
+"""Traffic signs: before exits, in gores, after entries, before tight curves and construction zones."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import pairwise
+
+import numpy as np
+
+from ...base.schema import rounded
+from ...road.guidelines import BARRIER_DISTANCE, EXIT_SEQUENCE, EXIT_SIGN_ROOM, GORE_SIGN, OBSTACLE_POST, SIGN_DISTANCE
+from ...road.section import Turnout
+from ...road.things.furniture import Side, TrafficSign
+from ...road.things.signs import SignType, sign_catalogue
+from ...road.turnout_geometry import STEP, TurnoutShape
+from .edge import island_begin, ramp_station
+from .layout import MEDIAN_BARRIER_HALF, MEDIAN_OBSTACLE, Layout, Roadside, Spot
+from .ranges import Range, nearest_free
+
+CURVE_SIGNS = (400.0, 200.0)
+"""Distances before a tight curve at which its danger sign stands, m."""
+SECOND_CURVE = 300.0
+"""A tight curve the other way that follows within this distance makes a double curve, m."""
+CONSTRUCTION_SIGNS = {400.0: "123", 300.0: "274-100", 200.0: "121-10", 100.0: "274-80"}
+"""Distance before a construction zone (m) -> code of the sign there."""
+CONSTRUCTION_END = 30.0
+"""Behind a construction zone's end the sign "282" stands, m."""
+URBAN_LIMITS = ("274-80", "274-100")
+"""Speed limits of urban motorways (EKA 3)."""
+LIMIT_BEHIND_BEGIN, LIMIT_BEHIND_ENTRY, TABLE_BEHIND_ENTRY = 30.0, 60.0, 250.0
+"""Where speed limits and distance tables stand behind the road's begin and behind entries, m."""
+_ROOM = 20.0  # m: signs whose distance doesn't matter much may be moved so far
+_HALF, _LARGE_HALF = 0.5, 1.0  # m that small signs and large boards take to either side along the road
+_GORE_MARGIN = 0.1  # m beyond `SIGN_DISTANCE`: the ramp's edge runs aslant
+_NARROWEST_GORE_SIGN = 0.1  # m
+
+
+def plan_gore_signs(layout: Layout) -> None:
+    """Put the exit boards onto the islands behind the noses, on thin posts, smaller where there is little room."""
+    sign = sign_catalogue().signs[GORE_SIGN]
+    for side, roadside in layout.sides.items():
+        section = layout.site.sections[side]
+        for _, turnout in layout.site.exits(side):
+            station = _gore_station(layout.site.shape(turnout), sign.width)
+            if not 0.0 <= station <= layout.length:
+                continue
+            inner, outer = (float(edge[0]) for edge in section.boundaries_of("island", station))
+            width = min(sign.width, outer - inner - 2.0 * (SIGN_DISTANCE + _GORE_MARGIN))
+            if width < _NARROWEST_GORE_SIGN:
+                continue
+            fields = sign.fields() | {"width": rounded(width), "code": GORE_SIGN, "text": sign.text}
+            middle = (inner + outer) / 2.0
+            roadside.put(Spot("sign-gore", TrafficSign, station, _LARGE_HALF, width, fields, distance=middle))
+
+
+def plan_exit_signs(layout: Layout, rng: np.random.Generator) -> None:
+    """Put the signs that announce exits; those that fall before the road's begin are left out."""
+    for side, roadside in layout.sides.items():
+        for _, turnout in layout.site.exits(side):
+            number, names = str(rng.integers(1, 100)), _names(rng, 3)
+            values = {"number": number, "exit": names[0], "near": names[1], "middle": names[1], "far": names[2]}
+            for distance, code in EXIT_SEQUENCE.items():
+                station = roadside.ahead(layout.site.begin(turnout), -distance)
+                stand(roadside, code, station, EXIT_SIGN_ROOM, values)
+
+
+def plan_other_signs(layout: Layout, rng: np.random.Generator, zones: dict[Side, Range]) -> None:
+    """Put all other signs.
+
+    Args:
+        layout: what stands already.
+        rng: the signs' random numbers.
+        zones: the construction zone of a carriageway, by side: the lowest and highest station, m.
+    """
+    urban = layout.site.design_class == "EKA3"
+    for side, roadside in layout.sides.items():
+        if side in zones:
+            _announce_construction(layout, roadside, zones[side])
+        limit = URBAN_LIMITS[int(rng.integers(len(URBAN_LIMITS)))]
+        begin = 0.0 if roadside.traffic > 0 else layout.length
+        if urban:
+            stand(roadside, limit, roadside.ahead(begin, LIMIT_BEHIND_BEGIN), _ROOM)
+        for _, turnout in layout.site.entries(side):
+            _behind_entry(layout, roadside, turnout, limit if urban else None, rng)
+        for code, station in _curve_signs(layout, roadside):
+            stand_on_both_sides(layout, roadside, code, station)
+
+
+def stand(
+    roadside: Roadside, code: str, station: float, room: float, values: dict[str, str] | None = None, shift: float = 0.0
+) -> bool:
+    """Put a sign as near as possible to a station; return whether there is room for it.
+
+    Args:
+        roadside: where.
+        code: number in the catalogue.
+        station: where it belongs, m; nothing is put beyond the road's ends.
+        room: how far it may be moved, m.
+        values: what is filled into its text.
+        shift: how much farther out than it has to it stands, m.
+    """
+    if not 0.0 <= station <= roadside.length:
+        return False
+    sign = sign_catalogue().signs[code]
+    large = is_obstacle(sign)
+    zones = (roadside.near, roadside.far, roadside.crossed) if large else (roadside.near,)
+    half = _LARGE_HALF if large else _HALF
+    place = nearest_free(station, half, room, roadside.length, *zones)
+    if place is None:
+        return False
+    text = tuple(line.format(**values) for line in sign.text) if values else sign.text
+    fields = sign.fields() | {"code": code, "text": text}
+    roadside.put(Spot("sign", TrafficSign, place, half, sign.width, fields, shift, obstacle=large))
+    if large:
+        roadside.far.add(place - half, place + half)
+    return True
+
+
+def stand_on_both_sides(layout: Layout, roadside: Roadside, code: str, station: float) -> None:
+    """Put a sign to the right of a carriageway, and one into the median where that has room for it."""
+    if not stand(roadside, code, station, _ROOM):
+        return
+    sign, median = sign_catalogue().signs[code], layout.median
+    if median.has_obstacles or not layout.site.scenario.barriers.median:
+        edge, offset = (MEDIAN_OBSTACLE if median.has_obstacles else BARRIER_DISTANCE), 0.0
+        fits = sign.width / 2.0 <= median.half_width - edge
+    else:
+        offset = MEDIAN_BARRIER_HALF + sign.width / 2.0
+        fits = offset + sign.width / 2.0 <= median.half_width - SIGN_DISTANCE
+    place = nearest_free(station, _HALF, _ROOM, layout.length, median.taken)
+    if len(median.inner) < 2 or not fits or place is None:
+        return
+    median.taken.add(place - _HALF, place + _HALF)
+    median.signs.append(
+        TrafficSign(
+            instance=1,
+            station=rounded(place),
+            offset=rounded(roadside.sign * offset),
+            rotation_deg=roadside.facing,
+            code=code,
+            text=sign.text,
+            **sign.fields(),
+        )
+    )
+
+
+def is_obstacle(sign: SignType) -> bool:
+    """Return whether a sign's posts are so thick that it needs a barrier."""
+    return sign.post_diameter > OBSTACLE_POST
+
+
+def destination_values(rng: np.random.Generator) -> dict[str, str]:
+    """Return what is filled into the texts of boards: a number, names, and names with growing distances."""
+    names = _names(rng, 4)
+    distances = np.cumsum(rng.integers(3, 60, 3)).tolist()
+    near, middle, far = (f"{name} {distance} km" for name, distance in zip(names[1:], distances, strict=True))
+    return {"number": str(rng.integers(1, 100)), "exit": names[0], "near": near, "middle": middle, "far": far}
+
+
+def median_signs(layout: Layout) -> Iterator[tuple[str, TrafficSign]]:
+    """Yield (id, sign) of the signs in the median."""
+    for number, sign in enumerate(layout.median.signs, start=1):
+        yield f"sign-median-{number:03d}", sign
+
+
+def _gore_station(shape: TurnoutShape, width: float) -> float:
+    """Return where the island is wide enough for a sign (m), or else the last station on it."""
+    ramp = shape.turnout.ramp
+    assert ramp is not None
+    wanted = island_begin(shape, ramp, width + 2.0 * (SIGN_DISTANCE + _GORE_MARGIN))
+    return ramp_station(shape, min(max(wanted, shape.nose + 2.0 * STEP), ramp.length - STEP))
+
+
+def _behind_entry(
+    layout: Layout, roadside: Roadside, turnout: Turnout, limit: str | None, rng: np.random.Generator
+) -> None:
+    end = roadside.ahead(layout.site.begin(turnout), turnout.length)
+    if limit:
+        stand(roadside, limit, roadside.ahead(end, LIMIT_BEHIND_ENTRY), _ROOM)
+    stand(roadside, "453", roadside.ahead(end, TABLE_BEHIND_ENTRY), _ROOM, destination_values(rng))
+
+
+def _announce_construction(layout: Layout, roadside: Roadside, zone: Range) -> None:
+    first, last = zone if roadside.traffic > 0 else (zone[1], zone[0])
+    for distance, code in CONSTRUCTION_SIGNS.items():
+        stand_on_both_sides(layout, roadside, code, roadside.ahead(first, -distance))
+    stand_on_both_sides(layout, roadside, "282", roadside.ahead(last, CONSTRUCTION_END))
+
+
+def _curve_signs(layout: Layout, roadside: Roadside) -> Iterator[tuple[str, float]]:
+    """Yield code and station of the danger signs before tight curves."""
+    ahead = roadside.traffic
+    arcs = sorted((*sorted((ahead * start, ahead * end)), ahead * bend > 0.0) for start, end, bend in layout.tight_arcs)
+    announced = -np.inf
+    for (begin, end, left), (following, _, next_left) in pairwise([*arcs, (np.inf, np.inf, False)]):
+        if begin - announced >= SECOND_CURVE:
+            double = next_left != left and following - end < SECOND_CURVE
+            code = f"{'105' if double else '103'}-{10 if left else 20}"
+            yield from ((code, ahead * (begin - distance)) for distance in CURVE_SIGNS)
+        announced = end
+
+
+def _names(rng: np.random.Generator, count: int) -> list[str]:
+    names = sign_catalogue().destinations
+    return [names[i] for i in rng.choice(len(names), count, replace=False)]

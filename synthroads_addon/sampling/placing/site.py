@@ -1,0 +1,111 @@
+"""What the placement of furniture needs to know of a road that is being sampled."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ...base.random_streams import stream
+from ...road.guidelines import LIMITS, DesignLimits
+from ...road.parameters import AlignmentObject
+from ...road.section import Carriageway, Turnout
+from ...road.section_geometry import CarriagewaySection
+from ...road.surroundings import Terrain
+from ...road.things.furniture import Side
+from ...road.turnout_geometry import TurnoutShape
+from ...scenario.road import RoadScenario
+
+Float = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Site:
+    """A road without its furniture.
+
+    Attributes:
+        scenario, seed: limits, and the seed of everything drawn.
+        alignment, terrain: as in the parameter set.
+        carriageways: by side; their ids are ``carriageway-left`` and ``carriageway-right``.
+        turnouts: by id.
+        sections: the carriageways' cross-sections, made from the above.
+    """
+
+    scenario: RoadScenario
+    seed: int
+    alignment: AlignmentObject
+    carriageways: dict[Side, Carriageway]
+    turnouts: dict[str, Turnout]
+    terrain: Terrain
+    sections: dict[Side, CarriagewaySection] = field(init=False)
+
+    def __post_init__(self) -> None:
+        sections = {
+            side: CarriagewaySection(carriageway, self.turnouts_of(side).values())
+            for side, carriageway in self.carriageways.items()
+        }
+        object.__setattr__(self, "sections", sections)
+
+    @cached_property
+    def length(self) -> float:
+        """Length of the centreline, m."""
+        return self.alignment.length
+
+    @property
+    def design_class(self) -> str:
+        """Design class of the RAA."""
+        return self.scenario.design_class
+
+    @property
+    def limits(self) -> DesignLimits:
+        """Limits of the design class."""
+        return LIMITS[self.scenario.design_class]
+
+    def stream(self, *purpose: str | int) -> np.random.Generator:
+        """Return the random stream of a purpose."""
+        return stream(self.seed, *purpose)
+
+    def turnouts_of(self, side: Side) -> dict[str, Turnout]:
+        """Return the turnouts of one carriageway by id."""
+        return {name: item for name, item in self.turnouts.items() if item.carriageway == f"carriageway-{side}"}
+
+    def exits(self, side: Side) -> list[tuple[str, Turnout]]:
+        """Return the exits of one carriageway with their ids."""
+        return [(name, item) for name, item in self.turnouts_of(side).items() if item.kind == "exit"]
+
+    def entries(self, side: Side) -> list[tuple[str, Turnout]]:
+        """Return the entries of one carriageway with their ids."""
+        return [(name, item) for name, item in self.turnouts_of(side).items() if item.kind == "entry"]
+
+    def shape(self, turnout: Turnout) -> TurnoutShape:
+        """Return the shape of one of the road's turnouts."""
+        shapes = (shape for section in self.sections.values() for shape in section.turnouts)
+        return next(shape for shape in shapes if shape.turnout is turnout)
+
+    def begin(self, turnout: Turnout) -> float:
+        """Return the station at which traffic meets a turnout first."""
+        ahead = self.shape(turnout).carriageway.traffic > 0
+        return turnout.start_station if ahead else turnout.end_station
+
+    def gore_tip(self, turnout: Turnout) -> float:
+        """Return the station of an exit's or entry's gore tip."""
+        return self.shape(turnout).gore_tip()
+
+    def nose(self, turnout: Turnout) -> float:
+        """Return the station of an exit's or entry's nose, where the unpaved ground begins."""
+        return self.shape(turnout).nose_station()
+
+    def curvature(self, station: ArrayLike) -> Float:
+        """Return the curvature (1/m, positive to the left) at stations, same shape."""
+        borders, at_borders = self._curvatures
+        return np.interp(np.asarray(station, dtype=np.float64), borders, at_borders)
+
+    @cached_property
+    def _curvatures(self) -> tuple[Float, Float]:
+        elements = self.alignment.horizontal
+        lengths = np.array([element.length for element in elements])
+        ends = np.cumsum(lengths)
+        borders = np.column_stack([np.concatenate([[0.0], ends[:-1]]), ends]).ravel()
+        return borders, np.array([(e.curvature_start, e.curvature_end) for e in elements]).ravel()

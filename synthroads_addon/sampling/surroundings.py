@@ -1,0 +1,327 @@
+"""What surrounds a sampled road: ground, plants, traffic, light and weather, materials. Nothing drawn is rejected."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from itertools import groupby, pairwise
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..base.random_streams import stream
+from ..base.schema import rounded
+from ..road.guidelines import OBSTACLE_DISTANCE
+from ..road.objects import AnyWidth, nominal_width, width_at, width_kinks
+from ..road.parameters import ConstructionBeacon, Environment, MaterialVariation, RoadObject, TemporaryBarrier, Terrain
+from ..road.section_geometry import CarriagewaySection
+from ..road.surroundings import Vegetation, Vehicle
+from ..road.things.furniture import Side
+from ..road.things.vehicles import (
+    COLORS,
+    HEAVY_SPEED,
+    VEHICLE_GAP,
+    VEHICLE_LANE_WIDTH,
+    VEHICLE_ROOM,
+    VEHICLE_TYPES,
+)
+from ..scenario.road import Interval, MaterialLimits, RoadScenario
+from .placing.site import Site
+
+Float = NDArray[np.float64]
+Kind = Literal["grass", "shrub", "tree"]
+
+SHRUB_DISTANCE = 2.0
+"""Shrubs stand at least so far (m) behind the verge, so that they don't grow over the pavement."""
+MOST_SPECIES = {"grass": 2, "shrub": 3, "tree": 3}
+"""Most species of a kind along one road."""
+WEATHER = {
+    "haze": (4000.0, 0.8),
+    "fog": (400.0, 0.2),
+    "rain": (7000.0, 0.3),
+    "snow": (1500.0, 0.4),
+    "dust": (2000.0, 0.6),
+}
+"""Bad weather -> visibility (m) and strength of the sun."""
+
+_HIGHEST_SEED = 2**31
+_MODELS = list(VEHICLE_TYPES)
+_LIGHT_SUMS = np.cumsum([0.0 if kind.heavy else kind.weight for kind in VEHICLE_TYPES.values()])
+_HEAVY_SUMS = np.cumsum([kind.weight if kind.heavy else 0.0 for kind in VEHICLE_TYPES.values()])
+_COLORS = list(COLORS)
+_COLOR_SUMS = np.cumsum(list(COLORS.values()))
+
+
+def draw(rng: np.random.Generator, limits: Interval) -> float:
+    """Draw a number within an interval."""
+    low, high = limits.minimum, limits.maximum
+    return min(max(rounded(low + (high - low) * rng.random()), low), high)
+
+
+def _seed(rng: np.random.Generator) -> int:
+    return int(rng.integers(_HIGHEST_SEED))
+
+
+def sample_terrain(scenario: RoadScenario, seed: int) -> Terrain:
+    """Return the ground of a seed; its instance number is 1."""
+    rng = stream(seed, "terrain")
+    return Terrain(
+        instance=1,
+        half_width=scenario.half_width,
+        embankment_height=draw(rng, scenario.embankment_height),
+        undulation=draw(rng, scenario.undulation),
+        wavelength=draw(rng, scenario.wavelength),
+        batter_slope=draw(rng, scenario.batter_slope),
+        seed=_seed(rng),
+        elevation_model=scenario.elevation_model,
+    )
+
+
+def sample_environment(scenario: RoadScenario, seed: int) -> Environment:
+    """Return the light and weather of a seed."""
+    rng, limits = stream(seed, "environment"), scenario.environment
+    light = {
+        "sun_azimuth_deg": draw(rng, limits.sun_azimuth_deg),
+        "sun_elevation_deg": draw(rng, limits.sun_elevation_deg),
+        "cloud_cover": draw(rng, limits.cloud_cover),
+    }
+    wet, wetness = rng.random() < limits.wet, draw(rng, limits.wetness)
+    if rng.random() < limits.bad_weather:
+        weather = list(WEATHER)[rng.integers(len(WEATHER))]
+        light["visibility"], light["sun_strength"] = WEATHER[weather]
+    else:
+        weather = "clear"
+    return Environment(wetness=wetness if wet or weather == "rain" else 0.0, weather=weather, **light)
+
+
+def sample_materials(scenario: RoadScenario, seed: int) -> MaterialVariation:
+    """Return how the materials of a seed differ from the mean."""
+    rng = stream(seed, "materials")
+    values = {name: draw(rng, getattr(scenario.materials, name)) for name in MaterialLimits.model_fields}
+    return MaterialVariation(seed=_seed(rng), **values)
+
+
+# --- plants ----------------------------------------------------------------------------------------------------------
+
+
+def sample_vegetation(site: Site) -> Iterator[tuple[str, Vegetation]]:
+    """Yield the plants by id, species by species; their instance numbers are 1.
+
+    Grass grows everywhere beside the road. Shrubs follow behind the verge, one species after the other. Trees mix, and
+    grow where they are no obstacle that needed a barrier (RPS).
+    """
+    scenario, limits = site.scenario, site.scenario.vegetation
+    room = _room_beside(site)
+    yield from _mixed(site, "grass", limits.grasses, scenario.grass_density, limits.grass_height, 0.0)
+    yield from _belts(site, room)
+    first_tree = _first_tree(site)
+    if first_tree < room:
+        density = scenario.trees_per_hectare / 10_000.0
+        yield from _mixed(site, "tree", limits.trees, density, limits.tree_height, first_tree)
+
+
+def _room_beside(site: Site) -> float:
+    """Return the width (m) of the ground between the verge and the end of the terrain, where the road has all lanes."""
+    edges = []
+    for road in site.carriageways.values():
+        strips = (road.inner_edge_strip_width, road.outer_edge_strip_width, road.hard_shoulder_width, road.verge_width)
+        widths = (road.inner_offset, *strips, *(lane.width for lane in road.lanes))
+        edges.append(math.fsum(nominal_width(width) for width in widths))
+    return site.terrain.half_width - min(edges)
+
+
+def _first_tree(site: Site) -> float:
+    """Return the distance (m) behind the verge from which trees may stand beside either carriageway."""
+    verges = [road.verge_width for road in site.carriageways.values()]
+    narrowest = min(min(p.width for p in verge) if isinstance(verge, tuple) else verge for verge in verges)
+    return rounded(max(0.0, OBSTACLE_DISTANCE[site.design_class] - narrowest))
+
+
+def _species(rng: np.random.Generator, kind: Kind, names: tuple[str, ...]) -> list[str]:
+    """Return some of the species, in random order; reed is not the first of several."""
+    known = list(dict.fromkeys(names))
+    mixed = [known[i] for i in rng.permutation(len(known))]
+    if mixed[0] == "reed":
+        mixed[:2] = mixed[1::-1]
+    return mixed[: rng.integers(1, min(len(mixed), MOST_SPECIES[kind]) + 1)]
+
+
+def _mixed(
+    site: Site, kind: Kind, names: tuple[str, ...], density: float, heights: Interval, band_start: float
+) -> Iterator[tuple[str, Vegetation]]:
+    """Yield species that share a density (1/m2) between them, the first most of it, all from a distance (m) on."""
+    if density <= 0.0:
+        return
+    rng = site.stream(kind)
+    species = _species(rng, kind, names)
+    shares = sorted(rng.uniform(0.5, 1.5, len(species)).tolist(), reverse=True)
+    for name, part in zip(species, shares, strict=True):
+        band = (band_start, site.terrain.half_width)
+        yield _plants(rng, kind, name, rounded(density * part / math.fsum(shares)), band, heights)
+
+
+def _belts(site: Site, room: float) -> Iterator[tuple[str, Vegetation]]:
+    """Yield the shrubs, each species in a belt of its own behind that of the one before."""
+    limits, density = site.scenario.vegetation, rounded(site.scenario.shrubs_per_hectare / 10_000.0)
+    if density <= 0.0 or room <= SHRUB_DISTANCE:
+        return
+    rng = site.stream("shrub")
+    species = _species(rng, "shrub", limits.shrubs)
+    between = np.sort(rng.uniform(SHRUB_DISTANCE, room, len(species) - 1))
+    borders = [SHRUB_DISTANCE, *map(rounded, between), site.terrain.half_width]
+    for name, band in zip(species, pairwise(borders), strict=True):
+        yield _plants(rng, "shrub", name, density, band, limits.shrub_height)
+
+
+def _plants(
+    rng: np.random.Generator, kind: Kind, species: str, density: float, band: tuple[float, float], heights: Interval
+) -> tuple[str, Vegetation]:
+    low, high = sorted((draw(rng, heights), draw(rng, heights)))
+    plants = Vegetation(
+        instance=1,
+        kind=kind,
+        species=species,
+        density=density,
+        band_start=band[0],
+        band_end=band[1],
+        height_min=low,
+        height_max=high,
+        seed=_seed(rng),
+    )
+    return f"{kind}-{species}", plants
+
+
+# --- traffic ---------------------------------------------------------------------------------------------------------
+
+
+def sample_vehicles(site: Site, objects: Mapping[str, RoadObject]) -> Iterator[tuple[str, Vehicle]]:
+    """Yield the vehicles by id; their instance numbers are 1.
+
+    They are `VEHICLE_GAP` apart at the time 0 and remain so: in each lane the faster drive ahead of the slower.
+
+    Args:
+        site: the road.
+        objects: what stands on it: lanes that beacons or temporary barriers cross are closed.
+    """
+    limits = site.scenario.vehicles
+    for side, section in site.sections.items():
+        rng = site.stream("vehicles", side)
+        per_km, heavy_share = draw(rng, limits.per_km), draw(rng, limits.trucks)
+        stretches = _open_stretches(section, site.length, _closures(side, objects))
+        number = int(per_km * site.length / 1000.0 + rng.random())
+        traffic = _traffic(rng, stretches, rng.random(number) < heavy_share, limits.speed)
+        colors = iter(_pick(rng, _COLOR_SUMS, number).tolist())
+        count = 0
+        for lane, queue in groupby(traffic, key=lambda vehicle: vehicle[0]):
+            vehicles = list(queue)
+            stretch, lengths = stretches[lane].tolist(), [VEHICLE_TYPES[model].length for _, _, model in vehicles]
+            stations = _queue(rng, lengths, stretch, section.carriageway.traffic)
+            for station, (_, speed, model) in zip(stations, vehicles, strict=False):
+                count += 1
+                vehicle = Vehicle(
+                    instance=1,
+                    model=model,
+                    carriageway=f"carriageway-{side}",
+                    lane=lane,
+                    station=rounded(station),
+                    speed=speed,
+                    color=_COLORS[next(colors)],
+                )
+                yield f"vehicle-{side}-{count}", vehicle
+
+
+def _closures(side: Side, objects: Mapping[str, RoadObject]) -> Float:
+    """Return stations and distances from the centreline (N, 2) of what closes lanes of a carriageway, m."""
+    places = []
+    for item in objects.values():
+        if isinstance(item, ConstructionBeacon):
+            places.append((item.station, item.offset))
+        elif isinstance(item, TemporaryBarrier):
+            places += [(item.start_station, item.offset), (item.end_station, item.end_offset)]
+    found = np.array(places, dtype=np.float64).reshape(-1, 2) * (1.0, 1.0 if side == "left" else -1.0)
+    return found[found[:, 1] > 0.0]
+
+
+def _open_stretches(section: CarriagewaySection, length: float, closures: Float) -> Float:
+    """Return the beginning and end (lanes, 2) of the longest part of each lane that is open, from outside, m.
+
+    A lane is open where it is wide enough, and closed altogether if anything that closes lanes, or the ground between
+    two such things, is in the way of its vehicles. Beginning and end are the same where there is no open part.
+    """
+    lanes = section.carriageway.lanes
+    stretches = np.array([_wide_stretch(lane.width, length) for lane in lanes])
+    if len(closures):
+        boundaries = section.lane_boundaries(closures[:, 0])
+        centres = (boundaries[:, :-1] + boundaries[:, 1:]) / 2.0
+        low, high = closures[:, 1].min() - VEHICLE_ROOM, closures[:, 1].max() + VEHICLE_ROOM
+        stretches[((centres > low) & (centres < high)).any(axis=0)] = 0.0
+    return stretches
+
+
+def _wide_stretch(width: AnyWidth, length: float) -> tuple[float, float]:
+    """Return the beginning and end of the longest part of a lane that is wide enough to drive on, m."""
+    if not isinstance(width, tuple):
+        return 0.0, length if width >= VEHICLE_LANE_WIDTH else 0.0
+    kinks = np.unique([0.0, length, *(s for s in width_kinks(width) if 0.0 < s < length)])
+    spare = width_at(width, kinks) - VEHICLE_LANE_WIDTH
+    crossed = np.flatnonzero(spare[:-1] * spare[1:] < 0.0)
+    share = spare[crossed] / (spare[crossed] - spare[crossed + 1])
+    borders = np.unique([*kinks, *(kinks[crossed] + share * np.diff(kinks)[crossed])])
+    wide = width_at(width, (borders[:-1] + borders[1:]) / 2.0) >= VEHICLE_LANE_WIDTH
+    changes = np.flatnonzero(np.diff(np.concatenate([[False], wide, [False]]).astype(np.int8)))
+    starts, ends = borders[changes[0::2]], borders[changes[1::2]]
+    if not len(starts):
+        return 0.0, 0.0
+    longest = np.argmax(ends - starts)
+    return float(starts[longest]), float(ends[longest])
+
+
+def _traffic(
+    rng: np.random.Generator, stretches: Float, heavy: NDArray[np.bool_], limits: Interval
+) -> list[tuple[int, float, str]]:
+    """Return lane, speed (m/s) and model of vehicles, in this order sorted; none where every lane is closed.
+
+    The outer lanes have most. Heavy vehicles drive in the outermost, and of three or more in the second as well; where
+    these are closed there are none.
+    """
+    count = len(stretches)
+    sums = np.cumsum(np.arange(count, 0, -1) * (stretches[:, 1] - stretches[:, 0]))
+    outer = sums[: 2 if count > 2 else 1]
+    if sums[-1] == 0.0:
+        return []
+    if outer[-1] == 0.0:
+        heavy = np.zeros_like(heavy)
+    lanes = np.where(heavy, _pick(rng, outer, len(heavy)), _pick(rng, sums, len(heavy)))
+    models = np.where(heavy, _pick(rng, _HEAVY_SUMS, len(heavy)), _pick(rng, _LIGHT_SUMS, len(heavy)))
+    highest = np.where(heavy, min(HEAVY_SPEED, limits.maximum), limits.maximum)
+    speeds = limits.minimum + (highest - limits.minimum) * rng.random(len(heavy))
+    rows = zip(lanes.tolist(), speeds.tolist(), models.tolist(), highest.tolist(), strict=True)
+    return sorted((lane, min(rounded(speed), most), _MODELS[model]) for lane, speed, model, most in rows)
+
+
+def _pick(rng: np.random.Generator, sums: Float, number: int) -> NDArray[np.intp]:
+    """Draw so many numbers from 0 to N - 1, whose weights have the running sums (N,)."""
+    return sums.searchsorted(rng.random(number) * sums[-1], side="right")
+
+
+def _queue(rng: np.random.Generator, lengths: list[float], stretch: list[float], traffic: int) -> Iterator[float]:
+    """Yield the stations (m) of the middles of vehicles that follow each other, the hindmost first.
+
+    Between them is the least gap and their shares of what it leaves free. Those that find no room are left out.
+
+    Args:
+        lengths: of the vehicles, m.
+        stretch: stations between which they are, m.
+        traffic: 1 where they drive with the stations, -1 against them.
+    """
+    start, end = stretch
+    middles, front = [], -VEHICLE_GAP
+    for length in lengths:
+        if front + VEHICLE_GAP + length > end - start:
+            break
+        middles.append(front + VEHICLE_GAP + length / 2.0)
+        front += VEHICLE_GAP + length
+    for middle, share in zip(middles, sorted(rng.random(len(middles)).tolist()), strict=True):
+        ahead = middle + share * (end - start - front)
+        yield start + ahead if traffic > 0 else end - ahead

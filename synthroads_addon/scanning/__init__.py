@@ -1,0 +1,1 @@
+"""What a scanner does: pulses, returns, radiometry, noise, weather."""

@@ -1,0 +1,58 @@
+"""How a scan is cut into blocks of pulses, whatever is scanned."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from .devices.device import ScannerSetting
+from .patterns.pattern import shot_count, shots
+from .platforms.path import Path, Strip
+
+RAYS_PER_BLOCK = 2**18
+"""Rays of one block at most; what keeps memory bounded. Fixed, as blocks carry their own random streams."""
+SECONDS_PER_BLOCK = 3.0
+"""Seconds of one block at most: slow scanners' blocks don't reach far along the road either."""
+
+Block = tuple[Strip, int]
+"""A strip, and the number of a block in it."""
+
+
+@dataclass(frozen=True)
+class Blocks:
+    """The blocks of a scan.
+
+    Attributes:
+        setting: the scanner's.
+        path: the scanner's.
+        rays_per_pulse: rays that sample a pulse.
+    """
+
+    setting: ScannerSetting
+    path: Path
+    rays_per_pulse: int
+
+    @property
+    def size(self) -> int:
+        """Return the fixed number of pulses of a block."""
+        return max(1, min(RAYS_PER_BLOCK // self.rays_per_pulse, shot_count(self.setting, SECONDS_PER_BLOCK)))
+
+    def pulses(self, strip: Strip) -> int:
+        """Return how many pulses a strip has."""
+        return shot_count(self.setting, strip.duration)
+
+    def of(self, strip: Strip) -> range:
+        """Return the numbers of a strip's blocks."""
+        return range(-(-self.pulses(strip) // self.size))
+
+    def all(self) -> list[Block]:
+        """Return every block, in the order of time."""
+        return [(strip, block) for strip in self.path.strips for block in self.of(strip)]
+
+    def pulses_of(self, strip: Strip, block: int) -> tuple[int, int]:
+        """Return the first pulse of a block, counted within its strip, and how many it has."""
+        first = block * self.size
+        return first, min(self.size, self.pulses(strip) - first)
+
+    def time(self, strip: Strip, pulse: int) -> float:
+        """Return when a pulse of a strip leaves, s since the first strip's start."""
+        return strip.start_time + float(shots(self.setting, pulse, 1, False).time[0])

@@ -1,0 +1,1 @@
+"""Colours and material layers of points."""

@@ -1,0 +1,251 @@
+"""Colours and material layers of points: what every source of them gives, and the materials' own values."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, fields
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...materials.table import Material
+from ...scenario.colour import ColourMode
+from .light import CloudShadows, SunAndSky
+
+Float = NDArray[np.float64]
+
+MATERIAL_LAYERS: dict[str, int] = {"base_color": 3, "roughness": 1, "metallic": 1, "specular": 1}
+"""Layers of the surface itself, and their components."""
+FROM_MATERIAL, NEARBY, FROM_RETURN = 0, 254, 255
+"""`LayerValues.source` of a material's mean, of a place of the same material close by, and of a pixel per return; n in
+between is the n-th best image."""
+_FALSE_COLOUR = ("roughness", "metallic", "specular")
+
+
+@dataclass(frozen=True)
+class LayerValues:
+    """Values of N points.
+
+    Attributes:
+        arrays: by layer: ``rgb`` (N, 3) uint16 sRGB, ``base_color`` (N, 3) float32 linear, the others (N,) float32.
+        source: (N,) uint8: `FROM_MATERIAL`, `NEARBY`, `FROM_RETURN`, or the rank of the image, from 1.
+    """
+
+    arrays: dict[str, NDArray[np.generic]]
+    source: NDArray[np.uint8]
+
+
+def source_name(number: int) -> str:
+    """Return what a `LayerValues.source` is called in reports."""
+    names = {FROM_MATERIAL: "material", 1: "image", NEARBY: "nearby", FROM_RETURN: "return"}
+    return names.get(number, "next image")
+
+
+def shares_by_source(counts: NDArray[np.integer]) -> dict[str, float]:
+    """Return the share of the points that took their values from each source, by `source_name`.
+
+    Args:
+        counts: (256,) points by source.
+    """
+    total = max(1, int(counts.sum()))
+    shares: dict[str, float] = {}
+    for number in np.flatnonzero(counts):
+        name = source_name(int(number))
+        shares[name] = shares.get(name, 0.0) + int(counts[number]) / total
+    return {name: round(share, 6) for name, share in shares.items()}
+
+
+class LayerSource(Protocol):
+    """Gives points their layers.
+
+    Attributes:
+        main_thread_only: it renders, which only Blender's main thread may; else any threads, side by side.
+    """
+
+    main_thread_only: bool
+
+    @property
+    def report(self) -> dict[str, Any]:
+        """Return what was rendered, as JSON data; empty without."""
+
+    def sample(
+        self,
+        position: Float,
+        scanner: Float,
+        normal: NDArray[np.floating],
+        material: NDArray[np.uint16],
+        time: Float,
+        wanted: frozenset[str],
+    ) -> LayerValues:
+        """Return the wanted layers of N points.
+
+        Args:
+            position: (N, 3) where the surface was hit, without any error, in the scene as it was rendered: local, m.
+            scanner: (N, 3) where the pulse came from, local, m.
+            normal: (N, 3) unit normals towards the scanner.
+            material: (N,) indices into the scene mesh's materials.
+            time: (N,) s since the scan's start.
+            wanted: ``rgb`` and layers of `MATERIAL_LAYERS`; none other is computed.
+        """
+        ...
+
+
+@dataclass(frozen=True)
+class SurfaceConstants:
+    """Means of M materials, and which of their layers vary over the surface.
+
+    Attributes:
+        values: by layer of `MATERIAL_LAYERS`: (M, 3) or (M,) float32.
+        varies: by layer: (M,) bool; where False the mean is the exact value everywhere and nothing need be rendered.
+    """
+
+    values: dict[str, NDArray[np.float32]]
+    varies: dict[str, NDArray[np.bool_]]
+
+    def varying(self, wanted: frozenset[str]) -> tuple[str, ...]:
+        """Return those of the wanted layers that some material varies, in the order of `MATERIAL_LAYERS`."""
+        return tuple(name for name in MATERIAL_LAYERS if name in wanted and bool(self.varies[name].any()))
+
+
+def surface_constants(
+    rows: Sequence[Material], varies: dict[str, NDArray[np.bool_]] | None = None
+) -> SurfaceConstants:
+    """Return the constants of materials in the order of the scene mesh's; nothing varies if not said so."""
+    values = {
+        name: np.array([getattr(row, name) for row in rows], np.float32).reshape((-1, 3) if parts == 3 else (-1,))
+        for name, parts in MATERIAL_LAYERS.items()
+    }
+    none = {name: np.zeros(len(rows), bool) for name in MATERIAL_LAYERS}
+    return SurfaceConstants(values, none if varies is None else varies)
+
+
+def needed_layers(wanted: frozenset[str], mode: ColourMode) -> frozenset[str]:
+    """Return the layers of the surface that the wanted ones are computed from, in a mode of RGB."""
+    needed = wanted - {"rgb"}
+    if "rgb" in wanted:
+        needed |= set(_FALSE_COLOUR) if mode == "false_colour" else {"base_color"}
+    return frozenset(needed)
+
+
+def encode(linear: NDArray[np.floating]) -> NDArray[np.uint16]:
+    """Return linear colours as 16-bit sRGB (IEC 61966-2-1), clipped to what that can show."""
+    linear = np.clip(np.asarray(linear, np.float32), 0.0, 1.0)
+    curve = np.float32(1.055) * np.power(linear, np.float32(1 / 2.4)) - np.float32(0.055)
+    encoded = np.where(linear <= 0.0031308, np.float32(12.92) * linear, curve)
+    return np.asarray(encoded * np.float32(65535.0) + np.float32(0.5), dtype=np.uint16)
+
+
+@dataclass(frozen=True)
+class Shading:
+    """How layers and light become RGB.
+
+    Attributes:
+        mode: what RGB shows.
+        light: sun and sky, exposed.
+        clouds: shadows that drift, or None.
+    """
+
+    mode: ColourMode = "lit"
+    light: SunAndSky = field(default_factory=SunAndSky)
+    clouds: CloudShadows | None = None
+
+
+@dataclass(frozen=True)
+class Targets:
+    """Points that layers are wanted of; arrays as of `LayerSource.sample`."""
+
+    position: Float
+    scanner: Float
+    normal: NDArray[np.floating]
+    material: NDArray[np.uint16]
+    time: Float
+
+    def __len__(self) -> int:
+        return len(self.position)
+
+    def select(self, rows: NDArray[np.bool_] | NDArray[np.intp] | slice) -> Targets:
+        """Return some of the points."""
+        return Targets(*(getattr(self, f.name)[rows] for f in fields(self)))
+
+
+def joined_targets(parts: Sequence[Targets]) -> Targets:
+    """Return the points of several parts, in order; at least one part is needed."""
+    return Targets(*(np.concatenate([getattr(part, f.name) for part in parts]) for f in fields(Targets)))
+
+
+class MaterialLayers:
+    """Each material's means, under sun and sky without shadows of objects. Can be used by many threads at once."""
+
+    main_thread_only = False
+
+    def __init__(self, constants: SurfaceConstants, shading: Shading | None = None) -> None:
+        self.constants = constants
+        self.shading = shading or Shading()
+
+    @property
+    def report(self) -> dict[str, Any]:
+        """Return that nothing was rendered."""
+        return {}
+
+    def sample(
+        self,
+        position: Float,
+        scanner: Float,
+        normal: NDArray[np.floating],
+        material: NDArray[np.uint16],
+        time: Float,
+        wanted: frozenset[str],
+    ) -> LayerValues:
+        """Return the wanted layers of N points; see `LayerSource.sample`."""
+        points = Targets(position, scanner, normal, material, time)
+        return self.completed(points, {}, np.full(len(points), FROM_MATERIAL, np.uint8), wanted)
+
+    def completed(
+        self,
+        points: Targets,
+        channels: dict[str, NDArray[np.float32]],
+        source: NDArray[np.uint8],
+        wanted: frozenset[str],
+    ) -> LayerValues:
+        """Return the wanted layers: rendered ones where there are any and the material varies, else the means.
+
+        Args:
+            points: N points; their times are those at which they were seen.
+            channels: rendered layers (N, C) by name, and ``sun`` and ``sky``, the exposed light of each that the
+                surfaces reflect. Rows of points that nothing was rendered for aren't read.
+            source: (N,) of `LayerValues`.
+            wanted: layers.
+        """
+        found = source != FROM_MATERIAL
+        layers: dict[str, NDArray[np.float32]] = {}
+        for name in sorted(needed_layers(wanted, self.shading.mode)):
+            layers[name] = self.constants.values[name][points.material]
+            if name in channels:
+                use = found & self.constants.varies[name][points.material]
+                layers[name][use] = channels[name][use].reshape(layers[name][use].shape)
+        arrays: dict[str, NDArray[np.generic]] = {name: layers[name] for name in layers.keys() & wanted}
+        if "rgb" in wanted:
+            arrays["rgb"] = self._rgb(points, layers, channels, found)
+        return LayerValues(arrays, source)
+
+    def _rgb(
+        self,
+        points: Targets,
+        layers: dict[str, NDArray[np.float32]],
+        channels: dict[str, NDArray[np.float32]],
+        found: NDArray[np.bool_],
+    ) -> NDArray[np.uint16]:
+        if self.shading.mode == "false_colour":
+            return encode(np.stack([layers[name] for name in _FALSE_COLOUR], axis=1))
+        color = layers["base_color"]
+        if self.shading.mode == "unlit":
+            return encode(color)
+        sun, sky = color * self.shading.light.sunlight(points.normal), color * self.shading.light.sky(points.normal)
+        if "sun" in channels:
+            sun[found] = channels["sun"][found]
+        if "sky" in channels:
+            sky[found] = channels["sky"][found]
+        if self.shading.clouds is not None:
+            sun *= self.shading.clouds.transmission(points.position, points.time)[:, None]
+        return encode(sun + sky)

@@ -1,0 +1,236 @@
+"""Points take their layers from images: the image that fits best, the occlusion test, and the sampling."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .colour import FROM_MATERIAL, NEARBY, LayerValues, MaterialLayers, Targets
+from .nearby import REACH, light_nearby, sample_nearby
+from .views import RenderedImage, View
+
+Float = NDArray[np.float64]
+
+CANDIDATES = 8
+"""Images nearest to the scanner that a point can take its values from; all of three places where that is more."""
+TRIES = 3
+"""Of these, how many of the best are looked into."""
+ALL_CANDIDATES = 24
+"""As `CANDIDATES`, of the points that none of the best shows; of these images all are looked into."""
+DISTANCE_WEIGHT = 0.25
+"""What twice the scanner's range counts for in the choice of an image, rad: ln 2 times this."""
+TOLERANCE = 0.03
+"""Depth that a surface may differ by from the plane through the point, m, beside half a pixel's own width."""
+_STEEPEST = 0.02
+"""Cosine under which a surface is seen too flat to be sampled."""
+_LEAST_WEIGHT = 0.05
+"""Share of the four pixels around a point that must show its surface."""
+_NOWHERE = np.float32(1e9)
+
+
+class ImageLayers:
+    """Layers from images along the path, else from the materials. Can be used by many threads at once.
+
+    A point takes the image whose ray differs least from the scanner's: the angle between both, plus `DISTANCE_WEIGHT`
+    times the logarithm of how much farther away the camera is. Where the point is hidden there, the next best, and
+    so on, through all images around. What none of them shows takes a place of its material close by, see
+    `colour_nearby`; in the end the material's means. Of the four pixels around the point's projection those count that
+    show the same material at the depth of the plane through the point, so that neither what stands before it nor what
+    lies behind an edge mixes in, and grazing views stay usable.
+    """
+
+    main_thread_only = False
+
+    def __init__(self, images: Sequence[RenderedImage], channels: dict[str, int], material: MaterialLayers) -> None:
+        """Take images with these channels (name and components, in order), and what to take where none shows a point.
+
+        The channels are those of `MATERIAL_LAYERS` that vary, and ``sun`` and ``sky``: the light of each that the
+        surface reflects, exposed.
+        """
+        self.images = list(images)
+        self.material = material
+        self.report: dict[str, Any] = {}
+        starts = np.cumsum([0, *channels.values()])
+        self.channels = {
+            name: slice(int(a), int(b)) for name, a, b in zip(channels, starts[:-1], starts[1:], strict=True)
+        }
+        self._locate()
+
+    def _locate(self) -> None:
+        """Note where the images were taken."""
+        self._places = np.array([image.view.position for image in self.images]).reshape(-1, 3)
+        places, count = np.unique(self._places, axis=0, return_counts=True)
+        most = int(count.max(initial=0))
+        self._candidates, self._all = max(CANDIDATES, 3 * most), max(ALL_CANDIDATES, 9 * most)
+        # Points whose scanner stood within one such cube share their candidates.
+        apart = np.linalg.norm(np.diff(places, axis=0), axis=1) if len(places) > 1 else np.ones(1)
+        self._cell = max(float(np.median(apart)) / 2.0, 0.5)
+
+    def sample(
+        self,
+        position: Float,
+        scanner: Float,
+        normal: NDArray[np.floating],
+        material: NDArray[np.uint16],
+        time: Float,
+        wanted: frozenset[str],
+    ) -> LayerValues:
+        """Return the wanted layers of N points; see `LayerSource.sample`."""
+        points = Targets(position, scanner, normal, material, np.array(time, np.float64))
+        source = np.full(len(points), FROM_MATERIAL, np.uint8)
+        taken = np.zeros((len(points), sum(part.stop - part.start for part in self.channels.values())), np.float32)
+        if len(points) and self.images:
+            self._take_all(points, taken, source)
+        return self.material.completed(
+            points, {name: taken[:, part] for name, part in self.channels.items()}, source, wanted
+        )
+
+    def _take_all(self, points: Targets, taken: NDArray[np.float32], source: NDArray[np.uint8]) -> None:
+        """Fill in values, sources, and times of the points that an image shows."""
+        cube = np.floor(points.scanner / self._cell).astype(np.int64)
+        if (cube == cube[0]).all():
+            self._take(points, taken, source)
+            return
+        _, group = np.unique(cube @ np.array([1, 1 << 20, 1 << 40]), return_inverse=True)
+        order = np.argsort(group, kind="stable")
+        for rows in np.split(order, np.flatnonzero(np.diff(group[order])) + 1):
+            part, values, own = points.select(rows), taken[rows], source[rows]
+            self._take(part, values, own)
+            taken[rows], source[rows], points.time[rows] = values, own, part.time
+
+    def _take(self, points: Targets, taken: NDArray[np.float32], source: NDArray[np.uint8]) -> None:
+        """Do so for points that the scanner saw from about one place."""
+        chosen, misfit = self._misfits(points, self._candidates)
+        order = np.argsort(misfit, axis=0, kind="stable")[:TRIES]
+        best = np.where(np.take_along_axis(misfit, order, axis=0) >= _NOWHERE, -1, order)
+        for rank in range(best.shape[0]):
+            left = np.flatnonzero((source == FROM_MATERIAL) & (best[rank] >= 0))
+            slots = best[rank, left]
+            for slot in np.unique(slots):
+                rows = left[slots == slot]
+                image = self.images[chosen[slot]]
+                values, shown = sample_image(image, points.position[rows], points.normal[rows], points.material[rows])
+                rows = rows[shown]
+                taken[rows], source[rows], points.time[rows] = values, rank + 1, image.view.time
+        hidden = np.flatnonzero(source == FROM_MATERIAL)
+        if len(hidden):
+            few, values, own = points.select(hidden), taken[hidden], source[hidden]
+            self._take_hidden(few, values, own)
+            taken[hidden], source[hidden], points.time[hidden] = values, own, few.time
+
+    def _take_hidden(self, points: Targets, taken: NDArray[np.float32], source: NDArray[np.uint8]) -> None:
+        """Fill in what any image around shows of points that the best ones don't, and then what it shows close by.
+
+        These are few: it is quicker to look at all of them in image by image than to go by their own order.
+        """
+        chosen, misfit = self._misfits(points, self._all)
+        shows = (misfit < _NOWHERE).any(axis=1)
+        chosen, misfit = chosen[shows], misfit[shows]
+        rank = np.argsort(np.argsort(misfit, axis=0, kind="stable"), axis=0)
+        least = np.full(len(points), _NOWHERE)
+        for slot, number in enumerate(chosen):
+            rows = np.flatnonzero(misfit[slot] < least)
+            image = self.images[number]
+            values, shown = sample_image(image, points.position[rows], points.normal[rows], points.material[rows])
+            rows = rows[shown]
+            taken[rows], points.time[rows], least[rows] = values, image.view.time, misfit[slot, rows]
+            source[rows] = rank[slot, rows] + 1
+        away = np.where(source == FROM_MATERIAL, REACH, 0.0)
+        for slot, number in enumerate(chosen):
+            rows = np.flatnonzero((away > 0.0) & (misfit[slot] < _NOWHERE))
+            image = self.images[number]
+            values, closer, distance = sample_nearby(image, points.position[rows], points.material[rows], away[rows])
+            rows = rows[closer]
+            taken[rows], points.time[rows], source[rows], away[rows] = values, image.view.time, NEARBY, distance
+        near = np.flatnonzero(source == NEARBY)
+        taken[near] = light_nearby(self.material, points.select(near), taken[near], self.channels)
+
+    def _misfits(self, points: Targets, candidates: int) -> tuple[NDArray[np.intp], NDArray[np.float32]]:
+        """Return the images (C,) nearest to the scanner and how badly they suit each point (C, N)."""
+        away = np.linalg.norm(self._places - points.scanner.mean(axis=0), axis=1)
+        chosen = np.argsort(away, kind="stable")[:candidates]
+        middle = points.position.mean(axis=0)
+        at = (points.position - middle).astype(np.float32)
+        scanned = (points.scanner - points.position).astype(np.float32)
+        reach = np.maximum(_length(scanned), np.float32(1e-6))
+        normal = np.asarray(points.normal, np.float32)
+        misfit = np.empty((len(chosen), len(points)), np.float32)
+        for row, number in enumerate(chosen):
+            misfit[row] = _misfit(self.images[number].view, at, middle, scanned, reach, normal)
+        return chosen, misfit
+
+
+def _misfit(
+    view: View,
+    at: NDArray[np.float32],
+    middle: Float,
+    scanned: NDArray[np.float32],
+    reach: NDArray[np.float32],
+    normal: NDArray[np.float32],
+) -> NDArray[np.float32]:
+    """Return how badly (N,) an image suits points; `_NOWHERE` where it doesn't show them."""
+    towards = (view.position - middle).astype(np.float32) - at
+    away = np.maximum(_length(towards), np.float32(1e-6))
+    cosine = np.einsum("nk,nk->n", towards, scanned) / (away * reach)
+    misfit = np.arccos(np.clip(cosine, -1.0, 1.0)) + DISTANCE_WEIGHT * np.abs(np.log(away / reach))
+    right, up, back = (-towards @ view.rotation.astype(np.float32)).T
+    scale = view.focal / np.maximum(-back, np.float32(1e-6))
+    x, y = view.centre[0] + right * scale, view.centre[1] - up * scale
+    inside = (back < 0.0) & (x > 0.0) & (x < view.size[0]) & (y > 0.0) & (y < view.size[1])
+    inside &= np.einsum("nk,nk->n", towards, normal) > _STEEPEST * away
+    return np.where(inside, misfit, _NOWHERE)
+
+
+def sample_image(
+    image: RenderedImage, position: Float, normal: NDArray[np.floating], material: NDArray[np.uint16]
+) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
+    """Return an image's layers (n, C) of those n points (N, 3) that it shows, and which those are (N,).
+
+    Bilinear over the pixels around a point that show its surface: the same material, at the depth of the plane
+    through the point within `TOLERANCE` and half a pixel's width there.
+    """
+    view = image.view
+    x, y, depth = view.project(position)
+    column, row = np.floor(x - 0.5), np.floor(y - 0.5)
+    plane = _plane(view, position, normal)
+    slack = TOLERANCE + 0.5 * depth / view.focal
+    width, height = view.size
+    values = np.zeros((len(position), image.layers.shape[2]), np.float32)
+    total = np.zeros(len(position), np.float32)
+    for dy in (0, 1):
+        for dx in (0, 1):
+            i, j = column + dx, row + dy
+            weight = (1.0 - np.abs(x - 0.5 - i)) * (1.0 - np.abs(y - 0.5 - j))
+            good = (i >= 0) & (i < width) & (j >= 0) & (j < height)
+            i, j = np.where(good, i, 0).astype(np.intp), np.where(good, j, 0).astype(np.intp)
+            # Where the plane stands edge-on its depth has no meaning, and no pixel agrees with it.
+            with np.errstate(divide="ignore", invalid="ignore"):
+                expected = plane(i, j)
+                good &= image.material[j, i] == material + 1
+                good &= np.abs(image.depth[j, i] - expected) < slack
+            part = np.where(good, weight, 0.0).astype(np.float32)
+            values += part[:, None] * image.layers[j, i]
+            total += part
+    shown = total >= _LEAST_WEIGHT
+    return values[shown] / total[shown, None], shown
+
+
+def _plane(
+    view: View, position: Float, normal: NDArray[np.floating]
+) -> Callable[[NDArray[np.intp], NDArray[np.intp]], Float]:
+    """Return the function that gives the depths (N,) at which pixels' rays meet the planes through the points."""
+    own = np.asarray(normal, np.float64) @ view.rotation
+    constant = np.einsum("nk,nk->n", own, (position - view.position) @ view.rotation)
+
+    def depths(i: NDArray[np.intp], j: NDArray[np.intp]) -> Float:
+        right, up = (i + 0.5 - view.centre[0]) / view.focal, (view.centre[1] - j - 0.5) / view.focal
+        return np.asarray(constant / (own[:, 0] * right + own[:, 1] * up - own[:, 2]))
+
+    return depths
+
+
+def _length(vectors: NDArray[np.float32]) -> NDArray[np.float32]:
+    return np.sqrt(np.einsum("nk,nk->n", vectors, vectors))

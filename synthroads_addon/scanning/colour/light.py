@@ -1,0 +1,136 @@
+"""Light on the scene as the points' colours need it: sun, open sky, and the drifting shadows of clouds."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ...base.random_streams import stream
+from ...road.surroundings import Environment
+
+Float = NDArray[np.float64]
+
+SUN = np.array([0.35, -0.45, 0.82]) / np.linalg.norm([0.35, -0.45, 0.82])
+"""Direction of a usual sun, where no environment says another."""
+WHITE = 0.9
+"""Exposure: linear value of a white matt horizontal surface in the sun."""
+GROUND_ALBEDO = 0.2
+"""Share of the light that the ground throws back at what faces down."""
+SHADE = 0.15
+"""Share of the direct sun below a cloud."""
+_CELLS = 256
+_CELL = 1.0 / 8.0
+"""Cells of the periodic field of clouds, and their width as a share of a cloud."""
+_OCTAVES = ((8, 1.0), (4, 0.45), (2, 0.2))
+"""Cells per feature and its weight, from the clouds' own size down."""
+_PENUMBRA = 0.04
+"""Half the width of a shadow's edge, as a share of the field's range: some 10 m of a cloud of 120 m."""
+
+
+def sun_direction(environment: Environment) -> Float:
+    """Return the unit vector (3,) towards the sun; x east, y north, z up."""
+    azimuth, elevation = np.deg2rad([environment.sun_azimuth_deg, environment.sun_elevation_deg])
+    return np.array([np.cos(elevation) * np.sin(azimuth), np.cos(elevation) * np.cos(azimuth), np.sin(elevation)])
+
+
+@dataclass(frozen=True)
+class SunAndSky:
+    """Light that a white matt surface reflects, exposed so that `WHITE` is a horizontal one's value in the sun.
+
+    Attributes:
+        direction: (3,) unit vector towards the sun.
+        sun: (3,) of a surface that faces the sun.
+        above: (3,) of a surface that faces the open sky straight up.
+        below: (3,) of a surface that faces the ground straight down.
+    """
+
+    direction: Float = field(default_factory=SUN.copy)
+    sun: Float = field(default_factory=lambda: np.full(3, 0.55))
+    above: Float = field(default_factory=lambda: np.full(3, 0.45))
+    below: Float = field(default_factory=lambda: np.full(3, 0.45))
+
+    def sunlight(self, normal: NDArray[np.floating]) -> NDArray[np.float32]:
+        """Return (N, 3) light of the sun on white matt surfaces with these unit normals (N, 3), unshadowed."""
+        cosine = np.clip(np.asarray(normal, np.float32) @ self.direction.astype(np.float32), 0.0, None)
+        return np.asarray(cosine[:, None] * self.sun.astype(np.float32))
+
+    def sky(self, normal: NDArray[np.floating]) -> NDArray[np.float32]:
+        """Return (N, 3) light of an unobstructed sky, and of the ground below it, on white matt surfaces.
+
+        A surface sees a share (1 + n_z) / 2 of an even sky.
+        """
+        share = ((1.0 + np.asarray(normal, np.float32)[:, 2]) / 2.0)[:, None]
+        return share * self.above.astype(np.float32) + (1.0 - share) * self.below.astype(np.float32)
+
+
+def exposed(direction: Float, sun: Float, sky: Float) -> tuple[SunAndSky, float]:
+    """Return sun and sky as a camera sees them that is set for a horizontal surface in the sun, and its exposure.
+
+    Args:
+        direction: (3,) unit vector towards the sun.
+        sun: (3,) radiance of a white matt surface that faces the sun.
+        sky: (3,) radiance of one that faces straight up, from the sky alone.
+    """
+    horizontal = sun * max(float(direction[2]), 0.0) + sky
+    exposure = WHITE / max(float(horizontal.mean()), 1e-9)
+    below = GROUND_ALBEDO * horizontal
+    return SunAndSky(direction, sun * exposure, sky * exposure, below * exposure), exposure
+
+
+class CloudShadows:
+    """Shadows of clouds on the ground: a periodic field that drifts with the wind.
+
+    A cloud's shadow is soft-edged and leaves `SHADE` of the direct sun; its share of the ground is the
+    environment's cloud cover.
+    """
+
+    def __init__(self, environment: Environment, seed: int, frame: ArrayLike = (0.0, 0.0, 0.0)) -> None:
+        """Take where (3,) the local frame begins, m: that of a section of a road in the whole road's."""
+        self.environment = environment
+        self._frame = np.asarray(frame, dtype=np.float64)
+        self._cell = environment.cloud_size * _CELL
+        heading = np.deg2rad(environment.cloud_direction_deg)
+        self.drift: Float = environment.cloud_speed * np.array([np.sin(heading), np.cos(heading)])
+        sun = sun_direction(environment)
+        # At sunset shadows would be infinitely long.
+        self._slope = sun[:2] / max(float(sun[2]), 0.05)
+        self._field = _cloud_field(environment.cloud_cover, seed)
+
+    def transmission(self, position: Float, time: ArrayLike) -> NDArray[np.float32]:
+        """Return the share (N,) of the direct sun at local positions (N, 3), m, and times (N,) or one time, s."""
+        position = position + self._frame
+        plan = position[:, :2] - position[:, 2:3] * self._slope
+        plan = plan - np.asarray(time, np.float64).reshape(-1, 1) * self.drift
+        scaled = plan / self._cell
+        low = np.floor(scaled).astype(np.int64)
+        u, v = (scaled - low).T.astype(np.float32)
+        i, j = (low % _CELLS).T
+        k, m = (i + 1) % _CELLS, (j + 1) % _CELLS
+        f = self._field
+        return np.asarray((1 - v) * ((1 - u) * f[i, j] + u * f[k, j]) + v * ((1 - u) * f[i, m] + u * f[k, m]))
+
+
+def _cloud_field(cover: float, seed: int) -> NDArray[np.float32]:
+    """Return the transmission of the direct sun on a periodic lattice (C, C)."""
+    random = stream(seed, "cloud shadows")
+    total = np.zeros((_CELLS, _CELLS))
+    for cells, weight in _OCTAVES:
+        coarse = random.normal(size=(_CELLS // cells,) * 2)
+        total += weight * _smooth(_smooth(coarse, cells).T, cells).T
+    rank = np.argsort(np.argsort(total, axis=None)).reshape(total.shape) / total.size
+    # The densest share of the field is cloud: ranks are even, so the cover is met exactly.
+    edge = np.clip((rank - (1.0 - cover)) / (2.0 * _PENUMBRA) + 0.5, 0.0, 1.0)
+    if cover in (0.0, 1.0):
+        edge = np.full(total.shape, cover)
+    return np.asarray(1.0 - (1.0 - SHADE) * edge, np.float32)
+
+
+def _smooth(values: Float, cells: int) -> Float:
+    """Return a periodic field's rows (n, m), each interpolated at `cells` places by a cubic step: (n * cells, m)."""
+    t = (np.arange(cells) / cells)[:, None]
+    step = t * t * (3.0 - 2.0 * t)
+    following = np.roll(values, -1, axis=0)
+    blended = values[:, None, :] * (1.0 - step) + following[:, None, :] * step
+    return np.asarray(blended.reshape(-1, values.shape[1]))

@@ -1,0 +1,258 @@
+"""Calibrated pinhole cameras along the path: where they stand, what they see, and where points lie in their images."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...scenario.colour import ColourSettings
+from ..scene.mesh import SceneMesh
+
+Float = NDArray[np.float64]
+
+OVERLAP = 1.3
+"""Length that an image covers as a multiple of the image spacing: what stands up is seen from aside."""
+_STEEPEST = np.tan(np.deg2rad(62.0))
+"""Tangent of the largest angle off the axis that a camera facing down sees."""
+_HIGH = 20.0
+"""Platforms that are higher above the ground than this look down; others look around, m."""
+_BESIDE = 3.0
+"""How far beyond an image's limit along the path the scene counts for its width."""
+_SAMPLE = 40_000
+"""Vertices, and as many places on faces, that the images are cut out by."""
+_NADIR = np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+"""Camera's axes (right, up, backwards) as columns in a level frame that looks forward (x), left (y) and up (z)."""
+
+
+class Poses(Protocol):
+    """What is needed of a scanner's path: strips with ``start_time`` and ``duration``, and poses."""
+
+    @property
+    def strips(self) -> tuple[Any, ...]:
+        """Passes of the platform."""
+        ...
+
+    @property
+    def typical_range(self) -> float:
+        """Usual range, m."""
+        ...
+
+    def pose(self, strip: Any, time: Float) -> tuple[Float, Float]:
+        """Return positions (K, 3) and rotations (K, 3, 3) at times (K,) since the first strip's start."""
+        ...
+
+
+@dataclass(frozen=True)
+class View:
+    """A pinhole camera without distortion.
+
+    Attributes:
+        position: (3,) of the projection centre, local, m.
+        rotation: (3, 3) columns: the camera's right, up and backwards in the local frame.
+        focal: focal length, px.
+        centre: (2,) principal point, px from the left and from the top.
+        size: width and height, px.
+        time: when it sees the scene, s since the scan's start.
+    """
+
+    position: Float
+    rotation: Float
+    focal: float
+    centre: tuple[float, float]
+    size: tuple[int, int]
+    time: float
+
+    def project(self, points: Float) -> tuple[Float, Float, Float]:
+        """Return columns x, rows y (px; the first pixel's middle is 0.5) and depths (m) of points (N, 3).
+
+        Depth is measured along the axis; points behind the camera have none above 0, and columns and rows that mean
+        nothing.
+        """
+        right, up, back = ((points - self.position) @ self.rotation).T
+        depth = -back
+        with np.errstate(divide="ignore", invalid="ignore"):
+            scale = self.focal / depth
+            return self.centre[0] + right * scale, self.centre[1] - up * scale, depth
+
+    def place(self, column: NDArray[np.integer], row: NDArray[np.integer], depth: NDArray[np.floating]) -> Float:
+        """Return the places (..., 3) that the middles of pixels (...) show at depths (...) along the axis, m."""
+        right, up = (column + 0.5 - self.centre[0]) / self.focal, (self.centre[1] - row - 0.5) / self.focal
+        ray = np.stack([right, up, -np.ones_like(right)], axis=-1) @ self.rotation.T
+        return np.asarray(self.position + depth.astype(np.float64)[..., None] * ray)
+
+    def around(self, points: Float, margin: int) -> View | None:
+        """Return the part of the image that shows points (N, 3), with a margin, px; None if it shows none of them."""
+        x, y, depth = self.project(points)
+        shown = (depth > 0.0) & (x >= 0.0) & (x <= self.size[0]) & (y >= 0.0) & (y <= self.size[1])
+        if not shown.any():
+            return None
+        left, top = (max(0, int(values[shown].min()) - margin) for values in (x, y))
+        right, bottom = (
+            min(size, int(values[shown].max()) + 1 + margin) for values, size in zip((x, y), self.size, strict=True)
+        )
+        centre = (self.centre[0] - left, self.centre[1] - top)
+        return View(self.position, self.rotation, self.focal, centre, (right - left, bottom - top), self.time)
+
+    @property
+    def pixels(self) -> int:
+        """Return the number of pixels."""
+        return self.size[0] * self.size[1]
+
+
+@dataclass(frozen=True)
+class RenderedImage:
+    """One camera's image, rows from the top.
+
+    Attributes:
+        view: the camera.
+        layers: (H, W, C) float16 in the order of `ImageLayers.channels`.
+        depth: (H, W) float32 along the axis, m.
+        material: (H, W) uint16: index in the scene mesh's materials plus 1; 0 where there is nothing.
+    """
+
+    view: View
+    layers: NDArray[np.float16]
+    depth: NDArray[np.float32]
+    material: NDArray[np.uint16]
+
+
+def views_along(
+    path: Poses, points: Float, settings: ColourSettings, field_of_view: float, largest: int
+) -> list[View]:
+    """Return the cameras along a path, each cut to what it can see of the scene.
+
+    High platforms look straight down, with images as wide as the swath. Others look around: ahead, back, to both
+    sides, up and down, at right angles.
+
+    Args:
+        path: the scanner's.
+        points: (N, 3) places on the scene's surfaces, local, m; see `scene_sample`.
+        settings: spacing and resolution of the images.
+        field_of_view: of the scanner, all of it, rad.
+        largest: largest side of an image, px.
+    """
+    if not len(points):
+        return []
+    views: list[View] = []
+    for strip in path.strips:
+        times = _times(path, strip, settings.image_spacing)
+        position, heading = _level(path, strip, times)
+        for place, forward, time in zip(position, heading, times, strict=True):
+            level = np.array([[*forward, 0.0], [-forward[1], forward[0], 0.0], [0.0, 0.0, 1.0]]).T
+            views += _at(place, level, float(time), points, path.typical_range, settings, field_of_view, largest)
+    return views
+
+
+def scene_sample(mesh: SceneMesh) -> Float:
+    """Return places (N, 3) that a mesh extends over: some of its vertices, and others spread evenly over its faces."""
+    if not len(mesh):
+        return np.empty((0, 3))
+    used = mesh.vertices[:: max(1, len(mesh.vertices) // _SAMPLE)]
+    reached = np.cumsum(mesh.areas())
+    number = np.arange(_SAMPLE)
+    face = np.minimum(np.searchsorted(reached, (number + 0.5) / _SAMPLE * reached[-1]), len(mesh) - 1)
+    # Even over a triangle: two shares that fill the square evenly, folded at its diagonal.
+    a, b = (number * 0.7548776662466927) % 1.0, (number * 0.5698402909980532) % 1.0
+    a, b = np.where(a + b > 1.0, [1.0 - a, 1.0 - b], [a, b])
+    corner = mesh.vertices[mesh.triangles[face]].astype(np.float64)
+    inside = corner[:, 0] + a[:, None] * (corner[:, 1] - corner[:, 0]) + b[:, None] * (corner[:, 2] - corner[:, 0])
+    return np.concatenate([used.astype(np.float64), inside])
+
+
+def _times(path: Poses, strip: Any, spacing: float) -> Float:
+    """Return the times of a strip's images: evenly spaced, each in the middle of its share of the way."""
+    knots = strip.start_time + np.linspace(0.0, strip.duration, 257)
+    position, _ = path.pose(strip, knots)
+    way = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(position, axis=0), axis=1))])
+    if way[-1] < spacing / 100.0:
+        return np.array([strip.start_time + strip.duration / 2.0])
+    count = max(1, int(np.ceil(way[-1] / spacing - 1e-9)))
+    return np.interp((np.arange(count) + 0.5) / count * way[-1], way, knots)
+
+
+def _level(path: Poses, strip: Any, times: Float) -> tuple[Float, Float]:
+    """Return positions (K, 3) and the horizontal directions (K, 2) of travel; of the scanner's axis where it stands."""
+    position, rotation = path.pose(strip, times)
+    step = min(0.05, strip.duration / 4.0)
+    low, high = strip.start_time, strip.start_time + strip.duration
+    before, _ = path.pose(strip, np.clip(times - step, low, high))
+    after, _ = path.pose(strip, np.clip(times + step, low, high))
+    travel = (after - before)[:, :2]
+    still = np.linalg.norm(travel, axis=1) < 1e-6
+    travel[still] = rotation[still, :2, 0]
+    length = np.linalg.norm(travel, axis=1, keepdims=True)
+    return position, np.where(length > 1e-9, travel / np.maximum(length, 1e-9), [1.0, 0.0])
+
+
+def _at(
+    place: Float,
+    level: Float,
+    time: float,
+    points: Float,
+    typical_range: float,
+    settings: ColourSettings,
+    field_of_view: float,
+    largest: int,
+) -> list[View]:
+    """Return the cameras at one place."""
+    near = points - place
+    ahead, height = near @ level[:, 0], -near[:, 2]
+    below = height[np.abs(ahead) < settings.image_spacing]
+    ground = float(np.median(below)) if len(below) else typical_range
+    if ground < _HIGH:
+        focal = max(8.0, typical_range / settings.ground_sampling_distance)
+        around = (_cut(place, level @ axes, focal, time, points, (1.0, 1.0), largest) for axes in _AROUND)
+        return [view for view in around if view is not None]
+    focal = ground / settings.ground_sampling_distance
+    aside = min(_STEEPEST, np.tan(min(field_of_view / 2.0, 1.5)) * 1.05)
+    along = min(_STEEPEST, OVERLAP * settings.image_spacing / 2.0 / ground)
+    view = _cut(place, level @ _NADIR, focal, time, points, (aside, along), largest)
+    return [] if view is None else [view]
+
+
+def _around() -> Iterable[Float]:
+    """Yield the axes of cameras that look ahead, left, back, right, up and down, in a level frame."""
+    ahead = np.array([[0.0, 0.0, -1.0], [-1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
+    for quarter in range(4):
+        cos, sin = ((1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0))[quarter]
+        yield np.array([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]]) @ ahead
+    yield np.array([[0.0, -1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, -1.0]])
+    yield _NADIR
+
+
+_AROUND: Sequence[Float] = tuple(_around())
+
+
+def _cut(
+    place: Float,
+    rotation: Float,
+    focal: float,
+    time: float,
+    points: Float,
+    limits: tuple[float, float],
+    largest: int,
+) -> View | None:
+    """Return a camera whose image holds the scene within its limits (tangents aside and along), or None if empty."""
+    right, up, back = ((points - place) @ rotation).T
+    near = (back < -0.1) & (np.abs(up) <= -_BESIDE * limits[1] * back)
+    if not near.any():
+        return None
+    x, y = right[near] / -back[near], up[near] / -back[near]
+    left, aside = _within(x, limits[0])
+    bottom, top = _within(y, limits[1])
+    if aside <= left or top <= bottom:
+        return None
+    focal = min(focal, largest / max(aside - left, top - bottom))
+    size = (int(np.ceil((aside - left) * focal)), int(np.ceil((top - bottom) * focal)))
+    return View(place, rotation, focal, (float(-left * focal), float(top * focal)), size, time)
+
+
+def _within(values: Float, limit: float) -> tuple[float, float]:
+    """Return the range of values with a margin around it, since they are a sample, within the limits."""
+    low, high = float(values.min()), float(values.max())
+    spare = 0.02 * (1.0 + high - low)
+    return max(low - spare, -limit), min(high + spare, limit)

@@ -1,0 +1,298 @@
+"""Laser scanners: what a device can do, read from its preset, and the one setting that a scan uses."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Literal
+
+from pydantic import Field, model_validator
+
+from ...base.errors import InputError, nearest_name
+from ...base.files import PRESETS
+from ...base.schema import Model, quantity, read_json
+from ...scenario.scan import ScanScenario
+from .pattern_models import PatternModel
+
+DEVICES = PRESETS / "devices"
+SPEED_OF_LIGHT = 299_792_458.0
+
+BRIGHTEST = 1000.0
+"""Largest effective reflectance looked for: of retro-reflective sheeting at a right angle (a white target: 1)."""
+
+_Divergence = Annotated[float, Field(strict=True, ge=0, le=100)]
+_Lines = Annotated[float, Field(strict=True, gt=0, le=10_000)]
+
+
+class PulseMode(Model):
+    """A pulse repetition rate and what goes with it.
+
+    The pulse rate counts every pulse of one head: a rotating head's beams together. Each head of a device with
+    several fires at this rate, so that a scan has heads x pulse rate pulses per second.
+    """
+
+    pulse_rate_khz: float = quantity(gt=0, le=5000, unit="kHz", description="Pulse repetition rate of each head.")
+    field_of_view_deg: float = quantity(gt=0, le=360, unit="deg", description="Largest field of view.")
+    maximum_range: float = quantity(gt=0, le=20_000, unit="m", description="Farthest a 20 % target is detected.")
+
+
+class Head(Model):
+    """How one of several equal scanning heads sits on the device: roll (left side up), pitch (nose up), then yaw."""
+
+    roll_deg: float = quantity(0.0, ge=-180, le=180, unit="deg", description="About the forward axis.")
+    pitch_deg: float = quantity(0.0, ge=-90, le=90, unit="deg", description="Nose up.")
+    yaw_deg: float = quantity(0.0, ge=-180, le=180, unit="deg", description="Counter-clockwise from above.")
+
+
+class Device(Model):
+    """A laser scanner, from its data sheet."""
+
+    type: Literal["Device"] = "Device"
+    version: Literal["1.0"] = "1.0"
+    title: str = Field(description="Maker and model.")
+    source: str = Field(description="Where the numbers come from, and which of them are assumptions.")
+    pattern: PatternModel = Field(description="How the beam is deflected.")
+    heads: tuple[Head, ...] = Field(
+        (Head(),), min_length=1, max_length=16, description="Scanning heads; they fire in turn."
+    )
+    wavelength_nm: float = quantity(ge=300, le=2500, unit="nm", description="Wavelength.")
+    divergence_mrad: tuple[_Divergence, _Divergence] = Field(
+        description="Full angle of the beam at 1/e^2 of its peak: in the scan plane, and across it.",
+        json_schema_extra={"unit": "mrad"},
+    )
+    pulse_length_ns: float = quantity(gt=0, le=100, unit="ns", description="Pulse length (full width, half height).")
+    maximum_returns: int = quantity(ge=1, le=15, unit="1", description="Most returns recorded of one pulse.")
+    minimum_range: float = quantity(ge=0, unit="m", description="Nothing nearer is recorded.")
+    range_sigma: float = quantity(ge=0, le=1, unit="m", description="Precision of the range (one sigma).")
+    dynamic_range_db: float = quantity(
+        45.0,
+        gt=0,
+        le=150,
+        unit="dB",
+        description="Ratio of the optical power that saturates the receiver to the weakest detected; 45 is assumed.",
+    )
+    pulses_in_air: int = quantity(
+        1, ge=1, le=100, unit="1", description="Pulses of a beam that may be under way without being confused."
+    )
+    lines_per_second: tuple[_Lines, _Lines] = Field(
+        description="Slowest and fastest scan.", json_schema_extra={"unit": "1/s"}
+    )
+    finest_angle_deg: float = quantity(gt=0, le=10, unit="deg", description="Smallest angle between two pulses.")
+    modes: tuple[PulseMode, ...] = Field(
+        min_length=1, description="Pulse rates that can be chosen; the first is the default."
+    )
+
+    @property
+    def channels(self) -> int:
+        """Return the number of beams of all heads."""
+        return len(self.heads) * self.pattern.beams
+
+    def unambiguous_range(self, pulse_rate: float) -> float:
+        """Return the range (m) beyond which a return is taken for a later pulse's, at a head's pulse rate in 1/s.
+
+        c / 2 x the time between two pulses of the same beam x the pulses that may be in the air.
+        """
+        return 0.5 * SPEED_OF_LIGHT * self.pulses_in_air * self.pattern.beams / pulse_rate
+
+    @model_validator(mode="after")
+    def _consistent(self) -> Device:
+        for fault in self._faults():
+            raise ValueError(fault)
+        return self
+
+    def _faults(self) -> Iterator[str]:
+        slowest, fastest = self.lines_per_second
+        if slowest > fastest:
+            yield f"lines_per_second must be slowest and fastest, in this order (not {slowest:g}, {fastest:g})"
+        if self.channels > 256:
+            yield f"must have 256 beams at most, all heads together (not {self.channels})"
+        rates = [mode.pulse_rate_khz for mode in self.modes]
+        if len(set(rates)) < len(rates):
+            yield "modes must not have the same pulse_rate_khz twice"
+        for number, mode in enumerate(self.modes):
+            rate = mode.pulse_rate_khz * 1e3
+            fault = self.pattern.fault(mode.field_of_view_deg, rate)
+            if fault:
+                yield f"modes.{number}.field_of_view_deg {mode.field_of_view_deg:g} {fault}"
+            reach = self.unambiguous_range(rate)
+            if not self.minimum_range < mode.maximum_range <= reach:
+                yield (
+                    f"modes.{number}.maximum_range {mode.maximum_range:g} must be more than the minimum range and "
+                    f"at most {reach:.4g} m, unambiguous with {self.pulses_in_air} pulses in the air"
+                )
+
+
+@dataclass(frozen=True)
+class ScannerSetting:
+    """A device as it is set for one scan; SI units, all angles in radians.
+
+    Attributes:
+        pulse_rate: pulses per second of each head (all of its beams together) while the laser fires.
+        lines_per_second: lines of each head: turns of a mirror with one face, swings of an oscillating mirror, rows
+            of a grid, turns of the first wedge or of a rotating head.
+        field_of_view: angle within which it fires, centred as the pattern says; a wedge prism's full cone.
+        divergence: full beam angles at 1/e^2, in the scan plane and across it; 0 is a ray.
+        range_resolution: echoes closer than this (m) merge into one return: half the pulse's length in air.
+        minimum_range: nothing nearer is recorded, m.
+        maximum_range: nothing farther is recorded, m: returns would be taken for a later pulse's, or not even
+            retro-reflective sheeting (`BRIGHTEST`) passes the threshold.
+        threshold: smallest detected intensity, of an ideal white target at 1 m being 1: that of a 20 % target at a
+            right angle at the mode's maximum range, without attenuation.
+        saturation: the intensity above which the receiver saturates: threshold x 10^(dynamic range / 10 dB).
+        range_sigma: standard deviation of the range, m.
+    """
+
+    device: Device
+    pulse_rate: float
+    lines_per_second: float
+    field_of_view: float
+    divergence: tuple[float, float]
+    range_resolution: float
+    minimum_range: float
+    maximum_range: float
+    threshold: float
+    saturation: float
+    range_sigma: float
+
+    @property
+    def shot_rate(self) -> float:
+        """Return the pulses per second of all heads together, while they fire."""
+        return self.pulse_rate * len(self.device.heads)
+
+    @property
+    def angle_step(self) -> float:
+        """Return the angle between two pulses, rad: sweep of a line x lines per second / pulse rate.
+
+        A rotating head's: the azimuth between two firing sequences; a wedge prism's: the first wedge's turn between
+        two pulses; that of a mirror with sinusoidal motion: in the middle of the line, where it is largest.
+        """
+        return self.device.pattern.sweep(self.field_of_view) * self.lines_per_second / self.pulse_rate
+
+    @property
+    def pulses_per_line(self) -> int:
+        """Return how many pulses a head fires per line: a whole number of firing sequences."""
+        pattern = self.device.pattern
+        share = pattern.firing_share(self.field_of_view)
+        sequences = math.floor(share * self.pulse_rate / (self.lines_per_second * pattern.beams) + 1e-9)
+        return sequences * pattern.beams
+
+
+def device_names() -> list[str]:
+    """Return the names of the device presets."""
+    return sorted(path.stem for path in DEVICES.glob("*.json"))
+
+
+def load_device(name_or_file: str) -> Device:
+    """Load a preset or a file; raise `InputError` if there is no such device or it is inconsistent."""
+    path = DEVICES / f"{name_or_file}.json" if name_or_file in device_names() else Path(name_or_file)
+    if path.suffix != ".json":
+        hint = nearest_name(name_or_file, device_names())
+        raise InputError(
+            "scan.device", name_or_file, f"must be a .json file or one of {', '.join(device_names())}{hint}"
+        )
+    return Device.from_dict(read_json(path), source=str(name_or_file))
+
+
+def scanner_setting(scan: ScanScenario) -> ScannerSetting:
+    """Return the scenario's device as the scenario sets it; see `setting_of`.
+
+    Raises:
+        InputError: there is no such device, it can't do it, or values contradict each other.
+    """
+    return setting_of(load_device(scan.device), scan)
+
+
+def setting_of(device: Device, scan: ScanScenario) -> ScannerSetting:
+    """Return a device as the scenario sets it, whichever device the scenario names.
+
+    What the scenario leaves open is the device's: its first mode, the mode's field of view, the fastest scan.
+
+    Raises:
+        InputError: the device can't do it, or values contradict each other; names field, value and what is allowed.
+    """
+    mode = _mode(device, scan.pulse_rate_khz)
+    view = _field_of_view(device, mode, scan.field_of_view_deg)
+    lines = _lines(device, mode, math.radians(view), scan)
+    rate = mode.pulse_rate_khz * 1e3
+    threshold = 0.2 / mode.maximum_range**2
+    setting = ScannerSetting(
+        device=device,
+        pulse_rate=rate,
+        lines_per_second=lines,
+        field_of_view=math.radians(view),
+        divergence=(device.divergence_mrad[0] * 1e-3, device.divergence_mrad[1] * 1e-3),
+        range_resolution=SPEED_OF_LIGHT * device.pulse_length_ns * 1e-9 / 2.0,
+        minimum_range=device.minimum_range,
+        maximum_range=min(math.sqrt(BRIGHTEST / threshold), device.unambiguous_range(rate)),
+        threshold=threshold,
+        saturation=threshold * 10.0 ** (device.dynamic_range_db / 10.0),
+        range_sigma=device.range_sigma if scan.noise.range_sigma is None else scan.noise.range_sigma,
+    )
+    _check_step(setting, scan)
+    return setting
+
+
+def _mode(device: Device, pulse_rate_khz: float | None) -> PulseMode:
+    if pulse_rate_khz is None:
+        return device.modes[0]
+    for mode in device.modes:
+        if math.isclose(mode.pulse_rate_khz, pulse_rate_khz):
+            return mode
+    rates = ", ".join(f"{mode.pulse_rate_khz:g}" for mode in device.modes)
+    raise InputError("scan.pulse_rate_khz", pulse_rate_khz, f"{device.title} fires at {rates} kHz")
+
+
+def _field_of_view(device: Device, mode: PulseMode, wanted: float | None) -> float:
+    """Return the field of view in degrees."""
+    if wanted is None:
+        return mode.field_of_view_deg
+    if device.pattern.fixed_view and not math.isclose(wanted, mode.field_of_view_deg):
+        allowed = f"{device.title} always sees {mode.field_of_view_deg:g} deg: its optics are fixed"
+        raise InputError("scan.field_of_view_deg", wanted, allowed)
+    if wanted > mode.field_of_view_deg:
+        allowed = f"{device.title} sees {mode.field_of_view_deg:g} deg at {mode.pulse_rate_khz:g} kHz"
+        raise InputError("scan.field_of_view_deg", wanted, allowed)
+    return wanted
+
+
+def _lines(device: Device, mode: PulseMode, view: float, scan: ScanScenario) -> float:
+    """Return the lines per second; from the angle step where only that is given."""
+    slowest, fastest = device.lines_per_second
+    step_of_a_line = math.degrees(device.pattern.sweep(view)) / (mode.pulse_rate_khz * 1e3)
+    at = f"at {mode.pulse_rate_khz:g} kHz"
+    if scan.lines_per_second is None and scan.angle_step_deg is not None:
+        lines = scan.angle_step_deg / step_of_a_line
+        # A data sheet's angle is rounded, and may miss a limit by that.
+        for limit in device.lines_per_second:
+            lines = limit if math.isclose(lines, limit, rel_tol=1e-3) else lines
+        if not slowest <= lines <= fastest:
+            allowed = (
+                f"{device.title} scans {slowest:g} to {fastest:g} lines/s, "
+                f"that is {slowest * step_of_a_line:.4g} to {fastest * step_of_a_line:.4g} deg {at}"
+            )
+            raise InputError("scan.angle_step_deg", scan.angle_step_deg, allowed)
+        return lines
+    lines = fastest if scan.lines_per_second is None else scan.lines_per_second
+    if not slowest <= lines <= fastest:
+        raise InputError("scan.lines_per_second", lines, f"{device.title} scans {slowest:g} to {fastest:g} lines/s")
+    step = step_of_a_line * lines
+    if scan.angle_step_deg is not None and not math.isclose(scan.angle_step_deg, step, rel_tol=1e-3):
+        allowed = f"{lines:g} lines/s {at} give {step:.6g} deg: leave one of the two out"
+        raise InputError("scan.angle_step_deg", scan.angle_step_deg, allowed)
+    return lines
+
+
+def _check_step(setting: ScannerSetting, scan: ScanScenario) -> None:
+    """Refuse angles that are too fine for the device, and lines without a pulse."""
+    device, step = setting.device, math.degrees(setting.angle_step)
+    by_angle = scan.lines_per_second is None and scan.angle_step_deg is not None
+    field = "scan.angle_step_deg" if by_angle else "scan.lines_per_second"
+    value = scan.angle_step_deg if by_angle else setting.lines_per_second
+    gives = f"gives an angle step of {step:.4g} deg at {setting.pulse_rate / 1e3:g} kHz"
+    if step < device.finest_angle_deg * (1 - 1e-9):
+        raise InputError(field, value, f"{gives}; {device.title} steps {device.finest_angle_deg:g} deg at the finest")
+    if setting.pulses_per_line < 1:
+        view = math.degrees(setting.field_of_view)
+        raise InputError(field, value, f"{gives}, which leaves no pulse in the field of view of {view:g} deg")

@@ -1,0 +1,125 @@
+"""Errors of the platform's measured position and attitude, correlated in time.
+
+Each of position x, y, z, roll, pitch and heading is a stationary first-order Gauss-Markov process: Gaussian, with the
+standard deviation sigma at every time and the correlation exp(-dt / T) between times dt apart (T the correlation time).
+
+At knots T / 128 apart the process is exact: x[i+1] = a x[i] + sqrt(1 - a^2) w[i+1] with a = exp(-1 / 128) and white w.
+Between two knots it is their weighted mean, with the weights of the conditional expectation (hyperbolic sines) divided
+by its own standard deviation: the standard deviation is sigma there too, and the correlation differs from the
+exponential by less than 0.004.
+
+Innovations are drawn in blocks of 4096 knots, each from its own stream. What happened more than a block ago has lost
+exp(-32) of its influence, so a block is computed from its own and the previous one's innovations alone: any time can
+be asked for in any order, at the same cost.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..base.random_streams import stream
+from ..base.rotations import rotation_matrix
+from ..scenario.scan import Noise
+from .platforms.base import Strip
+
+Float = NDArray[np.float64]
+
+KNOTS_PER_CORRELATION_TIME = 128
+BLOCK = 4096
+"""Knots of a block."""
+
+_AXES = 6
+_BLOCKS_KEPT = 8
+
+
+class TrajectoryNoise:
+    """The errors of one strip.
+
+    Attributes:
+        knot_spacing: s, between knots of the process; between two of them errors are nearly linear in time.
+
+    Args:
+        noise: standard deviations and correlation time.
+        seed: of the scan.
+        strip: what the errors are for; each has its own.
+    """
+
+    def __init__(self, noise: Noise, seed: int, strip: Strip) -> None:
+        attitude, heading = np.deg2rad([noise.attitude_sigma_deg, noise.heading_sigma_deg])
+        self._sigma = np.array([noise.position_sigma] * 3 + [attitude, attitude, heading])
+        self.knot_spacing = noise.correlation_time / KNOTS_PER_CORRELATION_TIME
+        self._seed, self._strip = seed, strip
+        self._block = lru_cache(_BLOCKS_KEPT)(self._make_block)
+
+    def errors(self, time: Float) -> tuple[Float, Float]:
+        """Return errors at times (K,) since the first strip's start; before the strip's start they are as there.
+
+        Returns:
+            position (K, 3), m, along the local axes; roll, pitch and heading (K, 3), rad.
+        """
+        time = np.asarray(time, dtype=np.float64)
+        if not self._sigma.any():
+            return np.zeros((len(time), 3)), np.zeros((len(time), 3))
+        run = np.maximum(time - self._strip.start_time, 0.0) / self.knot_spacing
+        knot = np.floor(run)
+        number, within = np.divmod(knot.astype(np.int64), BLOCK)
+        before, after = _weights(run - knot)
+        values = np.empty((len(time), _AXES))
+        for block in np.unique(number):
+            here = np.flatnonzero(number == block)
+            at, knots = within[here], self._block(int(block))
+            values[here] = before[here, None] * knots[at] + after[here, None] * knots[at + 1]
+        values *= self._sigma
+        return values[:, :3], values[:, 3:]
+
+    def _make_block(self, number: int) -> Float:
+        """Return the process of unit variance (`BLOCK` + 1, 6) at a block's knots and the first of the next one."""
+        innovations = [self._innovations(number, BLOCK), self._innovations(number + 1, 1)]
+        if number > 0:
+            innovations.insert(0, self._innovations(number - 1, BLOCK))
+        return _autoregression(np.concatenate(innovations))[-BLOCK - 1 :]
+
+    def _innovations(self, number: int, count: int) -> Float:
+        rng = stream(self._seed, "trajectory noise", self._strip.index, number)
+        return rng.standard_normal((count, _AXES))
+
+
+def measured_pose(position: Float, rotation: Float, errors: tuple[Float, Float]) -> tuple[Float, Float]:
+    """Return poses as they are measured.
+
+    Roll and pitch have one standard deviation, so their errors tilt the platform about the local x axis and the local
+    -y axis whatever its heading; a scanner that turns on a tripod is tilted with the tripod and not with its own turn.
+
+    Args:
+        position: (K, 3), m.
+        rotation: (K, 3, 3).
+        errors: position (K, 3), m, and roll, pitch and heading (K, 3), rad.
+    """
+    shift, (roll, pitch, heading) = errors[0], errors[1].T
+    return position + shift, rotation_matrix(heading, pitch, roll) @ rotation
+
+
+def _weights(share: Float) -> tuple[Float, Float]:
+    """Return the weights (K,) of two neighbouring knots at shares (K,) of the way between them."""
+    h = 1.0 / KNOTS_PER_CORRELATION_TIME
+    before, after = np.sinh((1.0 - share) * h), np.sinh(share * h)
+    norm = np.sqrt(before**2 + after**2 + 2.0 * before * after * np.exp(-h))
+    return before / norm, after / norm
+
+
+def _autoregression(innovations: Float) -> Float:
+    """Return the process (N, 6) of unit variance that its first value and white innovations make.
+
+    The sum over all earlier innovations is built by doubling its reach: log2(N) passes over the array.
+    """
+    a = np.exp(-1.0 / KNOTS_PER_CORRELATION_TIME)
+    values = innovations.copy()
+    values[1:] *= np.sqrt(1.0 - a * a)
+    reach = 1
+    while reach < len(values):
+        values[reach:] += a**reach * values[:-reach].copy()
+        reach *= 2
+    return values

@@ -1,0 +1,1 @@
+"""Scan patterns: when each pulse is fired, and where to."""

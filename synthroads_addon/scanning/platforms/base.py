@@ -1,0 +1,151 @@
+"""What every path has: strips, poses, and knots between which poses may be interpolated."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...base.errors import InputError
+from ...base.rotations import rotation_matrix
+from ...scenario.scan import Platform, PlatformKind
+
+Float = NDArray[np.float64]
+
+TURNAROUND = 10.0
+"""Seconds between two strips."""
+KNOT_ERROR = 2e-5
+"""What interpolation between two knots may err, m, in the place of a point at `KNOT_RANGE` from the scanner."""
+KNOT_RANGE = 100.0
+"""m."""
+
+_SLOWEST_KNOTS = 0.25  # s, where nothing turns or accelerates
+_FASTEST_KNOTS = 1e-6  # s
+_MARGIN = 0.95  # of `KNOT_ERROR`
+_MOST_STRIPS = 65_536  # a point's strip is a number of 16 bits
+
+
+@dataclass(frozen=True)
+class Strip:
+    """One pass along the road, or one position of a tripod.
+
+    Attributes:
+        index: number of the strip, from 0.
+        start_time: time of its first pulse since the first strip's, s.
+        duration: s.
+    """
+
+    index: int
+    start_time: float
+    duration: float
+
+
+class Path(Protocol):
+    """Where the scanner is, and how it is turned, at any time."""
+
+    @property
+    def strips(self) -> tuple[Strip, ...]:
+        """Return the strips in the order of time."""
+        ...
+
+    @property
+    def knot_spacing(self) -> float:
+        """Return the time (s) between knots from a strip's start on, at most.
+
+        Between the poses at two of them, linear interpolation of position and rotation matrix errs less than
+        `KNOT_ERROR` at `KNOT_RANGE`. It can be shorter than the time between two pulses, where knots don't pay.
+        """
+        ...
+
+    @property
+    def typical_range(self) -> float:
+        """Return the usual distance (m) to what is scanned, to which the scale of intensities refers."""
+        ...
+
+    @property
+    def deviation(self) -> float:
+        """Return the largest horizontal distance (m) by which the path's form leaves what it follows."""
+        ...
+
+    def pose(self, strip: Strip, time: Float) -> tuple[Float, Float]:
+        """Return where the scanner is at times of a strip.
+
+        Args:
+            strip: one of `strips`.
+            time: (K,) seconds since the first strip's start; a little beyond the strip's ends is allowed.
+
+        Returns:
+            local positions (K, 3), m, and rotations (K, 3, 3) from the scanner's frame (x forward, y left, z up) to
+            the local one, its mounting included.
+        """
+        ...
+
+
+@dataclass(frozen=True)
+class Usual:
+    """What is usual for a kind of platform.
+
+    Attributes:
+        height: m; above the centreline (uav, airborne), the road surface (vehicle), or the ground (tripod).
+        speed: over ground, m/s.
+        lateral_offsets: of the strips, m; None where they follow from the road's cross-section.
+        typical_range: distance to what is scanned, m; None for the height.
+    """
+
+    height: float
+    speed: float
+    lateral_offsets: tuple[float, ...] | None
+    typical_range: float | None = None
+
+    def seen_from(self, height: float) -> float:
+        """Return the distance to what is scanned from a height, m."""
+        return height if self.typical_range is None else max(self.typical_range, height)
+
+
+USUAL: dict[PlatformKind, Usual] = {
+    "uav": Usual(60.0, 8.0, (10.0, -10.0)),
+    "vehicle": Usual(2.2, 20.0, None, 8.0),
+    "tripod": Usual(1.8, 0.0, None, 15.0),
+    "airborne": Usual(800.0, 60.0, (0.0,)),
+}
+"""Usual values by kind of platform; a trajectory has its own."""
+
+
+def mounting(platform: Platform) -> Float:
+    """Return the rotation (3, 3) from the scanner's frame to the platform's."""
+    angles = np.deg2rad([platform.yaw_deg, platform.pitch_deg, platform.roll_deg])
+    return rotation_matrix(*angles)
+
+
+def strips_of(durations: list[float]) -> tuple[Strip, ...]:
+    """Return strips of these durations (s), `TURNAROUND` apart.
+
+    Raises:
+        InputError: there are more than a point cloud can number.
+    """
+    if len(durations) > _MOST_STRIPS:
+        raise InputError("scan.platform", len(durations), f"at most {_MOST_STRIPS} strips or positions are possible")
+    starts = np.concatenate(([0.0], np.cumsum(np.array(durations) + TURNAROUND)))
+    return tuple(Strip(i, float(starts[i]), float(duration)) for i, duration in enumerate(durations))
+
+
+def turning(platform: Platform) -> float:
+    """Return the rate, rad/s, at which a tripod turns the scanner, counter-clockwise."""
+    return math.radians(platform.turn_deg) / platform.turn_seconds
+
+
+def knots_for(bend: float, jump: float = 0.0) -> float:
+    """Return the knots' spacing, s, that keeps `KNOT_ERROR`.
+
+    Args:
+        bend: largest second derivative by time of the place of a point at `KNOT_RANGE`, m/s2: between knots h apart
+            linear interpolation errs by up to bend h^2 / 8.
+        jump: largest jump of that place's velocity, m/s: it errs by up to jump h / 4.
+    """
+    # Both at once: bend h^2 / 8 + jump h / 4 = error, solved in the form that doesn't cancel.
+    error = 8.0 * _MARGIN * KNOT_ERROR
+    spacing = error / max(jump + np.sqrt(jump * jump + error * bend), 1e-300)
+    return float(np.clip(spacing, _FASTEST_KNOTS, _SLOWEST_KNOTS))

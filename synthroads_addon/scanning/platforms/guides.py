@@ -1,0 +1,218 @@
+"""What a path follows: the centreline of a road, any polyline (`path_polyline`), or polynomials fitted to either.
+
+A guide is a curve in plan, evaluated by station (m) in float64, with an elevation along it and a ground around it. Its
+offsets count to the left.
+"""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...base.errors import InputError
+from ...road.damage import damage_depth
+from ...road.geometry import RoadGeometry
+from ...road.section_geometry import CarriagewaySection
+from ...road.surface import surface_elevation
+
+Float = NDArray[np.float64]
+
+_SAMPLES = 201  # stations at which a lane's place is looked up
+_FULL_LANE = 1.99  # m; what is narrower is a lane that begins or ends
+
+
+class Guide(Protocol):
+    """What a path follows."""
+
+    @property
+    def length(self) -> float:
+        """Return the largest station, m; the first is 0."""
+        ...
+
+    @property
+    def origin(self) -> Float:
+        """Return the map coordinates (3,) of the local origin, m."""
+        ...
+
+    @property
+    def breaks(self) -> Float:
+        """Return the stations (B,) at which the curvature may jump or bend."""
+        ...
+
+    def at(self, station: Float) -> tuple[Float, Float]:
+        """Return local positions (K, 3), m, and headings (K,), rad, at stations (K,)."""
+        ...
+
+    def frame(self, station: Float) -> tuple[Float, Float, Float, Float]:
+        """Return plan position (K, 2), heading (K,), curvature (K,) 1/m, and plan length per station (K,)."""
+        ...
+
+    def elevation(self, station: Float) -> Float:
+        """Return the local elevation (K,) of the guide itself."""
+        ...
+
+    def ground(self, station: Float, offset: Float, damaged: bool) -> Float:
+        """Return the local elevation (K,) of what lies beneath, with or without ruts and potholes; NaN if unknown."""
+        ...
+
+    def project(self, plan: Float) -> tuple[Float, Float]:
+        """Return stations (K,) and offsets (K,) of local points (K, 2)."""
+        ...
+
+    def driving_offsets(self) -> tuple[float, ...]:
+        """Return the offset of the outermost lane's middle for each carriageway, m."""
+        ...
+
+    def roadside_offsets(self, station: Float) -> Float:
+        """Return the offsets (K,) at which a tripod stands at stations (K,), m."""
+        ...
+
+
+class RoadGuide:
+    """The centreline of a road."""
+
+    def __init__(self, geometry: RoadGeometry) -> None:
+        self.geometry = geometry
+        self.origin = np.array(geometry.parameters.transform.translate, dtype=np.float64)
+
+    @property
+    def length(self) -> float:
+        """Return the length of the centreline, m."""
+        return self.geometry.length
+
+    @property
+    def breaks(self) -> Float:
+        """Return the stations (B,) at which the curvature may jump or bend."""
+        return self.geometry.alignment.element_starts
+
+    def at(self, station: Float) -> tuple[Float, Float]:
+        """Return local positions (K, 3), m, and headings (K,), rad, at stations (K,)."""
+        plan, heading, _ = self.geometry.alignment.frame(station)
+        return np.column_stack([plan, self.elevation(station)]), heading
+
+    def frame(self, station: Float) -> tuple[Float, Float, Float, Float]:
+        """Return plan position (K, 2), heading (K,), curvature (K,) 1/m, and plan length per station (K,): 1."""
+        plan, heading, curvature = self.geometry.alignment.frame(station)
+        return plan, heading, curvature, np.ones(len(station))
+
+    def elevation(self, station: Float) -> Float:
+        """Return the profile's local elevation (K,)."""
+        return self.geometry.profile.elevation(station)
+
+    def ground(self, station: Float, offset: Float, damaged: bool) -> Float:
+        """Return the local elevation (K,) of the road, its batter or the ground; NaN beyond an elevation model."""
+        height = surface_elevation(self.geometry, station, offset)
+        if not damaged:
+            for section in self.geometry.sections.values():
+                height += damage_depth(section, station, offset)
+        return height
+
+    def project(self, plan: Float) -> tuple[Float, Float]:
+        """Return stations (K,) and offsets (K,) of local points (K, 2)."""
+        return self.geometry.alignment.project(plan)
+
+    def driving_offsets(self) -> tuple[float, ...]:
+        """Return the offset of the outermost through lane's middle, right carriageway first, m.
+
+        It is the median along the road of the outermost lane that is there along at least half of it.
+        """
+        sections = sorted(self.geometry.sections.items(), reverse=True)
+        return tuple(_lane_middle(section, self.length) for _, section in sections)
+
+    def roadside_offsets(self, station: Float) -> Float:
+        """Return the offsets (K,) of the pavement's outer edges at stations (K,): by turns right and left."""
+        sections = [section for _, section in sorted(self.geometry.sections.items(), reverse=True)]
+        edges = [section.carriageway.sign * section.paved_edge(station) for section in sections]
+        return np.choose(np.arange(len(station)) % len(edges), edges)
+
+
+class SmoothedGuide:
+    """Polynomials of the station fitted to a guide's x and y by least squares; elevations stay the guide's.
+
+    They are Chebyshev sums of the station scaled to -1 ... 1, about the guide's mean, so that a high degree on a long
+    road stays well conditioned.
+
+    Attributes:
+        deviation: largest horizontal distance of the polynomials from the guide, m.
+
+    Args:
+        guide: what to fit.
+        degree: of the polynomials.
+
+    Raises:
+        InputError: the polynomials turn back on themselves.
+    """
+
+    def __init__(self, guide: Guide, degree: int) -> None:
+        self._guide = guide
+        self.length, self.origin = guide.length, guide.origin
+        self.breaks = np.zeros(0)
+        count = int(np.clip(np.ceil(self.length), 20 * degree, 20_000))
+        station = np.arange(count + 1) * (self.length / count)
+        plan = guide.frame(station)[0]
+        self._mean = plan.mean(axis=0)
+        fit = np.polynomial.chebyshev
+        coefficients = fit.chebfit(self._scaled(station), plan - self._mean, degree)
+        self._derivatives = [coefficients]
+        for _ in range(2):
+            self._derivatives.append(fit.chebder(self._derivatives[-1]) * (2.0 / self.length))
+        fitted, _, _, stretch = self.frame(station)
+        if stretch.min() < 0.02:
+            at = float(station[stretch.argmin()])
+            raise InputError(
+                "scan.platform.polynomial_degree", degree, f"the smoothed path turns back at station {at:.1f} m"
+            )
+        self.deviation = float(np.abs(guide.project(fitted)[1]).max())
+
+    def _scaled(self, station: Float) -> Float:
+        return 2.0 * station / self.length - 1.0
+
+    def at(self, station: Float) -> tuple[Float, Float]:
+        """Return local positions (K, 3), m, and headings (K,), rad within half a turn, at stations (K,)."""
+        plan, heading, _, _ = self.frame(station)
+        return np.column_stack([plan, self.elevation(station)]), heading
+
+    def frame(self, station: Float) -> tuple[Float, Float, Float, Float]:
+        """Return plan position (K, 2), heading (K,), curvature (K,) 1/m, and plan length per station (K,)."""
+        u = self._scaled(station)
+        (x, y), (dx, dy), (ddx, ddy) = (np.polynomial.chebyshev.chebval(u, part) for part in self._derivatives)
+        stretch = np.hypot(dx, dy)
+        curvature = (dx * ddy - dy * ddx) / np.maximum(stretch, 1e-12) ** 3
+        return np.stack([x, y], axis=1) + self._mean, np.arctan2(dy, dx), curvature, stretch
+
+    def elevation(self, station: Float) -> Float:
+        """Return the local elevation (K,) of the guide at the same stations."""
+        return self._guide.elevation(station)
+
+    def ground(self, station: Float, offset: Float, damaged: bool) -> Float:
+        """Return the local elevation (K,) of what lies beneath the polynomials' offset points."""
+        plan, heading, _, _ = self.frame(station)
+        left = np.stack([-np.sin(heading), np.cos(heading)], axis=1)
+        return self._guide.ground(*self._guide.project(plan + offset[:, None] * left), damaged)
+
+    def project(self, plan: Float) -> tuple[Float, Float]:
+        """Return stations (K,) and offsets (K,) of local points (K, 2) along the guide."""
+        return self._guide.project(plan)
+
+    def driving_offsets(self) -> tuple[float, ...]:
+        """Return the guide's."""
+        return self._guide.driving_offsets()
+
+    def roadside_offsets(self, station: Float) -> Float:
+        """Return the guide's."""
+        return self._guide.roadside_offsets(station)
+
+
+def _lane_middle(section: CarriagewaySection, length: float) -> float:
+    station = np.arange(_SAMPLES) * (length / (_SAMPLES - 1))
+    boundaries = section.lane_boundaries(station)
+    full = boundaries[:, :-1] - boundaries[:, 1:] >= _FULL_LANE
+    through = [lane.kind == "through" for lane in section.carriageway.lanes]
+    share = full.mean(axis=0) * np.where(through, 1.0, 1e-3)
+    wide = np.flatnonzero(share >= 0.5)
+    lane = int(wide[0]) if len(wide) else int(share.argmax())
+    middle = (boundaries[:, lane] + boundaries[:, lane + 1]) / 2.0
+    there = full[:, lane] if full[:, lane].any() else np.ones(len(station), dtype=bool)
+    return section.carriageway.sign * float(np.median(middle[there]))

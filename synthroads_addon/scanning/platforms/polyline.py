@@ -1,0 +1,196 @@
+"""Any polyline as what a path follows: its corners are rounded, so that heading and curvature are continuous."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ...base.errors import InputError
+from ...base.rotations import wrapped
+from ...fitting.read import read_axis
+from ...road.alignment import CURVATURE_LIMIT, Alignment, Element, finite_array
+from ...road.profile import IntersectionPoint, Profile
+
+Float = NDArray[np.float64]
+
+CORNER = 10.0
+"""A corner is rounded from this far (m) before it on, or from nearly half way to the nearer neighbouring point."""
+MEASURED = 0.05
+"""Points of a measured line nearer than this (m) to the line through the others say nothing of its course."""
+
+_REPEATED = 1e-3  # m
+
+
+class PolylineGuide:
+    """A polyline whose corners are rounded in plan, so that its heading is continuous.
+
+    Each corner is replaced by two clothoids that begin `CORNER` before it (or at 49 % of the way to the nearer
+    neighbouring point) and end as far behind it; heading and curvature are continuous. In height it is straight
+    between the corners. What lies beneath is level across and as high as the polyline.
+
+    A measured line that jitters by centimetres has bends of a few metres' radius at points half a metre apart, beside
+    which there is no offset line. A tolerance leaves out the points that lie within it of the line through the others
+    (Douglas and Peucker 1973).
+
+    Attributes:
+        alignment: the rounded line in plan.
+        profile: its elevation.
+        deviation: how far the rounded line is from any point at most, m, in plan.
+
+    Args:
+        points: (N, 2) or (N, 3) local coordinates, m; without z the elevation is 0. Points that repeat the one before
+            are left out.
+        origin: map coordinates of the local origin, m.
+        tolerance: m; 0 keeps every point.
+
+    Raises:
+        InputError: points that aren't finite, fewer than two distinct ones, or a corner too sharp to be rounded.
+    """
+
+    def __init__(
+        self, points: ArrayLike, origin: Sequence[float] = (0.0, 0.0, 0.0), tolerance: float = 0.0
+    ) -> None:
+        given = finite_array("points", points)
+        if given.ndim != 2 or given.shape[1] not in (2, 3):
+            raise InputError("points", given.shape, "an array of shape (N, 2) or (N, 3) is needed")
+        kept = _kept(given, tolerance)
+        line = given[kept]
+        self.origin = np.array(origin, dtype=np.float64)
+        step = np.diff(line[:, :2], axis=0)
+        span, heading = np.hypot(*step.T), np.arctan2(step[:, 1], step[:, 0])
+        turn = wrapped(np.diff(heading))
+        reach = np.minimum(CORNER, 0.49 * np.minimum(span[:-1], span[1:]))
+        lengths = _clothoid_lengths(turn, reach)
+        _refuse_sharp(given, kept, turn, lengths)
+        x, y = line[0, :2].tolist()
+        self.alignment = Alignment(_elements(span, reach, turn, lengths), x, y, float(heading[0]))
+        self.deviation = float(np.abs(self.alignment.project(given[:, :2])[1]).max())
+        straight = span - np.concatenate(([0.0], reach)) - np.concatenate((reach, [0.0]))
+        station = np.cumsum(straight) + np.concatenate(([0.0], np.cumsum(2.0 * lengths)))
+        station[:-1] += lengths
+        station = np.concatenate(([0.0], station))
+        height = line[:, 2] if line.shape[1] == 3 else np.zeros(len(line))
+        self.profile = Profile([IntersectionPoint(float(s), float(z)) for s, z in zip(station, height, strict=True)])
+
+    @classmethod
+    def read(
+        cls, path: str | os.PathLike[str], origin: Sequence[float] | None = None, tolerance: float = MEASURED
+    ) -> PolylineGuide:
+        """Return the guide of a CSV or GeoJSON file, as `read_axis` reads it.
+
+        Args:
+            path: the file, in map coordinates.
+            origin: map coordinates of the local origin, m; the points' mean to the metre if not given.
+            tolerance: m, see the class.
+
+        Raises:
+            InputError: the file is missing or no line, or has a corner too sharp to be rounded.
+        """
+        points = read_axis(path)
+        base = np.round(points.mean(axis=0)) if origin is None else np.array(origin, dtype=np.float64)
+        return cls(points - base, base.tolist(), tolerance)
+
+    @property
+    def length(self) -> float:
+        """Return the length of the rounded line, m."""
+        return self.alignment.length
+
+    @property
+    def breaks(self) -> Float:
+        """Return the stations (B,) at which the curvature may jump or bend."""
+        return self.alignment.element_starts
+
+    def at(self, station: Float) -> tuple[Float, Float]:
+        """Return local positions (K, 3), m, and headings (K,), rad, at stations (K,)."""
+        plan, heading, _ = self.alignment.frame(station)
+        return np.column_stack([plan, self.elevation(station)]), heading
+
+    def frame(self, station: Float) -> tuple[Float, Float, Float, Float]:
+        """Return plan position (K, 2), heading (K,), curvature (K,) 1/m, and plan length per station (K,): 1."""
+        plan, heading, curvature = self.alignment.frame(station)
+        return plan, heading, curvature, np.ones(len(station))
+
+    def elevation(self, station: Float) -> Float:
+        """Return the local elevation (K,) of the line."""
+        return self.profile.elevation(station)
+
+    def ground(self, station: Float, offset: Float, damaged: bool) -> Float:
+        """Return the local elevation (K,) of the line at the stations."""
+        return self.elevation(station)
+
+    def project(self, plan: Float) -> tuple[Float, Float]:
+        """Return stations (K,) and offsets (K,) of local points (K, 2)."""
+        return self.alignment.project(plan)
+
+    def driving_offsets(self) -> tuple[float, ...]:
+        """Return that a vehicle drives along the line."""
+        return (0.0,)
+
+    def roadside_offsets(self, station: Float) -> Float:
+        """Return that a tripod stands on the line."""
+        return np.zeros(len(station))
+
+
+def _kept(points: Float, tolerance: float) -> NDArray[np.intp]:
+    """Return the indices of the points that make the line: without repetitions, and thinned in three dimensions."""
+    apart = np.concatenate(([True], np.hypot(*np.diff(points[:, :2], axis=0).T) > _REPEATED))[: len(points)]
+    kept = np.flatnonzero(apart)
+    if len(kept) < 2:
+        raise InputError("points", len(points), "at least two points, more than 1 mm apart in plan, are needed")
+    if tolerance <= 0.0:
+        return kept
+    line, wanted = points[kept], np.zeros(len(kept), dtype=bool)
+    wanted[[0, -1]] = True
+    stack = [(0, len(kept) - 1)]
+    while stack:
+        first, last = stack.pop()
+        chord, inner = line[last] - line[first], line[first + 1 : last] - line[first]
+        if not len(inner):
+            continue
+        share = np.clip(inner @ chord / max(float(chord @ chord), 1e-300), 0.0, 1.0)
+        distance = np.linalg.norm(inner - share[:, None] * chord, axis=1)
+        farthest = int(distance.argmax())
+        if distance[farthest] > tolerance:
+            middle = first + 1 + farthest
+            wanted[middle] = True
+            stack += [(first, middle), (middle, last)]
+    return kept[wanted]
+
+
+def _clothoid_lengths(turn: Float, reach: Float) -> Float:
+    """Return how long each of a corner's two clothoids is, (C,) m.
+
+    With the deflection f and unit length, one clothoid ends at x = int cos(f u^2 / 2), y = int sin(f u^2 / 2); the
+    tangent from the corner is x + y tan(f / 2) long.
+    """
+    nodes, weights = np.polynomial.legendre.leggauss(20)
+    angle = np.abs(turn)[:, None] / 2.0 * ((nodes + 1.0) / 2.0) ** 2
+    x, y = np.cos(angle) @ weights / 2.0, np.sin(angle) @ weights / 2.0
+    half = np.abs(turn) / 2.0
+    return np.asarray(reach / (x + y * np.tan(half)))
+
+
+def _refuse_sharp(points: Float, kept: NDArray[np.intp], turn: Float, lengths: Float) -> None:
+    sharp = (np.abs(turn) > CURVATURE_LIMIT * lengths) | (np.abs(turn) > np.deg2rad(170.0))
+    if not sharp.any():
+        return
+    at = int(np.argmax(sharp))
+    index = int(kept[at + 1])
+    degrees = abs(float(np.rad2deg(turn[at])))
+    allowed = f"the line turns by {degrees:.0f} degrees here, too sharply to be rounded with a radius of 1 m or more"
+    raise InputError(f"points[{index}]", [float(value) for value in points[index]], allowed)
+
+
+def _elements(span: Float, reach: Float, turn: Float, lengths: Float) -> list[Element]:
+    """Return straights with two clothoids at each corner between them."""
+    straight = span - np.concatenate(([0.0], reach)) - np.concatenate((reach, [0.0]))
+    elements = [Element(float(straight[0]), 0.0, 0.0)]
+    for angle, length, after in zip(turn, lengths, straight[1:], strict=True):
+        sharpest = float(angle / length)
+        elements.append(Element(float(length), 0.0, sharpest))
+        elements.append(Element(float(length), sharpest, 0.0))
+        elements.append(Element(float(after), 0.0, 0.0))
+    return elements

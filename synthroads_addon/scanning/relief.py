@@ -1,0 +1,166 @@
+"""Roughness adjustment: points are shifted along the surface's normal by the material's micro-relief.
+
+The scene's surfaces are smooth; real ones have texture. `heights` is that texture as a random field in space: the same
+place has the same height in every strip, and pulses near each other have similar ones. Strength 1 is the relief that
+pavements and soils have been measured to have (`RELIEF`), 0 none, more an exaggeration.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..base.errors import InputError
+from ..base.noise import field
+from ..cloud.points import PointBlock
+from ..materials.table import UNKNOWN, Material, materials
+
+Float = NDArray[np.float64]
+
+MAX_STRENGTH = 100.0
+OCTAVES = {"draft": 2, "standard": 4, "high": 6}
+"""Octaves of the relief by fidelity: each halves the shortest wavelength; the standard deviation is the same."""
+
+
+class Relief(NamedTuple):
+    """A surface's micro-relief: standard deviation and longest wavelength, m."""
+
+    amplitude: float
+    wavelength: float
+
+
+SMOOTH = Relief(0.0, 0.1)
+ASPHALT = Relief(0.0008, 0.1)
+RELIEF: dict[str, Relief] = {
+    "asphalt": ASPHALT,
+    "concrete": Relief(0.0007, 0.1),
+    "paint_white": Relief(0.0003, 0.1),
+    "paint_yellow": Relief(0.0003, 0.1),
+    "barrier_concrete": Relief(0.0003, 0.1),
+    "bridge_concrete": Relief(0.0005, 0.1),
+    "noise_concrete": Relief(0.002, 0.1),
+    "noise_wood": Relief(0.001, 0.1),
+    "verge": Relief(0.005, 0.15),
+    "median": Relief(0.010, 0.4),
+    "grass_ground": Relief(0.015, 0.4),
+    "soil": Relief(0.010, 0.3),
+    "bark": Relief(0.004, 0.06),
+}
+"""Relief of the material table's surfaces; a name such as ``birch_bark`` has that of its last word.
+
+Pavements: so that profiles have the mean profile depth (ISO 13473-1) of their kind with 6 octaves: asphalt 0.85 mm,
+between asphalt concrete (0.4 to 0.8) and stone mastic asphalt (0.8 to 1.2), concrete with exposed aggregate 0.75 mm.
+Paint fills the texture that it lies on, hence the same wavelength: it has the asphalt's relief, flattened. Ground:
+random roughness, the standard deviation of heights about the mean plane. `docs/roughness.md` has sources and limits.
+Grass blades, leaves and all that is rolled, cast, painted or glazed are smooth, or are shaped by their own geometry.
+"""
+
+
+@dataclass(frozen=True)
+class MicroRelief:
+    """Relief of a scene's materials, in the order of `SceneMesh.materials`.
+
+    Attributes:
+        amplitude: (M,) standard deviation, m; 0 is smooth.
+        wavelength: (M,) longest wavelength, m.
+    """
+
+    amplitude: Float
+    wavelength: Float
+
+
+def micro_relief(names: Sequence[str], rows: Sequence[Material]) -> MicroRelief:
+    """Return the relief of materials: `RELIEF`'s, or that of the roughness where the name isn't in the material table.
+
+    Args:
+        names: of the M materials.
+        rows: their properties.
+    """
+    pairs = [_relief(name, row) for name, row in zip(names, rows, strict=True)]
+    values = np.array(pairs, dtype=np.float64).reshape(-1, 2)
+    return MicroRelief(amplitude=values[:, 0], wavelength=values[:, 1])
+
+
+def _relief(name: str, row: Material) -> Relief:
+    known = RELIEF.get(name) or RELIEF.get(name.rpartition("_")[2])
+    if known is not None:
+        return known
+    return SMOOTH if name in materials() and name != UNKNOWN else relief_of_roughness(row)
+
+
+def relief_of_roughness(row: Material) -> Relief:
+    """Return the relief of a surface of which only a renderer's properties are known.
+
+    None up to a roughness of 0.5, then growing with the square; asphalt's at asphalt's. None for metals and for what
+    light goes through.
+    """
+    if row.metallic > 0.5 or row.transmission > 0.0:
+        return SMOOTH
+    excess = max(0.0, row.roughness - 0.5) / (materials()["asphalt"].roughness - 0.5)
+    return ASPHALT._replace(amplitude=ASPHALT.amplitude * excess**2)
+
+
+def heights(position: Float, amplitude: Float, wavelength: Float, seed: int, octaves: int = 4) -> Float:
+    """Return the relief's height above the mean surface, along its normal.
+
+    Every value is drawn from one random field per wavelength, see `noise_field`: mean 0, standard deviation
+    `amplitude`, correlation 1/e at 0.28 wavelengths (4 octaves). Materials of one wavelength share the field.
+
+    Args:
+        position: (N, 3) local coordinates on the mean surface, free of noise, m.
+        amplitude: (N,) standard deviation, m.
+        wavelength: (N,) longest wavelength, m.
+        seed: the scene's.
+        octaves: see `OCTAVES`.
+
+    Returns:
+        (N,) m.
+    """
+    return amplitude * field(position, wavelength, seed, octaves)
+
+
+def adjusted(
+    points: PointBlock, position: Float, relief: MicroRelief, strength: float, seed: int, octaves: int = 4
+) -> PointBlock:
+    """Return the points with `xyz` shifted along the normal, and `range` to match; all else is kept.
+
+    The range becomes the distance to the shifted point: less by the height times the cosine of the incidence angle.
+    `true_xyz` and `true_range` stay those of the mean surface; intensity, normal and incidence angle stay as well.
+    With strength 0, or if nothing has relief, the very same block is returned.
+
+    Args:
+        points: needs `normal` and `material`.
+        position: (N, 3) local coordinates of the points without noise, m. The measured ones will do, but then the
+            heights of neighbours are less alike than they should be, by as much as noise moves the points.
+        relief: of the scene's materials.
+        strength: factor on every amplitude, 0 to `MAX_STRENGTH`.
+        seed: the scene's.
+        octaves: see `OCTAVES`.
+
+    Raises:
+        InputError: strength out of range.
+        ValueError: the points lack `normal` or `material`.
+    """
+    if not 0.0 <= strength <= MAX_STRENGTH:
+        raise InputError("roughness strength", strength, f"must be 0 to {MAX_STRENGTH:g}")
+    if strength == 0.0 or not relief.amplitude.any():
+        return points
+    if points.normal is None or points.material is None:
+        raise ValueError("the roughness adjustment needs the points' normals and materials")
+    found = np.flatnonzero(relief.amplitude[points.material])
+    if len(found) == 0:
+        return points
+    rough = found if len(found) < len(points) else slice(None)
+    material = points.material[rough]
+    height = heights(
+        position[rough], strength * relief.amplitude[material], relief.wavelength[material], seed, octaves
+    )
+    xyz, distance = points.xyz.copy(), points.range.copy()
+    xyz[rough] += height[:, None] * points.normal[rough]
+    before, cosine = distance[rough], np.cos(np.radians(points.incidence_deg[rough].astype(np.float64)))
+    distance[rough] = np.sqrt(before**2 - 2.0 * before * height * cosine + height**2)
+    return replace(points, xyz=xyz, range=distance)

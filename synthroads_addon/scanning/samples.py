@@ -1,0 +1,101 @@
+"""Short stretches of a path, to scan or to colour a sample of a job in place of all of it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .platforms.path import Path, Strip
+
+Float = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Stretches:
+    """A path of which only stretches are flown; see `path_base.Path`.
+
+    Attributes:
+        whole: the path.
+        strips: its stretches: each has the index of the strip that it is of.
+    """
+
+    whole: Path
+    strips: tuple[Strip, ...]
+
+    @property
+    def knot_spacing(self) -> float:
+        """Return the whole path's."""
+        return self.whole.knot_spacing
+
+    @property
+    def typical_range(self) -> float:
+        """Return the whole path's."""
+        return self.whole.typical_range
+
+    @property
+    def deviation(self) -> float:
+        """Return the whole path's."""
+        return self.whole.deviation
+
+    def pose(self, strip: Strip, time: Float) -> tuple[Float, Float]:
+        """Return the whole path's pose."""
+        return self.whole.pose(self._of(strip), time)
+
+    @property
+    def share(self) -> float:
+        """Return how much of the path's duration the stretches are."""
+        return sum(strip.duration for strip in self.strips) / sum(strip.duration for strip in self.whole.strips)
+
+    def _of(self, stretch: Strip) -> Strip:
+        return next(strip for strip in self.whole.strips if strip.index == stretch.index)
+
+
+def spread(path: Path, count: int, duration: float) -> Stretches:
+    """Return stretches of a duration (s) spread evenly over each strip, from its start to its end.
+
+    A strip that is shorter than all its stretches together is taken whole.
+    """
+    strips: list[Strip] = []
+    for strip in path.strips:
+        if strip.duration <= count * duration:
+            strips.append(strip)
+            continue
+        starts = strip.start_time + np.linspace(0.0, strip.duration - duration, count)
+        strips += [Strip(strip.index, float(start), duration) for start in starts]
+    return Stretches(path, tuple(strips))
+
+
+def middle(path: Path, share: float) -> Stretches:
+    """Return the middle of each strip, a share of its duration long."""
+    return Stretches(
+        path,
+        tuple(
+            Strip(strip.index, strip.start_time + strip.duration * (1.0 - share) / 2.0, strip.duration * share)
+            for strip in path.strips
+        ),
+    )
+
+
+def scattered(path: Path, count: int, duration: float, phase: float = 0.5, most: float = 0.25) -> Stretches:
+    """Return stretches of a duration (s) scattered evenly over all strips together, however many there are.
+
+    Args:
+        path: of one strip or more.
+        count: of stretches.
+        duration: of each; less where they would be more than `most` of the path, or longer than a strip.
+        phase: where each lies in its share of the path, 0 to 1: other phases give other stretches.
+        most: largest share of the path that they take together.
+    """
+    ends = np.cumsum([strip.duration for strip in path.strips])
+    duration = min(duration, most * float(ends[-1]) / count)
+    strips: list[Strip] = []
+    for place in (np.arange(count) + phase) / count * ends[-1]:
+        number = min(int(np.searchsorted(ends, place, side="right")), len(ends) - 1)
+        strip = path.strips[number]
+        length = min(duration, strip.duration)
+        into = float(place - (ends[number] - strip.duration))
+        start = strip.start_time + min(max(into - length / 2.0, 0.0), strip.duration - length)
+        strips.append(Strip(strip.index, start, length))
+    return Stretches(path, tuple(strips))

@@ -1,0 +1,337 @@
+"""One block of pulses, from the path to the points. Pure arrays: the casters are all that knows the scene."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..cloud.points import PointBlock, concatenate
+from ..materials.surfaces import Surfaces, brightness_of
+from ..materials.texture_spread import spread_factors
+from ..scenario.scan import Noise
+from .beam import BeamPattern, beam_pattern, conical, cylindrical_offsets
+from .blocks import Block, Blocks
+from .colour.colour import Targets, joined_targets
+from .devices.device import ScannerSetting
+from .knots import Track
+from .platforms.path import Path, Strip
+from .pulses import Errors, Poses, Pulses, make_pulses, reaching_scene
+from .radiometry import received, saturated
+from .returns import Echoes, Marks, chosen_echoes, group_returns, number_returns
+from .scene.target import Target
+from .trace import Hits, Rays, Traced, trace
+
+Float = NDArray[np.float64]
+Index = NDArray[np.intp]
+
+LENIENT = 0.25
+"""Share of the threshold that is enough for an echo whose intensity is yet to change: none is expected to become four
+times as bright as its material's mean makes it."""
+_SPARE = 2
+"""Factor on the returns of a pulse that are kept meanwhile: some are lost to the threshold later."""
+_UNCOUNTED = 1e-6
+"""Least reflectance that a hit has in a return's mean range, so that black surfaces have a range as well."""
+
+
+@dataclass(frozen=True)
+class Scan:
+    """All that the blocks of one scan share.
+
+    Attributes:
+        attenuation: 1/m of range.
+        wanted: names of `PointBlock`'s optional arrays to be filled.
+        targets: whether to say where each point was seen, for colours and relief: `BlockResult.seen`.
+        detects_later: intensities are yet to change, see `finish`: every echo that may pass the detector is kept, and
+            nothing saturates.
+        frame: (3,) where the scene's local frame begins, in the coordinates of the surfaces' random fields, m: those of
+            the whole road where only a section of it is scanned.
+        only: blocks that are scanned, in their order; all if None.
+        driven: whether a vehicle carries the scanner.
+    """
+
+    target: Target
+    surfaces: Surfaces
+    setting: ScannerSetting
+    path: Path
+    rings: tuple[int, ...]
+    seed: int
+    noise: Noise = Noise()  # noqa: RUF009 (frozen)
+    attenuation: float = 0.0
+    beam: Literal["conical", "cylindrical"] = "conical"
+    wanted: frozenset[str] = frozenset()
+    targets: bool = False
+    detects_later: bool = False
+    frame: Float = field(default_factory=lambda: np.zeros(3))
+    only: tuple[Block, ...] | None = None
+    driven: bool = False
+    pattern: BeamPattern = field(init=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "pattern", beam_pattern(self.rings))
+
+    @property
+    def rays_per_pulse(self) -> int:
+        """Return how many rays sample a pulse."""
+        return len(self.pattern.weights)
+
+    @property
+    def most_returns(self) -> int:
+        """Return how many returns of a pulse are kept at most."""
+        return self.setting.device.maximum_returns * (_SPARE if self.detects_later else 1)
+
+    @property
+    def cut(self) -> Blocks:
+        """Return how the pulses are cut into blocks."""
+        return Blocks(self.setting, self.path, self.rays_per_pulse)
+
+    def pulses(self, strip: Strip) -> int:
+        """Return how many pulses a strip has."""
+        return self.cut.pulses(strip)
+
+    def blocks(self) -> list[Block]:
+        """Return (strip, number) of every block that is scanned, in the order of time."""
+        return self.cut.all() if self.only is None else list(self.only)
+
+
+@dataclass(frozen=True)
+class BlockResult:
+    """The points of one block and what was counted on the way.
+
+    Attributes:
+        points: as measured.
+        seen: where, if the scan was to say so.
+        pulses, rays: emitted, and cast at what is first in their way.
+        below_threshold, saturated: returns that the detector lost or clipped.
+        sources: (256,) points by the source of their colour, once they are finished.
+        blocks: how many blocks these are.
+    """
+
+    points: PointBlock
+    seen: Targets | None
+    pulses: int
+    rays: int
+    below_threshold: int
+    saturated: int
+    sources: NDArray[np.int64] | None = None
+    blocks: int = 1
+
+
+def joined_results(results: list[BlockResult]) -> BlockResult:
+    """Return several blocks that aren't finished yet as one, in their order."""
+    seen = [result.seen for result in results if result.seen is not None]
+
+    def total(name: str) -> int:
+        return sum(getattr(result, name) for result in results)
+
+    return BlockResult(
+        points=concatenate([result.points for result in results]),
+        seen=joined_targets(seen) if seen else None,
+        pulses=total("pulses"),
+        rays=total("rays"),
+        below_threshold=total("below_threshold"),
+        saturated=total("saturated"),
+        blocks=total("blocks"),
+    )
+
+
+def scan_block(scan: Scan, strip: Strip, block: int) -> BlockResult:
+    """Scan one block; blocks can be computed in any order and by any worker."""
+    return scan_pulses(scan, strip, *scan.cut.pulses_of(strip, block), block)
+
+
+def scan_pulses(scan: Scan, strip: Strip, first: int, count: int, key: int = 0) -> BlockResult:
+    """Scan pulses ``first`` to ``first + count`` of a strip at once; ``key`` is that of their random numbers.
+
+    A block isn't cut any smaller, though its arrays leave the processor's cache: blocks are scanned side by side in
+    threads that take turns in Python, so that few long calls beat many short ones.
+    """
+    errors = Errors.drawn(scan, strip, count, key)
+    poses = Poses.between(scan, strip, *(scan.cut.time(strip, i) for i in (first, first + count - 1)))
+    pulses = make_pulses(scan, strip, poses, errors.angle, first, count)
+    number = np.arange(count)  # of each pulse within the block
+    towards = reaching_scene(scan, pulses, poses.motions)
+    if towards is not None:
+        number = np.flatnonzero(towards)
+        pulses = pulses.select(number)
+    rays = beam_rays(scan, pulses, poses.motions)
+    traced = trace(
+        scan.target, scan.surfaces, rays, poses.motions, scan.setting.minimum_range, scan.setting.maximum_range
+    )
+    echoes = echoes_of(scan, traced)
+    if scan.surfaces.varying:
+        echoes = _uneven(scan, traced, echoes, poses.motions)
+    threshold = scan.setting.threshold * (LENIENT if scan.detects_later else 1.0)
+    strong = np.flatnonzero(echoes.intensity >= threshold)
+    weak = len(echoes.pulse) - len(strong)
+    if weak:
+        echoes = chosen_echoes(echoes, strong)
+    if errors.lost is not None:
+        echoes = _kept(echoes, errors.lost[number])
+    points, seen, clipped = _points(scan, strip, pulses, traced, echoes, errors, number, poses.motions)
+    return BlockResult(points, seen, count, traced.first.face.size, weak, clipped)
+
+
+def beam_rays(scan: Scan, pulses: Pulses, motions: list[Track]) -> Rays:
+    """Return the rays that sample the pulses' footprints."""
+    origin, share = pulses.origin[:, None, :], scan.pattern.weights[:, None]
+    if scan.rays_per_pulse == 1:
+        return Rays(origin, pulses.direction[:, None, :], share, pulses.time)
+    assert pulses.in_plane is not None
+    assert pulses.across is not None
+    divergence = scan.setting.divergence
+    if scan.beam == "conical":
+        direction = conical(pulses.direction, pulses.in_plane, pulses.across, scan.pattern, divergence)
+        return Rays(origin, direction, share, pulses.time)
+    reach = scan.setting.maximum_range
+    distance = scan.target.cast(pulses.origin, pulses.direction, reach, pulses.time, motions).distance
+    offsets = cylindrical_offsets(pulses.in_plane, pulses.across, scan.pattern, divergence, distance)
+    direction = np.repeat(pulses.direction[:, None, :], scan.rays_per_pulse, axis=1)
+    return Rays(origin + offsets, direction, share, pulses.time)
+
+
+def echoes_of(scan: Scan, traced: Traced) -> Echoes:
+    """Return the returns of traced rays, before the threshold."""
+    first, behind = (_marks(scan, hits) for hits in (traced.first, traced.behind))
+    return group_returns(first, behind, traced.pulse, scan.setting.range_resolution)
+
+
+def _marks(scan: Scan, hits: Hits) -> Marks:
+    """Return what hits add to returns."""
+    surfaces, material = scan.surfaces, hits.material.ravel()
+    brightness = brightness_of(surfaces, material, np.abs(hits.along.ravel())).reshape(hits.face.shape)
+    brightness *= hits.share
+    weight = np.maximum(np.take(surfaces.reflectivity, material), _UNCOUNTED).reshape(hits.face.shape)
+    weight *= hits.share
+    return Marks(hits.distance, weight, received(brightness, hits.distance, scan.attenuation))
+
+
+def _uneven(scan: Scan, traced: Traced, echoes: Echoes, motions: list[Track]) -> Echoes:
+    """Return the echoes as bright as the places are that gave most of them, see `spread`."""
+    material = traced.pick("material", echoes.hit)
+    own = np.flatnonzero(np.take(scan.surfaces.uneven, material, mode="clip"))
+    if not len(own):
+        return echoes
+    hit = echoes.hit[own]
+    ray, reach, face = traced.ray_of(hit), traced.pick("distance", hit), traced.pick("face", hit)
+    position, _ = _where(traced.rays, ray, reach)
+    if scan.target.moving:
+        (position,) = scan.target.at_start(face, position, traced.rays.time[ray % len(traced.rays.time)], motions)
+    intensity = echoes.intensity.copy()
+    intensity[own] *= spread_factors(scan.surfaces, material[own], position.T + scan.frame, scan.seed)
+    return replace(echoes, intensity=intensity)
+
+
+def _where(rays: Rays, ray: Index, reach: Float) -> tuple[Float, Float]:
+    """Return where rays end after ``reach``, and where they began, (3, N) local, m."""
+    scanner = np.take(
+        rays.origin.reshape(3, -1), ray if rays.origin.shape[1] > 1 else ray % len(rays.time), axis=1
+    )
+    return scanner + reach * np.take(rays.direction.reshape(3, -1), ray, axis=1), scanner
+
+
+def _kept(echoes: Echoes, lost: NDArray[np.bool_]) -> Echoes:
+    """Return the echoes that are not lost at random, by their number within the pulse."""
+    keep, number, _ = number_returns(echoes.pulse, lost.shape[1])
+    chosen = np.flatnonzero(keep)
+    chosen = chosen[~lost[echoes.pulse[chosen], number - 1]]
+    return chosen_echoes(echoes, chosen)
+
+
+def _points(
+    scan: Scan,
+    strip: Strip,
+    pulses: Pulses,
+    traced: Traced,
+    echoes: Echoes,
+    errors: Errors,
+    number_in_block: Index,
+    motions: list[Track],
+) -> tuple[PointBlock, Targets | None, int]:
+    """Return the points of the echoes, where they were seen, and how many of them saturated the detector."""
+    keep, number, returns = number_returns(echoes.pulse, scan.most_returns)
+    if not keep.all():
+        echoes = chosen_echoes(echoes, keep)
+    pulse, hit, target = echoes.pulse, echoes.hit, scan.target
+    face, along = traced.pick("face", hit), traced.pick("along", hit)
+    distance = echoes.range + scan.noise.range_bias
+    if errors.range is not None:
+        own = errors.of_range(number_in_block[pulse], number, scan.most_returns)
+        distance = distance + scan.setting.range_sigma * own
+    intensity, clipped = saturated(echoes.intensity, np.inf if scan.detects_later else scan.setting.saturation)
+    normal = None
+    if scan.targets or "normal" in scan.wanted:
+        normal = target.normals(face, along, pulses.time[pulse], motions)
+    points = PointBlock(
+        xyz=_places(pulses.measured_origin, pulses.measured_direction, pulse, distance, target.origin),
+        intensity=intensity,
+        rgb=np.zeros((len(pulse), 3), dtype=np.uint16),
+        class_id=target.class_id[face],
+        instance_id=target.instance_id[face],
+        return_number=number,
+        number_of_returns=returns,
+        gps_time=pulses.time[pulse],
+        scan_angle_deg=np.rad2deg(pulses.scan_angle[pulse]).astype(np.float32),
+        strip=np.full(len(pulse), strip.index, dtype=np.uint16),
+        range=distance,
+        incidence_deg=np.rad2deg(np.arccos(np.minimum(np.abs(along), 1.0))).astype(np.float32),
+        **dict(_optional(scan, pulses, pulse, echoes.range, face, normal)),
+    )
+    seen = None
+    if scan.targets and normal is not None:
+        ray, reach = traced.ray_of(hit), traced.pick("distance", hit)
+        seen = _seen(scan, traced.rays, ray, reach, face, normal, motions)
+    return points, seen, clipped
+
+
+def _seen(
+    scan: Scan, rays: Rays, ray: Index, reach: Float, face: Index, normal: Float, motions: list[Track]
+) -> Targets:
+    """Return where the points were seen, in the scene as it stands at the time 0: as it is rendered.
+
+    That is on the surface that gave most of the return: the mean of all its hits may lie in the air between them.
+    """
+    target, time = scan.target, rays.time[ray % len(rays.time)]
+    position, scanner = _where(rays, ray, reach)
+    if target.moving:
+        begin, offset, normal = target.at_start(face, position, time, motions, (scanner - position, normal))
+        position, scanner = begin, begin + offset
+    return Targets(
+        position=np.ascontiguousarray(position.T),
+        scanner=np.ascontiguousarray(scanner.T),
+        normal=np.ascontiguousarray(normal.T),
+        material=target.material[face],
+        time=time,
+    )
+
+
+def _places(origin: Float, direction: Float, pulse: Index, distance: Float, map_origin: Float) -> Float:
+    """Return (N, 3) map coordinates."""
+    result = np.empty((len(pulse), 3))
+    for axis in range(3):
+        place = np.take(direction[axis], pulse)
+        place *= distance
+        place += np.take(origin[axis], pulse)
+        place += map_origin[axis]
+        result[:, axis] = place
+    return result
+
+
+def _optional(
+    scan: Scan, pulses: Pulses, pulse: Index, distance: Float, face: Index, normal: Float | None
+) -> Iterator[tuple[str, Any]]:
+    """Yield the optional arrays that are wanted, by name."""
+    wanted, origin = scan.wanted, scan.target.origin
+    if "normal" in wanted and normal is not None:
+        yield "normal", np.ascontiguousarray(normal.T, dtype=np.float32)
+    if "scanner" in wanted:
+        yield "scanner", pulses.origin.T[pulse] + origin
+    if "true_range" in wanted:
+        yield "true_range", distance
+    if "true_xyz" in wanted:
+        yield "true_xyz", _places(pulses.origin, pulses.direction, pulse, distance, origin)
+    if "material" in wanted:
+        yield "material", scan.target.material[face]

@@ -1,0 +1,1 @@
+"""What rays can meet: triangles, and what moves."""

@@ -1,0 +1,96 @@
+"""Which rays come near a body that moves: whole bundles of neighbouring rays are ruled out before single rays are."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..knots import Track, Way
+
+Float = NDArray[np.float64]
+Index = NDArray[np.intp]
+
+RAYS = 64
+"""Rays of a bundle. Fewer make more bundles, more make wider ones; no result depends on it."""
+_SLACK = 1e-6
+"""Added to angles, rad: an arc cosine near 1 has a rounding error of 1e-8."""
+
+
+@dataclass(frozen=True)
+class Bundles:
+    """N rays cut into B bundles of `RAYS` that follow on each other: each lies in a cone whose apex is a ball.
+
+    Attributes:
+        origins, directions: (3, N) of the rays, m and unit vectors.
+        times: (N,) when they are cast, s.
+        reach: (N,) how far they go, m.
+        time, delay: (B,) middle of a bundle's times, and half their spread, s.
+        apex, ball: (3, B) and (B,) middle and radius of the ball that holds its origins, m.
+        axis, angle: (3, B) and (B,) the cone's axis, and its largest angle against a ray, rad.
+        farthest: (B,) the longest reach, m.
+    """
+
+    origins: Float
+    directions: Float
+    times: Float
+    reach: Float
+    time: Float
+    delay: Float
+    apex: Float
+    ball: Float
+    axis: Float
+    angle: Float
+    farthest: Float
+
+    @classmethod
+    def of(cls, origins: Float, directions: Float, times: Float, reach: Float) -> Bundles:
+        """Gather rays."""
+        starts = np.arange(0, len(times), RAYS)
+        time, delay = _box(times[None], starts)
+        apex, ball = _box(origins, starts)
+        # All directions lie in a ball around the middle of their box: seen from the origin it has this angle.
+        axis, spread = _box(directions, starts)
+        length = np.sqrt(np.einsum("ib,ib->b", axis, axis))
+        angle = np.where(spread < length, np.arcsin(np.minimum(spread / np.maximum(length, 1e-300), 1.0)), np.pi)
+        axis /= np.maximum(length, 1e-300)
+        farthest = np.maximum.reduceat(reach, starts)
+        return cls(
+            origins, directions, times, reach, time[0], delay, apex, ball, axis, angle + _SLACK, farthest
+        )
+
+    def near(self, track: Track, centre: Float, radius: float) -> Index:
+        """Return the rays that come nearer to a moving ball than its radius before the end of their reach.
+
+        Args:
+            track: of the body.
+            centre: (3,) of the ball, own frame, m.
+            radius: m.
+        """
+        way = track.way(centre)
+        bundles = self._bundles_near(way, radius)
+        rays = (bundles[:, None] * RAYS + np.arange(RAYS)).ravel()
+        rays = rays[rays < len(self.times)]
+        towards = way.at(self.times[rays]) - self.origins[:, rays]
+        direction = self.directions[:, rays]
+        ahead = np.einsum("in,in->n", towards, direction)
+        towards -= np.clip(ahead, 0.0, self.reach[rays]) * direction
+        return rays[np.einsum("in,in->n", towards, towards) <= radius**2]
+
+    def _bundles_near(self, way: Way, radius: float) -> Index:
+        """Return the bundles whose cone touches the ball while they are cast."""
+        towards = way.at(self.time) - self.apex
+        away = np.sqrt(np.einsum("ib,ib->b", towards, towards))
+        room = radius + self.ball + way.fastest * self.delay
+        ahead = np.einsum("ib,ib->b", towards, self.axis)
+        off_axis = np.arccos(np.clip(ahead / np.maximum(away, 1e-300), -1.0, 1.0))
+        seen_under = np.arcsin(np.minimum(room / np.maximum(away, 1e-300), 1.0))
+        touched = (away <= room) | (off_axis <= self.angle + seen_under)
+        return np.flatnonzero(touched & (away <= self.farthest + room))
+
+
+def _box(values: Float, starts: Index) -> tuple[Float, Float]:
+    """Return the middles (C, B) of the boxes around bundles of values (C, N), and half their diagonals (B,)."""
+    low, high = (np.stack([ends.reduceat(row, starts) for row in values]) for ends in (np.minimum, np.maximum))
+    return (low + high) / 2.0, np.sqrt(np.square(high - low).sum(axis=0)) / 2.0

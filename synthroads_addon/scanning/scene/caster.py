@@ -1,0 +1,94 @@
+"""What a ray caster is, and what every caster shares: the range from the face's plane in float64."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .mesh import SceneMesh
+
+Float = NDArray[np.float64]
+
+
+class Caster(Protocol):
+    """Finds the first face that each ray meets.
+
+    Attributes:
+        name: as `scan.caster` in a scenario.
+        main_thread_only: whether `cast` must be called from Blender's main thread; else any threads may, side by side.
+    """
+
+    name: str
+    main_thread_only: bool
+
+    def cast(
+        self, origins: NDArray[np.float32], directions: NDArray[np.float32], maximum_range: float
+    ) -> NDArray[np.int32]:
+        """Return the (N,) indices of the faces hit; -1 where nothing is hit within ``maximum_range`` (m).
+
+        Args:
+            origins: (N, 3) C-contiguous, local coordinates, m.
+            directions: (N, 3) C-contiguous unit vectors.
+            maximum_range: no hit lies farther away, m.
+        """
+        ...
+
+
+class FacePlanes:
+    """The planes of a mesh's faces in float64: n . x = c.
+
+    Attributes:
+        planes: (4, T) unit normal and c, a row each; the normal of a face without area is 0.
+    """
+
+    def __init__(self, mesh: SceneMesh) -> None:
+        self.planes: Float = np.empty((4, len(mesh.triangles)))
+        for start in range(0, len(mesh.triangles), _BLOCK):
+            self._fill(mesh, slice(start, start + _BLOCK))
+
+    def _fill(self, mesh: SceneMesh, block: slice) -> None:
+        a, b, c = (mesh.vertices[mesh.triangles[block, i]].T.astype(np.float64) for i in range(3))
+        b -= a
+        c -= a
+        normal = self.planes[:3, block]
+        for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
+            normal[i] = b[j] * c[k] - b[k] * c[j]
+        length = np.sqrt(np.einsum("ij,ij->j", normal, normal))
+        normal /= np.where(length > 0.0, length, 1.0)
+        self.planes[3, block] = np.einsum("ij,ij->j", normal, a)
+
+    def meet(self, faces: NDArray[np.intp], origins: Float, directions: Float) -> tuple[Float, Float]:
+        """Return where rays meet the planes of ``faces``: range (m) and n . d, whose size is the cosine of incidence.
+
+        Args:
+            faces: (...); where negative the result has no meaning.
+            origins: (3, ...) in float64; of the faces' shape, or one that spreads to it.
+            directions: (3, ...) unit vectors in float64; of the faces' shape.
+
+        Returns:
+            (...) range, not finite for a ray in the plane or a face without area; (...) n . d, negative where the ray
+            meets the side that the normal points to.
+        """
+        # Clipped, indices needn't be checked one by one before.
+        height, product = np.take(self.planes[3], faces, mode="clip"), np.empty(faces.shape)
+        normal = np.take(self.planes[0], faces, mode="clip")
+        along = normal * directions[0]
+        height -= np.multiply(normal, origins[0], out=product)
+        for i in (1, 2):
+            np.take(self.planes[i], faces, mode="clip", out=normal)
+            along += np.multiply(normal, directions[i], out=product)
+            height -= np.multiply(normal, origins[i], out=product)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            height /= along
+        return height, along
+
+    def normals(self, faces: NDArray[np.intp], along: Float) -> Float:
+        """Return (3, H) unit normals of faces, turned towards rays with n . d = ``along`` (H,)."""
+        result = np.take(self.planes[:3], faces, axis=1)
+        result *= np.where(along > 0.0, -1.0, 1.0)
+        return result
+
+
+_BLOCK = 1 << 16

@@ -1,0 +1,116 @@
+"""`SceneMesh`: a scene as triangles with class, instance and material; what casters and radiometry read."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...base.errors import InputError
+
+_BLOCK = 1 << 18
+_SHAPES: dict[str, tuple[type, tuple[int | None, ...]]] = {
+    "vertices": (np.float32, (None, 3)),
+    "triangles": (np.int32, (None, 3)),
+    "class_id": (np.uint8, (None,)),
+    "instance_id": (np.uint32, (None,)),
+    "material": (np.uint16, (None,)),
+    "origin": (np.float64, (3,)),
+}
+
+
+@dataclass(frozen=True)
+class SceneMesh:
+    """Triangles of a scene in its local frame.
+
+    Attributes:
+        vertices: (V, 3) float32, local coordinates, m.
+        triangles: (T, 3) int32 indices into `vertices`, against the clock seen from outside.
+        class_id: (T,) uint8, see `cloud.labels`; 255 is unlabelled.
+        instance_id: (T,) uint32, number of the object that the triangle belongs to; 0 is none.
+        material: (T,) uint16 indices into `materials`.
+        materials: names of materials, those of the material table or the scene's own.
+        origin: (3,) float64 map coordinates of the local origin, m.
+
+    Raises:
+        InputError: wrong shape or type, indices out of range, or numbers that aren't finite; names the field.
+    """
+
+    vertices: NDArray[np.float32]
+    triangles: NDArray[np.int32]
+    class_id: NDArray[np.uint8]
+    instance_id: NDArray[np.uint32]
+    material: NDArray[np.uint16]
+    materials: tuple[str, ...]
+    origin: NDArray[np.float64]
+
+    def __post_init__(self) -> None:
+        for name, (dtype, shape) in _SHAPES.items():
+            array = np.asarray(getattr(self, name))
+            fits = array.ndim == len(shape) and all(
+                n in (None, m) for n, m in zip(shape, array.shape, strict=True)
+            )
+            if not fits or array.dtype != dtype:
+                wanted = f"must be {np.dtype(dtype)} of shape {shape} with None for any length"
+                raise InputError(f"scene mesh: {name}", f"{array.dtype} {array.shape}", wanted)
+        for name in ("class_id", "instance_id", "material"):
+            if len(getattr(self, name)) != len(self.triangles):
+                raise InputError(
+                    f"scene mesh: {name}", len(getattr(self, name)), f"must have {len(self.triangles)} values"
+                )
+        for name in ("vertices", "origin"):
+            if not np.isfinite(getattr(self, name)).all():
+                raise InputError(f"scene mesh: {name}", None, "must be finite numbers")
+        self._check_indices("triangles", len(self.vertices), "vertices")
+        self._check_indices("material", len(self.materials), "materials")
+
+    def _check_indices(self, name: str, count: int, target: str) -> None:
+        array = getattr(self, name)
+        if array.size and (array.min() < 0 or array.max() >= count):
+            worst = int(array.min() if array.min() < 0 else array.max())
+            raise InputError(f"scene mesh: {name}", worst, f"must index one of {count} {target}")
+
+    def __len__(self) -> int:
+        """Return the number of triangles."""
+        return len(self.triangles)
+
+    @property
+    def nbytes(self) -> int:
+        """Return the size of all arrays, bytes."""
+        return sum(value.nbytes for f in fields(self) if hasattr(value := getattr(self, f.name), "nbytes"))
+
+    def normals(self) -> NDArray[np.float64]:
+        """Return (T, 3) unit normals; triangles without area have the zero vector."""
+        result = np.empty((len(self.triangles), 3))
+        for start in range(0, len(result), _BLOCK):
+            cross = self._cross(start)
+            length = np.linalg.norm(cross, axis=1)
+            result[start : start + _BLOCK] = cross / np.where(length > 0.0, length, 1.0)[:, None]
+        return result
+
+    def areas(self) -> NDArray[np.float64]:
+        """Return (T,) areas, m2."""
+        result = np.empty(len(self.triangles))
+        for start in range(0, len(result), _BLOCK):
+            result[start : start + _BLOCK] = np.linalg.norm(self._cross(start), axis=1) / 2.0
+        return result
+
+    def _cross(self, start: int) -> NDArray[Any]:
+        """Return (B, 3) cross products of two sides of the triangles of one block, in float64."""
+        corners = self.vertices[self.triangles[start : start + _BLOCK]].astype(np.float64)
+        return np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+
+
+def empty_scene_mesh(origin: NDArray[np.float64], materials: tuple[str, ...] = ()) -> SceneMesh:
+    """Return a mesh without triangles."""
+    return SceneMesh(
+        vertices=np.empty((0, 3), np.float32),
+        triangles=np.empty((0, 3), np.int32),
+        class_id=np.empty(0, np.uint8),
+        instance_id=np.empty(0, np.uint32),
+        material=np.empty(0, np.uint16),
+        materials=materials,
+        origin=origin,
+    )

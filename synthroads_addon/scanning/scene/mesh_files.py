@@ -1,0 +1,221 @@
+"""Mesh files looked at before Blender's importers are: what they claim must lie within the file.
+
+Blender's reader of PLY ends the process where a face names a vertex that isn't there, and its reader of STL takes what
+is left of a truncated file without a word. Its reader of glTF, in Python, makes room for as many values as a header
+says.
+"""
+
+from __future__ import annotations
+
+import json
+import struct
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any, BinaryIO
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...base.errors import InputError
+
+_PLY_TYPES = {
+    **dict.fromkeys(("char", "int8"), "i1"),
+    **dict.fromkeys(("uchar", "uint8"), "u1"),
+    **dict.fromkeys(("short", "int16"), "i2"),
+    **dict.fromkeys(("ushort", "uint16"), "u2"),
+    **dict.fromkeys(("int", "int32"), "i4"),
+    **dict.fromkeys(("uint", "uint32"), "u4"),
+    **dict.fromkeys(("float", "float32"), "f4"),
+    **dict.fromkeys(("double", "float64"), "f8"),
+}
+_GLB, _JSON = 0x46546C67, 0x4E4F534A  # "glTF", "JSON"
+_COMPONENTS = {5120: 1, 5121: 1, 5122: 2, 5123: 2, 5125: 4, 5126: 4}
+_WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT2": 4, "MAT3": 9, "MAT4": 16}
+_LONGEST_HEADER = 1 << 20
+_FEW = 16
+_FAULTS = (ValueError, LookupError, TypeError, ArithmeticError, AttributeError, RecursionError, struct.error)
+"""What looking into a file raises whose content isn't what it should be."""
+_MOST_VALUES = 1 << 24
+"""Values of a glTF accessor without a buffer, which are all zero."""
+
+_Property = tuple[str, str, str]
+"""Type of a list's length ("" for a scalar), type of the values, name."""
+
+
+def check_mesh_file(path: Path) -> None:
+    """Refuse a mesh file that is truncated, or whose faces name vertices that aren't there.
+
+    Args:
+        path: a .ply, .stl or .glb that exists; files of other kinds aren't looked into.
+
+    Raises:
+        InputError: it is damaged.
+    """
+    look: dict[str, Callable[[Path], None]] = {".ply": _check_ply, ".stl": _check_stl, ".glb": _check_glb}
+    try:
+        look.get(path.suffix.lower(), lambda _: None)(path)
+    except _FAULTS as problem:
+        raise InputError(str(path), None, f"is damaged ({problem})") from None
+
+
+# --- STL ------------------------------------------------------------------------------------------------------------
+
+
+def _check_stl(path: Path) -> None:
+    """Refuse a binary STL that ends before its triangles do: a header of 80 bytes, their number, 50 bytes each."""
+    size = path.stat().st_size
+    with path.open("rb") as file:
+        head = file.read(84)
+    if head[:5] == b"solid":  # text; Blender says itself what it doesn't understand
+        return
+    if size < 84 or size < 84 + 50 * int.from_bytes(head[80:], "little"):
+        raise ValueError(f"{size:,} bytes are less than its triangles take")
+
+
+# --- PLY ------------------------------------------------------------------------------------------------------------
+
+
+def _check_ply(path: Path) -> None:
+    with path.open("rb") as file:
+        kind, elements = _ply_header(file)
+        rows = _ply_text(file, elements) if kind == "ascii" else _ply_bytes(path, file, kind, elements)
+        vertices = next((count for name, count, _ in elements if name == "vertex"), 0)
+        for numbers in rows:
+            if numbers.size and not (numbers.min() >= 0 and numbers.max() < vertices):
+                raise ValueError(f"a face names a vertex that is none of its {vertices:,}")
+
+
+def _ply_header(file: BinaryIO) -> tuple[str, list[tuple[str, int, list[_Property]]]]:
+    """Return the file's kind, and name, number and properties of its elements."""
+    kind, elements = "", list[tuple[str, int, list[_Property]]]()
+    while (line := file.readline(_LONGEST_HEADER).decode("ascii", errors="replace")) and file.tell() < _LONGEST_HEADER:
+        words = line.split()
+        if words[:1] == ["format"]:
+            kind = words[1]
+        elif words[:1] == ["element"]:
+            elements.append((words[1], int(words[2]), []))
+        elif words[:2] == ["property", "list"]:
+            elements[-1][2].append((_PLY_TYPES[words[2]], _PLY_TYPES[words[3]], words[4]))
+        elif words[:1] == ["property"]:
+            elements[-1][2].append(("", _PLY_TYPES[words[1]], words[2]))
+        elif words[:1] == ["end_header"]:
+            return kind, elements
+    raise ValueError("it ends within its header")
+
+
+def _ply_text(file: BinaryIO, elements: list[tuple[str, int, list[_Property]]]) -> Iterator[NDArray[Any]]:
+    """Yield the vertices of each face of a PLY as text."""
+    for name, count, properties in elements:
+        for _ in range(count):
+            words = file.readline().split()
+            if not words:
+                raise ValueError("it ends before its elements do")
+            if name == "face":
+                at = next(place for place, (length, _, _) in enumerate(properties) if length)
+                yield np.array(words[at + 1 : at + 1 + int(words[at])], dtype=np.int64)
+
+
+def _ply_bytes(
+    path: Path, file: BinaryIO, kind: str, elements: list[tuple[str, int, list[_Property]]]
+) -> Iterator[NDArray[Any]]:
+    """Yield the vertices of faces of a binary PLY: of all at once where all have as many, else of one by one."""
+    order = {"binary_little_endian": "<", "binary_big_endian": ">"}[kind]
+    data, at = np.memmap(path, np.uint8, "r"), file.tell()
+    for name, count, properties in elements:
+        lists = [place for place, (length, _, _) in enumerate(properties) if length]
+        if count < 0 or (len(lists) > 1 and name == "face"):
+            raise ValueError(f"its element {name} isn't understood")
+        if not lists:
+            at += count * sum(np.dtype(kind).itemsize for _, kind, _ in properties)
+        else:
+            ordered = [(length and order + length, order + kind, name) for length, kind, name in properties]
+            for numbers, end in _ply_lists(data, at, count, ordered):
+                at = end
+                if name == "face":
+                    yield numbers
+        if at > len(data):
+            raise ValueError("it ends before its elements do")
+
+
+def _ply_lists(
+    data: NDArray[np.uint8], at: int, count: int, properties: list[_Property]
+) -> Iterator[tuple[NDArray[Any], int]]:
+    """Yield the lists of an element's entries, and where the entries end that they belong to."""
+    place = next(place for place, (length, _, _) in enumerate(properties) if length)
+    before = sum(np.dtype(kind).itemsize for _, kind, _ in properties[:place])
+    after = sum(np.dtype(kind).itemsize for _, kind, _ in properties[place + 1 :])
+    length, values = np.dtype(properties[place][0]), np.dtype(properties[place][1])
+    most = _FEW
+    while count:
+        first = int(np.frombuffer(data[at + before : at + before + length.itemsize], length)[0])
+        entry = np.dtype(
+            [("before", np.uint8, before), ("length", length), ("values", values, (first,)), ("after", np.uint8, after)]
+        )
+        room = min(count, most, (len(data) - at) // entry.itemsize)
+        if room == 0:
+            raise ValueError("it ends before its elements do")
+        rows = np.frombuffer(data[at : at + room * entry.itemsize], entry)
+        others = np.flatnonzero(rows["length"] != first)
+        same = int(others[0]) if len(others) else room
+        most = 2 * most if same == room else _FEW
+        at, count = at + same * entry.itemsize, count - same
+        yield rows["values"][:same], at
+
+
+# --- glTF -----------------------------------------------------------------------------------------------------------
+
+
+def _check_glb(path: Path) -> None:
+    size = path.stat().st_size
+    with path.open("rb") as file:
+        magic, _, length, chunk, kind = struct.unpack("<5I", file.read(20))
+        if magic != _GLB or kind != _JSON:
+            raise ValueError("it is no binary glTF")
+        if length > size or chunk > size - 20:
+            raise ValueError(f"{size:,} bytes are left of {length:,}")
+        text = file.read(chunk)
+    content = json.loads(text)
+    binary = max(0, size - 20 - chunk - 8)
+    for buffer in content.get("buffers", [])[:1]:
+        if "uri" not in buffer and buffer["byteLength"] > binary:
+            raise ValueError(f"its buffer has {binary:,} bytes of {buffer['byteLength']:,}")
+    _check_views(content)
+    _check_nodes(content.get("nodes", []))
+
+
+def _check_views(content: dict[str, Any]) -> None:
+    """Refuse views beyond their buffers and accessors beyond their views."""
+    buffers, views = content.get("buffers", []), content.get("bufferViews", [])
+    for view in views:
+        if view.get("byteOffset", 0) + view["byteLength"] > buffers[view["buffer"]]["byteLength"]:
+            raise ValueError("a view lies beyond its buffer")
+    for accessor in content.get("accessors", []):
+        width = _COMPONENTS[accessor["componentType"]] * _WIDTHS[accessor["type"]]
+        if "bufferView" not in accessor:
+            fits = 0 <= accessor["count"] <= _MOST_VALUES
+        else:
+            view = views[accessor["bufferView"]]
+            step = max(view.get("byteStride", 0), width)
+            last = accessor.get("byteOffset", 0) + step * (accessor["count"] - 1) + width
+            fits = accessor["count"] > 0 and last <= view["byteLength"]
+        if not fits:
+            raise ValueError(f"an accessor claims {accessor['count']:,} values")
+
+
+def _check_nodes(nodes: list[dict[str, Any]]) -> None:
+    """Refuse nodes below themselves."""
+    parents = {}
+    for number, node in enumerate(nodes):
+        for child in node.get("children", []):
+            if child in parents or not 0 <= child < len(nodes):
+                raise ValueError(f"node {child} isn't the child of exactly one")
+            parents[child] = number
+    sound: set[int] = set()
+    for number in range(len(nodes)):
+        way = {number}
+        while (above := parents.get(number)) is not None and above not in sound:
+            if above in way:
+                raise ValueError(f"node {number} lies below itself")
+            way.add(above)
+            number = above  # noqa: PLW2901 (upwards)
+        sound |= way

@@ -1,0 +1,238 @@
+"""What moves in a scene, and how: vehicles along their lanes, other things straight on."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ...base.errors import InputError
+from ...road.alignment import finite_array
+from ...road.geometry import RoadGeometry
+from ...road.lane_lines import LaneLine, lane_of
+from ...road.parameters import Vehicle
+from ...road.things.chassis import CHASSIS, wheel_base
+from ...road.things.vehicles import VEHICLE_TYPES
+from .mesh import SceneMesh
+from .passes import Passes, passes
+
+Float = NDArray[np.float64]
+Pose = tuple[Float, Float, NDArray[np.bool_]]
+
+
+class Motion(Protocol):
+    """Where a rigid body is at any time."""
+
+    def pose(self, time: Float) -> Pose:
+        """Return rotation (K, 3, 3), translation (K, 3) and whether (K,) the body is there, at times (K,), s.
+
+        Both take the body's own frame to the local one: ``local = rotation @ own + translation``. Exact at any time,
+        finite even where the body isn't there; the same from any thread.
+        """
+
+
+@dataclass(frozen=True)
+class MovingMesh:
+    """A body that moves.
+
+    Attributes:
+        mesh: its triangles in its own frame; ``origin`` has no meaning there and is 0.
+        motion: of the own frame.
+    """
+
+    mesh: SceneMesh
+    motion: Motion
+
+
+@dataclass(frozen=True)
+class ScannedScene:
+    """What a scan meets. All meshes have the same tuple of materials.
+
+    Attributes:
+        static: what stands, in the local frame.
+        moving: what moves; at the time 0 it is where the scene shows it.
+        unmatched: patterns of the class mapping that nothing in the scene matched, e.g. ``materials: Lack*``.
+    """
+
+    static: SceneMesh
+    moving: tuple[MovingMesh, ...] = ()
+    unmatched: tuple[str, ...] = ()
+
+
+class LinearMotion:
+    """Straight on without turning. The own frame is parallel to the local one.
+
+    Args:
+        velocity: (3,) m/s.
+        place: (3,) local place of the own frame's origin at the time 0, m.
+    """
+
+    def __init__(self, velocity: ArrayLike, place: ArrayLike = (0.0, 0.0, 0.0)) -> None:
+        self.velocity = finite_array("velocity", velocity).reshape(3)
+        self.place = finite_array("place", place).reshape(3)
+
+    def pose(self, time: Float) -> Pose:
+        """Return the poses at times (K,), see `Motion`."""
+        time = np.asarray(time, dtype=np.float64)
+        rotation = np.broadcast_to(np.eye(3), (len(time), 3, 3))
+        return rotation, self.place + time[:, None] * self.velocity, np.ones(len(time), dtype=bool)
+
+
+class LaneMotion:
+    """A vehicle in its lane, with its carriageway's traffic.
+
+    Its middle keeps to the lane's centre, at its speed along that line in plan. It looks along the line (where lanes
+    widen or narrow, along the chord between its axles' places) and stands on the road with its axles' wheels, so that
+    grade and crossfall pitch and roll it as the model's nodes do. At its lane's end, which is the road's or where the
+    lane becomes too narrow to drive on, it leaves and comes in again where the lane begins: see `passes`. While a part
+    of it would stick out there it is not there at all.
+
+    The own frame has its origin on the road below the vehicle's middle, x forward, y left, z up.
+
+    Args:
+        geometry: the road.
+        vehicle: the vehicle; with a speed of 0 it stands.
+        speed_factor: share of its speed that it drives at, >= 0.
+        origin: (3,) the local frame's origin in the road's local coordinates; they are the same unless only a stretch
+            of the road was built.
+        line: of its lane, if there is one already.
+        way: when it is where, at a factor of 1; as if it were alone in its lane, if None.
+    """
+
+    def __init__(
+        self,
+        geometry: RoadGeometry,
+        vehicle: Vehicle,
+        speed_factor: float = 1.0,
+        *,
+        origin: ArrayLike = (0.0, 0.0, 0.0),
+        line: LaneLine | None = None,
+        way: Passes | None = None,
+    ) -> None:
+        self.vehicle = vehicle
+        self.line = line or lane_of(geometry, vehicle)
+        self.speed_factor = checked_factor(speed_factor)
+        self._alignment = geometry.alignment
+        self._traffic = self.line.carriageway.traffic
+        self._chassis = CHASSIS[vehicle.model]
+        self._origin = finite_array("origin", origin)
+        self._low, self._high = self.line.distance(np.array(self.line.range_at(vehicle.station))).tolist()
+        self._way = way or (_ways([vehicle], self.line)[0] if vehicle.speed > 0.0 else None)
+
+    @property
+    def stands(self) -> bool:
+        """Return whether it is always at the same place."""
+        return self._way is None or self.speed_factor == 0.0
+
+    def station(self, time: Float) -> Float:
+        """Return the stations (K,) of its middle at times (K,), m."""
+        return self._place(np.asarray(time, dtype=np.float64))[0]
+
+    def pose(self, time: Float) -> Pose:
+        """Return the poses at times (K,), see `Motion`."""
+        station, present = self._place(np.asarray(time, dtype=np.float64))
+        rotation, translation = self._standing(station)
+        return rotation, translation, present
+
+    def from_elsewhere(self, place: Float) -> LaneMotion:
+        """Return the motion of the same vehicle if it is beside a place (3,) of the local frame at the time 0."""
+        plan = (place + self._origin)[None, :2]
+        station = float(np.clip(self._alignment.project(plan)[0][0], 0.0, self._alignment.length))
+        vehicle = self.vehicle.model_copy(update={"station": station})
+        moved = LaneMotion(self.line.geometry, vehicle, self.speed_factor, origin=self._origin, line=self.line)
+        if self._way is not None and moved._way is not None and (moved._low, moved._high) == (self._low, self._high):
+            moved._way = self._way.from_elsewhere(moved._way.start)
+        return moved
+
+    def _place(self, time: Float) -> tuple[Float, NDArray[np.bool_]]:
+        """Return stations and presence (K,)."""
+        if self._way is None or self.speed_factor == 0.0:
+            return np.full(time.shape, self.vehicle.station), np.ones(time.shape, dtype=bool)
+        along, present = self._way.at(time * self.speed_factor)
+        station = self.line.station(self._low + along if self._traffic > 0 else self._high - along)
+        # The way there and back through distances leaves a nanometre: at the time 0 it is where it was put.
+        return np.where(time == 0.0, self.vehicle.station, station), present
+
+    def _standing(self, station: Float) -> tuple[Float, Float]:
+        """Return rotations (K, 3, 3) and places (K, 3) of the vehicle with its middle at stations (K,)."""
+        position, axis, bend = self._alignment.frame(station)
+        offset = self.line.offset(station)
+        middle = np.stack([position[:, 0] - offset * np.sin(axis), position[:, 1] + offset * np.cos(axis)])
+        turn = self.line.turn(station, wheel_base(self.vehicle.model) / 2.0)
+        heading = axis + turn + (0.0 if self._traffic > 0 else np.pi)
+        ahead = np.stack([np.cos(heading), np.sin(heading)])
+        left = np.stack([-ahead[1], ahead[0]])
+        front, rear, track = self._chassis
+        heights = {}
+        per_metre = self._traffic * np.cos(turn) / np.maximum(1.0 - bend * offset, 0.02)
+        for along in (rear, front):
+            for beside in (-track, track):
+                wheel = middle + along * ahead + beside * left
+                heights[along, beside] = self._height(wheel.T, station + along * per_metre)
+        behind, before = (0.5 * (heights[along, -track] + heights[along, track]) for along in (rear, front))
+        rise = (before - behind) / (front - rear)
+        roll = sum(heights[along, track] - heights[along, -track] for along in (rear, front)) / (4.0 * track)
+        forward = _unit(np.stack([*ahead, rise]))
+        side = np.stack([*left, roll])
+        side = _unit(side - (side * forward).sum(axis=0) * forward)
+        up = np.cross(forward, side, axis=0)
+        place = np.stack([*middle, behind - rise * rear]) - self._origin[:, None]
+        return np.moveaxis(np.stack([forward, side, up], axis=1), -1, 0), place.T
+
+    def _height(self, plan: Float, near: Float) -> Float:
+        """Return the road's height (K,) at places in plan (K, 2) whose stations are about those given."""
+        return self.line.height(*self._alignment.project_near(plan, near, 2.0))
+
+
+def lane_motions(
+    geometry: RoadGeometry, speed_factor: float = 1.0, origin: ArrayLike = (0.0, 0.0, 0.0)
+) -> dict[str, LaneMotion]:
+    """Return the motions of a road's vehicles by id; those that stand, because their speed is 0, are left out.
+
+    Args:
+        geometry: the road.
+        speed_factor: share of their speeds that they drive at, >= 0; with 0 all stand.
+        origin: see `LaneMotion`.
+
+    Raises:
+        InputError: the factor is negative or not a number.
+    """
+    if checked_factor(speed_factor) == 0.0:
+        return {}
+    lines: dict[tuple[str, int], LaneLine] = {}
+    groups: dict[tuple[str, int, tuple[float, float]], dict[str, Vehicle]] = {}
+    for name, vehicle in geometry.parameters.of_type(Vehicle).items():
+        lane = (vehicle.carriageway, vehicle.lane)
+        if lane not in lines:
+            lines[lane] = lane_of(geometry, vehicle)
+        if vehicle.speed > 0.0:
+            groups.setdefault((*lane, lines[lane].range_at(vehicle.station)), {})[name] = vehicle
+    motions: dict[str, LaneMotion] = {}
+    for (road, number, _), vehicles in groups.items():
+        line = lines[road, number]
+        for (name, vehicle), way in zip(vehicles.items(), _ways(list(vehicles.values()), line), strict=True):
+            motions[name] = LaneMotion(geometry, vehicle, speed_factor, origin=origin, line=line, way=way)
+    return motions
+
+
+def checked_factor(speed_factor: float) -> float:
+    """Return a factor of speeds; InputError unless it is a number >= 0."""
+    if not (np.isfinite(speed_factor) and speed_factor >= 0.0):
+        raise InputError("speed_factor", speed_factor, "must be 0 or more")
+    return float(speed_factor)
+
+
+def _ways(vehicles: list[Vehicle], line: LaneLine) -> list[Passes]:
+    """Return the passes of vehicles on one open range of a lane."""
+    low, high = line.distance(np.array(line.range_at(vehicles[0].station))).tolist()
+    middle = line.distance(np.array([vehicle.station for vehicle in vehicles]))
+    start = middle - low if line.carriageway.traffic > 0 else high - middle
+    lengths = [VEHICLE_TYPES[vehicle.model].length for vehicle in vehicles]
+    return passes(start.tolist(), [vehicle.speed for vehicle in vehicles], lengths, high - low)
+
+
+def _unit(vectors: Float) -> Float:
+    """Return vectors (3, K) with length 1."""
+    return vectors / np.sqrt((vectors * vectors).sum(axis=0))

@@ -1,0 +1,248 @@
+"""What rays can meet: the static scene and what moves in it, their faces numbered one after the other."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..knots import KeptPoses, Track, track_knots
+from .bundles import Bundles
+from .caster import Caster, FacePlanes
+from .mesh import SceneMesh
+from .motion import MovingMesh, ScannedScene
+
+Float = NDArray[np.float64]
+Faces = NDArray[np.intp]
+
+CLEARANCE = np.array([2.5, 1.0, 3.0])
+"""What a vehicle that carries the scanner takes up around it: half its length and width, and its height, m."""
+
+
+@dataclass(frozen=True)
+class _Part:
+    """A mesh of the target.
+
+    Attributes:
+        first: number of its first face among all.
+        half: (3,) half the size of the box around ``centre`` (own frame) that holds it, m.
+        radius: of the sphere that holds it, m.
+    """
+
+    caster: Caster
+    planes: FacePlanes
+    first: int
+    count: int
+    centre: Float
+    half: Float
+    radius: float
+
+
+@dataclass(frozen=True)
+class Met:
+    """What rays meet first; one value per ray, in the shape of the rays.
+
+    Attributes:
+        face: number among all faces of the target, -1 for none.
+        distance: m, inf for none.
+        along: n . d of the face's normal and the ray.
+    """
+
+    face: Faces
+    distance: Float
+    along: Float
+
+
+class Target:
+    """The scene as rays meet it.
+
+    Args:
+        scene: static mesh and moving ones.
+        make_caster: gives a caster of a mesh.
+
+    Attributes:
+        class_id: (F,) uint8 of all faces.
+        instance_id: (F,) uint32.
+        material: (F,) uint16 indices into ``materials``.
+        origin: (3,) float64 map coordinates of the local origin, m.
+        caster: the static mesh's.
+        bounds: (2, 3) float64 smallest and largest corner of the static mesh, m; None without vertices.
+    """
+
+    def __init__(self, scene: ScannedScene, make_caster: Callable[[SceneMesh], Caster]) -> None:
+        static = scene.static
+        self.materials = static.materials
+        self.origin = static.origin
+        self.moving: tuple[MovingMesh, ...] = scene.moving
+        self._poses = [KeptPoses(part.motion.pose) for part in scene.moving]
+        meshes = [static, *(part.mesh for part in scene.moving)]
+        self.class_id = _joined([mesh.class_id for mesh in meshes])
+        self.instance_id = _joined([mesh.instance_id for mesh in meshes])
+        self.material = _joined([mesh.material for mesh in meshes])
+        self.triangles = len(self.class_id)
+        self.vertices = sum(len(mesh.vertices) for mesh in meshes)
+        firsts = np.cumsum([0, *(len(mesh.triangles) for mesh in meshes)])
+        self._parts = [
+            _part(mesh, make_caster(mesh), int(first)) for mesh, first in zip(meshes, firsts[:-1], strict=True)
+        ]
+        self.caster = self._parts[0].caster
+        self.bounds = (
+            np.array([static.vertices.min(axis=0), static.vertices.max(axis=0)], dtype=np.float64)
+            if len(static.vertices)
+            else None
+        )
+
+    def motions(self, begin: float, end: float, spacing: float, driven: Track | None = None) -> list[Track]:
+        """Return the moving parts' poses between two times, on knots ``spacing`` (s) apart.
+
+        Args:
+            driven: the scanner's, if a vehicle carries it. What drives through this vehicle isn't there meanwhile:
+                others' ways know nothing of it.
+        """
+        tracks = [poses.track(begin, end, spacing) for poses in self._poses]
+        if driven is None or not tracks:
+            return tracks
+        _, scanner, _ = driven.at(track_knots(begin, end, spacing))
+        return [_out_of_the_way(track, part, scanner) for track, part in zip(tracks, self._parts[1:], strict=True)]
+
+    def moving_bounds(self, motions: list[Track]) -> list[Float]:
+        """Return (2, 3) smallest and largest corner that each moving part reaches on its way, if it is there."""
+        boxes = (track.swept(part.centre, part.radius) for part, track in zip(self._parts[1:], motions, strict=True))
+        return [np.array(box) for box in boxes if box is not None]
+
+    def cast(
+        self, origins: Float, directions: Float, maximum_range: float, times: Float, motions: list[Track]
+    ) -> Met:
+        """Return what each ray meets first.
+
+        Args:
+            origins: (3, ...) float64, local; of the directions' shape, or one that spreads to it.
+            directions: (3, ...) unit vectors.
+            maximum_range: m.
+            times: (...) when each ray is cast, s; spreads likewise.
+            motions: see `motions`; they must span ``times``.
+        """
+        met = _cast(self._parts[0], origins, directions, maximum_range)
+        if not self.moving:
+            return met
+        shape = directions.shape
+        flat_origins = np.broadcast_to(origins, shape).reshape(3, -1)
+        flat_directions, flat_times = directions.reshape(3, -1), np.broadcast_to(times, shape[1:]).ravel()
+        nearest = Met(*(getattr(met, name).ravel() for name in ("face", "distance", "along")))
+        rays = Bundles.of(flat_origins, flat_directions, flat_times, np.minimum(nearest.distance, maximum_range))
+        for part, track in zip(self._parts[1:], motions, strict=True):
+            if track.present.any():
+                _cast_moving(part, track, rays, maximum_range, nearest)
+        return Met(*(getattr(nearest, name).reshape(shape[1:]) for name in ("face", "distance", "along")))
+
+    def at_start(
+        self, faces: Faces, places: Float, times: Float, motions: list[Track], vectors: tuple[Float, ...] = ()
+    ) -> tuple[Float, ...]:
+        """Return places on faces, and directions there, as they are in the scene at the time 0.
+
+        Args:
+            faces: (H,).
+            places: (3, H) local, m, at ``times``.
+            times: (H,) s.
+            motions: see `motions`.
+            vectors: (3, H) each; turned only.
+        """
+        results = (places.copy(), *(vector.copy() for vector in vectors))
+        for part, moving, track in zip(self._parts[1:], self.moving, motions, strict=True):
+            mine = np.flatnonzero((faces >= part.first) & (faces < part.first + part.count))
+            if not len(mine):
+                continue
+            rotation, place, _ = track.at(times[mine])
+            begin_rotation, begin_place, _ = moving.motion.pose(np.zeros(1))
+            own = _inverse(rotation, places[:, mine] - place)
+            results[0][:, mine] = begin_rotation[0] @ own + begin_place[0][:, None]
+            for result, vector in zip(results[1:], vectors, strict=True):
+                result[:, mine] = begin_rotation[0] @ _inverse(rotation, vector[:, mine])
+        return results
+
+    def normals(self, faces: Faces, along: Float, times: Float, motions: list[Track]) -> Float:
+        """Return (3, H) unit normals, local, turned towards the rays that met the faces."""
+        result = np.empty((3, len(faces)))
+        for number, part in enumerate(self._parts):
+            mine = np.flatnonzero((faces >= part.first) & (faces < part.first + part.count))
+            if not len(mine):
+                continue
+            normal = part.planes.normals(faces[mine] - part.first, along[mine])
+            if number:
+                rotation, _, _ = motions[number - 1].at(times[mine])
+                normal = np.einsum("ijn,jn->in", rotation.reshape(3, 3, -1), normal)
+            result[:, mine] = normal
+        return result
+
+
+def _joined(arrays: list[NDArray[Any]]) -> NDArray[Any]:
+    return arrays[0] if len(arrays) == 1 else np.concatenate(arrays)
+
+
+def _part(mesh: SceneMesh, caster: Caster, first: int) -> _Part:
+    if len(mesh.vertices):
+        low, high = mesh.vertices.min(axis=0).astype(np.float64), mesh.vertices.max(axis=0).astype(np.float64)
+    else:
+        low = high = np.zeros(3)
+    centre = (low + high) / 2.0
+    half = (high - low) / 2.0
+    radius = float(np.linalg.norm(half)) + 1e-3
+    return _Part(caster, FacePlanes(mesh), first, len(mesh.triangles), centre, half, radius)
+
+
+def _out_of_the_way(track: Track, part: _Part, scanner: Float) -> Track:
+    """Return a part's track on which it isn't there where the scanner's vehicle is; places (3, K) at its knots."""
+    own = _inverse(track.rotation, scanner - track.position)
+    away = (np.abs(own.T - part.centre) > part.half + CLEARANCE).any(axis=1)
+    return replace(track, present=track.present & away)
+
+
+def _cast(part: _Part, origins: Float, directions: Float, maximum_range: float) -> Met:
+    """Cast rays at one part in its own frame; face numbers are those of all parts."""
+    shape = directions.shape[1:]
+    begin, towards = (np.broadcast_to(_rows(array), (*shape, 3)).reshape(-1, 3) for array in (origins, directions))
+    found = part.caster.cast(begin, towards, maximum_range)
+    face = found.reshape(shape).astype(np.intp)
+    if not part.count:
+        return Met(face, np.full(shape, np.inf), np.zeros(shape))
+    # A miss is worked out with some face and then forgotten: that is less work than to sort them out before.
+    distance, along = part.planes.meet(face, origins, directions)
+    missed = face < 0
+    edge_on = not along.all()  # in the face's plane, or a face without area
+    if edge_on:
+        missed |= ~np.isfinite(distance)
+    np.copyto(distance, np.inf, where=missed)
+    face += part.first
+    if part.first or edge_on:
+        face[missed] = -1
+    return Met(face, distance, along)
+
+
+def _rows(vectors: Float) -> NDArray[np.float32]:
+    """Return vectors (3, ...) as casters take them, (..., 3)."""
+    result = np.empty((*vectors.shape[1:], 3), dtype=np.float32)
+    for i in range(3):
+        result[..., i] = vectors[i]
+    return result
+
+
+def _cast_moving(part: _Part, track: Track, rays: Bundles, maximum_range: float, nearest: Met) -> None:
+    """Put a moving part's hits in place of farther ones; all arrays are flat."""
+    near = rays.near(track, part.centre, part.radius)
+    if not len(near):
+        return
+    rotation, place, present = track.at(rays.times[near])
+    near, rotation, place = near[present], rotation[:, present], place[:, present]
+    begin, towards = rays.origins[:, near] - place, rays.directions[:, near]
+    own = _cast(part, _inverse(rotation, begin), _inverse(rotation, towards), maximum_range)
+    closer = np.flatnonzero(own.distance < nearest.distance[near])
+    for name in ("face", "distance", "along"):
+        getattr(nearest, name)[near[closer]] = getattr(own, name)[closer]
+
+
+def _inverse(rotation: Float, vectors: Float) -> Float:
+    """Return vectors (3, N) turned back by rotations (9, N)."""
+    return np.asarray(np.einsum("jin,jn->in", rotation.reshape(3, 3, -1), vectors))

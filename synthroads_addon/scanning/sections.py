@@ -1,0 +1,181 @@
+"""A long road's scan by section: which blocks of pulses belong to which, and how much of the road they can reach.
+
+A block belongs to the section in which its middle lies. What of the road must be there for a section follows from its
+own pulses: where their rays leave the scene's heights, the corridor beside the axis, or the device's range. So a block
+meets the same surfaces whatever the sections are.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..road.geometry import RoadGeometry
+from ..road.parameters import Overpass, Vegetation
+from ..road.surface import surface_elevation
+from .blocks import Block, Blocks
+from .patterns.pattern import shots
+from .platforms.path import Strip
+
+Float = NDArray[np.float64]
+
+BORDER = 25.0
+"""What is built beyond the reach of a section's rays (m), so that where the model is cut lies beyond it as well."""
+
+_PLACES = 8
+"""Blocks of a section at whose beginning, middle and end its rays are looked at, for each strip."""
+_RUN, _TAKEN = 8192, 128
+"""Pulses in a row there, and how many of them are looked at."""
+_STEPS = 9
+"""Points along each ray that are looked at."""
+_TALLEST = 30.0
+"""Height above the ground that nothing but the tallest trees exceeds, m."""
+_BRIDGE_SIDE = 160.0
+"""Offset to which an overpass's approaches reach, m."""
+_UNEVEN = 5.0
+"""What the ground between the places that are looked at may lie beside them, m."""
+
+
+@dataclass(frozen=True)
+class Section:
+    """A part of a road that is built and scanned at once.
+
+    Attributes:
+        start, end: stations that it is of, m.
+        low, high: stations between which the road is built for it, m.
+        blocks: its blocks of pulses, in the order of time.
+    """
+
+    start: float
+    end: float
+    low: float
+    high: float
+    blocks: tuple[Block, ...]
+
+
+def sections(cut: Blocks, geometry: RoadGeometry, length: float, shadows: float = 0.0) -> Iterator[Section]:
+    """Yield the sections of a scan from the road's start to its end; without those that no block is of.
+
+    Args:
+        cut: the scan's blocks.
+        geometry: the road's.
+        length: of a section along the road, m; the last one is shorter.
+        shadows: how far something must be built, beside what the rays reach, for the shadow that it throws, m.
+    """
+    count = max(1, int(np.ceil(geometry.length / length - 1e-9)))
+    owned: list[list[Block]] = [[] for _ in range(count)]
+    for strip in cut.path.strips:
+        station = _middles(cut, geometry, strip)
+        for block, owner in enumerate(np.clip(station // length, 0, count - 1).astype(int)):
+            owned[owner].append((strip, block))
+    beyond = BORDER + shadows + _skew(geometry)
+    for number, blocks in enumerate(owned):
+        if blocks:
+            low, high = reach(cut, geometry, blocks)
+            start, end = number * length, min((number + 1) * length, geometry.length)
+            yield Section(start, end, max(low - beyond, 0.0), min(high + beyond, geometry.length), tuple(blocks))
+
+
+def reach(cut: Blocks, geometry: RoadGeometry, blocks: list[Block]) -> tuple[float, float]:
+    """Return the stations between which the rays of some blocks can meet anything."""
+    stations = []
+    for strip in {block[0].index: block[0] for block in blocks}.values():
+        own = [number for owner, number in blocks if owner.index == strip.index]
+        chosen = np.unique(np.linspace(0, len(own) - 1, _PLACES).astype(int))
+        rays = [_rays(cut, strip, own[i]) for i in chosen]
+        origin, direction = (np.concatenate(parts) for parts in zip(*rays, strict=True))
+        stations.append(_reached(cut, geometry, origin, direction))
+    return min(low for low, _ in stations), max(high for _, high in stations)
+
+
+def shadow_length(geometry: RoadGeometry) -> float:
+    """Return how far the shadows of a road's tallest things fall, m."""
+    elevation = np.deg2rad(max(geometry.parameters.environment.sun_elevation_deg, 10.0))
+    return float(_tallest(geometry) / np.tan(elevation))
+
+
+def _middles(cut: Blocks, geometry: RoadGeometry, strip: Strip) -> Float:
+    """Return the stations (B,) of the scanner in the middle of a strip's blocks."""
+    borders = [cut.pulses_of(strip, block) for block in cut.of(strip)]
+    times = np.array([cut.time(strip, first + count // 2) for first, count in borders])
+    return geometry.alignment.project(cut.path.pose(strip, times)[0][:, :2])[0]
+
+
+def _rays(cut: Blocks, strip: Strip, block: int) -> tuple[Float, Float]:
+    """Return where some of a block's pulses begin (N, 3) and their directions (N, 3): its ends are among them."""
+    first, count = cut.pulses_of(strip, block)
+    starts = sorted({first, first + max(0, (count - _RUN) // 2), first + max(0, count - _RUN)})
+    origins, directions = [], []
+    for start in starts:
+        run = min(_RUN, first + count - start)
+        taken = np.linspace(0, run - 1, min(run, _TAKEN)).astype(int)
+        shot = shots(cut.setting, start, run, False)
+        position, rotation = cut.path.pose(strip, strip.start_time + shot.time[taken])
+        origins.append(position)
+        directions.append(np.einsum("nij,jn->ni", rotation, shot.direction[:, taken]))
+    return np.concatenate(origins), np.concatenate(directions)
+
+
+def _reached(cut: Blocks, geometry: RoadGeometry, origin: Float, direction: Float) -> tuple[float, float]:
+    """Return the smallest and the largest station that rays come to where there can be anything."""
+    farthest = cut.setting.maximum_range
+    begin, _ = geometry.alignment.project(origin[:, :2])
+    lowest, highest = _heights(geometry, float(begin.min()) - farthest, float(begin.max()) + farthest)
+    rise = direction[:, 2]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        down, up = (lowest - origin[:, 2]) / rise, (highest - origin[:, 2]) / rise
+    # From where to where a ray is between the lowest and the highest that there is.
+    level = np.abs(rise) < 1e-9
+    inside = (origin[:, 2] >= lowest) & (origin[:, 2] <= highest)
+    first = np.where(level, np.where(inside, 0.0, np.inf), np.clip(np.minimum(down, up), 0.0, None))
+    last = np.where(level, farthest, np.clip(np.maximum(down, up), None, farthest))
+    meets = np.flatnonzero(first <= last)
+    if not len(meets):
+        return float(begin.min()), float(begin.max())
+    share = np.linspace(0.0, 1.0, _STEPS)
+    along = first[meets, None] + (last - first)[meets, None] * share
+    footprint = 0.5 * max(cut.setting.divergence) * float(along.max())
+    places = (origin[meets, None, :2] + along[..., None] * direction[meets, None, :2]).reshape(-1, 2)
+    station, offset = geometry.alignment.project(places)
+    near = station[np.abs(offset) <= _corridor(geometry) + footprint]
+    every = np.concatenate([near, begin])
+    return float(every.min()) - footprint, float(every.max()) + footprint
+
+
+def _skew(geometry: RoadGeometry) -> float:
+    """Return how far along the road an overpass reaches at most from where it crosses, m."""
+    bridges = geometry.parameters.of_type(Overpass).values()
+    lengths = [abs(np.sin(np.deg2rad(item.rotation_deg))) * _BRIDGE_SIDE + item.width for item in bridges]
+    return float(max(lengths, default=0.0))
+
+
+def _corridor(geometry: RoadGeometry) -> float:
+    """Return the largest offset at which there is anything, m."""
+    parameters = geometry.parameters
+    edges = [float(section.road_edge([0.0, *section.kinks()]).max()) for section in geometry.sections.values()]
+    reach = [*edges, parameters.terrain.half_width if parameters.terrain else 0.0]
+    return max(reach) + (_BRIDGE_SIDE if parameters.of_type(Overpass) else 0.0)
+
+
+def _heights(geometry: RoadGeometry, start: float, end: float) -> tuple[float, float]:
+    """Return the lowest and the highest local elevation of what there is between two stations, m."""
+    station = np.linspace(max(start, 0.0), min(end, geometry.length), 60)
+    wide = _corridor(geometry)
+    offset = np.linspace(-wide, wide, 9)
+    pairs: Any = np.meshgrid(station, offset)
+    height = surface_elevation(geometry, *(part.ravel() for part in pairs))
+    axis = geometry.profile.elevation(station)
+    lowest = min(float(np.nanmin(height)), float(axis.min()))
+    highest = max(float(np.nanmax(height)), float(axis.max()))
+    return lowest - _UNEVEN, highest + _UNEVEN + _tallest(geometry)
+
+
+def _tallest(geometry: RoadGeometry) -> float:
+    """Return the height of the tallest things beside or over a road, m."""
+    plants = [item.height_max * 1.3 for item in geometry.parameters.of_type(Vegetation).values()]
+    others = [float(getattr(item, "height", 0.0)) for item in geometry.parameters.objects.values()]
+    return max([_TALLEST, *plants, *others])

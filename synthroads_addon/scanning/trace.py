@@ -1,0 +1,165 @@
+"""Rays followed through permeable surfaces: all that each of them meets, and the share of light that arrives there."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..materials.surfaces import Surfaces
+from .knots import Track
+from .scene.target import Target
+
+Float = NDArray[np.float64]
+
+LAYERS = 8
+"""Surfaces that a ray passes at most."""
+FAINTEST = 1e-2
+"""A ray ends where less than this of its own light is left."""
+_BEYOND = 1e-3
+"""A ray goes on this far, m, behind the surface that it has passed: farther than float32 rounds."""
+
+
+@dataclass(frozen=True)
+class Rays:
+    """K rays of each of P pulses.
+
+    The pulses stand side by side, so that sums over a pulse's rays are sums of long rows.
+
+    Attributes:
+        origin: (3, 1 or K, P) float64, local.
+        direction: (3, K, P) unit vectors.
+        share: (K, 1) of the pulse's energy.
+        time: (P,) s.
+    """
+
+    origin: Float
+    direction: Float
+    share: Float
+    time: Float
+
+
+@dataclass(frozen=True)
+class Hits:
+    """Surfaces that rays meet; all arrays have one shape.
+
+    Attributes:
+        face: number among all faces of the target; -1 for none.
+        material: of the face; any for none. As wide as indices are: looking tables up is several times faster then.
+        distance: range from the ray's origin, m; inf for none, or where it is out of the device's reach.
+        along: n . d of the face's normal and the ray.
+        share: of the pulse's energy that the surface takes: what arrives less what goes through. It may spread to the
+            shape of the others.
+    """
+
+    face: NDArray[np.intp]
+    material: NDArray[np.intp]
+    distance: Float
+    along: Float
+    share: Float
+
+
+@dataclass(frozen=True)
+class Traced:
+    """All that the rays of a block meet.
+
+    Attributes:
+        rays: the rays.
+        first: (K, P) what each ray meets first.
+        behind: (B,) what rays meet behind permeable surfaces.
+        ray: (B,) rays of these: k * P + p for ray k of pulse p.
+    """
+
+    rays: Rays
+    first: Hits
+    behind: Hits
+    ray: NDArray[np.intp]
+
+    @property
+    def pulse(self) -> NDArray[np.intp]:
+        """Return the pulses (B,) of what lies behind."""
+        return np.asarray(self.ray % self.first.face.shape[1])
+
+    def ray_of(self, hits: NDArray[np.intp]) -> NDArray[np.intp]:
+        """Return the rays of hits, numbered as in `returns.Echoes`."""
+        late = np.flatnonzero(hits >= self.first.face.size)
+        result = hits.copy()
+        result[late] = self.ray[hits[late] - self.first.face.size]
+        return result
+
+    def pick(self, name: str, hits: NDArray[np.intp]) -> NDArray[Any]:
+        """Return an attribute of chosen hits, numbered as in `returns.Echoes`."""
+        first, behind = getattr(self.first, name).ravel(), getattr(self.behind, name)
+        if not len(behind):
+            return np.asarray(np.take(first, hits))
+        late = np.flatnonzero(hits >= len(first))
+        result = np.take(first, hits, mode="clip")
+        result[late] = behind[hits[late] - len(first)]
+        return np.asarray(result)
+
+
+def trace(
+    target: Target, surfaces: Surfaces, rays: Rays, motions: list[Track], nearest: float, farthest: float
+) -> Traced:
+    """Follow rays to what they meet between two ranges (m).
+
+    The shares taken along one ray never add up to more than its own.
+    """
+    met = target.cast(rays.origin, rays.direction, farthest, rays.time, motions)
+    material = np.take(target.material, met.face, mode="clip").astype(np.intp)
+    if not surfaces.permeable:
+        first = Hits(met.face, material, _within(met.distance, nearest, np.inf), met.along, rays.share)
+        return _traced(rays, first, [], [])
+    on = np.flatnonzero(np.take(surfaces.pervious, material, mode="clip"))
+    on = on[np.take(met.distance, on) < farthest]
+    through = surfaces.transmission[np.take(material, on)]
+    share = np.broadcast_to(rays.share, material.shape).copy()
+    left = np.take(share, on)
+    share.ravel()[on] = left * (1.0 - through)
+    start = np.take(met.distance, on)
+    first = Hits(met.face, material, _within(met.distance, nearest, np.inf), met.along, share)
+    layers, rays_on = [], []
+    left *= through
+    for _ in range(LAYERS - 1):
+        bright = np.flatnonzero(left > FAINTEST * np.take(rays.share, on // material.shape[1]))
+        if not len(bright):
+            break
+        on, left, start = on[bright], left[bright], start[bright] + _BEYOND
+        pulse = on % material.shape[1]
+        direction = np.take(rays.direction.reshape(3, -1), on, axis=1)
+        origin = np.take(rays.origin.reshape(3, -1), on if rays.origin.shape[1] > 1 else pulse, axis=1)
+        origin += start * direction
+        met = target.cast(origin, direction, farthest, rays.time[pulse], motions)
+        hit = np.flatnonzero(met.face >= 0)
+        on, left, start = on[hit], left[hit], start[hit] + met.distance[hit]
+        face = met.face[hit]
+        own = np.take(target.material, face).astype(np.intp)
+        through = np.take(surfaces.transmission, own)
+        layers.append(Hits(face, own, _within(start, nearest, farthest), met.along[hit], left * (1.0 - through)))
+        rays_on.append(on)
+        left = left * through
+    return _traced(rays, first, layers, rays_on)
+
+
+def _traced(rays: Rays, first: Hits, layers: list[Hits], on: list[NDArray[np.intp]]) -> Traced:
+    """Return everything; of what lies behind only what is within reach."""
+    if not layers:
+        nothing = Hits(*(np.empty(0, dtype=getattr(first, field.name).dtype) for field in fields(Hits)))
+        return Traced(rays, first, nothing, np.empty(0, dtype=np.intp))
+    behind = Hits(*(np.concatenate([getattr(layer, field.name) for layer in layers]) for field in fields(Hits)))
+    inside = np.flatnonzero(behind.distance < np.inf)
+    chosen = Hits(*(getattr(behind, field.name)[inside] for field in fields(Hits)))
+    return Traced(rays, first, chosen, np.concatenate(on)[inside])
+
+
+def _within(distance: Float, nearest: float, farthest: float) -> Float:
+    """Return ranges; inf where nothing is recorded: what lies there has taken its share of the light all the same.
+
+    What rays meet first is never farther than they were cast, so there ``farthest`` is inf.
+    """
+    if distance.size == 0 or (farthest == np.inf and distance.min() >= nearest):
+        return distance
+    outside = (distance < nearest) | (distance > farthest)
+    return np.where(outside, np.inf, distance) if outside.any() else distance

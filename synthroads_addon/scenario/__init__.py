@@ -1,0 +1,1 @@
+"""The scenario: the one description of a job."""

@@ -1,0 +1,58 @@
+"""`CloudScenario`: which files the cloud is written to, and what they hold of each point."""
+
+from __future__ import annotations
+
+from typing import Literal, get_args
+
+from pydantic import Field, model_validator
+
+from ..base.classes import ClassScheme, class_scheme
+from ..base.schema import quantity
+from ..cloud.layers import DEFAULT_ATTRIBUTES, Attribute, needs
+from .road import ScenarioModel
+
+CloudFormat = Literal["laz", "las", "ply", "e57", "npz"]
+Intensity = Literal["received", "range_corrected"]
+CLOUD_FORMATS: tuple[CloudFormat, ...] = get_args(CloudFormat)
+
+__all__ = ["CLOUD_FORMATS", "CloudFormat", "CloudScenario", "Intensity", "needs"]
+
+
+class CloudScenario(ScenarioModel):
+    """The cloud's files and their content."""
+
+    formats: tuple[CloudFormat, ...] = Field(("laz",), min_length=1, description="Kinds of files.")
+    attributes: tuple[Attribute, ...] = Field(
+        DEFAULT_ATTRIBUTES, description="What is kept of each point beyond what every cloud holds."
+    )
+    classes: str = Field("17", min_length=1, description="17, 5, or a JSON file of classes of one's own.")
+    point_spacing: float | None = quantity(
+        None, ge=0.001, le=10, unit="m", description="Grid of which one point per cell is kept; all if not given."
+    )
+    intensity: Intensity = Field(
+        "received", description="As received, or times the squared range: what instruments call reflectance."
+    )
+    intensity_scale: float | None = quantity(
+        None, gt=0, unit="1", description="16-bit steps per unit of intensity; by the usual range if not given."
+    )
+
+    @model_validator(mode="after")
+    def _nothing_twice(self) -> CloudScenario:
+        for name in ("formats", "attributes"):
+            values = getattr(self, name)
+            twice = next((value for value in values if values.count(value) > 1), None)
+            if twice is not None:
+                raise ValueError(f"{name} names {twice} twice")
+        return self
+
+    def file_names(self) -> tuple[str, ...]:
+        """Return the names of the files, ``cloud.laz`` and the like."""
+        return tuple(f"cloud.{kind}" for kind in self.formats)
+
+    def arrays(self) -> frozenset[str]:
+        """Return the names of the `PointBlock` arrays that the attributes are made of: no other need be computed."""
+        return frozenset[str]().union(*(needs(name) for name in self.attributes))
+
+    def scheme(self) -> ClassScheme:
+        """Return the scheme of the classes; raise `InputError` if there is no such scheme."""
+        return class_scheme(self.classes)

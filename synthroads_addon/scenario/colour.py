@@ -1,0 +1,105 @@
+"""`ColourScenario`: where the points' colours and material layers come from, and how finely they are rendered."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Literal
+
+from pydantic import Field, model_validator
+
+from ..base.schema import quantity
+from .road import ScenarioModel
+
+ColourSource = Literal["auto", "images", "returns", "material"]
+Engine = Literal["cycles", "eevee"]
+ColourMode = Literal["lit", "unlit", "false_colour"]
+Lighting = Literal["direct", "path"]
+
+
+USUAL_RANGE = 60.0
+"""Range that the fidelities' spacings and pixels are meant for, m."""
+_LEAST_SCALE = 0.5
+
+
+def image_scale(typical_range: float) -> float:
+    """Return how many times as far apart and as coarse images are as from `USUAL_RANGE`, seen from a range (m)."""
+    return max(typical_range / USUAL_RANGE, _LEAST_SCALE)
+
+
+class ColourScenario(ScenarioModel):
+    """Colours and material layers of the points. What isn't given is the fidelity's own value."""
+
+    source: ColourSource = Field(
+        "auto",
+        description="Images along the path, a pixel per return (Blender 5.0 and newer), or each material's mean; "
+        "auto takes a pixel per return where Blender has it.",
+    )
+    rgb: bool = Field(True, description="Whether the points are coloured; without, RGB is 0 and needs no light.")
+    engine: Engine = Field("cycles", description="Renderer of the images.")
+    mode: ColourMode = Field(
+        "lit",
+        description="RGB under sun and sky, of the base colour, or of the layers: roughness, metallic, specular "
+        "as red, green, blue.",
+    )
+    lighting: Lighting = Field(
+        "direct",
+        description="Sun with shadows and an open sky, without noise; or whole light paths, which need more samples.",
+    )
+    image_spacing: float | None = quantity(
+        None, ge=0.5, le=1000, unit="m", description="Distance between two images along the path."
+    )
+    ground_sampling_distance: float | None = quantity(
+        None, ge=0.002, le=10, unit="m", description="Width of a pixel on the ground, or at the platform's usual range."
+    )
+    samples: int | None = quantity(None, ge=1, le=4096, unit="1", description="Samples per pixel of the lit colours.")
+    max_resolution: int = quantity(4096, ge=16, le=16384, unit="px", description="Largest side of an image.")
+    intensity_from_layers: bool = Field(
+        False, description="Intensities from each point's own layers, in place of its material's means."
+    )
+
+    @model_validator(mode="after")
+    def _direct_needs_no_samples(self) -> ColourScenario:
+        if self.lighting == "direct" and (self.samples or 1) > 1:
+            raise ValueError("samples can't be given for direct lighting, which has no noise")
+        return self
+
+    def settings(self, fidelity: str, typical_range: float = USUAL_RANGE) -> ColourSettings:
+        """Return the numbers that a fidelity (draft, standard, high) stands for, after the scenario's own.
+
+        Args:
+            fidelity: draft, standard or high.
+            typical_range: the platform's usual range, m: images from farther away are farther apart and coarser.
+        """
+        preset = COLOUR_FIDELITIES[fidelity]
+        scale = image_scale(typical_range)
+
+        def pick(own: Any, otherwise: Any) -> Any:
+            return otherwise if own is None else own
+
+        return ColourSettings(
+            image_spacing=pick(self.image_spacing, preset.image_spacing * scale),
+            ground_sampling_distance=pick(self.ground_sampling_distance, preset.ground_sampling_distance * scale),
+            samples=pick(self.samples, 1 if self.lighting == "direct" else preset.samples),
+        )
+
+
+@dataclass(frozen=True)
+class ColourSettings:
+    """What trades speed for accuracy.
+
+    Attributes:
+        image_spacing: distance between two images along the path, m.
+        ground_sampling_distance: width of a pixel at the usual range, m.
+        samples: samples per pixel of the lit colours.
+    """
+
+    image_spacing: float
+    ground_sampling_distance: float
+    samples: int
+
+
+COLOUR_FIDELITIES = {
+    "draft": ColourSettings(image_spacing=40.0, ground_sampling_distance=0.25, samples=4),
+    "standard": ColourSettings(image_spacing=30.0, ground_sampling_distance=0.15, samples=16),
+    "high": ColourSettings(image_spacing=15.0, ground_sampling_distance=0.06, samples=64),
+}

@@ -1,0 +1,286 @@
+"""`RoadScenario`: the limits that a road is sampled within. Every drawn value has its interval here."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal
+
+from pydantic import Discriminator, Field, Tag, model_validator
+
+from ..base.schema import Model, quantity
+from ..road.guidelines import SECTIONS_OF_CLASS, STANDARD_CROSS_SECTIONS, USUAL_SECTION, design_class_of
+from ..road.section import SHORTEST_DASH
+from ..road.surroundings import GRASSES, SHRUBS, TREES
+
+Finite = Annotated[float, Field(strict=True, ge=-1e8, le=1e8)]
+
+
+class ScenarioModel(Model):
+    """Base of the scenario's parts; a scenario has no vendor keys."""
+
+    vendor_keys_allowed = False
+
+
+class Interval(ScenarioModel):
+    """Limits that a sampled value lies within."""
+
+    minimum: Finite = Field(description="Smallest value.")
+    maximum: Finite = Field(description="Largest value.")
+
+    @model_validator(mode="after")
+    def _in_order(self) -> Interval:
+        if self.maximum < self.minimum:
+            raise ValueError(f"maximum {self.maximum} must not be less than minimum {self.minimum}")
+        return self
+
+
+def interval(low: float, high: float, unit: str, description: str) -> Any:
+    """Declare an interval with its default limits."""
+    return Field(Interval(minimum=low, maximum=high), description=description, json_schema_extra={"unit": unit})
+
+
+def share(default: float, description: str) -> Any:
+    """Declare a probability that a road (or a carriageway) has something."""
+    return quantity(default, ge=0, le=1, unit="1", description=description)
+
+
+class FreeCrossSection(ScenarioModel):
+    """One direction of a cross-section by hand, lanes from outside to inside."""
+
+    lanes: tuple[Annotated[float, Field(strict=True, ge=2, le=6)], ...] = Field(
+        min_length=1, max_length=8, description="Widths of the lanes, m.", json_schema_extra={"unit": "m"}
+    )
+    hard_shoulder: float = quantity(2.5, ge=0, le=6, unit="m", description="Width of the hard shoulder.")
+    outer_edge_strip: float = quantity(0.5, ge=0.3, le=2, unit="m", description="Width of the outer edge strip.")
+    inner_edge_strip: float = quantity(0.5, ge=0.15, le=2, unit="m", description="Width of the inner edge strip.")
+    median: float = quantity(4.0, ge=0.5, le=40, unit="m", description="Width of the median.")
+    verge: float = quantity(1.5, ge=0.5, le=5, unit="m", description="Width of the verge.")
+
+
+def _form(section: object) -> str | None:
+    """Return whether a cross-section is a standard one's name or a free one: only that form's faults are told."""
+    if isinstance(section, str):
+        return "name"
+    return "free" if isinstance(section, dict | FreeCrossSection) else None
+
+
+CrossSection = Annotated[
+    Annotated[str, Tag("name")] | Annotated[FreeCrossSection, Tag("free")],
+    Discriminator(_form, "cross_section_type", "must be a standard cross-section's name or a JSON object with lanes"),
+]
+"""A standard cross-section's name, or one by hand."""
+
+
+class LaneChangeLimits(ScenarioModel):
+    """Lane drops and gains."""
+
+    share: float = share(0.25, "Probability that a carriageway of three lanes or more drops or gains one.")
+    taper_length: Interval = interval(80.0, 200.0, "m", "Length over which a lane begins or ends.")
+
+
+class TurnoutLimits(ScenarioModel):
+    """Exits, entries and emergency bays."""
+
+    exits: float = share(0.3, "Probability that a carriageway long enough has an exit.")
+    entries: float = share(0.3, "Probability that a carriageway long enough has an entry.")
+    emergency_bays: float = share(0.3, "Probability that a carriageway long enough has an emergency bay.")
+    lane_length: Interval = interval(150.0, 300.0, "m", "Length of a deceleration or acceleration lane.")
+    taper_length: Interval = interval(30.0, 60.0, "m", "Length of its taper.")
+    lane_width: Interval = interval(3.5, 3.75, "m", "Width of a deceleration or acceleration lane.")
+    shoulder_width: Interval = interval(0.0, 2.0, "m", "Hard shoulder beside it.")
+    ramp_length: Interval = interval(65.0, 100.0, "m", "Length of the ramp that is built; never above its A.")
+    ramp_clothoid: Interval = interval(75.0, 120.0, "m", "Clothoid parameter A of the ramp.")
+    bay_length: Interval = interval(40.0, 60.0, "m", "Length of an emergency bay at full width.")
+    bay_taper_length: Interval = interval(20.0, 30.0, "m", "Length of its tapers.")
+    bay_width: Interval = interval(3.0, 3.5, "m", "Width of an emergency bay.")
+
+
+class PavementLimits(ScenarioModel):
+    """What the carriageways are paved with, and their damage."""
+
+    concrete: float = share(0.2, "Probability of a concrete pavement.")
+    rutted: float = share(0.3, "Probability that a carriageway's outer lane is rutted.")
+    rut_depth: Interval = interval(0.004, 0.025, "m", "Depth of ruts.")
+    rut_width: Interval = interval(0.6, 1.0, "m", "Width of a wheel track.")
+    potholes_per_km: Interval = interval(0.0, 8.0, "1/km", "Potholes per km of carriageway.")
+    pothole_size: Interval = interval(0.1, 0.8, "m", "Diameters of potholes.")
+    pothole_depth: Interval = interval(0.01, 0.06, "m", "Depth of potholes.")
+
+
+class MarkingLimits(ScenarioModel):
+    """Line markings; what isn't given follows the RMS."""
+
+    lane_dash: float | None = quantity(
+        None, ge=SHORTEST_DASH, le=100, unit="m", description="Dash of lane lines; 6 m by the RMS."
+    )
+    lane_gap: float | None = quantity(
+        None, ge=SHORTEST_DASH, le=100, unit="m", description="Gap of lane lines; 12 m by the RMS."
+    )
+    film_thickness: Interval = interval(0.0015, 0.004, "m", "Thickness of the film.")
+
+
+class BarrierLimits(ScenarioModel):
+    """Guardrails, concrete barriers and noise barriers."""
+
+    median: bool = Field(True, description="A barrier in the median.")
+    roadside: bool = Field(True, description="Barriers at the edges, by the safety rules.")
+    concrete_median: float = share(0.3, "Probability that the median's barrier is of concrete.")
+    concrete_roadside: float = share(0.1, "Probability that a roadside barrier is of concrete.")
+    guardrail_height: Interval = interval(0.75, 0.9, "m", "Top of guardrails.")
+    noise_barrier: float = share(0.25, "Probability of a noise barrier beside a carriageway.")
+    noise_barrier_height: Interval = interval(2.5, 6.0, "m", "Height of noise barriers.")
+    noise_barrier_length: Interval = interval(100.0, 800.0, "m", "Length of noise barriers.")
+
+
+class FurnitureLimits(ScenarioModel):
+    """Signs, gantries and equipment."""
+
+    signs: bool = Field(True, description="Traffic signs.")
+    delineators: bool = Field(True, description="Delineator posts.")
+    gantries: float = share(0.3, "Probability of a gantry, where no spacing is given.")
+    gantry_spacing: float | None = quantity(
+        None, ge=1, le=10_000, unit="m", description="Spacing of gantries; they then stand all along."
+    )
+    gantry_clearance: Interval = interval(5.0, 5.8, "m", "Clearance under gantries.")
+    lighting: float = share(0.15, "Probability of lighting poles.")
+    lighting_spacing: Interval = interval(35.0, 50.0, "m", "Spacing of lighting poles.")
+    lighting_height: Interval = interval(10.0, 14.0, "m", "Height of lighting poles.")
+    surveillance: float = share(0.2, "Probability of a surveillance pole.")
+    surveillance_height: Interval = interval(8.0, 15.0, "m", "Height of surveillance poles.")
+    traffic_lights: float = share(0.3, "Probability that an entry is metered by traffic lights.")
+    kilometre_boards: bool = Field(True, description="Kilometre boards every 500 m.")
+    emergency_phones: bool = Field(True, description="Emergency phones every 2 km.")
+    cabinets_per_km: Interval = interval(0.0, 3.0, "1/km", "Utility cabinets per km.")
+    overpass: float = share(0.15, "Probability of an overpass.")
+    overpass_clearance: Interval = interval(4.7, 5.6, "m", "Clearance under an overpass.")
+    overpass_width: Interval = interval(6.0, 14.0, "m", "Width of an overpass.")
+    construction_zone: float = share(0.1, "Probability that a carriageway long enough has a construction zone.")
+    construction_length: Interval = interval(120.0, 400.0, "m", "Length of a construction zone.")
+
+
+class VehicleLimits(ScenarioModel):
+    """Traffic."""
+
+    per_km: Interval = interval(0.0, 25.0, "1/km", "Vehicles per km of carriageway.")
+    trucks: Interval = interval(0.1, 0.35, "1", "Share of trucks, semitrailers and buses.")
+    speed: Interval = interval(22.0, 36.0, "m/s", "Speed of cars; trucks drive at most 25 m/s.")
+
+
+class VegetationLimits(ScenarioModel):
+    """Species and sizes of plants; their densities stand beside."""
+
+    trees: tuple[Literal[TREES], ...] = Field(TREES, min_length=1, description="Species of trees.")  # type: ignore[valid-type]
+    shrubs: tuple[Literal[SHRUBS], ...] = Field(SHRUBS, min_length=1, description="Species of shrubs.")  # type: ignore[valid-type]
+    grasses: tuple[Literal[GRASSES], ...] = Field(GRASSES, min_length=1, description="Species of grass.")  # type: ignore[valid-type]
+    tree_height: Interval = interval(4.0, 16.0, "m", "Height of trees.")
+    shrub_height: Interval = interval(0.5, 3.0, "m", "Height of shrubs.")
+    grass_height: Interval = interval(0.08, 0.5, "m", "Height of grass.")
+
+
+class EnvironmentLimits(ScenarioModel):
+    """Light and weather."""
+
+    sun_azimuth_deg: Interval = interval(0.0, 360.0, "deg", "Direction of the sun, clockwise from north.")
+    sun_elevation_deg: Interval = interval(20.0, 62.0, "deg", "Height of the sun.")
+    cloud_cover: Interval = interval(0.0, 0.6, "1", "Share of the ground in clouds' shadow.")
+    wet: float = share(0.15, "Probability of a wet road.")
+    wetness: Interval = interval(0.3, 1.0, "1", "Wetness of a wet road.")
+    bad_weather: float = share(0.15, "Probability of haze, fog, rain, snow or dust.")
+
+
+class MaterialLimits(ScenarioModel):
+    """How much roads' materials differ."""
+
+    asphalt_age: Interval = interval(0.0, 1.0, "1", "0 new and black, 1 old and bright.")
+    asphalt_brightness: Interval = interval(0.85, 1.2, "1", "Factor on the base colour.")
+    patch_density: Interval = interval(0.0, 2.0, "1/100 m", "Repaired patches per 100 m.")
+    crack_density: Interval = interval(0.0, 0.6, "1", "0 no cracks, 1 cracked all over.")
+    wheel_track_polish: Interval = interval(0.0, 0.6, "1", "Polish of the wheel tracks.")
+    concrete_brightness: Interval = interval(0.85, 1.2, "1", "Factor on the base colour.")
+    paint_wear: Interval = interval(0.0, 0.5, "1", "Share of the markings' film worn off.")
+    grass_dryness: Interval = interval(0.0, 0.8, "1", "0 green, 1 dry.")
+    soil_brightness: Interval = interval(0.8, 1.25, "1", "Factor on the base colour.")
+
+
+class RoadScenario(ScenarioModel):
+    """Limits that the road is sampled within."""
+
+    design_class: Literal["EKA1A", "EKA1B", "EKA2", "EKA3"] = Field(
+        "EKA1A", description="Design class (RAA); if not given, the first that has the cross-section."
+    )
+    cross_section: CrossSection = Field(
+        "RQ31", description="Standard cross-section, or one by hand; if not given, EKA2 has RQ28 and EKA3 RQ25."
+    )
+    lanes: int | None = quantity(
+        None, ge=1, le=8, unit="1", description="Lanes per direction; the cross-section's if not given."
+    )
+    lane_width: float | None = quantity(
+        None, ge=2, le=6, unit="m", description="Width of every lane; the cross-section's if not given."
+    )
+    median_width: float | None = quantity(
+        None, ge=0.5, le=40, unit="m", description="Width of the median; the cross-section's if not given."
+    )
+    length: float = quantity(600.0, ge=1, le=200_000, unit="m", description="Length of the centreline.")
+    radius: Interval | None = Field(
+        None,
+        description="Radii of curves; from the class's smallest to 5000 m if not given.",
+        json_schema_extra={"unit": "m"},
+    )
+    grade_percent: Interval | None = Field(
+        None, description="Longitudinal grades; the class's if not given.", json_schema_extra={"unit": "%"}
+    )
+    placement: Literal["rules", "random"] = Field(
+        "rules", description="Furniture by the safety rules, or at random within its limits."
+    )
+    lane_changes: LaneChangeLimits = Field(LaneChangeLimits(), description="Lane drops and gains.")
+    turnouts: TurnoutLimits = Field(TurnoutLimits(), description="Exits, entries, emergency bays.")
+    pavement: PavementLimits = Field(PavementLimits(), description="Pavement and its damage.")
+    markings: MarkingLimits = Field(MarkingLimits(), description="Line markings.")
+    barriers: BarrierLimits = Field(BarrierLimits(), description="Guardrails and other barriers.")
+    furniture: FurnitureLimits = Field(FurnitureLimits(), description="Signs, gantries, equipment.")
+    vehicles: VehicleLimits = Field(VehicleLimits(), description="Traffic.")
+    embankment_height: Interval = interval(-4.0, 5.0, "m", "Mean height of the road above the ground.")
+    undulation: Interval = interval(0.05, 0.8, "m", "Standard deviation of the ground.")
+    wavelength: Interval = interval(30.0, 60.0, "m", "Shortest wavelength of the ground's undulation.")
+    batter_slope: Interval = interval(1.5, 2.5, "m/m", "Run of the batter per height.")
+    half_width: float = quantity(78.0, ge=5, le=1000, unit="m", description="Reach built to either side.")
+    elevation_model: str | None = Field(
+        None, description="File of a digital elevation model (GeoTIFF, ESRI ASCII grid) instead of generated ground."
+    )
+    epsg: int = quantity(25832, ge=1024, le=99_999_999, unit="1", description="Map coordinate system.")
+    map_origin: tuple[Finite, Finite, Finite] = Field(
+        (294_000.0, 5_628_000.0, 180.0),
+        description="Map coordinates (east, north, elevation) of the local origin, m.",
+    )
+    grass_density: float = quantity(0.8, ge=0, le=50, unit="1/m2", description="Tufts of grass per area.")
+    shrubs_per_hectare: float = quantity(60.0, ge=0, le=5000, unit="1/ha", description="Shrubs per hectare.")
+    trees_per_hectare: float = quantity(40.0, ge=0, le=2000, unit="1/ha", description="Trees per hectare.")
+    vegetation: VegetationLimits = Field(VegetationLimits(), description="Species and sizes of plants.")
+    environment: EnvironmentLimits = Field(EnvironmentLimits(), description="Light and weather.")
+    materials: MaterialLimits = Field(MaterialLimits(), description="Variation of materials.")
+    assets: tuple[str, ...] = Field((), description="Libraries of free assets to place from: roadside, or JSON files.")
+
+    @model_validator(mode="before")
+    @classmethod
+    def _what_fits(cls, data: Any) -> Any:
+        """Take, where one of design class and cross-section isn't given, what fits the other."""
+        if not isinstance(data, dict):
+            return data
+        given, section = str(data.get("design_class")), data.get("cross_section")
+        if "cross_section" not in data and given in USUAL_SECTION:
+            return {**data, "cross_section": USUAL_SECTION[given]}
+        if "design_class" not in data and isinstance(section, str) and section in STANDARD_CROSS_SECTIONS:
+            return {**data, "design_class": design_class_of(section, next(iter(USUAL_SECTION)))}
+        return data
+
+    @model_validator(mode="after")
+    def _known(self) -> RoadScenario:
+        if not isinstance(self.cross_section, str):
+            return self
+        if self.cross_section not in STANDARD_CROSS_SECTIONS:
+            names = ", ".join(STANDARD_CROSS_SECTIONS)
+            raise ValueError(f"cross_section is '{self.cross_section}': must be one of {names}")
+        allowed = SECTIONS_OF_CLASS[self.design_class]
+        if self.cross_section not in allowed:
+            names = ", ".join(allowed)
+            raise ValueError(f"cross_section is '{self.cross_section}': {self.design_class} allows {names}")
+        return self

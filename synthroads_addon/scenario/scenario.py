@@ -1,0 +1,207 @@
+"""`Scenario`: the one description of a job, from the road's limits to the files wanted, and what it requires."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal, get_args
+
+from pydantic import Field, field_validator
+
+from ..base.errors import InputError, nearest_name
+from ..base.files import PRESETS
+from ..base.schema import Model, quantity, read_json
+from ..base.typed_text import typed_value
+from ..materials.table import Material, material_table_path, read_material_table
+from ..twin.formats import TwinFormat
+from .cloud import CloudScenario
+from .colour import ColourScenario
+from .giving_way import without_what_gives_way
+from .road import RoadScenario, ScenarioModel
+from .scan import ScanScenario
+from .tolerance import TIMES, Tolerance, with_unit
+
+SCENARIOS = PRESETS / "scenarios"
+
+Output = Literal["parameters", "cloud", "centerline", "scene", "previews"]
+OUTPUTS: tuple[Output, ...] = get_args(Output)
+_DEEPEST = 20
+"""Dots in the path of a change: more fields don't lie in each other."""
+LONGEST_WHOLE, SECTION_LENGTH = 5000.0, 500.0
+"""A longer road is built and scanned by sections of this length unless the scenario says otherwise, m."""
+
+
+class Scenario(ScenarioModel):
+    """One job: a road, a scan, the files wanted, and how faithful they are to be."""
+
+    type: Literal["Scenario"] = "Scenario"
+    version: Literal["1.0"] = "1.0"
+    title: str = Field("", description="Title for people.")
+    seed: int = quantity(1, ge=0, le=2**63 - 1, unit="1", description="Seed of everything random.")
+    fidelity: Literal["draft", "standard", "high"] = Field("standard", description="Point on the trade-off.")
+    geometric_tolerance: float | None = quantity(
+        None, ge=1e-4, le=1, unit="m", description="Chord error of the model; the fidelity's if not given."
+    )
+    vegetation_detail: float | None = quantity(
+        None, ge=0, le=1, unit="1", description="Share of the vegetation built; the fidelity's if not given."
+    )
+    tolerance: Tolerance | None = Field(
+        None, description="Largest errors; the cheapest settings that keep them are chosen, but for knobs given here."
+    )
+    time_budget: float | None = quantity(
+        None, gt=0, le=1e7, unit="s", description="Time for the whole job; the best settings that fit it are chosen."
+    )
+    materials_table: str | None = Field(
+        None, description="JSON file, or shipped table, of materials in place of the usual ones of the same names."
+    )
+    road: RoadScenario = Field(RoadScenario(), description="The road's limits.")
+    scan: ScanScenario = Field(ScanScenario(), description="The scan.")
+    colour: ColourScenario = Field(ColourScenario(), description="Colours and material layers.")
+    cloud: CloudScenario = Field(CloudScenario(), description="The cloud's files and what they hold.")
+    outputs: tuple[Output, ...] = Field(
+        OUTPUTS, description="Files wanted; nothing is computed that none of them needs."
+    )
+
+    twin: tuple[TwinFormat, ...] = Field((), description="Formats of the geometric-semantic model that are wanted.")
+
+    @field_validator("time_budget", mode="before")
+    @classmethod
+    def _with_unit(cls, value: Any) -> Any:
+        if not isinstance(value, str):
+            return value
+        try:
+            return with_unit("time_budget", value, TIMES)
+        except InputError as error:
+            raise ValueError(error.allowed) from None
+
+    @property
+    def chooses(self) -> bool:
+        """Return whether settings are to be chosen before the work begins."""
+        return self.tolerance is not None or self.time_budget is not None
+
+    def own_materials(self) -> dict[str, Material]:
+        """Return the materials of the scenario's own table by name; none if it has none.
+
+        Raises:
+            InputError: the file isn't there or no material table.
+        """
+        return read_material_table(material_table_path(self.materials_table)) if self.materials_table else {}
+
+    def section_length(self, length: float) -> float | None:
+        """Return the length (m) of the sections by which a road of a length (m) is built and scanned; None: whole."""
+        if not set(self.outputs) & {"cloud", "previews"}:
+            return None
+        own = self.scan.section_length
+        section, longest = (SECTION_LENGTH, LONGEST_WHOLE) if own is None else (own, 2.0 * own)
+        return section if length > longest else None
+
+    def settings(self) -> Settings:
+        """Return the numbers that the fidelity stands for, after the scenario's own."""
+        preset = FIDELITIES[self.fidelity]
+
+        def pick(own: Any, otherwise: Any) -> Any:
+            return otherwise if own is None else own
+
+        return Settings(
+            tolerance=pick(self.geometric_tolerance, preset.tolerance),
+            vegetation_detail=pick(self.vegetation_detail, preset.vegetation_detail),
+            rays_per_pulse=pick(self.scan.rays_per_pulse, preset.rays_per_pulse),
+            relief_octaves=pick(self.scan.relief_octaves, preset.relief_octaves),
+        )
+
+
+@dataclass(frozen=True)
+class Settings:
+    """What trades speed for accuracy.
+
+    Attributes:
+        tolerance: largest chord error of the model's road surface, m.
+        vegetation_detail: share of the plants that are built, 0 to 1.
+        rays_per_pulse: rays that sample a pulse's footprint.
+        relief_octaves: octaves of the surfaces' micro-relief.
+    """
+
+    tolerance: float
+    vegetation_detail: float
+    rays_per_pulse: int
+    relief_octaves: int = 4
+
+
+FIDELITIES = {
+    "draft": Settings(tolerance=0.020, vegetation_detail=0.3, rays_per_pulse=1, relief_octaves=2),
+    "standard": Settings(tolerance=0.005, vegetation_detail=1.0, rays_per_pulse=7, relief_octaves=4),
+    "high": Settings(tolerance=0.001, vegetation_detail=1.0, rays_per_pulse=19, relief_octaves=6),
+}
+
+
+def scenario_names() -> list[str]:
+    """Return the names of the built-in scenarios."""
+    return sorted(path.stem for path in SCENARIOS.glob("*.json"))
+
+
+def load_scenario(name_or_file: str, changes: list[str] | None = None) -> Scenario:
+    """Load a built-in scenario or a file and apply ``path=value`` changes.
+
+    Raises:
+        InputError: there is no such scenario, or a field is unknown or out of its limits.
+    """
+    path = Path(name_or_file)
+    if name_or_file in scenario_names():
+        path = SCENARIOS / f"{name_or_file}.json"
+    elif path.suffix != ".json":
+        hint = nearest_name(name_or_file, scenario_names())
+        raise InputError(
+            "--scenario", name_or_file, f"must be a .json file or one of {', '.join(scenario_names())}{hint}"
+        )
+    scenario = Scenario.from_dict(read_json(path), source=str(name_or_file))
+    if not changes:
+        return scenario
+    return Scenario.from_dict(with_changes(scenario.to_dict(), map(parsed_change, changes)))
+
+
+def with_changes(data: Any, changes: Iterable[tuple[str, Any]]) -> Any:
+    """Return a scenario's JSON data with values set by their dotted paths, one after another.
+
+    What the scenario said itself and doesn't fit them any more gives way, see `without_what_gives_way`.
+    """
+    named = set()
+    for path, value in changes:
+        data = apply_values(data, {path: value})
+        named.add(path)
+    return without_what_gives_way(data, named)
+
+
+def apply_change(data: Any, change: str, model: type[Model] = Scenario) -> Any:
+    """Return JSON data with one ``path=value`` applied, the value being of the type of the model's field."""
+    path, value = parsed_change(change, model)
+    return _with_value(data, path, value)
+
+
+def apply_values(data: Any, values: Mapping[str, Any]) -> Any:
+    """Return JSON data with values set by their dotted paths; raise `InputError` where a path is none."""
+    for path, value in values.items():
+        if not _is_path(path):
+            raise InputError("set", path, "must be the path of a field, e.g. road.length")
+        data = _with_value(data, path, value)
+    return data
+
+
+def parsed_change(change: str, model: type[Model] = Scenario) -> tuple[str, Any]:
+    """Return path and value of ``path=value``, see `typed_value`; raise `InputError` if it has another form."""
+    path, equals, text = change.partition("=")
+    if not equals or not _is_path(path):
+        raise InputError("--set", change, "must be path=value, e.g. road.length=800")
+    return path, typed_value(model, path, text)
+
+
+def _is_path(text: str) -> bool:
+    return bool(text) and text.count(".") <= _DEEPEST
+
+
+def _with_value(data: Any, path: str, value: Any, above: str = "") -> Any:
+    head, dot, rest = path.partition(".")
+    if not isinstance(data, dict):
+        raise InputError(above or "scenario", data, f"must be a JSON object before its field {head} can be set")
+    here = f"{above}.{head}" if above else head
+    return {**data, head: _with_value(data.get(head, {}), rest, value, here) if dot else value}

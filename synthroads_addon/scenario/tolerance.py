@@ -1,0 +1,149 @@
+"""`Tolerance`: how large the errors of a cloud may be; and the words for it, ``height=5mm,intensity=5%``."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from typing import Any
+
+from pydantic import model_validator
+
+from ..base.errors import InputError, nearest_name
+from ..base.schema import quantity
+from .road import ScenarioModel
+
+LENGTHS = {"um": 1e-6, "µm": 1e-6, "mm": 1e-3, "cm": 1e-2, "m": 1.0}
+SHARES = {"": 1.0, "%": 0.01, "‰": 0.001}
+PLAIN = {"": 1.0}
+TIMES = {"": 1.0, "s": 1.0, "min": 60.0, "h": 3600.0}
+_NUMBER = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*([^\s\d]*)\s*")
+
+
+@dataclass(frozen=True)
+class Kind:
+    """A kind of error.
+
+    Attributes:
+        column: of the trade-off's tables, see `tradeoff.ROW_TITLES`.
+        units: that a tolerance can be given in, and their factors.
+        factor: by which the column's numbers become the kind's.
+        suffix: the column's unit.
+    """
+
+    column: str
+    units: dict[str, float]
+    factor: float = 1.0
+    suffix: str = ""
+
+
+KINDS: dict[str, Kind] = {
+    "height": Kind("height_mm", LENGTHS, 1e-3, " mm"),
+    "position": Kind("position_mm", LENGTHS, 1e-3, " mm"),
+    "relief": Kind("relief_mm", LENGTHS, 1e-3, " mm"),
+    "intensity": Kind("intensity_percent", SHARES, 0.01, " %"),
+    "colour": Kind("colour_95", PLAIN),
+    "layers": Kind("layers_rmse", PLAIN),
+    "labels": Kind("labels_percent", SHARES, 0.01, " %"),
+    "density": Kind("density_percent", SHARES, 0.01, " %"),
+}
+"""Kinds of errors by the names of `Tolerance`'s fields."""
+
+
+class Tolerance(ScenarioModel):
+    """Largest errors that a cloud may have; what isn't given may be as large as the cheapest settings make it.
+
+    As text each can have a unit: ``"5mm"``, ``"2 %"``.
+    """
+
+    height: float | None = quantity(
+        None, ge=0, le=10, unit="m", description="Height of the road's surface, largest error."
+    )
+    position: float | None = quantity(
+        None, ge=0, le=10, unit="m", description="Position of the hits, error of 95 % of the pulses."
+    )
+    relief: float | None = quantity(
+        None, ge=0, le=10, unit="m", description="Micro-relief of the points, error of 95 % of them."
+    )
+    intensity: float | None = quantity(
+        None, ge=0, le=10, unit="1", description="Intensity, relative error of 95 % of the pulses."
+    )
+    colour: float | None = quantity(
+        None, ge=0, le=100, unit="1", description="Colour, CIEDE2000 of 95 % of the points."
+    )
+    layers: float | None = quantity(
+        None, ge=0, le=1, unit="1", description="Material layers, root mean square error of the worst."
+    )
+    labels: float | None = quantity(None, ge=0, le=1, unit="1", description="Share of the pulses of another class.")
+    density: float | None = quantity(
+        None, ge=0, le=1, unit="1", description="Share of the points that are missing or too many."
+    )
+
+    @model_validator(mode="before")
+    @classmethod
+    def _with_units(cls, data: Any) -> Any:
+        if isinstance(data, str):
+            data = parse_tolerance(data, "tolerance")
+        if not isinstance(data, dict):
+            return data
+        return {key: _in_si(key, value) if isinstance(value, str) else value for key, value in data.items()}
+
+    def limits(self) -> dict[str, float]:
+        """Return the kinds of errors that are limited, and how."""
+        return {name: value for name in KINDS if (value := getattr(self, name)) is not None}
+
+
+def _in_si(name: str, text: str) -> float | str:
+    """Return a text with its unit as a number; the text itself of a kind that there isn't, which is refused later."""
+    if name not in KINDS:
+        return text
+    try:
+        return with_unit(f"tolerance.{name}", text, KINDS[name].units)
+    except InputError as error:
+        raise ValueError(f"{name} {error.allowed}") from None
+
+
+def with_unit(field: str, text: str, units: dict[str, float]) -> float:
+    """Return a number with a unit, such as ``5mm``, in the unit whose factor is 1.
+
+    Raises:
+        InputError: it is no number, or lacks a unit where it needs one, or has another.
+    """
+    found = _NUMBER.fullmatch(text)
+    named = [unit for unit in units if unit]
+    wanted = f"a number with a unit of {', '.join(named)}" if named else "a number without a unit"
+    if "" in units and named:
+        wanted = f"a number, or one with a unit of {', '.join(named)}"
+    if not found:
+        raise InputError(field, text, f"must be {wanted}")
+    number, unit = found.groups()
+    if unit not in units:
+        said = f"has the unit '{unit}'" if unit else "has no unit"
+        raise InputError(field, text, f"{said}: must be {wanted}{nearest_name(unit, named) if unit else ''}")
+    # As a decimal, so that 5mm is the number that 0.005 is.
+    return float(f"{float(number) * units[unit]:.15g}")
+
+
+def parse_tolerance(text: str, field: str = "--tolerance") -> dict[str, float]:
+    """Return what ``height=5mm,colour=2,intensity=5%`` says, as a `Tolerance`'s data.
+
+    Raises:
+        InputError: a kind that there isn't, or one named twice; a number or a unit is wrong, or a limit is exceeded.
+    """
+    data: dict[str, float] = {}
+    for part in text.split(","):
+        name, equals, value = (piece.strip() for piece in part.partition("="))
+        if not equals or not name or not value:
+            raise InputError(field, text, "must be KIND=VALUE, more of them with commas, e.g. height=5mm,intensity=5%")
+        if name not in KINDS:
+            raise InputError(field, name, f"must be any of {', '.join(KINDS)}{nearest_name(name, KINDS)}")
+        if name in data:
+            raise InputError(field, text, f"names {name} twice")
+        data[name] = with_unit(f"{field}: {name}", value, KINDS[name].units)
+    Tolerance.from_dict(data, field)
+    return data
+
+
+def shown(name: str, value: float) -> str:
+    """Return an error of a kind in the unit that its tolerance is usually given in: ``5 mm``, ``2 %``."""
+    kind = KINDS[name]
+    return f"{value / kind.factor:.3g}{kind.suffix}"

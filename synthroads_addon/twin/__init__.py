@@ -1,0 +1,1 @@
+"""Geometric-semantic models of a road in open formats."""

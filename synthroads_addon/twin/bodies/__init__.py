@@ -1,0 +1,1 @@
+"""Bodies of furniture and structures in true dimensions."""

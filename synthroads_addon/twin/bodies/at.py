@@ -1,0 +1,247 @@
+"""Bodies of what stands at one place, in true dimensions: posts, faces, boxes; without fittings."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ...road.geometry import RoadGeometry
+from ...road.parameters import (
+    Cabinet,
+    ConstructionBeacon,
+    Delineator,
+    Gantry,
+    GantrySign,
+    KilometreBoard,
+    Overpass,
+    PointObject,
+    Pole,
+    TrafficLight,
+    TrafficSign,
+)
+from ...road.surface import highest_pavement
+from ...road.things import body_shapes as shapes
+from ..faces import Faces, Float, loft
+from ..surfaces import on_ground
+
+ROUND = 12
+"""Corners of a round post; they lie on its circle."""
+_ROUND_FACE = 32
+_PLATE = 0.003
+"""Thickness of a sign's plate, m."""
+_POST_TOPS = {"round": 0.9, "triangle": 0.6, "rectangle": 0.97, "octagon": 0.93, "arrow": 0.9}
+"""How far a sign's posts reach up behind its face, as a share of its height."""
+_ARM = 0.06
+_LUMINAIRE = (0.6, 0.26, 0.09)
+_SHORTEST_ARM = 0.05
+
+
+@dataclass(frozen=True)
+class Place:
+    """The frame of something at one place: x to the right of traffic with the stations, y along it, z up.
+
+    Attributes:
+        geometry: the road.
+        origin: (3,) local coordinates of its foot.
+        right, along: (2,) unit vectors in plan.
+    """
+
+    geometry: RoadGeometry
+    origin: Float
+    right: Float
+    along: Float
+
+    def local(self, points: Any) -> Float:
+        """Return local coordinates (..., 3) of points (..., 3) of the frame."""
+        points = np.asarray(points, dtype=np.float64)
+        plan = points[..., :1] * self.right + points[..., 1:2] * self.along
+        return self.origin + np.concatenate([plan, points[..., 2:]], axis=-1)
+
+    def ground(self, x: Any, y: Any) -> Float:
+        """Return z (N,) in the frame of the ground at points (N,) of the frame."""
+        x, y = np.broadcast_arrays(np.atleast_1d(np.asarray(x, float)), np.atleast_1d(np.asarray(y, float)))
+        plan = self.origin[:2] + x[:, None] * self.right + y[:, None] * self.along
+        station, offset = self.geometry.alignment.project(plan)
+        return on_ground(self.geometry, station, offset)[:, 2] - self.origin[2]
+
+    def prism(self, outline: Iterable[tuple[float, float]], low: float, high: float) -> Faces:
+        """Return the body between two heights over an outline (x, y)."""
+        flat = np.array(list(outline))
+        ends = [np.column_stack([flat, np.full(len(flat), z)]) for z in (low, high)]
+        return loft(self.local(np.stack(ends)))
+
+    def box(self, size: tuple[float, float, float], middle: tuple[float, float, float]) -> Faces:
+        """Return a box of a size (x, y, z) around a point."""
+        corners = [(-0.5, -0.5), (0.5, -0.5), (0.5, 0.5), (-0.5, 0.5)]
+        outline = [(middle[0] + x * size[0], middle[1] + y * size[1]) for x, y in corners]
+        return self.prism(outline, middle[2] - size[2] / 2.0, middle[2] + size[2] / 2.0)
+
+    def post(self, diameter: float, low: float, high: float, x: float = 0.0, y: float = 0.0) -> Faces:
+        """Return a round post."""
+        return self.prism([(x + diameter / 2 * u, y + diameter / 2 * v) for u, v in _circle(ROUND)], low, high)
+
+    def plate(self, outline: Iterable[tuple[float, float]], front: float, back: float) -> Faces:
+        """Return the upright plate between two y over an outline (x, z)."""
+        flat = np.array(list(outline))
+        ends = [np.column_stack([flat[:, 0], np.full(len(flat), y), flat[:, 1]]) for y in (front, back)]
+        return loft(self.local(np.stack(ends)))
+
+
+def places_of(geometry: RoadGeometry, items: Sequence[PointObject]) -> list[Place]:
+    """Return the frames of objects on the surface below them, turned by their rotations; of a bridge's, by nothing."""
+    station, offset, above = (
+        np.array([getattr(item, name) for item in items]) for name in ("station", "offset", "elevation")
+    )
+    origins = on_ground(geometry, station, offset)
+    origins[:, 2] += above
+    turns = [0.0 if isinstance(item, Overpass) else item.rotation_deg for item in items]
+    heading = geometry.alignment.heading(station) + np.deg2rad(np.array(turns))
+    along = np.stack([np.cos(heading), np.sin(heading)], axis=1)
+    right = np.stack([along[:, 1], -along[:, 0]], axis=1)
+    return [Place(geometry, *frame) for frame in zip(origins, right, along, strict=True)]
+
+
+def bodies_at(place: Place, item: PointObject) -> list[Faces]:
+    """Return the closed bodies of an object in its frame."""
+    return _MAKERS[type(item)](place, item)
+
+
+def pavement_below(place: Place, x: tuple[float, float], y: tuple[float, float], shear: float = 0.0) -> float:
+    """Return the height of the pavement's highest point below a rectangle of a frame, in the local frame, m.
+
+    Args:
+        place: the frame.
+        x, y: the rectangle's limits in it, m.
+        shear: y grows by this per x.
+
+    Where nothing below is paved it is the frame's origin.
+    """
+    across = np.linspace(*x, max(2, int(np.ceil((x[1] - x[0]) / 0.25)) + 1))
+    beside, forth = (grid.ravel() for grid in np.meshgrid(across, np.linspace(*y, 7)))
+    plan = place.origin[:2] + beside[:, None] * place.right + (forth + shear * beside)[:, None] * place.along
+    station, offset = place.geometry.alignment.project(plan)
+    highest = highest_pavement(place.geometry, station, offset)
+    return float(place.origin[2]) if highest is None else highest
+
+
+def _circle(count: int) -> list[tuple[float, float]]:
+    turns = 2.0 * np.pi * np.arange(count) / count
+    return list(zip(np.cos(turns).tolist(), np.sin(turns).tolist(), strict=True))
+
+
+def _delineator(place: Place, item: Delineator) -> list[Faces]:
+    return [place.prism(shapes.DELINEATOR, 0.0, item.height)]
+
+
+def _sign(place: Place, item: TrafficSign) -> list[Faces]:
+    corners = shapes.SIGN_OUTLINES.get(item.shape) or [(u / 2, v / 2) for u, v in _circle(_ROUND_FACE)]
+    middle = item.lower_edge + item.height / 2.0
+    face = [(u * item.width, middle + v * item.height) for u, v in corners]
+    front = -(item.post_diameter / 2.0 + shapes.SIGN_RAIL)
+    top = item.lower_edge + item.height * _POST_TOPS[item.shape]
+    beside = [((i + 0.5) / item.posts - 0.5) * item.width for i in range(item.posts)]
+    feet = place.ground(beside, 0.0) if item.posts > 1 else [-item.elevation]
+    posts = [place.post(item.post_diameter, float(z), top, x) for x, z in zip(beside, feet, strict=True)]
+    return [place.plate(face, front - _PLATE, front), *posts]
+
+
+def _kilometre_board(place: Place, item: KilometreBoard) -> list[Faces]:
+    middle = item.lower_edge + item.height / 2.0
+    board = place.box((item.width, 2.0 * _PLATE, item.height), (0.0, 0.0, middle))
+    return [board, place.post(shapes.KILOMETRE_POST, -item.elevation, item.lower_edge)]
+
+
+def _pole(place: Place, item: Pole) -> list[Faces]:
+    bodies = [place.post(item.diameter, -item.elevation, item.height)]
+    if item.arm_length <= _SHORTEST_ARM:
+        return bodies
+    high = item.height - _ARM / 2.0
+    bodies.append(place.box((item.arm_length, _ARM, _ARM), (-item.arm_length / 2.0, 0.0, high)))
+    if item.kind == "lighting":
+        long, wide, thick = _LUMINAIRE
+        bodies.append(place.box((long, wide, thick), (-item.arm_length - long / 2.0, 0.0, item.height - thick / 2.0)))
+    return bodies
+
+
+def _traffic_light(place: Place, item: TrafficLight) -> list[Faces]:
+    wide, deep, tall = 1.3 * item.light_diameter, 0.7 * item.light_diameter, 1.25 * item.light_diameter * item.lights
+    head = place.box(
+        (wide, deep, tall), (0.0, -(shapes.TRAFFIC_LIGHT_POST + deep) / 2.0, item.height - tall / 2.0)
+    )
+    return [place.post(shapes.TRAFFIC_LIGHT_POST, -item.elevation, item.height), head]
+
+
+def _cabinet(place: Place, item: Cabinet) -> list[Faces]:
+    low = -item.elevation
+    return [place.box((item.width, item.depth, item.height - low), (0.0, 0.0, (item.height + low) / 2.0))]
+
+
+def _beacon(place: Place, item: ConstructionBeacon) -> list[Faces]:
+    foot, bottom = shapes.BEACON_FOOT, shapes.BEACON_BLADE_BOTTOM
+    blade = place.box((item.width, shapes.BEACON_BLADE, item.height), (0.0, 0.0, bottom + item.height / 2.0))
+    return [place.box(foot, (0.0, 0.0, foot[2] / 2.0)), blade]
+
+
+def _gantry(place: Place, item: Gantry) -> list[Faces]:
+    left, right = item.offset - item.left_offset, item.offset - item.right_offset
+    front, rear = _reach(item)
+    low = pavement_below(place, (left, right), (-front, rear)) + item.clearance - float(place.origin[2])
+    hangs = max([sign.height - item.beam_height for sign in item.signs] + [0.0]) * shapes.GANTRY_OVERHANG
+    bottom = low + hangs
+    beam = place.box(
+        (right - left, item.beam_depth, item.beam_height), ((left + right) / 2.0, 0.0, bottom + item.beam_height / 2.0)
+    )
+    boards = [_board(place, item, sign, low, bottom) for sign in item.signs]
+    return [beam, *_gantry_posts(place, item, (left, right), bottom), *boards]
+
+
+def _reach(item: Gantry) -> tuple[float, float]:
+    """Return how far a gantry with its signs reaches towards -y and +y."""
+    front = rear = item.beam_depth / 2.0
+    for sign in item.signs:
+        beyond = item.beam_depth / 2.0 + shapes.GANTRY_HANGER + _board_depth(sign)
+        front, rear = (max(front, beyond), rear) if sign.offset < 0.0 else (front, max(rear, beyond))
+    return front, rear
+
+
+def _board_depth(sign: GantrySign) -> float:
+    return shapes.GANTRY_DISPLAY if sign.kind == "display" else shapes.GANTRY_BOARD
+
+
+def _gantry_posts(place: Place, item: Gantry, ends: tuple[float, float], bottom: float) -> list[Faces]:
+    wanted = {"left": ends[0], "right": ends[1], "middle": item.offset}
+    if item.kind == "cantilever":
+        wanted = {item.post_side: wanted[item.post_side]}
+    elif item.kind == "one_sided":
+        del wanted["middle"]
+    feet = place.ground(list(wanted.values()), 0.0) + item.elevation
+    bodies = []
+    for (side, x), foot in zip(wanted.items(), feet.tolist(), strict=True):
+        top = bottom if side == "middle" else bottom + item.beam_height
+        size = (item.post_width, item.beam_depth, top - foot)
+        bodies.append(place.box(size, (x, 0.0, (top + foot) / 2.0)))
+    return bodies
+
+
+def _board(place: Place, item: Gantry, sign: GantrySign, low: float, bottom: float) -> Faces:
+    """Return a board's body, in front of the beam as the traffic below it sees it."""
+    behind = low + sign.height < bottom + item.beam_height
+    z = low + sign.height / 2.0 if behind else bottom + item.beam_height / 2.0
+    deep = _board_depth(sign)
+    y = item.beam_depth / 2.0 + shapes.GANTRY_HANGER + deep / 2.0
+    return place.box((sign.width, deep, sign.height), (item.offset - sign.offset, -y if sign.offset < 0.0 else y, z))
+
+
+_MAKERS: dict[type[PointObject], Callable[[Place, Any], list[Faces]]] = {
+    Delineator: _delineator,
+    TrafficSign: _sign,
+    KilometreBoard: _kilometre_board,
+    Pole: _pole,
+    TrafficLight: _traffic_light,
+    Cabinet: _cabinet,
+    ConstructionBeacon: _beacon,
+    Gantry: _gantry,
+}

@@ -1,0 +1,245 @@
+"""City objects as CityJSON 2.0 knows them, with geometry in local float64 coordinates, and how they become a file."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field, replace
+from itertools import chain
+from pathlib import Path
+from typing import Any, Literal, TextIO
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..faces import Faces, Float, Int, without_collapsed
+
+SCALE = 1e-4
+"""Step of the vertices' whole numbers, m: rounding moves a vertex by 0.05 mm at most along each axis."""
+
+_LINE = 20_000  # polygons and vertices turned into text at a time
+
+GeometryType = Literal["MultiPoint", "MultiLineString", "MultiSurface", "Solid", "MultiSolid"]
+
+
+@dataclass(frozen=True)
+class CityGeometry:
+    """A geometry of a city object.
+
+    Attributes:
+        type: CityJSON's name.
+        lod: level of detail.
+        parts: the surfaces of a MultiSurface (one part), the bodies of a Solid (one) or MultiSolid; lines and points
+            are "polygons" of one part.
+        semantics: what the polygons can be, with their attributes; only a MultiSurface's here.
+        values: (F,) index of each polygon into the semantics.
+    """
+
+    type: GeometryType
+    lod: str
+    parts: tuple[Faces, ...]
+    semantics: tuple[dict[str, Any], ...] = ()
+    values: Int | None = None
+
+
+@dataclass(frozen=True)
+class CityObject:
+    """A city object.
+
+    Attributes:
+        id: as in the parameter set; parts of a bridge have the bridge's, a slash and a name.
+        type: CityJSON's name of its class.
+        attributes: JSON data.
+        geometry: its geometries; empty ones are left out.
+        parent, children: ids.
+    """
+
+    id: str
+    type: str
+    attributes: dict[str, Any]
+    geometry: tuple[CityGeometry, ...] = ()
+    parent: str | None = None
+    children: tuple[str, ...] = ()
+
+
+@dataclass
+class _Shell:
+    corners: Int
+    sizes: Int
+    kept: NDArray[np.bool_] = field(default_factory=lambda: np.empty(0, dtype=bool))
+
+
+@dataclass
+class CityModel:
+    """City objects whose vertices are collected, made whole numbers and shared.
+
+    Attributes:
+        translate: map coordinates of the local origin, m: what is added to a vertex times `SCALE`.
+    """
+
+    translate: tuple[float, float, float]
+
+    def __post_init__(self) -> None:
+        self._objects: list[tuple[CityObject, list[list[_Shell]]]] = []
+        self._vertices: list[Int] = []
+        self._count = 0
+
+    def add(self, item: CityObject) -> None:
+        """Take an object over; of its points only the whole numbers are kept."""
+        shells = [[self._shell(part) for part in shape.parts] for shape in item.geometry]
+        bare = tuple(replace(shape, parts=()) for shape in item.geometry)
+        self._objects.append((replace(item, geometry=bare), shells))
+
+    def _shell(self, faces: Faces) -> _Shell:
+        shell = _Shell(faces.corners + self._count, faces.sizes)
+        self._vertices.append(np.rint(faces.points / SCALE).astype(np.int64))
+        self._count += len(faces.points)
+        return shell
+
+    def write(self, path: Path, metadata: dict[str, Any]) -> None:
+        """Write the file; same objects, same bytes.
+
+        Args:
+            path: its name.
+            metadata: CityJSON's, without the extent.
+        """
+        vertices = self._share()
+        extent = self._extent(vertices)
+        head = {
+            "type": "CityJSON",
+            "version": "2.0",
+            "metadata": metadata | {"geographicalExtent": extent},
+            "transform": {"scale": [SCALE] * 3, "translate": list(self.translate)},
+        }
+        with path.open("w", encoding="utf-8", newline="\n") as file:
+            file.write(_text(head)[:-1] + ',\n"CityObjects":{')
+            before = "\n"
+            for item, shapes in self._objects:
+                file.write(f"{before}{_text(item.id)}:")
+                _write_object(file, item, shapes)
+                before = ",\n"
+            file.write('},\n"vertices":[')
+            for first in range(0, len(vertices), _LINE):
+                file.write("," * bool(first) + "\n" + _text(vertices[first : first + _LINE].tolist())[1:-1])
+            file.write("]}\n")
+
+    def _share(self) -> Int:
+        """Let equal vertices be one, drop polygons that vanish and vertices that nothing uses; return (V, 3)."""
+        raw = np.concatenate(self._vertices) if self._vertices else np.empty((0, 3), np.int64)
+        self._vertices = []
+        same = _first_equal(raw)
+        used = np.zeros(len(raw), dtype=bool)
+        for shell, closed in self._shells():
+            corners = same[shell.corners]
+            if closed:
+                shell.corners, shell.sizes, shell.kept = without_collapsed(corners, shell.sizes)
+            else:
+                shell.corners, shell.kept = corners, np.ones(len(shell.sizes), dtype=bool)
+            used[shell.corners] = True
+        number = np.cumsum(used) - 1
+        for shell, _ in self._shells():
+            shell.corners = number[shell.corners]
+        return raw[used]
+
+    def _shells(self) -> Iterator[tuple[_Shell, bool]]:
+        """Yield every shell, and whether its corners run round polygons."""
+        for item, shapes in self._objects:
+            for shape, shells in zip(item.geometry, shapes, strict=True):
+                yield from ((shell, "Surface" in shape.type or "Solid" in shape.type) for shell in shells)
+
+    def _extent(self, vertices: Int) -> list[float]:
+        ends = [vertices.min(axis=0), vertices.max(axis=0)] if len(vertices) else [np.zeros(3), np.zeros(3)]
+        return [round(float(v) * SCALE + t, 4) for end in ends for v, t in zip(end, self.translate, strict=True)]
+
+
+def _first_equal(vertices: Int) -> Int:
+    """Return for each vertex (V, 3) the index of the first one that is equal."""
+    order = np.lexsort((np.arange(len(vertices)), vertices[:, 2], vertices[:, 1], vertices[:, 0]))
+    ordered = vertices[order]
+    new = np.ones(len(vertices), dtype=bool)
+    new[1:] = np.any(ordered[1:] != ordered[:-1], axis=1)
+    same = np.empty(len(vertices), dtype=np.int64)
+    same[order] = order[new][np.cumsum(new) - 1]
+    return same
+
+
+# --- text -------------------------------------------------------------------------------------------------------
+
+
+def _write_object(file: TextIO, item: CityObject, shapes: list[list[_Shell]]) -> None:
+    head: dict[str, Any] = {"type": item.type, "attributes": item.attributes}
+    if item.parent:
+        head["parents"] = [item.parent]
+    if item.children:
+        head["children"] = list(item.children)
+    there = [
+        (shape, shells)
+        for shape, shells in zip(item.geometry, shapes, strict=True)
+        if any(len(shell.sizes) for shell in shells)
+    ]
+    if not there:
+        file.write(_text(head))
+        return
+    file.write(_text(head)[:-1] + ',"geometry":[')
+    for number, (shape, shells) in enumerate(there):
+        file.write("," * bool(number))
+        _write_geometry(file, shape, [shell for shell in shells if len(shell.sizes)])
+    file.write("]}")
+
+
+def _write_geometry(file: TextIO, shape: CityGeometry, shells: list[_Shell]) -> None:
+    file.write(_text({"type": shape.type, "lod": shape.lod})[:-1] + ',"boundaries":')
+    if shape.type == "MultiSolid":
+        file.write("[")
+        for number, shell in enumerate(shells):
+            file.write(("," * bool(number)) + "[" + _text(_rings(shell, 0, len(shell.sizes), True)) + "]")
+        file.write("]")
+    elif shape.type == "Solid":
+        file.write("[" + _text(_rings(shells[0], 0, len(shells[0].sizes), True)) + "]")
+    elif shape.type == "MultiPoint":
+        file.write(_text(shells[0].corners.tolist()))
+    else:
+        _write_many(file, shells[0], shape.type == "MultiSurface")
+    if shape.values is not None:
+        values = shape.values[shells[0].kept]
+        used, numbers = np.unique(values, return_inverse=True)
+        surfaces = [shape.semantics[index] for index in used.tolist()]
+        file.write(',"semantics":' + _text({"surfaces": surfaces, "values": numbers.tolist()}))
+    file.write("}")
+
+
+def _write_many(file: TextIO, shell: _Shell, surfaces: bool) -> None:
+    """Write many polygons (or lines) a few thousand at a time: as lists of Python's they take much memory."""
+    file.write("[")
+    for first in range(0, len(shell.sizes), _LINE):
+        text = _text(_rings(shell, first, first + _LINE, surfaces))[1:-1]
+        file.write("," * bool(first) + text)
+    file.write("]")
+
+
+def _rings(shell: _Shell, first: int, last: int, surfaces: bool) -> list[Any]:
+    sizes = shell.sizes[first:last]
+    start = int(shell.sizes[:first].sum())
+    ends = (start + np.cumsum(sizes)).tolist()
+    corners = shell.corners[start : ends[-1] if ends else start].tolist()
+    rings = [corners[a - start : b - start] for a, b in zip([start, *ends[:-1]], ends, strict=True)]
+    return [[ring] for ring in rings] if surfaces else rings
+
+
+def _text(data: Any) -> str:
+    return json.dumps(data, ensure_ascii=False, separators=(",", ":"), allow_nan=False)
+
+
+def lines(points: Iterable[Float]) -> Faces:
+    """Return lines (K, 3) as the one part of a MultiLineString."""
+    listed = list(points)
+    sizes = np.array([len(line) for line in listed], dtype=np.int64)
+    return Faces(np.concatenate(listed), np.arange(int(sizes.sum())), sizes)
+
+
+def solids(bodies: Iterable[Faces], lod: str) -> tuple[CityGeometry, ...]:
+    """Return the geometry of closed bodies: a Solid if it is one, else a MultiSolid; none if there are none."""
+    parts = tuple(chain(bodies))
+    if not parts:
+        return ()
+    return (CityGeometry("Solid" if len(parts) == 1 else "MultiSolid", lod, parts),)

@@ -1,0 +1,148 @@
+"""The road as CityJSON's Road objects: centreline, carriageways, median and turnouts with semantic surfaces."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...road.geometry import RoadGeometry
+from ...road.parameters import Arrow, Carriageway, Hatching, LineMarking, Median, RoadObject, Turnout
+from ..attributes import attributes_of
+from ..faces import Faces, Int, joined
+from ..strips import StripSurface, strip_surfaces
+from ..surfaces import dash_surfaces, painted_surface, pothole_surface
+from .model import CityGeometry, CityObject, lines
+
+Float = NDArray[np.float64]
+Surface = tuple[dict[str, Any], Faces]
+"""A semantic surface and its polygons."""
+
+LOD = "3"
+_FUNCTIONS = {
+    "median": "median",
+    "lane": "driving lane",
+    "turnout_lane": "driving lane",
+    "bay": "emergency bay",
+    "hard_shoulder": "hard shoulder",
+    "turnout_shoulder": "hard shoulder",
+    "inner_edge_strip": "edge strip",
+    "outer_edge_strip": "edge strip",
+    "turnout_edge_strip": "edge strip",
+    "ramp_inner_strip": "edge strip",
+    "gore": "gore",
+    "island": "traffic island",
+    "verge": "soft shoulder",
+}
+"""Kind of strip -> what it is for."""
+_LANES = {"exit": "deceleration lane", "entry": "acceleration lane"}
+_DRIVEN = ("lane", "turnout_lane")
+
+
+def road_objects(geometry: RoadGeometry, stations: Float, tolerance: float) -> Iterator[CityObject]:
+    """Yield the Roads: the centreline's, and one for every carriageway, median and turnout.
+
+    Args:
+        geometry: the road.
+        stations: (N,) stations at which its surface is sampled.
+        tolerance: chord error within damage, m.
+    """
+    parameters = geometry.parameters
+    plan = geometry.alignment.position(stations)
+    axis = lines([np.column_stack([plan, geometry.profile.elevation(stations)])])
+    name = next(name for name, item in parameters.objects.items() if item is parameters.alignment)
+    attributes = attributes_of(parameters.alignment) | {
+        "class": "motorway",
+        "function": "centreline",
+        "design_class": parameters.design_class,
+        "length": round(geometry.length, 6),
+    }
+    yield CityObject(name, "Road", attributes, (CityGeometry("MultiLineString", "0", (axis,)),))
+    surfaces = _surfaces(geometry, stations, tolerance)
+    for name, item in parameters.objects.items():
+        if isinstance(item, Carriageway | Median | Turnout):
+            yield _road(name, item, surfaces.pop(item.instance, []))
+
+
+def _road(name: str, item: RoadObject, surfaces: list[Surface]) -> CityObject:
+    function = {Carriageway: "carriageway", Median: "median"}.get(type(item), "turnout")
+    if isinstance(item, Turnout):
+        function = item.kind.replace("_", " ")
+    attributes = attributes_of(item) | {"class": "motorway", "function": function}
+    if isinstance(item, Carriageway):
+        attributes["direction"] = "with stations" if item.traffic > 0 else "against stations"
+    if not surfaces:
+        return CityObject(name, "Road", attributes)
+    faces = [part for _, part in surfaces]
+    values = np.repeat(np.arange(len(surfaces)), [len(part) for part in faces])
+    semantics = tuple(about for about, _ in surfaces)
+    shape = CityGeometry("MultiSurface", LOD, (joined(faces),), semantics, values)
+    return CityObject(name, "Road", attributes, (shape,))
+
+
+def _surfaces(geometry: RoadGeometry, stations: Float, tolerance: float) -> dict[int, list[Surface]]:
+    """Return the surfaces of every Road by its instance number: strips, then markings, then potholes."""
+    found: dict[int, list[Surface]] = {}
+    for surface in strip_surfaces(geometry, stations, tolerance):
+        found.setdefault(surface.instance, []).append((_area(geometry, surface), surface.faces))
+    for name, item in geometry.parameters.objects.items():
+        if isinstance(item, LineMarking | Hatching | Arrow):
+            owner = geometry.parameters.objects[item.turnout if isinstance(item, Hatching) else item.carriageway]
+            found.setdefault(owner.instance, []).extend(_marking(geometry, name, item, stations))
+    for section in geometry.sections.values():
+        own = found.setdefault(section.carriageway.instance, [])
+        for pothole in section.carriageway.pavement.potholes:
+            about = {"type": "TransportationHole", "function": "pothole"} | pothole.model_dump()
+            own.append((about, pothole_surface(geometry, pothole, tolerance)))
+    return {instance: [pair for pair in pairs if len(pair[1])] for instance, pairs in found.items()}
+
+
+def _area(geometry: RoadGeometry, surface: StripSurface) -> dict[str, Any]:
+    """Return what a strip's surface is."""
+    strip = surface.strip
+    about: dict[str, Any] = {
+        "type": "TrafficArea" if strip.kind in _DRIVEN else "AuxiliaryTrafficArea",
+        "function": _FUNCTIONS[strip.kind],
+        "surfaceMaterial": [strip.material if strip.class_name == "road" else "grass"],
+        "strip": strip.kind,
+        "instance": surface.instance,
+    }
+    if strip.side:
+        about["side"] = strip.side
+        section = geometry.sections[strip.side]
+        if surface.lane is not None:
+            about |= {"lane": surface.lane, "lane_kind": section.carriageway.lanes[surface.lane].kind}
+        for shape in section.turnouts if strip.kind == "turnout_lane" else ():
+            if shape.turnout.instance == surface.instance:
+                about["function"] = _LANES.get(shape.turnout.kind, about["function"])
+    return about
+
+
+def _marking(
+    geometry: RoadGeometry, name: str, item: LineMarking | Hatching | Arrow, stations: Float
+) -> Iterator[Surface]:
+    """Yield the surfaces of a marking: one for each dash of a line."""
+    function = "line" if isinstance(item, LineMarking) else item.type.lower()
+    about = {"type": "TransportationMarking", "function": function, "id": name, "instance": item.instance}
+    about |= {"color": item.color, "film_thickness": item.film_thickness}
+    if not isinstance(item, LineMarking):
+        kind = {"kind": item.kind} if isinstance(item, Arrow) else {}
+        yield about | kind, painted_surface(geometry, item, stations)
+        return
+    about |= {"kind": item.kind, "width": item.width}
+    dashes, faces, owner = dash_surfaces(geometry, item, stations)
+    starts = np.cumsum(faces.sizes) - faces.sizes
+    for number, (start, end) in enumerate(dashes.tolist()):
+        own = np.flatnonzero(owner == number)
+        dash = {"start_station": round(start, 6), "end_station": round(end, 6)}
+        yield about | dash, _part(faces, starts, own)
+
+
+def _part(faces: Faces, starts: Int, chosen: Int) -> Faces:
+    """Return neighbouring polygons of many, with their own points."""
+    begin, end = int(starts[chosen[0]]), int(starts[chosen[-1]] + faces.sizes[chosen[-1]])
+    corners = faces.corners[begin:end]
+    low, high = int(corners.min()), int(corners.max()) + 1
+    return Faces(faces.points[low:high], corners - low, faces.sizes[chosen])

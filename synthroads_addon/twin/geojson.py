@@ -1,0 +1,177 @@
+"""GeoJSON in map coordinates: centreline, lanes, lane lines, boundaries, markings, and where furniture stands."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..road.centerline import centerline_geojson
+from ..road.geometry import RoadGeometry
+from ..road.objects import LineObject, PointObject, RoadObject
+from ..road.parameters import Arrow, Carriageway, Hatching, LineMarking, Median, RoadParameters, Turnout
+from .attributes import attributes_of
+from .surfaces import dash_stations, line_points, on_ground, painted_surface, road_stations
+
+Float = NDArray[np.float64]
+Feature = dict[str, Any]
+
+DIGITS = 4
+"""Decimals of coordinates and of stations and widths beside them: 0.1 mm."""
+_THERE = 1e-6
+"""Width above which a lane is there, m."""
+
+
+def write_geojson(parameters: RoadParameters, path: Path, tolerance: float) -> None:
+    """Write a road's lines and places as GeoJSON, one feature per line.
+
+    Coordinates are those of the parameter set's reference system, named by the member ``crs`` (GeoJSON 2008): degrees
+    of WGS 84, which RFC 7946 wants, would cost millimetres.
+
+    Args:
+        parameters: the road.
+        path: the file.
+        tolerance: largest chord error of curved lines, m, > 0.
+    """
+    geometry = RoadGeometry(parameters)
+    stations = road_stations(geometry, tolerance)
+    collection = centerline_geojson(geometry, stations)
+    features = collection.pop("features")
+    for feature in features:
+        feature["properties"] = {"feature": "centerline", "object_type": "Alignment"} | feature["properties"]
+    with path.open("w", encoding="utf-8", newline="\n") as file:
+        file.write(_text(collection)[:-1] + ',"features":[')
+        before = "\n"
+        for feature in (*features, *_Writer(geometry, stations, tolerance).features()):
+            file.write(before + _text(feature))
+            before = ",\n"
+        file.write("\n]}\n")
+
+
+class _Writer:
+    """What the features of one road are made from."""
+
+    def __init__(self, geometry: RoadGeometry, stations: Float, tolerance: float) -> None:
+        self.geometry = geometry
+        self.stations = stations
+        self.tolerance = tolerance
+        self.origin = np.array(geometry.parameters.transform.translate)
+
+    def features(self) -> Iterator[Feature]:
+        """Yield the features of every object, in the order of the parameter set."""
+        for name, item in self.geometry.parameters.objects.items():
+            if isinstance(item, Carriageway):
+                yield from self._carriageway(name, item)
+            elif isinstance(item, Turnout):
+                yield from self._turnout(name, item)
+            elif isinstance(item, Median):
+                yield from self._median(name, item)
+            elif isinstance(item, LineMarking):
+                yield from self._line_marking(name, item)
+            elif isinstance(item, Hatching | Arrow):
+                yield from self._painted(name, item)
+            elif isinstance(item, PointObject):
+                place = on_ground(self.geometry, np.array([item.station]), np.array([item.offset]))
+                place[:, 2] += item.elevation
+                yield _feature(self._furniture(name, item), "Point", self._map(place)[0])
+            elif isinstance(item, LineObject):
+                line = self._map(line_points(self.geometry, item, self.tolerance))
+                yield _feature(self._furniture(name, item), "LineString", line)
+
+    def _furniture(self, name: str, item: RoadObject) -> Feature:
+        return attributes_of(item) | {"id": name, "feature": "furniture"}
+
+    def _carriageway(self, name: str, item: Carriageway) -> Iterator[Feature]:
+        section = self.geometry.sections[item.side]
+        about = {"id": name, "instance": item.instance, "object_type": "Carriageway", "side": item.side}
+        edges = {
+            "inner_edge": section.distances(self.stations)[:, 0],
+            "paved_edge": section.paved_edge(self.stations),
+            "road_edge": section.road_edge(self.stations),
+        }
+        for kind, distance in edges.items():
+            yield self._along(about | {"feature": kind}, item.sign * distance)
+        boundaries = section.lane_boundaries(self.stations)
+        for number in range(len(item.lanes) + 1):
+            offset = item.sign * boundaries[:, number]
+            yield self._along(about | {"feature": "lane_boundary", "boundary": number}, offset)
+        for number, lane in enumerate(item.lanes):
+            of_lane = {"feature": "lane", "lane": number, "lane_kind": lane.kind}
+            yield from self._lanes(about | of_lane, item, (boundaries[:, number + 1], boundaries[:, number]))
+
+    def _turnout(self, name: str, item: Turnout) -> Iterator[Feature]:
+        carriageway = self.geometry.parameters.objects[item.carriageway]
+        assert isinstance(carriageway, Carriageway)
+        section = self.geometry.sections[carriageway.side]
+        shape = next(shape for shape in section.turnouts if shape.turnout.instance == item.instance)
+        kind = "bay" if item.ramp is None else "turnout_lane"
+        inner, outer = section.boundaries_of(kind, self.stations)
+        low, high = shape.range()
+        here = (self.stations >= low) & (self.stations <= high)
+        about = {"id": name, "instance": item.instance, "object_type": "Turnout", "side": carriageway.side}
+        about |= {"turnout": item.kind, "feature": "lane" if item.ramp else "bay"}
+        yield from self._lanes(about, carriageway, (np.where(here, inner, 0.0), np.where(here, outer, 0.0)))
+
+    def _lanes(self, about: Feature, carriageway: Carriageway, distances: tuple[Float, Float]) -> Iterator[Feature]:
+        """Yield a lane's centreline with its widths wherever it is there."""
+        inner, outer = distances
+        there = np.flatnonzero(outer - inner > _THERE)
+        for run in np.split(there, np.flatnonzero(np.diff(there) > 1) + 1):
+            # A row more at either end: there the lane's width is 0, or the road ends.
+            rows = np.arange(max(run[0] - 1, 0), min(run[-1] + 2, len(outer))) if len(run) else run
+            rows = rows[(outer - inner)[rows] >= 0.0]
+            if len(rows) > 1:
+                middle = carriageway.sign * (inner[rows] + outer[rows]) / 2.0
+                widths = {"widths": np.round((outer - inner)[rows], DIGITS).tolist()}
+                yield self._along(about | widths, middle, rows)
+
+    def _median(self, name: str, item: Median) -> Iterator[Feature]:
+        inner = {side: section.distances(self.stations)[:, 0] for side, section in self.geometry.sections.items()}
+        if len(inner) < 2:
+            return
+        left = on_ground(self.geometry, self.stations, inner["left"])
+        right = on_ground(self.geometry, self.stations, -inner["right"])
+        ring = self._map(np.concatenate([right, left[::-1], right[:1]]))
+        about = {"id": name, "instance": item.instance, "object_type": "Median", "feature": "median"}
+        yield _feature(about, "Polygon", [ring])
+
+    def _line_marking(self, name: str, item: LineMarking) -> Iterator[Feature]:
+        dashes, station, owner = dash_stations(self.geometry, item, self.stations)
+        if not len(dashes):
+            return
+        left, right = self.geometry.marking_edges(item, station)
+        points = on_ground(self.geometry, station, (left + right) / 2.0)
+        points[:, 2] += item.film_thickness
+        lines = np.split(points, np.flatnonzero(np.diff(owner)) + 1)
+        about = attributes_of(item) | {"id": name, "feature": "marking", "dashes": np.round(dashes, DIGITS).tolist()}
+        yield _feature(about, "MultiLineString", [self._map(line) for line in lines])
+
+    def _painted(self, name: str, item: Hatching | Arrow) -> Iterator[Feature]:
+        faces = painted_surface(self.geometry, item, self.stations)
+        if not len(faces):
+            return
+        points = self._map(faces.points)
+        rings = np.split(faces.corners, np.cumsum(faces.sizes)[:-1])
+        closed = [[[points[i] for i in (*ring, ring[0])]] for ring in rings]
+        yield _feature(attributes_of(item) | {"id": name, "feature": "marking"}, "MultiPolygon", closed)
+
+    def _along(self, about: Feature, offset: Float, rows: NDArray[np.intp] | None = None) -> Feature:
+        station = self.stations if rows is None else self.stations[rows]
+        points = on_ground(self.geometry, station, offset)
+        about = about | {"stations": np.round(station, DIGITS).tolist(), "offsets": np.round(offset, DIGITS).tolist()}
+        return _feature(about, "LineString", self._map(points))
+
+    def _map(self, points: Float) -> list[Any]:
+        return np.round(points + self.origin, DIGITS).tolist()
+
+
+def _feature(properties: Feature, kind: str, coordinates: list[Any]) -> Feature:
+    return {"type": "Feature", "properties": properties, "geometry": {"type": kind, "coordinates": coordinates}}
+
+
+def _text(data: Any) -> str:
+    return json.dumps(data, ensure_ascii=False, separators=(",", ":"), allow_nan=False)

@@ -1,0 +1,368 @@
+"""The centreline in IFC 4.3: semantic segments and the curves that they mean, both from one table.
+
+The plan is an IfcCompositeCurve of lines, arcs and clothoids, the profile an IfcGradientCurve over it of constant
+grades and parabolas. Distances along are stations: horizontal lengths.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ...road.alignment import Alignment
+from ...road.geometry import RoadGeometry
+from ...road.parameters import Carriageway
+from ...road.profile import Profile
+from .entities import Entity, IfcFile, short
+
+_HORIZONTAL = {"line": "LINE", "arc": "CIRCULARARC", "clothoid": "CLOTHOID"}
+_SHORTEST = 1e-6
+"""Pieces of the profile up to this length (m) are left out: roundings that touch."""
+_SAME_GRADE = 1e-9
+_FAR_OUT = 1.0
+"""A clothoid that begins where its spiral has turned by more than this (rad) is written with its curvature at the start
+instead of as a piece of the spiral: readers integrate from the spiral's middle, and from 2 rad on they are millimetres
+to kilometres off. The guidelines' clothoids (A up to R) begin within 0.5 rad."""
+_NO_QUADRATIC = 1e9
+"""Quadratic term (m) of a spiral that has none: over 1 km it turns by less than 1e-18 rad."""
+_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(16)
+
+
+@dataclass(frozen=True)
+class PlanSegment:
+    """One element of the plan.
+
+    Attributes:
+        kind: ``LINE``, ``CIRCULARARC``, ``CLOTHOID``.
+        x, y: start, local, m.
+        heading: at the start, rad.
+        length: m.
+        start_curvature, end_curvature: 1/m, positive to the left.
+    """
+
+    kind: str
+    x: float
+    y: float
+    heading: float
+    length: float
+    start_curvature: float
+    end_curvature: float
+
+
+@dataclass(frozen=True)
+class ProfileSegment:
+    """One piece of the profile: ``height`` + u (``grade`` + u ``curvature`` / 2), u from 0 to ``length`` (m)."""
+
+    station: float
+    length: float
+    height: float
+    grade: float
+    curvature: float
+
+
+@dataclass(frozen=True)
+class Axis:
+    """The centreline in the file.
+
+    Attributes:
+        alignment: the IfcAlignment.
+        plan: its IfcCompositeCurve: what distances along are measured on.
+    """
+
+    alignment: Entity
+    plan: Entity
+
+
+def plan_segments(alignment: Alignment) -> list[PlanSegment]:
+    """Return the plan's elements; a clothoid so flat that readers of IFC fail on it is an arc or a line."""
+    starts = alignment.element_starts[:-1]
+    position, heading, _ = alignment.frame(starts)
+    found = []
+    for element, (x, y), angle in zip(alignment.elements, position.tolist(), heading.tolist(), strict=True):
+        kind, mean = element.kind, element.mean_curvature
+        first, last = (element.curvature_start, element.curvature_end) if kind == "clothoid" else (mean, mean)
+        if kind == "line":
+            first = last = 0.0
+        found.append(PlanSegment(_HORIZONTAL[kind], x, y, angle, element.length, first, last))
+    return found
+
+
+def profile_segments(profile: Profile, length: float) -> list[ProfileSegment]:
+    """Return the profile's pieces from station 0 to the road's length."""
+    inside = profile.breakpoints[(profile.breakpoints > _SHORTEST) & (profile.breakpoints < length - _SHORTEST)]
+    borders = np.concatenate([[0.0], inside, [length]])
+    keep = np.append(np.diff(borders) > _SHORTEST, True)
+    borders = borders[keep]
+    middle = (borders[:-1] + borders[1:]) / 2.0
+    half, curvature = np.diff(borders) / 2.0, np.asarray(profile.curvature(middle))
+    grade = profile.grade(middle) - curvature * half
+    height = profile.elevation(middle) - half * (grade + 0.5 * curvature * half)
+    rows = np.column_stack([borders[:-1], 2.0 * half, height, grade, curvature]).tolist()
+    return [ProfileSegment(*row) for row in rows]
+
+
+def write_alignment(ifc: IfcFile, geometry: RoadGeometry) -> Axis:
+    """Add the alignment: its layouts, curves and referents; return what other things are placed along."""
+    name, item = next((n, o) for n, o in geometry.parameters.objects.items() if o is geometry.parameters.alignment)
+    plan, gradient = _Plan(ifc, name), _Profile(ifc, name)
+    plan_curve = plan.write(geometry.alignment)
+    gradient_curve = gradient.write(geometry.profile, geometry.length, plan_curve)
+    shapes = [
+        ifc.add("IfcShapeRepresentation", ifc.contexts["Axis"], "FootPrint", "Curve2D", [plan_curve]),
+        ifc.add("IfcShapeRepresentation", ifc.contexts["Axis"], "Axis", "Curve3D", [gradient_curve]),
+    ]
+    alignment = ifc.rooted(
+        "IfcAlignment",
+        name,
+        Name=name,
+        ObjectPlacement=ifc.local_frame,
+        Representation=ifc.add("IfcProductDefinitionShape", None, None, shapes),
+    )
+    ifc.gather("IfcRelAggregates", ifc.project, [alignment])
+    ifc.gather("IfcRelNests", alignment, [plan.layout, gradient.layout])
+    own = {key: value for key, value in ifc.parameters_of(item).items() if key not in ("horizontal", "vertical")}
+    ifc.properties(alignment, "SynthRoads", own | {"length": ifc.value(geometry.length, "m")})
+    axis = Axis(alignment, plan_curve)
+    _write_referents(ifc, geometry, axis)
+    return axis
+
+
+class _Layout:
+    """What plan and profile have in common: segments, and an end of length 0 as IFC wants it."""
+
+    entity: str
+
+    def __init__(self, ifc: IfcFile, name: str) -> None:
+        self.ifc, self.name = ifc, name
+        self.layout = ifc.rooted(self.entity, name)
+        self.line = ifc.add(
+            "IfcLine",
+            ifc.point(0.0, 0.0),
+            ifc.add("IfcVector", ifc.direction(1.0, 0.0), 1.0),
+        )
+        self.curves: list[Entity] = []
+
+    def segment(self, number: int, design: Entity, curve: Entity) -> None:
+        """Add a semantic segment and its curve."""
+        key = f"{self.name}/{number}"
+        made = self.ifc.rooted("IfcAlignmentSegment", f"{self.entity}/{key}", Name=key, DesignParameters=design)
+        self.ifc.gather("IfcRelNests", self.layout, [made])
+        self.curves.append(curve)
+
+    def curve(self, placement: Entity, parent: tuple[Entity, float, float], transition: str) -> Entity:
+        """Add the piece of a parent curve from a start on with a length (both along it), moved to a placement."""
+        curve, start, length = parent
+        return self.ifc.add(
+            "IfcCurveSegment",
+            Transition=transition,
+            Placement=placement,
+            SegmentStart=self.ifc.length(start),
+            SegmentLength=self.ifc.length(length),
+            ParentCurve=curve,
+        )
+
+
+class _Plan(_Layout):
+    entity = "IfcAlignmentHorizontal"
+
+    def write(self, alignment: Alignment) -> Entity:
+        """Add all segments; return the composite curve."""
+        segments = plan_segments(alignment)
+        end, heading, _ = alignment.frame(np.array([alignment.length]))
+        x, y = end[0].tolist()
+        segments.append(PlanSegment("LINE", x, y, float(heading[0]), 0.0, 0.0, 0.0))
+        for number, segment in enumerate(segments):
+            self._write(number, segment, _plan_transition(*segments[number : number + 2]))
+        return self.ifc.add("IfcCompositeCurve", self.curves, False)
+
+    def _write(self, number: int, segment: PlanSegment, transition: str) -> None:
+        ifc = self.ifc
+        angle = short(math.remainder(segment.heading, 2.0 * math.pi), 12)
+        radii = [1.0 / k if k else 0.0 for k in (segment.start_curvature, segment.end_curvature)]
+        start = ifc.add("IfcCartesianPoint", short([segment.x, segment.y], 9))
+        design = ifc.add(
+            "IfcAlignmentHorizontalSegment",
+            StartPoint=start,
+            StartDirection=angle,
+            StartRadiusOfCurvature=radii[0],
+            EndRadiusOfCurvature=radii[1],
+            SegmentLength=segment.length,
+            PredefinedType=segment.kind,
+        )
+        placement = ifc.add("IfcAxis2Placement2D", start, ifc.heading(angle))
+        self.segment(number, design, self.curve(placement, self._parent(segment), transition))
+
+    def _parent(self, segment: PlanSegment) -> tuple[Entity, float, float]:
+        """Return the curve that a segment is a piece of, and where along it the piece begins and how long it is."""
+        ifc, first, length = self.ifc, segment.start_curvature, segment.length
+        if segment.kind == "LINE":
+            return self.line, 0.0, length
+        axes = ifc.axes_2d(0.0, 0.0, 0.0)
+        if segment.kind == "CIRCULARARC":
+            return ifc.add("IfcCircle", axes, 1.0 / abs(first)), 0.0, math.copysign(length, first)
+        # From curvature 0 on: k(s) = s / (A |A|).
+        change = segment.end_curvature - first
+        constant = math.copysign(math.sqrt(length / abs(change)), change)
+        start = first * length / change
+        if abs(first * start) / 2.0 > _FAR_OUT:
+            return ifc.add("IfcSecondOrderPolynomialSpiral", axes, _NO_QUADRATIC, constant, 1.0 / first), 0.0, length
+        return ifc.add("IfcClothoid", axes, constant), start, length
+
+
+class _Profile(_Layout):
+    entity = "IfcAlignmentVertical"
+
+    def write(self, profile: Profile, length: float, plan: Entity) -> Entity:
+        """Add all segments; return the gradient curve over the plan."""
+        segments = profile_segments(profile, length)
+        last = segments[-1]
+        grade = last.grade + last.curvature * last.length
+        height = last.height + last.length * (last.grade + 0.5 * last.curvature * last.length)
+        segments.append(ProfileSegment(length, 0.0, height, grade, 0.0))
+        for number, segment in enumerate(segments):
+            self._write(number, segment, _profile_transition(*segments[number : number + 2]))
+        return self.ifc.add("IfcGradientCurve", self.curves, False, plan, None)
+
+    def _write(self, number: int, segment: ProfileSegment, transition: str) -> None:
+        ifc, curvature, grade, length = self.ifc, segment.curvature, segment.grade, segment.length
+        design = ifc.add(
+            "IfcAlignmentVerticalSegment",
+            StartDistAlong=segment.station,
+            HorizontalLength=length,
+            StartHeight=short(segment.height, 9),
+            StartGradient=grade,
+            EndGradient=grade + curvature * length,
+            RadiusOfCurvature=1.0 / curvature if curvature else None,
+            PredefinedType="PARABOLICARC" if curvature else "CONSTANTGRADIENT",
+        )
+        place = ifc.add("IfcCartesianPoint", short([segment.station, segment.height], 9))
+        slope = ifc.direction(1.0 / math.hypot(1.0, grade), grade / math.hypot(1.0, grade))
+        placement = ifc.add("IfcAxis2Placement2D", place, slope)
+        along = _slope_length(grade, curvature, length)
+        parent = self.line
+        if curvature:
+            parent = ifc.add(
+                "IfcPolynomialCurve",
+                Position=ifc.axes_2d(0.0, 0.0, 0.0),
+                CoefficientsX=[0.0, 1.0],
+                CoefficientsY=[short(segment.height, 9), grade, curvature / 2.0],
+            )
+        self.segment(number, design, self.curve(placement, (parent, 0.0, along), transition))
+
+
+def _plan_transition(segment: PlanSegment, after: PlanSegment | None = None) -> str:
+    """Return how a segment goes over into the next one."""
+    if after is None:
+        return "DISCONTINUOUS"
+    same = segment.end_curvature == after.start_curvature
+    return "CONTSAMEGRADIENTSAMECURVATURE" if same else "CONTSAMEGRADIENT"
+
+
+def _profile_transition(segment: ProfileSegment, after: ProfileSegment | None = None) -> str:
+    """Return how a segment goes over into the next one; at an intersection without rounding the grade jumps."""
+    if after is None:
+        return "DISCONTINUOUS"
+    grade = segment.grade + segment.curvature * segment.length
+    if abs(grade - after.grade) > _SAME_GRADE:
+        return "CONTINUOUS"
+    return "CONTSAMEGRADIENTSAMECURVATURE" if segment.curvature == after.curvature else "CONTSAMEGRADIENT"
+
+
+def _slope_length(grade: float, curvature: float, length: float) -> float:
+    """Return the length (m) of a piece of profile along its slope."""
+    at = (_NODES + 1.0) / 2.0 * length
+    return float(np.sqrt(1.0 + (grade + curvature * at) ** 2) @ _WEIGHTS * length / 2.0)
+
+
+# --- referents ------------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class _Referent:
+    """A point of the alignment of which something is known: its station (m), name, kind, and one property set."""
+
+    station: float
+    name: str
+    kind: str
+    properties: str
+    values: Mapping[str, Any]
+
+
+def _write_referents(ifc: IfcFile, geometry: RoadGeometry, axis: Axis) -> None:
+    """Nest the beginning of the stationing, and the points of crossfall and of changing widths, by station."""
+    zero = {"Station": ifc.add("IfcLengthMeasure", 0.0)}
+    found = [_Referent(0.0, "station-0", "STATION", "Pset_Stationing", zero)]
+    for name, carriageway in geometry.parameters.of_type(Carriageway).items():
+        found += _superelevation(ifc, name, carriageway)
+        found += _widths(ifc, geometry, name, carriageway)
+    # What lies before or behind the road isn't on the curve.
+    inside = [item for item in found if 0.0 <= item.station <= geometry.length]
+    for item in sorted(inside, key=lambda item: item.station):
+        place = linear_placement(ifc, geometry, axis, item.station)
+        referent = ifc.rooted(
+            "IfcReferent", item.name, Name=item.name, ObjectPlacement=place, PredefinedType=item.kind
+        )
+        ifc.properties(referent, item.properties, item.values)
+        if item.kind != "STATION":
+            ifc.properties(referent, "Pset_Stationing", {"Station": ifc.value(item.station, "m")})
+        ifc.gather("IfcRelNests", axis.alignment, [referent], "referents")
+
+
+def _superelevation(ifc: IfcFile, name: str, carriageway: Carriageway) -> Iterator[_Referent]:
+    """Yield a referent per point of crossfall, a ratio that is positive where the surface falls to the right."""
+    for number, point in enumerate(carriageway.crossfall):
+        values = {
+            "Side": [carriageway.side.upper()],
+            "Superelevation": ifc.add("IfcRatioMeasure", short(point.crossfall_percent / 100.0, 9)),
+            "TransitionSuperelevation": ["LINEAR"],
+        }
+        key = f"{name}/crossfall-{number}"
+        yield _Referent(point.station, key, "SUPERELEVATIONEVENT", "Pset_Superelevation", values)
+
+
+def _widths(ifc: IfcFile, geometry: RoadGeometry, name: str, carriageway: Carriageway) -> Iterator[_Referent]:
+    """Yield a referent at the beginning and wherever the width of a carriageway's pavement bends."""
+    section = geometry.sections[carriageway.side]
+    for number, station in enumerate(sorted({0.0, *section.kinks()})):
+        distances = section.distances(station)[0]
+        values = {
+            "Side": [carriageway.side.upper()],
+            "TransitionWidth": ["LINEAR"],
+            "NominalWidth": ifc.add("IfcNonNegativeLengthMeasure", short(distances[-2] - distances[0])),
+        }
+        yield _Referent(station, f"{name}/width-{number}", "WIDTHEVENT", "Pset_Width", values)
+
+
+# --- placing --------------------------------------------------------------------------------------------------------
+
+
+def linear_placement(
+    ifc: IfcFile, geometry: RoadGeometry, axis: Axis, station: float, offset: float = 0.0, height: float | None = None
+) -> Entity:
+    """Place something along the alignment: x along it, y to the left, z up.
+
+    Distances are along the plan, which is flat: so heights are elevations, and nothing leans with the grade. The
+    directions are those of the curve, which all readers take alike. The same as Cartesian coordinates stands beside it
+    for readers that know no linear placement.
+
+    Args:
+        station, offset: m.
+        height: local elevation, m; None for the profile's.
+    """
+    position, heading, _ = geometry.alignment.frame(np.array([station]))
+    angle = float(heading[0])
+    z = float(geometry.profile.elevation(station)) if height is None else height
+    x, y = (position[0] + offset * np.array([-math.sin(angle), math.cos(angle)])).tolist()
+    place = ifc.add(
+        "IfcPointByDistanceExpression",
+        DistanceAlong=ifc.length(station),
+        OffsetLateral=short(offset, 9),
+        OffsetVertical=short(z),
+        BasisCurve=axis.plan,
+    )
+    relative = ifc.add("IfcAxis2PlacementLinear", place, ifc.direction(0.0, 0.0, 1.0), None)
+    return ifc.add("IfcLinearPlacement", None, relative, ifc.axes_3d((x, y, z), angle))

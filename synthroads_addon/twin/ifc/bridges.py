@@ -1,0 +1,136 @@
+"""Overpasses in IFC 4.3: an IfcBridge across the road with deck, railings, piers and abutments."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from ...road.parameters import Overpass
+from ...road.things.body_shapes import (
+    BRIDGE_ABUTMENT,
+    BRIDGE_BEARING,
+    BRIDGE_BURIED,
+    BRIDGE_PIER_LENGTH,
+    BRIDGE_SEAT,
+)
+from .clearance import pavement_below
+from .entities import Entity
+from .scene import Place, Scene
+from .solids import Point2, Solids
+
+_RAILING, _LOWEST_RAILING = 0.09, 0.5
+"""Thickness of a railing, and the height (m) from which there is one."""
+
+
+def write_overpasses(scene: Scene) -> None:
+    """Add all overpasses."""
+    for name, item in scene.geometry.parameters.of_type(Overpass).items():
+        _Bridge(scene, name, item).write()
+
+
+class _Bridge:
+    """Writes one bridge. A skewed one is sheared: the ends of its deck stay parallel to the road."""
+
+    def __init__(self, scene: Scene, name: str, item: Overpass) -> None:
+        self.scene, self.ifc, self.name, self.item = scene, scene.ifc, name, item
+        self.place: Place = scene.place_of(item)
+        self.shear = math.tan(math.radians(item.rotation_deg))
+        self.left, self.right = item.left_abutment - item.offset, item.right_abutment - item.offset
+        along, across = (-item.width / 2.0, item.width / 2.0), (self.left, self.right)
+        pavement = pavement_below(scene.geometry, self.place, along, across, self.shear)
+        self.low = pavement + item.clearance - float(self.place.origin[2])
+        self.solids = Solids(scene.ifc)
+
+    def write(self) -> None:
+        """Add the bridge, its parts and their elements."""
+        ifc, item = self.ifc, self.item
+        self.bridge = ifc.rooted(
+            "IfcBridge",
+            self.name,
+            Name=self.name,
+            ObjectType="Overpass",
+            ObjectPlacement=self.place.placement,
+            CompositionType="ELEMENT",
+            PredefinedType="NOTDEFINED",
+        )
+        ifc.gather("IfcRelAggregates", self.scene.site, [self.bridge])
+        ifc.gather("IfcRelPositions", self.scene.axis.alignment, [self.bridge])
+        self.scene.describe(self.bridge, item)
+        above, below = self._part("superstructure"), self._part("substructure")
+        self._deck(above)
+        for number, offset in enumerate(item.pier_offsets, 1):
+            size = (item.width * BRIDGE_PIER_LENGTH, item.pier_width)
+            self._support(below, "IfcColumn", f"pier-{number}", "PIERSTEM", offset - item.offset, size)
+        for name, face, behind in (("left", self.left, 1.0), ("right", self.right, -1.0)):
+            size = (item.width, BRIDGE_ABUTMENT)
+            middle = face + behind * BRIDGE_ABUTMENT / 2.0
+            self._support(below, "IfcWall", f"abutment-{name}", "RETAININGWALL", middle, size)
+
+    def _part(self, kind: str) -> Entity:
+        name = f"{self.name}/{kind}"
+        part = self.ifc.rooted(
+            "IfcBridgePart",
+            name,
+            Name=name,
+            ObjectPlacement=self._frame(),
+            CompositionType="PARTIAL",
+            UsageType="VERTICAL",
+            PredefinedType=kind.upper(),
+        )
+        self.ifc.gather("IfcRelAggregates", self.bridge, [part])
+        return part
+
+    def _frame(self) -> Entity:
+        return self.ifc.add("IfcLocalPlacement", self.place.placement, self.ifc.flat_axes)
+
+    def _deck(self, part: Entity) -> None:
+        item, left, right = self.item, self.left + BRIDGE_SEAT, self.right - BRIDGE_SEAT
+        half = item.width / 2.0
+        deck = self.solids.prism(self._strip(left, right, -half, half), (0.0, 0.0, self.low), item.deck_thickness)
+        self._element(part, "IfcSlab", "deck", deck, "USERDEFINED", "bridge_concrete", "BRIDGEDECK")
+        if item.parapet_height < _LOWEST_RAILING:
+            return
+        top = self.low + item.deck_thickness
+        for name, near, far in (("near", -half, -half + _RAILING), ("far", half - _RAILING, half)):
+            body = self.solids.prism(self._strip(left, right, near, far), (0.0, 0.0, top), item.parapet_height)
+            self._element(part, "IfcRailing", f"railing-{name}", body, "BALUSTRADE", "galvanised_steel")
+
+    def _strip(self, left: float, right: float, near: float, far: float) -> list[Point2]:
+        """Return a strip across the road, x along the road and y to its left, against the clock."""
+        return [(x - self.shear * y, y) for x, y in ((near, left), (near, right), (far, right), (far, left))]
+
+    def _support(self, part: Entity, entity: str, name: str, kind: str, y: float, size: Point2) -> None:
+        """Add what the deck rests on, from below the ground up to its bearings."""
+        x = -self.shear * y
+        ground = self._ground(x, y)
+        foot = ground - float(self.place.origin[2]) - BRIDGE_BURIED
+        height = max(self.low - BRIDGE_BEARING - foot, BRIDGE_BEARING)
+        body = self.solids.box((*size, height), (x, y, foot))
+        self._element(part, entity, name, body, kind, "bridge_concrete")
+
+    def _ground(self, x: float, y: float) -> float:
+        """Return the local elevation of the ground at a point of the bridge's frame, m."""
+        heading, (east, north, _) = self.place.heading, self.place.origin
+        cosine, sine = math.cos(heading), math.sin(heading)
+        plan = (east + x * cosine - y * sine, north + x * sine + y * cosine)
+        station, offset = self.scene.geometry.alignment.project(np.array([plan]))
+        return self.scene.at(float(station[0]), float(offset[0]))[0]
+
+    def _element(
+        self, part: Entity, entity: str, name: str, body: Entity, kind: str, material: str, about: str | None = None
+    ) -> None:
+        ifc, key = self.ifc, f"{self.name}/{name}"
+        made = ifc.rooted(
+            entity,
+            key,
+            Name=key,
+            ObjectType=about,
+            ObjectPlacement=self._frame(),
+            Representation=ifc.shape([body], "SweptSolid"),
+            PredefinedType=kind,
+        )
+        ifc.gather("IfcRelContainedInSpatialStructure", part, [made])
+        ifc.made_of(made, material)
+        values = {"instance": ifc.value(self.item.instance), "class": ifc.value("bridge")}
+        ifc.properties(made, "SynthRoads", values)

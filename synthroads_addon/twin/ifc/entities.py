@@ -1,0 +1,272 @@
+"""An IFC 4.3 file in the making: entities with stable identifiers, placements, properties, relations, materials.
+
+Everything that says the same of several objects (a container's elements, a material's) is gathered, and becomes one
+relation each at the end. Identifiers come from the objects' names, never from chance or from the clock.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...base.errors import InputError
+from ...base.schema import Model, canonical_json, unit_of
+from ...materials.table import UNKNOWN, materials
+
+Float = NDArray[np.float64]
+Entity = Any
+"""An instance in the file (`ifcopenshell.entity_instance`)."""
+Values = Mapping[str, Entity]
+
+SCHEMA = "IFC4X3_ADD2"
+LENGTH_DIGITS = 6
+"""Digits of coordinates: a micrometre."""
+_DIRECTION_DIGITS = 10
+_LONGEST_LABEL = 255
+_HEADER_TIME = "1970-01-01T00:00:00"
+_MEASURES = {"m": "IfcLengthMeasure", "m/s": "IfcLinearVelocityMeasure"}
+
+
+def library() -> Any:
+    """Return the package `ifcopenshell`; InputError saying how to install it where it is missing."""
+    try:
+        import ifcopenshell
+        import ifcopenshell.guid
+    except ImportError:
+        raise InputError("format", "ifc", "needs ifcopenshell: pip install 'synthroads[twin]'") from None
+    return ifcopenshell
+
+
+def short(values: Any, digits: int = LENGTH_DIGITS) -> Any:
+    """Return numbers rounded for the file, as (nested) lists of floats; no negative zeros."""
+    return (np.round(np.asarray(values, dtype=np.float64), digits) + 0.0).tolist()
+
+
+class IfcFile:
+    """A file in the making.
+
+    Attributes:
+        file: ifcopenshell's file.
+        project: the IfcProject, once it is there.
+    """
+
+    def __init__(self, namespace: str) -> None:
+        """Make an empty file; ``namespace`` (the road's identifier) keeps apart the identifiers of different roads."""
+        ifcopenshell = library()
+        self.file = ifcopenshell.file(schema=SCHEMA)
+        self._compress = ifcopenshell.guid.compress
+        self._namespace = namespace
+        self._keys: set[str] = set()
+        self._gathered: dict[tuple[str, int, str], tuple[Entity, list[Entity]]] = {}
+        self._materials: dict[str, Entity] = {}
+        self._directions: dict[tuple[float, ...], Entity] = {}
+        self._shapes: dict[object, Entity] = {}
+        self.project: Entity = None
+        self.contexts: dict[str, Entity] = {}
+        self.origin = self.add("IfcCartesianPoint", [0.0, 0.0, 0.0])
+        self.flat_axes = self.add("IfcAxis2Placement3D", self.origin, None, None)
+        self.local_frame = self.add("IfcLocalPlacement", None, self.flat_axes)
+
+    # --- entities -------------------------------------------------------------------------------------------------
+
+    def add(self, entity: str, *values: Any, **named: Any) -> Entity:
+        """Add an entity with its attributes."""
+        return self.file.create_entity(entity, *values, **named)
+
+    def guid(self, key: str) -> str:
+        """Return the identifier of a key, which must be new: a hash of the road's identifier and the key."""
+        if key in self._keys:
+            raise ValueError(f"two objects have the key {key!r}")
+        self._keys.add(key)
+        digest = hashlib.sha256(f"{self._namespace}\n{key}".encode()).digest()[:16]
+        # The bits that mark a UUID made of a name (RFC 9562, version 8: by a hash of one's own choice).
+        marked = bytearray(digest)
+        marked[6] = marked[6] & 0x0F | 0x80
+        marked[8] = marked[8] & 0x3F | 0x80
+        return str(self._compress(bytes(marked).hex()))
+
+    def rooted(self, entity: str, key: str, **named: Any) -> Entity:
+        """Add an entity that has a GlobalId, which follows from its class and key."""
+        return self.add(entity, GlobalId=self.guid(f"{entity}/{key}"), **named)
+
+    # --- geometry -------------------------------------------------------------------------------------------------
+
+    def point(self, *coordinates: float) -> Entity:
+        """Add a point."""
+        return self.add("IfcCartesianPoint", short(coordinates))
+
+    def direction(self, *ratios: float) -> Entity:
+        """Return a direction; equal ones are one entity."""
+        key = tuple(short(ratios, _DIRECTION_DIGITS))
+        if key not in self._directions:
+            self._directions[key] = self.add("IfcDirection", list(key))
+        return self._directions[key]
+
+    def heading(self, angle: float, dimension: int = 2) -> Entity:
+        """Return the horizontal direction of an angle from the x axis (rad)."""
+        return self.direction(*(math.cos(angle), math.sin(angle), 0.0)[:dimension])
+
+    def axes_2d(self, x: float, y: float, angle: float) -> Entity:
+        """Add a 2D placement whose x axis has an angle (rad)."""
+        return self.add("IfcAxis2Placement2D", self.point(x, y), self.heading(angle))
+
+    def axes_3d(self, place: Sequence[float], angle: float = 0.0) -> Entity:
+        """Add an upright 3D placement, turned about the vertical by an angle (rad)."""
+        return self.add(
+            "IfcAxis2Placement3D", self.point(*place), self.direction(0.0, 0.0, 1.0), self.heading(angle, 3)
+        )
+
+    def length(self, value: float) -> Entity:
+        """Add a length with its type, where IFC lets a choice of types."""
+        return self.add("IfcLengthMeasure", short(value, 9))
+
+    def mesh(self, vertices: Float, triangles: NDArray[np.intp], closed: bool) -> Entity | None:
+        """Add a triangulated face set; None if no triangle has an area.
+
+        Args:
+            vertices: (N, 3) m, in the frame of the product's placement.
+            triangles: (M, 3) indices, counter-clockwise from outside or above.
+            closed: whether it bounds a solid.
+        """
+        places = np.round(vertices, LENGTH_DIGITS) + 0.0
+        unique, index = np.unique(places, axis=0, return_inverse=True)
+        merged = index.reshape(-1)[triangles]
+        first, second, third = merged.T
+        merged = merged[(first != second) & (second != third) & (third != first)]
+        if not len(merged):
+            return None
+        used, numbers = np.unique(merged, return_inverse=True)
+        points = self.add("IfcCartesianPointList3D", unique[used].tolist())
+        numbered = (numbers.reshape(-1, 3) + 1).tolist()
+        return self.add("IfcTriangulatedFaceSet", Coordinates=points, Closed=closed, CoordIndex=numbered)
+
+    def shape(self, items: Iterable[Entity | None], kind: str, key: object = None) -> Entity | None:
+        """Add the body of a product from items of one kind (``Tessellation``, ``SweptSolid``); None without items.
+
+        Bodies of the same ``key`` are one: the second product shares the first one's.
+        """
+        if key is not None and key in self._shapes:
+            return self._shapes[key]
+        found = [item for item in items if item is not None]
+        if not found:
+            return None
+        body = self.add("IfcShapeRepresentation", self.contexts["Body"], "Body", kind, found)
+        made = self.add("IfcProductDefinitionShape", None, None, [body])
+        if key is not None:
+            self._shapes[key] = made
+        return made
+
+    def has_shape(self, key: object) -> bool:
+        """Return whether a body of this key is there."""
+        return key in self._shapes
+
+    # --- what is said of objects ----------------------------------------------------------------------------------
+
+    def gather(self, relation: str, of: Entity, members: Iterable[Entity], group: str = "") -> None:
+        """Note that objects stand in a relation (``IfcRelAggregates``, ...) to another, to be written at the end.
+
+        Those of different groups become relations of their own.
+        """
+        self._gathered.setdefault((relation, of.id(), group), (of, []))[1].extend(members)
+
+    def properties(self, item: Entity, name: str, values: Values) -> None:
+        """Give an object a property set: of values of IFC's simple types, and of lists of labels that are chosen."""
+        made = [self._property(key, value) for key, value in values.items()]
+        if not made:
+            return
+        key = f"{item.GlobalId}/{name}"
+        found = self.rooted("IfcPropertySet", key, Name=name, HasProperties=made)
+        self.rooted("IfcRelDefinesByProperties", key, RelatedObjects=[item], RelatingPropertyDefinition=found)
+
+    def _property(self, name: str, value: Entity | list[str]) -> Entity:
+        if isinstance(value, list):
+            chosen = [self.add("IfcLabel", label) for label in value]
+            return self.add("IfcPropertyEnumeratedValue", name, None, chosen, None)
+        return self.add("IfcPropertySingleValue", name, None, value, None)
+
+    def value(self, value: object, unit: str = "") -> Entity:
+        """Return a value of a parameter set as one of IFC's simple types; what has parts becomes JSON text."""
+        if isinstance(value, bool):
+            return self.add("IfcBoolean", value)
+        if isinstance(value, int):
+            return self.add("IfcInteger", value)
+        if isinstance(value, float):
+            return self.add(_MEASURES.get(unit, "IfcReal"), value + 0.0)
+        text = value if isinstance(value, str) else " ".join(canonical_json(_plain(value)).split())
+        return self.add("IfcLabel" if isinstance(value, str) and len(text) <= _LONGEST_LABEL else "IfcText", text)
+
+    def parameters_of(self, model: Model) -> dict[str, Entity]:
+        """Return all that a parameter set says of an object, under the same names, as IFC values."""
+        fields = type(model).model_fields
+        found = {name: (getattr(model, name), unit_of(field)) for name, field in fields.items()}
+        return {name: self.value(value, unit) for name, (value, unit) in found.items() if value is not None}
+
+    def made_of(self, item: Entity, name: str) -> None:
+        """Give an object its material, by its name in the material table."""
+        if name not in self._materials:
+            self._materials[name] = self._material(name)
+        self.gather("IfcRelAssociatesMaterial", self._materials[name], [item])
+
+    def _material(self, name: str) -> Entity:
+        """Add a material and its colour."""
+        entry = materials().get(name, materials()[UNKNOWN])
+        # Viewers take the colour as it is; linear base colours would look too dark.
+        red, green, blue = short([channel ** (1.0 / 2.2) for channel in entry.base_color], 4)
+        material = self.add("IfcMaterial", Name=name)
+        colour = self.add("IfcColourRgb", None, red, green, blue)
+        shading = self.add("IfcSurfaceStyleShading", colour, None)
+        style = self.add("IfcSurfaceStyle", name, "BOTH", [shading])
+        item = self.add("IfcStyledItem", None, [style], None)
+        shown = self.add("IfcStyledRepresentation", self.contexts["Body"], "Style", "Material", [item])
+        self.add("IfcMaterialDefinitionRepresentation", None, None, [shown], material)
+        return material
+
+    # --- the end --------------------------------------------------------------------------------------------------
+
+    def relate(self) -> None:
+        """Write the gathered relations."""
+        for (relation, _, group), (of, members) in self._gathered.items():
+            relating, related = _RELATIONS[relation]
+            key = f"{of.GlobalId if hasattr(of, 'GlobalId') else of.Name}/{group}"
+            self.rooted(relation, key, **{relating: of, related: members})
+        self._gathered.clear()
+
+    def write(self, path: Path, title: str, program: str) -> None:
+        """Write the file; its header names no time, so that the same road gives the same bytes."""
+        header = self.file.header
+        header.file_description.description = ("ViewDefinition [NotAssigned]",)
+        name = header.file_name
+        name.name, name.time_stamp, name.author, name.organization = title, _HEADER_TIME, ("",), ("",)
+        name.preprocessor_version, name.originating_system = "IfcOpenShell", program
+        name.authorization = ""
+        try:
+            self.file.write(str(path))
+        except RuntimeError as error:
+            raise InputError(str(path), None, f"cannot be written ({error})") from None
+
+
+_RELATIONS = {
+    "IfcRelAggregates": ("RelatingObject", "RelatedObjects"),
+    "IfcRelNests": ("RelatingObject", "RelatedObjects"),
+    "IfcRelContainedInSpatialStructure": ("RelatingStructure", "RelatedElements"),
+    "IfcRelReferencedInSpatialStructure": ("RelatingStructure", "RelatedElements"),
+    "IfcRelAssociatesMaterial": ("RelatingMaterial", "RelatedObjects"),
+    "IfcRelAdheresToElement": ("RelatingElement", "RelatedSurfaceFeatures"),
+    "IfcRelPositions": ("RelatingPositioningElement", "RelatedProducts"),
+}
+"""Relation -> its attributes for the one object and for the many."""
+
+
+def _plain(value: object) -> object:
+    """Return models in a value as plain JSON data."""
+    if isinstance(value, Model):
+        return value.to_dict()
+    if isinstance(value, tuple | list):
+        return [_plain(item) for item in value]
+    return value

@@ -1,0 +1,259 @@
+"""What stands at one place in IFC 4.3: signs, posts, poles, lights, cabinets, beacons, assets.
+
+Each stands on an IfcLinearPlacement at its station, offset and height. Objects of the same size and rotation share one
+body.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+from ...road.parameters import (
+    Asset,
+    Cabinet,
+    ConstructionBeacon,
+    Delineator,
+    KilometreBoard,
+    PointObject,
+    Pole,
+    TrafficLight,
+    TrafficSign,
+)
+from ...road.things.body_shapes import (
+    BEACON_BLADE,
+    BEACON_BLADE_BOTTOM,
+    BEACON_FOOT,
+    DELINEATOR,
+    KILOMETRE_POST,
+    SIGN_RAIL,
+    TRAFFIC_LIGHT_POST,
+)
+from .entities import Entity
+from .scene import Place, Scene
+from .solids import Solids
+
+BURIED = 0.3
+"""Depth to which posts are modelled below the surface, m."""
+_FACE = 0.003
+"""Thickness of a sign's face, m."""
+_POST_TOP = {"round": 0.9, "triangle": 0.6, "rectangle": 0.97, "octagon": 0.93, "arrow": 0.9}
+"""Shape of a sign -> height of its posts' top as a share of the face's."""
+_LIGHT_BOARD, _CHAMBER_HEIGHT, _LIGHT_MARGIN = 1.9, 1.25, 0.05
+"""Width of a traffic light's board and height of a light's housing in its diameters; the board's margin, m."""
+_LUMINAIRE = (0.26, 0.6, 0.09)
+"""Size of a street light along the road, across it, and in height, m."""
+_CAMERA = (0.4, 0.13, 0.12)
+_ARM = 0.06
+"""Thickness of a pole's arm, m."""
+_ARM_RISE = 0.12
+
+
+def write_furniture(scene: Scene) -> None:
+    """Add everything that stands at one place but gantries and bridges."""
+    for name, item in scene.geometry.parameters.objects.items():
+        write = _WRITERS.get(type(item))
+        if write is not None:
+            write(scene, name, item)
+
+
+def _turn(item: PointObject) -> float:
+    """Return an object's rotation, rad."""
+    return math.radians(math.remainder(item.rotation_deg, 360.0))
+
+
+def _key(item: PointObject) -> object:
+    """Return what makes the body of one object that of another: all but its place and its number."""
+    hidden = {"instance", "station", "offset", "elevation", "text", "code"}
+    values = {name: value for name, value in item.to_dict().items() if name not in hidden}
+    values["rotation_deg"] = math.remainder(item.rotation_deg, 360.0)
+    return tuple(sorted((name, str(value)) for name, value in values.items()))
+
+
+def _stand(
+    scene: Scene, entity: str, name: str, item: PointObject, body: Callable[[Solids], list[Entity]], **named: Any
+) -> Entity:
+    """Add an element with its body at its place."""
+    ifc, key = scene.ifc, _key(item)
+    items = [] if ifc.has_shape(key) else body(Solids(ifc, _turn(item)))
+    made = ifc.rooted(
+        entity,
+        name,
+        Name=name,
+        ObjectPlacement=scene.place_of(item).placement,
+        Representation=ifc.shape(items, "SweptSolid", key),
+        **named,
+    )
+    scene.describe(made, item)
+    scene.stand(made, scene.container(item.station, item.offset))
+    return made
+
+
+# --- signs ----------------------------------------------------------------------------------------------------------
+
+
+def _sign(scene: Scene, name: str, item: TrafficSign) -> None:
+    def body(solids: Solids) -> list[Entity]:
+        height = item.lower_edge + item.height * _POST_TOP[item.shape] + BURIED
+        beside = [((number + 0.5) / item.posts - 0.5) * item.width for number in range(item.posts)]
+        posts = [solids.cylinder(item.post_diameter, (0.0, y, -BURIED), height) for y in beside]
+        middle = (-item.post_diameter / 2.0 - SIGN_RAIL, 0.0, item.lower_edge + item.height / 2.0)
+        return [solids.plate(item.shape, item.width, item.height, middle, _FACE), *posts]
+
+    sign = _stand(scene, "IfcSign", name, item, body, ObjectType=item.type, PredefinedType="PICTORAL")
+    _about_sign(scene, sign, item.code, "TrafficSign", "galvanised_steel")
+
+
+def _board(scene: Scene, name: str, item: KilometreBoard) -> None:
+    def body(solids: Solids) -> list[Entity]:
+        middle = (_FACE, 0.0, item.lower_edge + item.height / 2.0)
+        post = solids.cylinder(KILOMETRE_POST, (0.0, 0.0, -BURIED), item.lower_edge + item.height / 2.0 + BURIED)
+        return [solids.plate("rectangle", item.width, item.height, middle, 2.0 * _FACE), post]
+
+    sign = _stand(scene, "IfcSign", name, item, body, ObjectType=item.type, PredefinedType="MARKER")
+    _about_sign(scene, sign, item.text, "KilometreBoard", "sheeting_blue")
+
+
+def _delineator(scene: Scene, name: str, item: Delineator) -> None:
+    def body(solids: Solids) -> list[Entity]:
+        outline = [(along, -away) for away, along in DELINEATOR]
+        return [solids.prism(outline, (0.0, 0.0, -BURIED), item.height + BURIED)]
+
+    sign = _stand(scene, "IfcSign", name, item, body, ObjectType=item.type, PredefinedType="MARKER")
+    _about_sign(scene, sign, "", "Delineator", "plastic_white")
+
+
+def _beacon(scene: Scene, name: str, item: ConstructionBeacon) -> None:
+    def body(solids: Solids) -> list[Entity]:
+        middle = (BEACON_BLADE / 2.0, 0.0, BEACON_BLADE_BOTTOM + item.height / 2.0)
+        blade = solids.plate("rectangle", item.width, item.height, middle, BEACON_BLADE)
+        wide, long, high = BEACON_FOOT
+        tenon = solids.box((0.05, 0.07, 0.1), (0.0, 0.0, 0.07))
+        return [blade, tenon, solids.box((long, wide, high), (0.0, 0.0, 0.0))]
+
+    sign = _stand(scene, "IfcSign", name, item, body, ObjectType=item.type, PredefinedType="MARKER")
+    _about_sign(scene, sign, "", "ConstructionBeacon", "sheeting_red")
+
+
+def _about_sign(scene: Scene, sign: Entity, reference: str, category: str, material: str) -> None:
+    ifc = scene.ifc
+    values = {"IsExternal": ifc.value(True), "Category": ifc.add("IfcLabel", category)}
+    if reference:
+        values["Reference"] = ifc.add("IfcIdentifier", reference)
+    ifc.properties(sign, "Pset_SignCommon", values)
+    ifc.made_of(sign, material)
+
+
+# --- equipment ------------------------------------------------------------------------------------------------------
+
+
+def _light(scene: Scene, name: str, item: TrafficLight) -> None:
+    def body(solids: Solids) -> list[Entity]:
+        tall = item.lights * item.light_diameter * _CHAMBER_HEIGHT + 2.0 * _LIGHT_MARGIN
+        post = solids.cylinder(TRAFFIC_LIGHT_POST, (0.0, 0.0, -BURIED), item.height + BURIED - 0.03)
+        middle = (-TRAFFIC_LIGHT_POST / 2.0, 0.0, item.height - tall / 2.0)
+        board = solids.plate("rectangle", _LIGHT_BOARD * item.light_diameter, tall, middle, 0.01)
+        lamps = []
+        for number in range(item.lights):
+            level = item.height - _LIGHT_MARGIN - (number + 0.5) * item.light_diameter * _CHAMBER_HEIGHT
+            place = (-TRAFFIC_LIGHT_POST / 2.0 - 0.01, 0.0, level)
+            lamps.append(solids.plate("round", item.light_diameter, item.light_diameter, place, 0.14))
+        return [post, board, *lamps]
+
+    signal = _stand(scene, "IfcSignal", name, item, body, ObjectType=item.type, PredefinedType="VISUAL")
+    scene.ifc.made_of(signal, "plastic_black")
+
+
+def _cabinet(scene: Scene, name: str, item: Cabinet) -> None:
+    def body(solids: Solids) -> list[Entity]:
+        return [solids.box((item.depth, item.width, item.height + BURIED), (0.0, 0.0, -BURIED))]
+
+    if item.kind == "emergency_phone":
+        entity, named = "IfcCommunicationsAppliance", {"ObjectType": item.kind, "PredefinedType": "USERDEFINED"}
+    else:
+        entity, named = "IfcElectricDistributionBoard", {"ObjectType": item.kind, "PredefinedType": "DISTRIBUTIONBOARD"}
+    cabinet = _stand(scene, entity, name, item, body, **named)
+    scene.ifc.made_of(cabinet, "plastic_orange" if item.kind == "emergency_phone" else "cabinet_grey")
+
+
+def _asset(scene: Scene, name: str, item: Asset) -> None:
+    """Add a free asset: its shape is in its library's file."""
+    _stand(scene, "IfcBuildingElementProxy", name, item, lambda _: [], ObjectType=item.name, PredefinedType="ELEMENT")
+
+
+def _pole(scene: Scene, name: str, item: Pole) -> None:
+    """Add a mast with what it carries: an assembly of the column and a street light, or a camera."""
+    ifc, place = scene.ifc, scene.place_of(item)
+    assembly = ifc.rooted(
+        "IfcElementAssembly",
+        name,
+        Name=name,
+        ObjectType=item.kind,
+        ObjectPlacement=place.placement,
+        AssemblyPlace="FACTORY",
+        PredefinedType="MAST",
+    )
+    scene.describe(assembly, item)
+    scene.stand(assembly, scene.container(item.station, item.offset))
+    column = part_of(scene, assembly, place, "IfcColumn", f"{name}/column", PredefinedType="COLUMN")
+    lighting = item.kind == "lighting"
+    head = part_of(
+        scene,
+        assembly,
+        place,
+        "IfcLightFixture" if lighting else "IfcAudioVisualAppliance",
+        f"{name}/{'light' if lighting else 'camera'}",
+        PredefinedType="POINTSOURCE" if lighting else "CAMERA",
+    )
+    key = _key(item)
+    solids = Solids(ifc, _turn(item))
+    known = ifc.has_shape((key, "column"))
+    column.Representation = ifc.shape([] if known else _mast(solids, item), "SweptSolid", (key, "column"))
+    head.Representation = ifc.shape([] if known else [_head(solids, item)], "SweptSolid", (key, "head"))
+    ifc.made_of(column, "galvanised_steel")
+    ifc.made_of(head, "cabinet_grey")
+    for entity in (column, head):
+        ifc.properties(entity, "SynthRoads", {"instance": ifc.value(item.instance), "class": ifc.value("pole")})
+
+
+def _mast(solids: Solids, item: Pole) -> list[Entity]:
+    """Return a pole's mast and its arm, which points to the left."""
+    top = item.height - (_LUMINAIRE[2] + _ARM_RISE * item.arm_length if item.kind == "lighting" else 0.0)
+    parts = [solids.cylinder(item.diameter, (0.0, 0.0, -BURIED), top + BURIED)]
+    if item.arm_length > _ARM:
+        parts.append(solids.box((_ARM, item.arm_length, _ARM), (0.0, item.arm_length / 2.0, _mount(item) - _ARM)))
+    return parts
+
+
+def _head(solids: Solids, item: Pole) -> Entity:
+    """Return a street light under its top, or a camera; at the end of the arm."""
+    if item.kind == "lighting":
+        return solids.box(_LUMINAIRE, (0.0, item.arm_length + _LUMINAIRE[1] / 2.0, item.height - _LUMINAIRE[2]))
+    return solids.box(_CAMERA, (0.0, item.arm_length, _mount(item) - _ARM - _CAMERA[2]))
+
+
+def _mount(item: Pole) -> float:
+    """Return the height of a pole's arm, m."""
+    return item.height - (0.0 if item.kind == "lighting" else 0.35)
+
+
+def part_of(scene: Scene, whole: Entity, place: Place, entity: str, name: str, **named: Any) -> Entity:
+    """Add an element that is part of another one, in its frame."""
+    ifc = scene.ifc
+    frame = ifc.add("IfcLocalPlacement", place.placement, ifc.flat_axes)
+    part = ifc.rooted(entity, name, Name=name, ObjectPlacement=frame, **named)
+    ifc.gather("IfcRelAggregates", whole, [part])
+    return part
+
+
+_WRITERS: dict[type, Callable[[Scene, str, Any], None]] = {
+    Asset: _asset,
+    Cabinet: _cabinet,
+    ConstructionBeacon: _beacon,
+    Delineator: _delineator,
+    KilometreBoard: _board,
+    Pole: _pole,
+    TrafficLight: _light,
+    TrafficSign: _sign,
+}

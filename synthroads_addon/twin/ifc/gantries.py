@@ -1,0 +1,118 @@
+"""Shield gantries in IFC 4.3: an assembly of posts, a beam, signs and displays."""
+
+from __future__ import annotations
+
+import math
+
+from ...road.parameters import Gantry
+from ...road.things.body_shapes import GANTRY_BOARD, GANTRY_DISPLAY, GANTRY_HANGER, GANTRY_OVERHANG
+from ...road.things.furniture import GantrySign
+from .clearance import pavement_below
+from .entities import Entity
+from .furniture import part_of
+from .scene import Place, Scene
+from .solids import Solids
+
+_BURIED = 0.6
+"""Depth of the posts' foundations below the surface, m."""
+
+
+def write_gantries(scene: Scene) -> None:
+    """Add all gantries."""
+    for name, item in scene.geometry.parameters.of_type(Gantry).items():
+        _Gantry(scene, name, item).write()
+
+
+class _Gantry:
+    """Writes one gantry. Its frame's y is to the left; it is turned about the middle of its beam."""
+
+    def __init__(self, scene: Scene, name: str, item: Gantry) -> None:
+        self.scene, self.ifc, self.name, self.item = scene, scene.ifc, name, item
+        self.place: Place = scene.place_of(item)
+        self.solids = Solids(scene.ifc, math.radians(item.rotation_deg))
+        across = (item.left_offset - item.offset, item.right_offset - item.offset)
+        along = (-self._reach(1.0), self._reach(-1.0))
+        pavement = pavement_below(scene.geometry, self.place, along, across)
+        self.low = pavement + item.clearance - float(self.place.origin[2])
+        tallest = max((sign.height for sign in item.signs), default=0.0)
+        self.bottom = self.low + max(tallest - item.beam_height, 0.0) * GANTRY_OVERHANG
+
+    def _reach(self, facing: float) -> float:
+        """Return how far the beam, and the signs on one side of it, reach along the road, m."""
+        signs = [GANTRY_HANGER + _depth(sign) for sign in self.item.signs if _facing(sign) == facing]
+        return self.item.beam_depth / 2.0 + max(signs, default=0.0)
+
+    def write(self) -> None:
+        """Add the assembly and its parts."""
+        item, scene = self.item, self.scene
+        self.assembly = self.ifc.rooted(
+            "IfcElementAssembly",
+            self.name,
+            Name=self.name,
+            ObjectType=f"Gantry {item.kind}",
+            ObjectPlacement=self.place.placement,
+            AssemblyPlace="SITE",
+            PredefinedType="SIGNALASSEMBLY",
+        )
+        scene.describe(self.assembly, item)
+        scene.stand(self.assembly, scene.parts[f"roadside-{item.post_side}"])
+        middle = (item.left_offset + item.right_offset) / 2.0 - item.offset
+        size = (item.beam_depth, item.left_offset - item.right_offset, item.beam_height)
+        self._part("IfcBeam", "beam", self.solids.box(size, (0.0, middle, self.bottom)), "gantry_steel", "BEAM")
+        for number, offset in enumerate(self._posts()):
+            self._post(number, offset)
+        for number, sign in enumerate(item.signs, 1):
+            self._sign(number, sign)
+
+    def _posts(self) -> list[float]:
+        """Return the offsets of the posts, m."""
+        item = self.item
+        if item.kind == "cantilever":
+            return [item.left_offset if item.post_side == "left" else item.right_offset]
+        return [item.left_offset, item.right_offset, *([0.0] if item.kind == "two_sided" else [])]
+
+    def _post(self, number: int, offset: float) -> None:
+        item = self.item
+        ground, _ = self.scene.at(item.station, offset)
+        foot = ground + item.elevation - float(self.place.origin[2]) - _BURIED
+        size = (item.beam_depth, item.post_width, self.bottom + item.beam_height - foot)
+        solid = self.solids.box(size, (0.0, offset - item.offset, foot))
+        self._part("IfcColumn", f"post-{number + 1}", solid, "gantry_steel", "COLUMN")
+
+    def _sign(self, number: int, sign: GantrySign) -> None:
+        """Add a sign, or a display, which is a signal; it faces the traffic of the carriageway below it."""
+        item = self.item
+        # Lower edges are in line; what is smaller than the beam hangs before its middle.
+        small = self.low + sign.height < self.bottom + item.beam_height
+        z = self.bottom + item.beam_height / 2.0 if small else self.low + sign.height / 2.0
+        facing, depth = _facing(sign), _depth(sign)
+        # The middle of the board, before the beam as its traffic sees it.
+        x = -facing * (item.beam_depth / 2.0 + GANTRY_HANGER + depth / 2.0)
+        solid = self.solids.box((depth, sign.width, sign.height), (x, sign.offset - item.offset, z - sign.height / 2.0))
+        display = sign.kind == "display"
+        part = self._part(
+            "IfcSignal" if display else "IfcSign",
+            f"sign-{number}",
+            solid,
+            "display" if display else "sheeting_blue",
+            "VISUAL" if display else "PICTORAL",
+        )
+        self.ifc.properties(part, "SynthRoads sign", self.ifc.parameters_of(sign))
+
+    def _part(self, entity: str, name: str, solid: Entity, material: str, kind: str) -> Entity:
+        ifc = self.ifc
+        part = part_of(self.scene, self.assembly, self.place, entity, f"{self.name}/{name}", PredefinedType=kind)
+        part.Representation = ifc.shape([solid], "SweptSolid")
+        ifc.made_of(part, material)
+        values = {"instance": ifc.value(self.item.instance), "class": ifc.value("shield_gantry")}
+        ifc.properties(part, "SynthRoads", values)
+        return part
+
+
+def _depth(sign: GantrySign) -> float:
+    return GANTRY_DISPLAY if sign.kind == "display" else GANTRY_BOARD
+
+
+def _facing(sign: GantrySign) -> float:
+    """Return 1 for a sign that faces traffic with the stations: on the right of the centreline; else -1."""
+    return 1.0 if sign.offset < 0.0 else -1.0

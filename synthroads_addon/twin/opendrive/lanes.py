@@ -1,0 +1,112 @@
+"""Lane sections with their lanes: widths, links, heights of the verges and road marks."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...road.parameters import Lane
+from ...road.things.furniture import Side
+from .marks import RoadMarks
+from .pieces import Float, chords, cubics, runs
+from .sections import LanePlan, LaneStrip, Section
+from .surface import LateralShape
+from .xml import Element, cubic, element, note
+
+HEIGHT_TOLERANCE = 1e-4
+"""Largest distance (m) of a verge's edge from what is interpolated between two lane heights."""
+
+
+def lanes(road: Element, plan: LanePlan, shape: LateralShape, marks: RoadMarks) -> None:
+    """Add the lanes of a road, section by section."""
+    parent = element(road, "lanes")
+    if not plan.divided:
+        _lane_offset(parent, plan)
+    for number, section in enumerate(plan.sections):
+        item = element(parent, "laneSection", {"s": section.start})
+        _side(item, plan, shape, marks, (number, "left"))
+        centre = element(element(item, "center"), "lane", {"id": 0, "type": "none", "level": False})
+        marks.write(centre, number, 0)
+        _side(item, plan, shape, marks, (number, "right"))
+
+
+def _lane_offset(parent: Element, plan: LanePlan) -> None:
+    """Shift the centre lane of a single carriageway to its inner edge."""
+    (section,) = plan.geometry.sections.values()
+    sign = section.carriageway.sign
+    offsets = cubics(lambda station: sign * section.distances(station)[:, :1], plan.column_kinks())
+    for start, coefficients in runs(offsets.borders, offsets.coefficients[:, 0]):
+        cubic(parent, "laneOffset", {"s": start}, coefficients)
+
+
+def _side(parent: Element, plan: LanePlan, shape: LateralShape, marks: RoadMarks, where: tuple[int, Side]) -> None:
+    """Add one side's lanes, from left to right."""
+    number, side = where
+    section = plan.sections[number]
+    if not section.lanes[side]:
+        return
+    group = element(parent, side)
+    sign = 1 if side == "left" else -1
+    numbered = list(enumerate(section.lanes[side], 1))
+    for own, strip in reversed(numbered) if sign > 0 else numbered:
+        lane = element(group, "lane", {"id": sign * own, "type": strip.type, "level": False})
+        _links(lane, plan, number, side, strip)
+        _widths(lane, plan, section, strip)
+        marks.write(lane, number, sign * own)
+        if strip.kind == "verge":
+            _heights(lane, plan, shape, section, side)
+        _notes(lane, plan, side, strip)
+
+
+def _links(lane: Element, plan: LanePlan, number: int, side: Side, strip: LaneStrip) -> None:
+    sign = 1 if side == "left" else -1
+    found = {
+        tag: plan.linked(number, other, side, strip.column)
+        for tag, other in (("predecessor", number - 1), ("successor", number + 1))
+    }
+    if any(found.values()):
+        link = element(lane, "link")
+        for tag, other in found.items():
+            if other is not None:
+                element(link, tag, {"id": sign * other})
+
+
+def _widths(lane: Element, plan: LanePlan, section: Section, strip: LaneStrip) -> None:
+    first, last = section.pieces
+    borders = plan.widths.borders[first : last + 1]
+    own = plan.widths.coefficients[first:last, strip.column]
+    for start, coefficients in runs(borders, own):
+        cubic(lane, "width", {"sOffset": start - section.start}, coefficients)
+
+
+def _heights(lane: Element, plan: LanePlan, shape: LateralShape, section: Section, side: Side) -> None:
+    """Add the heights of a verge: it falls away from the pavement's plane, from its inner edge on."""
+    geometry = plan.geometry
+
+    def drop(station: Float) -> Float:
+        edge = 0 if side == "left" else -1
+        offset = geometry.offsets(station)[:, edge]
+        level = geometry.boundary_elevations(station)[:, edge] - geometry.profile.elevation(station)
+        return np.asarray(level - shape.plane(side, station, offset))[:, None]
+
+    points = [point.station for point in geometry.sections[side].carriageway.crossfall]
+    inside = [s for s in points if section.start < s < section.end]
+    first, last = section.pieces
+    borders = np.unique(np.concatenate([plan.widths.borders[first : last + 1], inside]))
+    stations = chords(drop, borders, HEIGHT_TOLERANCE)
+    values = drop(stations)[:, 0]
+    if np.ptp(values) <= HEIGHT_TOLERANCE / 10.0:
+        stations, values = stations[:1], values[:1]
+    for station, value in zip(stations.tolist(), values.tolist(), strict=True):
+        outer = round(value, 6)
+        element(lane, "height", {"sOffset": station - section.start, "inner": 0.0, "outer": outer})
+
+
+def _notes(lane: Element, plan: LanePlan, side: Side, strip: LaneStrip) -> None:
+    note(lane, "instance", strip.instance)
+    note(lane, "strip", strip.kind)
+    if strip.kind == "lane":
+        section = plan.geometry.sections[side]
+        index = len(section.carriageway.lanes) - 1 - (strip.index - section.kinds.index("lane"))
+        own: Lane = section.carriageway.lanes[index]
+        note(lane, "lane", index)
+        note(lane, "kind", own.kind)

@@ -1,0 +1,149 @@
+"""Line markings as road marks of the lanes whose outer borders they follow."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from ...road.geometry import RoadGeometry
+from ...road.parameters import Carriageway, LineMarking
+from ...road.things.furniture import Side
+from .pieces import CLOSE
+from .sections import LanePlan, Section
+from .xml import Element, element, notes
+
+_OUTWARDS = {"outer_edge": 0.5, "block": 0.5, "turnout_edge": 0.5, "inner_edge": -0.5, "gore_edge": -0.5}
+"""Kind of a line -> where its axis lies from its border, outwards, in widths."""
+
+
+@dataclass(frozen=True)
+class _Stretch:
+    """A line along one lane's border in one section.
+
+    Attributes:
+        name, line: its id and itself.
+        start, end: stations, m.
+        side: of the carriageway.
+    """
+
+    name: str
+    line: LineMarking
+    start: float
+    end: float
+    side: Side
+
+    @property
+    def rest(self) -> tuple[float, float]:
+        """Return the length of the dash that the start lies in (0: none), and the distance of the next dash, m."""
+        line = self.line
+        period = line.dash_length + line.gap_length
+        if period == 0.0:
+            return self.end - self.start, 0.0
+        within = (self.start - line.start_station) % period
+        if period - within < CLOSE or within < CLOSE:
+            return 0.0, 0.0
+        return max(0.0, line.dash_length - within), period - within
+
+
+class RoadMarks:
+    """The road marks of a road.
+
+    Attributes:
+        loose: (id, line, start, end) of lines, or parts of them, that follow no lane's border or one that has a line.
+    """
+
+    def __init__(self, plan: LanePlan) -> None:
+        self._plan = plan
+        self._of: dict[tuple[int, int], list[_Stretch]] = {}
+        self.loose: list[tuple[str, LineMarking, float, float]] = []
+        for name, line in plan.geometry.parameters.of_type(LineMarking).items():
+            self._place(name, line)
+        for stretches in self._of.values():
+            stretches.sort(key=lambda item: item.start)
+
+    def _place(self, name: str, line: LineMarking) -> None:
+        start, end = line.start_station, min(line.end_station, self._plan.geometry.length)
+        if end - start <= CLOSE:
+            return
+        carriageway = self._plan.geometry.parameters.objects[line.carriageway]
+        assert isinstance(carriageway, Carriageway)
+        index = _border(self._plan.geometry, carriageway.side, line)
+        for number, section in enumerate(self._plan.sections):
+            low, high = max(start, section.start), min(end, section.end)
+            if high - low <= CLOSE:
+                continue
+            if index is None or not self._on_border(_Stretch(name, line, low, high, carriageway.side), number, index):
+                self._let_loose(name, line, low, high)
+
+    def _on_border(self, stretch: _Stretch, number: int, index: int) -> bool:
+        """Put a stretch on the border outside of a strip; return whether it is free."""
+        section: Section = self._plan.sections[number]
+        sign = 1 if stretch.side == "left" else -1
+        own = self._of.setdefault((number, sign * section.number(stretch.side, index)), [])
+        if any(stretch.start < other.end - CLOSE and other.start < stretch.end - CLOSE for other in own):
+            return False
+        own.append(stretch)
+        return True
+
+    def _let_loose(self, name: str, line: LineMarking, start: float, end: float) -> None:
+        if self.loose and self.loose[-1][0] == name and start - self.loose[-1][3] <= CLOSE:
+            start = self.loose.pop()[2]
+        self.loose.append((name, line, start, end))
+
+    def write(self, lane: Element, number: int, lane_id: int) -> None:
+        """Add the road marks of a lane of a section."""
+        section = self._plan.sections[number]
+        reached = section.start
+        for stretch in self._of.get((number, lane_id), []):
+            if stretch.start - reached > CLOSE and reached > section.start:
+                _nothing(lane, reached - section.start)
+            _write_stretch(lane, stretch, section.start)
+            reached = stretch.end
+        if section.start < reached < section.end - CLOSE:
+            _nothing(lane, reached - section.start)
+
+
+def _border(geometry: RoadGeometry, side: Side, line: LineMarking) -> int | None:
+    """Return the strip of a side whose outer border a line lies beside; -1 is the median, None no border."""
+    section = geometry.sections[side]
+    if line.kind == "free":
+        return None
+    if line.kind == "turnout_edge":
+        return section.kinds.index("turnout_lane")
+    if line.kind == "gore_edge":
+        return section.kinds.index("turnout_lane") - 1
+    return section.kinds.index("lane") + len(section.carriageway.lanes) - line.boundary - 1
+
+
+def _nothing(lane: Element, offset: float) -> None:
+    element(lane, "roadMark", {"sOffset": offset, "type": "none", "color": "white", "width": 0.0})
+
+
+def _write_stretch(lane: Element, stretch: _Stretch, section_start: float) -> None:
+    """Add a stretch: a dash that the border of two sections cuts is a solid line, what follows it is broken again."""
+    line, start = stretch.line, stretch.start - section_start
+    if line.dash_length == 0.0:
+        _mark(lane, stretch, start, (stretch.end - stretch.start, 0.0, 0.0))
+        return
+    rest, following = stretch.rest
+    if rest > CLOSE:
+        _mark(lane, stretch, start, (min(rest, stretch.end - stretch.start), 0.0, 0.0))
+    if stretch.start + rest < stretch.end - CLOSE:
+        pattern = (line.dash_length, line.gap_length, following - rest)
+        _mark(lane, stretch, start + rest, pattern)
+
+
+def _mark(lane: Element, stretch: _Stretch, offset: float, pattern: tuple[float, float, float]) -> None:
+    """Add a road mark that begins at an offset (m) in its section, of dashes, gaps and a first gap (m)."""
+    line = stretch.line
+    dash, gap, first = pattern
+    broken = line.dash_length > 0.0
+    weight = "bold" if line.width > 0.2 else "standard"
+    attributes = {"sOffset": offset, "type": "broken" if gap > 0.0 else "solid", "weight": weight, "color": line.color}
+    attributes |= {"width": line.width, "height": line.film_thickness, "laneChange": "both" if broken else "none"}
+    mark = element(lane, "roadMark", attributes)
+    kind = element(mark, "type", {"name": line.kind, "width": line.width})
+    sign = 1.0 if stretch.side == "left" else -1.0
+    rule = "none" if broken else "no passing"
+    shape = {"length": dash, "space": gap, "tOffset": sign * _OUTWARDS.get(line.kind, 0.0) * line.width}
+    element(kind, "line", {**shape, "sOffset": first, "rule": rule, "width": line.width, "color": line.color})
+    notes(mark, stretch.name, line.instance)

@@ -1,0 +1,98 @@
+"""Where objects stand: how high the surface below them lies above the reference line."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from ...base.errors import InputError
+from ...road.geometry import RoadGeometry
+from ...road.parameters import LineObject, PointObject
+from ...road.surface import highest_pavement, known_elevation
+from .pieces import CLOSE, Float, chords, merged_stations
+
+_COLUMNS, _ROWS = 240, 7
+
+
+class Ground:
+    """The surface that objects stand on, relative to the reference line's elevation.
+
+    Attributes:
+        geometry: the road.
+        tolerance: largest distance (m) of what runs along the road from the surface below it.
+    """
+
+    def __init__(self, geometry: RoadGeometry, tolerance: float) -> None:
+        self.geometry = geometry
+        self.tolerance = tolerance
+        points = geometry.parameters.of_type(PointObject)
+        for name, item in points.items():
+            if item.station > geometry.length + CLOSE:
+                allowed = f"OpenDRIVE has nothing beyond the road's end, {geometry.length:.9g} m"
+                raise InputError(f"objects.{name}.station", item.station, allowed)
+        places = np.array([(item.station, item.offset) for item in points.values()]).reshape(-1, 2)
+        heights = self.height(places[:, 0], places[:, 1])
+        raised = heights + np.array([item.elevation for item in points.values()])
+        self._feet = dict(zip(points, raised.tolist(), strict=True))
+
+    def foot(self, name: str) -> float:
+        """Return the height of a point object's foot above the reference line, m."""
+        return self._feet[name]
+
+    def height(self, station: Float, offset: Float) -> Float:
+        """Return the height (N,) of road or ground above the reference line; the road's edge where there is no data."""
+        along = np.clip(station, 0.0, self.geometry.length)
+        return known_elevation(self.geometry, along, offset) - self.geometry.profile.elevation(along)
+
+    def along(self, item: LineObject, share: Callable[[Float], Float], kinks: list[float]) -> Float:
+        """Return rows (N, 4) of station, offset, height of the ground and height of the object, m.
+
+        Between two of them all is linear within the tolerance.
+
+        Args:
+            item: the object.
+            share: stations (N,) -> share (N,) of its height that it has there.
+            kinks: stations at which that bends.
+        """
+        start, end = item.start_station, min(item.end_station, self.geometry.length)
+        if end - start <= CLOSE:
+            return np.empty((0, 4))
+        sections = self.geometry.sections.values()
+        bends = [s for section in sections for s in section.kinks()]
+        bends += [point.station for section in sections for point in section.carriageway.crossfall]
+        last = getattr(item, "end_offset", item.offset)
+        tall: Any = getattr(item, "height", 0.0)
+        length = max(item.end_station - item.start_station, CLOSE)
+
+        def rows(station: Float) -> Float:
+            offset = item.offset + (last - item.offset) * (station - item.start_station) / length
+            return np.column_stack([offset, self.height(station, offset), tall * share(station)])
+
+        stations = chords(rows, merged_stations([*bends, *kinks], start, end), self.tolerance, shortest=0.05)
+        return np.column_stack([stations, rows(stations)])
+
+    def pavement_below(self, stations: tuple[float, float], offsets: tuple[float, float], lean: float = 0.0) -> float:
+        """Return the height of the pavement's highest point within a rectangle above the profile at its middle, m.
+
+        Stations grow by ``lean`` per offset from its middle. Where nothing there is paved it is 0.
+        """
+        geometry = self.geometry
+        middle, across = sum(stations) / 2.0, sum(offsets) / 2.0
+        s, t = (grid.ravel() for grid in np.meshgrid(np.linspace(*stations, _ROWS), np.linspace(*offsets, _COLUMNS)))
+        s = s + lean * (t - across)
+        highest = highest_pavement(geometry, s, t)
+        return 0.0 if highest is None else highest - float(geometry.profile.elevation(middle))
+
+
+def ramp_share(item: LineObject, length: float) -> tuple[Callable[[Float], Float], list[float]]:
+    """Return the share of its height that a barrier with ramped ends has at stations, and where that bends."""
+    start, end = item.start_station, min(item.end_station, length)
+    ramp = min(float(getattr(item, "terminal_length", 0.0)), (end - start) / 2.0)
+    if ramp <= 1e-3:
+        return lambda station: np.ones(station.shape), []
+    return (
+        lambda station: np.clip(np.minimum(station - start, end - station) / ramp, 0.0, 1.0),
+        [start + ramp, end - ramp],
+    )

@@ -1,0 +1,114 @@
+"""Signals along a road: traffic signs, the signs of gantries, traffic lights and kilometre boards."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+from ...road.parameters import Gantry, GantrySign, KilometreBoard, PointObject, TrafficLight, TrafficSign
+from .objects import gantry_levels
+from .places import Ground
+from .xml import Element, Value, element, notes
+
+SPEED_LIMIT = "274"
+"""Number of the sign whose subtype is a speed, km/h."""
+TRAFFIC_LIGHT = "1000001"
+"""OpenDRIVE's number of a traffic light with its lights one above the other."""
+_HEAD, _LIGHT = 1.3, 1.25
+"""Width of a traffic light's head, and height per light, in diameters of a light."""
+
+
+def signals(parent: Element, ground: Ground) -> None:
+    """Add all signals in the order of the parameter set; each stands at the lower edge of its face."""
+    for name, item in ground.geometry.parameters.objects.items():
+        if make := _MAKERS.get(type(item)):
+            make(parent, ground, name, item)
+
+
+def _sign(parent: Element, ground: Ground, name: str, item: TrafficSign) -> None:
+    kind, _, subtype = item.code.partition("-")
+    attributes: dict[str, Value] = {"country": "DE", "type": kind, "subtype": subtype or "-1"}
+    if kind == SPEED_LIMIT and subtype.isdigit():
+        attributes |= {"value": float(subtype), "unit": "km/h"}
+    if item.text:
+        attributes["text"] = "\n".join(item.text)
+    face = (item.lower_edge, item.width, item.height)
+    made = _signal(parent, ground, (name, item), face, attributes)
+    notes(made, name, item.instance, object_type="TrafficSign", code=item.code, shape=item.shape)
+
+
+def _board(parent: Element, ground: Ground, name: str, item: KilometreBoard) -> None:
+    attributes: dict[str, Value] = {"country": "DE", "type": "kilometreBoard", "subtype": "-1", "text": item.text}
+    made = _signal(parent, ground, (name, item), (item.lower_edge, item.width, item.height), attributes)
+    notes(made, name, item.instance, object_type="KilometreBoard")
+
+
+def _light(parent: Element, ground: Ground, name: str, item: TrafficLight) -> None:
+    attributes: dict[str, Value] = {"country": "OpenDRIVE", "type": TRAFFIC_LIGHT, "subtype": "-1", "dynamic": "yes"}
+    tall = _LIGHT * item.light_diameter * item.lights
+    face = (item.height - tall, _HEAD * item.light_diameter, tall)
+    made = _signal(parent, ground, (name, item), face, attributes)
+    notes(made, name, item.instance, object_type="TrafficLight", lights=item.lights)
+
+
+def _signal(
+    parent: Element,
+    ground: Ground,
+    named: tuple[str, Any],
+    face: tuple[float, float, float],
+    attributes: dict[str, Value],
+) -> Element:
+    """Add the signal of an object: its face's lower edge above the foot, width and height (m)."""
+    name, item = named
+    low, width, height = face
+    own = {"id": str(item.instance), "name": name, **_place(item, item.offset, ground.foot(name) + low)}
+    own |= {"dynamic": "no", "width": width, "height": height, **attributes}
+    made = element(parent, "signal", own)
+    element(made, "reference", {"elementType": "object", "elementId": f"{item.instance}-posts", "type": "posts"})
+    return made
+
+
+def _gantry(parent: Element, ground: Ground, name: str, item: Gantry) -> None:
+    low, bottom = gantry_levels(ground, item)
+    for number, sign in enumerate(item.signs, 1):
+        _hung(parent, (name, item), (number, sign), (low, bottom))
+
+
+def _hung(
+    parent: Element, named: tuple[str, Gantry], numbered: tuple[int, GantrySign], levels: tuple[float, float]
+) -> None:
+    """Add a sign on a gantry; it faces the traffic that drives below it, and hangs before its beam."""
+    (name, item), (number, sign), (low, bottom) = named, numbered, levels
+    behind = low + sign.height < bottom + item.beam_height
+    lower = low if behind else bottom + (item.beam_height - sign.height) / 2.0
+    turned = item.model_copy(update={"rotation_deg": item.rotation_deg + (180.0 if sign.offset > 0.0 else 0.0)})
+    own: dict[str, Value] = {"id": f"{item.instance}-{number}", "name": f"{name}-{number}"}
+    own |= _place(turned, sign.offset, lower)
+    own |= {"dynamic": "yes" if sign.kind == "display" else "no", "country": "DE", "type": sign.kind, "subtype": "-1"}
+    own |= {"width": sign.width, "height": sign.height, "text": "\n".join(sign.text) if sign.text else None}
+    made = element(parent, "signal", own)
+    element(made, "reference", {"elementType": "object", "elementId": str(item.instance), "type": "gantry"})
+    notes(made, name, item.instance, object_type="GantrySign")
+
+
+def _place(item: PointObject, offset: float, height: float) -> dict[str, Value]:
+    """Return where a signal is and which traffic it is for: + drives with the stations."""
+    turn = (item.rotation_deg + 180.0) % 360.0 - 180.0
+    with_stations = abs(turn) <= 90.0
+    rest = turn if with_stations else (turn + 360.0) % 360.0 - 180.0
+    return {
+        "s": item.station,
+        "t": offset,
+        "zOffset": round(height, 6),
+        "hOffset": math.radians(rest),
+        "orientation": "+" if with_stations else "-",
+    }
+
+
+_MAKERS: dict[type, Callable[[Element, Ground, str, Any], None]] = {
+    TrafficSign: _sign,
+    KilometreBoard: _board,
+    TrafficLight: _light,
+    Gantry: _gantry,
+}

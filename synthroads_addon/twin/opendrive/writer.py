@@ -1,0 +1,124 @@
+"""A road as OpenDRIVE 1.8: reference line, surface, lanes, road marks, objects and signals.
+
+The elements are written by small functions of ours: the library `scenariogeneration` puts the time of day into the
+header and knows neither its offset nor heights of lanes, rows of shapes, skeletons and user data of lanes.
+"""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+from ...base.crs import wkt
+from ...road.geometry import RoadGeometry
+from ...road.parameters import LineMarking, RoadParameters, Turnout, Vehicle
+from ...road.section import Carriageway, Median
+from ...road.surroundings import Terrain, Vegetation
+from .lanes import lanes
+from .marks import RoadMarks
+from .objects import Objects
+from .places import Ground
+from .sections import LanePlan
+from .signals import signals
+from .surface import LateralShape, bounds, elevation_profile, lateral_profile, plan_view
+from .xml import Element, Value, element, note, verbatim, write
+
+REVISION = (1, 8)
+ROAD = "1"
+"""Id of the road."""
+_GROUND = 0.001
+"""Largest distance (m) of barriers from the ground that they stand on, whatever the tolerance."""
+
+
+def write_opendrive(parameters: RoadParameters, path: Path, tolerance: float) -> None:
+    """Write a road's geometric-semantic model as an OpenDRIVE file.
+
+    Coordinates in it are local; the header's offset adds the map origin, and its ``geoReference`` names the map's
+    coordinate system. Lanes, reference line and surface don't depend on the tolerance.
+
+    Args:
+        parameters: the road.
+        path: the file.
+        tolerance: largest chord error (m) of lines that follow no lane.
+
+    Raises:
+        InputError: an object stands beyond the road's end, or the coordinate system isn't known here.
+    """
+    geometry = RoadGeometry(parameters)
+    root = element(None, "OpenDRIVE")
+    _header(root, geometry)
+    attributes: dict[str, Value] = {"id": ROAD, "junction": "-1", "length": geometry.length, "rule": "RHT"}
+    road = element(root, "road", {"name": parameters.metadata.identifier, **attributes})
+    element(road, "type", {"s": 0.0, "type": "motorway", "country": "DE"})
+    plan_view(road, geometry)
+    elevation_profile(road, geometry)
+    shape = LateralShape(geometry)
+    lateral_profile(road, shape)
+    plan = LanePlan(geometry)
+    marks = RoadMarks(plan)
+    lanes(road, plan, shape, marks)
+    ground = Ground(geometry, min(tolerance, _GROUND))
+    objects = Objects(element(road, "objects"), ground)
+    objects.write(marks.loose)
+    objects.underpasses()
+    signals(element(road, "signals"), ground)
+    note(road, "instance", parameters.alignment.instance)
+    _list_rest(root, parameters)
+    write(root, path)
+
+
+def _header(root: Element, geometry: RoadGeometry) -> None:
+    """Add the header, without a date: the same road has the same bytes."""
+    parameters = geometry.parameters
+    metadata = parameters.metadata
+    attributes: dict[str, Value] = {
+        "revMajor": REVISION[0],
+        "revMinor": REVISION[1],
+        "name": metadata.identifier,
+        "version": "1",
+    }
+    header = element(root, "header", {**attributes, **bounds(geometry), "vendor": metadata.generator})
+    verbatim(header, "geoReference", geo_reference(metadata.epsg))
+    x, y, z = parameters.transform.translate
+    element(header, "offset", {"x": float(x), "y": float(y), "z": float(z), "hdg": 0.0})
+    note(header, "epsg", metadata.epsg)
+    note(header, "title", metadata.title)
+
+
+_PROJ = {
+    "latitude_of_origin": "lat_0",
+    "central_meridian": "lon_0",
+    "scale_factor": "k",
+    "false_easting": "x_0",
+    "false_northing": "y_0",
+}
+_ELLIPSOIDS = {"GRS 1980": "GRS80", "WGS 84": "WGS84"}
+_PLAIN_DATUMS = ("European_Terrestrial_Reference_System_1989", "WGS_1984")
+
+
+def geo_reference(epsg: int) -> str:
+    """Return a coordinate system as a PROJ string if it is a plain Transverse Mercator one, else as WKT.
+
+    A datum other than WGS 84's or ETRS89's has no PROJ string that would say it exactly: WKT names it.
+
+    Raises:
+        InputError: the code is unknown, or it isn't shipped and `pyproj` isn't installed.
+    """
+    text = wkt(epsg)
+    number = dict(re.findall(r'PARAMETER\["(\w+)",([-0-9.]+)\]', text))
+    spheroid = re.search(r'SPHEROID\["([^"]+)"', text)
+    datum = re.search(r'DATUM\["([^"]+)"', text)
+    plain = text.startswith("PROJCS") and 'PROJECTION["Transverse_Mercator"]' in text and set(number) == set(_PROJ)
+    if not (plain and spheroid and datum and datum[1] in _PLAIN_DATUMS):
+        return text
+    values = " ".join(f"+{key}={number[name]}" for name, key in _PROJ.items())
+    return f"+proj=tmerc {values} +ellps={_ELLIPSOIDS[spheroid[1]]} +units=m +vunits=m +no_defs"
+
+
+def _list_rest(root: Element, parameters: RoadParameters) -> None:
+    """Name what has no element of its own: parts of the road whose lanes bear their number, ground, plants, traffic."""
+    kinds = (Carriageway, Median, Turnout, LineMarking, Terrain, Vegetation, Vehicle)
+    for name, item in parameters.objects.items():
+        if isinstance(item, kinds):
+            entry = element(root, "userData", {"code": "instance", "value": item.instance})
+            element(entry, "parameterObject", {"id": name, "type": type(item).__name__, "instance": item.instance})

@@ -1,0 +1,75 @@
+"""The XML of OpenDRIVE files: elements with numbers that are short and the same on every machine."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from xml.etree import ElementTree
+
+from ...base.schema import rounded
+
+Element = ElementTree.Element
+Value = str | int | float | bool | None
+
+DIGITS = 9
+"""Decimals of lengths (m) and angles (rad)."""
+PLAN_DIGITS = 7
+"""Decimals of what a sine or a logarithm went into: its last bits differ between machines."""
+_FORBIDDEN = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
+_VERBATIM = "verbatim:"
+
+
+def element(parent: Element | None, tag: str, attributes: Mapping[str, Value] | None = None) -> Element:
+    """Return a new element with attributes; those that are None are left out. Floats keep `DIGITS` decimals."""
+    texts = {name: text(value) for name, value in (attributes or {}).items() if value is not None}
+    return ElementTree.Element(tag, texts) if parent is None else ElementTree.SubElement(parent, tag, texts)
+
+
+def text(value: str | int | float | bool) -> str:
+    """Return a value as OpenDRIVE writes it; characters that XML can't hold are left out."""
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, float):
+        return repr(rounded(value, DIGITS)).removesuffix(".0")
+    return _FORBIDDEN.sub("", str(value))
+
+
+def cubic(parent: Element, tag: str, where: Mapping[str, Value], coefficients: Sequence[float]) -> Element:
+    """Return a new element of a cubic a + b u + c u^2 + d u^3, which begins at `where`.
+
+    Coefficients have 12 significant digits: at 100 m a d of 12 digits is exact to less than a nanometre.
+    """
+    a, *higher = coefficients
+    texts = {name: f"{value + 0.0:.12g}" for name, value in zip("bcd", higher, strict=True)}
+    return element(parent, tag, {**where, "a": float(a), **texts})
+
+
+def note(parent: Element, code: str, value: Value) -> None:
+    """Add user data to an element: what OpenDRIVE has no attribute for."""
+    element(parent, "userData", {"code": code, "value": value})
+
+
+def notes(parent: Element, name: str, instance: int, **more: Value) -> None:
+    """Add an object's id and instance number, and more, as user data."""
+    for code, value in {"instance": instance, "id": name, **more}.items():
+        if value is not None:
+            note(parent, code, value)
+
+
+def verbatim(parent: Element, tag: str, content: str) -> None:
+    """Add an element whose text is marked as CDATA, as the standard asks for."""
+    element(parent, tag).text = _VERBATIM + content
+
+
+def write(root: Element, path: Path) -> None:
+    """Write a tree, indented, with Unix line ends."""
+    ElementTree.indent(root, " ")
+    content = ElementTree.tostring(root, encoding="unicode")
+    content = re.sub(f">{_VERBATIM}([^<]*)<", _as_cdata, content)
+    path.write_text(f'<?xml version="1.0" encoding="UTF-8"?>\n{content}\n', encoding="utf-8", newline="\n")
+
+
+def _as_cdata(found: re.Match[str]) -> str:
+    content = found[1].replace("&lt;", "<").replace("&gt;", ">").replace("&amp;", "&").replace("]]>", "]]]]><![CDATA[>")
+    return f"><![CDATA[{content}]]><"

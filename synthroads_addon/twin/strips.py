@@ -1,0 +1,210 @@
+"""The strips of the carriageways and the median as polygons whose corners lie on the analytic surface."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..road.damage import damage_columns, damage_depth, damaged_strips, spaced
+from ..road.geometry import RoadGeometry, Strip
+from ..road.parameters import Pavement, Pothole, Rut
+from ..road.section_geometry import CarriagewaySection
+from .faces import Faces, Float, compact, grid_corners, joined, polygons, quads
+
+Mask = NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class StripSurface:
+    """The surface of one strip, as far as it belongs to one object.
+
+    Attributes:
+        strip: the strip.
+        lane: number of its lane, counted from outside; None if it is no lane.
+        instance: instance number of the object that it belongs to there.
+        faces: its polygons.
+    """
+
+    strip: Strip
+    lane: int | None
+    instance: int
+    faces: Faces
+
+
+@dataclass(frozen=True)
+class _Damage:
+    """One rut or pothole on one strip: the stations between which it lies, and where across it needs points."""
+
+    start: float
+    end: float
+    shares: Float
+
+
+@dataclass(frozen=True)
+class _Edges:
+    """The two edges of a strip at N stations, and what its points are made from.
+
+    Attributes:
+        geometry: the road.
+        stations: (N,).
+        plan, left: (N, 2) points of the centreline, and unit vectors to the left.
+        offsets, heights: (N, 2) of the strip's left and right edge.
+    """
+
+    geometry: RoadGeometry
+    stations: Float
+    plan: Float
+    left: Float
+    offsets: Float
+    heights: Float
+
+    def points(self, first: int, last: int, shares: Float) -> Float:
+        """Return points (R, C, 3) of the rows from `first` to `last` at shares (C,) of the width, damage included."""
+        rows = slice(first, last + 1)
+        offset = self.offsets[rows, :1] * (1.0 - shares) + self.offsets[rows, 1:] * shares
+        height = self.heights[rows, :1] * (1.0 - shares) + self.heights[rows, 1:] * shares
+        station = np.repeat(self.stations[rows], len(shares))
+        for section in self.geometry.sections.values():
+            pavement = section.carriageway.pavement
+            if pavement.ruts or pavement.potholes:
+                height = height - damage_depth(section, station, offset.ravel()).reshape(offset.shape)
+        plan = self.plan[rows, None] + offset[..., None] * self.left[rows, None]
+        return np.concatenate([plan, height[..., None]], axis=2)
+
+
+def strip_surfaces(geometry: RoadGeometry, stations: Float, tolerance: float) -> Iterator[StripSurface]:
+    """Yield the surface of every strip from left to right, those of turnouts one by one.
+
+    Neighbouring strips share their points. Where a strip is damaged it has as many points across as keep it within
+    the tolerance.
+
+    Args:
+        geometry: the road.
+        stations: (N,) stations at which it is sampled.
+        tolerance: chord error within damage, m.
+    """
+    offsets, heights = geometry.offsets(stations), geometry.boundary_elevations(stations)
+    plan, heading, _ = geometry.alignment.frame(stations)
+    left = np.stack([-np.sin(heading), np.cos(heading)], axis=1)
+    middle = (stations[:-1] + stations[1:]) / 2.0
+    damages, lanes = _damages(geometry, tolerance), _lane_numbers(geometry)
+    for number, strip in enumerate(geometry.strips):
+        two = slice(number, number + 2)
+        edges = _Edges(geometry, stations, plan, left, offsets[:, two], heights[:, two])
+        width = offsets[:, number] - offsets[:, number + 1]
+        owners = geometry.instances(strip, middle)
+        for owner in np.unique(owners).tolist():
+            faces = _faces(edges, damages.get(number, []), (width[:-1] + width[1:] > 1e-9) & (owners == owner))
+            if len(faces):
+                yield StripSurface(strip, lanes.get(number), owner, faces)
+
+
+def _lane_numbers(geometry: RoadGeometry) -> dict[int, int]:
+    """Return the lane of each strip that is one, counted from outside."""
+    found: dict[int, int] = {}
+    for side in geometry.sections:
+        own = [n for n, strip in enumerate(geometry.strips) if strip.side == side and strip.kind == "lane"]
+        found |= {number: lane for lane, number in enumerate(own if side == "left" else own[::-1])}
+    return found
+
+
+# --- damage -----------------------------------------------------------------------------------------------------
+
+
+def _damages(geometry: RoadGeometry, tolerance: float) -> dict[int, list[_Damage]]:
+    """Return what damages each strip, by the strip's number."""
+    found: dict[int, list[_Damage]] = {}
+    for side, section in geometry.sections.items():
+        own = [number for number, strip in enumerate(geometry.strips) if strip.side == side]
+        outwards = own[::-1] if side == "left" else own
+        pavement = section.carriageway.pavement
+        items: list[Rut | Pothole] = [*pavement.ruts, *pavement.potholes]
+        for item in items:
+            alone = _only(section, item)
+            for index in damaged_strips(alone):
+                shares = damage_columns(alone, index, tolerance)
+                shares = 1.0 - shares[::-1] if side == "left" else shares
+                found.setdefault(outwards[index], []).append(_Damage(*_range(item), shares))
+    return found
+
+
+def _only(section: CarriagewaySection, item: Rut | Pothole) -> CarriagewaySection:
+    """Return a section with only one rut or pothole."""
+    alone, carriageway = copy.copy(section), section.carriageway
+    pavement = Pavement(ruts=(item,)) if isinstance(item, Rut) else Pavement(potholes=(item,))
+    alone.carriageway = carriageway.model_copy(update={"pavement": pavement})
+    return alone
+
+
+def _range(item: Rut | Pothole) -> tuple[float, float]:
+    if isinstance(item, Rut):
+        return item.start_station, item.end_station
+    return item.station - item.length / 2.0, item.station + item.length / 2.0
+
+
+def _row_masks(stations: Float, damages: list[_Damage]) -> Mask:
+    """Return which damages (N, D) a row's points must follow: those before or behind it."""
+    starts, ends = np.array([d.start for d in damages]), np.array([d.end for d in damages])
+    between = (starts < stations[1:, None] - 1e-6) & (ends > stations[:-1, None] + 1e-6)
+    rows = np.zeros((len(stations), len(damages)), dtype=bool)
+    rows[:-1] |= between
+    rows[1:] |= between
+    return rows
+
+
+def _shares(damages: list[_Damage], mask: Mask) -> Float:
+    """Return where across (C,), from 0 at the left to 1 at the right edge, a row needs points."""
+    wanted = [damage.shares for damage, there in zip(damages, mask.tolist(), strict=True) if there]
+    return spaced(np.unique(np.concatenate([[0.0, 1.0], *wanted])))
+
+
+# --- polygons ---------------------------------------------------------------------------------------------------
+
+
+def _faces(edges: _Edges, damages: list[_Damage], wanted: Mask) -> Faces:
+    """Return a strip's polygons between those rows that are wanted (N - 1,), row by row.
+
+    From edge to edge there is one polygon, but where the strip is damaged. Rows with different numbers of points are
+    joined by triangles, so that all points are corners on both sides.
+    """
+    if not wanted.any():
+        return joined([])
+    masks = _row_masks(edges.stations, damages) if damages else np.zeros((len(edges.stations), 1), dtype=bool)
+    even = np.all(masks[:-1] == masks[1:], axis=1)
+    parts = []
+    for first, last in _runs(even & wanted, wanted):
+        shares, others = (_shares(damages, masks[row]) if damages else np.array([0.0, 1.0]) for row in (first, last))
+        if even[first]:
+            points = edges.points(first, last, shares)
+            parts.append(quads(points.reshape(-1, 3), grid_corners(*points.shape[:2])))
+        else:
+            points = np.concatenate([edges.points(first, first, shares)[0], edges.points(last, last, others)[0]])
+            parts.append(polygons(points, _zipped(shares, others)))
+    return compact(joined(parts))
+
+
+def _runs(even: Mask, wanted: Mask) -> Iterator[tuple[int, int]]:
+    """Yield (first, last) rows: as many as have the same damages, or two that differ."""
+    number = np.flatnonzero(wanted)
+    breaks = np.ones(len(number), dtype=bool)
+    breaks[1:] = (np.diff(number) > 1) | ~even[number[1:]] | ~even[number[:-1]]
+    starts = number[breaks]
+    ends = np.append(number[:-1][breaks[1:]], number[-1]) + 1
+    yield from zip(starts.tolist(), ends.tolist(), strict=True)
+
+
+def _zipped(here: Float, there: Float) -> list[list[int]]:
+    """Return triangles between a row of points at shares (C,) and the next one at shares (D,)."""
+    rings, i, j, ahead = [], 0, 0, len(here)
+    while i < len(here) - 1 or j < len(there) - 1:
+        if j == len(there) - 1 or (i < len(here) - 1 and here[i + 1] <= there[j + 1]):
+            rings.append([i, i + 1, ahead + j])
+            i += 1
+        else:
+            rings.append([ahead + j, i, ahead + j + 1])
+            j += 1
+    return rings

@@ -1,0 +1,1 @@
+"""Fields of the scenario as Blender properties, and how they are drawn."""

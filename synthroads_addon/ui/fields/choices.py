@@ -1,0 +1,70 @@
+"""Menus whose items say more than the schema does: what each choice stands for."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from functools import lru_cache
+from pathlib import Path
+
+from ...base.errors import InputError
+from ...road.guidelines import SECTIONS_OF_CLASS, STANDARD_CROSS_SECTIONS
+from ...scanning.devices.device import Device, load_device
+from ...scanning.platforms.path import USUAL
+from ...scenario.scenario import FIDELITIES
+from .wording import value_name
+
+Items = Sequence[tuple[str, str, str]]
+
+
+def _fidelities() -> Iterator[tuple[str, str, str]]:
+    for name, settings in FIDELITIES.items():
+        rays = "1 ray" if settings.rays_per_pulse == 1 else f"{settings.rays_per_pulse} rays"
+        model = f"{1000 * settings.tolerance:g} mm chord error, {settings.vegetation_detail:.0%} of the plants"
+        yield name, name.title(), f"{model}, {rays} per pulse"
+
+
+def _cross_sections() -> Iterator[tuple[str, str, str]]:
+    for name, section in STANDARD_CROSS_SECTIONS.items():
+        lanes = len(section.lanes)
+        shoulder = f"hard shoulders of {section.hard_shoulder:g} m, median of {section.median:g} m"
+        yield name, f"{name.replace('RQ', 'RQ ')}, 2 × {lanes} lanes", f"{lanes} lanes each way, {shoulder}"
+
+
+def _design_classes() -> Iterator[tuple[str, str, str]]:
+    for name, sections in SECTIONS_OF_CLASS.items():
+        yield name, value_name("road.design_class", name), f"With {', '.join(sections)}"
+
+
+def _platforms() -> Iterator[tuple[str, str, str]]:
+    path = "scan.platform.kind"
+    for kind, usual in USUAL.items():
+        yield kind, value_name(path, kind), f"Usually {usual.height:g} m up, at {usual.speed:g} m/s"
+    yield "trajectory", value_name(path, "trajectory"), "Along a trajectory read from a file"
+
+
+ITEMS: dict[str, Items] = {
+    "fidelity": tuple(_fidelities()),
+    "road.design_class": tuple(_design_classes()),
+    "scan.platform.kind": tuple(_platforms()),
+}
+"""Path of a choice and its items."""
+STANDARD_PARTS: dict[str, Items] = {"road.cross_section": tuple(_cross_sections())}
+"""Path of a field that takes a standard part's name or a part by hand, and the standard parts."""
+
+
+def device_of(name_or_file: str) -> Device | None:
+    """Return a device, or None if it can't be read; quick enough to be asked whenever the panel is drawn."""
+    path = Path(name_or_file)
+    try:
+        changed = path.stat().st_mtime_ns if path.suffix == ".json" else 0
+    except OSError:
+        return None
+    return _device(name_or_file, changed)
+
+
+@lru_cache(maxsize=64)
+def _device(name_or_file: str, changed: int) -> Device | None:
+    try:
+        return load_device(name_or_file)
+    except InputError:
+        return None

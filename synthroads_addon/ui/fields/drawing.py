@@ -1,0 +1,206 @@
+"""How fields of the scenario are drawn: one row each, its name to the left; a field that isn't given greyed."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from operator import attrgetter
+from typing import Any
+
+import bpy
+
+from .fields import (
+    AUTOMATIC,
+    ChoiceField,
+    ChoicesField,
+    Field,
+    FilesField,
+    FlagField,
+    IntervalField,
+    NumberField,
+    TextField,
+)
+from .groups import BY_HAND, GroupField, NamedOrByHandField
+from .inherited import inherited_text
+
+ADD_FILE, REMOVE_FILE = "synthroads.add_file", "synthroads.remove_file"
+"""Operators that lengthen and shorten a list of files."""
+_NAMES_SHARE = 0.45
+"""Share of a row's width that its name takes."""
+
+
+def draw_field(layout: bpy.types.UILayout, settings: Any, field: Field) -> None:
+    """Draw one field of the scenario, unless the other settings leave it without meaning."""
+    if not RELEVANT.get(field.path, _always)(settings):
+        return
+    owner = owner_of(settings, field.path)
+    for kind, draw in _DRAWN.items():
+        if isinstance(field, kind):
+            draw(layout, settings, owner, field)
+            return
+    _simple(layout, settings, owner, field)
+
+
+def owner_of(settings: Any, path: str) -> Any:
+    """Return the property group that has the property of a field."""
+    head, _, _ = path.rpartition(".")
+    return attrgetter(head)(settings) if head else settings
+
+
+def value_row(layout: bpy.types.UILayout, label: str) -> bpy.types.UILayout:
+    """Draw a name, and return the place for its value: wide enough for two numbers, the name for three words."""
+    split = layout.split(factor=_NAMES_SHARE)
+    name = split.row()
+    name.alignment = "RIGHT"
+    name.label(text=label)
+    row = split.row(align=True)
+    row.use_property_split = False
+    return row
+
+
+def _simple(layout: bpy.types.UILayout, settings: Any, owner: Any, field: Field) -> None:
+    value_row(layout, field.label).prop(owner, field.name, text="")
+
+
+def _flag(layout: bpy.types.UILayout, settings: Any, owner: Any, field: Field) -> None:
+    value_row(layout, "").prop(owner, field.name, text=field.label)
+
+
+def _number(layout: bpy.types.UILayout, settings: Any, owner: Any, field: NumberField) -> None:
+    if field.is_share and not field.optional:  # a slider has its name inside
+        row = layout.row()
+        row.use_property_split = False
+        row.prop(owner, field.name, text=field.label)
+        return
+    row = _own(layout, settings, owner, field) if field.optional else value_row(layout, field.label)
+    if row:
+        row.prop(owner, field.name, text="")
+
+
+def _interval(layout: bpy.types.UILayout, settings: Any, owner: Any, field: IntervalField) -> None:
+    row = _own(layout, settings, owner, field) if field.optional else value_row(layout, field.label)
+    if row:
+        for name in field.ends:
+            row.prop(owner, name, text="")
+
+
+def _own(
+    layout: bpy.types.UILayout, settings: Any, owner: Any, field: NumberField | IntervalField | GroupField
+) -> bpy.types.UILayout | None:
+    """Draw the checkbox of a field that may be left out; return the place for its value if it is ticked."""
+    row = value_row(layout, field.label)
+    row.prop(owner, field.own, text="")
+    if getattr(owner, field.own):
+        return row
+    _greyed(row, inherited_text(settings, field.path, field.unit))
+    return None
+
+
+def _greyed(row: bpy.types.UILayout, text: str) -> None:
+    greyed = row.row(align=True)
+    greyed.active = False
+    greyed.label(text=text)
+
+
+def _choice(layout: bpy.types.UILayout, settings: Any, owner: Any, field: ChoiceField) -> None:
+    row = value_row(layout, field.label)
+    row.prop(owner, field.name, text="")
+    if field.optional and getattr(owner, field.name) == AUTOMATIC:
+        _greyed(row, inherited_text(settings, field.path, field.unit))
+
+
+def _choices(layout: bpy.types.UILayout, settings: Any, owner: Any, field: ChoicesField) -> None:
+    column = value_row(layout, field.label).column(align=True)
+    for name in field.values:
+        column.prop_enum(owner, field.name, name)
+
+
+def _text(layout: bpy.types.UILayout, settings: Any, owner: Any, field: TextField) -> None:
+    greyed = inherited_text(settings, field.path, "") if field.optional else ""
+    value_row(layout, field.label).prop(owner, field.name, text="", placeholder=greyed)
+
+
+def _files(layout: bpy.types.UILayout, settings: Any, owner: Any, field: FilesField) -> None:
+    for number, item in enumerate(getattr(owner, field.name)):
+        row = layout.row(align=True)
+        row.use_property_split = False
+        row.prop(item, "file", text="")
+        remove = row.operator(REMOVE_FILE, text="", icon="X")
+        remove.path, remove.number = field.path, number
+    layout.operator(ADD_FILE, icon="ADD").path = field.path
+
+
+def _group(layout: bpy.types.UILayout, settings: Any, owner: Any, field: GroupField) -> None:
+    if field.optional:
+        _own(layout, settings, owner, field)
+        if not getattr(owner, field.own):
+            return
+    for inner in field.fields.values():
+        draw_field(layout, settings, inner)
+
+
+def _by_hand(layout: bpy.types.UILayout, settings: Any, owner: Any, field: NamedOrByHandField) -> None:
+    value_row(layout, field.label).prop(owner, field.name, text="")
+    if getattr(owner, field.name) == BY_HAND:
+        for inner in field.by_hand.fields.values():
+            draw_field(layout, settings, inner)
+
+
+_DRAWN: Mapping[type[Field], Callable[..., None]] = {
+    FlagField: _flag,
+    NumberField: _number,
+    IntervalField: _interval,
+    ChoiceField: _choice,
+    ChoicesField: _choices,
+    TextField: _text,
+    FilesField: _files,
+    GroupField: _group,
+    NamedOrByHandField: _by_hand,
+}
+
+
+def _always(settings: Any) -> bool:
+    return True
+
+
+def _on(*kinds: str) -> Callable[[Any], bool]:
+    return lambda settings: settings.scan.platform.kind in kinds
+
+
+def _along(path: str) -> Callable[[Any], bool]:
+    return lambda settings: _on(*_MOVING)(settings) and settings.scan.platform.path == path
+
+
+def _images(settings: Any) -> bool:
+    return settings.colour.source in ("auto", "images")
+
+
+def _rendered(settings: Any) -> bool:
+    return settings.colour.source != "material"
+
+
+_MOVING = ("uav", "vehicle", "airborne")
+RELEVANT: dict[str, Callable[[Any], bool]] = {
+    "scan.platform.height": _on(*_MOVING, "tripod"),
+    "scan.platform.speed": _on(*_MOVING),
+    "scan.platform.lateral_offsets": _on(*_MOVING, "tripod"),
+    "scan.platform.there_and_back": _on("uav", "airborne"),
+    "scan.platform.path": _on(*_MOVING),
+    "scan.platform.polynomial_degree": _along("smoothed"),
+    "scan.platform.zigzag_amplitude": _along("zigzag"),
+    "scan.platform.zigzag_wavelength": _along("zigzag"),
+    "scan.platform.stations": _on("tripod"),
+    "scan.platform.station_spacing": _on("tripod"),
+    "scan.platform.turn_seconds": _on("tripod"),
+    "scan.platform.turn_deg": _on("tripod"),
+    "scan.platform.file": _on("trajectory"),
+    "scan.weather.rate_mm_h": lambda settings: settings.scan.weather.condition in ("rain", "snow"),
+    "colour.engine": _rendered,
+    "colour.mode": lambda settings: settings.colour.rgb,
+    "colour.lighting": _rendered,
+    "colour.image_spacing": _images,
+    "colour.ground_sampling_distance": _images,
+    "colour.max_resolution": _images,
+    "colour.samples": lambda settings: _rendered(settings) and settings.colour.lighting == "path",
+    "colour.intensity_from_layers": _rendered,
+}
+"""Path -> whether a field has a meaning; those without are left out."""

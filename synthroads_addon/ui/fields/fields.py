@@ -1,0 +1,347 @@
+"""Fields of the schema as Blender properties: their limits, units, defaults and tooltips, and the way to JSON and back.
+
+Each `Field` keeps one field of a pydantic model in one or several properties of a property group. `field_groups`
+chooses the kind by the field's type, so that a new field of the schema has its properties without more being written.
+Blender's numbers have 32 bits. What was loaded is kept beside (`base`), and given back where a property still shows it;
+a number typed in is the shortest decimal that stands for its 32 bits (0.1, not 0.10000000149).
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterator, Mapping
+from typing import Any, get_args
+
+import bpy
+from pydantic.fields import FieldInfo
+
+from ...base.errors import InputError
+from ...base.schema import unit_of
+from ...scenario.road import Interval
+from .choices import ITEMS
+from .numbers import exact, fitting, is_share, listed, number_property, numbers_in, push_along
+from .wording import label, value_name
+
+AUTOMATIC = "AUTOMATIC"
+"""Item of a choice that stands for "not given"."""
+Hooks = Mapping[str, Callable[[Any, Any], None]]
+"""Path -> what Blender calls when that property has changed."""
+
+
+class Field:
+    """One field of the schema. Values are JSON data, as in a scenario's file; None is a field that isn't given.
+
+    Attributes:
+        path: where it stands in the scenario, e.g. ``road.turnouts.exits``; its last part is the property's name.
+        info: the schema's declaration.
+        kind: its type, without None.
+        optional: whether None is allowed.
+        default: value at first.
+        choice: whether others can depend on it: written before them.
+    """
+
+    choice = False
+
+    def __init__(self, path: str, info: FieldInfo, kind: Any, optional: bool, default: Any) -> None:
+        self.path, self.info, self.kind, self.optional, self.default = path, info, kind, optional, default
+        self.name = path.rpartition(".")[2]
+        self.unit = unit_of(info)
+        self.label = label(path, self.unit)
+
+    @property
+    def tooltip(self) -> str:
+        """Return the description without its final stop: Blender adds one."""
+        return (self.info.description or "").removesuffix(".")
+
+    @property
+    def own(self) -> str:
+        """Return the name of the checkbox of a field that may be left out, where its kind has one."""
+        return f"own_{self.name}"
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Return the names of its properties."""
+        return (self.name,)
+
+    def properties(self, hooks: Hooks) -> dict[str, Any]:
+        """Return its properties by name, for the annotations of a property group."""
+        raise NotImplementedError
+
+    def read(self, owner: Any, base: Any) -> Any:
+        """Return the value that a property group shows; `base` is what was loaded last. `InputError` if it is none."""
+        raise NotImplementedError
+
+    def write(self, owner: Any, value: Any) -> None:
+        """Have a property group show a value."""
+        setattr(owner, self.name, value)
+
+    def classes(self) -> Iterator[type]:
+        """Yield the property groups that must be registered before the one that it stands in."""
+        return iter(())
+
+    def _common(self, hooks: Hooks, name: str | None = None) -> dict[str, Any]:
+        hook = {"update": hooks[self.path]} if self.path in hooks else {}
+        return {"name": name or self.label, "description": self.tooltip, **hook}
+
+
+class FlagField(Field):
+    """Yes or no."""
+
+    def properties(self, hooks: Hooks) -> dict[str, Any]:
+        """Return a checkbox."""
+        return {self.name: bpy.props.BoolProperty(**self._common(hooks), default=bool(self.default))}
+
+    def read(self, owner: Any, base: Any) -> bool:
+        """Return whether it is ticked."""
+        return bool(getattr(owner, self.name))
+
+
+class NumberField(Field):
+    """A number with its limits. One that isn't given shows in a checkbox of its own, `own`, that isn't ticked."""
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Return the names of its properties."""
+        return (self.own, self.name) if self.optional else (self.name,)
+
+    @property
+    def is_share(self) -> bool:
+        """Return whether it is a share or a probability, which a slider shows."""
+        return is_share(self.info)
+
+    def properties(self, hooks: Hooks) -> dict[str, Any]:
+        """Return the number, and its checkbox."""
+        number = number_property(self.info, self.kind is int, self.default, **self._common(hooks))
+        return checkbox(self, hooks) | {self.name: number}
+
+    def read(self, owner: Any, base: Any) -> float | None:
+        """Return the number, or None where the checkbox isn't ticked."""
+        if self.optional and not getattr(owner, self.own):
+            return None
+        return exact(getattr(owner, self.name), base)
+
+    def write(self, owner: Any, value: Any) -> None:
+        """Show a number, as far as Blender's numbers reach."""
+        if self.optional:
+            setattr(owner, self.own, value is not None)
+        if value is not None:
+            setattr(owner, self.name, fitting(value) if self.kind is int else value)
+
+
+class IntervalField(Field):
+    """Two numbers, smallest and largest; a checkbox `own` where none need be given."""
+
+    @property
+    def ends(self) -> tuple[str, str]:
+        """Return the names of the two numbers."""
+        return f"{self.name}_minimum", f"{self.name}_maximum"
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Return the names of its properties."""
+        return (self.own, *self.ends) if self.optional else self.ends
+
+    def properties(self, hooks: Hooks) -> dict[str, Any]:
+        """Return the two numbers, of which the one pushes the other along."""
+        low, high = self.ends
+        default = self.default or {"minimum": 0.0, "maximum": 0.0}
+        result = checkbox(self, hooks)
+        pushes = (push_along(low, high, max), push_along(high, low, min))
+        for name, end, push in zip(self.ends, ("minimum", "maximum"), pushes, strict=True):
+            info = Interval.model_fields[end]
+            text = f"{self.tooltip}: {end}" if self.tooltip else end
+            arguments = {"name": f"{self.label} {end.title()}", "description": text, "update": push}
+            beside = max(map(abs, default.values()))
+            result[name] = number_property(info, False, default[end], self.unit, beside, **arguments)
+        return result
+
+    def read(self, owner: Any, base: Any) -> dict[str, float] | None:
+        """Return the interval, or None where the checkbox isn't ticked."""
+        if self.optional and not getattr(owner, self.own):
+            return None
+        loaded = base if isinstance(base, dict) else {}
+        ends = zip(("minimum", "maximum"), self.ends, strict=True)
+        return {end: exact(getattr(owner, name), loaded.get(end)) for end, name in ends}
+
+    def write(self, owner: Any, value: Any) -> None:
+        """Show an interval: its minimum first, which may push the maximum that is written next."""
+        if self.optional:
+            setattr(owner, self.own, value is not None)
+        for name, end in zip(self.ends, ("minimum", "maximum"), strict=True):
+            if value is not None:
+                setattr(owner, name, value[end])
+
+
+class ChoiceField(Field):
+    """One of several values; one more item stands for "not given"."""
+
+    choice = True
+
+    def __init__(self, *arguments: Any) -> None:
+        super().__init__(*arguments)
+        self.values = {str(value): value for value in get_args(self.kind)}
+
+    def properties(self, hooks: Hooks) -> dict[str, Any]:
+        """Return a menu."""
+        items = list(ITEMS.get(self.path, [(name, value_name(self.path, name), "") for name in self.values]))
+        if self.optional:
+            items.insert(0, (AUTOMATIC, "Automatic", self.tooltip))
+        default = AUTOMATIC if self.default is None else str(self.default)
+        return {self.name: bpy.props.EnumProperty(**self._common(hooks), items=items, default=default)}
+
+    def read(self, owner: Any, base: Any) -> Any:
+        """Return the chosen value."""
+        return self.values.get(getattr(owner, self.name))
+
+    def write(self, owner: Any, value: Any) -> None:
+        """Choose a value."""
+        setattr(owner, self.name, AUTOMATIC if value is None else str(value))
+
+
+class ChoicesField(Field):
+    """Any of several values; their order is the schema's, unless they were loaded in another."""
+
+    def __init__(self, *arguments: Any) -> None:
+        super().__init__(*arguments)
+        self.values = tuple(str(value) for value in get_args(get_args(self.kind)[0]))
+
+    def properties(self, hooks: Hooks) -> dict[str, Any]:
+        """Return buttons of which several can be pressed."""
+        items = [(name, value_name(self.path, name), "") for name in self.values]
+        flags = {"items": items, "default": set(self.default or ()), "options": {"ENUM_FLAG", "ANIMATABLE"}}
+        return {self.name: bpy.props.EnumProperty(**self._common(hooks), **flags)}
+
+    def read(self, owner: Any, base: Any) -> list[str]:
+        """Return the chosen values."""
+        chosen = getattr(owner, self.name)
+        if isinstance(base, list) and set(base) == chosen:
+            return base
+        return [name for name in self.values if name in chosen]
+
+    def write(self, owner: Any, value: Any) -> None:
+        """Choose values."""
+        setattr(owner, self.name, set(value or ()))
+
+
+class TextField(Field):
+    """A text; nothing at all is "not given" where that is allowed."""
+
+    choice = True
+
+    def properties(self, hooks: Hooks) -> dict[str, Any]:
+        """Return a line of text, with a button to choose a file where it names one."""
+        file = {"subtype": "FILE_PATH", "options": {"PATH_SUPPORTS_BLEND_RELATIVE"}} if self.names_file else {}
+        default = self.default or ""
+        return {self.name: bpy.props.StringProperty(**self._common(hooks), **file, default=default)}
+
+    @property
+    def names_file(self) -> bool:
+        """Return whether it can be nothing but a file."""
+        return self.optional and "file" in f"{self.name} {self.tooltip}".lower()
+
+    def read(self, owner: Any, base: Any) -> Any:
+        """Return the text; a file beside the .blend file by its whole name."""
+        text = str(getattr(owner, self.name))
+        if self.optional and not text:
+            return None
+        return bpy.path.abspath(text) if text.startswith("//") and self.names_file else text
+
+    def write(self, owner: Any, value: Any) -> None:
+        """Show a text."""
+        setattr(owner, self.name, value or "")
+
+
+class NumbersField(TextField):
+    """Several numbers as text, separated by commas: exact, and as many as are wanted."""
+
+    choice = False
+    names_file = False
+
+    def properties(self, hooks: Hooks) -> dict[str, Any]:
+        """Return a line of text."""
+        default = listed(self.default or ())
+        return {self.name: bpy.props.StringProperty(**self._common(hooks), default=default)}
+
+    def read(self, owner: Any, base: Any) -> list[float] | None:
+        """Return the numbers; raise `InputError` if there is something else among them."""
+        text = getattr(owner, self.name)
+        if self.optional and not text.strip():
+            return None
+        try:
+            return numbers_in(text)
+        except ValueError:
+            raise InputError(self.path, text, "must be numbers, separated by commas") from None
+
+    def write(self, owner: Any, value: Any) -> None:
+        """Show numbers."""
+        setattr(owner, self.name, listed(value or ()))
+
+
+class JsonField(TextField):
+    """Whatever else the schema may hold: its JSON text."""
+
+    choice = False
+    names_file = False
+
+    def properties(self, hooks: Hooks) -> dict[str, Any]:
+        """Return a line of text."""
+        default = "" if self.default is None else json.dumps(self.default)
+        return {self.name: bpy.props.StringProperty(**self._common(hooks), default=default)}
+
+    def read(self, owner: Any, base: Any) -> Any:
+        """Return the data; raise `InputError` if it isn't JSON."""
+        text = getattr(owner, self.name).strip()
+        try:
+            return json.loads(text) if text else None
+        except ValueError:
+            raise InputError(self.path, text, "must be JSON") from None
+
+    def write(self, owner: Any, value: Any) -> None:
+        """Show data."""
+        setattr(owner, self.name, "" if value is None else json.dumps(value))
+
+
+class SYNTHROADS_PG_file(bpy.types.PropertyGroup):
+    """One file of a list."""
+
+    __annotations__ = {
+        "file": bpy.props.StringProperty(
+            name="File", subtype="FILE_PATH", options={"PATH_SUPPORTS_BLEND_RELATIVE"}, description="A JSON file"
+        )
+    }
+
+
+class FilesField(Field):
+    """Files, one below the other."""
+
+    def properties(self, hooks: Hooks) -> dict[str, Any]:
+        """Return a list; it is empty at first."""
+        return {self.name: bpy.props.CollectionProperty(type=SYNTHROADS_PG_file, **self._common({}))}
+
+    def read(self, owner: Any, base: Any) -> list[str]:
+        """Return the files that are named, those beside the .blend file by their whole names."""
+        texts = [item.file for item in getattr(owner, self.name) if item.file]
+        return [bpy.path.abspath(text) if text.startswith("//") else text for text in texts]
+
+    def write(self, owner: Any, value: Any) -> None:
+        """Show files."""
+        items = getattr(owner, self.name)
+        items.clear()
+        for text in value or ():
+            items.add().file = text
+
+
+def checkbox(field: Any, hooks: Hooks) -> dict[str, Any]:
+    """Return the checkbox of a field that may be left out; none for others."""
+    if not field.optional:
+        return {}
+    hook = {"update": hooks[own_path]} if (own_path := own(field.path)) in hooks else {}
+    text = f"{field.tooltip}. Tick to give a value of your own"
+    name = f"Own {field.label}"
+    return {field.own: bpy.props.BoolProperty(name=name, description=text, default=field.default is not None, **hook)}
+
+
+def own(path: str) -> str:
+    """Return the path of a field's checkbox."""
+    head, dot, name = path.rpartition(".")
+    return f"{head}{dot}own_{name}"

@@ -1,0 +1,232 @@
+"""Parts of the schema as property groups, and the fields that a part of the scenario has."""
+
+from __future__ import annotations
+
+import types
+from collections.abc import Iterator, Mapping
+from typing import Annotated, Any, Literal, Union, get_args, get_origin
+
+import bpy
+from pydantic import BaseModel
+from pydantic.fields import FieldInfo
+
+from ...scenario.road import Interval
+from . import fields as kinds
+from .choices import STANDARD_PARTS, Items
+from .fields import Field, FilesField, Hooks, checkbox
+
+BY_HAND = "BY_HAND"
+"""Item of a choice that stands for a part by hand."""
+
+
+class GroupField(Field):
+    """A part of the scenario: a property group of its own; a checkbox `own` where it may be left out.
+
+    Attributes:
+        fields: what it holds, by name.
+        group: its class.
+    """
+
+    def __init__(self, path: str, info: FieldInfo, kind: Any, optional: bool, default: Any, hooks: Hooks) -> None:
+        super().__init__(path, info, kind, optional, default)
+        self.fields = make_fields(kind, default or _defaults(kind), path, hooks)
+        annotations = {name: p for field in self.fields.values() for name, p in field.properties(hooks).items()}
+        self.group = type(
+            f"SYNTHROADS_PG_{path.replace('.', '_')}", (bpy.types.PropertyGroup,), {"__annotations__": annotations}
+        )
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Return the names of its properties."""
+        return (self.own, self.name) if self.optional else (self.name,)
+
+    def properties(self, hooks: Hooks) -> dict[str, Any]:
+        """Return a pointer to its group, and its checkbox."""
+        pointer = bpy.props.PointerProperty(type=self.group, name=self.label, description=self.tooltip)
+        return checkbox(self, hooks) | {self.name: pointer}
+
+    def read(self, owner: Any, base: Any) -> dict[str, Any] | None:
+        """Return the part's data without fields that aren't given."""
+        if self.optional and not getattr(owner, self.own):
+            return None
+        return read_fields(self.fields, getattr(owner, self.name), base)
+
+    def write(self, owner: Any, value: Any) -> None:
+        """Show the part's data."""
+        if self.optional:
+            setattr(owner, self.own, value is not None)
+        if value is not None:
+            write_fields(self.fields, getattr(owner, self.name), value)
+
+    def classes(self) -> Iterator[type]:
+        """Yield the group's class after those in it."""
+        for field in self.fields.values():
+            yield from field.classes()
+        yield self.group
+
+
+class NamedOrByHandField(Field):
+    """One of the standard parts by its name, or a part by hand, which is a group of its own: ``NAME_by_hand``.
+
+    Attributes:
+        by_hand: the part by hand.
+        items: names of the standard parts, as a menu has them.
+    """
+
+    choice = True
+
+    def __init__(self, path: str, info: FieldInfo, model: Any, default: Any, items: Items, hooks: Hooks) -> None:
+        super().__init__(path, info, model, False, default)
+        self.items = items
+        start = default if isinstance(default, dict) else _first_values(model)
+        self.by_hand = GroupField(f"{path}_by_hand", info, model, False, start, hooks)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Return the names of its properties."""
+        return (self.name, self.by_hand.name)
+
+    def properties(self, hooks: Hooks) -> dict[str, Any]:
+        """Return a menu, and the group."""
+        items = [*self.items, (BY_HAND, "By Hand", "Widths of your own")]
+        default = self.default if isinstance(self.default, str) else BY_HAND
+        menu = bpy.props.EnumProperty(**self._common(hooks), items=items, default=default)
+        return {self.name: menu} | self.by_hand.properties({})
+
+    def read(self, owner: Any, base: Any) -> Any:
+        """Return the name, or the data of the part by hand."""
+        chosen = getattr(owner, self.name)
+        return self.by_hand.read(owner, base if isinstance(base, dict) else {}) if chosen == BY_HAND else chosen
+
+    def write(self, owner: Any, value: Any) -> None:
+        """Show a name, or the data of a part by hand."""
+        setattr(owner, self.name, BY_HAND if isinstance(value, dict) else value)
+        if isinstance(value, dict):
+            self.by_hand.write(owner, value)
+
+    def classes(self) -> Iterator[type]:
+        """Yield the group's class."""
+        return self.by_hand.classes()
+
+
+NOT_HERE = ("tolerance", "time_budget")
+"""Fields that the panel doesn't have: its road is built before it is scanned, with knobs that are seen and set."""
+
+
+def make_fields(model: type[BaseModel], default: dict[str, Any], path: str, hooks: Hooks) -> dict[str, Field]:
+    """Return the fields of a model by name, except those that can have one value only."""
+    made = (
+        make_field(f"{path}.{name}" if path else name, info, default.get(name), hooks)
+        for name, info in model.model_fields.items()
+    )
+    return {field.name: field for field in made if field}
+
+
+def make_field(path: str, info: FieldInfo, default: Any, hooks: Hooks) -> Field | None:
+    """Return a field as the panel keeps it, chosen by its type; None for a constant, or if the panel lacks it."""
+    if path in NOT_HERE:
+        return None
+    kind, optional = _without_none(info.annotation)
+    if get_origin(kind) is Union or isinstance(kind, types.UnionType):
+        models = [part for part in map(_bare, get_args(kind)) if _is_model(part)]
+        if path in STANDARD_PARTS and len(models) == 1 and not optional:
+            return NamedOrByHandField(path, info, models[0], default, STANDARD_PARTS[path], hooks)
+        return kinds.JsonField(path, info, kind, optional, default)
+    if kind is not Interval and _is_model(kind):
+        return GroupField(path, info, kind, optional, default, hooks)
+    if get_origin(kind) is Literal and len(get_args(kind)) == 1:
+        return None
+    return _simple(kind)(path, info, kind, optional, default)
+
+
+def _simple(kind: Any) -> type[Field]:
+    if get_origin(kind) is Literal:
+        return kinds.ChoiceField
+    if get_origin(kind) is tuple:
+        member = _bare(get_args(kind)[0])
+        if get_origin(member) is Literal:
+            return kinds.ChoicesField
+        return {str: FilesField, float: kinds.NumbersField, int: kinds.NumbersField}.get(member, kinds.JsonField)
+    by_type: dict[Any, type[Field]] = {
+        bool: kinds.FlagField,
+        int: kinds.NumberField,
+        float: kinds.NumberField,
+        str: kinds.TextField,
+        Interval: kinds.IntervalField,
+    }
+    return by_type.get(kind, kinds.JsonField)
+
+
+def read_fields(fields: Mapping[str, Field], owner: Any, base: Any) -> dict[str, Any]:
+    """Return what a property group shows as JSON data, without fields that aren't given."""
+    loaded = base if isinstance(base, dict) else {}
+    values = {name: field.read(owner, loaded.get(name)) for name, field in fields.items()}
+    return {name: value for name, value in values.items() if value is not None}
+
+
+def write_fields(fields: Mapping[str, Field], owner: Any, data: Mapping[str, Any]) -> None:
+    """Have a property group show JSON data. Choices come first: choosing resets what depends on it."""
+    for field in sorted(fields.values(), key=lambda field: not field.choice):
+        field.write(owner, data.get(field.name))
+
+
+def shown(fields: Mapping[str, Field], owner: Any) -> list[Any]:
+    """Return all that a property group shows, right or wrong, to tell whether it has changed; quick."""
+    result: list[Any] = []
+    for field in fields.values():
+        for name in field.names:
+            value = getattr(owner, name)
+            if isinstance(field, FilesField):
+                value = [item.file for item in value]
+            elif isinstance(value, bpy.types.PropertyGroup):
+                group = field.by_hand if isinstance(field, NamedOrByHandField) else field
+                assert isinstance(group, GroupField)
+                value = shown(group.fields, value)
+            result.append(sorted(value) if isinstance(value, set) else value)
+    return result
+
+
+def leaves(fields: Mapping[str, Field]) -> Iterator[Field]:
+    """Yield the fields that are drawn by themselves: all but parts, unless a part may be left out as a whole."""
+    for field in fields.values():
+        if isinstance(field, GroupField) and not field.optional:
+            yield from leaves(field.fields)
+        else:
+            yield field
+
+
+def _without_none(kind: Any) -> tuple[Any, bool]:
+    """Return a type without None and the limits that are annotated, and whether None was allowed."""
+    kind = _bare(kind)
+    if get_origin(kind) is Union or isinstance(kind, types.UnionType):
+        parts = [part for part in get_args(kind) if part is not type(None)]
+        optional = len(parts) < len(get_args(kind))
+        return (_bare(parts[0]) if len(parts) == 1 else Union[tuple(parts)]), optional  # noqa: UP007
+    return kind, False
+
+
+def _bare(kind: Any) -> Any:
+    while get_origin(kind) is Annotated:
+        kind = get_args(kind)[0]
+    return kind
+
+
+def _is_model(kind: Any) -> bool:
+    return isinstance(kind, type) and issubclass(kind, BaseModel)
+
+
+def _defaults(model: type[BaseModel]) -> dict[str, Any]:
+    """Return the defaults of a model that has one for each field, or else of those that have."""
+    data: dict[str, Any] = {}
+    for name, info in model.model_fields.items():
+        value = info.get_default(call_default_factory=True)
+        if isinstance(value, BaseModel):
+            data[name] = value.model_dump(mode="json")
+        elif not info.is_required():
+            data[name] = list(value) if isinstance(value, tuple) else value
+    return data
+
+
+def _first_values(model: type[BaseModel]) -> dict[str, Any]:
+    """Return what a part by hand shows at first: an example where there is no default."""
+    return {"lanes": [3.75, 3.75]} | _defaults(model)

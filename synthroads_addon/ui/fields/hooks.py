@@ -1,0 +1,95 @@
+"""What follows from a change in the panel: settings that belonged to the choice before, or exclude each other."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from ...road.guidelines import SECTIONS_OF_CLASS, design_class_of
+from .fields import AUTOMATIC, own
+from .groups import BY_HAND
+from .inherited import BEGINNINGS, begin_with_inherited
+
+Hook = Callable[[Any, Any], None]
+_DEVICE_SETTINGS = ("pulse_rate_khz", "field_of_view_deg", "lines_per_second", "angle_step_deg")
+
+
+def _clear(*names: str) -> Hook:
+    """Return a hook that takes back values of one's own."""
+
+    def clear(group: Any, context: Any) -> None:
+        for name in names:
+            setattr(group, name, type(getattr(group, name))())
+
+    return clear
+
+
+def _instead(name: str, *others: str) -> Hook:
+    """Return a hook that takes back other values once this one is given."""
+
+    def instead(group: Any, context: Any) -> None:
+        if getattr(group, name):
+            _clear(*others)(group, context)
+
+    return instead
+
+
+def _class_for_section(road: Any, context: Any) -> None:
+    if road.cross_section != BY_HAND:
+        fitting = design_class_of(road.cross_section, road.design_class)
+        if fitting != road.design_class:
+            road.design_class = fitting
+
+
+def _section_for_class(road: Any, context: Any) -> None:
+    allowed = SECTIONS_OF_CLASS[road.design_class]
+    if road.cross_section not in (*allowed, BY_HAND):
+        road.cross_section = allowed[0]
+
+
+def _no_rate(weather: Any, context: Any) -> None:
+    if weather.condition not in ("rain", "snow"):
+        weather.own_rate_mm_h = False
+
+
+def _no_samples(colour: Any, context: Any) -> None:
+    if colour.lighting == "direct":
+        colour.own_samples = False
+
+
+def _no_rings(scan: Any, context: Any) -> None:
+    if scan.rays_per_pulse != AUTOMATIC and scan.beam_rings:
+        scan.beam_rings = ""
+
+
+def _no_rays(scan: Any, context: Any) -> None:
+    if scan.beam_rings:
+        scan.rays_per_pulse = AUTOMATIC
+
+
+def _in_turn(first: Hook, second: Hook) -> Hook:
+    def both(group: Any, context: Any) -> None:
+        first(group, context)
+        second(group, context)
+
+    return both
+
+
+HOOKS: dict[str, Hook] = {own(path): begin_with_inherited(path) for path in BEGINNINGS} | {
+    "road.cross_section": _class_for_section,
+    "road.design_class": _section_for_class,
+    # A pulse rate and angles are those of one device, strips and heights those of one platform.
+    "scan.device": _clear(*map(own, _DEVICE_SETTINGS)),
+    "scan.platform.kind": _clear("own_height", "own_speed", "lateral_offsets", "stations", "file"),
+    "scan.own_weather": _instead("own_weather", "own_attenuation"),
+    "scan.own_attenuation": _instead("own_attenuation", "own_weather"),
+    "scan.weather.condition": _no_rate,
+    "scan.weather.own_rate_mm_h": _instead("own_rate_mm_h", "own_visibility"),
+    "scan.beam_rings": _no_rays,
+    "scan.rays_per_pulse": _no_rings,
+    "colour.lighting": _no_samples,
+}
+HOOKS["scan.weather.own_visibility"] = _in_turn(
+    begin_with_inherited("scan.weather.visibility"), _instead("own_visibility", "own_rate_mm_h")
+)
+"""Path of a property -> what Blender calls when it has changed."""

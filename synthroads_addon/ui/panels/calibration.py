@@ -1,0 +1,267 @@
+"""The panel "Calibration": materials beside a real cloud, fitted to it, saved to a table.
+
+The work is `calibration.job`'s, in a thread.
+
+Annotations are not postponed here: Blender reads the properties from them.
+"""
+
+from typing import cast
+
+import bpy
+
+from ...base.errors import InputError
+from ...calibration.fit import FITTED
+from ...calibration.job import Calibration, Compared, save_fitted
+from ..work import calibration_run
+from ..work.calibration_run import PICTURE, calibration_work, fitted_result, show_picture
+from ..work.common import Sidebar, column, is_free, large_button, refuse
+from ..work.job import Job
+from ..work.long_operator import LongOperator
+from . import calibration_settings
+from .calibration_settings import file_of
+
+
+class _Calibrates(LongOperator):
+    """What the two buttons that calibrate share."""
+
+    fit = False
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """Object mode, nothing else at work, and something to compare."""
+        if not is_free(cast("type[bpy.types.Operator]", cls), context):
+            return False
+        settings = context.window_manager.synthroads_calibration
+        if not settings.classes or (cls.fit and not settings.real):
+            text = "Choose a real cloud first" if settings.classes else "Add a material first"
+            cls.poll_message_set(text)  # type: ignore[attr-defined]
+            return False
+        return True
+
+    def job(self, context: bpy.types.Context) -> Job[Calibration]:
+        """Return the calibration that the panel asks for."""
+        wanted = context.window_manager.synthroads_calibration.job(self.fit)
+        return Job("Calibration", calibration_work(wanted))
+
+    def succeed(self, context: bpy.types.Context, job: Job[Calibration]) -> str:
+        """Draw the diagrams; return the largest errors."""
+        assert job.result is not None
+        calibration_run.latest = job.result
+        show_picture(job.result)
+        return _sentence(job.result)
+
+
+class SYNTHROADS_OT_compare_intensities(_Calibrates, bpy.types.Operator):
+    """Show what intensities the materials are expected to give, beside those of the real cloud"""
+
+    bl_idname = "synthroads.compare_intensities"
+    bl_label = "Compare"
+
+
+class SYNTHROADS_OT_fit_materials(_Calibrates, bpy.types.Operator):
+    """Fit the materials to the real cloud, with one gain of the device for all of them"""
+
+    bl_idname = "synthroads.fit_materials"
+    bl_label = "Fit"
+    fit = True
+
+
+class SYNTHROADS_OT_save_materials(bpy.types.Operator):
+    """Save the fitted materials to the table, which scenarios name as materials_table"""
+
+    bl_idname = "synthroads.save_materials"
+    bl_label = "Save to Table"
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """Something was fitted."""
+        if fitted_result() is None:
+            cls.poll_message_set("Fit materials first")
+            return False
+        return True
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        """Write the table; other materials that it holds stay."""
+        result, path = fitted_result(), file_of(context.window_manager.synthroads_calibration.table)
+        if path is None:
+            self.report({"ERROR"}, "Choose the table's file")
+            return {"CANCELLED"}
+        try:
+            save_fitted(cast(Calibration, result), path, overwrite=True)
+        except InputError as error:
+            return refuse(self, error)
+        self.report({"INFO"}, f"Saved to {path}")
+        return {"FINISHED"}
+
+
+class SYNTHROADS_OT_add_calibration_class(bpy.types.Operator):
+    """Add a material to be compared"""
+
+    bl_idname = "synthroads.add_calibration_class"
+    bl_label = "Add Material"
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        """Add a row: the first two are asphalt and white paint."""
+        settings = context.window_manager.synthroads_calibration
+        usual = (("asphalt", "road"), ("paint_white", "road_marking"))
+        row = settings.classes.add()
+        row.material, row.told = usual[min(len(settings.classes), 2) - 1]
+        settings.active = len(settings.classes) - 1
+        return {"FINISHED"}
+
+
+class SYNTHROADS_OT_remove_calibration_class(bpy.types.Operator):
+    """Remove a material from those compared"""
+
+    bl_idname = "synthroads.remove_calibration_class"
+    bl_label = "Remove Material"
+
+    index: bpy.props.IntProperty()
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        """Remove the row."""
+        context.window_manager.synthroads_calibration.classes.remove(self.index)
+        return {"FINISHED"}
+
+
+class SYNTHROADS_OT_show_calibration(bpy.types.Operator):
+    """Show the diagrams in an image editor"""
+
+    bl_idname = "synthroads.show_calibration"
+    bl_label = "Show Diagrams"
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """There are diagrams, and a window to show them in."""
+        return PICTURE in bpy.data.images and context.window is not None
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        """Show them in an editor that is open, else in a window of their own."""
+        areas = [area for window in context.window_manager.windows for area in window.screen.areas]
+        area = next((area for area in areas if area.type == "IMAGE_EDITOR"), None)
+        if area is None:
+            bpy.ops.wm.window_new()
+            area = context.window_manager.windows[-1].screen.areas[0]
+            area.type = "IMAGE_EDITOR"
+        area.spaces.active.image = bpy.data.images[PICTURE]
+        return {"FINISHED"}
+
+
+class SYNTHROADS_PT_calibration(Sidebar, bpy.types.Panel):
+    """Intensities of materials and of real clouds."""
+
+    bl_label = "Calibration"
+    bl_parent_id = "SYNTHROADS_PT_main"
+    bl_order = 70
+    bl_options = {"DEFAULT_CLOSED"}  # noqa: RUF012
+
+    def draw(self, context: bpy.types.Context) -> None:
+        """Show materials, cloud, view, buttons and the result."""
+        layout, settings = column(self), context.window_manager.synthroads_calibration
+        _draw_classes(layout, settings)
+        _draw_cloud(layout.column(), settings)
+        _draw_view(layout.column(), settings)
+        layout.prop(settings, "table")
+        row = large_button(layout).row(align=True)
+        row.operator(SYNTHROADS_OT_compare_intensities.bl_idname, icon="SEQ_HISTOGRAM")
+        row.operator(SYNTHROADS_OT_fit_materials.bl_idname, icon="MOD_DATA_TRANSFER")
+        if calibration_run.latest is not None:
+            _draw_result(layout, calibration_run.latest)
+
+
+def _draw_classes(layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup) -> None:
+    textured = calibration_settings.textured()
+    for index, item in enumerate(settings.classes):
+        box = layout.box()
+        row = box.row(align=True)
+        row.prop(item, "material", text="")
+        if settings.real:
+            row.prop(item, "told", text="")
+        row.operator(SYNTHROADS_OT_remove_calibration_class.bl_idname, text="", icon="X").index = index
+        if item.material in textured:
+            box.prop(item, "texture")
+            if item.texture:
+                box.prop(item, "texture_width")
+    layout.operator(SYNTHROADS_OT_add_calibration_class.bl_idname, icon="ADD")
+
+
+def _draw_cloud(layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup) -> None:
+    layout.prop(settings, "real")
+    if not settings.real:
+        return
+    layout.prop(settings, "axis")
+    for name in ("paved", "lines", "line_width") if settings.axis else ("class_field",):
+        layout.prop(settings, name)
+    for name in ("range_corrected", "decibels", "gain"):
+        layout.prop(settings, name)
+    layout.row().prop(settings, "parts")
+
+
+def _draw_view(layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup) -> None:
+    layout.prop(settings, "device")
+    layout.prop(settings, "reflection")
+    if settings.real:
+        layout.prop(settings, "use_scanner")
+    for name in ("scanner",) if settings.real and settings.use_scanner else ("angles", "ranges"):
+        layout.prop(settings, name)
+
+
+def _draw_result(layout: bpy.types.UILayout, result: Calibration) -> None:
+    """Show the figures, and what can be done with them."""
+    if result.job.real is not None:
+        layout.label(text=f"Gain {result.gain:.5g}, one for all")
+    for entry in result.compared:
+        box = layout.box()
+        for number, line in enumerate(lines_of(entry)):
+            box.label(text=line, icon="MATERIAL" if number == 0 else "NONE")
+    row = layout.row(align=True)
+    row.operator(SYNTHROADS_OT_show_calibration.bl_idname, icon="IMAGE_DATA")
+    if result.job.real is not None and result.job.fit:
+        row.operator(SYNTHROADS_OT_save_materials.bl_idname, icon="FILE_TICK")
+
+
+def lines_of(entry: Compared) -> list[str]:
+    """Return the figures of a material as the panel shows them."""
+    before, after = entry.before.reflectivity, entry.after.reflectivity
+    changed = f"{before:.3f} → {after:.3f}" if before != after else f"{after:.3f}"
+    data = entry.to_dict()
+    lines = [f"{entry.wanted.material}: reflectivity {changed}"]
+    names = [f"{100 * share:g}" for share in FITTED]
+    if entry.real is not None:
+        lines.append(f"{data['points']:,} points, {data['zeros_left_out']:,} zeros left out")
+        lines.append("Real: " + ", ".join(f"{data['real'][name]:,.5g}" for name in names))
+    lines.append("Expected: " + ", ".join(f"{data['expected'][name]:,.5g}" for name in names))
+    if entry.real is not None:
+        errors = data["error_of_interquartile_range"]
+        lines.append("Error / IQR: " + ", ".join(f"{errors[name]:+.1%}" for name in names))
+    return lines
+
+
+def _sentence(result: Calibration) -> str:
+    if result.job.real is None:
+        return "Expected intensities computed"
+    shown = (f"{entry.wanted.material} {entry.to_dict()['largest_error']:.1%}" for entry in result.compared)
+    return f"Largest error as a share of the interquartile range: {', '.join(shown)}"
+
+
+CLASSES = (
+    *calibration_settings.CLASSES,
+    SYNTHROADS_OT_compare_intensities,
+    SYNTHROADS_OT_fit_materials,
+    SYNTHROADS_OT_save_materials,
+    SYNTHROADS_OT_add_calibration_class,
+    SYNTHROADS_OT_remove_calibration_class,
+    SYNTHROADS_OT_show_calibration,
+    SYNTHROADS_PT_calibration,
+)
+
+
+def register() -> None:
+    """Attach the settings."""
+    calibration_settings.register()
+
+
+def unregister() -> None:
+    """Take the settings away, and forget the last result."""
+    calibration_run.latest = None
+    calibration_settings.unregister()

@@ -1,0 +1,198 @@
+"""What the panel "Calibration" asks for: materials with their classes, a real cloud, how it was seen, what is fitted.
+
+It is no part of a job's description: it is kept with the window, not with the file.
+
+Annotations are not postponed here: Blender reads the properties from them.
+"""
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any, cast
+
+import bpy
+
+from ...base.errors import InputError
+from ...blender.materials import constants, table_name
+from ...blender.materials.image import base_color_image, color_image_node
+from ...calibration.job import CalibrationJob, Part, Wanted, check
+from ...calibration.pavement import RoadClasses
+from ...calibration.texture import texture_of
+from ...materials.surfaces import Reflection
+from ...materials.table import Material, materials
+from ...scanning.devices.device import device_names, load_device
+
+_RAY = "RAY"
+
+
+def _materials(self: Any, context: bpy.types.Context, typed: str) -> Iterator[str]:
+    """Yield the materials of table and scene that hold what is typed."""
+    names = {*materials(), *(table_name(item) for item in bpy.data.materials)}
+    yield from sorted(name for name in names if typed.lower() in name.lower())
+
+
+def _devices() -> Iterator[tuple[str, str, str]]:
+    yield _RAY, "A Ray", "No footprint: every place is seen by itself"
+    for name in device_names():
+        wide, high = load_device(name).divergence_mrad
+        yield name, load_device(name).title, f"Divergence {wide:g} × {high:g} mrad"
+
+
+class SYNTHROADS_PG_calibration_class(bpy.types.PropertyGroup):
+    """A material and the class of the cloud that it is compared with."""
+
+    material: bpy.props.StringProperty(name="Material", default="asphalt", search=_materials)
+    told: bpy.props.StringProperty(
+        name="Class", description="Number or name of the cloud's class; paved or line beside an axis"
+    )
+    texture: bpy.props.BoolProperty(
+        name="From Its Texture", description="Take the colours of the image that the scene's material has"
+    )
+    texture_width: bpy.props.FloatProperty(
+        name="Texture Width",
+        description="Width of the surface that the image shows",
+        default=1.0,
+        min=1e-3,
+        unit="LENGTH",
+    )
+
+
+class SYNTHROADS_PG_calibration(bpy.types.PropertyGroup):
+    """What is compared, and how it was seen; `job` turns it into what the command line takes."""
+
+    classes: bpy.props.CollectionProperty(type=SYNTHROADS_PG_calibration_class)
+    active: bpy.props.IntProperty()
+    real: bpy.props.StringProperty(name="Real Cloud", subtype="FILE_PATH", description="None: expected values alone")
+    class_field: bpy.props.StringProperty(
+        name="Class Field", description="Extra attribute of the cloud that holds the classes, if it isn't the usual one"
+    )
+    axis: bpy.props.StringProperty(
+        name="Axis", subtype="FILE_PATH", description="Tells pavement and markings apart in a cloud without classes"
+    )
+    paved: bpy.props.StringProperty(
+        name="Paved", default="-7 -1; 1 7", description="Offsets from the axis between which there is pavement, m"
+    )
+    lines: bpy.props.StringProperty(name="Lines", default="-4 4", description="Offsets of the markings, m")
+    line_width: bpy.props.FloatProperty(name="Line Width", default=0.15, min=0.02, max=2.0, unit="LENGTH")
+    device: bpy.props.EnumProperty(
+        name="Beam", items=list(_devices()), description="Whose footprint places are seen with"
+    )
+    angles: bpy.props.StringProperty(name="Incidence", default="0 20 40 60", description="Incidence angles, degrees")
+    ranges: bpy.props.StringProperty(name="Ranges", default="60", description="Ranges, m")
+    use_scanner: bpy.props.BoolProperty(name="From One Place", description="Angles and ranges are those of one place")
+    scanner: bpy.props.FloatVectorProperty(name="Scanner", description="Its map coordinates", subtype="TRANSLATION")
+    reflection: bpy.props.EnumProperty(
+        name="Reflection",
+        items=[("lambert", "Lambert", "Matt"), ("oren_nayar", "Oren-Nayar", "Rough, by the facets' slope")],
+    )
+    range_corrected: bpy.props.BoolProperty(
+        name="Range Corrected", description="The device has taken the fall-off with the range out of its intensities"
+    )
+    decibels: bpy.props.FloatProperty(
+        name="Decibels",
+        description="What the 16 bits of the file span, dB; 0: intensities are linear",
+        min=0.0,
+        max=200.0,
+    )
+    parts: bpy.props.EnumProperty(
+        name="Fit",
+        description="What is fitted besides the brightness",
+        items=[
+            ("spread", "Spread", "How much places differ"),
+            ("wavelength", "Wavelength", "Over what distance they differ"),
+            ("slope", "Facet Slope", "Fall-off with the incidence angle, with Oren-Nayar"),
+        ],
+        options={"ENUM_FLAG"},
+        default={"spread", "wavelength"},
+    )
+    gain: bpy.props.FloatProperty(name="Gain", description="The device's, if it is known; 0: free", min=0.0)
+    table: bpy.props.StringProperty(
+        name="Table", subtype="FILE_PATH", description="Material table to begin with, and to save to (.json)"
+    )
+
+    def job(self, fit: bool) -> CalibrationJob:
+        """Return what the panel asks for.
+
+        Raises:
+            InputError: a field isn't what it should be, in the words of the command line's options.
+        """
+        table = file_of(self.table)
+        road = None
+        if self.axis and self.real:
+            spans = tuple(_pair(text) for text in self.paved.split(";") if text.strip())
+            road = RoadClasses(Path(file_of(self.axis) or ""), spans, _numbers("Lines", self.lines), self.line_width)
+        names = [row.material for row in self.classes]
+        here = _of_scene(names)
+        job = CalibrationJob(
+            wanted=tuple(_wanted(row, here, bool(self.real)) for row in self.classes),
+            table=table if table is not None and table.exists() else None,
+            real=file_of(self.real),
+            class_field=self.class_field or None,
+            road=road,
+            device=None if self.device == _RAY else self.device,
+            incidence_deg=_numbers("Incidence", self.angles),
+            ranges=_numbers("Ranges", self.ranges),
+            scanner=cast("tuple[float, float, float]", tuple(self.scanner)) if self.use_scanner else None,
+            reflection=cast(Reflection, self.reflection),
+            range_corrected=self.range_corrected,
+            decibels=self.decibels or None,
+            fit=fit,
+            parts=cast("frozenset[Part]", frozenset(self.parts)),
+            gain=self.gain or None,
+            scene=here,
+        )
+        check(job)
+        return job
+
+
+def textured() -> set[str]:
+    """Return the names of the scene's materials that have an image as their base colour."""
+    return {table_name(item) for item in bpy.data.materials if color_image_node(item) is not None}
+
+
+def _of_scene(names: list[str]) -> dict[str, Material]:
+    """Return the properties of the scene's materials of these names."""
+    there = {table_name(item) for item in bpy.data.materials}
+    return dict(constants(name for name in names if name in there))
+
+
+def _wanted(row: Any, here: dict[str, Material], compared: bool) -> Wanted:
+    told = row.told if compared else None
+    if not row.texture:
+        return Wanted(row.material, told)
+    item = next((item for item in bpy.data.materials if table_name(item) == row.material), None)
+    pixels = None if item is None else base_color_image(item)
+    if pixels is None:
+        raise InputError("Texture", row.material, "the scene's material has no image as its base colour")
+    return Wanted(row.material, told, texture_of(pixels, row.texture_width, here[row.material]), row.texture_width)
+
+
+def file_of(text: str) -> Path | None:
+    """Return the file that a property names; None if it is empty."""
+    return Path(bpy.path.abspath(text)) if text else None
+
+
+def _numbers(field: str, text: str) -> tuple[float, ...]:
+    try:
+        return tuple(float(part) for part in text.replace(",", " ").split())
+    except ValueError:
+        raise InputError(field, text, "must be numbers with spaces between them") from None
+
+
+def _pair(text: str) -> tuple[float, float]:
+    values = _numbers("Paved", text)
+    if len(values) != 2:
+        raise InputError("Paved", text, "must be pairs FROM TO with semicolons between them")
+    return values[0], values[1]
+
+
+CLASSES = (SYNTHROADS_PG_calibration_class, SYNTHROADS_PG_calibration)
+
+
+def register() -> None:
+    """Attach the settings to the window manager."""
+    bpy.types.WindowManager.synthroads_calibration = bpy.props.PointerProperty(type=SYNTHROADS_PG_calibration)
+
+
+def unregister() -> None:
+    """Take the settings away."""
+    del bpy.types.WindowManager.synthroads_calibration

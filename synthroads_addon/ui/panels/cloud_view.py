@@ -1,0 +1,300 @@
+"""Clouds in the 3D view: the last scan's or any other, coloured by class, intensity, colour or height.
+
+Annotations are not postponed here: Blender reads the properties from them.
+"""
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import bpy
+import numpy as np
+from bpy.app.handlers import persistent
+from mathutils import Vector
+
+from ...base.errors import InputError
+from ...blender.model.store import find_road
+from ...blender.views.cloud import CloudView, scene_origin
+from ...cloud.formats.writing import ENDINGS
+from ...cloud.tools.display import COLOURINGS, ColourBy, DisplayCloud, height_colors, read_display
+from ..work.common import Sidebar, column, is_free
+from ..work.job import Aside, Job, Report, Work
+from ..work.long_operator import LongOperator, draw_job
+from ..work.view import frame_points, redraw_views, view_of
+from .swatches import swatch
+
+ENDINGS_GLOB = ";".join(f"*{ending}" for ending in ENDINGS)
+_FAR = 20_000.0
+"""A cloud farther than this (m) from the road's origin and beyond the road's length is likely to be of elsewhere."""
+_LABELS: dict[ColourBy, tuple[str, str]] = {
+    "class": ("Class", "The classes' colours, as in the pictures of a scan"),
+    "intensity": (
+        "Intensity",
+        "Black to white, the darkest and brightest half percent cut; times the squared range",
+    ),
+    "rgb": ("RGB", "The points' own colours"),
+    "height": ("Height", "From dark blue to yellow, the lowest and highest half percent cut"),
+}
+_GRADIENT_STEPS = 10
+
+view = CloudView()
+"""What is drawn over the 3D views."""
+
+
+def last_cloud(context: bpy.types.Context) -> Path | None:
+    """Return the cloud that lies in the panel's folder, where a scan writes it; None if there is none."""
+    settings = context.scene.synthroads
+    if not settings.chosen_folder().strip() or settings.needs_saved_file():
+        return None
+    paths = [settings.folder() / f"cloud{ending}" for ending in ENDINGS]
+    return next((path for path in paths if path.is_file()), None)
+
+
+def cloud_path(context: bpy.types.Context, given: str) -> Path:
+    """Return the file that is given, or the last scan's cloud; raise `InputError` if there is neither."""
+    if given.strip():
+        return Path(bpy.path.abspath(given)).expanduser()
+    path = last_cloud(context)
+    if path is None:
+        raise InputError("File", None, "scan first, or choose a cloud")
+    return path
+
+
+def read_cloud_to_show(path: Path, points: int, origin: Any, report: Report) -> DisplayCloud:
+    """Read a cloud with all its colourings, so that changing them is quick; see `read_display`."""
+    cloud = read_display(path, points, origin, lambda share: report(0.9 * share))
+    for number, by in enumerate(cloud.colorings(), 1):
+        cloud.colors(by)
+        report(0.9 + 0.1 * number / len(COLOURINGS))
+    return cloud
+
+
+def _redraw(settings: "SYNTHROADS_PG_cloud_view", context: bpy.types.Context) -> None:
+    """Draw as it is set now."""
+    view.by, view.size, view.visible = settings.by, settings.size, settings.visible
+    redraw_views(context)
+
+
+class SYNTHROADS_PG_cloud_view(bpy.types.PropertyGroup):
+    """How clouds are shown."""
+
+    file: bpy.props.StringProperty(
+        name="File",
+        description="Cloud to show (LAZ, LAS, PLY, E57, NPZ); the last scan's if empty",
+        subtype="FILE_PATH",
+    )
+    points: bpy.props.IntProperty(
+        name="Points",
+        description="Largest number of points that are shown; of more, an even choice. Each takes 50 bytes of memory",
+        default=2_000_000,
+        min=1_000,
+        max=100_000_000,
+        soft_max=20_000_000,
+        step=100_000,
+    )
+    by: bpy.props.EnumProperty(
+        name="Colour",
+        description="What the points are coloured by",
+        items=[(name, *_LABELS[name]) for name in COLOURINGS],
+        default="class",
+        update=_redraw,
+    )
+    size: bpy.props.FloatProperty(
+        name="Point Size",
+        description="Of a point on the screen, pixels",
+        default=2.0,
+        min=1.0,
+        max=20.0,
+        update=_redraw,
+    )
+    visible: bpy.props.BoolProperty(name="Visible", description="Show or hide", default=True, update=_redraw)
+
+
+class SYNTHROADS_OT_show_cloud(LongOperator, bpy.types.Operator):
+    """Show a cloud over the 3D view. It adds nothing to the file, and is neither scanned nor rendered"""
+
+    bl_idname = "synthroads.show_cloud"
+    bl_label = "Show Cloud"
+
+    filepath: bpy.props.StringProperty(
+        name="File", description="Cloud; the last scan's if empty", subtype="FILE_PATH", options={"SKIP_SAVE"}
+    )
+    nothing_done = "the view is as before"
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """Nothing else at work."""
+        return is_free(cls, context)
+
+    def job(self, context: bpy.types.Context) -> Job[DisplayCloud]:
+        """Return the reading of the cloud in the scene's frame."""
+        path, points = cloud_path(context, self.filepath), context.window_manager.synthroads_cloud_view.points
+        origin = scene_origin(context.scene)
+
+        def work() -> Work[DisplayCloud]:
+            cloud: DisplayCloud = yield Aside(
+                lambda report: read_cloud_to_show(path, points, origin, report), "Loading the cloud"
+            )
+            return cloud
+
+        return Job("Loading", work())
+
+    def succeed(self, context: bpy.types.Context, job: Job[DisplayCloud]) -> str:
+        """Draw it; where there is no road to look at, look at it."""
+        cloud, settings = job.result, context.window_manager.synthroads_cloud_view
+        assert cloud
+        first = view.cloud is None and find_road(context.scene) is None
+        if settings.by not in cloud.colorings():
+            settings.by = "class"
+        view.show(cloud, context.scene)
+        settings.visible = True
+        _redraw(settings, context)
+        space = view_of(context)
+        if first and space:
+            frame_points(space, cloud.xyz)
+        return f"{len(cloud):,} of {cloud.total:,} points of {cloud.header.path.name} are shown"
+
+
+class SYNTHROADS_OT_hide_cloud(bpy.types.Operator):
+    """Show the cloud no more, and free its memory"""
+
+    bl_idname = "synthroads.hide_cloud"
+    bl_label = "Remove Cloud"
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """A cloud must be shown."""
+        return view.cloud is not None
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        """Remove it."""
+        view.remove()
+        redraw_views(context)
+        return {"FINISHED"}
+
+
+class SYNTHROADS_OT_frame_cloud(bpy.types.Operator):
+    """Turn the 3D view to the whole cloud"""
+
+    bl_idname = "synthroads.frame_cloud"
+    bl_label = "Look at Cloud"
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """A cloud must be shown, and a view be there."""
+        return view.cloud is not None and view_of(context) is not None
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        """Frame it."""
+        assert view.cloud
+        frame_points(view_of(context), view.cloud.xyz, Vector(view.offset(context.scene)))
+        redraw_views(context)
+        return {"FINISHED"}
+
+
+class SYNTHROADS_PT_cloud_view(Sidebar, bpy.types.Panel):
+    """A cloud over the 3D view."""
+
+    bl_label = "Cloud in Viewport"
+    bl_parent_id = "SYNTHROADS_PT_output"
+    bl_order = 10
+    bl_options = {"DEFAULT_CLOSED"}  # noqa: RUF012
+
+    def draw(self, context: bpy.types.Context) -> None:
+        """Show what is shown, how, and what its colours mean."""
+        layout, settings = column(self), context.window_manager.synthroads_cloud_view
+        layout.prop(settings, "file", placeholder="Last scan's cloud")
+        layout.prop(settings, "points")
+        if not draw_job(layout):
+            layout.operator(SYNTHROADS_OT_show_cloud.bl_idname, icon="POINTCLOUD_DATA").filepath = settings.file
+        cloud = view.cloud
+        if cloud is None:
+            return
+        row = layout.row(align=True)
+        icon = "HIDE_OFF" if settings.visible else "HIDE_ON"
+        row.prop(settings, "visible", text="", icon=icon, emboss=False)
+        row.label(text=cloud.header.path.name)
+        row.operator(SYNTHROADS_OT_frame_cloud.bl_idname, text="", icon="VIEWZOOM", emboss=False)
+        row.operator(SYNTHROADS_OT_hide_cloud.bl_idname, text="", icon="X", emboss=False)
+        for text, icon in notes(cloud, context.scene):
+            layout.label(text=text, icon=icon)
+        row = layout.row(align=True)
+        row.use_property_split = False
+        for by in COLOURINGS:
+            choice = row.row(align=True)
+            choice.enabled = by in cloud.colorings()
+            choice.prop_enum(settings, "by", by)
+        layout.prop(settings, "size")
+        _legend(layout, cloud, settings.by)
+
+
+def notes(cloud: DisplayCloud, scene: bpy.types.Scene) -> Iterator[tuple[str, str]]:
+    """Yield what a user should know of the cloud that is shown, each with its icon."""
+    yield f"{len(cloud):,} of {cloud.total:,} points", "NONE"
+    if scene_origin(scene) is None:
+        x, y, z = (f"{value:,.0f}" for value in cloud.origin)
+        yield f"No road: drawn from {x}, {y}, {z}", "INFO"
+    elif _distance(cloud, scene) > _FAR:
+        yield f"It lies {_distance(cloud, scene) / 1000.0:,.0f} km from the road", "ERROR"
+
+
+def _distance(cloud: DisplayCloud, scene: bpy.types.Scene) -> float:
+    """Return the distance of the cloud's first point from the road's origin, m."""
+    return float(np.hypot(*(cloud.xyz[0, :2] + view.offset(scene)[:2])))
+
+
+def _legend(layout: bpy.types.UILayout, cloud: DisplayCloud, by: ColourBy) -> None:
+    if by == "class":
+        _class_legend(layout, cloud)
+    elif by in ("intensity", "height"):
+        low, high = cloud.limits(by)
+        colors = height_colors() if by == "height" else np.repeat(np.arange(256, dtype=np.uint8)[:, None], 3, axis=1)
+        form, unit = ("{:,.1f}", " m") if by == "height" else ("{:.3g}", "")
+        row = layout.row(align=True)
+        for step in np.linspace(0, 255, _GRADIENT_STEPS).astype(int):
+            row.label(text="", icon_value=swatch(colors[step]))
+        row = layout.row()
+        row.label(text=form.format(low) + unit)
+        end = row.row()
+        end.alignment = "RIGHT"
+        end.label(text=form.format(high) + unit)
+        if by == "intensity":
+            layout.label(text=cloud.brightness_text.capitalize())
+
+
+def _class_legend(layout: bpy.types.UILayout, cloud: DisplayCloud) -> None:
+    rows = layout.column(align=True)
+    for row, count in cloud.classes():
+        line = rows.split(factor=0.65)
+        line.label(text=row.name.replace("_", " "), icon_value=swatch(row.color))
+        number = line.row()
+        number.alignment = "RIGHT"
+        number.label(text=f"{count:,}")
+
+
+@persistent
+def _forget(path: str) -> None:
+    """Remove the cloud: another file is opened."""
+    view.remove()
+
+
+CLASSES = (
+    SYNTHROADS_PG_cloud_view,
+    SYNTHROADS_OT_show_cloud,
+    SYNTHROADS_OT_hide_cloud,
+    SYNTHROADS_OT_frame_cloud,
+    SYNTHROADS_PT_cloud_view,
+)
+
+
+def register() -> None:
+    """Attach the settings to the window manager: they belong to the screen, not to the file."""
+    bpy.types.WindowManager.synthroads_cloud_view = bpy.props.PointerProperty(type=SYNTHROADS_PG_cloud_view)
+    bpy.app.handlers.load_pre.append(_forget)
+
+
+def unregister() -> None:
+    """Take settings and cloud away."""
+    bpy.app.handlers.load_pre.remove(_forget)
+    view.remove()
+    del bpy.types.WindowManager.synthroads_cloud_view

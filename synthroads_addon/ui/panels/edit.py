@@ -1,0 +1,223 @@
+"""The sub-panel Edit: inputs of the built model's modifiers. The mesh follows at once, nothing is built again.
+
+Only those are shown that are carried back into the parameter set: what is saved or scanned agrees with what is seen.
+Annotations are not postponed here: Blender reads the properties from them.
+"""
+
+from collections.abc import Iterator
+from functools import lru_cache
+from typing import Any
+
+import bpy
+
+from ...base.errors import InputError
+from ...blender.compat import shown_input
+from ...blender.model.read_back import carried_inputs
+from ...blender.model.store import PARAMETERS, find_road, objects_of, recall_parameters
+from ...blender.things.model_builder import ROLE, SUPPORT
+from ...road.parameters import RoadParameters, Vegetation
+from ..fields.drawing import value_row
+from ..fields.wording import title_case
+from ..work.common import Sidebar, column
+
+_NOTHING = ("NOTHING", "Choose a Part", "Choose a part here, or click it in the view", "RESTRICT_SELECT_OFF", 0)
+_MARKING = "Marking "
+Section = tuple[str, list[tuple[str, str]]]
+"""A part's inputs under one heading: their names as shown, and identifiers."""
+
+
+def parts(scene: bpy.types.Scene) -> dict[str, bpy.types.Object]:
+    """Return the objects of the scene's road that have something to edit, by role."""
+    road, parameters = find_road(scene), open_parameters(scene)
+    if road is None or parameters is None:
+        return {}
+    return {role: item for role, item in objects_of(road).items() if _editable(parameters, item)}
+
+
+def _editable(parameters: RoadParameters, item: bpy.types.Object) -> bool:
+    modifier = _modifier(item)
+    return modifier is not None and SUPPORT not in item and bool(carried_inputs(parameters, str(item[ROLE]), modifier))
+
+
+def open_parameters(scene: bpy.types.Scene) -> RoadParameters | None:
+    """Return what the scene's road was built from; None if there is no road, or its set is damaged."""
+    road = find_road(scene)
+    return _parameters(str(road[PARAMETERS])) if road else None
+
+
+@lru_cache(maxsize=2)
+def _parameters(text: str) -> RoadParameters | None:
+    try:
+        return recall_parameters({PARAMETERS: text})  # it reads this key only
+    except InputError:
+        return None
+
+
+def sections(parameters: RoadParameters, item: bpy.types.Object) -> Iterator[Section]:
+    """Yield what can be edited of a part, by the headings that its node group has."""
+    modifier = _modifier(item)
+    if modifier is None:
+        return
+    carried = carried_inputs(parameters, str(item[ROLE]), modifier)
+    found: dict[str, list[tuple[str, str]]] = {}
+    for socket in modifier.node_group.interface.items_tree:
+        if socket.item_type == "SOCKET" and socket.in_out == "INPUT" and socket.name in carried:
+            heading = socket.parent.name
+            found.setdefault(heading, []).append((_without_heading(socket.name, heading), socket.identifier))
+    yield from found.items()
+
+
+def _without_heading(name: str, heading: str) -> str:
+    """Return an input's name without what its heading says already."""
+    of = heading.removeprefix(_MARKING) if heading.startswith(_MARKING) else heading.partition(" ")[0]
+    return name.removeprefix(f"{of} ") if of else name
+
+
+def _modifier(item: bpy.types.Object) -> bpy.types.NodesModifier | None:
+    return next((m for m in item.modifiers if m.type == "NODES" and m.node_group), None)
+
+
+def part_name(role: str) -> str:
+    """Return what a part is called: the id ``guardrail-left-1`` becomes Guardrail Left 1."""
+    return title_case(role.replace("/", " / ").replace("-", " "))
+
+
+_items: list[tuple[str, str, str, str, int]] = []
+"""What Blender shows at present: it doesn't keep the texts itself."""
+
+
+def _part_items(state: Any, context: Any) -> list[tuple[str, str, str, str, int]]:
+    found = parts(context.scene)
+    _items[:] = [_NOTHING, *((role, part_name(role), "", "NONE", i) for i, role in enumerate(found, 1))]
+    return _items
+
+
+def _shown_part(state: Any) -> int:
+    context = bpy.context
+    active = context.view_layer.objects.active
+    roles = list(parts(context.scene))
+    role = active.get(ROLE) if active else None
+    return roles.index(role) + 1 if role in roles else 0
+
+
+def _choose_part(state: Any, number: int) -> None:
+    context = bpy.context
+    items = list(parts(context.scene).values())
+    for other in context.view_layer.objects.selected:
+        other.select_set(False)
+    chosen = items[number - 1] if number else None
+    context.view_layer.objects.active = chosen
+    if chosen and chosen.visible_get():
+        chosen.select_set(True)
+
+
+class SYNTHROADS_PG_edit(bpy.types.PropertyGroup):
+    """Which part is shown: the active object."""
+
+    part: bpy.props.EnumProperty(
+        name="Part",
+        items=_part_items,
+        get=_shown_part,
+        set=_choose_part,
+        description="Part of the road to edit; it becomes the active object",
+    )
+
+
+class SYNTHROADS_OT_show_plants(bpy.types.Operator):
+    """Leave the plants out of the view and of scans, or show them again. Without them the view follows edits faster"""
+
+    bl_idname = "synthroads.show_plants"
+    bl_label = "Hide Plants"
+    bl_options = {"REGISTER", "UNDO"}  # noqa: RUF012 (Blender reads a plain set)
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        """Turn all plants' visibility round."""
+        plants = plants_of(context.scene)
+        hide = any(not item.hide_viewport for item in plants)
+        for item in plants:
+            item.hide_viewport = hide  # what is only hidden by `hide_set` is still evaluated
+        return {"FINISHED"}
+
+
+def plants_of(scene: bpy.types.Scene) -> list[bpy.types.Object]:
+    """Return the objects of the scene's road that are vegetation."""
+    road, parameters = find_road(scene), open_parameters(scene)
+    if road is None or parameters is None:
+        return []
+    ids = parameters.of_type(Vegetation)
+    return [item for role, item in objects_of(road).items() if role in ids]
+
+
+class SYNTHROADS_PT_edit(Sidebar, bpy.types.Panel):
+    """Inputs of the built model."""
+
+    bl_label = "Edit"
+    bl_parent_id = "SYNTHROADS_PT_road"
+    bl_order = 20
+    bl_options = {"DEFAULT_CLOSED"}  # noqa: RUF012
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """There must be a road."""
+        return find_road(context.scene) is not None
+
+    def draw(self, context: bpy.types.Context) -> None:
+        """Show the choice of a part, and the chosen one's inputs."""
+        layout = column(self)
+        row = layout.row(align=True)
+        row.use_property_split = False
+        row.prop(context.window_manager.synthroads_edit, "part", text="")
+        row.operator("view3d.view_selected", text="", icon="VIEWZOOM")
+        plants = plants_of(context.scene)
+        if plants:
+            hidden = all(item.hide_viewport for item in plants)
+            text, icon = ("Show Plants", "RESTRICT_VIEW_ON") if hidden else ("Hide Plants", "RESTRICT_VIEW_OFF")
+            layout.operator(SYNTHROADS_OT_show_plants.bl_idname, text=text, icon=icon)
+        parameters, item = open_parameters(context.scene), context.view_layer.objects.active
+        if parameters and item and ROLE in item:
+            _draw_part(layout, item, list(sections(parameters, item)))
+
+
+def _draw_part(layout: bpy.types.UILayout, item: bpy.types.Object, found: list[Section]) -> None:
+    """Draw a part's inputs, each heading to be opened; the many of lines within one more."""
+    markings = [(heading, inputs) for heading, inputs in found if heading.startswith(_MARKING)]
+    for heading, inputs in found:
+        if not heading:
+            _draw_inputs(layout, item, inputs)
+        elif not heading.startswith(_MARKING):
+            _draw_section(layout, item, heading, inputs)
+    if markings:
+        header, body = layout.panel("synthroads_edit_markings", default_closed=True)
+        header.label(text="Markings")
+        for heading, inputs in markings if body else ():
+            _draw_section(body, item, heading, inputs)
+
+
+def _draw_section(
+    layout: bpy.types.UILayout, item: bpy.types.Object, heading: str, inputs: list[tuple[str, str]]
+) -> None:
+    header, body = layout.panel(f"synthroads_edit_{heading}", default_closed=True)
+    header.label(text=part_name(heading.removeprefix(_MARKING)))
+    if body:
+        _draw_inputs(body, item, inputs)
+
+
+def _draw_inputs(layout: bpy.types.UILayout, item: bpy.types.Object, inputs: list[tuple[str, str]]) -> None:
+    modifier = _modifier(item)
+    assert modifier
+    for name, identifier in inputs:
+        data, prop = shown_input(modifier, identifier)
+        value_row(layout, name).prop(data, prop, text="")
+
+
+CLASSES = (SYNTHROADS_PG_edit, SYNTHROADS_OT_show_plants, SYNTHROADS_PT_edit)
+
+
+def register() -> None:
+    """Attach the state of the sub-panel to the window."""
+    bpy.types.WindowManager.synthroads_edit = bpy.props.PointerProperty(type=SYNTHROADS_PG_edit)
+
+
+def unregister() -> None:
+    """Take it away."""
+    del bpy.types.WindowManager.synthroads_edit

@@ -1,0 +1,269 @@
+"""Export: clouds in other formats, thinner or with fewer classes; and the road as a geometric-semantic model.
+
+Annotations are not postponed here: Blender reads the properties from them.
+"""
+
+import os
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import bpy
+
+from ...base.errors import InputError
+from ...base.files import output_folder
+from ...blender.model.store import find_road
+from ...cloud.formats.writing import ENDINGS
+from ...cloud.formats.writing import missing_package as cloud_package
+from ...cloud.tools.convert import convert, subsample
+from ...cloud.tools.display import BLOCK
+from ...road.parameters import RoadParameters
+from ...twin.formats import TOLERANCE, TWIN_FORMATS, check_formats, missing_packages, twin_file_names, write_twin
+from ..fields.numbers import exact
+from ..work.common import Sidebar, column, is_free
+from ..work.file_operator import FileOperator
+from ..work.job import Aside, Job, Report, Work
+from ..work.long_operator import draw_job
+from .cloud_view import ENDINGS_GLOB, cloud_path, last_cloud
+from .rules import road_now, wrapped
+
+_FORMATS = {
+    ".laz": ("LAZ", "LAS 1.4, compressed"),
+    ".las": ("LAS", "LAS 1.4"),
+    ".ply": ("PLY", "Polygon file format, binary, points only"),
+    ".e57": ("E57", "ASTM E57"),
+    ".npz": ("NPZ", "NumPy arrays"),
+}
+_TWIN_LABELS = {
+    "cityjson": ("CityJSON", "Surfaces and objects with their meaning (OGC CityJSON 2.0)"),
+    "ifc": ("IFC", "Alignment, pavement and furniture for building information models (IFC 4.3)"),
+    "opendrive": ("OpenDRIVE", "Lanes, markings, signs and objects for driving simulators (ASAM OpenDRIVE)"),
+    "geojson": ("GeoJSON", "Lines, areas and points for geographic information systems"),
+}
+
+
+def export_cloud(source: Path, output: Path, classes: str | None, spacing: float, report: Report) -> dict[str, Any]:
+    """Write a cloud in the format of another ending; see `convert` and `subsample`, which one it is by the spacing."""
+
+    def progress(stage: str, share: float) -> None:
+        report(share)
+
+    if spacing > 0.0:
+        return subsample(source, output, spacing, classes, overwrite=True, progress=progress, block=BLOCK)
+    return convert(source, output, classes, overwrite=True, progress=progress, block=BLOCK)
+
+
+def export_twin(
+    parameters: RoadParameters, folder: Path, formats: Sequence[str], tolerance: float, overwrite: bool, report: Report
+) -> tuple[str, ...]:
+    """Write a road's model in some formats, all or none; return the files' names; see `write_twin`."""
+    names = twin_file_names(formats)
+    with output_folder(folder, names, overwrite) as temporary:
+        for number, name in enumerate(formats, 1):
+            write_twin(parameters, temporary, [name], tolerance)
+            report(number / len(formats))
+    return names
+
+
+class SYNTHROADS_OT_export_cloud(FileOperator, bpy.types.Operator):
+    """Write the last scan's cloud, or any other, in another format, thinned out or with fewer classes"""
+
+    bl_idname = "synthroads.export_cloud"
+    bl_label = "Export Cloud"
+    nothing_done = "nothing was written"
+
+    filepath: bpy.props.StringProperty(subtype="FILE_PATH", options={"SKIP_SAVE"})
+    check_existing: bpy.props.BoolProperty(default=True, options={"HIDDEN"})
+    filter_glob: bpy.props.StringProperty(default=ENDINGS_GLOB, options={"HIDDEN"})
+    source: bpy.props.StringProperty(
+        name="Cloud", description="Cloud to read; the last scan's if empty", options={"SKIP_SAVE"}
+    )
+    format: bpy.props.EnumProperty(
+        name="Format", items=[(ending, *_FORMATS[ending]) for ending in ENDINGS], description="Kind of file"
+    )
+    classes: bpy.props.EnumProperty(
+        name="Classes",
+        items=[("own", "As they are", "The cloud's own classes"), ("5", "5", "The 17 classes merged into five")],
+        description="Classes that are written",
+    )
+    spacing: bpy.props.FloatProperty(
+        name="Spacing",
+        description="Edge of a grid's cells of which one point each is kept; all points if 0",
+        default=0.0,
+        min=0.0,
+        max=10.0,
+        step=1,
+        precision=3,
+        unit="LENGTH",
+    )
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """Nothing else at work."""
+        return is_free(cls, context)
+
+    def suggest(self, context: bpy.types.Context) -> None:
+        """Suggest a file beside the cloud that is read."""
+        source = Path(bpy.path.abspath(self.source)) if self.source else last_cloud(context)
+        if source is not None and not self.filepath:
+            self.filepath = str(source.with_name(f"{source.stem}-export{self.format}"))
+
+    def check(self, context: bpy.types.Context) -> bool:
+        """Give the file the ending of its format; return whether that changed it. Called by the file browser."""
+        path = Path(self.filepath)
+        if not path.name or path.suffix.lower() == self.format:
+            return False
+        self.filepath = str(path.with_suffix(self.format))
+        return True
+
+    def draw(self, context: bpy.types.Context) -> None:
+        """Draw the settings beside the file browser."""
+        layout = column(self)
+        source = self.source or last_cloud(context)
+        layout.label(text=Path(source).name if source else "Scan first, or choose a cloud", icon="POINTCLOUD_DATA")
+        for name in ("format", "classes", "spacing"):
+            layout.prop(self, name)
+
+    def job(self, context: bpy.types.Context) -> Job[dict[str, Any]]:
+        """Return the writing; the file browser has asked whether a file that is there may be replaced."""
+        source, output = cloud_path(context, self.source), Path(bpy.path.abspath(self.filepath))
+        classes, spacing = None if self.classes == "own" else self.classes, exact(self.spacing, None)
+        return _aside("Export", lambda report: export_cloud(source, output, classes, spacing, report))
+
+    def succeed(self, context: bpy.types.Context, job: Job[dict[str, Any]]) -> str:
+        """Say what was written."""
+        assert job.result
+        return f"{job.result['points']:,} points written to {job.result['output']}"
+
+
+class SYNTHROADS_OT_export_twin(FileOperator, bpy.types.Operator):
+    """Write the road as it is edited now as a geometric-semantic model, in map coordinates"""
+
+    bl_idname = "synthroads.export_twin"
+    bl_label = "Export Model"
+    nothing_done = "nothing was written"
+
+    directory: bpy.props.StringProperty(
+        name="Folder", description="Folder for the files", subtype="DIR_PATH", options={"SKIP_SAVE"}
+    )
+    filter_folder: bpy.props.BoolProperty(default=True, options={"HIDDEN"})
+    formats: bpy.props.EnumProperty(
+        name="Formats",
+        items=[(name, *_TWIN_LABELS[name]) for name in TWIN_FORMATS],
+        options={"ENUM_FLAG"},
+        default={"cityjson"},
+        description="Formats that are written",
+    )
+    tolerance: bpy.props.FloatProperty(
+        name="Tolerance",
+        description="Largest chord error of curved surfaces and lines",
+        default=TOLERANCE,
+        min=0.0001,
+        max=1.0,
+        precision=4,
+        step=0.1,
+        unit="LENGTH",
+    )
+    overwrite: bpy.props.BoolProperty(name="Replace Files", description="Replace files that are already there")
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """There must be a road, and nothing else at work."""
+        if find_road(context.scene) is None:
+            cls.poll_message_set("Build a road first")
+            return False
+        return is_free(cls, context)
+
+    def suggest(self, context: bpy.types.Context) -> None:
+        """Suggest the output folder, where the cloud is."""
+        folder = context.scene.synthroads.folder_to_open()
+        if folder is not None and not self.directory:
+            self.directory = f"{folder}{os.sep}"
+
+    def draw(self, context: bpy.types.Context) -> None:
+        """Draw the settings beside the file browser; formats whose package is missing can't be chosen."""
+        layout = column(self)
+        _draw_formats(layout, context, self)
+        layout.prop(self, "tolerance")
+        layout.prop(self, "overwrite")
+
+    def job(self, context: bpy.types.Context) -> Job[tuple[str, ...]]:
+        """Return the writing of the road as it is edited now."""
+        parameters = road_now(context.scene)
+        assert parameters  # poll() has seen the road
+        formats = [name for name in TWIN_FORMATS if name in self.formats]
+        if not formats:
+            raise InputError("Formats", None, "choose at least one")
+        if not self.directory.strip():
+            raise InputError("Folder", None, "choose a folder for the files")
+        check_formats(formats)
+        folder, tolerance, overwrite = (
+            Path(bpy.path.abspath(self.directory)),
+            exact(self.tolerance, None),
+            self.overwrite,
+        )
+        return _aside("Export", lambda report: export_twin(parameters, folder, formats, tolerance, overwrite, report))
+
+    def succeed(self, context: bpy.types.Context, job: Job[tuple[str, ...]]) -> str:
+        """Say what was written."""
+        assert job.result
+        return f"{', '.join(job.result)} written to {bpy.path.abspath(self.directory)}"
+
+
+class SYNTHROADS_PT_export(Sidebar, bpy.types.Panel):
+    """Files of other formats."""
+
+    bl_label = "Export"
+    bl_parent_id = "SYNTHROADS_PT_output"
+    bl_order = 20
+    bl_options = {"DEFAULT_CLOSED"}  # noqa: RUF012
+
+    def draw(self, context: bpy.types.Context) -> None:
+        """Show the buttons, and how far a file is."""
+        layout = column(self)
+        if draw_job(layout):
+            return
+        row = layout.row()
+        shown = context.window_manager.synthroads_cloud_view.file
+        row.enabled = bool(shown) or last_cloud(context) is not None
+        row.operator(SYNTHROADS_OT_export_cloud.bl_idname, icon="EXPORT").source = shown
+        layout.operator(SYNTHROADS_OT_export_twin.bl_idname, icon="EXPORT")
+
+
+def _aside(title: str, work: Callable[[Report], Any]) -> Job[Any]:
+    """Return a job that is done in a thread as a whole."""
+
+    def steps() -> Work[Any]:
+        return (yield Aside(work, title))
+
+    return Job(title, steps())
+
+
+def _draw_formats(layout: bpy.types.UILayout, context: bpy.types.Context, operator: SYNTHROADS_OT_export_twin) -> None:
+    rows = layout.column(align=True)
+    rows.use_property_split = False
+    missing = {name: package for name in TWIN_FORMATS if (package := missing_packages(name))}
+    for name in TWIN_FORMATS:
+        row = rows.row()
+        row.enabled = name not in missing
+        row.prop_enum(operator, "formats", name)
+    _say_what_is_missing(rows, context, {_TWIN_LABELS[name][0]: package for name, package in missing.items()})
+
+
+def draw_missing(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
+    """Say which packages the chosen formats of scans need and don't find."""
+    settings = context.scene.synthroads
+    clouds = {_FORMATS[f".{name}"][0]: cloud_package(f".{name}") for name in sorted(settings.cloud.formats)}
+    twins = {_TWIN_LABELS[name][0]: missing_packages(name) for name in TWIN_FORMATS if name in settings.twin}
+    missing = {name: package for name, package in (clouds | twins).items() if package}
+    _say_what_is_missing(layout, context, missing)
+
+
+def _say_what_is_missing(layout: bpy.types.UILayout, context: bpy.types.Context, missing: Mapping[str, str]) -> None:
+    for name, package in missing.items():
+        text = f"{name} needs the package {package}: pip install {package}, with Blender's Python"
+        for line in wrapped(text, context):
+            layout.label(text=line)
+
+
+CLASSES = (SYNTHROADS_OT_export_cloud, SYNTHROADS_OT_export_twin, SYNTHROADS_PT_export)

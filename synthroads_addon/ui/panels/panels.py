@@ -1,0 +1,130 @@
+"""The panels in the 3D view's sidebar: those made of the scenario's fields (`sheets`), and what some have beside."""
+
+from __future__ import annotations
+
+from typing import Any, ClassVar
+
+import bpy
+
+from ...blender.model.store import BUILT_FROM, find_road
+from ..fields.drawing import draw_field, value_row
+from ..fields.sheets import SHEETS, Sheet, fields_of
+from ..work.build import SYNTHROADS_OT_build
+from ..work.common import Sidebar, column, large_button
+from ..work.long_operator import draw_job
+from .export import draw_missing
+from .presets import (
+    SYNTHROADS_MT_devices,
+    SYNTHROADS_MT_scenarios,
+    SYNTHROADS_OT_random_road,
+    device_title,
+    scenario_title,
+)
+from .road_files import draw_road_files, source_of
+from .scan import draw_folder, draw_scan
+
+
+class SheetPanel(Sidebar):
+    """A panel that shows the fields of its sheet."""
+
+    sheet: ClassVar[Sheet]
+    layout: bpy.types.UILayout
+
+    def draw(self, context: bpy.types.Context) -> None:
+        """Show the fields."""
+        self.draw_fields(column(self), context.scene.synthroads)
+
+    def draw_fields(self, layout: bpy.types.UILayout, settings: Any) -> None:
+        """Show the fields, each by what belongs to its kind."""
+        for field in fields_of(self.sheet):
+            draw_field(layout, settings, field)
+
+
+class MainPanel(SheetPanel):
+    """What everything starts from."""
+
+    def draw(self, context: bpy.types.Context) -> None:
+        """Show which scenario the settings were taken from, and how fine all is."""
+        layout, settings = column(self), context.scene.synthroads
+        layout.menu(SYNTHROADS_MT_scenarios.bl_idname, text=scenario_title(settings.preset), icon="PRESET")
+        self.draw_fields(layout, settings)
+
+
+class RoadPanel(SheetPanel):
+    """What the road is, and the buttons that build it."""
+
+    def draw(self, context: bpy.types.Context) -> None:
+        """Show the fields, whether the road is older than they are, and the buttons."""
+        layout, settings = column(self), context.scene.synthroads
+        self.draw_fields(layout, settings)
+        if (seed := settings.exact_seed()) != settings.seed:
+            layout.label(text=f"Seed of the file: {seed}", icon="INFO")
+        road = find_road(context.scene)
+        if road and source_of(road):
+            layout.label(text=f"Built from {source_of(road)}", icon="FILE")
+        elif road and not road.get(BUILT_FROM):
+            layout.label(text="Built by a command, not from these settings", icon="FILE")
+        elif road and road.get(BUILT_FROM) != settings.road_values():
+            layout.label(text="Changed since it was built", icon="INFO")
+        if draw_job(layout):
+            return
+        row = large_button(layout)
+        row.operator(SYNTHROADS_OT_build.bl_idname, text="Rebuild Road" if road else "Build Road", icon="MOD_BUILD")
+        row.operator(SYNTHROADS_OT_random_road.bl_idname, text="Random Road", icon="FILE_REFRESH")
+        draw_road_files(layout)
+
+
+class ScannerPanel(SheetPanel):
+    """What scans, and the button that scans."""
+
+    def draw_fields(self, layout: bpy.types.UILayout, settings: Any) -> None:
+        """Show the fields; devices have a menu."""
+        for field in fields_of(self.sheet):
+            if field.path == "scan.device":
+                layout.menu(SYNTHROADS_MT_devices.bl_idname, text=device_title(settings.scan.device), icon="PRESET")
+            else:
+                draw_field(layout, settings, field)
+
+    def draw(self, context: bpy.types.Context) -> None:
+        """Show the fields, the folder and the button."""
+        layout = column(self)
+        self.draw_fields(layout, context.scene.synthroads)
+        draw_scan(layout, context)
+
+
+class OutputPanel(SheetPanel):
+    """Which files are written, and where."""
+
+    def draw(self, context: bpy.types.Context) -> None:
+        """Show the folder and the fields."""
+        layout, settings = column(self), context.scene.synthroads
+        draw_folder(layout, settings)
+        value_row(layout, "").prop(settings, "overwrite")
+        self.draw_fields(layout, settings)
+        draw_missing(layout, context)
+
+
+_OWN_PANELS: dict[str, type[SheetPanel]] = {
+    "main": MainPanel,
+    "road": RoadPanel,
+    "scanner": ScannerPanel,
+    "output": OutputPanel,
+}
+
+
+def _panel(sheet: Sheet) -> type:
+    """Return the class of a panel."""
+    base = _OWN_PANELS.get(sheet.name, SheetPanel)
+    parent = {"bl_parent_id": f"SYNTHROADS_PT_{sheet.parent}"} if sheet.parent else {}
+    members = {
+        "__doc__": sheet.title,
+        "bl_idname": sheet.panel,
+        "bl_label": sheet.title,
+        "bl_order": sheet.order,
+        "bl_options": {"DEFAULT_CLOSED"} if sheet.closed else set(),
+        "sheet": sheet,
+    }
+    return type(sheet.panel, (base, bpy.types.Panel), members | parent)
+
+
+CLASSES = tuple(_panel(sheet) for sheet in SHEETS)

@@ -1,0 +1,151 @@
+"""Roads from files and to files: parameter sets, and measured centrelines that a road is fitted to.
+
+Annotations are not postponed here: Blender reads the properties from them.
+"""
+
+import json
+from pathlib import Path
+
+import bpy
+
+from ...base.errors import InputError
+from ...base.files import output_folder
+from ...blender.model.read_back import edited_parameters
+from ...blender.model.store import BUILT_FROM, find_road, objects_of, recall_parameters
+from ...jobs.generate import Job as PipelineJob
+from ...jobs.generate import road_parameters
+from ...road.parameters import RoadParameters
+from ...scenario.scenario import Scenario
+from ..work.build import road_work
+from ..work.common import is_free, refuse
+from ..work.file_operator import FileOperator
+from ..work.job import Aside, Job, Work
+from ..work.view import look_along, view_of
+
+_FROM_FILE, _NAME = "file", "parameters.json"
+
+
+def source_of(road: bpy.types.Collection) -> str | None:
+    """Return the name of the file that a road was built from; None if the panel's settings made it."""
+    try:
+        what, name = json.loads(road[BUILT_FROM])
+    except (KeyError, TypeError, ValueError):
+        return None
+    return str(name) if what == _FROM_FILE else None
+
+
+class _Load(FileOperator):
+    """Base of what builds a road from a file."""
+
+    filepath: bpy.props.StringProperty(subtype="FILE_PATH", options={"SKIP_SAVE"})
+    bl_options = {"UNDO"}  # noqa: RUF012 (Blender reads a plain set)
+
+    _first = False
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """Object mode, and nothing else at work."""
+        return is_free(cls, context)
+
+    def job(self, context: bpy.types.Context) -> Job[str]:
+        """Return the reading and the building."""
+        self._first = find_road(context.scene) is None
+        path, scenario = Path(bpy.path.abspath(self.filepath)), context.scene.synthroads.scenario()
+        return Job("Build", self._work(path, scenario))
+
+    def succeed(self, context: bpy.types.Context, job: Job[str]) -> str:
+        """Show the first road that is built."""
+        road, space = find_road(context.scene), view_of(context)
+        if self._first and not bpy.app.background and road and space:
+            look_along(space, recall_parameters(road))
+        return str(job.result)
+
+    def _work(self, path: Path, scenario: Scenario) -> Work[str]:
+        reading = Aside(lambda _: self.read(path, scenario), "Reading", 0.0, 0.02)
+        parameters, message = yield reading
+        yield from road_work(parameters, scenario, json.dumps([_FROM_FILE, path.name]))
+        return message
+
+    def read(self, path: Path, scenario: Scenario) -> tuple[RoadParameters, str]:
+        """Return the road that a file stands for, and what to say when it is built; called in a thread."""
+        raise NotImplementedError
+
+
+class SYNTHROADS_OT_load_road(_Load, bpy.types.Operator):
+    """Build the road of a parameter set, at the panel's fidelity. It takes the place of the road built before"""
+
+    bl_idname = "synthroads.load_road"
+    bl_label = "Load Parameter Set"
+    filter_glob: bpy.props.StringProperty(default="*.json", options={"HIDDEN"})
+
+    def read(self, path: Path, scenario: Scenario) -> tuple[RoadParameters, str]:
+        """Read the parameter set."""
+        parameters, _ = road_parameters(PipelineJob(scenario, path.parent, parameters=path))
+        return parameters, f"Built {parameters.alignment.length:,.0f} m of road from {path.name}"
+
+
+class SYNTHROADS_OT_load_axis(_Load, bpy.types.Operator):
+    """Fit a road to a measured centreline (CSV with x, y, z, or GeoJSON), with the panel's cross-section and map coordinate system. It takes the place of the road built before"""  # noqa: E501 (a tooltip is one line)
+
+    bl_idname = "synthroads.load_axis"
+    bl_label = "Fit to Centreline"
+    filter_glob: bpy.props.StringProperty(default="*.csv;*.txt;*.geojson;*.json", options={"HIDDEN"})
+
+    def read(self, path: Path, scenario: Scenario) -> tuple[RoadParameters, str]:
+        """Fit the alignment and sample the road along it."""
+        parameters, report = road_parameters(PipelineJob(scenario, path.parent, axis=path))
+        fit = report["axis"]
+        across, up = (fit[name]["worst"] for name in ("horizontal", "height"))
+        said = f"{fit['points']:,} points, {fit['elements']} elements, within {across:.3f} m, heights {up:.3f} m"
+        return parameters, f"Built {parameters.alignment.length:,.0f} m of road along {path.name}: {said}"
+
+
+class SYNTHROADS_OT_save_road(bpy.types.Operator):
+    """Write the parameter set of the road as it is edited now"""
+
+    bl_idname = "synthroads.save_road"
+    bl_label = "Save Parameter Set"
+
+    filepath: bpy.props.StringProperty(subtype="FILE_PATH", options={"SKIP_SAVE"})
+    check_existing: bpy.props.BoolProperty(default=True, options={"HIDDEN"})
+    filter_glob: bpy.props.StringProperty(default="*.json", options={"HIDDEN"})
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """There must be a road."""
+        if find_road(context.scene) is None:
+            cls.poll_message_set("Build a road first")
+            return False
+        return True
+
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        """Open the file browser beside the .blend file."""
+        if not self.filepath:
+            self.filepath = str(Path(bpy.data.filepath).with_name(_NAME)) if bpy.data.filepath else _NAME
+        context.window_manager.fileselect_add(self)
+        return {"RUNNING_MODAL"}
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        """Write the file; the file browser has asked whether one that is there may be replaced."""
+        road, path = find_road(context.scene), Path(bpy.path.abspath(self.filepath)).with_suffix(".json")
+        assert road  # poll() has seen it
+        try:
+            parameters = edited_parameters(recall_parameters(road), objects_of(road))
+            with output_folder(path.parent, [path.name], overwrite=True) as folder:
+                (folder / path.name).write_text(parameters.to_json(), encoding="utf-8")
+        except InputError as error:
+            return refuse(self, error)
+        self.report({"INFO"}, f"Parameter set written to {path}")
+        return {"FINISHED"}
+
+
+def draw_road_files(layout: bpy.types.UILayout) -> None:
+    """Draw the buttons."""
+    column = layout.column(align=True)
+    row = column.row(align=True)
+    row.operator(SYNTHROADS_OT_load_road.bl_idname, text="Load Set", icon="IMPORT")
+    row.operator(SYNTHROADS_OT_save_road.bl_idname, text="Save Set", icon="EXPORT")
+    column.operator(SYNTHROADS_OT_load_axis.bl_idname, icon="CURVE_PATH")
+
+
+CLASSES = (SYNTHROADS_OT_load_road, SYNTHROADS_OT_load_axis, SYNTHROADS_OT_save_road)

@@ -1,0 +1,377 @@
+"""The rules that the road breaks, as a list; a click on one looks at its place.
+
+Annotations are not postponed here: Blender reads the properties from them.
+"""
+
+import textwrap
+
+import bpy
+import numpy as np
+from bpy.app.handlers import persistent
+
+from ...base.errors import InputError
+from ...blender.model.read_back import edited_parameters
+from ...blender.model.store import find_road, objects_of, recall_parameters
+from ...blender.things.model_builder import ROLE
+from ...checking.checker import RULES, Violation, check
+from ...road.geometry import RoadGeometry
+from ...road.parameters import Carriageway, LineMarking, RoadParameters
+from ..work.common import Sidebar, redraw_sidebars, refuse
+from ..work.view import Marker, look_at_place, redraw_views, view_of
+
+_CHARACTER = 6.2
+"""Width of a letter in the sidebar, pixels at a resolution scale of 1."""
+_SURENESS = {
+    "confirmed": "printed in secondary sources",
+    "derived": "computed from what secondary sources print",
+    "unconfirmed": "common knowledge, not found in print",
+    "definition": "a parameter set that breaks it is faulty",
+}
+
+
+class Checked:
+    """The road that was checked, and whether the one in the scene has changed since.
+
+    Attributes:
+        parameters: what was checked; None before.
+        marker: shows where a rule is broken.
+        asked: whether the scene may have changed since it was last compared.
+        stale: whether it had, when it was compared.
+    """
+
+    def __init__(self) -> None:
+        self.parameters: RoadParameters | None = None
+        self.marker = Marker()
+        self.asked = False
+        self.stale = False
+
+    def take(self, parameters: RoadParameters) -> None:
+        """Be about this road."""
+        self.parameters, self.asked, self.stale = parameters, False, False
+
+    def forget(self) -> None:
+        """Be about no road."""
+        self.parameters, self.asked, self.stale = None, False, False
+        self.marker.hide()
+
+    def outdated(self, scene: bpy.types.Scene) -> bool:
+        """Return whether the road has changed; reading it takes long enough to do so after changes only."""
+        if self.asked and self.parameters is not None:
+            try:
+                self.stale = road_now(scene) != self.parameters
+            except InputError:
+                self.stale = True
+            self.asked = False
+        return self.stale
+
+
+checked = Checked()
+
+
+def road_now(scene: bpy.types.Scene) -> RoadParameters | None:
+    """Return the parameter set of the road as it is edited now; None without a road.
+
+    Raises:
+        InputError: the set kept in the file is damaged, or an edited value is out of its limits.
+    """
+    road = find_road(scene)
+    return edited_parameters(recall_parameters(road), objects_of(road)) if road else None
+
+
+def offset_of(geometry: RoadGeometry, violation: Violation) -> float:
+    """Return the offset (m) of where a rule is broken: its object's, else of the middle of its carriageway."""
+    item = geometry.parameters.objects.get(violation.object)
+    station = float(np.clip(violation.station, 0.0, geometry.length))
+    if isinstance(item, LineMarking):
+        left, right = geometry.marking_edges(item, station)
+        return float(left[0] + right[0]) / 2.0
+    offset = getattr(item, "offset", None)
+    if isinstance(offset, float):
+        return offset
+    owner = geometry.parameters.objects.get(getattr(item, "carriageway", violation.object))
+    if isinstance(owner, Carriageway):
+        across = geometry.sections[owner.side].distances(station)[0] * owner.sign
+        return float(across[0] + across[-1]) / 2.0
+    return 0.0
+
+
+def _jump(rules: "SYNTHROADS_PG_rules", context: bpy.types.Context) -> None:
+    """Look at the chosen line's place."""
+    if not 0 <= rules.index < len(rules.violations) or checked.parameters is None:
+        return
+    row = rules.violations[rules.index]
+    geometry = RoadGeometry(checked.parameters)
+    checked.marker.show(geometry, row.station, row.offset)
+    space = view_of(context)
+    if space:
+        look_at_place(space, geometry, row.station, row.offset)
+    redraw_views(context)
+
+
+class SYNTHROADS_PG_violation(bpy.types.PropertyGroup):
+    """A broken rule: `Violation` with its offset. The name, by which Blender searches lists, is the rule's title."""
+
+    rule: bpy.props.StringProperty()
+    object: bpy.props.StringProperty()
+    station: bpy.props.FloatProperty()
+    offset: bpy.props.FloatProperty()
+    value: bpy.props.StringProperty()
+    limit: bpy.props.StringProperty()
+    found: bpy.props.StringProperty(description="Both, short")
+    text: bpy.props.StringProperty()
+
+
+class SYNTHROADS_PG_rules(bpy.types.PropertyGroup):
+    """The broken rules of the road that was checked last."""
+
+    violations: bpy.props.CollectionProperty(type=SYNTHROADS_PG_violation)
+    index: bpy.props.IntProperty(update=_jump, description="Click to look at the place")
+
+
+class SYNTHROADS_OT_check_rules(bpy.types.Operator):
+    """List every rule of the guidelines that the road, as it is edited now, breaks"""
+
+    bl_idname = "synthroads.check_rules"
+    bl_label = "Check Rules"
+    bl_options = {"REGISTER"}  # noqa: RUF012 (Blender reads a plain set)
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """There must be a road."""
+        if find_road(context.scene) is None:
+            cls.poll_message_set("Build a road first")
+            return False
+        return True
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        """Check the road and fill the list."""
+        try:
+            parameters = road_now(context.scene)
+        except InputError as error:
+            return refuse(self, error)
+        assert parameters  # poll() has seen the road
+        violations = check(parameters)
+        _clear(context.window_manager)
+        checked.take(parameters)
+        _fill(context.window_manager.synthroads_rules, parameters, violations)
+        self.report({"INFO"}, _count(len(violations)))
+        redraw_views(context)
+        return {"FINISHED"}
+
+
+class SYNTHROADS_OT_show_violation(bpy.types.Operator):
+    """Look along the road at the place where this rule is broken"""
+
+    bl_idname = "synthroads.show_violation"
+    bl_label = "Look at the Place"
+    bl_options = {"INTERNAL"}  # noqa: RUF012
+
+    index: bpy.props.IntProperty(name="Line", min=0, description="Line of the list, from 0")
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """Rules must have been checked, and some be broken."""
+        return len(context.window_manager.synthroads_rules.violations) > 0
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        """Choose the line, which jumps there."""
+        rules = context.window_manager.synthroads_rules
+        if self.index >= len(rules.violations):
+            return refuse(self, InputError("index", self.index, f"must be 0 to {len(rules.violations) - 1}"))
+        rules.index = self.index
+        return {"FINISHED"}
+
+
+class SYNTHROADS_OT_clear_rules(bpy.types.Operator):
+    """Empty the list, and take the marker out of the 3D view"""
+
+    bl_idname = "synthroads.clear_rules"
+    bl_label = "Clear List"
+    bl_options = {"INTERNAL"}  # noqa: RUF012
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        """Forget what was found."""
+        _clear(context.window_manager)
+        redraw_views(context)
+        return {"FINISHED"}
+
+
+class SYNTHROADS_UL_violations(bpy.types.UIList):
+    """A line for each broken rule: where, which, what was found and what is allowed."""
+
+    def draw_item(
+        self,
+        context: bpy.types.Context,
+        layout: bpy.types.UILayout,
+        data: SYNTHROADS_PG_rules,
+        item: SYNTHROADS_PG_violation,
+        icon: int,
+        active_data: SYNTHROADS_PG_rules,
+        active_property: str,
+    ) -> None:
+        """Draw one line."""
+        _columns(layout, (f"{item.station:,.0f} m", item.name, item.found))
+
+    def filter_items(
+        self, context: bpy.types.Context, data: SYNTHROADS_PG_rules, field: str
+    ) -> tuple[list[int], list[int]]:
+        """Search the titles, and order the lines along the road, or by title if that is asked for."""
+        rows = getattr(data, field)
+        helper = bpy.types.UI_UL_list
+        shown = helper.filter_items_by_name(self.filter_name, self.bitflag_filter_item, rows, "name")
+        if self.use_filter_sort_alpha:
+            return shown, helper.sort_items_by_name(rows, "name")
+        return shown, helper.sort_items_helper([(i, row.station) for i, row in enumerate(rows)], lambda pair: pair[1])
+
+
+class SYNTHROADS_PT_rules(Sidebar, bpy.types.Panel):
+    """The rules of the guidelines that the road breaks."""
+
+    bl_label = "Rules"
+    bl_parent_id = "SYNTHROADS_PT_road"
+    bl_order = 10
+    bl_options = {"DEFAULT_CLOSED"}  # noqa: RUF012
+
+    def draw(self, context: bpy.types.Context) -> None:
+        """Show the button, the list, and the chosen line in full."""
+        layout, rules = self.layout, context.window_manager.synthroads_rules
+        row = layout.row(align=True)
+        row.operator(SYNTHROADS_OT_check_rules.bl_idname, icon="CHECKMARK")
+        if checked.parameters is None:
+            return
+        row.operator(SYNTHROADS_OT_clear_rules.bl_idname, text="", icon="X")
+        if checked.outdated(context.scene):
+            layout.label(text="The road has changed since", icon="INFO")
+        count = len(rules.violations)
+        layout.label(text=_count(count), icon="ERROR" if count else "CHECKMARK")
+        if not count:
+            return
+        _columns(layout, ("Station", "Rule", "Found / limit"))
+        layout.template_list("SYNTHROADS_UL_violations", "", rules, "violations", rules, "index", rows=4)
+        if 0 <= rules.index < count:
+            _details(layout, context, rules)
+
+
+def _columns(layout: bpy.types.UILayout, texts: tuple[str, str, str]) -> None:
+    """Draw one line of the list, or its head."""
+    split = layout.split(factor=0.17)
+    split.label(text=texts[0])
+    rest = split.split(factor=0.62)
+    rest.label(text=texts[1])
+    cell = rest.row()
+    cell.alignment = "RIGHT"
+    cell.label(text=texts[2])
+
+
+def _details(layout: bpy.types.UILayout, context: bpy.types.Context, rules: SYNTHROADS_PG_rules) -> None:
+    item = rules.violations[rules.index]
+    rule = RULES[item.rule]
+    box = layout.box().column(align=True)
+    for line in wrapped(item.text, context):
+        box.label(text=line)
+    box.separator()
+    for title, value in (
+        ("Found", item.value),
+        ("Limit", item.limit),
+        ("Station", f"{item.station:,.2f} m"),
+        ("Object", item.object),
+        ("Rule", item.rule),
+    ):
+        row = box.split(factor=0.25)
+        row.label(text=title)
+        row.label(text=value)
+    source = f"{rule.source}: " if rule.source else ""
+    for line in wrapped(source + _SURENESS[rule.sure], context):
+        box.label(text=line)
+    box.operator(SYNTHROADS_OT_show_violation.bl_idname, icon="VIEWZOOM").index = rules.index
+
+
+def wrapped(text: str, context: bpy.types.Context) -> list[str]:
+    """Return a text in lines that the sidebar is wide enough for."""
+    width = context.region.width if context.region else 300
+    scale = context.preferences.system.ui_scale or 1.0  # 0 without a window
+    letters = int((width / scale - 60.0) / _CHARACTER)
+    return textwrap.wrap(text, max(20, letters))
+
+
+def _fill(rules: SYNTHROADS_PG_rules, parameters: RoadParameters, violations: list[Violation]) -> None:
+    geometry = RoadGeometry(parameters)
+    for violation in violations:
+        row = rules.violations.add()
+        row.name = RULES[violation.rule].title
+        row.rule, row.object, row.text = violation.rule, violation.object, violation.text
+        row.station, row.offset = violation.station, offset_of(geometry, violation)
+        row.value, row.limit = (_shown(number, violation.unit) for number in (violation.value, violation.limit))
+        row.found = f"{_brief(violation.value)} / {_brief(violation.limit)} {violation.unit}".removesuffix(" 1")
+    rules["index"] = -1  # past its update: nothing was clicked yet
+
+
+def _clear(manager: bpy.types.WindowManager) -> None:
+    checked.forget()
+    manager.synthroads_rules.violations.clear()
+
+
+def _count(number: int) -> str:
+    return {0: "No rule is broken", 1: "1 rule is broken"}.get(number, f"Rules are broken at {number} places")
+
+
+def _shown(value: float, unit: str) -> str:
+    return f"{value:,.6g}" + (f" {unit}" if unit != "1" else "")
+
+
+def _brief(value: float) -> str:
+    """Return a number with as many decimals as a narrow column has room for."""
+    size = abs(value)
+    if size >= 1e6:
+        return f"{value:.3g}"
+    text = f"{value:,.{1 if size >= 100 else 2 if size >= 1 else 4}f}"
+    return text.rstrip("0").rstrip(".")
+
+
+@persistent
+def _look_for_changes(scene: bpy.types.Scene, graph: bpy.types.Depsgraph | None = None) -> None:
+    """Notice that the road may have been edited, built again or undone."""
+    changes = [update.id for update in graph.updates if update.is_updated_geometry] if graph else []
+    if graph is None or any(isinstance(item, bpy.types.Object) and ROLE in item for item in changes):
+        checked.asked = True
+        if checked.parameters is not None:
+            redraw_sidebars(bpy.context)
+
+
+@persistent
+def _other_file(path: str) -> None:
+    """Forget the road of the file that was open before."""
+    _clear(bpy.data.window_managers[0])
+
+
+_HANDLERS = {
+    "depsgraph_update_post": _look_for_changes,
+    "undo_post": _look_for_changes,
+    "redo_post": _look_for_changes,
+    "load_post": _other_file,
+}
+
+CLASSES = (
+    SYNTHROADS_PG_violation,
+    SYNTHROADS_PG_rules,
+    SYNTHROADS_OT_check_rules,
+    SYNTHROADS_OT_show_violation,
+    SYNTHROADS_OT_clear_rules,
+    SYNTHROADS_UL_violations,
+    SYNTHROADS_PT_rules,
+)
+
+
+def register() -> None:
+    """Attach the list to the window manager, which is never undone, and look for changes."""
+    bpy.types.WindowManager.synthroads_rules = bpy.props.PointerProperty(type=SYNTHROADS_PG_rules)
+    for name, function in _HANDLERS.items():
+        getattr(bpy.app.handlers, name).append(function)
+
+
+def unregister() -> None:
+    """Take all that away."""
+    for name, function in _HANDLERS.items():
+        getattr(bpy.app.handlers, name).remove(function)
+    checked.forget()
+    del bpy.types.WindowManager.synthroads_rules

@@ -1,0 +1,87 @@
+"""What `rendered_scan` runs in a Blender of its own, without a window: the scan of a road in a copy of the user's file.
+
+It says on its standard output, in lines of JSON after `MARK`, how far it is and how it ended.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+import threading
+import traceback
+from pathlib import Path
+from typing import Any, NoReturn
+
+import bpy
+
+from ...base.errors import InputError
+from ...base.progress import Progress, StageTimer
+from ...blender.cameras import takes_returns
+from ...jobs.generate import scan_open_road
+from ...road.parameters import RoadParameters
+from ...scenario.colour import ColourScenario
+from ...scenario.scenario import Scenario
+
+MARK = "synthroads-scan: "
+"""Begins what is said in a line; Blender has lines of its own there."""
+
+
+def main(path: str) -> NoReturn:
+    """Do a job that `rendered_scan.save_open_scene` has written, and end the process."""
+    threading.Thread(target=_end_with_parent, daemon=True).start()
+    code = 0
+    try:
+        _say(done=_scan(json.loads(Path(path).read_text(encoding="utf-8"))))
+    except InputError as error:
+        _say(error=(str(error).removesuffix(f": {error.allowed}"), error.allowed))
+    except BaseException:
+        traceback.print_exc()
+        sys.stderr.flush()
+        code = 1
+    # Blender's own way out can crash, and may save the user's preferences.
+    os._exit(code)
+
+
+def _scan(job: dict[str, Any]) -> dict[str, Any]:
+    """Open the copy and scan it; return the counts and the stages."""
+    bpy.ops.wm.open_mainfile(filepath=job["file"], load_ui=False, use_scripts=job["scripts"])
+    scene = bpy.data.scenes[job["scene"]]
+    window = bpy.context.window_manager.windows[0]
+    window.scene, window.view_layer = scene, scene.view_layers[job["view_layer"]]
+    scenario = Scenario.from_dict(job["scenario"])
+    parameters = RoadParameters.from_dict(job["parameters"])
+    timer = StageTimer(_shown(scenario.colour))
+    with bpy.context.temp_override(window=window):
+        counts = scan_open_road(scenario, parameters, Path(job["folder"]), timer)
+    return {"counts": counts, "stages": timer.stages}
+
+
+def _shown(colour: ColourScenario) -> Progress:
+    """Return what says how much of the whole is done, from the share of a stage."""
+    # Images are rendered before the scan, a pixel per return is during the scan.
+    rendered = 0.1 if takes_returns(colour) else 0.6
+    spans = {
+        "scene mesh": (0.0, 0.05),
+        "caster": (0.05, 0.1),
+        "images": (0.1, rendered),
+        "scan": (rendered, 1.0),
+    }
+
+    def say(stage: str, share: float) -> None:
+        first, last = spans[stage]
+        _say(share=first + share * (last - first))
+
+    return say
+
+
+def _say(**what: Any) -> None:
+    sys.stdout.write(f"{MARK}{json.dumps(what)}\n")
+    sys.stdout.flush()
+
+
+def _end_with_parent() -> None:
+    """Wait until standard input is closed, which happens when the parent ends however it ends; then end at once."""
+    while os.read(0, 1024):
+        pass
+    os._exit(130)

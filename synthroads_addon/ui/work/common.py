@@ -1,0 +1,59 @@
+"""What the panel's modules share: where panels stand, how buttons and messages look, when a button may be pressed."""
+
+from __future__ import annotations
+
+import bpy
+
+from ...base.errors import InputError
+from .job import running_job
+
+
+class Sidebar:
+    """Base of panels: the 3D view's sidebar."""
+
+    bl_category = "SynthRoads"
+    bl_space_type = "VIEW_3D"
+    bl_region_type = "UI"
+
+
+def column(panel: bpy.types.Panel) -> bpy.types.UILayout:
+    """Return a panel's layout with names to the left of values."""
+    layout = panel.layout
+    layout.use_property_split = True
+    layout.use_property_decorate = False
+    return layout
+
+
+def large_button(layout: bpy.types.UILayout) -> bpy.types.UILayout:
+    """Return a row for a button that does much."""
+    row = layout.row()
+    row.scale_y = 1.4
+    return row
+
+
+def is_free(operator: type[bpy.types.Operator], context: bpy.types.Context) -> bool:
+    """Return whether long work may begin, for an operator's `poll`; else say why not."""
+    job = running_job()
+    if job is not None:
+        operator.poll_message_set(f"{job.title} is still at work")
+        return False
+    if context.mode != "OBJECT":
+        operator.poll_message_set("Go back to object mode first")
+        return False
+    return True
+
+
+def refuse(operator: bpy.types.Operator, error: InputError) -> set[str]:
+    """Show what is wrong in the panel's words."""
+    message = str(error).replace("--overwrite replaces it", "tick Replace Files, or choose another folder")
+    operator.report({"ERROR"}, message.replace("--output", "Output"))
+    return {"CANCELLED"}
+
+
+def redraw_sidebars(context: bpy.types.Context) -> None:
+    """Have the sidebars of all 3D views drawn again."""
+    for window in context.window_manager.windows:
+        for area in window.screen.areas:
+            for region in area.regions:
+                if area.type == "VIEW_3D" and region.type == "UI":
+                    region.tag_redraw()

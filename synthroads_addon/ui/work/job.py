@@ -1,0 +1,242 @@
+"""Long work of the panel, in one way for all of it: in steps between which the window lives, or in a thread.
+
+What a job does is a generator. It runs in Blender's main thread up to its next `yield`, and says there how far it is:
+
+    def work() -> Work[int]:
+        mesh = yield Aside(lambda progress: prepare(progress))   # in a thread; the window lives meanwhile
+        for item in mesh:
+            add(item)                                            # a step in the main thread: at most some 50 ms
+            yield 0.5                                            # share that is done
+
+Whoever wants to see whether something is at work asks `running_job`.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Generator
+from dataclasses import dataclass
+from threading import Event, Thread
+from typing import Any, Generic, TypeAlias, TypeVar
+
+from ...base.errors import Cancelled
+
+T = TypeVar("T")
+Report: TypeAlias = Callable[[float], None]
+"""Called in a thread with the share that is done; raises `Cancelled` where the job is to stop."""
+
+TICK = 0.03
+"""Seconds between two turns of a job in the window's thread."""
+BUDGET = 0.05
+"""Seconds of one such turn."""
+
+
+@dataclass(frozen=True)
+class Aside:
+    """What a job does in a thread; the generator gets what it returns.
+
+    Attributes:
+        work: gets a `Report` to call now and then; touches no data-block of Blender.
+        state: what it does, in words for the window.
+        first, last: the shares of the job at its begin and end.
+    """
+
+    work: Callable[[Report], Any]
+    state: str = ""
+    first: float = 0.0
+    last: float = 1.0
+
+
+@dataclass(frozen=True)
+class Step:
+    """A step that is done: its share, and what comes next, in words for the window."""
+
+    share: float
+    state: str = ""
+
+
+Work: TypeAlias = Generator[float | Step | Aside | None, Any, T]
+"""What a job does. ``None`` means that there is nothing to do in the main thread just now."""
+
+
+class Job(Generic[T]):
+    """Work that may take long. Across a part in a thread it holds on to no data of the file: an undo may take it away.
+
+    Args:
+        title: what is done, as a noun: "Scan".
+        work: see `Work`; closed when the job is stopped, so that its ``finally`` can clean up.
+
+    Attributes:
+        title: what is done.
+        share: how much is done, 0 to 1.
+        error: what ended it early, if something did; `Cancelled` after `stop`.
+        result: what the work returned; None until it has ended well.
+    """
+
+    def __init__(self, title: str, work: Work[T]) -> None:
+        self.title = title
+        self.share = 0.0
+        self.error: BaseException | None = None
+        self.result: T | None = None
+        self._work = work
+        self._state = ""
+        self._stopping = Event()
+        self._ended = self._idle = False
+        self._thread: _Thread | None = None
+        self._answer: Any = None
+        self._failure: BaseException | None = None
+        self._aside: Aside | None = None
+
+    @property
+    def running(self) -> bool:
+        """Return whether it has begun in the window and not ended yet."""
+        return running_job() is self and not self._ended
+
+    @property
+    def state(self) -> str:
+        """Return what it is doing, in words for the window."""
+        if self._stopping.is_set():
+            return "Stopping"
+        return f"{self._state or self.title} {self.share:.0%}"
+
+    @property
+    def touches_scene(self) -> bool:
+        """Return whether it may hold on to data of the file: what is true but for a part in a thread."""
+        return not self._ended and self._thread is None
+
+    def run(self) -> T:
+        """Do the whole work at once; raise what goes wrong."""
+        while not self._ended:
+            self._advance(self._do_at_once)
+        if self.error is not None:
+            raise self.error
+        return self.result  # type: ignore[return-value]
+
+    def start(self) -> None:
+        """Do the first step, so that what is refused is refused at once, and be the job that runs; raise what is wrong.
+
+        `tick` does the rest.
+        """
+        global _running
+        assert running_job() is None
+        self._advance(self._begin_thread)
+        if self.error is not None:
+            raise self.error
+        _running = self
+
+    def tick(self, seconds: float = BUDGET) -> bool:
+        """Go on for about so long in the main thread, by one step at least; return whether the job still runs."""
+        deadline = time.perf_counter() + seconds
+        while not self._ended:
+            if self._thread is not None:
+                if self._thread.is_alive():
+                    break
+                self._take_over()
+            self._advance(self._begin_thread)
+            if self._idle or time.perf_counter() >= deadline:
+                break
+        return not self._ended
+
+    def stop(self, wait: bool = False) -> None:
+        """Have it stop after the step at hand; `wait` until it has."""
+        self._stopping.set()
+        if not wait or self._ended:
+            return
+        if self._thread is not None:
+            self._thread.join()
+            self._take_over()
+        self._close(Cancelled(f"{self.title} was cancelled"))
+
+    def _advance(self, begin: Callable[[Aside], None]) -> None:
+        """Do one step."""
+        if self._stopping.is_set() and not self._idle:
+            self._close(Cancelled(f"{self.title} was cancelled"))
+            return
+        answer, failure, self._answer, self._failure = self._answer, self._failure, None, None
+        try:
+            found = self._work.send(answer) if failure is None else self._work.throw(failure)
+        except StopIteration as end:
+            self.result, self.share = end.value, 1.0
+            self._end()
+        except BaseException as error:
+            self._close(error)
+        else:
+            self._note(found, begin)
+
+    def _note(self, found: float | Step | Aside | None, begin: Callable[[Aside], None]) -> None:
+        """Take over what the work says at a `yield`."""
+        self._idle = found is None
+        if isinstance(found, Aside):
+            self._aside, self._state, self.share = found, found.state or self._state, found.first
+            begin(found)
+        elif found is not None:
+            step = found if isinstance(found, Step) else Step(found)
+            self.share, self._state = step.share, step.state or self._state
+
+    def _do_at_once(self, aside: Aside) -> None:
+        try:
+            self._answer = aside.work(self._report)
+        except BaseException as error:
+            self._failure = error
+
+    def _begin_thread(self, aside: Aside) -> None:
+        self._thread = _Thread(lambda: aside.work(self._report), f"SynthRoads {self.title}")
+        self._thread.start()
+
+    def _take_over(self) -> None:
+        """Keep what the thread made for the generator, or what went wrong: it may have to clean up."""
+        assert self._thread is not None
+        thread, self._thread = self._thread, None
+        self._answer, self._failure = thread.result, thread.error
+
+    def _report(self, share: float) -> None:
+        if self._stopping.is_set():
+            raise Cancelled(f"{self.title} was cancelled")
+        if self._aside is not None:
+            self.share = self._aside.first + share * (self._aside.last - self._aside.first)
+
+    def _close(self, error: BaseException) -> None:
+        """End early."""
+        self.error = error
+        try:
+            self._work.close()
+        except Exception as worse:
+            worse.__context__ = error
+            self.error = worse
+        self._end()
+
+    def _end(self) -> None:
+        global _running
+        self._ended = True
+        if _running is self:
+            _running = None
+
+
+class _Thread(Thread):
+    """A thread that keeps what it made, or what went wrong."""
+
+    def __init__(self, work: Callable[[], Any], name: str) -> None:
+        super().__init__(name=name)
+        self._work = work
+        self.result: Any = None
+        self.error: BaseException | None = None
+
+    def run(self) -> None:
+        try:
+            self.result = self._work()
+        except BaseException as error:
+            self.error = error
+
+
+_running: Job[Any] | None = None
+
+
+def running_job() -> Job[Any] | None:
+    """Return the job that is at work in the window, if there is one."""
+    return _running
+
+
+def stop_job() -> None:
+    """Stop what is at work, and wait until it has."""
+    if _running is not None:
+        _running.stop(wait=True)

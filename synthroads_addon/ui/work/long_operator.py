@@ -1,0 +1,192 @@
+"""What operators that take long have in common: the window lives on, the status bar shows how far they are, Esc stops.
+
+A subclass says what is to be done in `job`, and what to say at the end in `succeed`; its annotations and `poll` are its
+own. Called from Python (``bpy.ops.synthroads.scan()``) it does the same at once.
+"""
+
+from __future__ import annotations
+
+import traceback
+from typing import TYPE_CHECKING, Any
+
+import bpy
+
+from ...base.errors import Cancelled, InputError
+from ...blender.model.stage import remove_staged
+from .common import redraw_sidebars, refuse
+from .job import TICK, Job, running_job, stop_job
+
+
+class LongOperator:
+    """Base of an operator whose work is a `Job`. Give it `bl_options` without REGISTER: Repeat Last would block."""
+
+    nothing_done = "nothing was changed"
+    """What is said after the job was cancelled."""
+
+    if TYPE_CHECKING:
+
+        def report(self, kind: set[str], message: str, /) -> None:
+            """Blender's own, of every operator."""
+
+    _job: Job[Any] | None = None
+    _timer: bpy.types.Timer | None = None
+
+    def job(self, context: bpy.types.Context) -> Job[Any]:
+        """Return the work; raise `InputError` if it can't be done."""
+        raise NotImplementedError
+
+    def succeed(self, context: bpy.types.Context, job: Job[Any]) -> str:
+        """Return the message at the end; the job has its result."""
+        raise NotImplementedError
+
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        """Begin."""
+        return self.begin(context)
+
+    def begin(self, context: bpy.types.Context) -> set[str]:
+        """Do the first step; the window's timer does the rest."""
+        try:
+            self._job = self.job(context)
+            self._job.start()
+        except InputError as error:
+            return refuse(self, error)
+        self._timer = context.window_manager.event_timer_add(TICK, window=context.window)
+        context.window_manager.modal_handler_add(self)
+        context.workspace.status_text_set(_draw_status)
+        return {"RUNNING_MODAL"}
+
+    def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        """Do a piece of the work, or end."""
+        job = self._job
+        assert job
+        if event.type == "ESC" and event.value == "PRESS" and job.running:
+            job.stop()
+            return {"RUNNING_MODAL"}
+        if event.type != "TIMER":
+            return {"PASS_THROUGH"}
+        if job.tick():
+            context.workspace.status_text_set(_draw_status)
+            redraw_sidebars(context)
+            return {"PASS_THROUGH"}
+        self._leave(context)
+        return self._end(context, job)
+
+    def cancel(self, context: bpy.types.Context) -> None:
+        """Stop: another file is opened, or the window closed."""
+        if self._job is not None:
+            self._job.stop(wait=True)
+        self._leave(context)
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        """Do the whole work at once, without a window."""
+        try:
+            job = self.job(context)
+            job.run()
+        except InputError as error:
+            return refuse(self, error)
+        return self._say(self.succeed(context, job))
+
+    def _end(self, context: bpy.types.Context, job: Job[Any]) -> set[str]:
+        if job.error is None:
+            return self._say(self.succeed(context, job))
+        if isinstance(job.error, Cancelled):
+            self.report({"WARNING"}, f"{job.title} cancelled; {self.nothing_done}")
+            return {"CANCELLED"}
+        if isinstance(job.error, InputError):
+            return refuse(self, job.error)
+        traceback.print_exception(job.error)
+        self.report({"ERROR"}, f"{job.title} failed, {self.nothing_done}: {job.error!r} (the console says more)")
+        return {"CANCELLED"}
+
+    def _say(self, message: str) -> set[str]:
+        self.report({"INFO"}, message)
+        return {"FINISHED"}
+
+    def _leave(self, context: bpy.types.Context) -> None:
+        if self._timer is not None:
+            context.window_manager.event_timer_remove(self._timer)
+            self._timer = None
+        _reset_status()
+        redraw_sidebars(context)
+
+
+class SYNTHROADS_OT_cancel(bpy.types.Operator):
+    """Stop what is at work; everything is left as it was before"""
+
+    bl_idname = "synthroads.cancel"
+    bl_label = "Cancel"
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        """Have it stop; its own operator notices when it has."""
+        job = running_job()
+        if job is not None:
+            job.stop()
+        return {"FINISHED"}
+
+
+def draw_job(layout: bpy.types.UILayout) -> bool:
+    """Draw how far the running job is, with a button to cancel it; return whether there is one."""
+    job = running_job()
+    if job is None:
+        return False
+    row = layout.row(align=True)
+    row.scale_y = 1.4
+    row.progress(factor=job.share, text=job.state)
+    row.operator(SYNTHROADS_OT_cancel.bl_idname, text="", icon="X")
+    return True
+
+
+def _draw_status(header: bpy.types.Header, context: bpy.types.Context) -> None:
+    """Draw the status bar while a job is at work."""
+    job, layout = running_job(), header.layout
+    if job is None:
+        return
+    layout.label(text="", icon="EVENT_ESC")
+    layout.separator(factor=2.0)
+    layout.label(text=f"Cancel {job.title}")
+    layout.separator_spacer()
+    layout.label(text="SynthRoads")
+    layout.progress(factor=job.share, text=job.state)
+    layout.separator_spacer()
+
+
+def _reset_status() -> None:
+    """Give the status bar back to Blender; what draws it is the same in every workspace."""
+    bpy.data.workspaces[0].status_text_set(None)
+
+
+@bpy.app.handlers.persistent
+def _before_history(*_: object) -> None:
+    """Give up what holds on to data that an undo, a redo or another file is about to take away."""
+    job = running_job()
+    if job is not None and job.touches_scene:
+        job.stop(wait=True)
+
+
+@bpy.app.handlers.persistent
+def _after_history(*_: object) -> None:
+    """Remove a half-built road that an undo step or a file holds."""
+    if running_job() is None:
+        remove_staged()
+
+
+_BEFORE = ("undo_pre", "redo_pre", "load_pre")
+_AFTER = ("undo_post", "redo_post", "load_post")
+
+CLASSES = (SYNTHROADS_OT_cancel,)
+
+
+def register() -> None:
+    """Listen to undo, redo and other files."""
+    for names, function in ((_BEFORE, _before_history), (_AFTER, _after_history)):
+        for name in names:
+            getattr(bpy.app.handlers, name).append(function)
+
+
+def unregister() -> None:
+    """Stop what is at work, and listen no more."""
+    stop_job()
+    _reset_status()
+    for names, function in ((_BEFORE, _before_history), (_AFTER, _after_history)):
+        for name in names:
+            getattr(bpy.app.handlers, name).remove(function)

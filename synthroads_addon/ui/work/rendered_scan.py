@@ -1,0 +1,190 @@
+"""A scan that renders, beside the window: a copy of the open file, and another Blender that scans it."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import bpy
+
+from ...base.errors import InputError, OutputError
+from ...blender.files import save_scene
+from ...road.parameters import RoadParameters
+from ...scenario.scenario import Scenario
+from .background_scan import MARK
+from .job import Report
+
+_TICK = 0.1
+"""Seconds between two looks at the other Blender: it is ended so long after the user cancelled."""
+_JOB, _LINES, _ERRORS = "job.json", "lines.txt", "errors.txt"
+
+
+@dataclass(frozen=True)
+class Scanned:
+    """What the other Blender says at its end: the counts as JSON data, and its stages, see `StageTimer`."""
+
+    counts: dict[str, Any]
+    stages: dict[str, Any]
+
+
+@dataclass(frozen=True)
+class SavedScene:
+    """A copy of a file with what is to be done with it, in a folder of its own.
+
+    Attributes:
+        place: the folder; `scan` removes it.
+        command: what runs the other Blender.
+    """
+
+    place: Path
+    command: tuple[str, ...]
+
+    def scan(self, report: Report) -> Scanned:
+        """Scan it; the cloud and the previews are then in the folder that holds `place`. Runs in any thread.
+
+        Raises:
+            InputError: that of the other Blender; or it can't be started, or was ended by someone else.
+            Cancelled: by `report`; the other Blender is ended.
+            RuntimeError: a defect in the other Blender.
+        """
+        told = _Told()
+        try:
+            with self._process() as process:
+                self._watch(process, told, report)
+            return self._result(process.returncode, told)
+        finally:
+            shutil.rmtree(self.place, ignore_errors=True)
+
+    @contextmanager
+    def _process(self) -> Iterator[subprocess.Popen[bytes]]:
+        """Yield the other Blender; afterwards it has ended, whatever happens."""
+        # What a Blender that is killed leaves behind is removed with the folder.
+        environment = os.environ | dict.fromkeys(("TMPDIR", "TEMP", "TMP"), str(self.place))
+        with (self.place / _LINES).open("wb") as lines, (self.place / _ERRORS).open("wb") as errors:
+            try:
+                process = subprocess.Popen(
+                    self.command,
+                    stdin=subprocess.PIPE,  # closes, and so ends it, if this process ends in any way
+                    stdout=lines,
+                    stderr=errors,
+                    env=environment,
+                    creationflags=getattr(subprocess, "CREATE_NO_WINDOW", 0),
+                )
+            except OSError as error:
+                reason = f"can't be started in the background ({error.strerror})"
+                raise InputError("Blender", self.command[0], reason) from None
+            with process:
+                try:
+                    yield process
+                finally:
+                    process.kill()
+
+    def _watch(self, process: subprocess.Popen[bytes], told: _Told, report: Report) -> None:
+        """Pass on what the other Blender says until it ends."""
+        with (self.place / _LINES).open(encoding="utf-8", errors="replace") as lines:
+            ended = False
+            while not ended:
+                # Asked before reading: its last lines are read as well.
+                ended = process.poll() is not None
+                told.take(lines.read())
+                report(told.share)
+                if not ended:
+                    _wait(process)
+
+    def _result(self, code: int, told: _Told) -> Scanned:
+        if told.error is not None:
+            raise InputError(told.error[0], None, told.error[1])
+        if told.done is not None:
+            return Scanned(**told.done)
+        if code < 0:
+            raise InputError("Blender", None, f"was ended in the background by signal {-code} (too little memory?)")
+        said = (self.place / _ERRORS).read_text(encoding="utf-8", errors="replace").strip()
+        raise RuntimeError(f"Blender in the background ended with exit code {code}: {said or 'no message'}")
+
+
+@dataclass
+class _Told:
+    """What the other Blender has said so far.
+
+    Attributes:
+        share: of the scan that is done.
+        error: head and rest of the message that its input is wrong; None if it isn't.
+        done: counts and stages; None before the end.
+    """
+
+    share: float = 0.0
+    error: tuple[str, str] | None = None
+    done: dict[str, Any] | None = None
+    _rest: str = field(default="", repr=False)
+
+    def take(self, text: str) -> None:
+        """Read on: lines of ours, and others of Blender's own."""
+        *lines, self._rest = (self._rest + text).split("\n")
+        for line in lines:
+            # Blender may have left a line of its own unfinished.
+            _, mark, data = line.partition(MARK)
+            for name, value in json.loads(data).items() if mark else ():
+                setattr(self, name, value)
+
+
+def _wait(process: subprocess.Popen[bytes]) -> None:
+    try:
+        process.wait(_TICK)
+    except subprocess.TimeoutExpired:
+        return
+
+
+def save_open_scene(scenario: Scenario, parameters: RoadParameters, folder: Path) -> SavedScene:
+    """Save a copy of the open file for a scan in the background; the open file keeps its name and state.
+
+    Args:
+        scenario: what is scanned and rendered, and how.
+        parameters: the road that the scene shows.
+        folder: where the scan's files go; the copy is in a folder inside until it is scanned.
+
+    Raises:
+        OutputError: the copy can't be written.
+    """
+    place = folder / "background"
+    place.mkdir()
+    copy = place / "scene.blend"
+    try:
+        save_scene(copy, compress=False)
+    except RuntimeError as error:
+        reason = f"cannot be written ({' '.join(str(error).split())})"
+        raise OutputError("--output", str(folder.parent), reason) from None
+    job = {
+        "file": str(copy.resolve()),
+        "folder": str(folder.resolve()),
+        "scene": bpy.context.scene.name,
+        "view_layer": bpy.context.view_layer.name,
+        # The copy lies elsewhere than what the user trusts: its scripts run if those of the open file do.
+        "scripts": not bpy.app.autoexec_fail,
+        "scenario": json.loads(scenario.to_json()),
+        "parameters": json.loads(parameters.to_json()),
+    }
+    path = (place / _JOB).resolve()
+    path.write_text(json.dumps(job), encoding="utf-8")
+    return SavedScene(place, _command(path))
+
+
+def _command(job: Path) -> tuple[str, ...]:
+    """Return the command that runs `background_scan` in another Blender of this version.
+
+    It finds the add-on, and the packages that it needs, where this one did, whether it is enabled there or not.
+    """
+    places = [os.path.abspath(place) for place in sys.path]  # noqa: PTH100 - "" is the working directory
+    module = f"{__package__}.background_scan"
+    lines = f"import sys; sys.path += [p for p in {places!r} if p not in sys.path]; "
+    lines += f"from importlib import import_module; import_module({module!r}).main({str(job)!r})"
+    if bpy.app.binary_path:
+        return (bpy.app.binary_path, "--background", "--python-exit-code", "1", "--python-expr", lines)
+    return (sys.executable, "-c", lines)

@@ -1,0 +1,103 @@
+"""Output folders: nothing half-written, nothing of the user's touched."""
+
+import errno
+from pathlib import Path
+
+import pytest
+
+from synthroads_addon.base.errors import OutputError
+from synthroads_addon.base.files import files_below, output_folder, write_file
+
+
+def test_files_appear_at_the_end(tmp_path: Path) -> None:
+    target = tmp_path / "out"
+    with output_folder(target, ["a.txt"], overwrite=False) as folder:
+        (folder / "a.txt").write_text("new")
+        assert not (target / "a.txt").exists()
+    assert sorted(p.name for p in target.iterdir()) == ["a.txt"]
+
+
+def test_stopped_work_leaves_nothing(tmp_path: Path) -> None:
+    def stopped() -> None:
+        with output_folder(tmp_path / "out", ["a.txt"], False) as folder:
+            (folder / "a.txt").write_text("half")
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        stopped()
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_work_that_is_stopped_while_its_files_appear_leaves_all_of_them(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    replace, stops = Path.replace, ["first"]
+
+    def stopped(self: Path, target: Path) -> Path:
+        moved = replace(self, target)
+        if stops:
+            stops.pop()
+            raise KeyboardInterrupt
+        return moved
+
+    def work() -> None:
+        with output_folder(tmp_path / "out", [], False) as folder:
+            for name in ("a.txt", "b.txt", "c.txt"):
+                (folder / name).write_text(name)
+
+    monkeypatch.setattr(Path, "replace", stopped)
+    with pytest.raises(KeyboardInterrupt):
+        work()
+    assert sorted(path.name for path in (tmp_path / "out").iterdir()) == ["a.txt", "b.txt", "c.txt"]
+
+
+def test_present_files_need_overwrite_and_others_stay(tmp_path: Path) -> None:
+    (tmp_path / "a.txt").write_text("old")
+    (tmp_path / "mine.txt").write_text("mine")
+    with pytest.raises(OutputError, match="--overwrite"), output_folder(tmp_path, ["a.txt"], False):
+        pass
+    with output_folder(tmp_path, ["a.txt"], True) as folder:
+        (folder / "a.txt").write_text("new")
+    assert (tmp_path / "a.txt").read_text() == "new"
+    assert (tmp_path / "mine.txt").read_text() == "mine"
+
+
+def test_a_file_in_the_way_is_named(tmp_path: Path) -> None:
+    (tmp_path / "out").write_text("a file")
+    with pytest.raises(OutputError, match="--output"), output_folder(tmp_path / "out" / "x", [], False):
+        pass
+
+
+def test_full_disk_is_one_clear_line(tmp_path: Path) -> None:
+    with pytest.raises(OutputError, match="No space left"), output_folder(tmp_path / "out", [], False):
+        raise OSError(errno.ENOSPC, "No space left on device")
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("fault", [KeyboardInterrupt, OSError])
+def test_a_file_whose_writing_is_stopped_leaves_nothing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, fault: type[BaseException]
+) -> None:
+    def stopped(self: Path, mode: int) -> None:
+        raise fault
+
+    (tmp_path / "a.txt").write_text("old")
+    monkeypatch.setattr(Path, "chmod", stopped)
+    with pytest.raises((KeyboardInterrupt, OutputError)):
+        write_file(tmp_path / "a.txt", b"new", overwrite=True)
+    assert [path.name for path in tmp_path.iterdir()] == ["a.txt"]
+    assert (tmp_path / "a.txt").read_text() == "old"
+
+
+def test_folders_that_are_links_are_entered_once(tmp_path: Path) -> None:
+    """Scenes of a data set may lie on another disk; a link that leads back, or to what was there, adds nothing."""
+    here, there = tmp_path / "set", tmp_path / "disk"
+    for folder in (here / "a", there / "b" / "deep"):
+        folder.mkdir(parents=True)
+        (folder / "cloud.laz").touch()
+    (here / "b").symlink_to(there / "b", target_is_directory=True)
+    (there / "b" / "loop").symlink_to(here, target_is_directory=True)
+    (here / "0-again").symlink_to(here / "a", target_is_directory=True)
+    (here / "gone").symlink_to(there / "no-such", target_is_directory=True)
+    found = [path.relative_to(here).as_posix() for path in files_below(here)]
+    assert found == ["gone", "a/cloud.laz", "b/deep/cloud.laz"]

@@ -1,0 +1,38 @@
+"""The gallery: its pictures are made, and they show something."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from headless.cli import command
+from synthroads_addon.blender.views import gallery
+
+
+@pytest.fixture
+def short_roads(tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let the scenes have roads of 200 m."""
+    preset = json.loads(gallery.PRESET.read_text(encoding="utf-8"))
+    for scene in preset["scenes"].values():
+        scene["road"]["length"] = 200.0
+    file = tmp_path_factory.mktemp("preset") / "gallery.json"
+    file.write_text(json.dumps(preset), encoding="utf-8")
+    monkeypatch.setattr(gallery, "PRESET", file)
+
+
+@pytest.mark.usefixtures("short_roads")
+@pytest.mark.parametrize("only", ["materials-base_color", "materials-lit", "scene-rural-driver"])
+def test_a_picture_is_made(tmp_path: Path, only: str, capsys: pytest.CaptureFixture[str]) -> None:
+    arguments = ["--output", str(tmp_path), "--only", only, "--width", "160", "--samples", "1"]
+    assert command("gallery", arguments) == 0
+    out, err = capsys.readouterr()
+    assert out == f"1 pictures in {tmp_path}\n"
+    assert f"{tmp_path / only}.png" in err.splitlines(), "told as soon as it is there"
+    assert [path.name for path in tmp_path.iterdir()] == [f"{only}.png"]
+    picture = np.asarray(Image.open(tmp_path / f"{only}.png").convert("L"), dtype=np.float64)
+    assert picture.shape == (90, 160)
+    assert picture.std() > 5.0

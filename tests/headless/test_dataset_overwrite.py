@@ -1,0 +1,241 @@
+"""A data set in the place of another: the old one goes as a whole, what is the user's stays, and a crash harms neither.
+
+The scenes are made by a stand-in that writes small files: no Blender.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from headless import dataset_run
+from headless.cli import command
+from headless.dataset_run import DatasetRun, Outcome
+from headless.dataset_scene import DONE, FILES, published_folders
+from synthroads_addon.base.errors import InputError, OutputError
+from synthroads_addon.dataset import replacing
+from synthroads_addon.dataset.manifest import faults, file_entries, read_manifest
+from synthroads_addon.dataset.recipe import Recipe
+
+OLD = {"title": "Old", "seed": 1, "layouts": ["pointcept"], "groups": [{"name": "a", "scenes": 3}]}
+NEW = {"title": "New", "seed": 2, "layouts": ["pointcept"], "groups": [{"name": "b", "scenes": 2}]}
+
+
+def make(folder: Path, recipe: dict[str, Any], **options: Any) -> None:
+    """Make a data set of small files."""
+    DatasetRun(Recipe.from_dict(recipe), folder, **options).run(small_scenes)
+
+
+def small_scenes(folders: list[str]) -> Iterator[Outcome]:
+    for folder in map(Path, folders):
+        task = json.loads((folder / "task.json").read_text())
+        name, files = task["name"], folder / FILES
+        for path in (f"scenes/{name}/cloud.laz", f"pointcept/classes-5/train/{name}-n00e00/coord.npy"):
+            (files / path).parent.mkdir(parents=True)
+            (files / path).write_text(f"{task['scenario']['seed']} {path}")
+        done = {"points": 5, "length": 10.0, "classes": {"ground": 5}, "files": file_entries(files)}
+        done["folders"] = [path.relative_to(files).as_posix() for path in published_folders(files)]
+        (folder / DONE).write_text(json.dumps(done))
+        (folder / "report.json").write_text("{}")
+        yield Outcome(folder)
+
+
+def content(folder: Path) -> dict[str, bytes]:
+    """Return every file of a data set, but its lock."""
+    files = [path for path in folder.rglob("*") if path.is_file() and path.name != ".lock"]
+    return {path.relative_to(folder).as_posix(): path.read_bytes() for path in files}
+
+
+def folders(folder: Path) -> set[str]:
+    return {path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_dir()}
+
+
+@pytest.fixture
+def old(tmp_path: Path) -> Path:
+    make(tmp_path / "set", OLD)
+    return tmp_path / "set"
+
+
+@pytest.fixture
+def fresh(tmp_path: Path) -> Path:
+    """The new set where nothing was before."""
+    make(tmp_path / "fresh", NEW)
+    return tmp_path / "fresh"
+
+
+def test_the_new_set_is_as_if_nothing_had_been_there(old: Path, fresh: Path) -> None:
+    with pytest.raises(OutputError, match="--resume continues it, --overwrite replaces it"):
+        make(old, NEW)
+    make(old, NEW, overwrite=True)
+    assert content(old) == content(fresh)
+    assert folders(old) == folders(fresh)
+    make(old, NEW, overwrite=True)
+    assert content(old) == content(fresh), "and once more, of the same recipe"
+
+
+def test_what_is_not_the_sets_stays(old: Path, fresh: Path) -> None:
+    own = {"notes.txt": b"1", "scenes/mine/cloud.laz": b"2", "logs/mine.txt": b"3", "pointcept/classes-5/train/x": b"4"}
+    own |= {"pointcept/classes-5/train/mine/coord.npy": b"5", "semantickitti/classes-5/sequences/99/a": b"6"}
+    for name, data in own.items():
+        (old / name).parent.mkdir(parents=True, exist_ok=True)
+        (old / name).write_bytes(data)
+    make(old, NEW, overwrite=True)
+    assert content(old) == content(fresh) | own
+    make(old, NEW, resume=True)
+    assert content(old) == content(fresh) | own
+
+
+@pytest.mark.parametrize("place", ["scenes/a-02/notes.txt", "pointcept/classes-5/train/a-01-n00e00/sub/notes.txt"])
+def test_a_file_of_ones_own_among_a_scenes_is_named_and_nothing_is_touched(old: Path, place: str) -> None:
+    (old / place).parent.mkdir(exist_ok=True)
+    (old / place).write_text("mine")
+    before = content(old)
+    with pytest.raises(OutputError, match=f"holds {place}, which is not the data set's; move it away"):
+        make(old, NEW, overwrite=True)
+    assert content(old) == before
+    assert not faults(old, read_manifest(old).scenes)
+
+
+def test_a_place_that_the_new_set_needs_and_somebody_has_is_named(old: Path) -> None:
+    (old / "scenes" / "b-01").mkdir()
+    (old / "scenes" / "b-01" / "mine.txt").touch()
+    before = content(old)
+    with pytest.raises(OutputError, match="holds scenes/b-01, which is no scene's; move it away"):
+        make(old, NEW, overwrite=True)
+    assert content(old) == before
+
+
+@pytest.mark.parametrize("text", [None, "{}", '{"name": "a web page", "icons": []}', "no JSON"])
+def test_a_folder_that_no_data_set_made_is_refused(tmp_path: Path, text: str | None) -> None:
+    (tmp_path / "set" / "scenes" / "a-01").mkdir(parents=True)
+    (tmp_path / "set" / "scenes" / "a-01" / "cloud.laz").write_text("mine")
+    if text is not None:
+        (tmp_path / "set" / "manifest.json").write_text(text)
+    before = content(tmp_path / "set")
+    with pytest.raises(InputError, match="holds other files" if text is None else "manifest.json"):
+        make(tmp_path / "set", NEW, overwrite=True)
+    assert content(tmp_path / "set") == before
+
+
+@pytest.mark.parametrize("name", ["../mine", "/tmp/mine", "scenes/../../mine", "scenes", "scenes/a-01/x", "mine/x"])
+def test_a_manifest_that_names_places_of_others_is_refused(old: Path, name: str) -> None:
+    data = json.loads((old / "manifest.json").read_text())
+    data["scenes"][0]["folders"] = [name]
+    (old / "manifest.json").write_text(json.dumps(data))
+    (old.parent / "mine").mkdir()
+    before = content(old.parent)
+    with pytest.raises(InputError, match="is no folder that a data set makes"):
+        make(old, NEW, overwrite=True)
+    data["scenes"][0]["name"] = "../../mine"
+    (old / "manifest.json").write_text(json.dumps(data))
+    with pytest.raises(InputError, match="is no name of a scene"):
+        make(old, NEW, overwrite=True)
+    assert content(old.parent).keys() == before.keys()
+
+
+def test_of_a_scene_that_is_a_link_the_link_alone_goes(old: Path, fresh: Path, tmp_path: Path) -> None:
+    (old / "scenes" / "a-01").rename(tmp_path / "elsewhere")
+    (old / "scenes" / "a-01").symlink_to(tmp_path / "elsewhere", target_is_directory=True)
+    (tmp_path / "elsewhere" / "mine.txt").touch()
+    assert not faults(old, read_manifest(old).scenes), "it counts as a folder does"
+    make(old, OLD, resume=True)
+    assert (old / "scenes" / "a-01").is_symlink()
+    make(old, NEW, overwrite=True)
+    assert content(old) == content(fresh)
+    assert {path.name for path in (tmp_path / "elsewhere").iterdir()} == {"cloud.laz", "mine.txt"}
+
+
+def test_a_link_at_a_place_of_a_scene_that_is_missing_is_replaced(old: Path, tmp_path: Path) -> None:
+    """As where a run was killed before the manifest named the scene."""
+    whole = content(old)
+    data = json.loads((old / "manifest.json").read_text())
+    del data["scenes"][0]
+    (old / "manifest.json").write_text(json.dumps(data))
+    (old / "scenes" / "a-01").rename(tmp_path / "elsewhere")
+    (old / "scenes" / "a-01").symlink_to(tmp_path / "elsewhere", target_is_directory=True)
+    make(old, OLD, resume=True)
+    assert content(old) == whole
+    assert (tmp_path / "elsewhere" / "cloud.laz").is_file()
+
+
+class Crash(BaseException):
+    """The machine has lost its power."""
+
+
+def crashing(what: Callable[..., Any], after: int) -> Callable[..., Any]:
+    """Return a function that works some times and then crashes for good."""
+    calls: list[int] = []
+
+    def called(*arguments: Any, **options: Any) -> Any:
+        calls.append(1)
+        if len(calls) > after:
+            raise Crash
+        return what(*arguments, **options)
+
+    return called
+
+
+CRASHES = [("begin_removal", 0), ("finish_removal", 1), *(("write_atomically", after) for after in (0, 1, 3, 4))]
+CRASHES += [("remove", after) for after in (0, 1, 5)]
+"""Where it crashes: in which function, after how many calls."""
+
+
+@pytest.mark.parametrize(("place", "after"), CRASHES)
+@pytest.mark.parametrize("goes_on", ["resume", "overwrite"])
+def test_after_a_crash_no_scene_that_the_manifest_names_is_missing(
+    old: Path, fresh: Path, place: str, after: int, goes_on: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    home = replacing if place == "remove" else dataset_run
+    before = content(old)
+    with monkeypatch.context() as patched:
+        patched.setattr(home, place, crashing(getattr(home, place), after))
+        with pytest.raises(Crash):
+            make(old, NEW, overwrite=True)
+    manifest = read_manifest(old)
+    assert not faults(old, manifest.scenes)
+    if manifest.title == "Old":
+        assert {name: data for name, data in content(old).items() if name != replacing.REPLACED} == before
+        make(old, OLD, resume=True)
+        assert content(old) == before
+        goes_on = "overwrite"
+    make(old, NEW, **{goes_on: True})
+    assert content(old) == content(fresh)
+    assert folders(old) == folders(fresh)
+
+
+def test_nothing_is_removed_where_the_scheduler_does_not_answer(
+    old: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    pytest.importorskip("distributed")
+    recipe = tmp_path / "new.json"
+    recipe.write_text(json.dumps(NEW))
+    before = content(old)
+    words = [str(recipe), "--output", str(old), "--overwrite", "--scheduler", "tcp://127.0.0.1:1"]
+    assert command("dataset", words) == 2
+    assert "nobody answers there" in capsys.readouterr().err
+    assert content(old) == before
+
+
+@pytest.mark.parametrize("other", ["--resume", "--verify"])
+def test_what_contradicts_it_is_refused_by_name(old: Path, other: str, capsys: pytest.CaptureFixture[str]) -> None:
+    before = content(old)
+    assert command("dataset", ["small-roads", "--output", str(old), "--overwrite", other]) == 2
+    assert capsys.readouterr().err == f"error: --overwrite: can't be given with {other}, which keeps what is there\n"
+    assert content(old) == before
+
+
+def test_the_command_replaces_a_set(
+    old: Path, fresh: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(dataset_run, "local_processes", lambda jobs: small_scenes)
+    recipe = tmp_path / "new.json"
+    recipe.write_text(json.dumps(NEW))
+    assert command("dataset", [str(recipe), "--output", str(old)]) == 2
+    assert "--overwrite replaces it" in capsys.readouterr().err
+    assert command("dataset", [str(recipe), "--output", str(old), "--overwrite"]) == 0
+    assert "2 of 2 scenes, 10 points" in capsys.readouterr().out
+    assert content(old) == content(fresh)

@@ -1,0 +1,102 @@
+"""The command `synthroads twin`, and the scenario's `twin`."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from headless import cli
+from synthroads_addon.base.errors import InputError
+from synthroads_addon.scenario.scenario import Scenario, load_scenario
+from synthroads_addon.twin import formats as twin
+from tests.helpers.roads.twin_roads import many_roads
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+@pytest.fixture
+def parameters(tmp_path: Path) -> Path:
+    path = tmp_path / "parameters.json"
+    path.write_text(many_roads()[3].to_json(), encoding="utf-8")
+    return path
+
+
+def run(*arguments: object) -> int:
+    return cli.main(["twin", *(str(argument) for argument in arguments)])
+
+
+def test_command_writes_what_is_asked_for(parameters: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    out = tmp_path / "out"
+    assert run(parameters, "--output", out, "--twin", "cityjson,geojson,cityjson", "--json") == 0
+    assert sorted(path.name for path in out.iterdir()) == ["twin.city.json", "twin.geojson"]
+    assert json.loads(capsys.readouterr().out)["files"]["geojson"] == str(out / "twin.geojson")
+    assert run(parameters, "--output", out, "--twin", "geojson") == 2
+    assert "already holds twin.geojson; --overwrite replaces it" in capsys.readouterr().err
+    assert run(parameters, "--output", out, "--twin", "geojson", "--overwrite") == 0
+
+
+def test_command_needs_no_blender(parameters: Path, tmp_path: Path) -> None:
+    code = (
+        "import sys; sys.modules['bpy'] = None; from headless.cli import command\n"
+        f"raise SystemExit(command('twin', [{str(parameters)!r}, '--output', {str(tmp_path / 'o')!r}, "
+        "'--twin', 'cityjson,geojson']))"
+    )
+    subprocess.run([sys.executable, "-c", code], cwd=ROOT, check=True)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "wanted"),
+    [
+        (("--twin", "cityjsn"), "twin is 'cityjsn': must be one of cityjson, ifc, opendrive, geojson (did you mean"),
+        (("--twin", ""), "twin is '': must be one of"),
+        (("--max-deviation", "0"), "--max-deviation is 0.0: must be from 0.0001 to 1 m"),
+        (("--max-deviation", "nan"), "--max-deviation is nan: must be from 0.0001 to 1 m"),
+    ],
+)
+def test_bad_input_is_one_line_and_nothing_is_written(
+    arguments: tuple[str, ...], wanted: str, parameters: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run(parameters, "--output", tmp_path / "out", *arguments) == 2
+    said = capsys.readouterr().err
+    assert wanted in said
+    assert said.count("\n") == 1
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_missing_package_is_named_with_its_extra(
+    parameters: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setitem(twin._PACKAGES, "geojson", "no_such_package")
+    assert twin.missing_packages("geojson") == "no_such_package"
+    assert twin.missing_packages("cityjson") is None
+    assert run(parameters, "--output", tmp_path / "out", "--twin", "cityjson,geojson") == 2
+    assert "needs the package no_such_package: pip install 'synthroads[twin]'" in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
+
+
+def test_every_format_has_a_file_of_its_own() -> None:
+    names = twin.twin_file_names(twin.TWIN_FORMATS)
+    assert names == ("twin.city.json", "twin.ifc", "twin.xodr", "twin.geojson")
+    with pytest.raises(InputError, match="did you mean 'opendrive'"):
+        twin.twin_file_names(["opendriv"])
+
+
+def test_scenario_says_which_twins_are_wanted() -> None:
+    assert Scenario().twin == ()
+    assert load_scenario("rq31-600m", ['twin=["cityjson","geojson"]']).twin == ("cityjson", "geojson")
+    with pytest.raises(InputError, match=r"twin.*cityjsn"):
+        load_scenario("rq31-600m", ['twin=["cityjsn"]'])
+
+
+def test_generate_writes_the_twin_without_a_scene(tmp_path: Path) -> None:
+    pytest.importorskip("laspy")
+    from synthroads_addon.jobs.generate import Job, generate
+
+    scenario = load_scenario("rq31-600m", ["outputs=[]", 'twin=["cityjson"]', "road.length=60"])
+    report = generate(Job(scenario, tmp_path))
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["report.json", "twin.city.json"]
+    assert "twin" in report["stages"]

@@ -1,0 +1,107 @@
+"""Labelled points for tests of segmentation: a straight road with verge, shrubs and posts, without Blender."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ml.segmentation.data.tiles import Tile
+from ml.segmentation.recipes import SegmentationConfiguration
+from synthroads_addon.base.classes import class_scheme
+from synthroads_addon.cloud.formats.writing import open_writer
+from synthroads_addon.cloud.points import PointBlock
+
+NAMES = tuple(row.name for row in class_scheme("5").rows)
+
+
+def road_points(count: int, seed: int, length: float = 60.0) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Return xyz (N, 3), rgb (N, 3) 0 to 255, intensity (N,) 0 to 1 and class (N,) of a road along x."""
+    random = np.random.default_rng(seed)
+    xyz = random.uniform([0.0, 0.0, 0.0], [length, 40.0, 0.02], (count, 3))
+    label = np.where(np.abs(xyz[:, 1] - 20.0) < 6.0, 1, 0)
+    label[(label == 1) & (np.abs(np.abs(xyz[:, 1] - 20.0) - 5.0) < 0.3)] = 2
+    shrub = (label == 0) & (random.random(count) < 0.3)
+    xyz[shrub, 2] += random.uniform(0.3, 3.0, shrub.sum())
+    label[shrub] = 3
+    post = (np.abs(xyz[:, 1] - 26.3) < 0.25) & (label == 0)
+    xyz[post, 2] += random.uniform(0.0, 1.0, post.sum())
+    label[post] = 4
+    bright = np.array([0.3, 0.15, 0.6, 0.4, 0.5])[label] + random.normal(0.0, 0.03, count)
+    color = np.array([(120, 100, 70), (90, 90, 95), (220, 220, 220), (60, 130, 50), (150, 160, 170)])[label]
+    color = np.clip(color + random.normal(0.0, 12.0, (count, 3)), 1, 255)
+    return xyz, color.astype(np.uint8), np.clip(bright, 0.01, 1.0), label
+
+
+def road_tile(count: int = 6000, seed: int = 1, scene: str = "road", gain: float = 1.0, length: float = 60.0) -> Tile:
+    """Return the points as a tile; intensities times ``gain``."""
+    xyz, rgb, intensity, label = road_points(count, seed, length)
+    strength = np.clip(intensity * gain, 0.0, 1.0).astype(np.float32)
+    return Tile(scene, np.array([4e5, 5.6e6, 100.0]), xyz.astype(np.float32), rgb, strength, label.astype(np.int16))
+
+
+def write_pointcept(root: Path, split: str, tiles: list[Tile], scheme: str = "5") -> Path:
+    """Write tiles as a data set in Pointcept's layout; return its root."""
+    folder = root / "pointcept" / f"classes-{scheme}"
+    rows = class_scheme(scheme).rows
+    for place, tile in enumerate(tiles):
+        here = folder / split / f"{tile.scene}-{place}"
+        here.mkdir(parents=True)
+        np.save(here / "coord.npy", tile.coord)
+        np.save(here / "color.npy", np.zeros((len(tile), 3), np.uint8) if tile.color is None else tile.color)
+        np.save(here / "strength.npy", np.zeros((len(tile), 1)) if tile.strength is None else tile.strength[:, None])
+        np.save(here / "segment.npy", tile.segment.astype(np.int32))
+        (here / "tile.json").write_text(json.dumps({"scene": tile.scene, "origin": tile.origin.tolist()}))
+    told = {"classes": [row.name for row in rows], "ids": [row.id for row in rows], "ignore_index": -1}
+    (folder / "classes.json").write_text(json.dumps(told))
+    return folder
+
+
+def road_block(count: int, seed: int, length: float = 60.0) -> PointBlock:
+    """Return the points as the scanner's: classes of the five, intensity 1 for a white target."""
+    xyz, rgb, intensity, label = road_points(count, seed, length)
+    zeros = np.zeros(count)
+    return PointBlock(
+        xyz=xyz + np.array([4e5, 5.6e6, 100.0]),
+        intensity=intensity,
+        rgb=(rgb.astype(np.uint16) * 257).astype(np.uint16),
+        class_id=np.array([0, 1, 2, 3, 4], dtype=np.uint8)[label],
+        instance_id=np.arange(count, dtype=np.uint32) % 7,
+        return_number=np.ones(count, dtype=np.uint8),
+        number_of_returns=np.ones(count, dtype=np.uint8),
+        gps_time=np.arange(count) * 1e-5,
+        scan_angle_deg=zeros.astype(np.float32),
+        strip=np.zeros(count, dtype=np.uint16),
+        range=zeros + 50.0,
+        incidence_deg=zeros.astype(np.float32),
+    )
+
+
+def write_cloud(path: Path, block: PointBlock) -> Path:
+    """Write a cloud of five classes."""
+    scheme = class_scheme("5").as_stored()
+    with open_writer(path, 25832, block.xyz[0], 65535.0, scheme=scheme) as writer:
+        writer.write(block)
+    return path
+
+
+def toy(data: Path, **changes: Any) -> SegmentationConfiguration:
+    """Return a configuration that is trained within a second or two."""
+    sources = {name: [{"path": str(data / name), "split": "train"}] for name in ("real", "synthetic")}
+    tests = {"unseen": [{"path": str(data / "real"), "split": "test"}]}
+    base = {
+        "task": "segmentation",
+        "threads": 1,
+        "device": "cpu",
+        "voxel": 0.3,
+        "crop_points": 800,
+        "crops_per_tile": 4,
+        "batch": 4,
+        "set_up": "real",
+        "network": {"preset": "S", "width": 8, "radius": 0.9, "neighbours": 8, "dropout": 0.1},
+        "schedule": {"epochs": 2},
+        "data": {**sources, "tests": tests},
+    }
+    return SegmentationConfiguration.from_dict({**base, **changes})

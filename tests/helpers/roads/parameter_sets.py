@@ -1,0 +1,260 @@
+"""Random parameter sets as JSON data, built from the classes that declare them, for property-based tests."""
+
+from __future__ import annotations
+
+import types
+from dataclasses import astuple
+from functools import cache
+from itertools import count
+from typing import Annotated, Any, Literal, Union, get_args, get_origin
+
+import annotated_types
+from hypothesis import strategies as st
+from pydantic.fields import FieldInfo
+
+from synthroads_addon.base.schema import Model
+from synthroads_addon.road.objects import WidthPoint
+from synthroads_addon.road.parameters import AnyObject, Environment, MaterialVariation, Metadata, Transform
+from synthroads_addon.road.surroundings import SPECIES
+
+OBJECTS = {kind.model_fields["type"].default: kind for kind in get_args(get_args(AnyObject)[0])}
+"""Type of object -> its class."""
+VENDOR = st.recursive(
+    st.none() | st.booleans() | st.integers() | st.floats(allow_nan=False, allow_infinity=False) | st.text(),
+    lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.text(), inner, max_size=3),
+    max_leaves=4,
+)
+"""Any JSON: what a vendor may write."""
+
+
+@cache
+def road_data(*kinds: str) -> st.SearchStrategy[dict[str, Any]]:
+    """Return sets with a carriageway, an alignment, an exit and an object of each of these types."""
+
+    @st.composite
+    def build(draw: st.DrawFn) -> dict[str, Any]:
+        objects = {"alignment": draw(model_data(OBJECTS["Alignment"]))}
+        road = draw(model_data(OBJECTS["Carriageway"]))
+        objects["road"] = road
+        exit_ = OBJECTS["Turnout"]
+        objects["exit"] = draw(model_data(exit_).filter(lambda turnout: turnout["kind"] != "emergency_bay"))
+        for kind in kinds:
+            if kind not in ("Alignment", "Carriageway"):
+                objects[f"a-{kind}"] = draw(model_data(OBJECTS[kind]))
+        numbers = count(draw(st.integers(1, 2**32 - 100)))
+        for item in objects.values():
+            _refer(item, len(road["lanes"]))
+            item["instance"] = next(numbers)
+        return {
+            "metadata": draw(model_data(Metadata)),
+            "transform": draw(model_data(Transform)),
+            "design_class": draw(st.sampled_from(["EKA1A", "EKA1B", "EKA2", "EKA3"])),
+            "environment": draw(model_data(Environment)),
+            "materials": draw(model_data(MaterialVariation)),
+            "objects": objects,
+        }
+
+    return build()
+
+
+@cache
+def model_data(model: type[Model]) -> st.SearchStrategy[dict[str, Any]]:
+    """Return valid JSON data of one class; references to other objects are any text."""
+    required, optional = {}, {}
+    for name, field in model.model_fields.items():
+        into = required if field.is_required() or name in ("type", "kind") else optional
+        into[name] = _values(field.annotation, field.metadata)
+    whole = st.fixed_dictionaries(required, optional=optional)
+    vendor = st.dictionaries(st.text(max_size=3).map(lambda key: f"+{key}"), VENDOR, max_size=1)
+    return st.builds(lambda data, extra: _consistent(model, data) | extra, whole, vendor)
+
+
+def _values(kind: Any, metadata: list[Any]) -> st.SearchStrategy[Any]:
+    """Return JSON values of a type with the limits that pydantic keeps beside it."""
+    origin, arguments = get_origin(kind), get_args(kind)
+    if origin is Annotated:
+        limits = [m for item in arguments[1:] for m in (item.metadata if isinstance(item, FieldInfo) else [item])]
+        return _values(arguments[0], limits)
+    if origin is Literal:
+        return st.sampled_from(arguments)
+    if origin in (Union, types.UnionType):
+        return st.one_of([_values(member, metadata) for member in arguments])
+    if origin is tuple and arguments[-1] is not Ellipsis:
+        return st.tuples(*(_values(member, []) for member in arguments)).map(list)
+    if origin is tuple:
+        least = _limit(metadata, annotated_types.MinLen, 0)
+        most = min(_limit(metadata, annotated_types.MaxLen, 100), least + 2)
+        if arguments[0] is WidthPoint:
+            points = st.lists(model_data(WidthPoint), min_size=least, max_size=most, unique_by=lambda p: p["station"])
+            return points.map(lambda points: sorted(points, key=lambda p: p["station"]))
+        return st.lists(_values(arguments[0], []), min_size=least, max_size=most)
+    if isinstance(kind, type) and issubclass(kind, Model):
+        return model_data(kind)
+    return _scalars(kind, metadata)
+
+
+def _scalars(kind: Any, metadata: list[Any]) -> st.SearchStrategy[Any]:
+    if kind in (int, float):
+        above, below = (_limit(metadata, limit, None) for limit in (annotated_types.Gt, annotated_types.Lt))
+        low, high = (_limit(metadata, limit, None) for limit in (annotated_types.Ge, annotated_types.Le))
+        if kind is int:
+            return st.integers(low, high)
+        return st.floats(
+            low if above is None else above,
+            high if below is None else below,
+            exclude_min=above is not None,
+            exclude_max=below is not None,
+        )
+    if kind is str:
+        pattern = next((item.pattern for item in metadata if getattr(item, "pattern", None)), None)
+        if pattern:
+            return st.from_regex(pattern.strip("^$"), fullmatch=True)
+        return st.text(max_size=_limit(metadata, annotated_types.MaxLen, 5))
+    return {type(None): st.none(), bool: st.booleans()}[kind]
+
+
+def _limit(metadata: list[Any], kind: type, otherwise: Any) -> Any:
+    """Return the one value of a limit, e.g. that of ``Ge(ge=0)``."""
+    return next((astuple(item)[0] for item in metadata if isinstance(item, kind)), otherwise)
+
+
+def _consistent(model: type[Model], data: dict[str, Any]) -> dict[str, Any]:
+    """Return the data with what several fields must keep together."""
+    return data | _RULES.get(model.__name__, lambda data: {})(data)
+
+
+def _element(data: dict[str, Any]) -> dict[str, Any]:
+    start, end = data["curvature_start"], data["curvature_end"]
+    return {
+        "line": {"curvature_start": 0.0, "curvature_end": 0.0},
+        "arc": {"curvature_start": start or 0.01, "curvature_end": start or 0.01},
+        "clothoid": {"curvature_end": end if end != start else 0.0 if start else 0.01},
+    }[data["kind"]]
+
+
+def _axis(data: dict[str, Any]) -> dict[str, Any]:
+    share = min(1.0, 9e5 / sum(element["length"] for element in data["horizontal"]))
+    return {"horizontal": [{**element, "length": element["length"] * share} for element in data["horizontal"]]}
+
+
+def _line(data: dict[str, Any]) -> dict[str, Any]:
+    solid = data["dash_length"] == 0 or data["gap_length"] == 0
+    turnout = data["kind"] in ("turnout_edge", "gore_edge")
+    longer = {name: max(data[name], 0.05) for name in ("dash_length", "gap_length")}
+    return ({"dash_length": 0.0, "gap_length": 0.0} if solid else longer) | {"turnout": "exit" if turnout else None}
+
+
+def _turnout(data: dict[str, Any]) -> dict[str, Any]:
+    ramp = data.get("ramp") or {"length": 100.0}
+    return {
+        "taper_in_length": 0.0 if data["kind"] == "entry" else data.get("taper_in_length") or 30.0,
+        "taper_out_length": 0.0 if data["kind"] == "exit" else data.get("taper_out_length") or 30.0,
+        "ramp": None if data["kind"] == "emergency_bay" else ramp,
+    }
+
+
+def _plants(data: dict[str, Any]) -> dict[str, Any]:
+    species = SPECIES[data["kind"]]
+    return {
+        "species": data["species"] if data["species"] in species else species[0],
+        "band_end": max(data["band_start"], data["band_end"]),
+        "height_max": max(data["height_min"], data["height_max"]),
+    }
+
+
+def _gantry(data: dict[str, Any]) -> dict[str, Any]:
+    right, left = sorted((data["left_offset"], data["right_offset"]))
+    return {"left_offset": left, "right_offset": right} if right < left else {"left_offset": 10.0, "right_offset": 0.0}
+
+
+_RULES = {
+    "AlignmentObject": _axis,
+    "HorizontalElement": _element,
+    "LineMarking": _line,
+    "Turnout": _turnout,
+    "Vegetation": _plants,
+    "Gantry": _gantry,
+}
+
+
+def _refer(item: dict[str, Any], lanes: int) -> None:
+    """Let an object's references name objects that are there."""
+    if "carriageway" in item:
+        item["carriageway"] = "road"
+    if "boundary" in item:
+        item["boundary"] = min(item["boundary"], lanes)
+    if "lane" in item:
+        item["lane"] = min(item["lane"], lanes - 1)
+    if item["type"] == "Hatching":
+        item["turnout"] = "exit"
+
+
+POINTS = [{"station": 0.0, "width": 3.5}, {"station": 100.0, "width": 0.0}]
+SMALL_ROAD = {
+    "metadata": {
+        "identifier": "road",
+        "generator": "by hand",
+        "referenceSystem": "https://www.opengis.net/def/crs/EPSG/0/25832",
+    },
+    "transform": {"translate": [0.0, 0.0, 0.0]},
+    "design_class": "EKA1A",
+    "objects": {
+        "alignment": {
+            "type": "Alignment",
+            "instance": 1,
+            "start_x": 0.0,
+            "start_y": 0.0,
+            "start_heading_deg": 0.0,
+            "horizontal": [{"kind": "line", "length": 100.0, "curvature_start": 0.0, "curvature_end": 0.0}],
+            "vertical": [{"station": 0.0, "elevation": 0.0}],
+        },
+        "road": {
+            "type": "Carriageway",
+            "instance": 2,
+            "side": "right",
+            "inner_offset": 2.0,
+            "hard_shoulder_width": 2.5,
+            "outer_edge_strip_width": 0.5,
+            "lanes": [{"width": POINTS}, {"width": 3.5}],
+            "inner_edge_strip_width": 0.5,
+            "verge_width": 1.5,
+            "crossfall": [{"station": 0.0, "crossfall_percent": 2.5}],
+        },
+        "line": {
+            "type": "LineMarking",
+            "instance": 3,
+            "carriageway": "road",
+            "kind": "lane",
+            "boundary": 1,
+            "width": 0.15,
+            "dash_length": 6.0,
+            "gap_length": 12.0,
+            "start_station": 0.0,
+            "end_station": 100.0,
+        },
+        "rail": {
+            "type": "Guardrail",
+            "instance": 4,
+            "start_station": 0.0,
+            "end_station": 100.0,
+            "offset": -15.0,
+            "faces": "left",
+        },
+    },
+}
+"""A straight of 100 m with one carriageway of two lanes, of which the outer one ends; as JSON data."""
+
+LIBRARY_ONLY = {
+    "instance numbers are unique": "two objects have the same instance number",
+    "one Alignment at most": "exactly one Alignment",
+    "one Median and one Terrain at most": "may contain one (Median|Terrain) at most",
+    "one Carriageway per side at most": "one Carriageway per side",
+    "ids name objects that are there": "must name (a Carriageway|an exit or entry)",
+    "lanes and lane boundaries are there": "must name a lane boundary|must be less than the number of lanes",
+    "stations of a width's points increase": "must be greater than the one before",
+    "the alignment is at most 1000 km long": "must be at most 1e\\+06 m long together",
+    "an arc's curvatures are equal, a clothoid's differ": "kind '(arc|clothoid)' contradicts",
+    "a vegetation's band and heights end after they begin": "must not be less than band_start and height_min",
+    "a gantry's left end lies left of its right end": "left_offset must be greater than right_offset",
+}
+"""Conditions that JSON Schema can't express -> what the library says. docs/parameters.md lists them."""

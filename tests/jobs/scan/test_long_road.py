@@ -1,0 +1,162 @@
+"""100 km of road by section: memory as for 2 km, and returns where exact rays meet the exact triangles."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import laspy
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from synthroads_addon.base.classes import class_id
+from synthroads_addon.base.progress import StageTimer
+from synthroads_addon.jobs.scan.by_section import SectionScan
+from synthroads_addon.road.geometry import RoadGeometry
+from synthroads_addon.road.parameters import read_parameters
+from synthroads_addon.road.tessellation import sample_stations
+from synthroads_addon.scanning.pulses import Poses, make_pulses
+from synthroads_addon.scanning.scan import Scan, scan_pulses
+from synthroads_addon.scenario.scenario import Scenario
+from tests.helpers.scenes.sparse_scanner import sparse_scanner
+
+Float = NDArray[np.float64]
+
+TOLERANCE = 0.005
+LAS_ROUNDING = 0.0005 * np.sqrt(3.0)
+LONG = 100_000.0
+LOOKED_AT = 5
+"""Sections, spread over the road, that rays are cast at in float64."""
+PULSES = 400
+
+
+def sparse(folder: Path, length: float) -> dict[str, Any]:
+    return {
+        "type": "Scenario", "version": "1.0", "seed": 4, "vegetation_detail": 0.0,
+        "road": {"length": length},
+        "scan": {
+            "device": sparse_scanner(folder, kilohertz=2.0), "rays_per_pulse": 1, "relief": 0.0,
+            "lines_per_second": 20.0, "platform": {"speed": 40.0, "lateral_offsets": [0.0]},
+        },
+        "colour": {"source": "material", "rgb": False},
+        "outputs": ["parameters", "cloud", "centerline"],
+    }  # fmt: skip
+
+
+def generated(folder: Path, length: float) -> dict[str, Any]:
+    """Generate in a process of its own, whose memory is its own; return the report."""
+    file, output = folder / f"{length:g}.json", folder / f"{length:g}"
+    file.write_text(json.dumps(sparse(folder, length)), encoding="utf-8")
+    command = [sys.executable, "-m", "headless.generate", "--scenario", str(file), "--output", str(output), "--quiet"]
+    subprocess.run(command, check=True, cwd=Path(__file__).parents[3])
+    report: dict[str, Any] = json.loads((output / "report.json").read_text(encoding="utf-8"))
+    return report
+
+
+def exact_triangles(geometry: RoadGeometry, low: float, high: float, scan: Scan, frame: Float) -> Float:
+    """Return the triangles (T, 3, 3) of a section's pavement in the road's frame, their corners in float64.
+
+    They are the model's; only where its corners lie is worked out anew, from the road's rows and boundaries.
+    """
+    rows = sample_stations(geometry, TOLERANCE, low, high)
+    mesh = MESH[id(scan)]
+    chosen = mesh.triangles[mesh.class_id == class_id("road")]
+    used, corner = np.unique(chosen, return_inverse=True)
+    given = mesh.vertices[used].astype(np.float64) + frame
+    station, offset = geometry.alignment.project(given[:, :2])
+    nearest = np.clip(np.searchsorted(rows, station), 1, len(rows) - 1)
+    nearest -= np.abs(rows[nearest - 1] - station) < np.abs(rows[nearest] - station)
+    plan, heading, _ = geometry.alignment.frame(rows[nearest])
+    left = np.stack([-np.sin(heading), np.cos(heading)], axis=1)
+    exact = np.column_stack([plan + offset[:, None] * left, geometry.elevation(rows[nearest], offset)])
+    away = np.linalg.norm(exact - given, axis=1)
+    assert away.max() < 0.001, f"a corner of the model lies {away.max() * 1000:.2f} mm off"
+    return exact[corner.reshape(-1, 3)]
+
+
+MESH: dict[int, Any] = {}
+
+
+def met(triangles: Float, origin: Float, direction: Float) -> Iterator[float]:
+    """Yield the range at which each ray meets the first of some triangles, inf for none: Moeller and Trumbore."""
+    a = triangles[:, 0]
+    e1, e2 = triangles[:, 1] - a, triangles[:, 2] - a
+    for start, along in zip(origin, direction, strict=True):
+        p = np.cross(along, e2)
+        scale = np.einsum("ij,ij->i", e1, p)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            s = start - a
+            u = np.einsum("ij,ij->i", s, p) / scale
+            q = np.cross(s, e1)
+            v = q @ along / scale
+            distance = np.einsum("ij,ij->i", e2, q) / scale
+        inside = (u >= -1e-9) & (v >= -1e-9) & (u + v <= 1.0 + 1e-9) & (distance > 0.0)
+        yield float(distance[inside].min(initial=np.inf))
+
+
+def errors_of_a_section(work: SectionScan, section: Any, monkeypatch: pytest.MonkeyPatch) -> Float:
+    """Return how far (m) returns from the pavement lie from where exact rays meet the exact triangles."""
+    from synthroads_addon.jobs.scan import by_section as section_scan
+
+    make = section_scan.make_scan
+    meshes = []
+
+    def keep(scenario: Any, scene: Any, *rest: Any, **more: Any) -> Scan:
+        meshes.append(scene.static)
+        return make(scenario, scene, *rest, **more)
+
+    monkeypatch.setattr(section_scan, "make_scan", keep)
+    with work.prepared(section, StageTimer()) as (scan, _):
+        MESH[id(scan)] = meshes[-1]
+        triangles = exact_triangles(work.geometry, section.low, section.high, scan, scan.frame)
+        strip, block = section.blocks[len(section.blocks) // 2]
+        first, _ = work.cut.pulses_of(strip, block)
+        result = scan_pulses(scan, strip, first, PULSES, block).points
+        poses = Poses.between(scan, strip, work.cut.time(strip, first), work.cut.time(strip, first + PULSES - 1))
+        pulses = make_pulses(scan, strip, poses, None, first, PULSES)
+    monkeypatch.undo()
+    road = result.select(np.flatnonzero(result.class_id == class_id("road")))
+    rows = np.searchsorted(pulses.time, road.gps_time)
+    assert np.array_equal(pulses.time[rows], road.gps_time)
+    origin, direction = pulses.origin.T[rows] + scan.frame, pulses.direction.T[rows]
+    exact = np.array(list(met(triangles, origin, direction)))
+    place = origin + exact[:, None] * direction + np.array(work.parameters.transform.translate)
+    return np.linalg.norm(road.xyz - place, axis=1)
+
+
+@pytest.mark.slow
+def test_100_km(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    short, report = generated(tmp_path, 2000.0), generated(tmp_path, LONG)
+    peaks = [max(stage["peak_memory_mb"] for stage in one["stages"].values()) for one in (short, report)]
+    counts = report["counts"]
+    print(f"\n{counts['sections']} sections, {counts['points']:,} points in {report['seconds']:.0f} s")
+    print(f"peak memory {peaks[0]:.0f} MB for 2 km, {peaks[1]:.0f} MB for 100 km")
+    assert counts["sections"] == 200
+    assert peaks[1] < 1.10 * peaks[0]
+
+    folder = tmp_path / f"{LONG:g}"
+    parameters = read_parameters(folder / "parameters.json")
+    geometry = RoadGeometry(parameters)
+    worst = 0.0
+    with laspy.open(folder / "cloud.laz") as file:
+        for chunk in file.chunk_iterator(1_000_000):
+            xyz = np.column_stack([chunk.x, chunk.y, chunk.z])[np.asarray(chunk["class_id"]) == class_id("road")]
+            assert (xyz[:, 1] > 5.4e6).all()
+            local = xyz - np.array(parameters.transform.translate)
+            error = local[:, 2] - geometry.elevation(*geometry.alignment.project(local[:, :2]))
+            worst = max(worst, float(np.nanmax(np.abs(error))))
+    print(f"farthest from the analytic surface: {worst * 1000:.2f} mm")
+    assert worst < TOLERANCE + 0.001 + LAS_ROUNDING
+
+    work = SectionScan(Scenario.from_dict(sparse(tmp_path, LONG)), parameters)
+    sections = list(work.sections())
+    for number in np.linspace(0, len(sections) - 1, LOOKED_AT).astype(int):
+        errors = errors_of_a_section(work, sections[number], monkeypatch)
+        print(f"{sections[number].start:7.0f} m: {len(errors)} returns, at most {errors.max() * 1000:.3f} mm off")
+        assert len(errors) > 50
+        assert errors.max() < 0.001

@@ -1,0 +1,86 @@
+"""Colours, layers and relief in the main job: only what is wanted is rendered, and it agrees with the materials."""
+
+from pathlib import Path
+from typing import Any
+
+import laspy
+import numpy as np
+import pytest
+
+from synthroads_addon.base.classes import classes
+from synthroads_addon.jobs.generate import Job, generate
+from synthroads_addon.materials.table import materials
+from synthroads_addon.scenario.scenario import load_scenario
+
+SMALL = ["fidelity=draft", "road.length=60", "road.half_width=25", "scan.platform.lateral_offsets=[5]"]
+SMALL += ["scan.lines_per_second=25", "scan.platform.speed=20", 'outputs=["cloud"]', "scan.noise.range_sigma=0"]
+LAYERS = 'cloud.attributes=["roughness","metallic","specular","color_source"]'
+
+
+def made(folder: Path, *changes: str) -> tuple[dict[str, Any], laspy.LasData]:
+    counts = generate(Job(load_scenario("rq31-600m", [*SMALL, *changes]), folder))["counts"]
+    return counts, laspy.read(folder / "cloud.laz")
+
+
+def of_class(cloud: laspy.LasData, name: str) -> np.ndarray:
+    return np.flatnonzero(np.asarray(cloud["class_id"]) == next(row.id for row in classes() if row.name == name))
+
+
+def test_without_colours_and_layers_nothing_is_rendered(tmp_path: Path) -> None:
+    counts, cloud = made(tmp_path, "colour.rgb=false")
+    assert counts["rendered"] == {}
+    assert not np.asarray(cloud.red).any()
+
+
+def test_layers_that_no_material_varies_are_its_own_and_not_rendered(tmp_path: Path) -> None:
+    counts, cloud = made(tmp_path, "colour.rgb=false", LAYERS)
+    assert counts["rendered"] == {}
+    road = of_class(cloud, "road")
+    assert len(road) > 1000
+    row = materials()["asphalt"]
+    for name in ("roughness", "metallic", "specular"):
+        values = np.asarray(cloud[name])[road]
+        assert np.abs(values - np.median(values)).max() < 1e-3
+    assert np.median(np.asarray(cloud["roughness"])[road]) == pytest.approx(row.roughness, abs=1e-3)
+
+
+def test_what_is_wanted_is_rendered_and_nothing_else(tmp_path: Path) -> None:
+    counts, _ = made(tmp_path / "a", "colour.rgb=false", "colour.intensity_from_layers=true")
+    assert counts["rendered"]["layers"] == ["base_color"]
+    counts, cloud = made(tmp_path / "b", LAYERS)
+    assert "sun" in counts["rendered"]["layers"]
+    assert counts["points_by_colour_source"].get("material", 0.0) < 0.05
+    assert sum(counts["points_by_colour_source"].values()) == pytest.approx(1.0, abs=1e-5)
+    by_material = np.mean(np.asarray(cloud["color_source"]) == 0)
+    assert by_material == pytest.approx(counts["points_by_colour_source"].get("material", 0.0), abs=1e-5)
+    road, paint = of_class(cloud, "road"), of_class(cloud, "road_marking")
+    assert np.median(np.asarray(cloud.green)[paint]) > 1.3 * np.median(np.asarray(cloud.green)[road])
+
+
+def test_intensities_from_layers_are_the_materials_where_these_are_constant(tmp_path: Path) -> None:
+    same = ("colour.rgb=false", "scan.relief=0")
+    before, constant, patterned = (
+        made(tmp_path / name, *same, *changes)[1]
+        for name, changes in {
+            "plain": (),
+            "constant": ("colour.intensity_from_layers=true", "colour.source=material"),
+            "patterned": ("colour.intensity_from_layers=true",),
+        }.items()
+    )
+    plain = np.asarray(before.intensity, dtype=float)
+    assert np.abs(np.asarray(constant.intensity) - plain).max() <= 1.0  # a step of 16 bits
+    road = of_class(before, "road")
+    rendered = np.asarray(patterned.intensity, dtype=float)[road]
+    assert rendered.std() > plain[road].std()
+    assert rendered.mean() == pytest.approx(plain[road].mean(), rel=0.05)
+
+
+def test_relief_moves_points_along_the_normal_and_none_is_none(tmp_path: Path) -> None:
+    plain = made(tmp_path / "a", "colour.rgb=false", "scan.relief=0")[1]
+    rough = made(tmp_path / "b", "colour.rgb=false", "scan.relief=3")[1]
+    height = np.asarray(rough.z) - np.asarray(plain.z)
+    road, ground = of_class(plain, "road"), of_class(plain, "ground")
+    assert 1e-3 < height[road].std() < 4e-3
+    assert height[ground].std() > 5.0 * height[road].std()
+    assert abs(height[road].mean()) < 2e-4
+    np.testing.assert_array_equal(np.asarray(rough.intensity), np.asarray(plain.intensity))

@@ -1,0 +1,434 @@
+"""`synthroads scan`: scenes that others made, their classes, paths, wrong inputs; and the scene stays as it was."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import bpy
+import laspy
+import numpy as np
+import pytest
+
+from headless.cli import command
+from synthroads_addon.base.classes import class_id
+from synthroads_addon.blender.model.build import build_road
+from synthroads_addon.blender.model.store import remember
+from synthroads_addon.blender.scene.evaluated import scene_mesh
+from synthroads_addon.blender.scene.foreign import open_scene
+from synthroads_addon.cloud.formats.reading import open_cloud
+from synthroads_addon.jobs.scan_scene import SceneScan, scan_scene, scene_path
+from synthroads_addon.road.geometry import RoadGeometry
+from synthroads_addon.sampling.road import sample_road
+from synthroads_addon.scanning.platforms.path import USUAL
+from synthroads_addon.scenario.scenario import Scenario, load_scenario
+from tests.helpers.scenes.scene_hash import digest
+
+ROOT = Path(__file__).parents[2]
+DRAFT = ["--set", "scan.noise.range_sigma=0", "--set", "scan.lines_per_second=50", "--rays", "1"]
+DRAFT += ["--set", "colour.source=material", "--set", 'outputs=["cloud"]']
+
+
+def primitives() -> None:
+    """Make a scene of a ground of 40 m x 20 m at z = 1 with three boxes: two pillars and one named after nothing."""
+    bpy.ops.mesh.primitive_plane_add(size=1.0, location=(0.0, 0.0, 1.0))
+    ground = bpy.context.object
+    ground.name, ground.scale = "Floor", (40.0, 20.0, 1.0)
+    tar = bpy.data.materials.new("Tar")
+    if tar.node_tree is None:
+        tar.use_nodes = True
+    ground.data.materials.append(tar)
+    for number, x in enumerate((-10.0, 10.0)):
+        bpy.ops.mesh.primitive_cube_add(size=2.0, location=(x, 3.0, 3.0))
+        bpy.context.object.name = f"Pillar.{number}"
+    bpy.ops.mesh.primitive_cube_add(size=2.0, location=(0.0, -4.0, 2.0))
+    bpy.context.object.name = "Thing"
+    bpy.context.object.rotation_euler = (0.0, 0.0, 0.4)
+    for item in bpy.data.objects:
+        item.data.name = item.name  # some kinds of files keep only the meshes' names
+    bpy.context.view_layer.update()
+
+
+def write_scene(path: Path) -> Path:
+    """Write the open scene to a file, by Blender's own exporter for its kind."""
+    place = str(path)
+    suffix = path.suffix
+    if suffix in (".glb", ".gltf"):
+        bpy.ops.export_scene.gltf(filepath=place, export_format="GLB" if suffix == ".glb" else "GLTF_SEPARATE")
+    elif suffix == ".fbx":
+        bpy.ops.export_scene.fbx(filepath=place)
+    elif suffix == ".blend":
+        bpy.ops.wm.save_as_mainfile(filepath=place, copy=True)
+    else:
+        operators = {".obj": "obj_export", ".ply": "ply_export", ".stl": "stl_export", ".usda": "usd_export"}
+        getattr(bpy.ops.wm, operators[suffix])(filepath=place)
+    return path
+
+
+@pytest.fixture
+def scene(tmp_path: Path) -> Callable[[str], Path]:
+    """Return a function that writes the scene of primitives to a file of a kind."""
+
+    def write(suffix: str) -> Path:
+        primitives()
+        return write_scene(tmp_path / f"yard{suffix}")
+
+    return write
+
+
+@pytest.fixture
+def mapping(tmp_path: Path) -> Path:
+    path = tmp_path / "classes.json"
+    path.write_text(json.dumps({"objects": {"Pillar*": "pole", "Floor": "road"}, "materials": {"Nothing*": "bridge"}}))
+    return path
+
+
+def scan(scene: Path, output: Path, *arguments: str | Path) -> laspy.LasData:
+    """Run the command in this process and return the cloud."""
+    assert command("scan", [str(scene), "--output", str(output), *DRAFT, *map(str, arguments), "--quiet"]) == 0
+    return laspy.read(output / "cloud.laz")
+
+
+def report(output: Path) -> dict:
+    return json.loads((output / "report.json").read_text())
+
+
+# Kinds of files
+
+
+@pytest.mark.parametrize("suffix", [".blend", ".glb", ".gltf", ".obj", ".fbx", ".usda"])
+def test_scenes_of_others_are_scanned_with_their_classes(
+    suffix: str, scene: Callable[[str], Path], mapping: Path, tmp_path: Path
+) -> None:
+    file = scene(suffix)
+    before = file.read_bytes()
+    las = scan(file, tmp_path / "out", "--height", "30", "--classes", mapping)
+    assert file.read_bytes() == before
+    assert sorted(path.name for path in (tmp_path / "out").iterdir()) == ["cloud.laz", "report.json"]
+    label, xyz = np.array(las.class_id), las.xyz
+    assert set(np.unique(label)) == {class_id("road"), class_id("pole"), 255}
+    floor = xyz[label == class_id("road")]
+    assert np.abs(floor[:, 2] - 1.0).max() < 0.002
+    assert np.allclose([floor.min(axis=0)[:2], floor.max(axis=0)[:2]], [[-20, -10], [20, 10]], atol=0.5)
+    pillars = xyz[label == class_id("pole")]
+    assert np.isclose(pillars[:, 2].max(), 4.0, atol=0.002)
+    assert np.abs(np.abs(pillars[:, 0]) - 10.0).max() < 1.002
+    thing = xyz[label == 255]
+    assert np.linalg.norm(thing[:, :2] - [0.0, -4.0], axis=1).max() < np.sqrt(2.0) + 0.002
+    for kind in (floor, pillars, thing):
+        assert len(kind) > 100
+    assert len(np.unique(las.instance_id)) == 4
+    assert report(tmp_path / "out")["warnings"] == [
+        f"{mapping}: nothing in the scene is named as in materials: Nothing*",
+        f"{len(thing):,} points have no class",
+    ]
+
+
+@pytest.mark.parametrize("suffix", [".ply", ".stl"])
+def test_single_meshes_are_scanned(suffix: str, scene: Callable[[str], Path], tmp_path: Path) -> None:
+    las = scan(scene(suffix), tmp_path / "out", "--height", "30")
+    assert np.isclose(np.median(las.z), 1.0, atol=0.002)
+    assert np.isclose(las.z.max(), 4.0, atol=0.002)
+
+
+@pytest.mark.parametrize(("up", "flat"), [("y", False), ("z", True), (None, False)])
+def test_what_points_up_can_be_said(up: str | None, flat: bool, tmp_path: Path) -> None:
+    file = tmp_path / "floor.obj"
+    file.write_text("v -9 -5 0\nv 9 -5 0\nv 9 5 0\nv -9 5 0\nf 1 2 3 4\n")
+    open_scene(file, up)
+    bpy.context.view_layer.update()
+    assert (np.ptp(scene_mesh().vertices[:, 2]) < 1e-5) == flat
+
+
+def test_pictures_come_with_the_cloud_and_colours_are_rendered(scene: Callable[[str], Path], tmp_path: Path) -> None:
+    usual = ("--set", 'outputs=["cloud","previews"]', "--set", "colour.source=images")
+    las = scan(scene(".blend"), tmp_path / "out", "--height", "30", *usual)
+    assert sorted(path.name for path in (tmp_path / "out").iterdir()) == [
+        "cloud.laz", "preview_class.png", "preview_intensity.png", "preview_rgb.png", "report.json"
+    ]  # fmt: skip
+    assert report(tmp_path / "out")["counts"]["rendered"]["images"] > 0
+    assert las.red.std() > 0
+
+
+# Where the scanner is
+
+
+def test_one_strip_leads_straight_over_the_middle(scene: Callable[[str], Path], tmp_path: Path) -> None:
+    las = scan(scene(".blend"), tmp_path / "out", "--height", "30", "--speed", "5")
+    assert set(np.array(las.point_source_id)) == {1}
+    assert np.ptp(las.gps_time) == pytest.approx(40.0 / 5.0, abs=0.1)
+    below = np.abs(las.scan_angle * 0.006) < 0.2
+    assert np.abs(las.y[below]).max() < 0.3
+    assert np.ptp(las.x[below]) == pytest.approx(40.0, abs=0.5)
+    # Under the path the range is the height above the floor, where half of the scene's area lies.
+    counts = report(tmp_path / "out")["counts"]
+    assert counts["intensity_scale"] == pytest.approx(65535 * 15.0**2)
+
+
+def test_lateral_offsets_give_their_strips(scene: Callable[[str], Path], tmp_path: Path) -> None:
+    offsets = ("--height", "30", "--set", "scan.platform.lateral_offsets=[4,0,-4]")
+    las = scan(scene(".blend"), tmp_path / "out", *offsets)
+    assert set(np.array(las.point_source_id)) == {1, 2, 3}
+
+
+def epsg_of_file(folder: Path) -> int | None:
+    with open_cloud(folder / "cloud.laz") as cloud:
+        return cloud.header.epsg
+
+
+def test_a_path_is_followed_in_map_coordinates(scene: Callable[[str], Path], tmp_path: Path) -> None:
+    line = tmp_path / "line.csv"
+    line.write_text("x,y,z\n500005,5600090,101\n500005,5600110,101\n")
+    where = ("--origin", "500000,5600100,100", "--epsg", "25832", "--path", line, "--height", "25")
+    las = scan(scene(".glb"), tmp_path / "out", *where)
+    assert epsg_of_file(tmp_path / "out") == 25832
+    below = np.abs(las.scan_angle * 0.006) < 0.2
+    assert np.abs(las.x[below] - 500_005.0).max() < 0.3
+    assert np.isclose(np.median(las.z), 101.0, atol=0.002)
+    assert np.ptp(las.y) == pytest.approx(20.0, abs=0.5)
+
+
+def test_a_trajectory_is_flown(scene: Callable[[str], Path], tmp_path: Path) -> None:
+    file = tmp_path / "flight.csv"
+    file.write_text("time,x,y,z,roll,pitch,heading\n0,-15,2,21,0,0,90\n4,15,2,21,0,0,90\n")
+    las = scan(scene(".blend"), tmp_path / "out", "--trajectory", file)
+    assert np.ptp(las.gps_time) == pytest.approx(4.0, abs=0.05)
+    below = (np.abs(las.scan_angle * 0.006) < 0.2) & (las.z < 1.1)
+    assert np.abs(las.y[below] - 2.0).max() < 0.3
+
+
+def test_tripods_stand_on_the_surface_or_where_they_are_put(scene: Callable[[str], Path], tmp_path: Path) -> None:
+    where = ("--tripod=-15,-5", "--tripod", "5,5,2.5", "--set", "scan.platform.turn_seconds=2")
+    las = scan(scene(".blend"), tmp_path / "out", *where)
+    assert set(np.array(las.point_source_id)) == {1, 2}
+    for strip in (1, 2):
+        assert np.ptp(las.gps_time[np.array(las.point_source_id) == strip]) == pytest.approx(2.0, abs=0.05)
+    platform = {"kind": "tripod", "height": 1.5}
+    job = SceneScan(Scenario.from_dict({"scan": {"platform": platform}}), tmp_path, tripods=((-15, -5), (10.5, 3.5)))
+    assert np.allclose(scene_path(job, scene_mesh(), None).positions, [[-15, -5, 2.5], [10.5, 3.5, 5.5]])
+    scenario = Scenario.from_dict({"scan": {"platform": {"kind": "tripod"}}})
+    job = replace(job, tripods=((-15, -5, 2.8),), scenario=scenario)
+    assert np.allclose(scene_path(job, scene_mesh(), None).positions, [[-15, -5, 2.8]])
+    job = replace(job, tripods=((-15, -5),))
+    assert np.allclose(scene_path(job, scene_mesh(), None).positions, [[-15, -5, 1.0 + USUAL["tripod"].height]])
+
+
+@pytest.fixture
+def road_scene(tmp_path: Path) -> tuple[Path, RoadGeometry]:
+    """Return a .blend that holds a road of ours with the set that it was built from, and its geometry."""
+    scenario = load_scenario("rq31-600m", ["road.length=60", "road.half_width=25", "fidelity=draft"])
+    parameters = sample_road(scenario.road, scenario.seed)
+    model = build_road(parameters, 0.02, 0.0)
+    remember(model.collection, parameters, scenario, "")
+    return write_scene(tmp_path / "road.blend"), RoadGeometry(parameters)
+
+
+def test_a_road_of_ours_is_followed(road_scene: tuple[Path, RoadGeometry], tmp_path: Path) -> None:
+    file, geometry = road_scene
+    las = scan(file, tmp_path / "out", "--set", "scan.platform.lateral_offsets=[0]", "--height", "30")
+    below = np.abs(las.scan_angle * 0.006) < 0.2
+    origin = np.array(geometry.parameters.transform.translate)
+    station, offset = geometry.alignment.project(las.xyz[below, :2] - origin[:2])
+    assert np.abs(offset).max() < 0.3
+    assert np.ptp(station) > 55.0
+    assert class_id("road_marking") in np.array(las.class_id)
+    assert epsg_of_file(tmp_path / "out") == geometry.parameters.metadata.epsg
+
+
+# The scene stays as it was
+
+
+def furnish() -> None:
+    """Add to the scene of primitives what a scan might be tempted to touch."""
+    primitives()
+    thing = bpy.data.objects["Thing"]
+    modifier = thing.modifiers.new("Bevel", "BEVEL")
+    modifier.width = 0.1
+    thing["synthroads_class"] = "bridge"
+    thing["note"] = {"kept": [1, 2, 3]}
+    thing.parent = bpy.data.objects["Pillar.0"]
+    extra = bpy.data.collections.new("Extra")
+    bpy.context.scene.collection.children.link(extra)
+    hidden = bpy.data.objects.new("Hidden", bpy.data.objects["Floor"].data)
+    extra.objects.link(hidden)
+    hidden.hide_viewport = True
+    curve = bpy.data.curves.new("Cable", "CURVE")
+    curve.bevel_depth = 0.1
+    curve.splines.new("POLY").points.add(2)
+    bpy.context.scene.collection.objects.link(bpy.data.objects.new("Cable", curve))
+    bpy.data.worlds.new("Sky")
+    bpy.data.scenes.new("Other")
+
+
+CHANGES: dict[str, Callable[[], object]] = {
+    "an object moves": lambda: setattr(bpy.data.objects["Floor"], "location", (0.0, 0.0, 1.001)),
+    "a vertex moves": lambda: setattr(bpy.data.meshes[0].vertices[0], "co", (0.1, 0.0, 0.0)),
+    "a face's attribute comes": lambda: bpy.data.meshes[0].attributes.new("class_id", "INT", "FACE"),
+    "a face's material": lambda: setattr(bpy.data.meshes["Floor"].polygons[0], "material_index", 1),
+    "a colour": lambda: setattr(bpy.data.materials["Tar"], "roughness", 0.11),
+    "a node's input": lambda: setattr(
+        next(n for n in bpy.data.materials["Tar"].node_tree.nodes if n.type == "BSDF_PRINCIPLED").inputs[2],
+        "default_value",
+        0.123,
+    ),
+    "a custom property": lambda: bpy.data.objects["Thing"].__setitem__("note", {"kept": [1, 2, 4]}),
+    "a custom property comes": lambda: bpy.data.scenes[0].__setitem__("synthroads", 1),
+    "a modifier's value": lambda: setattr(bpy.data.objects["Thing"].modifiers[0], "width", 0.2),
+    "a modifier goes": lambda: bpy.data.objects["Thing"].modifiers.remove(bpy.data.objects["Thing"].modifiers[0]),
+    "a modifier is hidden": lambda: setattr(bpy.data.objects["Thing"].modifiers[0], "show_viewport", False),
+    "an object is shown": lambda: setattr(bpy.data.objects["Hidden"], "hide_viewport", False),
+    "an object is selected": lambda: bpy.data.objects["Floor"].select_set(True),
+    "an object leaves its collection": lambda: bpy.data.collections["Extra"].objects.unlink(bpy.data.objects["Hidden"]),
+    "a parent": lambda: setattr(bpy.data.objects["Thing"], "parent", None),
+    "a name": lambda: setattr(bpy.data.objects["Cable"], "name", "Rope"),
+    "a curve": lambda: setattr(bpy.data.curves["Cable"], "bevel_depth", 0.11),
+    "the frame": lambda: bpy.context.scene.frame_set(7),
+    "a render setting": lambda: setattr(bpy.data.scenes["Other"].render, "resolution_x", 77),
+    "a data block comes": lambda: bpy.data.meshes.new("left behind"),
+    "a data block goes": lambda: bpy.data.worlds.remove(bpy.data.worlds["Sky"]),
+}
+
+
+@pytest.mark.parametrize("change", CHANGES)
+def test_the_digest_notices(change: str) -> None:
+    furnish()
+    before = digest()
+    assert digest() == before
+    CHANGES[change]()
+    assert digest() != before
+
+
+@pytest.mark.parametrize("caster", ["embree", "bvhtree"])
+def test_a_scan_leaves_the_open_scene_as_it_was(caster: str, tmp_path: Path, mapping: Path) -> None:
+    furnish()
+    before = digest()
+    changes = {"device": "riegl-minivux-3uav", "rays_per_pulse": 1, "caster": caster, "lines_per_second": 10.0}
+    scenario = Scenario.from_dict({"scan": {**changes, "platform": {"height": 30.0, "speed": 20.0}}})
+    result = scan_scene(SceneScan(scenario, tmp_path / "out", classes=mapping))
+    assert result["counts"]["points"] > 1000
+    assert result["counts"]["points_by_class"]["bridge"] > 10
+    assert digest() == before
+
+
+def test_a_scan_leaves_a_road_of_ours_as_it_was(road_scene: tuple[Path, RoadGeometry], tmp_path: Path) -> None:
+    before = digest()
+    thin = {"lines_per_second": 20.0, "platform": {"height": 30.0, "speed": 30.0}}
+    scenario = Scenario.from_dict({"fidelity": "draft", "scan": thin, "outputs": ["cloud"]})
+    assert scan_scene(SceneScan(scenario, tmp_path / "out"))["counts"]["points"] > 1000
+    assert digest() == before
+
+
+# Wrong inputs
+
+BROKEN = {"broken.glb": b"glTF\x02\x00\x00\x00junk", "broken.blend": b"hello", "broken.ply": b"hello", "a.txt": b""}
+BROKEN |= {"empty.obj": b"# nothing\n", "points.obj": b"v 0 0 0\nv 1 0 0\nv 1 1 0\n", "broken.gltf": b'{"asset":'}
+BROKEN |= {"flat.obj": b"v 0 0 0\nv 1 0 0\nv 2 0 0\nf 1 2 3\n", "cut.stl": b"solid x\nfacet normal 0 0"}
+
+
+@pytest.mark.parametrize(
+    ("name", "arguments", "says"),
+    [
+        ("missing.blend", [], "SCENE is '{place}': no such file"),
+        ("missing.glb", [], "SCENE is '{place}': no such file"),
+        ("a.txt", [], "SCENE is '{place}': must end in one of .blend, .glb"),
+        ("broken.glb", [], "{place}: is damaged ("),
+        ("broken.gltf", [], "SCENE is '{place}': can't be read by Blender: "),
+        ("broken.blend", [], "SCENE is '{place}': can't be read by Blender: "),
+        ("broken.ply", [], "{place}: is damaged ("),
+        ("cut.stl", [], "SCENE is '{place}': can't be read by Blender: "),
+        ("empty.obj", [], "{place}: holds nothing visible with faces"),
+        ("points.obj", [], "{place}: holds nothing visible with faces"),
+        ("flat.obj", [], "{place}: holds nothing visible with faces"),
+        ("yard.glb", ["--up", "z"], "--up is 'z': only for .obj, .ply, .stl"),
+        ("yard.obj", ["--device", "riegl-minivux-4uav"], "scan.device is 'riegl-minivux-4uav'"),
+        ("yard.obj", ["--epsg", "1"], "epsg is 1"),
+        ("yard.obj", ["--rays", "8"], "scan.rays_per_pulse is 8"),
+        ("yard.obj", ["--seed", "-1"], "seed is -1"),
+        ("yard.obj", ["--height", "-3"], "scan.platform.height is -3"),
+        ("yard.obj", ["--set", "scan.platfrom.height=3"], "scan: unknown key 'platfrom' (did you mean 'platform'?)"),
+        ("yard.obj", ["--set", 'outputs=["scene"]'], "outputs is ['scene']: must name at least one of cloud, previews"),
+        ("yard.obj", ["--path", "nowhere.csv"], "nowhere.csv: an axis file is needed here"),
+        ("yard.obj", ["--trajectory", "nowhere.csv"], "nowhere.csv: a trajectory file is needed here"),
+        (
+            "yard.obj",
+            ["--trajectory", "nowhere.csv", "--speed", "3"],
+            "--speed is 3.0: can't be given with --trajectory",
+        ),
+        ("yard.obj", ["--tripod", "99,99"], "--tripod is '99,99': there is no surface below"),
+        ("yard.obj", ["--tripod", "1,1", "--speed", "3"], "--speed is 3.0: can't be given with --tripod"),
+        ("yard.obj", ["--tripod", "1,1,3", "--height", "3"], "--height is 3.0: can't be given with a tripod"),
+        ("yard.obj", ["--classes", "nowhere.json"], "nowhere.json: no such file"),
+        ("yard.obj", ["--classes", "{wrong}"], "there is no class 'rode' (did you mean 'road'?)"),
+        ("yard.obj", ["--classes", "{unknown}"], "unknown key 'object' (did you mean 'objects'?)"),
+    ],
+)
+def test_wrong_inputs_are_one_line_and_leave_nothing(
+    name: str, arguments: list[str], says: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    for file, content in BROKEN.items():
+        (tmp_path / file).write_bytes(content)
+    (tmp_path / "wrong.json").write_text('{"objects": {"Floor": "rode"}}')
+    (tmp_path / "unknown.json").write_text('{"object": "x"}')
+    if name.startswith("yard"):
+        primitives()
+        write_scene(tmp_path / name)
+    files = {"wrong": tmp_path / "wrong.json", "unknown": tmp_path / "unknown.json"}
+    before = sorted(tmp_path.iterdir())
+    capfd.readouterr()
+    place = tmp_path / name
+    given = [argument.format(**files) if "{" in argument[:1] else argument for argument in arguments]
+    assert command("scan", [str(place), "--output", str(tmp_path / "out"), *DRAFT, *given]) == 2
+    err = capfd.readouterr().err.splitlines()
+    assert len(err) == 1
+    assert err[0].startswith("error: ")
+    assert says.format(place=place) in err[0]
+    assert sorted(tmp_path.iterdir()) == before
+
+
+@pytest.mark.parametrize("given", [["--path", "a", "--trajectory", "b"], ["--tripod", "1,2", "--path", "a"]])
+def test_only_one_way_to_say_where_the_scanner_is(given: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as stop:
+        command("scan", ["x.blend", "--output", "out", *given])
+    assert stop.value.code == 2
+    lines = capsys.readouterr().err.splitlines()
+    assert len(lines) == 1
+    assert "not allowed with argument" in lines[0]
+
+
+@pytest.mark.parametrize("text", ["1", "1,2,3,4", "a,b", "nan,1", "1,1e10"])
+def test_positions_must_be_coordinates(text: str, capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as stop:
+        command("scan", ["x.blend", "--output", "out", "--tripod", text])
+    assert stop.value.code == 2
+    assert capsys.readouterr().err.splitlines() == [
+        f"synthroads scan: argument --tripod: is '{text}': must be X,Y or X,Y,Z in metres"
+    ]
+
+
+def test_output_is_not_replaced_unasked(
+    scene: Callable[[str], Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file, output = scene(".obj"), tmp_path / "out"
+    output.mkdir()
+    (output / "cloud.laz").write_text("mine")
+    assert command("scan", [str(file), "--output", str(output), *DRAFT]) == 2
+    assert "--overwrite replaces it" in capsys.readouterr().err
+    assert [path.name for path in output.iterdir()] == ["cloud.laz"]
+    scan(file, output, "--overwrite", "--height", "30")
+
+
+AS_BLENDER = "import runpy, sys; sys.argv[0] = 'blender'; runpy.run_path('headless/scan.py', run_name='__main__')"
+"""What ``blender -b -P headless/scan.py -- ...`` comes down to."""
+
+
+@pytest.mark.parametrize("words", [["-m", "headless.scan"], ["-c", AS_BLENDER, "-b", "-P", "headless/scan.py", "--"]])
+def test_it_is_a_command_of_its_own(words: list[str], scene: Callable[[str], Path], tmp_path: Path) -> None:
+    arguments = [scene(".glb"), "--output", tmp_path / "out", "--height", "30", *DRAFT, "--json"]
+    command_line = [sys.executable, *words, *map(str, arguments)]
+    done = subprocess.run(command_line, cwd=ROOT, capture_output=True, text=True, timeout=300, check=False)
+    assert done.returncode == 0, done.stderr
+    assert json.loads(done.stdout)["counts"] == report(tmp_path / "out")["counts"]

@@ -1,0 +1,44 @@
+"""How long a training will take, told from a few of its steps."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+import torch
+
+from ml.segmentation import projection
+from tests.helpers.clouds.segmentation_data import road_tile, toy, write_pointcept
+
+torch.set_num_threads(1)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return a folder with two tiles to learn from."""
+    home = tmp_path_factory.mktemp("projection")
+    write_pointcept(home / "real", "train", [road_tile(1500, 1 + k, f"real{k}") for k in range(2)])
+    return home
+
+
+def test_a_trainings_time_is_its_steps_times_what_one_takes(
+    folder: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    configuration = toy(folder, schedule={"epochs": 5})
+    (folder / "toy.yaml").write_text(json.dumps(configuration.to_dict()))
+    monkeypatch.setattr(projection, "timed_steps", lambda *_: (90.0, 80.0))
+    assert projection.main([str(folder / "toy.yaml"), "--output", str(folder / "projection.json")]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert told == json.loads((folder / "projection.json").read_text())
+    assert (told["tiles"], told["steps_per_epoch"], told["steps"]) == (2, 2, 10)  # 4 crops a tile, 4 a batch
+    assert (told["seconds_per_step"], told["batch_points"]) == (90.0, 3200)
+    assert told["hours"] == 0.25
+    assert projection.main([str(folder / "toy.yaml"), "--set", "crop_points=100000"]) == 2
+    assert "must not exceed the points" in capsys.readouterr().err
+
+
+def test_measured_steps_take_time(folder: Path) -> None:
+    told = projection.projection(toy(folder, crop_points=300), 2)
+    assert told["seconds_per_step"] > 0
+    assert told["cpu_seconds_per_step"] > 0

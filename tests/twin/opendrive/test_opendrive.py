@@ -1,0 +1,660 @@
+"""Roads as OpenDRIVE: read back after the standard's formulas, and by the programs of others."""
+
+from __future__ import annotations
+
+import math
+import re
+from itertools import pairwise
+from pathlib import Path
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from synthroads_addon.base.errors import InputError
+from synthroads_addon.road.geometry import RoadGeometry
+from synthroads_addon.road.objects import LineObject, PointObject
+from synthroads_addon.road.paint import arrow_outlines, hatching_outlines
+from synthroads_addon.road.parameters import (
+    ConstructionBeacon,
+    Gantry,
+    Guardrail,
+    LineMarking,
+    Overpass,
+    RoadParameters,
+    TrafficSign,
+    Turnout,
+    Vehicle,
+)
+from synthroads_addon.sampling.road import sample_road
+from synthroads_addon.twin.opendrive.pieces import chords, cubics, runs
+from synthroads_addon.twin.opendrive.writer import geo_reference, write_opendrive
+from tests.helpers.files.opendrive_reader import OpenDrive, corners_local, corners_road, notes_of, number
+from tests.helpers.roads.checker_full_road import full
+from tests.helpers.roads.sampled_parts import PAIRS, full_roads, scenario
+from tests.judges import require
+from tests.judges.opendrive import quality, quality_faults
+
+ORIGIN = (294_010.123456, 5_628_000.456789, 181.25)
+EVERYTHING = {"turnouts": {"exits": 1, "entries": 1, "emergency_bays": 1}, "lane_changes": {"share": 1}}
+MILLIMETRE = 1e-3
+TOLERANCE = 0.005
+
+
+def written(road: RoadParameters, folder: Path) -> OpenDrive:
+    path = folder / "road.xodr"
+    write_opendrive(road, path, TOLERANCE)
+    return OpenDrive.read(path)
+
+
+def changed(road: RoadParameters, **objects: dict) -> RoadParameters:
+    """Return a road of which some objects have other values."""
+    data = road.to_dict()
+    for name, values in objects.items():
+        data["objects"][name.replace("__", "-")].update(values)
+    return RoadParameters.from_dict(data)
+
+
+def everything() -> RoadParameters:
+    data = full()
+    data["transform"] = {"translate": list(ORIGIN)}
+    return RoadParameters.from_dict(data)
+
+
+def curved(road: RoadParameters) -> RoadParameters:
+    """Return a road on an egg clothoid, clothoids too flat to be one, and an S."""
+    length = road.alignment.length
+    bends = [(0.0, 0.0), (0.0, 1e-12), (1 / 900, 1 / 900), (1 / 900, 1 / 400), (1 / 400, 1 / 400 + 1e-11)]
+    bends += [(1 / 400, -1 / 500), (-1 / 500, -1 / 500), (-1 / 500, 0.0)]
+    kinds = ["line", "clothoid", "arc", "clothoid", "clothoid", "clothoid", "arc", "clothoid"]
+    share = length / len(bends)
+    elements = [
+        {"kind": kind, "length": share, "curvature_start": a, "curvature_end": b}
+        for kind, (a, b) in zip(kinds, bends, strict=True)
+    ]
+    return changed(road, axis={"horizontal": elements, "start_heading_deg": 123.4, "start_x": -7.0, "start_y": 5.5})
+
+
+def single(road: RoadParameters, side: str) -> RoadParameters:
+    """Return a road without one carriageway and what belongs to it."""
+    data = road.to_dict()
+    gone = [name for name, item in data["objects"].items() if item.get("side") == side] + ["median"]
+    turnouts = [n for n, i in data["objects"].items() if i["type"] == "Turnout" and i["carriageway"] in gone]
+    data["objects"] = {
+        name: item
+        for name, item in data["objects"].items()
+        if name not in gone
+        and item.get("carriageway") not in gone
+        and item.get("turnout") not in turnouts
+        and name not in turnouts
+    }
+    return RoadParameters.from_dict(data)
+
+
+def widening(road: RoadParameters) -> RoadParameters:
+    """Return a road whose median opens and closes while the crossfall changes, about its inner edges."""
+    points = [{"station": s, "width": w} for s, w in ((200.0, 2.0), (420.0, 4.5), (700.0, 3.0))]
+    falls = [{"station": s, "crossfall_percent": q} for s, q in ((150.0, 2.5), (300.0, -2.5), (600.0, 6.0))]
+    return changed(
+        road,
+        right={"inner_offset": points, "crossfall": falls},
+        left={"rotation_axis": "inner_edge", "inner_offset": points[:2], "crossfall": falls[1:]},
+    )
+
+
+ROADS = {
+    "everything": everything,
+    "curved": lambda: curved(everything()),
+    "right only": lambda: single(everything(), "left"),
+    "left only": lambda: single(everything(), "right"),
+    "widening": lambda: widening(everything()),
+    "sampled": lambda: sample_road(scenario(length=1500.0, **EVERYTHING), 7),
+    "narrow": lambda: full_roads()[3],
+    "wide": lambda: full_roads()[30],
+    "short": lambda: sample_road(scenario(length=1.0), 3),
+}
+
+
+MANY = ("left only", "sampled", "wide")
+"""Roads that the slow tests alone take: another of their kind is among the quick ones."""
+
+
+@pytest.fixture(
+    params=[pytest.param(name, marks=pytest.mark.slow if name in MANY else ()) for name in ROADS], scope="module"
+)
+def road(request: pytest.FixtureRequest) -> RoadParameters:
+    return ROADS[request.param]()
+
+
+@pytest.fixture(scope="module")
+def read(road: RoadParameters, tmp_path_factory: pytest.TempPathFactory) -> OpenDrive:
+    return written(road, tmp_path_factory.mktemp("opendrive"))
+
+
+# --- the road -----------------------------------------------------------------------------------------------------
+
+
+def stations(length: float) -> np.ndarray:
+    """Return every metre, and places that aren't whole metres."""
+    return np.unique(np.concatenate([np.arange(0.0, length, 1.0), np.linspace(0.0, length, 301), [length]]))
+
+
+def strips_there(geometry: RoadGeometry, offsets: np.ndarray) -> list[int]:
+    """Return the strips that have a width somewhere between stations whose boundaries' offsets (N, M + 1) are given."""
+    return [i for i in range(len(geometry.strips)) if np.any(offsets[:, i] - offsets[:, i + 1] > 1e-6)]
+
+
+def truth(geometry: RoadGeometry, s: np.ndarray, offset: np.ndarray, z: np.ndarray) -> np.ndarray:
+    plan, heading, _ = geometry.alignment.frame(s)
+    left = np.stack([-np.sin(heading), np.cos(heading)], axis=1)
+    return np.column_stack([plan + offset[:, None] * left, z]) + geometry.parameters.transform.translate
+
+
+def worst_border(road: RoadParameters, read: OpenDrive) -> float:
+    """Return the largest distance (m) in space of a lane's border from its strip's boundary, on the map."""
+    geometry, worst = RoadGeometry(road), 0.0
+    for section, own, points in read.border_points(stations(read.length)):
+        offsets, heights = geometry.offsets(own), geometry.boundary_elevations(own)
+        inside = geometry.offsets(np.linspace(section.start, section.end, 50))
+        strips = strips_there(geometry, inside)
+        numbers = sorted(section.lanes, reverse=True)
+        halves = [n for n in numbers if section.lanes[n].notes["strip"] == "median"]
+        kinds = [section.lanes[n].notes["strip"] for n in numbers if n not in halves[1:]]
+        assert kinds == [geometry.strips[i].kind for i in strips]
+        for strip, lane in zip(strips, [n for n in numbers if n not in halves[1:]], strict=True):
+            for boundary, outer in ((strip, lane), (strip + 1, lane - 1)):
+                if lane in halves:
+                    edge = halves[0] if boundary == strip else halves[-1]
+                else:
+                    edge = outer if lane > 0 else lane + 1 if boundary == strip else lane
+                wanted = truth(geometry, own, offsets[:, boundary], heights[:, boundary])
+                worst = max(worst, float(np.linalg.norm(points[edge] - wanted, axis=1).max()))
+    return worst
+
+
+def test_lanes_lie_where_the_strips_do(road: RoadParameters, read: OpenDrive) -> None:
+    assert worst_border(road, read) < 0.15 * MILLIMETRE
+
+
+def test_reference_line_is_the_centreline(road: RoadParameters, read: OpenDrive) -> None:
+    geometry, s = RoadGeometry(road), stations(read.length)
+    wanted = truth(geometry, s, np.zeros(len(s)), geometry.profile.elevation(s))
+    assert np.abs(read.point(s, np.zeros(len(s))) - wanted).max() < 2e-3 * MILLIMETRE
+    assert read.length == pytest.approx(geometry.length, abs=1e-9)
+
+
+def test_surface_between_borders_is_the_analytic_one(road: RoadParameters, read: OpenDrive) -> None:
+    data = road.to_dict()
+    for item in data["objects"].values():
+        if item["type"] == "Carriageway":
+            item.get("pavement", {}).pop("ruts", None)
+            item.get("pavement", {}).pop("potholes", None)
+    geometry = RoadGeometry(RoadParameters.from_dict(data))
+    for section, own in read.section_of(stations(read.length)[::4]):
+        borders = section.borders(own, read.lane_offset(own))
+        for i, lane in section.lanes.items():
+            inner, outer = borders[i - int(np.sign(i))], borders[i]
+            low, high = lane.height(own)
+            for share in (0.3, 0.9):
+                t = inner + share * (outer - inner)
+                z = read.elevation(own) + read.shape(own, t) + low + share * (high - low)
+                there = (np.abs(outer - inner) > 1e-3) & ~np.isnan(wanted := geometry.elevation(own, t))
+                assert np.abs(z - wanted)[there].max(initial=0.0) < 0.2 * MILLIMETRE
+
+
+def test_clothoids_too_flat_are_arcs_or_lines(tmp_path: Path) -> None:
+    read = written(curved(everything()), tmp_path)
+    kinds = [item[0].tag for item in read.road.findall("planView/geometry")]
+    # The first clothoid is a line and goes on with the line before it.
+    assert kinds == ["line", "arc", "spiral", "arc", "spiral", "arc", "spiral"]
+
+
+def test_lanes_are_linked_both_ways_if_they_go_on(road: RoadParameters, read: OpenDrive) -> None:
+    geometry = RoadGeometry(road)
+    for before, after in pairwise(read.sections):
+        border = np.array([after.start])
+        strips = {side: section.distances(border)[0] for side, section in geometry.sections.items()}
+        assert strips
+        for i, lane in before.lanes.items():
+            width = float(lane.width.at(border - 1e-9)[0])
+            other = lane.links.get("successor")
+            assert (other is not None) == (width > 1e-6)
+            if other is not None:
+                assert after.lanes[other].links["predecessor"] == i
+                assert after.lanes[other].notes["strip"] == lane.notes["strip"]
+                assert after.lanes[other].notes.get("lane") == lane.notes.get("lane")
+        back = [lane.links["predecessor"] for lane in after.lanes.values() if "predecessor" in lane.links]
+        assert sorted(back) == sorted(i for i, lane in before.lanes.items() if "successor" in lane.links)
+
+
+def test_lane_types_and_owners(tmp_path: Path) -> None:
+    road = everything()
+    read = written(road, tmp_path)
+    objects = road.objects
+    found = {
+        (lane.notes["strip"], lane.type, int(lane.notes["instance"]))
+        for s in read.sections
+        for lane in s.lanes.values()
+    }
+    right, left = objects["right"].instance, objects["left"].instance
+    assert {(kind, type_) for kind, type_, _ in found} == {
+        ("median", "median"),
+        ("inner_edge_strip", "border"),
+        ("lane", "driving"),
+        ("outer_edge_strip", "border"),
+        ("hard_shoulder", "stop"),
+        ("island", "none"),
+        ("gore", "restricted"),
+        ("ramp_inner_strip", "border"),
+        ("turnout_lane", "exit"),
+        ("turnout_lane", "offRamp"),
+        ("turnout_lane", "entry"),
+        ("turnout_lane", "onRamp"),
+        ("turnout_edge_strip", "border"),
+        ("bay", "stop"),
+        ("verge", "shoulder"),
+    }
+    owners = {kind: {i for k, _, i in found if k == kind} for kind, _, _ in found}
+    assert owners["median"] == {objects["median"].instance}
+    assert owners["lane"] == owners["verge"] == {left, right}
+    assert owners["turnout_lane"] == {objects["exit"].instance, objects["entry"].instance}
+    assert owners["bay"] == {objects["bay"].instance}
+
+
+# --- paint --------------------------------------------------------------------------------------------------------
+
+
+def test_road_marks_are_the_lines(road: RoadParameters, read: OpenDrive) -> None:
+    geometry = RoadGeometry(road)
+    pieces: dict[int, list[tuple[float, float]]] = {}
+    lines = {line.instance: line for line in road.of_type(LineMarking).values()}
+    for mark in read.marks():
+        line = lines[mark.instance]
+        assert (mark.width, mark.color) == (line.width, line.color)
+        s = np.linspace(mark.start, mark.end, 9)[1:-1]
+        section = next(item for item in read.sections if item.start <= s[0] <= item.end)
+        t = section.borders(s, read.lane_offset(s))[mark.lane] + mark.aside
+        left, right = geometry.marking_edges(line, s)
+        assert np.abs(t - (left + right) / 2.0).max() < 1e-3 * MILLIMETRE
+        pieces.setdefault(mark.instance, []).append((mark.start, mark.end))
+    for line in lines.values():
+        if line.kind != "free":
+            assert joined(pieces.get(line.instance, [])) == pytest.approx(
+                joined(geometry.dashes(line).tolist()), abs=1e-6
+            )
+
+
+def joined(pieces: list[tuple[float, float]]) -> np.ndarray:
+    """Return (N, 2) pieces of which those that touch are one."""
+    found: list[list[float]] = []
+    for start, end in sorted(map(tuple, pieces)):
+        if end - start <= 2e-6:
+            continue
+        if found and start - found[-1][1] < 2e-6:
+            found[-1][1] = max(found[-1][1], end)
+        else:
+            found.append([start, end])
+    return np.array(found).reshape(-1, 2)
+
+
+def test_free_lines_are_markings_along_corners(tmp_path: Path) -> None:
+    road = curved(everything())
+    read = written(road, tmp_path)
+    geometry, line = RoadGeometry(road), road.objects["left-yellow"]
+    item = read.objects()[str(line.instance)]
+    (corners,) = corners_road(item)
+    left, right = geometry.marking_edges(line, corners[:, 0])
+    assert np.abs(corners[:, 1] - (left + right) / 2.0).max() < 1e-6
+    ends = corners[[0, -1], 0]
+    assert ends == pytest.approx([line.start_station, line.end_station])
+    (marking,) = item.findall("markings/marking")
+    assert (marking.get("color"), number(marking, "width")) == ("yellow", 0.2)
+    assert len(marking.findall("cornerReference")) == len(corners)
+    # The chords between corners stay within a millimetre of the line.
+    middle = (corners[1:] + corners[:-1]) / 2.0
+    points = read.point(corners[:, 0], corners[:, 1], corners[:, 2])
+    along = read.point(middle[:, 0], middle[:, 1], middle[:, 2])
+    assert np.linalg.norm((points[1:] + points[:-1]) / 2.0 - along, axis=1).max() < MILLIMETRE
+
+
+def test_a_second_line_on_a_border_becomes_an_object(tmp_path: Path) -> None:
+    data = everything().to_dict()
+    line = dict(data["objects"]["right-2"], instance=99_999, color="yellow", start_station=310.0, end_station=900.0)
+    data["objects"]["again"] = line
+    road = RoadParameters.from_dict(data)
+    read = written(road, tmp_path)
+    assert all(mark.instance != 99_999 for mark in read.marks())
+    (corners,) = corners_road(read.objects()["99999"])
+    assert corners[[0, -1], 0] == pytest.approx([310.0, 900.0])
+
+
+def test_painted_areas_keep_their_outlines(tmp_path: Path) -> None:
+    road = everything()
+    read, geometry = written(road, tmp_path), RoadGeometry(road)
+    for name, outlines in (
+        ("exit-hatching", lambda item: hatching_outlines(geometry, item)),
+        ("arrow", arrow_outlines),
+    ):
+        item = road.objects[name]
+        found, wanted = corners_road(read.objects()[str(item.instance)]), outlines(item)
+        assert len(found) == len(wanted) > 2
+        for corners, outline in zip(found, wanted, strict=True):
+            assert np.abs(corners[:, :2] - outline).max() < 1e-6
+            z = corners[:, 2] + geometry.profile.elevation(outline[:, 0])
+            assert np.abs(z - geometry.elevation(*outline.T)).max() < 1e-5
+            assert np.all(corners[:, 3] == item.film_thickness)
+
+
+# --- objects ------------------------------------------------------------------------------------------------------
+
+
+def all_instances(read: OpenDrive) -> dict[int, set[str]]:
+    """Return every instance number that the file names, with the ids that stand beside it."""
+    found: dict[int, set[str]] = {}
+    for item in read.root.iter():
+        notes = notes_of(item)
+        if "instance" in notes:
+            found.setdefault(int(notes["instance"]), set()).add(notes.get("id", ""))
+    for item in read.root.iter("parameterObject"):
+        found.setdefault(int(item.get("instance")), set()).add(item.get("id"))
+    return found
+
+
+def test_every_object_is_there_by_id_and_instance(road: RoadParameters, read: OpenDrive) -> None:
+    found = all_instances(read)
+    assert set(found) == {item.instance for item in road.objects.values()}
+    for name, item in road.objects.items():
+        if item.type != "Alignment":
+            assert name in found[item.instance]
+    for name, item in road.objects.items():
+        if isinstance(item, PointObject) and not isinstance(item, TrafficSign):
+            known = read.objects() | read.signals()
+            assert known[str(item.instance)].get("name") == name
+
+
+def test_objects_stand_where_the_set_has_them(road: RoadParameters, read: OpenDrive) -> None:
+    geometry = RoadGeometry(road)
+    known = {**read.objects(), **read.signals()}
+    for item in road.objects.values():
+        if not isinstance(item, PointObject):
+            continue
+        found = read.place(known[str(item.instance)])
+        s, t = np.array([item.station]), np.array([item.offset])
+        z = geometry.elevation(s, t) + item.elevation + (item.lower_edge if hasattr(item, "lower_edge") else 0.0)
+        wanted = truth(geometry, s, t, z)[0]
+        assert np.abs(found - wanted)[:2].max() < MILLIMETRE
+        if not np.isnan(wanted[2]) and item.type != "TrafficLight":
+            assert abs(found[2] - wanted[2]) < MILLIMETRE
+
+
+def test_barriers_follow_the_ground(road: RoadParameters, read: OpenDrive) -> None:
+    from synthroads_addon.road.surface import surface_elevation
+
+    geometry, known = RoadGeometry(road), read.objects()
+    for item in road.objects.values():
+        if not isinstance(item, LineObject):
+            continue
+        repeats = known[str(item.instance)].findall("repeat")
+        starts = np.array([number(repeat, "s") for repeat in repeats])
+        ends = starts + [number(repeat, "length") for repeat in repeats]
+        assert np.abs(starts[1:] - ends[:-1]).max(initial=0.0) < 1e-6
+        assert (starts[0], ends[-1]) == pytest.approx((item.start_station, min(item.end_station, read.length)))
+        s = np.linspace(starts[0], ends[-1], 400)
+        piece = np.clip(np.searchsorted(starts, s, side="right") - 1, 0, None)
+        share = (s - starts[piece]) / np.maximum(ends[piece] - starts[piece], 1e-9)
+
+        def linear(name: str, repeats=repeats, piece=piece, share=share) -> np.ndarray:
+            first = np.array([number(repeat, f"{name}Start") for repeat in repeats])[piece]
+            return first + share * (np.array([number(repeat, f"{name}End") for repeat in repeats])[piece] - first)
+
+        t, z = linear("t"), linear("zOffset")
+        aside = 0.0
+        if isinstance(item, Guardrail) and item.faces != "both":
+            aside = 0.075 if item.faces == "left" else -0.075
+        last = getattr(item, "end_offset", item.offset)
+        axis = np.interp(s, [item.start_station, item.end_station], [item.offset, last])
+        assert np.abs(t - aside - axis).max() < 1e-6
+        wanted = surface_elevation(geometry, s, axis) - geometry.profile.elevation(s)
+        assert np.abs(z - wanted).max() < 1.5 * MILLIMETRE
+        assert linear("height").max() == pytest.approx(item.height, rel=0.02)
+
+
+def test_dimensions_and_headings(tmp_path: Path) -> None:
+    road = everything()
+    read = written(road, tmp_path)
+    known, seen = read.objects(), read.signals()
+    sign = road.objects["sign-274"]
+    item = seen[str(sign.instance)]
+    assert (item.get("type"), item.get("subtype"), item.get("value"), item.get("unit")) == ("274", "120", "120", "km/h")
+    assert (number(item, "width"), number(item, "height"), item.get("orientation")) == (sign.width, sign.height, "-")
+    assert number(item, "hOffset") == 0.0
+    posts = known[item.find("reference").get("elementId")]
+    assert notes_of(posts)["instance"] == str(sign.instance)
+    gantry = road.objects["gantry"]
+    assert isinstance(gantry, Gantry)
+    hung = seen[f"{gantry.instance}-1"]
+    assert (number(hung, "t"), hung.get("orientation")) == (gantry.signs[0].offset, "+")
+    beam, *posts = corners_local(known[str(gantry.instance)])
+    assert np.ptp(beam[:, 1]) == pytest.approx(gantry.left_offset - gantry.right_offset)
+    assert len(posts) == 2
+    beacon = next(iter(road.of_type(ConstructionBeacon).values()))
+    assert number(known[str(beacon.instance)], "width") == beacon.width
+
+
+def test_clearance_of_what_spans_the_road(tmp_path: Path) -> None:
+    road = curved(everything())
+    read, geometry = written(road, tmp_path), RoadGeometry(road)
+    bridge = next(iter(road.of_type(Overpass).values()))
+    item = read.objects()[str(bridge.instance)]
+    deck = corners_local(item)[0]
+    bottom = read.place(item)[2] + deck[0, 2] - ORIGIN[2]
+    s, t = np.meshgrid(np.linspace(bridge.station - 5.0, bridge.station + 5.0, 41), np.linspace(-18.0, 18.0, 721))
+    strips = geometry.strip_index(s.ravel(), t.ravel())
+    paved = np.array([strip.class_name == "road" for strip in geometry.strips])[strips] & (strips >= 0)
+    highest = geometry.elevation(s.ravel()[paved], t.ravel()[paved]).max()
+    assert bottom - highest == pytest.approx(bridge.clearance, abs=0.02)
+    (tunnel,) = read.road.findall("objects/tunnel")
+    assert (tunnel.get("type"), number(tunnel, "s")) == ("underpass", bridge.station - bridge.width / 2.0)
+
+
+def test_traffic_is_named_but_not_drawn(tmp_path: Path) -> None:
+    road = everything()
+    read = written(road, tmp_path)
+    for vehicle in road.of_type(Vehicle).values():
+        assert str(vehicle.instance) not in read.objects()
+        assert vehicle.instance in all_instances(read)
+
+
+# --- the file -----------------------------------------------------------------------------------------------------
+
+
+def test_same_road_same_bytes_and_no_date(tmp_path: Path) -> None:
+    road = sample_road(scenario(length=1000.0, **EVERYTHING), 11)
+    for name in ("a", "b"):
+        write_opendrive(RoadParameters.from_dict(road.to_dict()), tmp_path / name, TOLERANCE)
+    text = (tmp_path / "a").read_bytes()
+    assert text == (tmp_path / "b").read_bytes()
+    assert b"\r" not in text
+    header = re.search(rb"<header[^>]*>", text)
+    assert header
+    assert b"date" not in header[0]
+
+
+def test_header_tells_where_on_earth(tmp_path: Path) -> None:
+    read = written(everything(), tmp_path)
+    assert read.offset.tolist() == list(ORIGIN)
+    text = (tmp_path / "road.xodr").read_text()
+    assert re.search(r"<geoReference><!\[CDATA\[\+proj=tmerc [^<]*\]\]></geoReference>", text)
+    local = read.point(np.array([0.0, 1000.0]), np.zeros(2)) - read.offset
+    header = read.root.find("header")
+    assert number(header, "west") <= local[:, 0].min() <= local[:, 0].max() <= number(header, "east")
+
+
+@pytest.mark.parametrize("epsg", [25832, 32633, 31467, 2056, 5555])
+def test_coordinate_systems_place_points_alike(epsg: int) -> None:
+    require("pyproj")
+    import pyproj
+
+    other = pyproj.CRS.from_user_input(geo_reference(epsg))
+    own = pyproj.CRS.from_epsg(epsg)
+    for crs in (own, other):
+        assert crs.is_projected or crs.is_compound
+    plane = own.sub_crs_list[0] if own.is_compound else own
+    other = other.sub_crs_list[0] if other.is_compound else other
+    geodetic = pyproj.Proj(plane)(9.5, 50.5)
+    assert pyproj.Proj(other)(9.5, 50.5) == pytest.approx(geodetic, abs=1e-6)
+
+
+def test_odd_texts_stay_xml(tmp_path: Path) -> None:
+    data = everything().to_dict()
+    data["metadata"]["title"] = 'A "road" <of> & \x0b\x00 ]]> \U0001f69b verbatim:x'
+    data["objects"]["sign-448"]["text"] = ["<A 4>", "Köln & Bonn"]
+    read = written(RoadParameters.from_dict(data), tmp_path)
+    assert notes_of(read.root.find("header"))["title"] == 'A "road" <of> &  ]]> \U0001f69b verbatim:x'
+    assert read.signals()[str(data["objects"]["sign-448"]["instance"])].get("text") == "<A 4>\nKöln & Bonn"
+
+
+def test_what_stands_beyond_the_end_is_refused(tmp_path: Path) -> None:
+    road = changed(everything(), pole={"station": 2000.5})
+    with pytest.raises(InputError, match=r"objects\.pole\.station is 2000\.5.*2000 m"):
+        write_opendrive(road, tmp_path / "road.xodr", TOLERANCE)
+
+
+# --- pieces -------------------------------------------------------------------------------------------------------
+
+
+@given(
+    kinks=st.lists(st.floats(1.0, 99.0), min_size=1, max_size=5, unique=True),
+    values=st.lists(st.floats(-5.0, 5.0), min_size=12, max_size=12),
+)
+@settings(max_examples=50, deadline=None)
+def test_cubics_are_what_they_stand_for(kinks: list[float], values: list[float]) -> None:
+    borders = np.array([0.0, *sorted(kinks), 100.0])
+
+    def function(s: np.ndarray) -> np.ndarray:
+        line = np.interp(s, borders, values[: len(borders)])
+        return np.column_stack([line, np.minimum(line, values[7]) + values[8] * (s / 100.0) ** 3])
+
+    found = cubics(function, borders)
+    s = np.linspace(0.0, 100.0, 777)
+    steepest = 10.0 / max(np.diff(borders).min(), 1e-3)
+    for f in range(2):
+        starts, coefficients = zip(*runs(found.borders, found.coefficients[:, f]), strict=True)
+        piece = np.searchsorted(starts, s, side="right") - 1
+        a, b, c, d = np.array(coefficients)[piece].T
+        u = s - np.array(starts)[piece]
+        assert np.abs(a + u * (b + u * (c + u * d)) - function(s)[:, f]).max() < 1e-6 + 1e-4 * steepest
+
+
+def test_a_short_piece_goes_on_as_the_long_one_does() -> None:
+    borders = np.array([0.0, 0.05, 100.0, 100.1])
+    found = cubics(lambda s: ((s / 37.0) ** 3 + 0.1 * s)[:, None], borders)
+    ((start, coefficients),) = runs(found.borders, found.coefficients[:, 0])
+    assert start == 0.0
+    assert coefficients == pytest.approx([0.0, 0.1, 0.0, 37.0**-3], abs=1e-9)
+
+
+@given(st.floats(3.0, 30.0), st.floats(1e-4, 1e-2))
+@settings(max_examples=30, deadline=None)
+def test_chords_stay_within_the_tolerance(wavelength: float, tolerance: float) -> None:
+    def function(s: np.ndarray) -> np.ndarray:
+        return np.sin(s[:, None] / wavelength)
+
+    found = chords(function, np.array([0.0, 50.0, 100.0]), tolerance)
+    s = np.linspace(0.0, 100.0, 5001)
+    assert np.abs(np.interp(s, found, function(found)[:, 0]) - function(s)[:, 0]).max() < 1.5 * tolerance
+
+
+# --- faults that the reader sees ----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("path", "name", "by"),
+    [
+        ("planView/geometry", "x", 0.002),
+        ("planView/geometry/spiral", "curvEnd", 1e-6),
+        ("elevationProfile/elevation", "c", 1e-7),
+        ("lateralProfile/shape", "b", 1e-3),
+        ("lanes/laneSection/right/lane/width", "a", 0.002),
+        ("lanes/laneSection/left/lane/width", "b", 1e-3),
+        ("lanes/laneSection/right/lane/height", "outer", 0.002),
+    ],
+)
+def test_planted_faults_show(tmp_path: Path, path: str, name: str, by: float) -> None:
+    road = curved(everything())
+    read = written(road, tmp_path)
+    item = read.road.find(path)
+    item.set(name, repr(number(item, name) + by))
+    (tmp_path / "bad.xodr").write_text(ElementTree.tostring(read.root, "unicode"))
+    assert worst_border(road, OpenDrive.read(tmp_path / "bad.xodr")) > MILLIMETRE / 2.0
+
+
+# --- ASAM's checker; `tests/judges/test_judges.py` has other readers ------------------------------------------------
+
+
+@pytest.mark.parametrize("name", ["widening", "sampled"])
+@pytest.mark.first_python
+def test_quality_checker_finds_nothing(name: str, tmp_path: Path) -> None:
+    require("asam-qc-opendrive")
+    write_opendrive(ROADS[name](), tmp_path / "road.xodr", TOLERANCE)
+    assert quality_faults(tmp_path / "road.xodr") == []
+
+
+@pytest.mark.slow
+@pytest.mark.first_python
+def test_quality_checker_finds_nothing_in_fifty_roads(tmp_path: Path) -> None:
+    require("asam-qc-opendrive")
+    roads = [ROADS[name]() for name in ("everything", "curved", "right only", "left only", "widening")]
+    for i, (design_class, section) in enumerate(PAIRS):
+        for seed, more in enumerate(
+            ({}, {"turnouts": EVERYTHING["turnouts"]}, {"furniture": {"construction_zone": 1}})
+        ):
+            asked = scenario(design_class=design_class, cross_section=section, length=700.0 + 300.0 * seed, **more)
+            roads.append(sample_road(asked, 100 * i + seed))
+    roads += full_roads()[10:13] + full_roads()[40:43]
+    assert len(roads) == 50
+    assert sum(bool(road.of_type(Turnout)) for road in roads) >= 20
+    assert sum(bool(road.of_type(ConstructionBeacon)) for road in roads) >= 10
+    for i, road in enumerate(roads):
+        path = tmp_path / f"{i}.xodr"
+        write_opendrive(road, path, TOLERANCE)
+        assert worst_border(road, OpenDrive.read(path)) < 0.2 * MILLIMETRE
+        assert quality_faults(path) == []
+
+
+@pytest.mark.first_python
+def test_quality_checker_sees_planted_faults(tmp_path: Path) -> None:
+    require("asam-qc-opendrive")
+    write_opendrive(sample_road(scenario(length=600.0), 7), tmp_path / "good.xodr", TOLERANCE)
+    text = (tmp_path / "good.xodr").read_text()
+    faults = {
+        "xml_valid_schema": (r'type="driving"', 'type="drivable"'),
+        "no_horizontal_gaps": (r'curvEnd="[^"]*"', 'curvEnd="0.004"'),
+        "lanes_across_lane_sections": (r'<successor id="-4" ?/>', ""),
+        "zero_width_at_start": (
+            r'(<lane id="(-\d+)"[^>]*>\s*<link>)(\s*<successor[^>]*>\s*</link>\s*<width sOffset="0" a="0")',
+            r'\1<predecessor id="\2" />\3',
+        ),
+        "avoid_redundant_info": (
+            r'(<width sOffset=")0(" a="[^"]*" b="0" c="0" d="0" />)',
+            r"\g<1>0\2\g<1>0.01\2",
+        ),
+    }
+    for name, (pattern, to) in faults.items():
+        bad, count = re.subn(pattern, to, text, count=1)
+        assert count == 1, name
+        (tmp_path / "bad.xodr").write_text(bad)
+        found = quality(tmp_path / "bad.xodr")
+        assert [check for check, (_, issues) in found.items() if issues and name in check], name
+
+
+# --- cost ---------------------------------------------------------------------------------------------------------
+
+
+def test_long_road_takes_seconds(tmp_path: Path) -> None:
+    road = sample_road(scenario(length=20_000.0), 1)
+    read = written(road, tmp_path)
+    assert math.isclose(read.length, road.alignment.length)
+    assert (tmp_path / "road.xodr").stat().st_size < 4_000_000

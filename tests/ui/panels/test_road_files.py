@@ -1,0 +1,169 @@
+"""Roads from and to files: the buttons do what the library does, and bad files are messages."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import bpy
+import numpy as np
+import pytest
+
+from synthroads_addon.blender.compat import set_modifier_input
+from synthroads_addon.blender.model.store import find_road, recall
+from synthroads_addon.jobs.generate import Job, generate, road_parameters
+from synthroads_addon.road.parameters import RoadParameters, read_parameters
+from synthroads_addon.sampling.road import sample_road
+from synthroads_addon.scenario.scenario import Scenario, load_scenario
+from synthroads_addon.ui.panels.road_files import source_of
+from tests.helpers.scenes.panel_road import SAME, cheap, settings, small_pictures
+
+__all__ = ["cheap", "settings", "small_pictures"]
+
+pytestmark = pytest.mark.usefixtures("small_pictures")
+
+
+def set_file(folder: Path) -> Path:
+    """Write a set that the panel's settings would not make."""
+    wanted = load_scenario("rq31-600m", [*SAME, "road.length=130", "seed=11", "road.cross_section=RQ36"])
+    path = folder / "road.json"
+    path.write_text(sample_road(wanted.road, wanted.seed, "Mine").to_json(), encoding="utf-8")
+    return path
+
+
+def axis_file(folder: Path) -> Path:
+    """Write points along a bend of 900 m radius, 200 m long, rising by 1 %."""
+    angle = np.linspace(0.0, 200.0 / 900.0, 201)
+    points = np.stack([294_000 + 900 * np.sin(angle), 5_628_000 + 900 * (1 - np.cos(angle)), 180 + 9 * angle], axis=1)
+    path = folder / "axis.csv"
+    path.write_text("x,y,z\n" + "\n".join(f"{x:.4f},{y:.4f},{z:.4f}" for x, y, z in points), encoding="utf-8")
+    return path
+
+
+def built() -> tuple[RoadParameters, Scenario]:
+    collection = find_road(bpy.context.scene)
+    assert collection
+    return recall(collection)
+
+
+def test_a_loaded_road_is_the_files_at_the_panels_fidelity(cheap: Any, tmp_path: Path) -> None:
+    path = set_file(tmp_path)
+    cheap.fidelity = "standard"
+    assert bpy.ops.synthroads.load_road(filepath=str(path)) == {"FINISHED"}
+    parameters, kept = built()
+    assert parameters == read_parameters(path)
+    assert kept == cheap.scenario()
+    assert kept.fidelity == "standard"
+    assert source_of(find_road(bpy.context.scene)) == "road.json"
+
+
+def test_a_scan_of_a_loaded_road_is_the_librarys(cheap: Any, tmp_path: Path) -> None:
+    path = set_file(tmp_path)
+    cheap.output = str(tmp_path / "panel")
+    bpy.ops.synthroads.load_road(filepath=str(path))
+    bpy.ops.synthroads.scan()
+    wanted = load_scenario("rq31-600m", [*SAME, 'outputs=["parameters","cloud"]'])
+    generate(Job(wanted, tmp_path / "library", parameters=path, new_file=True))
+    for name in ("parameters.json", "cloud.laz"):
+        assert (tmp_path / "panel" / name).read_bytes() == (tmp_path / "library" / name).read_bytes(), name
+
+
+def test_a_fitted_road_is_the_librarys(cheap: Any, tmp_path: Path) -> None:
+    path = axis_file(tmp_path)
+    cheap.road.epsg = 25833
+    assert bpy.ops.synthroads.load_axis(filepath=str(path)) == {"FINISHED"}
+    parameters, report = road_parameters(Job(cheap.scenario(), tmp_path, axis=path))
+    assert built()[0] == parameters
+    assert report["axis"]["horizontal"]["worst"] < 0.01
+    assert parameters.metadata.epsg == 25833
+    assert parameters.alignment.length == pytest.approx(200.0, abs=0.01)
+    assert source_of(find_road(bpy.context.scene)) == "axis.csv"
+
+
+def test_a_saved_set_has_the_bytes_of_a_scans(cheap: Any, tmp_path: Path) -> None:
+    cheap.output = str(tmp_path)
+    bpy.ops.synthroads.build()
+    set_modifier_input(bpy.data.objects["Road"].modifiers[0], "Right Lane 1 Width", 4.5)
+    assert bpy.ops.synthroads.save_road(filepath=str(tmp_path / "mine.json")) == {"FINISHED"}
+    bpy.ops.synthroads.scan()
+    assert (tmp_path / "mine.json").read_bytes() == (tmp_path / "parameters.json").read_bytes()
+    assert read_parameters(tmp_path / "mine.json").carriageway("right").lanes[0].width == 4.5
+
+
+def test_a_saved_set_comes_back(cheap: Any, tmp_path: Path) -> None:
+    path = set_file(tmp_path)
+    bpy.ops.synthroads.load_road(filepath=str(path))
+    bpy.ops.synthroads.save_road(filepath=str(tmp_path / "again.json"))
+    assert (tmp_path / "again.json").read_bytes() == path.read_bytes()
+
+
+def test_the_panel_names_a_file_only_where_the_road_is_its(cheap: Any, tmp_path: Path) -> None:
+    bpy.ops.synthroads.load_road(filepath=str(set_file(tmp_path)))
+    bpy.ops.synthroads.build()
+    assert source_of(find_road(bpy.context.scene)) is None
+
+
+def test_the_users_own_things_stay(cheap: Any, tmp_path: Path) -> None:
+    bpy.ops.mesh.primitive_cube_add(location=(1.0, 2.0, 3.0))
+    cube, camera = bpy.context.object, bpy.data.cameras.new("Mine")
+    render = bpy.context.scene.render
+    render.resolution_x, render.engine = 333, "CYCLES"
+    before = (tuple(cube.location), cube.data.name, [c.name for c in cube.users_collection], camera.name)
+    bpy.ops.synthroads.load_road(filepath=str(set_file(tmp_path)))
+    bpy.ops.synthroads.save_road(filepath=str(tmp_path / "mine.json"))
+    assert before == (tuple(cube.location), cube.data.name, [c.name for c in cube.users_collection], camera.name)
+    assert (render.resolution_x, render.engine) == (333, "CYCLES")
+
+
+def test_saving_replaces_the_file_whole(cheap: Any, tmp_path: Path) -> None:
+    bpy.ops.synthroads.load_road(filepath=str(set_file(tmp_path)))
+    (tmp_path / "mine.json").write_text("old" * 100_000)
+    bpy.ops.synthroads.save_road(filepath=str(tmp_path / "mine.json"))
+    assert read_parameters(tmp_path / "mine.json") == built()[0]
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["mine.json", "road.json"]
+
+
+BAD = {
+    "missing": (None, "no such file"),
+    "empty": ("", "must be valid JSON"),
+    "no JSON": ("x,y,z\n1,2,3\n", "must be valid JSON"),
+    "another kind": (json.dumps({"type": "Scenario"}), "type is 'Scenario': must be 'RoadParameters'"),
+    "a version to come": (json.dumps({"type": "RoadParameters", "version": "9"}), "reads version"),
+    "not text": (b"\xff\xfe\x00", "must be JSON in UTF-8"),
+}
+BAD_AXES = {
+    "missing": (None, "an axis file is needed here"),
+    "empty": ("", "the file is empty"),
+    "one point": ("x,y,z\n1,2,3\n", "at least two distinct points"),
+    "a word": ("x,y,z\n1,2,3\n4,five,6\n", "five"),
+}
+
+
+@pytest.mark.parametrize(
+    ("operator", "content", "message"),
+    [("load_road", *case) for case in BAD.values()] + [("load_axis", *case) for case in BAD_AXES.values()],
+)
+def test_a_bad_file_is_a_message_and_the_road_stays(
+    cheap: Any, tmp_path: Path, operator: str, content: str | bytes | None, message: str
+) -> None:
+    cheap.road.length = 60.0
+    bpy.ops.synthroads.build()
+    before, path = built(), tmp_path / "bad.json"
+    if content is not None:
+        path.write_bytes(content if isinstance(content, bytes) else content.encode())
+    with pytest.raises(RuntimeError, match=message) as caught:
+        getattr(bpy.ops.synthroads, operator)(filepath=str(path))
+    assert "Traceback" not in str(caught.value)
+    assert built() == before
+
+
+def test_a_folder_that_cannot_be_written_is_a_message(cheap: Any, tmp_path: Path) -> None:
+    bpy.ops.synthroads.load_road(filepath=str(set_file(tmp_path)))
+    (tmp_path / "file").write_text("mine")
+    with pytest.raises(RuntimeError, match="cannot be written") as caught:
+        bpy.ops.synthroads.save_road(filepath=str(tmp_path / "file" / "mine.json"))
+    assert "Traceback" not in str(caught.value)
+
+
+def test_saving_needs_a_road(cheap: Any, tmp_path: Path) -> None:
+    with pytest.raises(RuntimeError, match="Build a road first"):
+        bpy.ops.synthroads.save_road(filepath=str(tmp_path / "mine.json"))

@@ -1,0 +1,279 @@
+"""The button that builds: it does what the library does, leaves the user's own alone, and nothing when cancelled."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Generator
+from typing import Any
+
+import bpy
+import pytest
+
+from synthroads_addon.base.errors import InputError
+from synthroads_addon.blender.model import build as model_module
+from synthroads_addon.blender.model.build import build_road, build_steps
+from synthroads_addon.blender.model.stage import Made, remove_staged
+from synthroads_addon.blender.model.store import find_road, recall
+from synthroads_addon.blender.scene.evaluated import scene_mesh
+from synthroads_addon.blender.things.model_builder import ROLE
+from synthroads_addon.road.parameters import RoadParameters
+from synthroads_addon.sampling.road import sample_road
+from synthroads_addon.scenario.scenario import load_scenario
+from synthroads_addon.ui.work import build
+from synthroads_addon.ui.work.job import Job, running_job
+from tests.helpers.scenes.kept_groups import KeptGroups
+from tests.helpers.scenes.panel_road import SAME, block_counts, cheap, choose, fingerprint, settings, users_own  # noqa: F401
+from tests.helpers.scenes.scene_hash import changes, digest, lines
+
+
+def parameters(**road: Any) -> RoadParameters:
+    """Return a small road with plants and barriers."""
+    changes = [f"road.{name}={value}" for name, value in ({"length": 60, "half_width": 20} | road).items()]
+    scenario = load_scenario("rq31-600m", changes)
+    return sample_road(scenario.road, scenario.seed, scenario.title)
+
+
+def finish(steps: Generator[Any, None, Any]) -> Any:
+    """Run a generator to its end; return what it returns."""
+    while True:
+        try:
+            next(steps)
+        except StopIteration as end:
+            return end.value
+
+
+def test_the_button_builds_what_the_library_builds(cheap: Any) -> None:  # noqa: F811
+    assert bpy.ops.synthroads.build() == {"FINISHED"}
+    found = find_road(bpy.context.scene)
+    kept, _ = recall(found)
+    panel = scene_mesh()
+    same = load_scenario("rq31-600m", SAME)
+    road = sample_road(same.road, same.seed, same.title)
+    assert kept == road
+    build_road(road, same.settings().tolerance, same.settings().vegetation_detail)
+    library = scene_mesh()
+    for name in ("vertices", "triangles", "class_id", "instance_id", "material"):
+        assert (getattr(panel, name) == getattr(library, name)).all(), name
+
+
+def test_steps_build_what_is_built_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(model_module, "_TURN", 0.0)  # as many turns as there can be
+    road = parameters()
+    first = finish(build_steps(road, 0.02, 0.1))
+    names = sorted(item.name for item in first.collection.objects)
+    stepped = scene_mesh()
+    second = build_road(road, 0.02, 0.1)
+    at_once = scene_mesh()
+    assert sorted(item.name for item in second.collection.objects) == names == sorted(second.objects)
+    for name in ("vertices", "triangles", "class_id", "instance_id", "material"):
+        assert (getattr(stepped, name) == getattr(at_once, name)).all(), name
+    assert [item.name for item in bpy.data.collections] == ["SynthRoads"]
+
+
+def steps_until_cancelled(number: int, begin: Callable[[], Generator[Any, None, Any]]) -> bool:
+    """Begin, do so many steps, give up; return whether there were as many."""
+    steps = begin()
+    try:
+        for _ in range(number):
+            next(steps)
+    except StopIteration:
+        return False
+    steps.close()
+    return True
+
+
+@pytest.mark.parametrize("before", ["nothing", "a road and the user's own"])
+def test_cancelling_at_any_step_leaves_the_file_as_it_was(
+    before: str,
+    users_own: bpy.types.Object,  # noqa: F811
+    monkeypatch: pytest.MonkeyPatch,
+    kept_groups: KeptGroups,
+) -> None:
+    if before != "nothing":
+        model = build_road(parameters(length=40), 0.02, 0.1)
+        model.collection.objects.link(users_own)
+        model.collection.color_tag = "COLOR_03"
+        kept_groups.on = False  # steps end in the midst of making groups too
+    monkeypatch.setattr(model_module, "_TURN", 0.002)
+    expected, counts = digest(), block_counts()
+    road = parameters()
+    number, seen = 1, 0
+    while steps_until_cancelled(number, lambda: build_steps(road, 0.02, 0.1)):
+        assert block_counts() == counts, number
+        assert digest() == expected, number
+        seen += 1
+        number = max(number + 1, int(1.6 * number))
+    assert seen >= 5
+
+
+def test_cancelling_leaves_what_the_user_made_meanwhile() -> None:
+    steps = build_steps(parameters(), 0.02, 0.1)
+    for _ in range(4):
+        next(steps)
+    bpy.data.materials.new("Mine")
+    bpy.data.objects.new("Mine", bpy.data.meshes.new("Mine"))
+    steps.close()
+    assert [item.name for item in bpy.data.objects] == ["Mine"]
+    assert [item.name for item in bpy.data.meshes] == ["Mine"]
+    assert [item.name for item in bpy.data.materials] == ["Mine"]
+    assert len(bpy.data.node_groups) == len(bpy.data.collections) == 0
+
+
+def test_the_road_before_stays_until_the_new_one_is_complete() -> None:
+    old = build_road(parameters(length=40), 0.02, 0.1)
+    names = sorted(old.objects)
+    steps = build_steps(parameters(), 0.02, 0.1)
+    next(steps)
+    for _ in steps:
+        found = bpy.data.collections["SynthRoads"]
+        assert sorted(item.name for item in found.objects) == names
+    assert sorted(item[ROLE] for item in bpy.data.collections["SynthRoads"].objects) == sorted(
+        item.name for item in bpy.data.objects if ROLE in item
+    )
+
+
+def test_a_part_that_fails_leaves_the_road_before(monkeypatch: pytest.MonkeyPatch) -> None:
+    build_road(parameters(length=40), 0.02, 0.1)
+    expected, counts = digest(), block_counts()
+
+    def fail(builder: Any) -> None:
+        raise InputError("asset", None, "cannot be read")
+
+    monkeypatch.setitem(model_module.PARTS, "delineators", fail)
+    for run in (lambda: build_road(parameters(), 0.02, 0.1), lambda: finish(build_steps(parameters(), 0.02, 0.1))):
+        with pytest.raises(InputError, match="cannot be read"):
+            run()
+        assert block_counts() == counts
+        assert digest() == expected
+
+
+def test_groups_of_an_older_version_get_their_names_back(kept_groups: KeptGroups) -> None:
+    build_road(parameters(length=40), 0.02, 0.1)
+    kept_groups.on = False
+    for group in bpy.data.node_groups:
+        group["synthroads_key"] = "older"
+    expected = digest()
+    steps = build_steps(parameters(), 0.02, 0.1)
+    while len(bpy.data.collections["SynthRoads (building)"].objects if len(bpy.data.collections) > 1 else ()) < 3:
+        next(steps)
+    assert any("(older)" in group.name for group in bpy.data.node_groups)
+    steps.close()
+    assert digest() == expected
+
+
+def test_what_a_build_could_not_clean_up_goes_with_the_next_look() -> None:
+    build_road(parameters(length=40), 0.02, 0.1)
+    expected = [line for line in lines() if not line.startswith("materials")]
+    steps = build_steps(parameters(), 0.02, 0.1)
+    # How often it pauses depends on the machine's speed.
+    for _ in steps:
+        found = bpy.data.collections.get("SynthRoads (building)")
+        if found is not None and len(found.objects):
+            break
+    else:
+        pytest.fail("it never paused with something half-built")
+    remove_staged()
+    assert [line for line in lines() if not line.startswith("materials")] == expected
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(Made, "remove", lambda self: None)
+        steps.close()
+
+
+def render_settings() -> dict[str, str]:
+    scene = bpy.context.scene
+    return {
+        f"{name}.{prop.identifier}": repr(getattr(part, prop.identifier))
+        for name, part in (("render", scene.render), ("view", scene.view_settings), ("eevee", scene.eevee))
+        for prop in part.bl_rna.properties
+        if prop.type in ("BOOLEAN", "INT", "FLOAT", "ENUM", "STRING") and not getattr(prop, "is_array", False)
+    }
+
+
+def test_building_leaves_the_users_objects_alone(cheap: Any, users_own: bpy.types.Object) -> None:  # noqa: F811
+    before, render = fingerprint(users_own), render_settings()
+    bpy.ops.synthroads.build()
+    bpy.ops.synthroads.build()  # takes the place of the first road
+    assert fingerprint(users_own) == before
+    assert render_settings() == render
+    assert [item.name for item in bpy.data.objects if ROLE not in item] == [users_own.name]
+
+
+@pytest.mark.new_groups
+def test_the_operator_cancelled_at_any_tick_leaves_the_file(cheap: Any) -> None:  # noqa: F811
+    choose(cheap, **{"road.length": 60.0})
+    expected, counts = lines(), block_counts()
+    for ticks in (0, 1, 2, 5, 9):
+        job = Job("Build", build.build_work(cheap.scenario(), ""))
+        job.start()
+        for _ in range(ticks):
+            job.tick(0.02)
+        job.stop()
+        while job.tick():
+            pass
+        assert running_job() is None
+        assert block_counts() == counts
+        assert changes(expected) == [], f"after {ticks} ticks"
+
+
+def test_undo_takes_the_road_away_and_redo_brings_it_back(cheap: Any, users_own: bpy.types.Object) -> None:  # noqa: F811
+    bpy.ops.ed.undo_push(message="before")
+    names = sorted(item.name for item in bpy.data.objects)
+    bpy.ops.synthroads.build()
+    bpy.ops.ed.undo_push(message="Build Road")
+    built = sorted(item.name for item in bpy.data.objects)
+    bpy.ops.ed.undo()
+    assert sorted(item.name for item in bpy.data.objects) == names
+    assert find_road(bpy.context.scene) is None
+    bpy.ops.ed.redo()
+    assert sorted(item.name for item in bpy.data.objects) == built
+    assert find_road(bpy.context.scene)
+
+
+def test_undo_in_the_midst_of_a_build_gives_it_up(cheap: Any, users_own: bpy.types.Object) -> None:  # noqa: F811
+    bpy.ops.ed.undo_push(message="before")
+    users_own.location.x += 1.0
+    bpy.ops.ed.undo_push(message="moved")
+    job = Job("Build", build.build_work(cheap.scenario(), ""))
+    job.start()
+    while len(bpy.data.objects) < 4:
+        job.tick()
+    bpy.ops.ed.undo()
+    assert running_job() is None
+    assert [item.name for item in bpy.data.objects] == ["Cube"]
+    assert [item.name for item in bpy.data.collections] == ["Mine"]
+
+
+def test_an_undo_step_of_a_half_built_road_holds_none_of_it(cheap: Any, users_own: bpy.types.Object) -> None:  # noqa: F811
+    bpy.ops.ed.undo_push(message="before")
+    job = Job("Build", build.build_work(cheap.scenario(), ""))
+    job.start()
+    while len(bpy.data.objects) < 4:
+        job.tick()
+    bpy.data.objects["Cube"].location.x += 1.0
+    bpy.ops.ed.undo_push(message="moved meanwhile")
+    while job.tick():
+        pass
+    assert job.error is None
+    bpy.ops.ed.undo_push(message="Build Road")
+    bpy.ops.ed.undo()
+    assert [item.name for item in bpy.data.objects] == ["Cube"]
+    assert [item.name for item in bpy.data.collections] == ["Mine"]
+
+
+def test_buttons_wait_for_object_mode(settings: Any, users_own: bpy.types.Object) -> None:  # noqa: F811
+    bpy.context.view_layer.objects.active = users_own
+    bpy.ops.object.mode_set(mode="EDIT")
+    with pytest.raises(RuntimeError, match="object mode"):
+        bpy.ops.synthroads.build()
+    bpy.ops.object.mode_set(mode="OBJECT")
+
+
+def test_a_refused_setting_leaves_the_built_road(cheap: Any, monkeypatch: pytest.MonkeyPatch) -> None:  # noqa: F811
+    def refuse(*arguments: Any) -> None:
+        raise InputError("road.radius", 1, "is too small")
+
+    bpy.ops.synthroads.build()
+    before = digest()
+    monkeypatch.setattr(build, "sample_road", refuse)
+    with pytest.raises(RuntimeError, match=r"Error: road\.radius is 1: is too small"):
+        bpy.ops.synthroads.build()
+    assert digest() == before

@@ -1,0 +1,204 @@
+"""Long work of the panel: steps in the window's thread, parts in a thread of their own, stopped at any time."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+
+import synthroads_addon
+from synthroads_addon.base.errors import Cancelled, InputError
+from synthroads_addon.ui.work import job as job_module
+from synthroads_addon.ui.work.common import is_free
+from synthroads_addon.ui.work.job import Aside, Job, Report, Step, Work, running_job, stop_job
+
+
+@pytest.fixture(autouse=True)
+def nothing_runs_before_and_after() -> Iterator[None]:
+    assert running_job() is None
+    yield
+    stop_job()
+
+
+def work(log: list[str], gate: threading.Event | None = None) -> Work[str]:
+    try:
+        log.append("begin")
+        yield Step(0.1, "Reading")
+        log.append("read")
+
+        def aside(report: Report) -> str:
+            for step in range(5):
+                report(step / 5)
+            if gate is not None:
+                gate.wait(30.0)
+            report(1.0)
+            return threading.current_thread().name
+
+        found = yield Aside(aside, "Scanning", 0.2, 0.8)
+        log.append(found)
+        yield 0.9
+    finally:
+        log.append("clean")
+    return "done"
+
+
+def tick_to_the_end(job: Job[Any]) -> None:
+    while job.tick(0.001):
+        pass
+
+
+def test_run_does_it_all_here() -> None:
+    log: list[str] = []
+    job = Job("Test", work(log))
+    assert job.run() == "done"
+    assert log == ["begin", "read", threading.current_thread().name, "clean"]
+    assert (job.result, job.share, job.error, running_job()) == ("done", 1.0, None, None)
+
+
+def test_in_the_window_the_long_part_has_a_thread() -> None:
+    log: list[str] = []
+    gate = threading.Event()
+    job = Job("Test", work(log, gate))
+    job.start()
+    assert running_job() is job
+    assert job.running
+    assert (job.share, job.state) == (0.1, "Reading 10%")
+    while job.touches_scene:
+        job.tick(0.0)
+    begin = time.perf_counter()
+    assert job.tick(10.0)
+    assert time.perf_counter() - begin < 1.0  # it does not wait for the thread
+    while job.share < 0.6:
+        time.sleep(0.001)
+    assert job.share == pytest.approx(0.68)
+    assert job.state == "Scanning 68%"
+    gate.set()
+    tick_to_the_end(job)
+    assert log == ["begin", "read", "SynthRoads Test", "clean"]
+    assert (job.result, job.running, running_job()) == ("done", False, None)
+
+
+def test_a_tick_keeps_to_its_budget() -> None:
+    def steps() -> Work[None]:
+        while True:
+            time.sleep(0.01)
+            yield 0.5
+
+    job = Job("Test", steps())
+    job.start()
+    begin = time.perf_counter()
+    job.tick(0.05)
+    assert 0.05 <= time.perf_counter() - begin < 0.5
+    job.stop(wait=True)
+
+
+def test_with_nothing_to_do_a_tick_ends() -> None:
+    count = 0
+
+    def steps() -> Work[None]:
+        nonlocal count
+        while True:
+            count += 1
+            yield None
+
+    job = Job("Test", steps())
+    job.start()
+    job.tick(10.0)
+    assert count == 2
+    job._idle = False
+    job.stop(wait=True)
+
+
+@pytest.mark.parametrize("ticks", [0, 1, 2])
+@pytest.mark.parametrize("wait", [False, True])
+def test_stopped_anywhere_it_cleans_up(ticks: int, wait: bool) -> None:
+    log: list[str] = []
+    job = Job("Test", work(log))
+    job.start()
+    for _ in range(ticks):
+        job.tick(0.0)
+    job.stop(wait)
+    if not wait:
+        tick_to_the_end(job)
+    assert isinstance(job.error, Cancelled)
+    assert log[-1] == "clean"
+    assert log.count("clean") == 1
+    assert (job.result, running_job()) == (None, None)
+
+
+def test_while_it_computes_aside_it_is_stopped_by_its_report() -> None:
+    log: list[str] = []
+    gate = threading.Event()
+    job = Job("Test", work(log, gate))
+    job.start()
+    while job.touches_scene:
+        job.tick(0.001)
+    job.stop()
+    assert job.state == "Stopping"
+    assert job.tick()  # still at work
+    gate.set()
+    tick_to_the_end(job)
+    assert isinstance(job.error, Cancelled)
+    assert log == ["begin", "read", "clean"]
+
+
+def test_what_is_wrong_at_the_begin_is_raised_at_once() -> None:
+    def wrong() -> Work[None]:
+        raise InputError("Output", None, "choose a folder")
+        yield 0.0
+
+    job = Job("Test", wrong())
+    with pytest.raises(InputError, match="choose a folder"):
+        job.start()
+    assert running_job() is None
+
+
+@pytest.mark.parametrize("where", ["step", "thread"])
+def test_what_goes_wrong_later_is_kept(where: str) -> None:
+    cleaned: list[bool] = []
+
+    def wrong() -> Work[None]:
+        try:
+            yield 0.0
+            if where == "thread":
+                yield Aside(lambda report: 1 / 0)
+            raise ZeroDivisionError
+        finally:
+            cleaned.append(True)
+
+    job = Job("Test", wrong())
+    job.start()
+    tick_to_the_end(job)
+    assert isinstance(job.error, ZeroDivisionError)
+    assert cleaned == [True]
+    with pytest.raises(ZeroDivisionError):
+        Job("Test", wrong()).run()
+
+
+def test_one_at_a_time() -> None:
+    job = Job("Test", work([]))
+    job.start()
+    with pytest.raises(AssertionError):
+        Job("Other", work([])).start()
+    job.stop(wait=True)
+    assert running_job() is None
+
+
+def test_buttons_wait_for_a_job(monkeypatch: pytest.MonkeyPatch) -> None:
+    import bpy
+
+    synthroads_addon.register()
+    said: list[str] = []
+
+    class Operator:
+        poll_message_set = said.append
+
+    assert is_free(Operator, bpy.context)
+    monkeypatch.setattr(job_module, "_running", Job("Scan", work([])))
+    assert not is_free(Operator, bpy.context)
+    assert said == ["Scan is still at work"]
+    monkeypatch.setattr(job_module, "_running", None)
+    synthroads_addon.unregister()
