@@ -41,7 +41,7 @@ def _in_callback(frame: FrameType | None) -> bool:
 
 
 def _end_quietly(kind: type[BaseException], error: BaseException, trace: TracebackType | None) -> None:
-    """End as `headless.cli.leave` does where the user stops a command that is still loading its parts."""
+    """End as `headless.commands.leave` does where the user stops a command that is still loading its parts."""
     if not issubclass(kind, KeyboardInterrupt) and not _stopped:
         sys.__excepthook__(kind, error, trace)
         return

@@ -16,7 +16,7 @@ from typing import Any
 if __name__ == "__main__":
     sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from headless.cli import Outcome, add_common_arguments, entry
+from headless.commands import Outcome, add_common_arguments, entry
 from headless.messages import progress_bar
 from synthroads_addon.base.errors import InputError
 from synthroads_addon.base.progress import Progress, silent

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 if __name__ == "__main__":
     sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from headless.cli import add_common_arguments, entry
+from headless.commands import add_common_arguments, entry
 
 if TYPE_CHECKING:
     from synthroads_addon.checking.checker import Violation

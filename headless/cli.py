@@ -1,50 +1,13 @@
-"""The console command `synthroads`: parses, runs, and turns errors into exit codes.
-
-Exit codes: 0 done; 1 a defect of ours; 2 bad input; 3 violations found, or scenes of a set failed; 130 interrupted.
-"""
+"""The console command `synthroads` with all of its sub-commands."""
 
 from __future__ import annotations
 
 import argparse
-import io
-import json
-import os
-import sys
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
-from importlib import import_module
-from pathlib import Path
+from collections.abc import Sequence
 from typing import Any
 
-from headless import was_stopped
-from headless.messages import messages
-from synthroads_addon.base.errors import InputError
+from headless.commands import Parser, add_short_options, leave, module_of, run
 from synthroads_addon.base.version import generator
-
-
-def _missing(error: ModuleNotFoundError) -> str:
-    """Return what to say of a package that isn't there; a missing part of our own is a defect and raised again."""
-    name = (error.name or "").partition(".")[0]
-    if name in ("", "headless", "ml", "synthroads_addon"):
-        raise error
-    extra = "ml" if name in ("torch", "scipy", "skimage", "matplotlib") else "blender"
-    return (
-        f"error: the package {name} is missing: in Blender install and enable the SynthRoads extension, "
-        f"elsewhere run pip install 'synthroads[{extra}]'"
-    )
-
-
-try:
-    from synthroads_addon.base.schema import canonical_json
-    from synthroads_addon.scenario.scenario import apply_change
-    from synthroads_addon.scenario.tolerance import KINDS, TIMES, parse_tolerance, shown, with_unit
-    from synthroads_addon.twin.formats import TWIN_FORMATS
-except ModuleNotFoundError as error:  # Blender itself has none of the packages that the extension brings
-    print(_missing(error), file=sys.stderr)
-    raise SystemExit(2) from None
-
-Outcome = tuple[int, dict[str, Any], str | Iterator[str]]
-"""What a sub-command returns: exit code, result as JSON data, result as text or lines of it."""
 
 COMMANDS = {
     "generate": "make a road, scan it and write cloud, parameters and pictures",
@@ -65,39 +28,6 @@ COMMANDS = {
     "reconstruct": "turn a cloud into the parameters of its road",
     "list": "list what comes under a name, and the fields that --set takes",
 }
-SHORT_OPTIONS = {
-    "--count": "-n",
-    "--device": "-d",
-    "--fidelity": "-f",
-    "--jobs": "-j",
-    "--output": "-o",
-    "--quiet": "-q",
-    "--seed": "-s",
-    "--verbose": "-v",
-    "--version": "-V",
-}
-"""Letters that stand for options, the same for all commands."""
-
-
-class _Parser(argparse.ArgumentParser):
-    """A parser whose complaints are one line, like every other bad input.
-
-    Attributes:
-        words: argument that takes words on both sides of options; argparse by itself ends one with ``*`` at the first.
-    """
-
-    words: str | None = None
-
-    def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
-        """Parse what is known; return it and the rest."""
-        found, rest = super().parse_known_args(args, namespace)
-        if self.words and not any(word.startswith("-") for word in rest):
-            setattr(found, self.words, [*(getattr(found, self.words) or ()), *rest])
-            rest = []
-        return found, rest
-
-    def error(self, message: str) -> Any:
-        self.exit(2, f"{self.prog}: {message}\n")
 
 
 class _PrintCompletion(argparse.Action):
@@ -120,254 +50,23 @@ class _PrintCompletion(argparse.Action):
 def main(argv: Sequence[str] | None = None) -> int:
     """Run one sub-command; return its exit code."""
     arguments = build_parser().parse_args(argv)
-    return run(_module(arguments.command).run, arguments)
+    return run(module_of(arguments.command).run, arguments)
 
 
 def build_parser() -> argparse.ArgumentParser:
     """Return the parser of `synthroads` with all of `COMMANDS`; the documentation's reference is made from it."""
-    parser = _Parser(prog="synthroads", description="Synthetic motorways, scanned and labelled.")
+    parser = Parser(prog="synthroads", description="Synthetic motorways, scanned and labelled.")
     parser.add_argument("--version", action="version", version=generator())
     text = "print what makes a shell complete commands, options, names and files"
     parser.add_argument("--print-completion", action=_PrintCompletion, choices=("bash", "fish", "zsh"), help=text)
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
     for name, summary in COMMANDS.items():
-        module = _module(name)
+        module = module_of(name)
         module.add_arguments(commands.add_parser(name, help=summary, description=module.__doc__))
     add_short_options(parser)
     return parser
 
 
-def add_short_options(parser: argparse.ArgumentParser) -> None:
-    """Let `SHORT_OPTIONS` stand for a parser's long options, and for those of its sub-commands."""
-    for action in parser._actions:
-        if isinstance(action, argparse._SubParsersAction):
-            for its_parser in action.choices.values():
-                add_short_options(its_parser)
-        letters = [SHORT_OPTIONS[name] for name in action.option_strings if name in SHORT_OPTIONS]
-        action.option_strings = [*letters, *action.option_strings]
-        parser._option_string_actions.update(dict.fromkeys(letters, action))
-
-
-def _module(name: str) -> Any:
-    return import_module(f"headless.{name}")
-
-
-def command(name: str, argv: Sequence[str] | None = None) -> int:
-    """Run the sub-command `name` by itself, as ``python -m headless.NAME`` or ``python -m ml.NAME`` does."""
-    module = _module(name)
-    parser = _Parser(prog=f"synthroads {name}", description=module.__doc__)
-    module.add_arguments(parser)
-    add_short_options(parser)
-    return run(module.run, parser.parse_args(argv))
-
-
-def add_changes_argument(parser: argparse.ArgumentParser) -> None:
-    """Add ``--set PATH=VALUE``, gathered in ``changes``."""
-    text = "change one field of the scenario, e.g. road.length=800 (can be repeated)"
-    parser.add_argument("--set", action="append", default=[], metavar="PATH=VALUE", dest="changes", help=text)
-
-
-def add_device_argument(parser: argparse.ArgumentParser) -> None:
-    """Add ``--device NAME``, short for the field ``scan.device``."""
-    text = "scanner: a preset's name (`synthroads list devices`) or a .json file (the scenario's own)"
-    parser.add_argument("--device", metavar="NAME", help=text)
-
-
-def all_changes(arguments: argparse.Namespace, short: Mapping[str, str]) -> list[str]:
-    """Return the changes of the scenario that ``--set`` and options which are short for fields ask for.
-
-    Args:
-        arguments: of the command.
-        short: name of an option's argument -> path of its field; options that aren't given are None or empty.
-
-    Raises:
-        InputError: an option and ``--set`` contradict each other.
-    """
-    said: Any = {}
-    for change in arguments.changes:
-        said = apply_change(said, change)
-    changes = list(arguments.changes)
-    for name, path in short.items():
-        value = getattr(arguments, name)
-        if value in (None, []):
-            continue
-        other = said
-        for key in path.split("."):
-            other = other.get(key, value) if isinstance(other, dict) else value
-        if other != value:
-            option = f"--{name.replace('_', '-')}"
-            raise InputError(option, value, f"contradicts --set {path}={other}; leave one of the two out")
-        changes.append(f"{path}={json.dumps(value)}")
-    return changes
-
-
-def add_choice_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add ``--tolerance`` and ``--time-budget``, by which settings are chosen."""
-    kinds = ", ".join(KINDS)
-    parser.add_argument(
-        "--tolerance",
-        metavar="KIND=VALUE,...",
-        help=f"choose the cheapest settings whose errors keep this, e.g. height=5mm,intensity=5%%; kinds: {kinds} "
-        "(the fidelity's settings)",
-    )
-    parser.add_argument(
-        "--time-budget",
-        metavar="TIME",
-        help="choose the best settings that fit this time, e.g. 60s or 2min (the fidelity's settings)",
-    )
-
-
-def choice_changes(arguments: argparse.Namespace) -> list[str]:
-    """Return the changes of the scenario that ``--tolerance`` and ``--time-budget`` stand for."""
-    changes = []
-    if arguments.tolerance is not None:
-        changes.append(f"tolerance={json.dumps(parse_tolerance(arguments.tolerance))}")
-    if arguments.time_budget is not None:
-        changes.append(f"time_budget={with_unit('--time-budget', arguments.time_budget, TIMES)}")
-    if changes and arguments.fidelity:
-        raise InputError("--fidelity", arguments.fidelity, "can't be given with a choice of the settings it stands for")
-    return changes
-
-
-def choice_summary(report: dict[str, Any]) -> list[str]:
-    """Return what was chosen, and what is expected of it, for people; nothing where nothing was."""
-    if "choice" not in report:
-        return []
-    choice = report["choice"]
-    chosen = ", ".join(f"{path}={value}" for path, value in choice["chosen"].items())
-    errors = ", ".join(f"{name} {shown(name, value)}" for name, value in choice["expected"]["errors"].items())
-    at_most = ", ".join(f"{name} {shown(name, value)}" for name, value in choice["expected"]["at_most"].items())
-    lines = [f"chosen: {chosen or 'nothing, as all is given'} ({choice['by']})", f"  expected errors: {errors}"]
-    lines += [f"  at most, with a confidence of 95 %: {at_most}"] if at_most else []
-    seconds = choice["expected"]["seconds"]
-    return lines + ([f"  expected time: {seconds:.0f} s in all"] if seconds is not None else [])
-
-
-def add_renamed_argument(parser: argparse.ArgumentParser, former: str, name: str) -> None:
-    """Refuse an option's former name with a hint at its name; help doesn't show it."""
-
-    class Renamed(argparse.Action):
-        def __call__(self, parser: argparse.ArgumentParser, *_: Any) -> None:
-            parser.error(f"{former} is now {name}")
-
-    parser.add_argument(former, action=Renamed, nargs="?", help=argparse.SUPPRESS)
-
-
-def add_twin_argument(parser: argparse.ArgumentParser, default: Sequence[str] = ()) -> None:
-    """Add ``--twin FORMATS``, a list of names of formats in ``twin``."""
-    text = f"geometric-semantic models, with commas: {', '.join(TWIN_FORMATS)} ({','.join(default) or 'none'})"
-    parser.add_argument("--twin", type=_listed, default=list(default), metavar="FORMATS", help=text)
-
-
-def _listed(text: str) -> list[str]:
-    """Return the names in a list with commas, each once."""
-    return list(dict.fromkeys(text.split(",")))
-
-
-def add_common_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the flags that every sub-command understands."""
-    amount = parser.add_mutually_exclusive_group()
-    text = "no progress and no notes: print errors only, and the result where it is written to no file"
-    amount.add_argument("--quiet", action="store_true", help=text)
-    amount.add_argument("--verbose", action="store_true", help="print settings, versions and times of stages as well")
-    parser.add_argument("--json", action="store_true", help="print the result as JSON on standard output")
-
-
-def _writes_files(arguments: argparse.Namespace) -> bool:
-    """Return whether a command's result is in files, so that what it prints are notes on them."""
-    named = ("output", "save", "plot", "document")
-    return any(getattr(arguments, name, None) for name in named) and not getattr(arguments, "verify", False)
-
-
-def run(action: Callable[[argparse.Namespace], Outcome], arguments: argparse.Namespace) -> int:
-    """Run an action and print of its outcome what was asked for; turn errors into one line and an exit code."""
-    try:
-        with _without_blenders_chatter(), messages(arguments):
-            code, result, text = action(arguments)
-        if arguments.json:
-            print(canonical_json(result), end="")
-        elif not arguments.quiet or not _writes_files(arguments):
-            for line in [text] if isinstance(text, str) else text:
-                print(line)
-        sys.stdout.flush()
-        return code
-    except InputError as error:
-        print(f"error: {error}", file=sys.stderr)
-        return 2
-    except ModuleNotFoundError as error:
-        if was_stopped():
-            return interrupted()
-        print(_missing(error), file=sys.stderr)
-        return 2
-    except BrokenPipeError:
-        # Whoever read our output has left (`| head`): nothing more to say, not even when the process ends.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
-        return 130
-    except KeyboardInterrupt:
-        return interrupted()
-
-
-def interrupted() -> int:
-    """Say that the user stopped the work; return the exit code."""
-    print("interrupted; nothing was left half-written", file=sys.stderr)
-    return 130
-
-
-def entry(name: str) -> None:
-    """Run a sub-command as a script, under plain Python or ``blender -b -P``; ends the process.
-
-    In Blender the arguments follow ``--``. The process is left at once, since Blender's teardown can crash.
-    """
-    in_blender = Path(sys.argv[0]).name.lower().startswith("blender")
-    begin = sys.argv.index("--") + 1 if "--" in sys.argv else len(sys.argv) if in_blender else 1
-    argv = sys.argv[begin:]
-    leave(lambda: command(name, argv))
-
-
 def console() -> None:
     """Run the console command `synthroads`; ends the process."""
     leave(main)
-
-
-def leave(action: Callable[[], int]) -> None:
-    """Run an action and end the process with its exit code, without Blender's teardown."""
-    for stream in (sys.stdout, sys.stderr):
-        if isinstance(stream, io.TextIOWrapper):  # names of files may hold what the terminal's encoding doesn't
-            stream.reconfigure(errors="backslashreplace")
-    try:
-        code = action()
-    except KeyboardInterrupt:  # before the command's own work began, or at its very end
-        code = interrupted()
-    except SystemExit as error:
-        code = error.code if isinstance(error.code, int) else 0 if error.code is None else 1
-    except BaseException:
-        if was_stopped():
-            code = interrupted()
-        else:
-            import traceback
-
-            traceback.print_exc()
-            code = 1
-    sys.stdout.flush()
-    sys.stderr.flush()
-    os._exit(code)
-
-
-@contextmanager
-def _without_blenders_chatter() -> Iterator[None]:
-    """Drop what Blender prints to standard output meanwhile (where it saved, say); its errors still show."""
-    sys.stdout.flush()
-    try:
-        saved = os.dup(1)
-    except OSError:  # no standard output at all
-        yield
-        return
-    silence = os.open(os.devnull, os.O_WRONLY)
-    os.dup2(silence, 1)
-    os.close(silence)
-    try:
-        yield
-    finally:
-        sys.stdout.flush()
-        os.dup2(saved, 1)
-        os.close(saved)

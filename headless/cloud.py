@@ -10,7 +10,7 @@ from typing import Any
 if __name__ == "__main__":
     sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from headless.cli import Outcome, add_common_arguments, entry
+from headless.commands import Outcome, add_common_arguments, entry
 from headless.messages import progress_bar
 
 _COLUMNS = (
@@ -109,7 +109,7 @@ def _preview_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def _info(arguments: argparse.Namespace) -> Outcome:
-    from synthroads_addon.cloud.formats.reading import open_cloud
+    from synthroads_addon.cloud.formats.registry import open_cloud
     from synthroads_addon.cloud.tools.statistics import cloud_statistics
 
     with open_cloud(arguments.file) as cloud:

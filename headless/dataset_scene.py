@@ -18,10 +18,10 @@ import numpy as np
 if __name__ == "__main__":
     sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from headless.cli import leave
+from headless.commands import leave
 from synthroads_addon.base.errors import InputError
 from synthroads_addon.base.schema import canonical_json, read_json
-from synthroads_addon.cloud.formats.reading import open_cloud
+from synthroads_addon.cloud.formats.registry import open_cloud
 from synthroads_addon.dataset.layouts import write_layouts
 from synthroads_addon.dataset.manifest import PUBLISHED, file_entries, write_atomically
 from synthroads_addon.dataset.recipe import Recipe, SceneJob

@@ -9,7 +9,7 @@ from pathlib import Path
 if __name__ == "__main__":
     sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from headless.cli import Outcome, add_common_arguments, entry
+from headless.commands import Outcome, add_common_arguments, entry
 from headless.messages import logger
 
 

@@ -11,7 +11,7 @@ from typing import Any
 if __name__ == "__main__":
     sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from headless.cli import (
+from headless.commands import (
     Outcome,
     add_changes_argument,
     add_choice_arguments,

@@ -76,7 +76,7 @@ def progress_bar(arguments: argparse.Namespace) -> Progress:
     """Return the progress that suits the flags: a bar in a terminal, lines elsewhere, nothing with ``--quiet``."""
     if arguments.quiet:
         return silent
-    set_up(arguments)  # for those that aren't run by `headless.cli.run`
+    set_up(arguments)  # for those that aren't run by `headless.commands.run`
     verbose = logger.isEnabledFor(logging.DEBUG)
     shown = _bar() if sys.stderr is not None and sys.stderr.isatty() else _Lines(0.0 if verbose else PATIENCE)
     return _StageTimes(shown) if verbose else shown

@@ -10,7 +10,7 @@ from typing import Any
 if __name__ == "__main__":
     sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from headless.cli import Outcome, add_changes_argument, add_common_arguments, all_changes, entry
+from headless.commands import Outcome, add_changes_argument, add_common_arguments, all_changes, entry
 from synthroads_addon.road.guidelines import STANDARD_CROSS_SECTIONS, USUAL_SECTION
 from synthroads_addon.road.parameters import DESIGN_CLASSES, RoadParameters
 from synthroads_addon.sampling.road import sample_road

@@ -13,7 +13,7 @@ if __name__ == "__main__":
     sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from headless import generate
-from headless.cli import (
+from headless.commands import (
     Outcome,
     add_changes_argument,
     add_choice_arguments,

@@ -9,7 +9,7 @@ from pathlib import Path
 if __name__ == "__main__":
     sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from headless.cli import Outcome, add_common_arguments, add_renamed_argument, add_twin_argument, entry
+from headless.commands import Outcome, add_common_arguments, add_renamed_argument, add_twin_argument, entry
 from synthroads_addon.base.errors import InputError
 from synthroads_addon.base.files import output_folder
 from synthroads_addon.road.parameters import read_parameters

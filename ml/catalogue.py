@@ -6,9 +6,9 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from synthroads_addon.base.catalogue import Entry, Kind, figures, preset
 from synthroads_addon.base.errors import InputError
 from synthroads_addon.base.schema import read_yaml
-from synthroads_addon.jobs.catalogue import Entry, Kind, figures, preset
 
 from .configuration import EXPERIMENTS, SHIPPED, Schedule, experiment_names, shipped_names
 from .segmentation.data.classes import SHIPPED as MAPPINGS

@@ -1,27 +1,48 @@
 """SynthRoads: synthetic motorway scenes, scanned by simulated laser scanners.
 
-Importing this package needs no Blender; `register` and `unregister`, which Blender calls, import what they need.
+Importing this package needs no Blender, and takes no time: what users call most is loaded when it is first asked for.
 """
 
 from __future__ import annotations
 
-from functools import cache
+import sys
+from importlib import import_module
+from importlib.machinery import PathFinder
+from importlib.util import module_from_spec
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from .base.version import version as version
+
+if TYPE_CHECKING:
+    from .cloud.formats.registry import open_cloud as open_cloud
+    from .jobs.generate import Job as Job
+    from .jobs.generate import generate as generate
+    from .jobs.scan_scene import SceneScan as SceneScan
+    from .jobs.scan_scene import scan_scene as scan_scene
+    from .road.parameters import read_parameters as read_parameters
+    from .sampling.road import sample_road as sample_road
+    from .scenario.scenario import load_scenario as load_scenario
+
+_PLACES = {
+    "Job": ".jobs.generate",
+    "SceneScan": ".jobs.scan_scene",
+    "generate": ".jobs.generate",
+    "load_scenario": ".scenario.scenario",
+    "open_cloud": ".cloud.formats.registry",
+    "read_parameters": ".road.parameters",
+    "sample_road": ".sampling.road",
+    "scan_scene": ".jobs.scan_scene",
+}
+"""Name -> module that has it."""
 
 
-@cache
-def version() -> str:
-    """Return the version from `blender_manifest.toml`: beside this file in the extension, above it in a checkout."""
-    import tomllib
-
-    here = Path(__file__).parent
-    for folder in (here, here.parent):
-        manifest = folder / "blender_manifest.toml"
-        if manifest.is_file():
-            return str(tomllib.loads(manifest.read_text(encoding="utf-8"))["version"])
-    from importlib.metadata import version as installed
-
-    return installed("synthroads")
+def __getattr__(name: str) -> Any:
+    if name not in _PLACES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    value = getattr(import_module(_PLACES[name], __name__), name)
+    globals()[name] = value
+    return value
 
 
 def register() -> None:
@@ -36,3 +57,15 @@ def unregister() -> None:
     from . import ui
 
     ui.unregister()
+
+
+def console() -> None:
+    """Run the command `synthroads`, whatever packages called `headless` or `ml` the working folder may have."""
+    beside = str(Path(__file__).parents[1])
+    for name in ("headless", "ml"):
+        spec = PathFinder.find_spec(name, [beside])
+        assert spec, name
+        assert spec.loader, name
+        sys.modules[name] = module_from_spec(spec)
+        spec.loader.exec_module(sys.modules[name])
+    import_module("headless.cli").console()

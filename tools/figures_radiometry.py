@@ -18,11 +18,11 @@ import numpy as np
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
 
+from synthroads_addon.materials.reflectance import facet_terms, returned_share  # noqa: E402
 from synthroads_addon.materials.table import Material, materials  # noqa: E402
 from synthroads_addon.materials.variation import varied  # noqa: E402
 from synthroads_addon.road.surroundings import Environment, MaterialVariation  # noqa: E402
 from synthroads_addon.scanning.beam import RINGS, beam_pattern, conical, cylindrical_offsets  # noqa: E402
-from synthroads_addon.scanning.radiometry import facet_terms, returned_share  # noqa: E402
 from synthroads_addon.scanning.weather import (  # noqa: E402
     USUAL_VISIBILITY,
     attenuation,

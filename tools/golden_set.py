@@ -266,8 +266,7 @@ def compare(tree: Path, files: Path, arguments: argparse.Namespace) -> int:
     failed = False
     with ThreadPoolExecutor(2) as pool:
         for name in arguments.jobs:
-            sides = {"base": tree, "head": ROOT}
-            list(pool.map(lambda side: run_job(sides[side], files / side, name), sides))
+            list(pool.map(run_job, (tree, ROOT), (files / "base", files / "head"), (name, name)))
             base, head = files / "base" / name, files / "head" / name
             found = differences(base, head)
             failed |= bool(found)

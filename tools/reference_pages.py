@@ -16,9 +16,9 @@ from pathlib import Path
 from typing import Any
 
 from headless.list import KINDS
+from synthroads_addon.base.catalogue import Entry, Kind, entries
 from synthroads_addon.base.field_list import Wording, class_of
 from synthroads_addon.base.schema import Model
-from synthroads_addon.jobs.catalogue import Entry, Kind, entries
 from tools.reference_commands import commands
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -28,11 +28,11 @@ FILES = {
     "scenario": ["synthroads_addon.scenario.scenario:Scenario"],
     "parameters": ["synthroads_addon.road.parameters:RoadParameters"],
     "recipe": ["synthroads_addon.dataset.recipe:Recipe"],
-    "device": ["synthroads_addon.scanning.devices.device:Device"],
+    "device": ["synthroads_addon.scenario.devices.device:Device"],
     "materials": ["synthroads_addon.materials.table:MaterialTable"],
     "classes": ["synthroads_addon.base.classes:ClassTable"],
     "mapping": ["ml.segmentation.data.classes:LabelMapping", "synthroads_addon.base.class_mapping:ClassMapping"],
-    "assets": ["synthroads_addon.road.things.assets:AssetLibrary"],
+    "assets": ["synthroads_addon.scenario.assets:AssetLibrary"],
     "segmentation": [
         "ml.segmentation.recipes:SegmentationConfiguration",
         "ml.segmentation.experiment:Experiment",

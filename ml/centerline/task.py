@@ -11,15 +11,15 @@ import torch
 from pydantic import Field
 from torch import nn
 
-from ml.configuration import Configuration
-from ml.fitting import chosen_device, fit
-from ml.runs import CALIBRATION, Run, plain, stream_seed
-from ml.tasks import Evaluation, Prediction
 from synthroads_addon.base.errors import InputError, MissingFileError, OutputError
 from synthroads_addon.base.files import write_file
 from synthroads_addon.base.progress import Progress, silent
 from synthroads_addon.base.schema import canonical_json, read_json
 
+from ..configuration import Configuration
+from ..fitting import chosen_device, fit
+from ..runs import CALIBRATION, Run, plain, stream_seed
+from ..tasks import Evaluation, Prediction
 from .data.batches import Batches, BatchOptions, DataOptions, Roads, fixed_batches, quiet, read_roads
 from .data.effects import Effects
 from .data.slices import SliceSettings

@@ -23,8 +23,9 @@ import torch
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from ml.cells import thin
 from synthroads_addon.base.errors import InputError
+
+from ..cells import thin
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.int64]

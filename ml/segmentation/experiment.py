@@ -12,9 +12,6 @@ from typing import Any, ClassVar
 
 from pydantic import Field
 
-from ml.configuration import EXPERIMENTS, experiment_names, load_configuration
-from ml.fitting import chosen_device
-from ml.runs import CHECKPOINT, CONFIGURATION, HISTORY, METRICS, PRETRAINING, Run, lasting
 from synthroads_addon.base.errors import InputError, nearest_name
 from synthroads_addon.base.files import write_file
 from synthroads_addon.base.progress import Progress, silent
@@ -22,6 +19,9 @@ from synthroads_addon.base.schema import Model, canonical_json, read_json, read_
 from synthroads_addon.dataset.manifest import checksum
 from synthroads_addon.scenario.scenario import apply_change, apply_values
 
+from ..configuration import EXPERIMENTS, experiment_names, load_configuration
+from ..fitting import chosen_device
+from ..runs import CHECKPOINT, CONFIGURATION, HISTORY, METRICS, PRETRAINING, Run, lasting
 from .data.sources import Source
 from .recipes import Data, SegmentationConfiguration
 from .scores.evaluation import score_all, trained_model

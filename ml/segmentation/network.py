@@ -8,9 +8,8 @@ from copy import deepcopy
 import torch
 from torch import Tensor, nn
 
-from ml.networks.neighbours import Neighbourhood, build_neighbours
-from ml.networks.pointnext import Architecture, PointNeXt, architecture
-
+from ..networks.neighbours import Neighbourhood, build_neighbours
+from ..networks.pointnext import Architecture, PointNeXt, architecture
 from .adaptation import adapt_norms
 from .data.classes import class_names
 from .data.crops import Item

@@ -19,14 +19,15 @@ import laspy
 import numpy as np
 from numpy.typing import NDArray
 
-from ml.cells import thin
 from synthroads_addon.base.classes import ClassScheme
 from synthroads_addon.base.errors import InputError, OutputError
 from synthroads_addon.base.progress import Progress, silent
-from synthroads_addon.cloud.formats.las_reading import open_to_copy
-from synthroads_addon.cloud.formats.reading import damaged, open_cloud
+from synthroads_addon.cloud.formats.las_reader import open_to_copy
+from synthroads_addon.cloud.formats.reader import damaged
+from synthroads_addon.cloud.formats.registry import open_cloud
 from synthroads_addon.cloud.tools.quantile_mapping import LEVELS
 
+from ..cells import thin
 from .data.crops import CropSettings
 from .data.sources import FULL
 from .data.tiles import Scaling, Tile, eight_bits

@@ -17,13 +17,13 @@ from typing import Any
 
 import torch
 
-from ml.configuration import load_configuration
-from ml.fitting import chosen_device, optimizer_of, train_step
 from synthroads_addon.base.errors import InputError
 from synthroads_addon.base.files import write_file
 from synthroads_addon.base.progress import peak_memory_mb
 from synthroads_addon.base.schema import canonical_json
 
+from ..configuration import load_configuration
+from ..fitting import chosen_device, optimizer_of, train_step
 from .data.classes import class_names
 from .data.crops import Item, Seeds
 from .data.sources import Source, pointcept_folders, pointcept_root

@@ -9,13 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, field_validator, model_validator
 
-from ml.configuration import Configuration, Part, Schedule
 from synthroads_addon.base.classes import ClassScheme, class_scheme
 from synthroads_addon.base.errors import InputError
 from synthroads_addon.base.random_streams import stream
 from synthroads_addon.base.schema import quantity
 from synthroads_addon.cloud.tools.quantile_mapping import LEVELS, QuantileMap
 
+from ..configuration import Configuration, Part, Schedule
 from .data.crops import FEATURES, CropSettings, Draw, Feature
 from .data.effects import Effects
 from .data.sources import FULL, Source

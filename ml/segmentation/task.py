@@ -7,16 +7,15 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-from ml.configuration import Configuration
-from ml.fitting import chosen_device
-from ml.runs import Run
-from ml.tasks import Evaluation, Prediction
 from synthroads_addon.base.errors import InputError
 from synthroads_addon.base.files import write_file
 from synthroads_addon.base.progress import Progress, peak_memory_mb, silent
-from synthroads_addon.cloud.formats.reading import open_cloud
-from synthroads_addon.cloud.formats.writing import ENDINGS
+from synthroads_addon.cloud.formats.registry import ENDINGS, open_cloud
 
+from ..configuration import Configuration
+from ..fitting import chosen_device
+from ..runs import Run
+from ..tasks import Evaluation, Prediction
 from .data.sources import Source
 from .prediction import Labelling, predict_file
 from .recipes import SegmentationConfiguration

@@ -12,10 +12,10 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
-from ml.fitting import Figures, chosen_device, fit
-from ml.runs import PRETRAINING, Run
 from synthroads_addon.base.progress import Progress, silent
 
+from ..fitting import Figures, chosen_device, fit
+from ..runs import PRETRAINING, Run
 from .data.classes import class_names
 from .data.crops import Item, Seeds
 from .data.tiles import Tile, scalings

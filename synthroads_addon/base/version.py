@@ -1,8 +1,22 @@
-"""The name under which SynthRoads signs what it writes."""
+"""The version of SynthRoads, and the name under which it signs what it writes."""
 
 from __future__ import annotations
 
-from .. import version
+import tomllib
+from functools import cache
+from importlib import metadata
+from pathlib import Path
+
+
+@cache
+def version() -> str:
+    """Return the version from `blender_manifest.toml`: in the package in the extension, above it in a checkout."""
+    here = Path(__file__).parents[1]
+    for folder in (here, here.parent):
+        manifest = folder / "blender_manifest.toml"
+        if manifest.is_file():
+            return str(tomllib.loads(manifest.read_text(encoding="utf-8"))["version"])
+    return metadata.version("synthroads")
 
 
 def generator() -> str:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from ..base.classes import ClassScheme
 from ..base.errors import InputError, nearest_name
-from ..cloud.formats.reading import open_cloud
+from ..cloud.formats.registry import open_cloud
 from ..cloud.points import concatenate
 
 Float = NDArray[np.float64]

@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 
 from ..base.errors import InputError
 from ..base.noise import field
+from ..materials.reflectance import LUMINANCE, facet_terms
 from ..materials.table import Material
 from ..materials.texture_spread import OCTAVES
-from ..scanning.radiometry import LUMINANCE, facet_terms
 from .expected import Expectation, Receiver
 
 Float = NDArray[np.float64]

@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..base.errors import InputError
+from ..base.thresholds import otsu
 from ..fitting.read import read_axis
 from .classes import RealClass, RealCloud, points_of
 
@@ -126,18 +127,6 @@ def _median_along(station: Float, intensity: Float) -> Float:
     spans = zip(begin, range(len(station)), end, strict=True)
     result[order] = [min(np.median(value[a : i + 1]), np.median(value[i:b])) for a, i, b in spans]
     return result
-
-
-def otsu(values: Float) -> float:
-    """Return Otsu's threshold (1979): the one with the largest variance between those below and those above it."""
-    count, edges = np.histogram(values, bins=256)
-    middle = (edges[:-1] + edges[1:]) / 2.0
-    below, moment = np.cumsum(count)[:-1], np.cumsum(count * middle)[:-1]
-    above = count.sum() - below
-    with np.errstate(divide="ignore", invalid="ignore"):
-        apart = (float((count * middle).sum()) - moment) / above - moment / below
-        between = np.where((below > 0) & (above > 0), below * above * apart**2, 0.0)
-    return float(edges[1:-1][np.argmax(between)])
 
 
 def beside_axis(points: Float, axis: Float) -> tuple[Float, Float]:

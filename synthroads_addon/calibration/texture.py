@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from ..base.errors import InputError, MissingFileError
+from ..materials.reflectance import reflectivity
 from ..materials.table import Material
-from ..scanning.radiometry import reflectivity
 
 Float = NDArray[np.float64]
 

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from ..base.classes import UNLABELLED, ClassScheme
 from ..base.errors import InputError
 from ..base.schema import canonical_json
-from ..cloud.formats.reading import open_cloud
+from ..cloud.formats.registry import open_cloud
 from ..cloud.points import PointBlock
 from ..cloud.tools.subsample import GridSubsampler
 from .recipe import Layout, Recipe, SceneJob

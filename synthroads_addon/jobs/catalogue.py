@@ -6,132 +6,16 @@ Files of one's own are described in the same way.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
+from ..base.catalogue import Entry, Kind, figures, plain, preset, span
 from ..base.classes import class_scheme, scheme_names
-from ..base.errors import InputError, nearest_name
 from ..base.files import PRESETS
 from ..dataset.recipe import RECIPES, load_recipe, recipe_names
 from ..materials.table import material_table_path, read_material_table
-from ..road.things.assets import library_file, library_names, read_asset_library
-from ..scanning.devices.device import DEVICES, device_names, load_device
+from ..scenario.assets import library_file, library_names, read_asset_library
+from ..scenario.devices.device import DEVICES, device_names, load_device
 from ..scenario.scenario import SCENARIOS, load_scenario, scenario_names
-
-
-@dataclass(frozen=True)
-class Entry:
-    """One thing that comes under a name.
-
-    Attributes:
-        name: as it is given to a command; of a file of one's own its path.
-        title: what it is, in one line.
-        file: that describes it.
-        figures: its key figures by name, JSON data.
-        note: what else is said of it; empty if nothing is.
-    """
-
-    name: str
-    title: str
-    file: Path
-    figures: dict[str, Any] = field(default_factory=dict)
-    note: str = ""
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return everything as JSON data."""
-        said = {"name": self.name, "title": self.title, **self.figures, "file": str(self.file)}
-        return said | ({"note": self.note} if self.note else {})
-
-
-def plain(value: Any) -> str:
-    """Return a figure as text: numbers short, lists with commas, of counts the name before."""
-    if isinstance(value, dict):
-        return ", ".join(f"{name} {plain(number)}" for name, number in value.items())
-    if isinstance(value, (list, tuple)):
-        return ", ".join(map(plain, value))
-    return f"{value:g}" if isinstance(value, float) else "-" if value is None else str(value)
-
-
-def span(values: Sequence[float]) -> str:
-    """Return the smallest and the largest of some numbers as text."""
-    low, high = min(values), max(values)
-    return f"{low:g}" if low == high else f"{low:g} to {high:g}"
-
-
-Rows = Callable[[Entry], Sequence[Sequence[str]]]
-"""From an entry to its rows of a table: one, or one for each of its parts."""
-
-
-@dataclass(frozen=True)
-class Kind:
-    """A kind of things that come under a name.
-
-    Attributes:
-        title: of all of them.
-        use: how one is given to a command.
-        names: of what is shipped.
-        read: from a name or a file of one's own to what it is; raises `InputError`.
-        endings: of the files.
-        head: titles of a table's columns behind the name.
-        rows: cells behind the name.
-    """
-
-    title: str
-    use: str
-    names: Callable[[], list[str]]
-    read: Callable[[str], Entry]
-    endings: tuple[str, ...]
-    head: tuple[str, ...]
-    rows: Rows
-
-
-def figures(*names: str, **shown: Callable[[Any], str]) -> Rows:
-    """Return what makes one row of an entry: its title, then some of its figures.
-
-    Args:
-        names: of the figures, in the order of the columns.
-        shown: by the name of a figure, how it is written where not plainly.
-    """
-    return lambda one: [[one.title, *(shown.get(name, plain)(one.figures[name]) for name in names)]]
-
-
-def entries(kind: Kind, wanted: Sequence[str] = ()) -> list[Entry]:
-    """Return what is shipped of a kind, or what is wanted of it.
-
-    Args:
-        kind: of the things.
-        wanted: beginnings of names, files of one's own, and folders of such files; empty for all that is shipped.
-
-    Raises:
-        InputError: no name begins so, or a file is wrong.
-    """
-    if not wanted:
-        return [kind.read(name) for name in kind.names()]
-    found = (name for text in wanted for name in _named(kind, text))
-    return [kind.read(name) for name in dict.fromkeys(found)]
-
-
-def _named(kind: Kind, text: str) -> list[str]:
-    """Return the names that begin with a text, the file that it is, or the files in the folder that it is."""
-    names = [name for name in kind.names() if name.startswith(text)]
-    path = Path(text)
-    if names:
-        return names
-    if path.suffix.lower() in kind.endings:
-        return [text]
-    files = sorted(str(file) for file in path.glob("*") if file.suffix.lower() in kind.endings) if path.is_dir() else []
-    if not files:
-        endings = " or ".join(kind.endings)
-        allowed = f"must be a {endings} file, a folder of such files, or the beginning of {', '.join(kind.names())}"
-        raise InputError(kind.title.lower(), text, f"{allowed}{nearest_name(text, kind.names())}")
-    return files
-
-
-def preset(folder: Path, ending: str, name_or_file: str, names: Sequence[str]) -> Path:
-    """Return the file of something shipped, or the one named."""
-    return folder / f"{name_or_file}{ending}" if name_or_file in names else Path(name_or_file)
 
 
 def _scenario(name: str) -> Entry:

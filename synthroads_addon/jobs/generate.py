@@ -13,23 +13,21 @@ from typing import TYPE_CHECKING, Any
 import laspy
 import numpy as np
 
-from .. import version
 from ..base.crs import wkt
 from ..base.errors import InputError
 from ..base.files import output_folder
 from ..base.machine import available_cores
 from ..base.progress import Progress, StageTimer, silent
 from ..base.schema import canonical_json
-from ..base.version import generator
-from ..road.centerline import centerline_geojson
+from ..base.version import generator, version
 from ..road.geometry import RoadGeometry
 from ..road.parameters import RoadParameters, read_parameters
-from ..road.tessellation import sample_stations
 from ..sampling.road import sample_road
-from ..scanning.devices.device import scanner_setting
 from ..scanning.scene.motion import ScannedScene
+from ..scenario.devices.device import scanner_setting
 from ..scenario.scenario import Scenario
 from ..twin.formats import check_formats, twin_file_names, write_twin
+from .road_files import write_road_files
 from .scan.by_section import check_by_section, scan_by_section
 from .scan.files import colour_job, make_scan, road_path, scan_to_files, top_view
 
@@ -102,12 +100,12 @@ def generate(job: Job, progress: Progress = silent) -> dict[str, Any]:
             check_by_section(job.scenario, geometry.length)
             report |= axis_report
             if not job.scenario.chooses:
-                write_texts(folder, wanted, parameters, geometry, job.scenario)
+                write_road_files(folder, wanted, parameters, geometry, job.scenario)
         built = None
         if job.scenario.chooses:
             with timer.stage("choice"):
                 job, built, report["choice"] = _chosen(job, parameters, begun)
-                write_texts(folder, wanted, parameters, geometry, job.scenario)
+                write_road_files(folder, wanted, parameters, geometry, job.scenario)
         if job.scenario.twin:
             with timer.stage("twin"):
                 write_twin(parameters, folder, job.scenario.twin, job.scenario.settings().tolerance)
@@ -166,18 +164,6 @@ def road_parameters(job: Job) -> tuple[RoadParameters, dict[str, Any]]:
         axis, road, fit = fitted_axis(job.axis, scenario.road)
         return sample_road(road, scenario.seed, scenario.title, axis), {"axis": fit}
     return sample_road(scenario.road, scenario.seed, scenario.title), {}
-
-
-def write_texts(
-    folder: Path, wanted: Sequence[str], parameters: RoadParameters, geometry: RoadGeometry, scenario: Scenario
-) -> None:
-    """Write the files that hold the road itself, as far as they are wanted."""
-    if "parameters" in wanted:
-        (folder / "parameters.json").write_text(parameters.to_json(), encoding="utf-8")
-    if "centerline" in wanted:
-        stations = sample_stations(geometry, scenario.settings().tolerance)
-        text = canonical_json(centerline_geojson(geometry, stations))
-        (folder / "centerline.geojson").write_text(text, encoding="utf-8")
 
 
 def _scene_outputs(

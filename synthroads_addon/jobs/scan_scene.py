@@ -22,7 +22,6 @@ from ..cloud.tools.previews import TopView
 from ..fitting.read import read_axis
 from ..road.geometry import RoadGeometry
 from ..road.parameters import RoadParameters
-from ..scanning.devices.device import scanner_setting
 from ..scanning.platforms.path import USUAL, PolylineGuide, RoadGuide, make_path
 from ..scanning.platforms.path import Path as ScanPath
 from ..scanning.platforms.positions import PositionsPath
@@ -30,6 +29,7 @@ from ..scanning.platforms.trajectory_file import read_trajectory
 from ..scanning.scene.extent import bounds, elevation_at, middle_line
 from ..scanning.scene.mesh import SceneMesh
 from ..scanning.scene.motion import ScannedScene
+from ..scenario.devices.device import scanner_setting
 from ..scenario.scenario import Output, Scenario
 from .generate import closing, file_names, opening
 from .scan.files import colour_job, make_scan, scan_to_files, top_view

@@ -9,7 +9,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from ..scanning.radiometry import facet_terms, reflectivity, returned_share
+from .reflectance import facet_terms, reflectivity, returned_share
 from .table import Material
 from .texture_spread import mean_over_median
 

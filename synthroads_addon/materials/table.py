@@ -32,7 +32,7 @@ from pydantic import Field
 from ..base.errors import InputError
 from ..base.files import PRESETS, write_file
 from ..base.schema import Model, quantity, read_json
-from ..scanning.radiometry import facet_slope, reflectivity
+from .reflectance import facet_slope, reflectivity
 
 UNKNOWN = "unknown"
 """Material of faces that have none."""

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from ..base.classes import ClassScheme
 from ..base.errors import InputError
-from ..cloud.formats.reading import open_cloud
+from ..cloud.formats.registry import open_cloud
 from .ground import above_ground
 from .path import Path
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from ..base.errors import InputError
-from ..calibration.pavement import otsu
+from ..base.thresholds import otsu
 from .edges import paved_edge, stretch_middles
 from .lines import USUAL, WAVELENGTH, Line
 from .path import SPACING

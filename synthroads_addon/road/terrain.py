@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 from ..base.files import stamp
 from ..base.random_streams import stream
 from ..base.schema import rounded
-from ..scenario.road import RoadScenario
 from .alignment import Alignment, Element
 from .elevation_model import Corridor, ElevationModel, read_elevation_model
 from .geometry import RoadGeometry
@@ -91,19 +90,6 @@ def _read(
     path: str, _stamp: tuple[int, int], epsg: int, axis: AlignmentObject, origin: tuple[float, float], reach: float
 ) -> ElevationModel:
     return read_elevation_model(path, epsg, Corridor(_alignment(axis), *origin, reach))
-
-
-def origin_on_ground(scenario: RoadScenario, axis: AlignmentObject, terrain: Terrain) -> tuple[float, float, float]:
-    """Return the map coordinates of a sampled road's local origin, m: the scenario's, or its elevation model's height.
-
-    Raises:
-        InputError: the elevation model is missing, unreadable or unfit for this road.
-    """
-    east, north, height = scenario.map_origin
-    if terrain.elevation_model is None:
-        return east, north, height
-    model = road_elevation_model(terrain.elevation_model, scenario.epsg, axis, (east, north), terrain.half_width)
-    return fit_to_ground(axis, (east, north), model, terrain.embankment_height)
 
 
 def fit_to_ground(

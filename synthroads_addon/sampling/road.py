@@ -23,17 +23,17 @@ from ..road.parameters import (
     Transform,
     Turnout,
 )
-from ..road.terrain import origin_on_ground
-from ..road.things.assets import sample_assets
 from ..road.things.furniture import Side
 from ..scenario.road import RoadScenario
 from .alignment import HorizontalSampler, sample_profile
 from .conflicts import check_conflicts
 from .markings import place_markings
+from .placing.assets import sample_assets
 from .placing.furniture import place_furniture
 from .placing.site import Site
 from .section import SIDES, CarriagewaySampler
 from .surroundings import (
+    origin_on_ground,
     sample_environment,
     sample_materials,
     sample_terrain,

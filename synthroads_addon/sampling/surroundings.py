@@ -14,9 +14,18 @@ from ..base.random_streams import stream
 from ..base.schema import rounded
 from ..road.guidelines import OBSTACLE_DISTANCE
 from ..road.objects import AnyWidth, nominal_width, width_at, width_kinks
-from ..road.parameters import ConstructionBeacon, Environment, MaterialVariation, RoadObject, TemporaryBarrier, Terrain
+from ..road.parameters import (
+    AlignmentObject,
+    ConstructionBeacon,
+    Environment,
+    MaterialVariation,
+    RoadObject,
+    TemporaryBarrier,
+    Terrain,
+)
 from ..road.section_geometry import CarriagewaySection
 from ..road.surroundings import Vegetation, Vehicle
+from ..road.terrain import fit_to_ground, road_elevation_model
 from ..road.things.furniture import Side
 from ..road.things.vehicles import (
     COLORS,
@@ -325,3 +334,16 @@ def _queue(rng: np.random.Generator, lengths: list[float], stretch: list[float],
     for middle, share in zip(middles, sorted(rng.random(len(middles)).tolist()), strict=True):
         ahead = middle + share * (end - start - front)
         yield start + ahead if traffic > 0 else end - ahead
+
+
+def origin_on_ground(scenario: RoadScenario, axis: AlignmentObject, terrain: Terrain) -> tuple[float, float, float]:
+    """Return the map coordinates of a sampled road's local origin, m: the scenario's, or its elevation model's height.
+
+    Raises:
+        InputError: the elevation model is missing, unreadable or unfit for this road.
+    """
+    east, north, height = scenario.map_origin
+    if terrain.elevation_model is None:
+        return east, north, height
+    model = road_elevation_model(terrain.elevation_model, scenario.epsg, axis, (east, north), terrain.half_width)
+    return fit_to_ground(axis, (east, north), model, terrain.embankment_height)

@@ -7,7 +7,7 @@ from typing import Any
 
 from ..base.errors import InputError
 from ..road.guidelines import SECTIONS_OF_CLASS
-from ..scanning.devices.device import scanner_setting
+from .devices.device import scanner_setting
 from .scan import ScanScenario
 
 _CLASS_AND_SECTION = ("design_class", "cross_section")

@@ -12,8 +12,7 @@ import pytest
 from synthroads_addon.base.classes import UNLABELLED, asprs_scheme, class_scheme, classes
 from synthroads_addon.base.errors import InputError
 from synthroads_addon.base.files import PRESETS
-from synthroads_addon.cloud.formats.reading import open_cloud
-from synthroads_addon.cloud.formats.writing import open_writer
+from synthroads_addon.cloud.formats.registry import open_cloud, open_writer
 from synthroads_addon.cloud.tools.convert import convert
 from synthroads_addon.scenario.cloud import CloudScenario
 

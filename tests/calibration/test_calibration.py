@@ -12,6 +12,7 @@ from PIL import Image
 from headless.cli import main
 from synthroads_addon.base.errors import InputError, OutputError
 from synthroads_addon.base.noise import field
+from synthroads_addon.base.thresholds import otsu
 from synthroads_addon.calibration.classes import RealClass, by_label, read_real, seen_from
 from synthroads_addon.calibration.expected import Expectation, Receiver, Views, chosen_views
 from synthroads_addon.calibration.fit import (
@@ -22,11 +23,12 @@ from synthroads_addon.calibration.fit import (
     gain_of,
 )
 from synthroads_addon.calibration.job import Calibration, CalibrationJob, Wanted, calibrate, save_fitted, steps
-from synthroads_addon.calibration.pavement import RoadClasses, beside_axis, otsu, road_classes
+from synthroads_addon.calibration.pavement import RoadClasses, beside_axis, road_classes
 from synthroads_addon.calibration.plot import save_plot
 from synthroads_addon.calibration.texture import read_texture, texture_of
+from synthroads_addon.materials.reflectance import facet_terms
 from synthroads_addon.materials.table import Material, materials, read_material_table, write_material_table
-from synthroads_addon.scanning.radiometry import facet_terms, lambert_intensity, oren_nayar_intensity
+from synthroads_addon.scanning.radiometry import lambert_intensity, oren_nayar_intensity
 from synthroads_addon.scenario.scenario import Scenario
 from tests.helpers.clouds.calibration_cloud import labelled, striped
 

@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 from hypothesis import strategies as st
 
-from headless.cli import command
+from headless.commands import command
 from synthroads_addon.base.errors import InputError
 from synthroads_addon.checking import checker
 from synthroads_addon.checking.checker import RULES, check

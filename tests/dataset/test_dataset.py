@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from synthroads_addon.base.classes import class_scheme
 from synthroads_addon.base.errors import InputError, MissingFileError
-from synthroads_addon.cloud.formats.writing import open_writer
+from synthroads_addon.cloud.formats.registry import open_writer
 from synthroads_addon.cloud.points import PointBlock
 from synthroads_addon.dataset.data_card import data_card
 from synthroads_addon.dataset.layouts import layout_descriptions, write_layouts

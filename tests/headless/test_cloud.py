@@ -9,9 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from headless.cli import command
-from synthroads_addon.cloud.formats.reading import open_cloud
-from synthroads_addon.cloud.formats.writing import open_writer
+from headless.commands import command
+from synthroads_addon.cloud.formats.registry import open_cloud, open_writer
 from synthroads_addon.cloud.points import PointBlock
 from tests.helpers.clouds.random_points import make_points
 

@@ -13,7 +13,7 @@ from typing import Any
 import pytest
 
 from headless import dataset_run
-from headless.cli import command
+from headless.commands import command
 from headless.dataset_run import DatasetRun, Outcome
 from headless.dataset_scene import DONE, FILES, published_folders
 from synthroads_addon.base.errors import InputError, OutputError

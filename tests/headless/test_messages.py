@@ -17,9 +17,9 @@ import numpy as np
 import pytest
 
 from headless import dataset_run, messages
-from headless.cli import Outcome, command, run
+from headless.commands import Outcome, command, run
 from headless.messages import INTERVAL, progress_bar
-from synthroads_addon.cloud.formats.writing import open_writer
+from synthroads_addon.cloud.formats.registry import open_writer
 from synthroads_addon.sampling.road import sample_road
 from synthroads_addon.scenario.road import RoadScenario
 from tests.helpers.clouds.random_points import make_points

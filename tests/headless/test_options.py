@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 
-from headless import cli, dataset, generate, scan
+from headless import cli, commands, dataset, generate, scan
 from synthroads_addon.dataset.recipe import load_recipe, scene_jobs
 
 
@@ -100,9 +100,9 @@ def test_tolerance_means_one_thing(capsys: pytest.CaptureFixture[str]) -> None:
 
 def test_device_is_short_for_its_field() -> None:
     words = ["generate", "--output", "out", "--device", "riegl-vux-1uav22"]
-    assert cli.all_changes(parsed(*words), generate._FIELDS) == ['scan.device="riegl-vux-1uav22"']
+    assert commands.all_changes(parsed(*words), generate._FIELDS) == ['scan.device="riegl-vux-1uav22"']
     same = [*words, "--set", "scan.device=riegl-vux-1uav22", "--seed", "7", "--twin", "ifc"]
-    assert cli.all_changes(parsed(*same), generate._FIELDS)[1:] == [
+    assert commands.all_changes(parsed(*same), generate._FIELDS)[1:] == [
         'scan.device="riegl-vux-1uav22"',
         "seed=7",
         'twin=["ifc"]',

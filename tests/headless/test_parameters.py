@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from headless import cli
+from headless import commands
 
 ROOT = Path(__file__).parents[2]
 
@@ -45,7 +45,7 @@ def test_two_processes_write_the_same_bytes() -> None:
 
 def test_wrong_input_is_one_line(capsys: pytest.CaptureFixture[str]) -> None:
     for arguments in (["--cross-section", "RQ3"], ["--length", "-1"], ["--seed", "-1"], ["--set", "road.widht=3"]):
-        assert cli.command("parameters", arguments) == 2
+        assert commands.command("parameters", arguments) == 2
         assert len(capsys.readouterr().err.strip().splitlines()) == 1
 
 

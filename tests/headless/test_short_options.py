@@ -8,7 +8,8 @@ from collections.abc import Iterator
 
 import pytest
 
-from headless.cli import COMMANDS, SHORT_OPTIONS, _module, build_parser, command
+from headless.cli import COMMANDS, build_parser
+from headless.commands import SHORT_OPTIONS, command, module_of
 
 
 def parsers(parser: argparse.ArgumentParser) -> Iterator[argparse.ArgumentParser]:
@@ -60,7 +61,7 @@ def test_a_command_by_itself_understands_them(capsys: pytest.CaptureFixture[str]
 @pytest.mark.parametrize("name", COMMANDS)
 def test_every_command_can_be_quiet_and_verbose(name: str) -> None:
     parser = argparse.ArgumentParser()
-    _module(name).add_arguments(parser)
+    module_of(name).add_arguments(parser)
     for tool in list(parsers(parser))[1:] or [parser]:
         known = tool._option_string_actions
         assert {"--quiet", "--verbose", "--json"} <= set(known)

@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from synthroads_addon.cloud.formats.reading import open_cloud
+from synthroads_addon.cloud.formats.registry import open_cloud
 from synthroads_addon.road.parameters import read_parameters
 from synthroads_addon.sampling.road import sample_road
 from synthroads_addon.scenario.road import RoadScenario

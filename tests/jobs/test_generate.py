@@ -11,7 +11,7 @@ import laspy
 import numpy as np
 import pytest
 
-from headless import cli
+from headless import commands
 from synthroads_addon.base.errors import InputError
 from synthroads_addon.cloud.points import concatenate
 from synthroads_addon.jobs.generate import FILES, Job, generate
@@ -263,7 +263,7 @@ def test_wrong_input_is_one_line_and_exit_code_2(
     line, named = BAD_INPUTS[name]
     output = [] if "--output" in line else ["--output", str(tmp_path / "out")]
     try:
-        code = cli.command("generate", [*line.format(tmp_path).split(), *output])
+        code = commands.command("generate", [*line.format(tmp_path).split(), *output])
     except SystemExit as stop:
         code = stop.code
     said = capfd.readouterr().err
@@ -276,9 +276,9 @@ def test_wrong_input_is_one_line_and_exit_code_2(
 
 def test_output_already_there_needs_overwrite(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     small = [part for change in [*SMALL, 'outputs=["parameters"]'] for part in ("--set", change)]
-    assert cli.command("generate", ["--output", str(tmp_path), *small]) == 0
+    assert commands.command("generate", ["--output", str(tmp_path), *small]) == 0
     capsys.readouterr()
-    assert cli.command("generate", ["--output", str(tmp_path), *small]) == 2
+    assert commands.command("generate", ["--output", str(tmp_path), *small]) == 2
     assert "--overwrite" in capsys.readouterr().err
     json_run = command("--output", tmp_path, *small, "--overwrite", "--json")
     assert json_run.returncode == 0

@@ -14,13 +14,13 @@ import laspy
 import numpy as np
 import pytest
 
-from headless.cli import command
+from headless.commands import command
 from synthroads_addon.base.classes import class_id
 from synthroads_addon.blender.model.build import build_road
 from synthroads_addon.blender.model.store import remember
 from synthroads_addon.blender.scene.evaluated import scene_mesh
 from synthroads_addon.blender.scene.foreign import open_scene
-from synthroads_addon.cloud.formats.reading import open_cloud
+from synthroads_addon.cloud.formats.registry import open_cloud
 from synthroads_addon.jobs.scan_scene import SceneScan, scan_scene, scene_path
 from synthroads_addon.road.geometry import RoadGeometry
 from synthroads_addon.sampling.road import sample_road

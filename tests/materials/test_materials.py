@@ -9,10 +9,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from synthroads_addon.base.errors import InputError
+from synthroads_addon.materials.reflectance import facet_slope, facet_terms, returned_share
 from synthroads_addon.materials.table import Material, material_table_path, materials, read_material_table
 from synthroads_addon.materials.variation import varied
 from synthroads_addon.road.surroundings import Environment, MaterialVariation
-from synthroads_addon.scanning.radiometry import facet_slope, facet_terms, returned_share
 
 DRY, WET = Environment(), Environment(wetness=1.0)
 MEAN = MaterialVariation()

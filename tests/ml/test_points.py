@@ -11,8 +11,8 @@ import pytest
 from ml.points import ROAD_CLASSES, read_ground, read_points
 from synthroads_addon.base.classes import class_scheme
 from synthroads_addon.base.errors import InputError, MissingFileError
-from synthroads_addon.cloud.formats.las_reading import LasReader
-from synthroads_addon.cloud.formats.writing import open_writer
+from synthroads_addon.cloud.formats.las_reader import LasReader
+from synthroads_addon.cloud.formats.registry import open_writer
 from synthroads_addon.cloud.points import PointBlock
 
 CORNER = np.array([294000.0, 5628000.0, 180.0])

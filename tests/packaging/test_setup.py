@@ -122,7 +122,7 @@ def test_blender_and_the_other_tests_have_processes_of_their_own(monkeypatch: py
     monkeypatch.setattr(noxfile, "ONLY", {("3.13", "others"): "smoke or ui"})
     assert noxfile.pytest_runs("3.13", "not slow", ["-x"]) == [
         ["-m", "(not slow)", "-x", *noxfile.BLENDER_TESTS],
-        ["-m", "(smoke or ui) and (not slow)", "-x", "tests", *(f"--ignore={folder}" for folder in noxfile.BLENDER_TESTS)],
+        ["-m", "(smoke or ui) and (not slow)", "-x", "tests", *(f"--ignore={name}" for name in noxfile.BLENDER_TESTS)],
     ]
     named = ["tests/road/test_alignment.py", "-q"]
     assert noxfile.pytest_runs("3.11", "not slow", named) == [named]

@@ -27,7 +27,8 @@ from synthroads_addon.road.parameters import (
     Transform,
     VerticalPoint,
 )
-from synthroads_addon.road.terrain import fit_to_ground, ground_elevation, origin_on_ground
+from synthroads_addon.road.terrain import fit_to_ground, ground_elevation
+from synthroads_addon.sampling.surroundings import origin_on_ground
 from synthroads_addon.scenario.road import RoadScenario
 
 WEST, NORTH = 294_000.0, 5_628_400.0

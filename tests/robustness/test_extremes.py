@@ -15,7 +15,7 @@ import pytest
 
 from synthroads_addon.base.errors import InputError
 from synthroads_addon.base.schema import Model, read_json, read_yaml
-from synthroads_addon.cloud.formats.las import LasWriter
+from synthroads_addon.cloud.formats.las_writer import LasWriter
 from synthroads_addon.dataset.recipe import RECIPES, load_recipe, scene_jobs
 from synthroads_addon.materials.table import MaterialTable
 from synthroads_addon.road.alignment import Alignment, Element, clip_offset
@@ -23,10 +23,10 @@ from synthroads_addon.road.geometry import RoadGeometry
 from synthroads_addon.road.parameters import LineMarking, RoadParameters
 from synthroads_addon.road.stretches import stretches
 from synthroads_addon.road.tessellation import sample_stations
-from synthroads_addon.road.things.assets import LIBRARIES, AssetLibrary
 from synthroads_addon.road.things.signs import SignCatalogue
 from synthroads_addon.sampling.road import sample_road
-from synthroads_addon.scanning.devices.device import DEVICES, Device
+from synthroads_addon.scenario.assets import LIBRARIES, AssetLibrary
+from synthroads_addon.scenario.devices.device import DEVICES, Device
 from synthroads_addon.scenario.road import RoadScenario
 from synthroads_addon.scenario.scenario import SCENARIOS, Scenario
 from tests.helpers.roads.checker_full_road import full

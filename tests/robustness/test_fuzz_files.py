@@ -28,12 +28,12 @@ from synthroads_addon.fitting.read import read_axis
 from synthroads_addon.materials.table import read_material_table
 from synthroads_addon.road.geometry import RoadGeometry
 from synthroads_addon.road.parameters import RoadParameters, read_parameters
-from synthroads_addon.road.things.assets import LIBRARIES, read_asset_library
 from synthroads_addon.road.things.signs import SignCatalogue
 from synthroads_addon.sampling.road import sample_road
-from synthroads_addon.scanning.devices.device import load_device, setting_of
 from synthroads_addon.scanning.platforms.path import make_path
 from synthroads_addon.scanning.platforms.polyline import PolylineGuide
+from synthroads_addon.scenario.assets import LIBRARIES, read_asset_library
+from synthroads_addon.scenario.devices.device import load_device, setting_of
 from synthroads_addon.scenario.road import RoadScenario
 from synthroads_addon.scenario.scan import Platform
 from synthroads_addon.scenario.scenario import Scenario, apply_change, load_scenario, parsed_change

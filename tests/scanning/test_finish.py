@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+from synthroads_addon.materials.reflectance import reflectivity
 from synthroads_addon.materials.table import materials
 from synthroads_addon.scanning.colour.colour import MaterialLayers, surface_constants
 from synthroads_addon.scanning.finish import Finish
-from synthroads_addon.scanning.radiometry import reflectivity
 from synthroads_addon.scanning.scan import BlockResult, Scan
 from tests.helpers.scenes.scan_scenes import mesh_of, middle_pulses, plane, scan_of
 

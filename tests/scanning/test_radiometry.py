@@ -7,18 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from synthroads_addon.scanning.radiometry import (
-    EDGE_ON,
-    NEAREST,
-    facet_slope,
-    facet_terms,
-    lambert_intensity,
-    oren_nayar_intensity,
-    received,
-    reflectivity,
-    returned_share,
-    saturated,
-)
+from synthroads_addon.materials.reflectance import EDGE_ON, facet_slope, facet_terms, reflectivity, returned_share
+from synthroads_addon.scanning.radiometry import NEAREST, lambert_intensity, oren_nayar_intensity, received, saturated
 
 RANGES = np.array([1.0, 1.7, 5.0, 20.0, 60.0, 123.4, 250.0, 500.0])
 ANGLES = np.deg2rad(np.append(np.arange(0.0, 90.0, 2.5), [88.0, 89.0, 89.9, 89.999, 90.0]))

@@ -11,12 +11,12 @@ from numpy.typing import NDArray
 from pydantic import Field, model_validator
 from torch import Tensor
 
-from ml.configuration import Part
 from synthroads_addon.base.errors import InputError
 from synthroads_addon.base.progress import Progress, silent
 from synthroads_addon.base.random_streams import stream
 from synthroads_addon.base.schema import quantity
 
+from ...configuration import Part
 from ..networks.models import mirrored
 from .axis import Axis
 from .corridor import Truth, TruthKind

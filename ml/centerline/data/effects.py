@@ -10,12 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
-from ml.configuration import Part
 from synthroads_addon.base.schema import quantity
 
-from ..data.frames import Frames
-from ..data.stretch import HEADING, HEIGHT, LEFT, RIGHT, Stretch
+from ...configuration import Part
+from .frames import Frames
 from .lighting import relight
+from .stretch import HEADING, HEIGHT, LEFT, RIGHT, Stretch
 
 Float = NDArray[np.float64]
 Generator = np.random.Generator

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from ..data.stretch import Stretch
+from .stretch import Stretch
 
 if TYPE_CHECKING:
     from .effects import Effects

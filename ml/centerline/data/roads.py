@@ -15,13 +15,13 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ml.points import GROUND_CLASSES, Points, read_ground, read_points
 from synthroads_addon.base.errors import InputError, MissingFileError, OutputError
 from synthroads_addon.base.random_streams import stream
 from synthroads_addon.cloud.formats.npz import ARCHIVE_FAULTS
 from synthroads_addon.dataset.manifest import checksum, read_manifest
 from synthroads_addon.road.parameters import read_parameters
 
+from ...points import GROUND_CLASSES, Points, read_ground, read_points
 from .axis import Axis
 from .corridor import Truth, TruthKind, truths
 from .frames import Frames

@@ -24,12 +24,12 @@ from pydantic import Field
 from torch import Tensor
 from torch.utils.data import Dataset, IterableDataset, get_worker_info
 
-from ml.configuration import Part
-from ml.points import ROAD_CLASSES
 from synthroads_addon.base.errors import InputError
 from synthroads_addon.base.random_streams import stream
 from synthroads_addon.base.schema import quantity
 
+from ...configuration import Part
+from ...points import ROAD_CLASSES
 from . import intensity
 from .corridor import CORRIDOR, TruthKind
 from .effects import Effects, leave_out, transform

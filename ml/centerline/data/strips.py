@@ -10,12 +10,13 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ml.points import GROUND_CLASSES, SIXTEEN_BITS, UNSORTED_CLASSES, Points, full_color
 from synthroads_addon.base.errors import InputError
 from synthroads_addon.base.progress import Progress, silent
-from synthroads_addon.cloud.formats.reading import CloudHeader, open_cloud
+from synthroads_addon.cloud.formats.reader import CloudHeader
+from synthroads_addon.cloud.formats.registry import open_cloud
 from synthroads_addon.cloud.points import PointBlock
 
+from ...points import GROUND_CLASSES, SIXTEEN_BITS, UNSORTED_CLASSES, Points, full_color
 from .axis import Axis
 from .frames import Frames, estimated_path
 from .roads import REACH, Road

@@ -8,9 +8,9 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
-from ml.configuration import Part
 from synthroads_addon.base.schema import quantity
 
+from ...configuration import Part
 from .models import LINES, SCALE, TARGETS, Batch, Output
 
 Figures = dict[str, float]

@@ -26,9 +26,9 @@ import torch
 from pydantic import Field, model_validator
 from torch import Tensor, nn
 
-from ml.configuration import Part
 from synthroads_addon.base.schema import quantity
 
+from ...configuration import Part
 from ..data.corridor import CORRIDOR
 from ..data.slices import FEATURES
 from .layers import (

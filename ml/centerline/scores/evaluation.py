@@ -26,10 +26,10 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
-from ml.points import ROAD_CLASSES
 from synthroads_addon.base.errors import InputError
 from synthroads_addon.base.random_streams import stream
 
+from ...points import ROAD_CLASSES
 from ..data.corridor import CORRIDOR, Truth
 from ..data.frames import Frames, along, displaced, estimated_path, stretches
 from ..data.roads import Road, Slices, cropped, cut_beside_median

@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ml.tasks import Evaluation
 from synthroads_addon.base.errors import InputError, MissingFileError
 from synthroads_addon.base.files import write_file
 from synthroads_addon.base.progress import Progress, silent
 from synthroads_addon.base.schema import canonical_json
 from synthroads_addon.dataset.manifest import MANIFEST
 
+from ...tasks import Evaluation
 from ..data.corridor import TruthKind
 from ..data.roads import Road, read_measured, read_scene, scene_folders
 from ..networks.models import TARGETS

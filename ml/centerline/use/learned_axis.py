@@ -31,8 +31,8 @@ def learned_axis(folder: FilePath, cloud_file: FilePath, scratch: FilePath) -> P
     Raises:
         MissingFileError, InputError: it is no run of a centreline model, or its training isn't finished.
     """
-    from ml.runs import Run
-    from ml.tasks import Prediction, kinds, task
+    from ...runs import Run
+    from ...tasks import Prediction, kinds, task
 
     trained = Run.open(folder, kinds())
     name = trained.configuration.task

@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 from pydantic import Field
 from torch import Tensor
 
-from ml.configuration import Part
 from synthroads_addon.base.errors import InputError
 from synthroads_addon.base.schema import quantity
 
+from ...configuration import Part
 from ..data.corridor import CORRIDOR, Truth
 from ..data.frames import Frames, interleaved, stretches
 from ..data.roads import Road

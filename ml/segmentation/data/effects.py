@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
-from ml.configuration import Part
 from synthroads_addon.base.schema import quantity
 
+from ...configuration import Part
 from .tiles import Tile
 
 FloatArray = NDArray[np.float32]

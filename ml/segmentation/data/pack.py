@@ -17,12 +17,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from headless.cli import add_short_options
+from headless.commands import add_short_options
 from synthroads_addon.base.classes import ClassScheme, class_scheme
 from synthroads_addon.base.errors import InputError, OutputError
 from synthroads_addon.base.random_streams import stream
 from synthroads_addon.base.schema import read_json
-from synthroads_addon.cloud.formats.reading import open_cloud
+from synthroads_addon.cloud.formats.registry import open_cloud
 from synthroads_addon.cloud.points import PointBlock, concatenate
 from synthroads_addon.cloud.tools.quantile_mapping import steps_per_unit
 from synthroads_addon.cloud.tools.subsample import GridSubsampler

@@ -19,12 +19,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ml.cells import cell_keys
 from synthroads_addon.base.classes import ClassScheme, stored_scheme
 from synthroads_addon.base.errors import InputError, MissingFileError
 from synthroads_addon.base.files import write_file
 from synthroads_addon.cloud.formats.npz import ARCHIVE_FAULTS
 
+from ...cells import cell_keys
 from ..scores.metrics import IGNORED
 from .tiles import Tile
 

@@ -9,9 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ml.cells import thin
-from ml.points import full_color
-
+from ...cells import thin
+from ...points import full_color
 from ..scores.metrics import IGNORED
 
 

@@ -10,11 +10,11 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor, nn
 
-from ml.runs import Run
 from synthroads_addon.base.classes import ClassScheme
 from synthroads_addon.base.errors import InputError
 from synthroads_addon.base.progress import Progress, silent
 
+from ...runs import Run
 from ..data.classes import class_names
 from ..data.crops import Item
 from ..data.sources import Source, read_tiles

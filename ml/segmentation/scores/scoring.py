@@ -11,9 +11,9 @@ import torch
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from ml.cells import thin
 from synthroads_addon.base.random_streams import stream
 
+from ...cells import thin
 from ..data.crops import CropSettings, Item, item
 from ..data.effects import crop_of
 from ..data.tiles import Scaling, Tile

@@ -14,8 +14,8 @@ from ...base.errors import InputError
 from ...base.stepper import by_caller
 from ...road.parameters import Asset
 from ...road.surface import surface_elevation
-from ...road.things.assets import LibraryAsset, library_file, read_asset_library
 from ...scanning.scene.mesh_files import check_mesh_file
+from ...scenario.assets import LibraryAsset, library_file, read_asset_library
 from ..files import complaint
 from ..scene.labels import CLASS_PROPERTY, INSTANCE_PROPERTY
 from .meshes import on_plan

@@ -1,15 +1,21 @@
-"""SR Beacon: beacons (Leitbaken) of a construction zone on given points."""
+"""Beacons (Leitbaken) of construction zones (SR Beacon)."""
 
 from __future__ import annotations
 
+import math
+
 import bpy
+import numpy as np
 
 from ...base.classes import class_id
+from ...road.parameters import ConstructionBeacon
 from ...road.things.body_shapes import BEACON_BLADE, BEACON_BLADE_BOTTOM, BEACON_FOOT
+from ..materials import material
 from ..nodes import operations as op
 from ..nodes.backbone import height_on
 from ..nodes.builder import Tree, Value, node_group
 from ..nodes.solids import box, flipped, moved, painted, prism, put
+from .model_builder import ModelBuilder
 
 CELLS = (2, 8)
 """Cells across and up a blade, each cut by the border of a stripe: of 0.25 m x 1 m they are squares."""
@@ -121,3 +127,30 @@ def _lamp(tree: Tree, housing: Value, lens: Value) -> Value:
         tree.node("GeometryNodeTransform", mesh, translation=middle, rotation=lying).value for mesh in (drum, glass)
     ]
     return op.join(body, painted(parts[0], housing), painted(parts[1], lens))
+
+
+def build_beacons(builder: ModelBuilder) -> None:
+    """Make all beacons as one object."""
+    beacons = list(builder.parameters.of_type(ConstructionBeacon).values())
+    if not beacons:
+        return
+    inputs = {
+        **builder.surfaces(),
+        "Red Material": material("sheeting_red"),
+        "White Material": material("sheeting_white"),
+        "Rubber Material": material("rubber"),
+        "Housing Material": material("plastic_black"),
+        "Lens Material": material("lamp_yellow"),
+    }
+    attributes = {
+        "width": np.array([beacon.width for beacon in beacons]),
+        "height": np.array([beacon.height for beacon in beacons]),
+        "pass_side": np.array([_own_side(beacon) for beacon in beacons]),
+    }
+    builder.add("Beacons", builder.points("Beacons", beacons, attributes), beacon_group(), inputs)
+
+
+def _own_side(beacon: ConstructionBeacon) -> int:
+    """Return +1 where traffic passes a beacon on its own left, -1 on its right: one turned round has them swapped."""
+    with_stations = math.cos(math.radians(beacon.rotation_deg)) > 0.0
+    return 1 if (beacon.pass_side == "left") == with_stations else -1

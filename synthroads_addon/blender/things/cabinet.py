@@ -1,4 +1,4 @@
-"""SR Cabinet: a utility cabinet with doors, on a plinth, under a lid."""
+"""Utility cabinets with doors, on a plinth, under a lid (SR Cabinet), and the objects of emergency phones."""
 
 from __future__ import annotations
 
@@ -7,10 +7,14 @@ from dataclasses import dataclass
 import bpy
 
 from ...base.classes import class_id
+from ...road.parameters import Cabinet
+from ..materials import material
 from ..nodes import operations as op
 from ..nodes.builder import Tree, Value, node_group
 from ..nodes.solids import box, painted, put, row_of_points
 from ..nodes.standing import declare_standing, put_on
+from .emergency_phone import emergency_phone_group
+from .model_builder import ModelBuilder
 
 BURIED = 0.5
 """Depth of the plinth below the surface, m: the ground may fall beside its middle."""
@@ -81,3 +85,30 @@ def _block(tree: Tree, cabinet: _Cabinet, inset: float, low: Value | float, high
     """Return a box between two heights, so much smaller than the cabinet all around."""
     size = op.vector(tree, cabinet.width - 2.0 * inset, cabinet.depth - 2.0 * inset, high - low)
     return box(tree, size, op.vector(tree, 0.0, 0.0, (high + low) * 0.5))
+
+
+_MATERIALS = {
+    "emergency_phone": {
+        "Body": "plastic_orange",
+        "Plinth": "concrete",
+        "Band": "sheeting_white",
+        "Writing": "sheeting_white",
+        "Panel": "plastic_black",
+    },
+    "utility": {"Body": "cabinet_grey", "Plinth": "concrete", "Fitting": "plastic_black"},
+}
+
+
+def build_cabinets(builder: ModelBuilder) -> None:
+    """Make one object per emergency phone and utility cabinet."""
+    for name, cabinet in builder.parameters.of_type(Cabinet).items():
+        group = emergency_phone_group() if cabinet.kind == "emergency_phone" else cabinet_group()
+        inputs = {
+            **builder.surfaces(),
+            "Width": cabinet.width,
+            "Depth": cabinet.depth,
+            "Height": cabinet.height,
+            "Instance": cabinet.instance,
+            **{f"{part} Material": material(entry) for part, entry in _MATERIALS[cabinet.kind].items()},
+        }
+        builder.add(name, builder.points(name, [cabinet], {}), group, inputs)

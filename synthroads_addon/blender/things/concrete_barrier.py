@@ -1,4 +1,4 @@
-"""SR Concrete Barrier: a concrete barrier of step or New Jersey profile, ramped down at its ends."""
+"""Concrete barriers of step or New Jersey profile, ramped down at their ends (SR Concrete Barrier)."""
 
 from __future__ import annotations
 
@@ -7,13 +7,16 @@ from dataclasses import dataclass
 import bpy
 
 from ...base.classes import class_id
+from ...road.parameters import ConcreteBarrier
 from ...road.things.body_shapes import CONCRETE_FLANKS, CONCRETE_TIP
+from ..materials import material
 from ..nodes import operations as op
 from ..nodes.backbone import first_station, last_station
 from ..nodes.builder import Tree, Value, node_group
 from ..nodes.foot import foot_at
 from ..nodes.solids import loft
 from ..nodes.strip import INSTANCES
+from .model_builder import ModelBuilder
 
 BURIED = 0.1
 """Depth of the foot below the surface, m."""
@@ -122,3 +125,22 @@ def _swept(tree: Tree, line: Value, barrier: _Barrier) -> Value:
         return op.sample_index(line, op.named(tree, "station"), row)
 
     return loft(tree, outline, len(_outline("step")), op.point_count(line), place, {"station": station})
+
+
+def build_concrete_barriers(builder: ModelBuilder) -> None:
+    """Make one object per concrete barrier."""
+    for name, barrier in builder.parameters.of_type(ConcreteBarrier).items():
+        inputs = {
+            **builder.surfaces("Backbone"),
+            "Start Station": builder.along(barrier.start_station),
+            "End Station": builder.along(min(barrier.end_station, builder.geometry.length)),
+            "Offset": barrier.offset,
+            "New Jersey": barrier.profile == "new_jersey",
+            "Height": barrier.height,
+            "Base Width": barrier.base_width,
+            "Terminal Length": barrier.terminal_length,
+            "Step": builder.step,
+            "Instance": barrier.instance,
+            "Material": material("barrier_concrete"),
+        }
+        builder.add(name, bpy.data.meshes.new("SR Concrete Barrier"), concrete_barrier_group(), inputs)

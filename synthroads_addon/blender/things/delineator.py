@@ -1,14 +1,18 @@
-"""SR Delineator: delineator posts (Leitpfosten) on given points."""
+"""Delineator posts, Leitpfosten (SR Delineator)."""
 
 from __future__ import annotations
 
 import bpy
+import numpy as np
 
 from ...base.classes import class_id
+from ...road.parameters import Delineator
 from ...road.things.body_shapes import DELINEATOR
+from ..materials import material
 from ..nodes import operations as op
 from ..nodes.builder import Tree, Value, node_group
 from ..nodes.standing import on_surface, put_on
+from .model_builder import ModelBuilder
 
 _SLANT = 0.6
 """Rise of the top and of the black band away from the road, m/m."""
@@ -97,3 +101,18 @@ def _raised(face: Value, material: Value) -> Value:
     """Return a reflector as thick as it stands out of the post."""
     solid = face.tree.node("GeometryNodeExtrudeMesh", face, offset_scale=_UNDER + _PROUD, individual=False).value
     return _set_material(solid, material)
+
+
+def build_delineators(builder: ModelBuilder) -> None:
+    """Make all delineator posts as one object."""
+    posts = list(builder.parameters.of_type(Delineator).values())
+    if not posts:
+        return
+    inputs = {
+        **builder.surfaces(),
+        "White Material": material("plastic_white"),
+        "Black Material": material("plastic_black"),
+        "Reflector Material": material("reflector"),
+    }
+    heights = np.array([post.height for post in posts])
+    builder.add("Delineators", builder.points("Delineators", posts, {"height": heights}), delineator_group(), inputs)

@@ -1,4 +1,4 @@
-"""SR Guardrail: a steel W-beam on posts, on one side or on both, ramped into the ground at its ends."""
+"""Steel guardrails: W-beams on posts, on one side or on both, ramped into the ground at their ends (SR Guardrail)."""
 
 from __future__ import annotations
 
@@ -7,17 +7,21 @@ from dataclasses import dataclass
 import bpy
 
 from ...base.classes import class_id
+from ...road.parameters import Guardrail
 from ...road.things.body_shapes import (
     GUARDRAIL_BEAM,
     GUARDRAIL_LOWEST_POST,
     GUARDRAIL_POST,
     GUARDRAIL_POST_TOP,
+    GUARDRAIL_SPACER,
     GUARDRAIL_TIP,
 )
+from ..materials import material
 from ..nodes import operations as op
 from ..nodes.backbone import first_station, height_on, last_station, look_up, raised, station_ribbon
 from ..nodes.builder import Operand, Tree, Value, node_group
 from ..nodes.strip import INSTANCES
+from .model_builder import ModelBuilder
 
 _THICKNESS = 0.003
 BEAM_PROFILE = [(x, 0.0, z) for x, z in GUARDRAIL_BEAM]
@@ -207,3 +211,24 @@ def _post(tree: Tree) -> Value:
     mesh, column, number = op.grid(tree, len(_POST), 2)
     section = op.choose(column, [(x, y, 0.0) for x, y in _POST])
     return op.set_position(mesh, section + op.vector(tree, 0.0, 0.0, number))
+
+
+def build_guardrails(builder: ModelBuilder) -> None:
+    """Make one object per guardrail."""
+    for name, rail in builder.parameters.of_type(Guardrail).items():
+        inputs = {
+            **builder.surfaces("Backbone"),
+            "Start Station": builder.along(rail.start_station),
+            "End Station": builder.along(min(rail.end_station, builder.geometry.length)),
+            "Offset": rail.offset,
+            "Left Beam": rail.faces in ("left", "both"),
+            "Right Beam": rail.faces in ("right", "both"),
+            "Spacer": GUARDRAIL_SPACER[rail.faces],
+            "Height": rail.height,
+            "Post Spacing": rail.post_spacing,
+            "Terminal Length": rail.terminal_length,
+            "Beam Step": builder.step,
+            "Instance": rail.instance,
+            "Material": material("galvanised_steel"),
+        }
+        builder.add(name, bpy.data.meshes.new("SR Guardrail"), guardrail_group(), inputs)

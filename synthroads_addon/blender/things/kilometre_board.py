@@ -1,4 +1,4 @@
-"""SR Kilometre Board: a board with writing on both sides, on a post of its own."""
+"""Kilometre boards: writing on both sides, on a post of their own (SR Kilometre Board)."""
 
 from __future__ import annotations
 
@@ -7,12 +7,16 @@ import math
 import bpy
 
 from ...base.classes import class_id
+from ...road.parameters import KilometreBoard
 from ...road.things.body_shapes import KILOMETRE_POST
+from ..materials import material
 from ..nodes import operations as op
 from ..nodes.builder import Tree, node_group
 from ..nodes.solids import moved
 from ..nodes.standing import declare_standing, put_on
+from .model_builder import ModelBuilder
 from .sign.face import declare_face, sign_face_group
+from .sign.looks import FaceStyle, face_inputs
 from .sign.posts import sign_posts_group
 
 
@@ -52,3 +56,22 @@ def _build(tree: Tree) -> None:
     with tree.frame("Labels"):
         mesh = standing.labelled(op.join(mesh, post), class_id("road_sign"))
     tree.output("Mesh", mesh, description="Board with its post")
+
+
+_STYLE = FaceStyle("blue", "white", "white")
+_THICKNESS = 0.024
+"""Thickness of either half of a board, m."""
+
+
+def build_kilometre_boards(builder: ModelBuilder) -> None:
+    """Make one object per kilometre board."""
+    for name, board in builder.parameters.of_type(KilometreBoard).items():
+        inputs = {
+            **builder.surfaces(),
+            **face_inputs(_STYLE, "rectangle", board.width, board.height, (board.text,)),
+            "Thickness": _THICKNESS,
+            "Lower Edge": board.lower_edge,
+            "Post Material": material("galvanised_steel"),
+            "Instance": board.instance,
+        }
+        builder.add(name, builder.points(name, [board], {}), kilometre_board_group(), inputs)

@@ -1,4 +1,4 @@
-"""SR Noise Barrier: level panels between posts, which step down with the ground from post to post."""
+"""Noise barriers: level panels between posts, which step down with the ground from post to post (SR Noise Barrier)."""
 
 from __future__ import annotations
 
@@ -8,7 +8,9 @@ from dataclasses import dataclass
 import bpy
 
 from ...base.classes import class_id
+from ...road.parameters import NoiseBarrier
 from ...road.things.body_shapes import SHORTEST_ELEMENT
+from ..materials import material
 from ..nodes import operations as op
 from ..nodes.backbone import first_station, last_station
 from ..nodes.builder import Tree, Value, node_group
@@ -16,6 +18,7 @@ from ..nodes.foot import foot_at
 from ..nodes.noise_panel import noise_panel_group
 from ..nodes.solids import box, painted, put
 from ..nodes.strip import INSTANCES
+from .model_builder import ModelBuilder
 
 # Section of an HEA profile of width 1 (HEA 160: 152 mm across the wall, 160 mm along it).
 _FLANGE, _INSIDE, _WEB = 0.475, 0.42, 0.02
@@ -162,3 +165,35 @@ def _filled(tree: Tree, wall: _Wall, bays: Value, sizes: tuple[Value, Value], bo
     deep = plinth + BURIED
     below = level - op.vector(tree, 0.0, 0.0, deep * 0.5)
     return op.realize(op.join(panels, put(bays, block, below, op.vector(tree, length, wall.thickness, deep), turned)))
+
+
+_MATERIALS = {
+    "aluminium": ("noise_aluminium", "noise_aluminium"),
+    "concrete": ("noise_concrete", "noise_concrete"),
+    "wood": ("noise_wood", "noise_wood"),
+    "glass": ("acrylic_glass", "galvanised_steel"),
+}
+"""Materials of a panel, and of its frame or cap."""
+
+
+def build_noise_barriers(builder: ModelBuilder) -> None:
+    """Make one object per noise barrier."""
+    for name, wall in builder.parameters.of_type(NoiseBarrier).items():
+        face, frame = _MATERIALS[wall.panel]
+        inputs = {
+            **builder.surfaces("Backbone"),
+            "Start Station": builder.along(wall.start_station),
+            "End Station": builder.along(min(wall.end_station, builder.geometry.length)),
+            "Offset": wall.offset,
+            "Height": wall.height,
+            "Panel": KINDS.index(wall.panel),
+            "Thickness": wall.thickness,
+            "Post Spacing": wall.post_spacing,
+            "Post Width": wall.post_width,
+            "Instance": wall.instance,
+            "Post Material": material("galvanised_steel"),
+            "Panel Material": material(face),
+            "Frame Material": material(frame),
+            "Plinth Material": material("noise_concrete"),
+        }
+        builder.add(name, bpy.data.meshes.new("SR Noise Barrier"), noise_barrier_group(), inputs)

@@ -1,4 +1,4 @@
-"""SR Pole: a tapered mast with an arm, and at its end a street light, or cameras."""
+"""Lighting and surveillance poles: masts with an arm, and at its end a street light, or cameras (SR Pole)."""
 
 from __future__ import annotations
 
@@ -8,11 +8,14 @@ from dataclasses import dataclass
 import bpy
 
 from ...base.classes import class_id
+from ...road.parameters import Pole
+from ..materials import material
 from ..nodes import operations as op
 from ..nodes.builder import Tree, Value, node_group
 from ..nodes.solids import box, moved, painted, prism
 from ..nodes.standing import BURIED, declare_standing, put_on
 from ..nodes.tubes import cone, tube
+from .model_builder import ModelBuilder
 
 _TAPER = 0.45
 """Diameter at the top as a share of that at the foot."""
@@ -131,3 +134,20 @@ def _camera(tree: Tree, pole: _Pole) -> Value:
     ).value
     camera = op.join(painted(op.join(box(tree, _CAMERA), shield), pole.housing), painted(lens, pole.glass))
     return tree.node("GeometryNodeTransform", camera, rotation=(math.radians(8.0), 0.0, 0.0)).value
+
+
+def build_poles(builder: ModelBuilder) -> None:
+    """Make one object per pole."""
+    for name, pole in builder.parameters.of_type(Pole).items():
+        inputs = {
+            **builder.surfaces(),
+            "Surveillance": pole.kind == "surveillance",
+            "Height": pole.height,
+            "Diameter": pole.diameter,
+            "Arm Length": pole.arm_length,
+            "Instance": pole.instance,
+            "Steel Material": material("galvanised_steel"),
+            "Housing Material": material("cabinet_grey"),
+            "Glass Material": material("lamp_glass" if pole.kind == "lighting" else "display"),
+        }
+        builder.add(name, builder.points(name, [pole], {}), pole_group(), inputs)

@@ -1,4 +1,4 @@
-"""SR Temporary Barrier: movable elements of a construction zone, in a straight line or along the road."""
+"""Movable barriers of construction zones: elements in a line or along the road (SR Temporary Barrier)."""
 
 from __future__ import annotations
 
@@ -7,13 +7,16 @@ from dataclasses import dataclass
 import bpy
 
 from ...base.classes import class_id
-from ...road.things.body_shapes import SHORTEST_ELEMENT, TEMPORARY_FLANKS, TEMPORARY_GAP
+from ...road.parameters import TemporaryBarrier
+from ...road.things.body_shapes import LONGEST_PLASTIC, SHORTEST_ELEMENT, TEMPORARY_FLANKS, TEMPORARY_GAP
+from ..materials import material
 from ..nodes import operations as op
 from ..nodes.backbone import first_station, last_station
 from ..nodes.builder import Tree, Value, node_group
 from ..nodes.foot import foot_at
 from ..nodes.solids import box, loft, painted, put
 from ..nodes.strip import INSTANCES
+from .model_builder import ModelBuilder
 
 _STEEL, _PLASTIC = TEMPORARY_FLANKS["steel"], TEMPORARY_FLANKS["plastic"]
 _REFLECTOR = (0.12, 0.02, 0.06)
@@ -140,3 +143,25 @@ def _stood(tree: Tree, points: Value, body: Value, whole: bool) -> Value:
         return put(points, body, (start + end) * 0.5, 1.0, turned.value)
     length = tree.node("ShaderNodeVectorMath", end - start, operation="LENGTH")["Value"]
     return put(points, body, start, op.vector(tree, length, 1.0, 1.0), turned.value)
+
+
+def build_temporary_barriers(builder: ModelBuilder) -> None:
+    """Make one object per movable barrier."""
+    for name, barrier in builder.parameters.of_type(TemporaryBarrier).items():
+        plastic = barrier.segment_length <= LONGEST_PLASTIC
+        inputs = {
+            **builder.surfaces("Backbone"),
+            "Start Station": builder.along(barrier.start_station),
+            "End Station": builder.along(barrier.end_station),
+            "Offset": barrier.offset,
+            "End Offset": barrier.end_offset,
+            "Height": barrier.height,
+            "Base Width": barrier.base_width,
+            "Segment Length": barrier.segment_length,
+            "Plastic": plastic,
+            "Instance": barrier.instance,
+            "Material": material("plastic_red" if plastic else "galvanised_steel"),
+            "Second Material": material("plastic_white" if plastic else "galvanised_steel"),
+            "Reflector Material": material("reflector"),
+        }
+        builder.add(name, bpy.data.meshes.new("SR Temporary Barrier"), temporary_barrier_group(), inputs)

@@ -1,14 +1,18 @@
-"""SR Terrain: batter and ground beside the road."""
+"""The ground beside the road, and the batters that join it to the road (SR Terrain)."""
 
 from __future__ import annotations
 
 import bpy
+import numpy as np
 
 from ...base.classes import class_id
+from ..materials import material
 from ..nodes import operations as op
 from ..nodes.backbone import cut, row
 from ..nodes.builder import Tree, Value, node_group
 from ..nodes.strip import INSTANCES
+from .meshes import ground_mesh
+from .model_builder import ModelBuilder
 
 _FINE = 0.12
 """Share of even spacing among the columns; the rest grows away from the road."""
@@ -105,3 +109,21 @@ def _ground_above(tree: Tree, ground: Value, place: Value) -> Value:
     above = place + (0.0, 0.0, 1000.0)
     ray = tree.node("GeometryNodeRaycast", target_geometry=ground, source_position=above, ray_length=2000.0)
     return op.switch(ray["Is Hit"], 0.0, 1000.0 - ray["Hit Distance"])
+
+
+def build_terrain(builder: ModelBuilder) -> None:
+    """Make the ground as it was, and the terrain that joins it to the road."""
+    terrain = builder.parameters.terrain
+    if terrain is None:
+        return
+    ground = ground_mesh(builder.geometry, terrain, builder.tolerance, builder.stretch, builder.origin)
+    builder.add("Ground", ground, support=True)
+    inputs = {
+        **{role: builder.objects[role] for role in ("Backbone", "Road", "Ground")},
+        "Half Width": terrain.half_width,
+        "Batter Slope": terrain.batter_slope,
+        "Columns": int(np.clip(terrain.half_width * 0.6, 12, 120)),
+        "Instance": terrain.instance,
+        "Material": material("grass_ground"),
+    }
+    builder.add("Terrain", bpy.data.meshes.new("SR Terrain"), terrain_group(), inputs)

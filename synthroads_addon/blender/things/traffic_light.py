@@ -1,4 +1,4 @@
-"""SR Traffic Light: lights one above the other with their visors, before a dark board, on a post."""
+"""Traffic lights: lamps one above the other with visors, before a dark board, on a post (SR Traffic Light)."""
 
 from __future__ import annotations
 
@@ -8,12 +8,15 @@ from dataclasses import dataclass
 import bpy
 
 from ...base.classes import class_id
+from ...road.parameters import TrafficLight
 from ...road.things.body_shapes import TRAFFIC_LIGHT_POST
+from ..materials import material
 from ..nodes import operations as op
 from ..nodes.builder import Tree, Value, node_group
 from ..nodes.solids import box, loft, moved, painted, put, row_of_points
 from ..nodes.standing import BURIED, declare_standing, put_on
 from ..nodes.tubes import cone, tube
+from .model_builder import ModelBuilder
 
 # In diameters of a light: a chamber of the housing, and the board behind it.
 _CHAMBER = (1.3, 0.7, 1.25)
@@ -144,3 +147,22 @@ def _visor(tree: Tree, diameter: Value) -> Value:
         return point - op.vector(tree, 0.0, reach * row)
 
     return loft(tree, outline, 2 * _VISOR_STEPS, 2, place)
+
+
+def build_traffic_lights(builder: ModelBuilder) -> None:
+    """Make one object per traffic light."""
+    for name, light in builder.parameters.of_type(TrafficLight).items():
+        inputs = {
+            **builder.surfaces(),
+            "Height": light.height,
+            "Lights": light.lights,
+            "Light Diameter": light.light_diameter,
+            "Instance": light.instance,
+            "Post Material": material("galvanised_steel"),
+            "Housing Material": material("plastic_black"),
+            "Rim Material": material("sheeting_white"),
+            "Red Material": material("lamp_red"),
+            "Yellow Material": material("lamp_yellow"),
+            "Green Material": material("lamp_green"),
+        }
+        builder.add(name, builder.points(name, [light], {}), traffic_light_group(), inputs)

@@ -11,9 +11,10 @@ from ...road.guidelines import DELINEATOR_SPACING, EMERGENCY_PHONE_SPACING, KILO
 from ...road.objects import LineObject, PointObject
 from ...road.section import LineMarking
 from ...road.surroundings import Vegetation, Vehicle
+from ...road.things.body_shapes import DELINEATOR_REACH
 from ...road.things.furniture import Cabinet, ConstructionBeacon, Delineator, KilometreBoard
 from .edges import Edges, Float
-from .obstacles import DELINEATOR_REACH, Bodies, Bool
+from .obstacles import Bodies, Bool
 from .rule import TOLERANCE, Finding, Road, Rule, below
 
 #: From the paved edge to a delineator's axis, m (HLB).

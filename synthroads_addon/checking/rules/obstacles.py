@@ -9,6 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...road.parameters import RoadParameters
+from ...road.things.body_shapes import (
+    BEACON_REACH,
+    BEAM_REACH,
+    BOARD_POST_REACH,
+    DELINEATOR_REACH,
+    FACE_REACH,
+    POST_REACH,
+)
 from ...road.things.furniture import (
     Asset,
     Cabinet,
@@ -26,10 +34,6 @@ from ...road.things.furniture import (
 )
 from .edges import Edges, Float
 
-#: From a guardrail's axis to the face of its beam, and to the rear of its posts, m.
-BEAM_REACH, POST_REACH = 0.2, 0.05
-#: Half the width of a delineator, and half the depth of a sign's face, a board's post and a beacon, m.
-DELINEATOR_REACH, FACE_REACH, BOARD_POST_REACH, BEACON_REACH = 0.06, 0.03, 0.03, 0.1
 #: What is longer than this (m) along the road is looked at at its ends as well.
 LONG = 1.5
 #: How far abutments reach, m: their embankments go on to the ground.

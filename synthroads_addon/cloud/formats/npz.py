@@ -26,8 +26,8 @@ from numpy.typing import NDArray
 from ...base.errors import InputError
 from ..layers import COLUMNS, columns, gather
 from ..points import PointBlock
-from .reading import BLOCK, CloudHeader, CloudReader, damaged, finite_coordinates, header_from_notes
-from .writing import CloudWriter
+from .reader import BLOCK, CloudHeader, CloudReader, damaged, finite_coordinates, header_from_notes
+from .writer import CloudWriter
 
 _ALWAYS = {
     "xyz": ("<f8", 3),

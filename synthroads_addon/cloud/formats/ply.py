@@ -19,8 +19,8 @@ from numpy.typing import NDArray
 from ...base.errors import InputError
 from ..layers import COLUMNS, Column, columns, gather
 from ..points import PointBlock
-from .reading import BLOCK, CloudHeader, CloudReader, damaged, finite_coordinates, header_from_notes
-from .writing import CloudWriter
+from .reader import BLOCK, CloudHeader, CloudReader, damaged, finite_coordinates, header_from_notes
+from .writer import CloudWriter
 
 _NAMES = {"NormalX": "nx", "NormalY": "ny", "NormalZ": "nz"}
 """Columns that PLY has names of its own for."""

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from ...scanning.devices.device import scanner_setting
 from ...scanning.patterns.pattern import shot_count
 from ...scanning.platforms.path import Path as ScanPath
+from ...scenario.devices.device import scanner_setting
 from ...scenario.scenario import Scenario
 from ..scan.files import wanted_layers
 from .pilot import Pilot

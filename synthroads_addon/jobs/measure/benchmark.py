@@ -31,7 +31,7 @@ from ...scanning.colour.colour import LayerSource
 from ...scanning.scan import Scan, scan_block
 from ...scanning.scene.caster import Caster
 from ...scenario.scenario import Scenario
-from ..generate import write_texts
+from ..road_files import write_road_files
 from ..scan.files import ScanToFiles, colour_job, make_scan, road_path, scan_blocks
 
 _CAST_BLOCKS, _WRITTEN_BLOCKS = 48, 96
@@ -50,7 +50,8 @@ def measure_demo(scenario: Scenario) -> dict[str, Any]:
     """Do the demo job and measure its stages and their floors; the open file is lost.
 
     Returns:
-        ``cores``; ``stages`` with seconds and peak memory; ``lines`` by the names of `jobs.measure.benchmark_table.LIMITS`;
+        ``cores``; ``stages`` with seconds and peak memory; ``lines`` by the names of
+        `jobs.measure.benchmark_table.LIMITS`;
         ``floors``: name, unit, ours and floor.
     """
     timer, settings = StageTimer(), scenario.settings()
@@ -60,7 +61,7 @@ def measure_demo(scenario: Scenario) -> dict[str, Any]:
         with timer.stage("parameters"):
             parameters = sample_road(scenario.road, scenario.seed, scenario.title)
             geometry = RoadGeometry(parameters)
-            write_texts(folder, scenario.outputs, parameters, geometry, scenario)
+            write_road_files(folder, scenario.outputs, parameters, geometry, scenario)
         with timer.stage("model"):
             model = build_road(parameters, settings.tolerance, settings.vegetation_detail)
         with timer.stage("scene mesh"):
@@ -165,7 +166,7 @@ def _best_of_both(ours: Callable[[], float], floor: Callable[[], float]) -> dict
 
 def _writing(scan: Scan, source: LayerSource, task: ScanToFiles, folder: Path) -> Rate:
     """Return the writing of LAZ beside the mere compression of the same records by lazrs through laspy."""
-    from ...cloud.formats.writing import open_writer
+    from ...cloud.formats.registry import open_writer
 
     few = replace(scan, only=tuple(_spread(scan, _WRITTEN_BLOCKS)))
     blocks = [result.points for result in scan_blocks(few, 0, task.finish)]

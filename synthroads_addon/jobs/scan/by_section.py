@@ -21,12 +21,12 @@ from ...road.geometry import RoadGeometry
 from ...road.parameters import RoadParameters
 from ...scanning.beam import RINGS, beam_pattern
 from ...scanning.blocks import Block, Blocks
-from ...scanning.devices.device import scanner_setting
 from ...scanning.platforms.path import Strip
 from ...scanning.platforms.shifted import ShiftedMotion, ShiftedPath
 from ...scanning.scan import Scan
 from ...scanning.scene.motion import LaneMotion, ScannedScene, lane_motions
 from ...scanning.sections import Section, sections, shadow_length
+from ...scenario.devices.device import scanner_setting
 from ...scenario.scenario import Scenario
 from .cloud_files import CloudFiles
 from .files import colour_job, make_finish, make_scan, may_render, of_scan, road_path, scan_blocks, top_view

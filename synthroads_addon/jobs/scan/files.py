@@ -21,7 +21,6 @@ from ...road.geometry import RoadGeometry
 from ...road.surroundings import Environment, MaterialVariation
 from ...scanning.beam import RINGS
 from ...scanning.colour.colour import LayerSource
-from ...scanning.devices.device import scanner_setting
 from ...scanning.finish import LAYERS, OPTIONAL, Finish
 from ...scanning.platforms.path import Path as ScanPath
 from ...scanning.platforms.path import RoadGuide, Strip, make_path
@@ -30,6 +29,7 @@ from ...scanning.scan import BlockResult, Scan, joined_results, scan_block
 from ...scanning.scene.motion import ScannedScene
 from ...scanning.scene.target import Target
 from ...scanning.weather import attenuation, weather_of
+from ...scenario.devices.device import scanner_setting
 from ...scenario.scenario import Scenario
 from .cloud_files import CloudFiles, ScanCounts
 

@@ -94,3 +94,8 @@ BRIDGE_PIER_LENGTH = 0.5
 """Length of a pier as a share of the deck's width."""
 BRIDGE_BURIED = 0.8
 """Depth of a bridge's walls and piers below the ground, m."""
+
+#: From a guardrail's axis to the face of its beam, and to the rear of its posts, m.
+BEAM_REACH, POST_REACH = 0.2, 0.05
+#: Half the width of a delineator, and half the depth of a sign's face, a board's post and a beacon, m.
+DELINEATOR_REACH, FACE_REACH, BOARD_POST_REACH, BEACON_REACH = 0.06, 0.03, 0.03, 0.1

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..devices.device import ScannerSetting
-from ..devices.pattern_models import (
+from ...scenario.devices.device import ScannerSetting
+from ...scenario.devices.pattern_models import (
     FULL_TURN,
     Grid,
     OscillatingMirror,

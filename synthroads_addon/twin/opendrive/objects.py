@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 
-from ...checking.rules.obstacles import BEACON_REACH, BEAM_REACH, DELINEATOR_REACH, POST_REACH
 from ...road.objects import LineObject, PointObject
 from ...road.paint import arrow_outlines, hatching_outlines
 from ...road.parameters import (
@@ -31,6 +30,7 @@ from ...road.parameters import (
     TrafficLight,
     TrafficSign,
 )
+from ...road.things.body_shapes import BEACON_REACH, BEAM_REACH, DELINEATOR_REACH, POST_REACH
 from .pieces import CLOSE, Float
 from .places import Ground, ramp_share
 from .xml import Element, Value, element, notes

@@ -15,7 +15,7 @@ from mathutils import Vector
 from ...base.errors import InputError
 from ...blender.model.store import find_road
 from ...blender.views.cloud import CloudView, scene_origin
-from ...cloud.formats.writing import ENDINGS
+from ...cloud.formats.registry import ENDINGS
 from ...cloud.tools.display import COLOURINGS, ColourBy, DisplayCloud, height_colors, read_display
 from ..work.common import Sidebar, column, is_free
 from ..work.job import Aside, Job, Report, Work

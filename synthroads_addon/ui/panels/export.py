@@ -13,8 +13,8 @@ import bpy
 from ...base.errors import InputError
 from ...base.files import output_folder
 from ...blender.model.store import find_road
-from ...cloud.formats.writing import ENDINGS
-from ...cloud.formats.writing import missing_package as cloud_package
+from ...cloud.formats.registry import ENDINGS
+from ...cloud.formats.registry import missing_package as cloud_package
 from ...cloud.tools.convert import convert, subsample
 from ...cloud.tools.display import BLOCK
 from ...road.parameters import RoadParameters

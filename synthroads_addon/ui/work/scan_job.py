@@ -19,7 +19,8 @@ from ...blender.cameras.surfaces import scene_constants
 from ...blender.files import save_scene
 from ...blender.scene.evaluated import CopiedScene, scanned_scene_steps
 from ...jobs.generate import Job as PipelineJob
-from ...jobs.generate import check, check_not_empty, closing, file_names, opening, write_texts
+from ...jobs.generate import check, check_not_empty, closing, file_names, opening
+from ...jobs.road_files import write_road_files
 from ...jobs.scan.files import ScanToFiles, make_scan, material_rows, may_render, road_path, top_view, wanted_layers
 from ...materials.table import Material
 from ...road.geometry import RoadGeometry
@@ -162,7 +163,7 @@ def _scan_copied(
 def _write_files(scan: RoadScan, measure: _Measure, output: _Output) -> int:
     """Write all files; return the number of points. Runs in a thread: it touches no data of Blender."""
     scenario, parameters = scan.scenario, scan.parameters
-    write_texts(output.folder, scenario.outputs, parameters, RoadGeometry(parameters), scenario)
+    write_road_files(output.folder, scenario.outputs, parameters, RoadGeometry(parameters), scenario)
     if scenario.twin:
         with output.timer.stage("twin"):
             write_twin(parameters, output.folder, scenario.twin, scenario.settings().tolerance)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from headless.cli import command
+from headless.commands import command
 from synthroads_addon.blender.views import gallery
 
 

@@ -13,8 +13,7 @@ from hypothesis import strategies as st
 
 from synthroads_addon.base.classes import class_scheme
 from synthroads_addon.base.errors import Cancelled, InputError, MissingFileError
-from synthroads_addon.cloud.formats.reading import read_cloud
-from synthroads_addon.cloud.formats.writing import ENDINGS, open_writer
+from synthroads_addon.cloud.formats.registry import ENDINGS, open_writer, read_cloud
 from synthroads_addon.cloud.points import PointBlock, concatenate
 from synthroads_addon.cloud.tools.display import chosen_points, drawing_places, height_colors, read_display
 from tests.helpers.clouds.random_points import make_points

@@ -14,8 +14,7 @@ from PIL import Image
 
 from synthroads_addon.base.classes import class_id, class_scheme
 from synthroads_addon.base.errors import InputError
-from synthroads_addon.cloud.formats.reading import open_cloud
-from synthroads_addon.cloud.formats.writing import open_writer
+from synthroads_addon.cloud.formats.registry import open_cloud, open_writer
 from synthroads_addon.cloud.points import PointBlock, concatenate
 from synthroads_addon.cloud.tools.convert import draw_previews, map_intensity, subsample
 from synthroads_addon.cloud.tools.picture import nice_step

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from synthroads_addon.base.classes import class_id
-from synthroads_addon.cloud.formats.writing import open_writer
+from synthroads_addon.cloud.formats.registry import open_writer
 from synthroads_addon.cloud.points import PointBlock
 from synthroads_addon.road.geometry import RoadGeometry
 from synthroads_addon.road.parameters import (

@@ -10,7 +10,7 @@ import numpy as np
 from ml.points import Points
 from synthroads_addon.base.classes import class_scheme
 from synthroads_addon.base.schema import canonical_json
-from synthroads_addon.cloud.formats.writing import open_writer
+from synthroads_addon.cloud.formats.registry import open_writer
 from synthroads_addon.cloud.points import PointBlock
 from tests.helpers.roads import analytic_roads
 

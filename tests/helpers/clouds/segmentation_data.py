@@ -11,7 +11,7 @@ import numpy as np
 from ml.segmentation.data.tiles import Tile
 from ml.segmentation.recipes import SegmentationConfiguration
 from synthroads_addon.base.classes import class_scheme
-from synthroads_addon.cloud.formats.writing import open_writer
+from synthroads_addon.cloud.formats.registry import open_writer
 from synthroads_addon.cloud.points import PointBlock
 
 NAMES = tuple(row.name for row in class_scheme("5").rows)

@@ -7,7 +7,6 @@ import numpy as np
 from synthroads_addon.materials.surfaces import surfaces_of
 from synthroads_addon.materials.table import materials
 from synthroads_addon.scanning.beam import RINGS
-from synthroads_addon.scanning.devices.device import scanner_setting
 from synthroads_addon.scanning.platforms.path import Strip
 from synthroads_addon.scanning.pulses import Poses, Pulses, make_pulses
 from synthroads_addon.scanning.returns import Echoes
@@ -16,6 +15,7 @@ from synthroads_addon.scanning.scene.mesh import SceneMesh
 from synthroads_addon.scanning.scene.motion import ScannedScene
 from synthroads_addon.scanning.scene.target import Target
 from synthroads_addon.scanning.trace import trace
+from synthroads_addon.scenario.devices.device import scanner_setting
 from synthroads_addon.scenario.scenario import load_scenario
 
 ORIGIN = np.array([294_000.0, 5_628_000.0, 180.0])

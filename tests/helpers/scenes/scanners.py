@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from synthroads_addon.scanning.devices.device import Device, ScannerSetting, load_device, scanner_setting, setting_of
-from synthroads_addon.scanning.devices.pattern_models import WedgePrism
+from synthroads_addon.scenario.devices.device import Device, ScannerSetting, load_device, scanner_setting, setting_of
+from synthroads_addon.scenario.devices.pattern_models import WedgePrism
 from synthroads_addon.scenario.scan import ScanScenario
 
 

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from headless import cli
+from headless import commands
 from synthroads_addon.base.schema import canonical_json
 from synthroads_addon.blender.cameras import HAS_RETURN_CAMERA
 from synthroads_addon.blender.model.build import build_road
@@ -71,11 +71,11 @@ def test_a_knob_is_measured(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> 
     assert abs(slow["errors"]["position_mm"] - fast["errors"]["position_mm"]) < 0.05 * fast["errors"]["position_mm"]
 
     # What is there already is refused, or kept: also a row of which we only pretend that it was measured.
-    assert cli.command("tradeoff", words) == 2
+    assert commands.command("tradeoff", words) == 2
     file = out / "rows" / "small" / "caster-embree.json"
     data = json.loads(file.read_text())
     file.write_text(json.dumps(data | {"row": fast | {"seconds": 4711.0}}))
-    assert cli.command("tradeoff", [*words, "--resume"]) == 0
+    assert commands.command("tradeoff", [*words, "--resume"]) == 0
     assert json.loads((out / "small.json").read_text())["rows"] == [slow, fast | {"seconds": 4711.0}]
     # A row of another job is measured again, and so is what another Blender couldn't measure.
     again = fast | {"seconds": 1.0}
@@ -83,7 +83,7 @@ def test_a_knob_is_measured(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> 
     lacking = {"row": {"knob": "caster", "value": "embree", "left_out": "lacks it"}}
     for old in (lacking, {"job": "another", "row": fast | {"seconds": 4711.0}}):
         file.write_text(json.dumps(data | old))
-        assert cli.command("tradeoff", [*words, "--resume"]) == 0
+        assert commands.command("tradeoff", [*words, "--resume"]) == 0
         kept, measured = json.loads((out / "small.json").read_text())["rows"]
         assert kept == slow
         assert measured.items() >= again.items()
@@ -109,7 +109,7 @@ def test_plants_that_are_left_out_are_an_error(tmp_path: Path) -> None:
 def test_bad_input_is_refused_before_anything_is_measured(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], words: list[str], said: str
 ) -> None:
-    assert cli.command("tradeoff", ["--output", str(tmp_path / "out"), *words]) == 2
+    assert commands.command("tradeoff", ["--output", str(tmp_path / "out"), *words]) == 2
     assert said in capsys.readouterr().err
     assert not (tmp_path / "out").exists()
 

@@ -25,6 +25,8 @@ from synthroads_addon.scanning.scan import Scan, scan_pulses
 from synthroads_addon.scenario.scenario import Scenario
 from tests.helpers.scenes.sparse_scanner import sparse_scanner
 
+pytestmark = pytest.mark.any_blender  # it takes half an hour
+
 Float = NDArray[np.float64]
 
 TOLERANCE = 0.005

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 import torch
 
-from headless import cli
+from headless import cli, commands
 from headless import evaluate as evaluate_command
 from headless import predict as predict_command
 from headless import train as train_command
@@ -270,7 +270,7 @@ def test_commands_train_evaluate_and_predict(data: Path, tmp_path: Path, capsys:
 
         parser = argparse.ArgumentParser()
         module.add_arguments(parser)
-        code = cli.run(module.run, parser.parse_args([*map(str, arguments), "--json"]))
+        code = commands.run(module.run, parser.parse_args([*map(str, arguments), "--json"]))
         out = capsys.readouterr()
         assert code == 0, out.err
         result: dict[str, Any] = json.loads(out.out)

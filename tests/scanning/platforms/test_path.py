@@ -18,7 +18,6 @@ from synthroads_addon.road.alignment import Alignment, Element
 from synthroads_addon.road.geometry import RoadGeometry
 from synthroads_addon.road.parameters import AlignmentObject, HorizontalElement, RoadParameters, VerticalPoint
 from synthroads_addon.sampling.road import sample_road
-from synthroads_addon.scanning.devices.device import scanner_setting
 from synthroads_addon.scanning.patterns.pattern import shot_count, shots
 from synthroads_addon.scanning.platforms.path import (
     KNOT_ERROR,
@@ -35,6 +34,7 @@ from synthroads_addon.scanning.platforms.path import (
 )
 from synthroads_addon.scanning.platforms.positions import PositionsPath
 from synthroads_addon.scanning.platforms.strip_line import Sway
+from synthroads_addon.scenario.devices.device import scanner_setting
 from synthroads_addon.scenario.scan import Platform
 from synthroads_addon.scenario.scenario import load_scenario
 

@@ -14,7 +14,7 @@ import synthroads_addon
 from synthroads_addon.base.errors import Cancelled
 from synthroads_addon.blender.model.store import find_road, recall_parameters
 from synthroads_addon.blender.views.cloud import Pace, scene_origin
-from synthroads_addon.cloud.formats.writing import ENDINGS, open_writer
+from synthroads_addon.cloud.formats.registry import ENDINGS, open_writer
 from synthroads_addon.cloud.points import PointBlock
 from synthroads_addon.cloud.tools.display import COLOURINGS, drawing_places, read_display
 from synthroads_addon.road.geometry import RoadGeometry

@@ -17,7 +17,7 @@ from ml.points import Points
 from synthroads_addon.base.classes import class_scheme
 from synthroads_addon.base.errors import InputError, MissingFileError
 from synthroads_addon.base.schema import canonical_json
-from synthroads_addon.cloud.formats.writing import open_writer
+from synthroads_addon.cloud.formats.registry import open_writer
 from synthroads_addon.cloud.points import PointBlock
 from tests.helpers.roads.analytic_roads import parameters, points, roads
 

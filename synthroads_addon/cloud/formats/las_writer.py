@@ -21,7 +21,7 @@ from ...base.errors import OutputError
 from ...base.schema import canonical_json
 from ..layers import Column
 from ..points import PointBlock
-from .writing import CloudWriter
+from .writer import CloudWriter
 
 SCALE = 0.001
 """Size of a coordinate's step, m."""

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from ...base.errors import InputError
 from ..layers import Column
 from ..points import PointBlock
-from .writing import CloudWriter
+from .writer import CloudWriter
 
 SCALE = 1e-4
 """Size of a coordinate's step, m."""

@@ -1,4 +1,4 @@
-"""Reading clouds of every format block by block; `open_cloud` picks the reader by the file's ending."""
+"""`CloudReader`: what the readers of all formats have in common."""
 
 from __future__ import annotations
 
@@ -14,10 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...base.classes import ClassScheme, asprs_scheme, stored_scheme
-from ...base.errors import InputError, MissingFileError
+from ...base.errors import InputError
 from ..layers import Attribute, attributes_of
 from ..points import PointBlock
-from .writing import check_ending
 
 BLOCK = 500_000
 """Points that are read at a time."""
@@ -88,45 +87,6 @@ class CloudReader(ABC):
     @abstractmethod
     def close(self) -> None:
         """Close the file; it may be closed already."""
-
-
-def open_cloud(path: Path) -> CloudReader:
-    """Open a cloud of any format.
-
-    Raises:
-        MissingFileError: there is no such file, or it can't be read.
-        InputError: it is no cloud, or truncated, or of a kind that isn't read here.
-    """
-    ending = check_ending(path)
-    if not path.is_file():
-        raise MissingFileError(str(path), None, "is a folder, not a cloud" if path.is_dir() else "no such file")
-    try:
-        with path.open("rb") as file:
-            if not file.read(1):
-                raise InputError(str(path), None, "is empty, not a cloud")
-    except OSError as problem:
-        raise MissingFileError(str(path), None, f"cannot be read ({problem.strerror})") from None
-    if ending == ".ply":
-        from .ply import PlyReader
-
-        return PlyReader(path)
-    if ending == ".e57":
-        from .e57_reading import E57Reader
-
-        return E57Reader(path)
-    if ending == ".npz":
-        from .npz import NpzReader
-
-        return NpzReader(path)
-    from .las_reading import LasReader
-
-    return LasReader(path)
-
-
-def read_cloud(path: Path, size: int = BLOCK) -> Iterator[PointBlock]:
-    """Yield the points of a cloud of any format, at most ``size`` at a time; see `open_cloud`."""
-    with open_cloud(path) as cloud:
-        yield from cloud.blocks(size)
 
 
 def epsg_of(text: str | None) -> int | None:

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from ...base.errors import InputError
 from ..layers import COLUMNS, columns, gather
 from ..points import PointBlock
-from .e57 import EXTENSION, e57_name, library
-from .reading import BLOCK, CloudHeader, CloudReader, damaged, finite_coordinates, header_from_notes
+from .e57_writer import EXTENSION, e57_name, library
+from .reader import BLOCK, CloudHeader, CloudReader, damaged, finite_coordinates, header_from_notes
 
 _STANDARD = {
     *("cartesianX", "cartesianY", "cartesianZ", "intensity", "colorRed", "colorGreen", "colorBlue", "timeStamp"),

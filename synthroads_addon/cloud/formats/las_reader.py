@@ -17,9 +17,9 @@ from ...base.classes import asprs_scheme, class_scheme, stored_scheme
 from ...base.errors import InputError
 from ..layers import attributes_of, columns, gather
 from ..points import PointBlock
-from .las import SCAN_ANGLE_STEP
+from .las_writer import SCAN_ANGLE_STEP
 from .laz_chunks import check_chunks
-from .reading import BLOCK, CloudHeader, CloudReader, damaged, epsg_of, intensity_scale
+from .reader import BLOCK, CloudHeader, CloudReader, damaged, epsg_of, intensity_scale
 
 _FAULTS = (
     *(laspy.errors.LaspyException, lazrs.LazrsError, ValueError, struct.error, OSError, EOFError, MemoryError),

@@ -21,9 +21,10 @@ from synthroads_addon.road.parameters import (
     Turnout,
     VerticalPoint,
 )
-from synthroads_addon.road.things.assets import AssetLibrary, read_asset_library, sample_assets
 from synthroads_addon.road.things.furniture import Asset
+from synthroads_addon.sampling.placing.assets import sample_assets
 from synthroads_addon.sampling.placing.site import Site
+from synthroads_addon.scenario.assets import AssetLibrary, read_asset_library
 from synthroads_addon.scenario.road import RoadScenario
 
 ROAD_EDGE = 2.0 + 0.75 + 3.75 + 0.5 + 2.5 + 1.5

@@ -1,9 +1,8 @@
-"""What the writers of all formats have in common; `open_writer` picks one by the file's ending."""
+"""`CloudWriter`: what the writers of all formats have in common."""
 
 from __future__ import annotations
 
 import hashlib
-import importlib.util
 import json
 from abc import ABC, abstractmethod
 from pathlib import Path
@@ -15,20 +14,9 @@ from numpy.typing import NDArray
 
 from ...base.classes import ClassScheme, class_scheme
 from ...base.crs import wkt
-from ...base.errors import InputError, OutputError, nearest_name
+from ...base.errors import InputError, OutputError
 from ..layers import ATTRIBUTES, DEFAULT_ATTRIBUTES, Attribute, Column, columns
 from ..points import PointBlock
-
-ENDINGS = (".laz", ".las", ".ply", ".e57", ".npz")
-"""Endings of the files that can be written and read."""
-_PACKAGES = {".e57": "pye57"}
-"""What is asked of packages that not every installation has."""
-
-
-def missing_package(ending: str) -> str | None:
-    """Return the package that files of this ending need and that isn't installed; None if there is none."""
-    package = _PACKAGES.get(ending)
-    return package if package and importlib.util.find_spec(package) is None else None
 
 
 class CloudWriter(ABC):
@@ -195,41 +183,3 @@ class CloudWriter(ABC):
         return OutputError(str(self.path), None, f"cannot be written ({reason})")
 
 
-def check_ending(path: Path, field: str = "file") -> str:
-    """Return a cloud file's ending in small letters; raise `InputError` if it is of no format known here."""
-    ending = path.suffix.lower()
-    if ending not in ENDINGS:
-        raise InputError(field, str(path), f"must end in {', '.join(ENDINGS)}{nearest_name(ending, ENDINGS)}")
-    return ending
-
-
-def open_writer(
-    path: Path,
-    epsg: int | None,
-    offset: NDArray[np.float64],
-    intensity_scale: float,
-    attributes: tuple[Attribute, ...] = DEFAULT_ATTRIBUTES,
-    scheme: ClassScheme | None = None,
-    crs_text: str | None = None,
-) -> CloudWriter:
-    """Return the writer for a file's ending, yet to be entered; see `CloudWriter` for the arguments."""
-    ending = check_ending(path)
-    return _writer_class(ending)(path, epsg, offset, intensity_scale, attributes, scheme, crs_text)
-
-
-def _writer_class(ending: str) -> type[CloudWriter]:
-    if ending == ".ply":
-        from .ply import PlyWriter
-
-        return PlyWriter
-    if ending == ".e57":
-        from .e57 import E57Writer
-
-        return E57Writer
-    if ending == ".npz":
-        from .npz import NpzWriter
-
-        return NpzWriter
-    from .las import LasWriter
-
-    return LasWriter

@@ -13,7 +13,7 @@ from pydantic import Field, model_validator
 from ...base.errors import InputError, nearest_name
 from ...base.files import PRESETS
 from ...base.schema import Model, quantity, read_json
-from ...scenario.scan import ScanScenario
+from ..scan import ScanScenario
 from .pattern_models import PatternModel
 
 DEVICES = PRESETS / "devices"

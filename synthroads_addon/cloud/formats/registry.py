@@ -1,0 +1,107 @@
+"""The formats of clouds by the endings of their files: `open_cloud` reads any of them, `open_writer` writes any."""
+
+from __future__ import annotations
+
+import importlib.util
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...base.classes import ClassScheme
+from ...base.errors import InputError, MissingFileError, nearest_name
+from ..layers import DEFAULT_ATTRIBUTES, Attribute
+from ..points import PointBlock
+from .reader import BLOCK, CloudReader
+from .writer import CloudWriter
+
+ENDINGS = (".laz", ".las", ".ply", ".e57", ".npz")
+"""Endings of the files that can be written and read."""
+_PACKAGES = {".e57": "pye57"}
+"""What is asked of packages that not every installation has."""
+
+
+def missing_package(ending: str) -> str | None:
+    """Return the package that files of this ending need and that isn't installed; None if there is none."""
+    package = _PACKAGES.get(ending)
+    return package if package and importlib.util.find_spec(package) is None else None
+
+
+def check_ending(path: Path, field: str = "file") -> str:
+    """Return a cloud file's ending in small letters; raise `InputError` if it is of no format known here."""
+    ending = path.suffix.lower()
+    if ending not in ENDINGS:
+        raise InputError(field, str(path), f"must end in {', '.join(ENDINGS)}{nearest_name(ending, ENDINGS)}")
+    return ending
+
+
+def open_writer(
+    path: Path,
+    epsg: int | None,
+    offset: NDArray[np.float64],
+    intensity_scale: float,
+    attributes: tuple[Attribute, ...] = DEFAULT_ATTRIBUTES,
+    scheme: ClassScheme | None = None,
+    crs_text: str | None = None,
+) -> CloudWriter:
+    """Return the writer for a file's ending, yet to be entered; see `CloudWriter` for the arguments."""
+    ending = check_ending(path)
+    return _writer_class(ending)(path, epsg, offset, intensity_scale, attributes, scheme, crs_text)
+
+
+def _writer_class(ending: str) -> type[CloudWriter]:
+    if ending == ".ply":
+        from .ply import PlyWriter
+
+        return PlyWriter
+    if ending == ".e57":
+        from .e57_writer import E57Writer
+
+        return E57Writer
+    if ending == ".npz":
+        from .npz import NpzWriter
+
+        return NpzWriter
+    from .las_writer import LasWriter
+
+    return LasWriter
+
+
+def open_cloud(path: Path) -> CloudReader:
+    """Open a cloud of any format.
+
+    Raises:
+        MissingFileError: there is no such file, or it can't be read.
+        InputError: it is no cloud, or truncated, or of a kind that isn't read here.
+    """
+    ending = check_ending(path)
+    if not path.is_file():
+        raise MissingFileError(str(path), None, "is a folder, not a cloud" if path.is_dir() else "no such file")
+    try:
+        with path.open("rb") as file:
+            if not file.read(1):
+                raise InputError(str(path), None, "is empty, not a cloud")
+    except OSError as problem:
+        raise MissingFileError(str(path), None, f"cannot be read ({problem.strerror})") from None
+    if ending == ".ply":
+        from .ply import PlyReader
+
+        return PlyReader(path)
+    if ending == ".e57":
+        from .e57_reader import E57Reader
+
+        return E57Reader(path)
+    if ending == ".npz":
+        from .npz import NpzReader
+
+        return NpzReader(path)
+    from .las_reader import LasReader
+
+    return LasReader(path)
+
+
+def read_cloud(path: Path, size: int = BLOCK) -> Iterator[PointBlock]:
+    """Yield the points of a cloud of any format, at most ``size`` at a time; see `open_cloud`."""
+    with open_cloud(path) as cloud:
+        yield from cloud.blocks(size)

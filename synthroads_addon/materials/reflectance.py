@@ -1,0 +1,109 @@
+"""How a surface reflects a laser: reflectivity, facets, retro-reflection.
+
+Lambert's and Oren and Nayar's surfaces and retro-reflection are in it. Mirror-like reflection and refraction are left
+out on purpose.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Float = NDArray[np.float64]
+Number = Float | float
+
+LUMINANCE = np.array([0.3, 0.59, 0.11])
+EDGE_ON = 1e-12
+"""A cosine of the incidence angle up to this is one of 90 degrees or more: it is what rounding leaves of 0."""
+
+
+def reflectivity(base_color: ArrayLike, metallic: ArrayLike, specular: ArrayLike) -> Float:
+    """Return R = (1 - m)(s + 0.5 L) + m L with L = 0.3 r + 0.59 g + 0.11 b of the linear base colour.
+
+    Args:
+        base_color: (..., 3) linear RGB, 0 to 1.
+        metallic: (...,) 0 to 1.
+        specular: (...,) 0 to 1. R can exceed 1 where it is over 0.5.
+    """
+    luminance = np.asarray(base_color, dtype=np.float64) @ LUMINANCE
+    metal = np.asarray(metallic, dtype=np.float64)
+    return (1.0 - metal) * (np.asarray(specular, dtype=np.float64) + 0.5 * luminance) + metal * luminance
+
+
+def facet_slope(roughness: ArrayLike) -> Float:
+    """Return the standard deviation of the facets' slope angle, rad: sqrt(v) = atan(r^2 / sqrt 2).
+
+    A renderer's roughness r stands for the Beckmann distribution with alpha = r^2, whose slopes have a standard
+    deviation of alpha / sqrt 2 along each axis (Beckmann & Spizzichino 1963; Walter et al. 2007).
+    """
+    return np.asarray(np.arctan(np.square(np.asarray(roughness, dtype=np.float64)) / np.sqrt(2.0)))
+
+
+def facet_terms(slope: ArrayLike) -> tuple[Float, Float]:
+    """Return A = 1 - 0.5 v / (v + 0.33) and B = 0.45 v / (v + 0.09) of Oren and Nayar's qualitative model (1994).
+
+    Args:
+        slope: (...,) standard deviation of the facets' slope angle sqrt(v), rad; for 0 they are exactly 1 and 0.
+    """
+    # Beyond 1e6 nothing changes any more, and the square stays finite.
+    variance = np.square(np.minimum(np.abs(np.asarray(slope, dtype=np.float64)), 1e6))
+    return 1.0 - 0.5 * variance / (variance + 0.33), 0.45 * variance / (variance + 0.09)
+
+
+def returned_share(
+    cosine: Number,
+    reflectance: Number,
+    facet_a: Number = 1.0,
+    facet_b: Number = 0.0,
+    retro: Number = 0.0,
+    inverse_lobe_squared: Number = 0.0,
+) -> Float:
+    """Return the brightness of surfaces before distance and attenuation: R (A c + B (1 - c^2)) + r exp(-t^2 / l^2).
+
+    c is the cosine of the incidence angle t. The first term is Oren and Nayar's for a scanner, where light and eye are
+    in the same place: their A + B sin t tan t, times cos t, has no tangent any more. It tends to R B at a grazing
+    angle, so back faces and angles of 90 degrees or more give 0. With A = 1 and B = 0 it is Lambert's R c, to the bit.
+
+    The second term is retro-reflection. What beads and prisms send back leaves them in a lobe of a few tenths of a
+    degree around the way that the light came; the receiver sits within it at every range, so the lobe's width doesn't
+    matter and only the fall-off with the entrance angle is left, a Gaussian.
+
+    Args:
+        cosine: (N,) of the incidence angle; not more than 1.
+        reflectance: R, (N,) or one number.
+        facet_a, facet_b: see `facet_terms`; the number 0 for ``facet_b`` leaves out the facets.
+        retro: r, effective reflectance at a right angle; the number 0 leaves the term out.
+        inverse_lobe_squared: 1 / l^2, 1/rad^2, of the entrance angle l at which it has fallen to 1/e.
+
+    Returns:
+        (N,) float64, all finite and not negative.
+    """
+    lit: Float = np.atleast_1d(np.asarray(cosine, dtype=np.float64))
+    result: Float = lit * facet_a
+    if not _is_zero(facet_b):
+        flat = np.square(lit)
+        np.subtract(1.0, flat, out=flat)
+        flat *= facet_b
+        result += flat
+    result *= reflectance
+    if not _is_zero(retro):
+        _add_retroreflection(result, lit, retro, inverse_lobe_squared)
+    if len(lit) and not lit.min() > EDGE_ON:
+        result[~(lit > EDGE_ON)] = 0.0
+    return result
+
+
+def _is_zero(value: Number) -> bool:
+    return np.ndim(value) == 0 and bool(value == 0.0)
+
+
+def _add_retroreflection(result: Float, cosine: Float, retro: Number, inverse_lobe_squared: Number) -> None:
+    """Add the retro-reflection to (N,) brightnesses; only where there is one, as few surfaces have it."""
+    own = np.broadcast_to(np.asarray(retro, dtype=np.float64), result.shape)
+    which = np.flatnonzero(own)
+    if not len(which):
+        return
+    angle = np.arccos(np.clip(cosine[which], -1.0, 1.0))
+    lobe = np.broadcast_to(np.asarray(inverse_lobe_squared, dtype=np.float64), result.shape)[which]
+    with np.errstate(under="ignore"):
+        result[which] += own[which] * np.exp(-angle * angle * lobe)

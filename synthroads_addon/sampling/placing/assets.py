@@ -1,0 +1,107 @@
+"""Free assets of the scenario's libraries, placed by their rules beside the road or in the median."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...base.errors import InputError
+from ...base.schema import rounded
+from ...road.section_geometry import CarriagewaySection
+from ...road.things.furniture import Asset
+from ...scenario.assets import FARTHEST, AssetPlacement, read_asset_library
+from ...scenario.road import Interval
+from .site import Site
+
+Float = NDArray[np.float64]
+
+
+def sample_assets(site: Site) -> Iterator[tuple[str, Asset]]:
+    """Yield the assets of the scenario's libraries by id, placed by their rules; their instance numbers are 1.
+
+    Where the road leaves no room for one, there is none.
+
+    Raises:
+        InputError: a library is faulty, or the road leaves no room for an asset anywhere.
+    """
+    count = 0
+    for number, path in enumerate(site.scenario.assets):
+        for name, asset in read_asset_library(path).assets.items():
+            field = f"{path}: assets.{name}.placement.distance"
+            for station, offset, rotation in _places(site, asset.placement, field, ("assets", number, name)):
+                count += 1
+                placed = Asset(
+                    instance=1,
+                    station=rounded(station),
+                    offset=rounded(offset),
+                    rotation_deg=rounded(rotation),
+                    library=path,
+                    name=name,
+                    class_name=asset.class_name,
+                    scale=asset.scale,
+                )
+                yield f"asset-{count}", placed
+
+
+def _places(
+    site: Site, placement: AssetPlacement, field: str, purpose: tuple[str | int, ...]
+) -> Iterator[tuple[float, float, float]]:
+    """Yield station (m), offset (m) and rotation (deg) of an asset's copies. In the median each takes either half."""
+    in_median = placement.side == "median"
+    sides = [side for side in site.sections if in_median or placement.side in (side, "both")]
+    for group in [sides] if in_median else [[side] for side in sides]:
+        rng = site.stream(*purpose, *group)
+        stations = _stations(rng, placement, site.length)
+        half = rng.integers(len(group), size=len(stations))
+        for number, side in enumerate(group):
+            section, own = site.sections[side], stations[half == number]
+            edge, room = _room(site, section, in_median, own, field, placement.distance.minimum)
+            distance = _drawn(rng, placement.distance, len(own), np.minimum(placement.distance.maximum, room))
+            away = edge - distance if in_median else edge + distance
+            turn = _drawn(rng, placement.rotation_deg, len(own), placement.rotation_deg.maximum)
+            turn += 0.0 if section.carriageway.traffic > 0 else 180.0
+            there = room >= placement.distance.minimum
+            offset = section.carriageway.sign * away
+            yield from zip(own[there], offset[there], ((turn + 180.0) % 360.0 - 180.0)[there], strict=True)
+
+
+def _drawn(rng: np.random.Generator, limits: Interval, number: int, highest: Float | float) -> Float:
+    return limits.minimum + (highest - limits.minimum) * rng.random(number)
+
+
+def _stations(rng: np.random.Generator, placement: AssetPlacement, length: float) -> Float:
+    """Return the stations (N,) of an asset's copies along one side, m."""
+    start = placement.start_station
+    end = length if placement.end_station is None else min(placement.end_station, length)
+    if end <= start:
+        return np.empty(0)
+    if placement.per_km is not None:
+        per_km = float(_drawn(rng, placement.per_km, 1, placement.per_km.maximum)[0])
+        return np.sort(rng.uniform(start, end, int(per_km * (end - start) / 1000.0 + rng.random())))
+    assert placement.spacing is not None
+    number = int((end - start) / placement.spacing.minimum) + 1
+    steps = _drawn(rng, placement.spacing, number, placement.spacing.maximum)
+    steps[0] *= rng.random()  # the first stands anywhere within a spacing
+    stations = start + np.cumsum(steps)
+    return stations[stations <= end]
+
+
+def _room(
+    site: Site, section: CarriagewaySection, in_median: bool, stations: Float, field: str, needed: float
+) -> tuple[Float, Float]:
+    """Return the distance (N,) of the edge that an asset's distance counts from, and the room beyond it there, m."""
+
+    def beside(at: Float) -> tuple[Float, Float]:
+        if in_median:
+            inner = section.distances(at)[:, 0]
+            return inner, inner
+        edge = section.road_edge(at)
+        return edge, min(site.terrain.half_width, FARTHEST) - edge
+
+    widest = float(beside(np.array([0.0, *section.kinks(), site.length]))[1].max())
+    if widest < needed:
+        where = "in this half of the median" if in_median else "between the verge and road.half_width"
+        raise InputError(field, needed, f"there are at most {max(widest, 0.0):g} m {where}")
+    return beside(stations)
