@@ -25,6 +25,8 @@ COMMANDS = {
     "evaluate": "measure a trained model",
     "predict": "label a cloud, or find its road, with a trained model",
     "experiment": "train variants of a segmentation with several seeds, and compare their scores",
+    "pack": "pack a data set's labelled points into one small file, to train from elsewhere",
+    "forecast": "forecast how long a training of a segmentation takes on this machine",
     "reconstruct": "turn a cloud into the parameters of its road",
     "list": "list what comes under a name, and the fields that --set takes",
 }

@@ -12,8 +12,8 @@ from typing import Any
 if __name__ == "__main__":
     sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
+import ml.catalogue
 from headless.commands import Outcome, add_common_arguments, entry
-from ml import catalogue as of_learning
 from synthroads_addon.base.catalogue import Kind, entries
 from synthroads_addon.base.errors import InputError, nearest_name
 from synthroads_addon.base.field_list import Field, fields_of
@@ -23,15 +23,15 @@ from synthroads_addon.scenario.scenario import Scenario
 
 _FIELDS = "fields"
 _LONGEST_DEFAULT = 24
-KINDS: dict[str, Kind] = {**catalogue.KINDS, **of_learning.KINDS}
+KINDS: dict[str, Kind] = {**catalogue.KINDS, **ml.catalogue.KINDS}
 """Kinds of things that are listed."""
 
 
-def _learned(task: str) -> Callable[[], Any]:
+def _learned(name: str) -> Callable[[], Any]:
     def kind() -> Any:
-        from ml.tasks import task as module
+        from ml.tasks import task
 
-        return module(task).configuration_kind()
+        return task(name).configuration_kind()
 
     return kind
 

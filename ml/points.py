@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from synthroads_addon.base.errors import InputError
-from synthroads_addon.cloud.formats.reader import CloudHeader
+from synthroads_addon.cloud.formats.base import CloudHeader
 from synthroads_addon.cloud.formats.registry import open_cloud
 from synthroads_addon.cloud.points import PointBlock
 

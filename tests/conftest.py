@@ -18,6 +18,7 @@ import hypothesis
 import pytest
 
 if TYPE_CHECKING:
+    from synthroads_addon.cloud.points import PointBlock
     from tests.helpers.scenes.kept_groups import KeptGroups
 
 TESTS = Path(__file__).resolve().parent
@@ -116,6 +117,14 @@ def _empty_scene_for_test(request: pytest.FixtureRequest, _empty_scene_for_modul
     _kept_groups().on = request.node.get_closest_marker("new_groups") is None
     if not request.node.get_closest_marker("keep_scene"):
         _empty_scene()
+
+
+@pytest.fixture
+def points() -> PointBlock:
+    """Return 10,000 random points."""
+    from tests.helpers.clouds.random_points import make_points
+
+    return make_points(10_000)
 
 
 _session: list[pytest.Session] = []

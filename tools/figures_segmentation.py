@@ -2,7 +2,7 @@
 
     python tools/figures_segmentation.py --small out/segmentation --mixing out/mixing-small \\
         --gantries out/gantries-small --run out/any-scanner-1 --run out/any-scanner-2 --real REAL_FOLDER \\
-        --prediction out/prediction/prediction.json --packed out/train.npz --projection out/projection.json \\
+        --prediction out/prediction/prediction.json --packed out/train.npz --forecast out/forecast.json \\
         --document docs/segmentation.md --pictures docs/pictures
 
 What isn't given is left out, and its tables in the document stay as they are. Runs are one network trained with several
@@ -24,7 +24,7 @@ sys.path.insert(0, str(ROOT))
 from ml.fitting import chosen_device  # noqa: E402
 from ml.runs import HISTORY, METRICS, PRETRAINING, Run  # noqa: E402
 from ml.segmentation.data.pack import CROP, summary  # noqa: E402
-from ml.segmentation.data.packing import PackReader  # noqa: E402
+from ml.segmentation.data.packed_file import PackReader  # noqa: E402
 from ml.segmentation.data.sources import Source  # noqa: E402
 from ml.segmentation.experiment import RESULTS  # noqa: E402
 from ml.segmentation.recipes import SegmentationConfiguration  # noqa: E402
@@ -108,8 +108,8 @@ def packed(file: Path) -> str:
     return _table(head, [*cells, f"{told['bytes_per_point']:.2f}", f"{told['crops']:,}"])
 
 
-def projection(file: Path) -> str:
-    """Return what `ml.segmentation.projection` found as a table."""
+def forecast(file: Path) -> str:
+    """Return what `synthroads forecast` found as a table."""
     told = read_json(file)
     head = ("tiles", "points of a batch", "s per step", "threads", "steps", "hours in all", "peak memory (MB)")
     numbers = (told["threads"], told["steps"], told["hours"], told["peak_memory_mb"])
@@ -127,7 +127,7 @@ READERS = {
     "gantries": experiment,
     "prediction": prediction,
     "packed": packed,
-    "projection": projection,
+    "forecast": forecast,
 }
 """What makes a table out of a folder or file; the names are those of the options and of the tables."""
 
@@ -153,8 +153,8 @@ def arguments_of(words: Sequence[str] | None) -> argparse.Namespace:
     parser.add_argument("--run", type=Path, action="append", default=[], metavar="RUN", help="a run to be scored")
     parser.add_argument("--real", type=Path, metavar="DIR", help="labelled real clouds, which the runs are scored on")
     parser.add_argument("--prediction", type=Path, metavar="FILE", help="result of tools/measure_prediction.py")
-    parser.add_argument("--packed", type=Path, metavar="FILE", help="file of `python -m ml.segmentation.data.pack`")
-    parser.add_argument("--projection", type=Path, metavar="FILE", help="of `python -m ml.segmentation.projection`")
+    parser.add_argument("--packed", type=Path, metavar="FILE", help="file of `synthroads pack`")
+    parser.add_argument("--forecast", type=Path, metavar="FILE", help="file of `synthroads forecast`")
     parser.add_argument("--pictures", type=Path, default=Path(), metavar="DIR", help="folder for the pictures")
     parser.add_argument("--document", type=Path, metavar="FILE", help="Markdown whose tables are replaced")
     arguments = parser.parse_args(words)

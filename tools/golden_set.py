@@ -229,7 +229,7 @@ def blend_dump(path: Path) -> bytes:
         return text.read_bytes() if text.exists() else b"the file can't be opened: " + path.read_bytes()
 
 
-SCENE_DUMP = Path("tests", "blender", "scene_hash.py")
+SCENE_DUMP = Path("tests", "helpers", "scenes", "scene_hash.py")
 
 
 def differences(base: Path, head: Path) -> list[str]:

@@ -22,11 +22,11 @@ from ..runs import CALIBRATION, Run, plain, stream_seed
 from ..tasks import Evaluation, Prediction
 from .data.batches import Batches, BatchOptions, DataOptions, Roads, fixed_batches, quiet, read_roads
 from .data.effects import Effects
-from .data.slices import SliceSettings
+from .data.slices import Batch, SliceSettings
 from .networks.losses import LossOptions, centerline_loss
-from .networks.models import TARGETS, Batch, CenterlineModel, ModelOptions, build
-from .scores.calibration import DEVIATIONS, Calibration
+from .networks.models import TARGETS, CenterlineModel, ModelOptions, build
 from .scores.evaluation import Cropping, case
+from .use.calibration import DEVIATIONS, Calibration
 from .use.predictor import CenterlinePredictor, UseOptions
 
 _FIRST_WEIGHTS = "first weights"
@@ -106,7 +106,7 @@ def predict(run: Run[CenterlineConfiguration], prediction: Prediction, progress:
         InputError: the run isn't finished, the output isn't a .geojson file, or the cloud has no ground.
         OutputError: an output is already there.
     """
-    from .use.using import find_road
+    from .use.find_road import find_road
     from .use.writing import corridor_json, geojson
 
     lines, corridor = prediction.output, prediction.output.with_suffix(".corridor.json")

@@ -22,16 +22,16 @@ from numpy.typing import NDArray
 from synthroads_addon.base.classes import ClassScheme
 from synthroads_addon.base.errors import InputError, OutputError
 from synthroads_addon.base.progress import Progress, silent
-from synthroads_addon.cloud.formats.las_reader import open_to_copy
-from synthroads_addon.cloud.formats.reader import damaged
+from synthroads_addon.cloud.formats.base import damaged
+from synthroads_addon.cloud.formats.las import open_to_copy
 from synthroads_addon.cloud.formats.registry import open_cloud
 from synthroads_addon.cloud.tools.quantile_mapping import LEVELS
 
 from ..cells import thin
+from .data.classes import IGNORED
 from .data.crops import CropSettings
 from .data.sources import FULL
 from .data.tiles import Scaling, Tile, eight_bits
-from .scores.metrics import IGNORED
 from .scores.scoring import Classifier, label_tile
 
 HEADER_TEXTS = range(26, 90)

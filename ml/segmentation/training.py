@@ -16,14 +16,14 @@ from synthroads_addon.base.progress import Progress, silent
 
 from ..fitting import Figures, chosen_device, fit
 from ..runs import PRETRAINING, Run
-from .data.classes import class_names
+from .data.classes import IGNORED, class_names
 from .data.crops import Item, Seeds
 from .data.tiles import Tile, scalings
 from .loading import epoch_batches, read_domains, thinned, watched_workers
 from .network import build, scores_of
 from .recipes import SegmentationConfiguration, class_shares, class_weights
 from .scores.evaluation import classifier
-from .scores.metrics import IGNORED, Confusion, mean
+from .scores.metrics import Confusion, mean
 from .scores.scoring import label_tile
 
 Domains = dict[str, list[Tile]]

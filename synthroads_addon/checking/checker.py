@@ -5,29 +5,21 @@ from __future__ import annotations
 import numpy as np
 
 from ..road.parameters import RoadParameters
-from .rules import alignment as checker_alignment
-from .rules import barriers as checker_barriers
-from .rules import crossfall as checker_crossfall
-from .rules import furniture as checker_furniture
-from .rules import markings as checker_markings
-from .rules import section as checker_section
-from .rules import signs as checker_signs
-from .rules import traffic as checker_traffic
-from .rules import turnouts as checker_turnout
+from .rules import alignment, barriers, crossfall, furniture, markings, section, signs, traffic, turnouts
 from .rules.rule import Road, Rule, Violation
 
 __all__ = ["RULES", "Rule", "Violation", "check"]
 
 MODULES = (
-    checker_alignment,
-    checker_crossfall,
-    checker_section,
-    checker_turnout,
-    checker_markings,
-    checker_barriers,
-    checker_signs,
-    checker_furniture,
-    checker_traffic,
+    alignment,
+    crossfall,
+    section,
+    turnouts,
+    markings,
+    barriers,
+    signs,
+    furniture,
+    traffic,
 )
 """Where the rules are, in the order of their findings."""
 RULES: dict[str, Rule] = {rule.id: rule for module in MODULES for rule in module.RULES}

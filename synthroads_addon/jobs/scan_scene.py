@@ -24,8 +24,8 @@ from ..road.geometry import RoadGeometry
 from ..road.parameters import RoadParameters
 from ..scanning.platforms.path import USUAL, PolylineGuide, RoadGuide, make_path
 from ..scanning.platforms.path import Path as ScanPath
-from ..scanning.platforms.positions import PositionsPath
-from ..scanning.platforms.trajectory_file import read_trajectory
+from ..scanning.platforms.trajectory import read_trajectory
+from ..scanning.platforms.tripod import PositionsPath
 from ..scanning.scene.extent import bounds, elevation_at, middle_line
 from ..scanning.scene.mesh import SceneMesh
 from ..scanning.scene.motion import ScannedScene

@@ -19,7 +19,7 @@ from .profiles import ACROSS, STRETCH, Grid, Profiles
 from .smoothing import smooth
 
 Float = NDArray[np.float64]
-Kind = Literal["dual", "single"]
+RoadKind = Literal["dual", "single"]
 
 _SEEN = 0.5  # of the road's length: what is seen on less belongs to a turnout or is a fault
 _SEEN_RURAL = 0.3
@@ -83,13 +83,13 @@ class Layout:
         notes: what was left out, in words.
     """
 
-    kind: Kind
+    kind: RoadKind
     bands: tuple[Band, ...]
     paved: Grid
     notes: tuple[str, ...]
 
 
-def find_layout(profiles: Profiles, lines: list[Line], wanted: Kind | None = None) -> Layout:
+def find_layout(profiles: Profiles, lines: list[Line], wanted: RoadKind | None = None) -> Layout:
     """Return the layout of profiles with lines.
 
     Args:

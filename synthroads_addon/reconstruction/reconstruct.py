@@ -16,8 +16,7 @@ from .assemble import Measured, RotationAxis, assembled
 from .axis import Centre, centre_of
 from .cloud import Kind, RoadCloud
 from .edges import Surface, paved_edge, stretch_middles, surface
-from .layout import Kind as RoadKind
-from .layout import Layout, find_layout
+from .layout import Layout, RoadKind, find_layout
 from .lines import find_lines
 from .objects import find_barriers, find_posts
 from .path import SPACING, Path, alignment_path, first_path, path_through

@@ -11,7 +11,7 @@ from scipy import ndimage
 
 from ..road.guidelines import STANDARD_CROSS_SECTIONS, StandardCrossSection
 from .edges import Edge, paved_edge, stretch_count
-from .layout import Band, Kind, Layout
+from .layout import Band, Layout, RoadKind
 from .lines import Line
 from .profiles import Profiles
 from .smoothing import mean_with_std
@@ -120,7 +120,7 @@ class Section:
         nearest: see ``distance``.
     """
 
-    kind: Kind
+    kind: RoadKind
     sides: dict[Side, SideSection]
     middle: Line | None
     standard: str | None
@@ -155,7 +155,7 @@ def measure_section(profiles: Profiles, layout: Layout, marked: bool) -> Section
     return Section(layout.kind, sides, None, standard, nearest, distance)
 
 
-def line_width(line: Line | None, kind: Literal["edge", "lane", "inner"], road: Kind, marked: bool) -> float:
+def line_width(line: Line | None, kind: Literal["edge", "lane", "inner"], road: RoadKind, marked: bool) -> float:
     """Return the width (m) that a line is taken to have: measured, or the usual one if it is near to that."""
     usual = EDGE_LINE if kind == "edge" else NARROW_LINE
     if road == "single":

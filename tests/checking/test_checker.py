@@ -1,6 +1,5 @@
 """The checker as a whole: good roads, what it documents and imports, odd input, speed, and the command."""
 
-import ast
 import contextlib
 import json
 import math
@@ -58,22 +57,6 @@ def test_roads_without_furniture_and_with_one_carriageway() -> None:
     assert {v.rule for v in checked(data)} == missing
     data["objects"] = {name: item for name, item in data["objects"].items() if not name.startswith("left")}
     assert {v.rule for v in checked(data)} == missing - {"median-barrier"}
-
-
-def test_the_checker_knows_nothing_of_the_sampler() -> None:
-    """It shares the table of limits and the model of the set with sampler and road model, nothing else."""
-    folder = Path(checker.__file__).parent
-    allowed = {path.stem for pattern in ("checker*.py", "model*.py") for path in folder.glob(pattern)} | {"limits"}
-    files = list(folder.glob("checker*.py"))
-    assert len(files) > len(checker.MODULES)
-    for path in files:
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-            if isinstance(node, ast.ImportFrom) and node.level:
-                names = {node.module} if node.module else {name.name for name in node.names}
-                assert (node.level, names <= allowed) == (1, True), path.name
-            elif isinstance(node, ast.ImportFrom | ast.Import):
-                names = {node.module or ""} if isinstance(node, ast.ImportFrom) else {name.name for name in node.names}
-                assert not any(name.startswith("synthroads") for name in names), path.name
 
 
 NUMBERS = st.floats(-1e15, 1e15) | st.sampled_from(

@@ -184,7 +184,7 @@ def test_fields_say_all_that_is_to_be_known(capsys: Capture) -> None:
 
 def test_it_needs_neither_pytorch_nor_blender() -> None:
     code = (
-        "import sys; sys.modules['torch'] = sys.modules['bpy'] = None; from headless.cli import command\n"
+        "import sys; sys.modules['torch'] = sys.modules['bpy'] = None; from headless.commands import command\n"
         f"raise SystemExit(max(command('list', [kind, '--quiet']) for kind in {[*KINDS, 'fields']!r}))"
     )
     subprocess.run([sys.executable, "-c", code], cwd=ROOT, check=True)

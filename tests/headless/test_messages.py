@@ -202,7 +202,7 @@ def test_what_was_held_back_is_shown_once_it_takes_longer(
 def test_in_a_terminal_progress_is_a_bar_and_messages_stand_above_it() -> None:
     code = """
 import argparse, time
-from headless.cli import run
+from headless.commands import run
 from headless.messages import logger, progress_bar
 
 def action(arguments):

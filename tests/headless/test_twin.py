@@ -41,7 +41,7 @@ def test_command_writes_what_is_asked_for(parameters: Path, tmp_path: Path, caps
 
 def test_command_needs_no_blender(parameters: Path, tmp_path: Path) -> None:
     code = (
-        "import sys; sys.modules['bpy'] = None; from headless.cli import command\n"
+        "import sys; sys.modules['bpy'] = None; from headless.commands import command\n"
         f"raise SystemExit(command('twin', [{str(parameters)!r}, '--output', {str(tmp_path / 'o')!r}, "
         "'--twin', 'cityjson,geojson']))"
     )

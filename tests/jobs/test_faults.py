@@ -264,7 +264,7 @@ def test_an_interrupt_that_a_library_turns_into_another_error(kind: str) -> None
     code = f"""
 import sys; sys.argv = ["-m"]
 import argparse, os, signal, time
-from headless.cli import leave, run
+from headless.commands import leave, run
 
 def work(arguments):
     try:
@@ -284,7 +284,7 @@ def test_an_interrupt_in_a_callback_of_blender_reaches_the_command() -> None:
     code = """
 import sys; sys.argv = ["-m"]
 import argparse, os, signal, time
-from headless.cli import leave, run
+from headless.commands import leave, run
 
 operators = {}
 text = "def call(action):\\n    try:\\n        action()\\n    except BaseException:\\n        pass\\n"

@@ -71,7 +71,7 @@ def openpoints_verdict(samples: Samples) -> list[str]:
     from ml.networks.pointnext import architecture
     from tests.judges import pointnext_reference as reference
 
-    with reference.theirs(openpoints_folder()) as modules:
+    with reference.openpoints_modules(openpoints_folder()) as modules:
         plan = architecture("S", in_channels=reference.INPUTS, num_classes=reference.CLASSES)
         count = sum(weight.numel() for weight in reference.Theirs(modules, plan).parameters())
         found = [] if count == reference.PUBLISHED["S"] else [f"{count} parameters"]

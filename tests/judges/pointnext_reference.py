@@ -67,7 +67,7 @@ def three_interpolate(features: Tensor, index: Tensor, weight: Tensor) -> Tensor
 
 
 @contextmanager
-def theirs(folder: Path) -> Iterator[types.SimpleNamespace]:
+def openpoints_modules(folder: Path) -> Iterator[types.SimpleNamespace]:
     """Yield their modules from the package's folder, with plain functions in place of CUDA's; then forget them."""
     with pytest.MonkeyPatch.context() as monkeypatch:
         yield from _loaded(folder, monkeypatch)

@@ -149,3 +149,11 @@ def test_shipped_tables_have_names_and_others_are_files(tmp_path: Path) -> None:
     assert material_table_path(str(tmp_path / "own.json")) == tmp_path / "own.json"
     with pytest.raises(InputError, match="shifted"):
         material_table_path("shiftet")
+
+
+def test_reflectivities_are_plausible_at_905_nm() -> None:
+    wanted = {"asphalt": 0.18, "paint_white": 0.65, "grass": 0.5, "leaves": 0.5, "soil": 0.3}
+    wanted |= {"galvanised_steel": 0.5, "plastic_white": 0.7, "concrete": 0.37, "plastic_black": 0.06}
+    for name, reflectivity in wanted.items():
+        assert materials()[name].reflectivity == pytest.approx(reflectivity, abs=0.03), name
+    assert max(row.reflectivity for row in materials().values()) < 1.0

@@ -16,7 +16,7 @@ from ml.centerline.data.roads import read_scene
 from ml.points import read_ground
 from ml.runs import CHECKPOINT, Run
 from ml.segmentation.data.crops import CropSettings, Item
-from ml.segmentation.data.packing import pack_tile, write_pack
+from ml.segmentation.data.packed_file import pack_tile, write_pack
 from ml.segmentation.data.sources import Source, read_tiles
 from ml.segmentation.prediction import Labelling, predict_file
 from ml.segmentation.recipes import SegmentationConfiguration

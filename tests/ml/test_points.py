@@ -11,7 +11,7 @@ import pytest
 from ml.points import ROAD_CLASSES, read_ground, read_points
 from synthroads_addon.base.classes import class_scheme
 from synthroads_addon.base.errors import InputError, MissingFileError
-from synthroads_addon.cloud.formats.las_reader import LasReader
+from synthroads_addon.cloud.formats.las import LasReader
 from synthroads_addon.cloud.formats.registry import open_writer
 from synthroads_addon.cloud.points import PointBlock
 

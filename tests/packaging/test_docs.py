@@ -69,7 +69,7 @@ def command_lines(text: str) -> list[list[str]]:
     """Return the words after `synthroads` of all commands, however they are called."""
     lines = [words[1:] for words in commands(text, "synthroads")]
     for words in commands(text, "python"):
-        if words[1:2] == ["-m"] and (match := re.fullmatch(r"(?:headless|ml)\.(\w+)", words[2])):
+        if words[1:2] == ["-m"] and (match := re.fullmatch(r"headless\.(\w+)", words[2])):
             lines.append([match[1], *words[3:]])
     for words in commands(text, "blender"):
         script = next((Path(word) for word in words if word.startswith("headless/")), None)
@@ -97,7 +97,7 @@ def test_modules_and_targets_that_are_run_are_there(page: Path) -> None:
     text = page.read_text(encoding="utf-8")
     makefile = (ROOT / "Makefile").read_text(encoding="utf-8")
     for words in commands(text, "python"):
-        if words[1] == "-m" and words[2].split(".")[0] in ("headless", "ml"):
+        if words[1] == "-m" and words[2].split(".")[0] == "headless":
             assert find_spec(words[2].rpartition(".")[0]), words
             assert (ROOT / f"{words[2].replace('.', '/')}.py").is_file(), words
         elif words[1].endswith(".py") and not words[1].startswith("my"):

@@ -14,7 +14,7 @@ import pytest
 
 from synthroads_addon.base.errors import InputError
 from synthroads_addon.calibration.texture import read_texture
-from synthroads_addon.cloud.formats.las_reader import open_to_copy
+from synthroads_addon.cloud.formats.las import open_to_copy
 from synthroads_addon.cloud.formats.registry import open_cloud, open_writer
 from synthroads_addon.cloud.layers import DEFAULT_ATTRIBUTES
 from synthroads_addon.materials.table import materials
@@ -203,7 +203,7 @@ def _centimetres() -> object:
 def test_points_that_are_not_finite_are_refused_by_name(tmp_path: Path, ending: str, value: float, monkeypatch) -> None:
     points = make_points(100)
     points = replace(points, xyz=np.where(np.arange(300).reshape(100, 3) == 31, value, points.xyz))
-    from synthroads_addon.cloud.formats import writer as writing
+    from synthroads_addon.cloud.formats import base as writing
 
     monkeypatch.setattr(writing.CloudWriter, "finite", lambda self, values, name: values)
     path = tmp_path / f"cloud{ending}"
@@ -216,9 +216,9 @@ def test_points_that_are_not_finite_are_refused_by_name(tmp_path: Path, ending: 
 def test_points_of_e57_that_are_not_finite_are_refused_by_name(tmp_path: Path, monkeypatch) -> None:
     """pye57 writes no NaN, but others do: here the scan's pose is the one."""
     require("pye57")
-    from synthroads_addon.cloud.formats import e57_reader as e57_reading
+    from synthroads_addon.cloud.formats import e57
 
-    monkeypatch.setattr(e57_reading, "_pose", lambda scan: (np.eye(3), np.array([0.0, 0.0, np.nan])))
+    monkeypatch.setattr(e57, "_pose", lambda scan: (np.eye(3), np.array([0.0, 0.0, np.nan])))
     with pytest.raises(InputError, match=r"cloud\.e57: z of point 0 is nan: must be finite"):
         use_cloud(cloud(tmp_path / "cloud.e57"))
 
@@ -245,7 +245,7 @@ NOTES = [{"intensity_scale": None}, {"intensity_scale": 0.0}, {"intensity_scale"
     ],
 )
 def test_notes_that_are_none_of_ours(tmp_path: Path, ending: str, notes: object, monkeypatch) -> None:
-    from synthroads_addon.cloud.formats import writer as writing
+    from synthroads_addon.cloud.formats import base as writing
 
     path = tmp_path / f"cloud{ending}"
     writer = open_writer(path, None, ORIGIN, 1.0, ())

@@ -15,7 +15,7 @@ import pytest
 
 from synthroads_addon.base.errors import InputError
 from synthroads_addon.base.schema import Model, read_json, read_yaml
-from synthroads_addon.cloud.formats.las_writer import LasWriter
+from synthroads_addon.cloud.formats.las import LasWriter
 from synthroads_addon.dataset.recipe import RECIPES, load_recipe, scene_jobs
 from synthroads_addon.materials.table import MaterialTable
 from synthroads_addon.road.alignment import Alignment, Element, clip_offset

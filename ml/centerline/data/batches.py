@@ -9,7 +9,6 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
-from torch import Tensor
 
 from synthroads_addon.base.errors import InputError
 from synthroads_addon.base.progress import Progress, silent
@@ -17,14 +16,12 @@ from synthroads_addon.base.random_streams import stream
 from synthroads_addon.base.schema import quantity
 
 from ...configuration import Part
-from ..networks.models import mirrored
 from .axis import Axis
 from .corridor import Truth, TruthKind
 from .effects import Crop, Effects
+from .mirroring import mirrored
 from .roads import Road, read_measured, read_scene, scene_folders
-from .slices import Sample, SliceDataset, SliceSettings, collate
-
-Batch = dict[str, Tensor]
+from .slices import Batch, Sample, SliceDataset, SliceSettings, collate
 
 
 class MeasuredRoad(Part):

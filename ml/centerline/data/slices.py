@@ -39,6 +39,7 @@ from .stretch import HEIGHT, Stretch
 
 Float = NDArray[np.float64]
 Sample = dict[str, Tensor]
+Batch = dict[str, Tensor]
 
 FEATURES = ("intensity", "contrast", "red", "green", "blue", "has_color")
 """Columns of ``feat``."""
@@ -254,7 +255,7 @@ def sample(
     }
 
 
-def collate(samples: Sequence[Mapping[str, Tensor]]) -> dict[str, Tensor]:
+def collate(samples: Sequence[Mapping[str, Tensor]]) -> Batch:
     """Return B samples as one batch, padded by zeros to P points per slice, the most that any slice has.
 
     ``coord`` (B, S, P, 3), ``feat`` (B, S, P, F) and ``mask`` (B, S, P), True where there is a point; all else stacked.
@@ -320,6 +321,7 @@ def _features(cut: Stretch, rng: np.random.Generator) -> Float:
 
 __all__ = [
     "FEATURES",
+    "Batch",
     "FrameSlices",
     "IterableSlices",
     "Road",

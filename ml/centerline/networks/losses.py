@@ -11,7 +11,8 @@ from torch.nn import functional
 from synthroads_addon.base.schema import quantity
 
 from ...configuration import Part
-from .models import LINES, SCALE, TARGETS, Batch, Output
+from ..data.slices import Batch
+from .models import LINES, SCALE, TARGETS, Output
 
 Figures = dict[str, float]
 

@@ -30,7 +30,8 @@ from synthroads_addon.base.schema import quantity
 
 from ...configuration import Part
 from ..data.corridor import CORRIDOR
-from ..data.slices import FEATURES
+from ..data.mirroring import mirrored, mirrored_corridor, with_sides_swapped
+from ..data.slices import FEATURES, Batch
 from .layers import (
     AttentionPool,
     DeformableKernelPoints,
@@ -42,7 +43,6 @@ from .layers import (
 )
 from .refinement import Refinement, parabola
 
-Batch = dict[str, Tensor]
 Output = dict[str, Tensor]
 
 LINES = ("center", "left_edge", "right_edge")
@@ -281,18 +281,6 @@ def build(options: ModelOptions, half_width: float, slices: int) -> CenterlineMo
     return Transformer(options, half_width, slices)
 
 
-def mirrored(batch: Batch) -> Batch:
-    """Return a batch with left and right swapped, truth and frames included."""
-    flip = batch["coord"].new_tensor([1.0, -1.0, 1.0])
-    other = dict(batch, coord=batch["coord"] * flip)
-    other["frame"] = batch["frame"] * batch["frame"].new_tensor([1.0, -1.0, -1.0, 1.0])
-    if "center" in batch:
-        other["center"] = -batch["center"]
-    if "corridor" in batch:
-        other["corridor"] = _swapped(batch["corridor"]) * _signs(batch["corridor"])
-    return other
-
-
 def both_ways(model: nn.Module, batch: Batch) -> Output:
     """Return the mean of a model's output and of that for the mirrored batch, mirrored back.
 
@@ -300,8 +288,8 @@ def both_ways(model: nn.Module, batch: Batch) -> Output:
     calibration sees it.
     """
     one, other = model(batch), model(mirrored(batch))
-    back = _swapped(other["corridor"]) * _signs(other["corridor"])
-    variance = _swapped(other["corridor_std"]) ** 2
+    back = mirrored_corridor(other["corridor"])
+    variance = with_sides_swapped(other["corridor_std"]) ** 2
     return {
         "center": 0.5 * (one["center"] - other["center"]),
         "center_std": (0.5 * (one["center_std"] ** 2 + other["center_std"] ** 2)).sqrt(),
@@ -312,14 +300,3 @@ def both_ways(model: nn.Module, batch: Batch) -> Output:
 
 def _bounded(logarithm: Tensor) -> Tensor:
     return _LARGEST_LOG * torch.tanh(logarithm / _LARGEST_LOG)
-
-
-def _swapped(corridor: Tensor) -> Tensor:
-    order = [
-        CORRIDOR.index({"left_edge": "right_edge", "right_edge": "left_edge"}.get(name, name)) for name in CORRIDOR
-    ]
-    return corridor[..., order]
-
-
-def _signs(corridor: Tensor) -> Tensor:
-    return corridor.new_tensor([-1.0 if name in ("left_edge", "right_edge", "heading") else 1.0 for name in CORRIDOR])

@@ -19,8 +19,8 @@ from ...tasks import Evaluation
 from ..data.corridor import TruthKind
 from ..data.roads import Road, read_measured, read_scene, scene_folders
 from ..networks.models import TARGETS
+from ..use.calibration import LEVELS
 from ..use.predictor import CenterlinePredictor, errors
-from .calibration import LEVELS
 from .evaluation import (
     Case,
     Cropping,

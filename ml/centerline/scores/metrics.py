@@ -28,7 +28,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 from scipy.special import ndtri
 
-from .calibration import LEVELS
+from ..use.calibration import LEVELS
 
 Float = NDArray[np.float64]
 Index = NDArray[np.intp]

@@ -14,7 +14,7 @@ from scipy.stats import rankdata
 
 from ..data.corridor import CORRIDOR
 from ..data.frames import Frames
-from .calibration import DEVIATIONS, LEVELS
+from ..use.calibration import DEVIATIONS, LEVELS
 from .evaluation import CORRIDOR_COLUMNS, Case, truth_of
 
 if TYPE_CHECKING:

@@ -82,9 +82,7 @@ def report(result: Mapping[str, Any]) -> str:
     return "\n".join([*parts, "", f"{model}, the corridor:", *text_table(*_cells(corridor, CORRIDOR_COLUMNS))])
 
 
-def _cells(
-    rows: Mapping[str, Mapping[str, Spread]], columns: Sequence[Column]
-) -> tuple[list[str], list[list[str]]]:
+def _cells(rows: Mapping[str, Mapping[str, Spread]], columns: Sequence[Column]) -> tuple[list[str], list[list[str]]]:
     """Return head and body of a table with a row of figures for each name; columns that nobody fills are left out."""
     used = [column for column in columns if any(column.figure in row for row in rows.values())]
     body = [[name, *(cell(row.get(column.figure), column) for column in used)] for name, row in rows.items()]
@@ -135,9 +133,7 @@ def _from_data(data: Mapping[str, Any]) -> Measured:
     """Return figures from the JSON data that `as_data` makes of them."""
 
     def spreads(figures: Mapping[str, Any]) -> dict[str, Spread]:
-        return {
-            name: Spread(_number(row["mean"]), _number(row["std"]), row["seeds"]) for name, row in figures.items()
-        }
+        return {name: Spread(_number(row["mean"]), _number(row["std"]), row["seeds"]) for name, row in figures.items()}
 
     return {name: {road: spreads(figures) for road, figures in rows.items()} for name, rows in data.items()}
 

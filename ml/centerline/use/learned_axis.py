@@ -14,6 +14,9 @@ from synthroads_addon.reconstruction.cloud import RoadCloud
 from synthroads_addon.reconstruction.path import Path
 from synthroads_addon.reconstruction.reconstruct import Predictor
 
+from ...runs import Run
+from ...tasks import Prediction, kinds, task
+
 Float = NDArray[np.float64]
 
 _USUAL_STD = 0.1  # m, where the model tells none
@@ -31,9 +34,6 @@ def learned_axis(folder: FilePath, cloud_file: FilePath, scratch: FilePath) -> P
     Raises:
         MissingFileError, InputError: it is no run of a centreline model, or its training isn't finished.
     """
-    from ...runs import Run
-    from ...tasks import Prediction, kinds, task
-
     trained = Run.open(folder, kinds())
     name = trained.configuration.task
     if name != "centerline":

@@ -22,7 +22,7 @@ from ..data.frames import Frames, interleaved, stretches
 from ..data.roads import Road
 from ..data.slices import FrameSlices, SliceSettings, collate
 from ..networks.models import LINES, TARGETS, CenterlineModel, both_ways
-from ..scores.calibration import Calibration, all_calibrated
+from .calibration import Calibration, all_calibrated
 
 Float = NDArray[np.float64]
 

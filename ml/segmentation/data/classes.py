@@ -14,9 +14,10 @@ from synthroads_addon.base.classes import UNLABELLED, ClassScheme, class_scheme
 from synthroads_addon.base.errors import InputError, nearest_name
 from synthroads_addon.base.schema import Model, read_json
 
-from ..scores.metrics import IGNORED
-
-SHIPPED = Path(__file__).parents[2] / "configurations" / "classes"
+MAPPINGS = Path(__file__).parents[2] / "configurations" / "classes"
+"""Folder of the shipped mappings."""
+IGNORED = -1
+"""Label of points that count nowhere."""
 
 
 class LabelMapping(Model):
@@ -82,8 +83,8 @@ def load_mapping(name_or_file: str) -> LabelMapping:
         MissingFileError: there is no such file.
         InputError: it is no mapping.
     """
-    shipped = sorted(path.stem for path in SHIPPED.glob("*.json"))
-    path = SHIPPED / f"{name_or_file}.json" if name_or_file in shipped else Path(name_or_file)
+    shipped = sorted(path.stem for path in MAPPINGS.glob("*.json"))
+    path = MAPPINGS / f"{name_or_file}.json" if name_or_file in shipped else Path(name_or_file)
     if path.suffix.lower() != ".json":
         known = ", ".join(shipped)
         raise InputError(

@@ -1,13 +1,7 @@
-"""Pack the corridor of a data set's roads into one file of training data, to be carried to where training is fast.
-
-Example: ``python -m ml.segmentation.data.pack out/reference --split train --output train.npz --limit-mb 50``
-"""
+"""The corridor of a data set's roads as packed tiles, as many as fit into a file of training data."""
 
 from __future__ import annotations
 
-import argparse
-import json
-import sys
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -17,9 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from headless.commands import add_short_options
-from synthroads_addon.base.classes import ClassScheme, class_scheme
-from synthroads_addon.base.errors import InputError, OutputError
+from synthroads_addon.base.classes import ClassScheme
+from synthroads_addon.base.errors import InputError
 from synthroads_addon.base.random_streams import stream
 from synthroads_addon.base.schema import read_json
 from synthroads_addon.cloud.formats.registry import open_cloud
@@ -28,7 +21,7 @@ from synthroads_addon.cloud.tools.quantile_mapping import steps_per_unit
 from synthroads_addon.cloud.tools.subsample import GridSubsampler
 from synthroads_addon.dataset.manifest import MANIFEST, SceneEntry, read_manifest
 
-from .packing import Packed, pack_tile, write_pack
+from .packed_file import Packed, pack_tile
 from .sources import Source, labelled_blocks, read_tiles, tile_of
 from .tiles import Tile
 
@@ -168,49 +161,3 @@ def summary(notes: Sequence[Mapping[str, Any]], size: int) -> dict[str, Any]:
         "bytes_per_point": round(size / max(points, 1), 3),
         "crops": points // CROP,
     }
-
-
-def parser() -> argparse.ArgumentParser:
-    """Return the parser of the command."""
-    made = argparse.ArgumentParser(prog="python -m ml.segmentation.data.pack", description=__doc__)
-    made.add_argument("source", type=Path, metavar="DATASET", help="data set, or another source of labelled points")
-    made.add_argument("--split", metavar="NAME", help="split to pack (default: all)")
-    made.add_argument("--output", type=Path, required=True, metavar="FILE", help="file to write, .npz")
-    made.add_argument("--classes", default="5", metavar="SCHEME", help="5, 17 or a JSON file (default: 5)")
-    made.add_argument("--voxel", type=float, default=0.1, metavar="M", help="edge of the grid's cells (default: 0.1)")
-    made.add_argument("--corridor", type=float, default=30.0, metavar="M", help="reach to either side (default: 30)")
-    made.add_argument(
-        "--limit-mb", type=float, default=50.0, metavar="MB", help="largest file, 1e6 bytes (default: 50)"
-    )
-    made.add_argument("--seed", type=int, default=1, metavar="N", help="seed of the choice of tiles (default: 1)")
-    made.add_argument("--overwrite", action="store_true", help="replace a file that is there")
-    add_short_options(made)
-    return made
-
-
-def main(argv: list[str] | None = None) -> int:
-    """Run the command; return its exit code."""
-    arguments = parser().parse_args(argv)
-    try:
-        if arguments.output.suffix != ".npz":
-            raise InputError("--output", str(arguments.output), "must end in .npz")
-        if arguments.output.exists() and not arguments.overwrite:
-            raise OutputError("--output", str(arguments.output), "is there already; --overwrite replaces it")
-        if not 0 <= arguments.seed < 2**63:
-            raise InputError("--seed", arguments.seed, "must be a whole number from 0")
-        for name, low, high in (("voxel", 0.02, 10.0), ("corridor", 5.0, 1000.0), ("limit_mb", 0.5, 1e5)):
-            if not low <= getattr(arguments, name) <= high:
-                raise InputError(f"--{name.replace('_', '-')}", getattr(arguments, name), f"must be {low} to {high:g}")
-        scheme = class_scheme(arguments.classes)
-        every = packed_tiles(arguments.source, arguments.split, scheme, arguments.voxel, arguments.corridor)
-        tiles = within(every, int(arguments.limit_mb * 1e6), arguments.seed)
-        size = write_pack(arguments.output, tiles, scheme, arguments.voxel, arguments.overwrite)
-    except InputError as error:
-        print(f"error: {error}", file=sys.stderr)
-        return 2
-    print(json.dumps(summary([tile.notes for tile in tiles], size), indent=1))
-    return 0
-
-
-if __name__ == "__main__":
-    raise SystemExit(main())

@@ -17,8 +17,8 @@ from synthroads_addon.base.classes import UNLABELLED, ClassScheme
 from synthroads_addon.base.errors import InputError, MissingFileError
 from synthroads_addon.base.files import files_below
 from synthroads_addon.base.schema import quantity, read_json
+from synthroads_addon.cloud.formats.base import BLOCK, CloudReader
 from synthroads_addon.cloud.formats.npz import ARCHIVE_FAULTS
-from synthroads_addon.cloud.formats.reader import BLOCK, CloudReader
 from synthroads_addon.cloud.formats.registry import ENDINGS, open_cloud
 from synthroads_addon.cloud.points import PointBlock
 from synthroads_addon.cloud.tools.quantile_mapping import levels, steps_per_unit
@@ -26,9 +26,8 @@ from synthroads_addon.dataset.tiles import TileSorter
 
 from ...cells import thin
 from ...configuration import Part
-from ..scores.metrics import IGNORED
-from .classes import LabelMapping, class_names, load_mapping, table_between
-from .packing import PackReader
+from .classes import IGNORED, LabelMapping, class_names, load_mapping, table_between
+from .packed_file import PackReader
 from .tiles import Tile, eight_bits
 
 FULL = 65535.0

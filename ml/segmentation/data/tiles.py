@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ...cells import thin
 from ...points import full_color
-from ..scores.metrics import IGNORED
+from .classes import IGNORED
 
 
 @dataclass(frozen=True)

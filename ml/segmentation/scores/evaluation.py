@@ -15,14 +15,14 @@ from synthroads_addon.base.errors import InputError
 from synthroads_addon.base.progress import Progress, silent
 
 from ...runs import Run
-from ..data.classes import class_names
+from ..data.classes import IGNORED, class_names
 from ..data.crops import Item
 from ..data.sources import Source, read_tiles
 from ..data.tiles import Tile, scalings
 from ..loading import adaptation_batches, thinned, watched_workers
 from ..network import adapted, build, on_device, plan_of, prepared, scores_of
 from ..recipes import SegmentationConfiguration
-from .metrics import IGNORED, Confusion
+from .metrics import Confusion
 from .scoring import Classifier, label_tile, score_tile
 
 

@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 from synthroads_addon.base.errors import InputError
 from synthroads_addon.base.text_table import text_table
 
-IGNORED = -1
-"""Label of points that count nowhere."""
+from ..data.classes import IGNORED
 
 FloatArray = NDArray[np.float64]
 

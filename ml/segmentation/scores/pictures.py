@@ -12,8 +12,8 @@ from PIL import Image
 
 from synthroads_addon.base.classes import class_scheme
 
+from ..data.classes import IGNORED
 from ..data.tiles import Tile
-from .metrics import IGNORED
 
 _PIXELS = 490
 """Of a view's longer side: as many as it has in the picture, so that none is lost."""

@@ -14,10 +14,11 @@ from scipy.spatial import cKDTree
 from synthroads_addon.base.random_streams import stream
 
 from ...cells import thin
+from ..data.classes import IGNORED
 from ..data.crops import CropSettings, Item, item
 from ..data.effects import crop_of
 from ..data.tiles import Scaling, Tile
-from .metrics import IGNORED, Confusion
+from .metrics import Confusion
 
 EDGE = 24.0
 """Edge of the pieces that are predicted at a time, m: about as wide as a crop of training."""

@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from ..nodes.builder import Value
-from ..things.vehicle.vehicle import COLOR
 from .shading import Shade
 
+COLOR = "vehicle_color"
+"""Attribute of vehicles that the paint's base colour is read from."""
 _COVER_TINT = 0.35
 """How much of the vehicle's colour its cover has; the rest is the table's mean."""
 

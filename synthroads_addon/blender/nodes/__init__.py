@@ -1,1 +1,1 @@
-"""The node groups: one module each, and the small builder that they share."""
+"""The builder of node groups, and what the groups of several things share."""

@@ -2,7 +2,7 @@
 
 Attributes of its points: ``station`` (m), ``left`` (unit vector, horizontal), ``curvature`` (1/m, positive to
 the left), ``crossfall_left`` and ``crossfall_right`` (m/m, positive where the surface falls to the right), and
-those of `nodes.road_layout.varying_widths`.
+those of `things.road.layout.varying_widths`.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ from .builder import Operand, Value
 
 FOLD_SHARE = 0.98
 """Share of the radius at which an offset curve is cut, as in `road.alignment.clip_offset`."""
+
 
 def row(backbone: Value, number: Value) -> tuple[Value, Value, Value]:
     """Return axis point, left vector and curvature of the backbone's row `number`."""

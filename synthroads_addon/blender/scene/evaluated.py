@@ -24,10 +24,10 @@ from ...scanning.scene.motion import (
     checked_factor,
     lane_motions,
 )
+from ..labels import Label, Labels, velocity_of
 from ..model.build import ORIGIN
 from ..things.model_builder import ROLE, SUPPORT
 from .changes import Changes
-from .labels import Label, Labels, velocity_of
 from .reading import Copied, Part, Places, Whole, copy_mesh, placed, slot_names
 
 Float = NDArray[np.float64]

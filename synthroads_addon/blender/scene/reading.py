@@ -1,4 +1,4 @@
-"""Meshes of an evaluated scene as arrays, and their placing: what `scene` puts a scene together with."""
+"""Meshes of an evaluated scene as arrays, and their placing: what `evaluated` puts a scene together with."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ from ...base.class_mapping import NameClasses
 from ...base.classes import UNLABELLED
 from ...base.errors import InputError
 from ...scanning.scene.mesh import SceneMesh, empty_scene_mesh
+from ..labels import Label
 from ..materials import table_name
-from .labels import Label
 
 Float = NDArray[np.float64]
 

@@ -17,7 +17,7 @@ from ...road.surface import surface_elevation
 from ...scanning.scene.mesh_files import check_mesh_file
 from ...scenario.assets import LibraryAsset, library_file, read_asset_library
 from ..files import complaint
-from ..scene.labels import CLASS_PROPERTY, INSTANCE_PROPERTY
+from ..labels import CLASS_PROPERTY, INSTANCE_PROPERTY
 from .meshes import on_plan
 from .model_builder import ModelBuilder
 

@@ -25,6 +25,16 @@ _OVERHANG, _DOOR, _GAP = 0.02, 0.012, 0.006
 _SLOTS = 5
 _WIDE = 0.7
 """Width from which a cabinet has two doors, m."""
+_MATERIALS = {
+    "emergency_phone": {
+        "Body": "plastic_orange",
+        "Plinth": "concrete",
+        "Band": "sheeting_white",
+        "Writing": "sheeting_white",
+        "Panel": "plastic_black",
+    },
+    "utility": {"Body": "cabinet_grey", "Plinth": "concrete", "Fitting": "plastic_black"},
+}
 
 
 @dataclass(frozen=True)
@@ -85,18 +95,6 @@ def _block(tree: Tree, cabinet: _Cabinet, inset: float, low: Value | float, high
     """Return a box between two heights, so much smaller than the cabinet all around."""
     size = op.vector(tree, cabinet.width - 2.0 * inset, cabinet.depth - 2.0 * inset, high - low)
     return box(tree, size, op.vector(tree, 0.0, 0.0, (high + low) * 0.5))
-
-
-_MATERIALS = {
-    "emergency_phone": {
-        "Body": "plastic_orange",
-        "Plinth": "concrete",
-        "Band": "sheeting_white",
-        "Writing": "sheeting_white",
-        "Panel": "plastic_black",
-    },
-    "utility": {"Body": "cabinet_grey", "Plinth": "concrete", "Fitting": "plastic_black"},
-}
 
 
 def build_cabinets(builder: ModelBuilder) -> None:

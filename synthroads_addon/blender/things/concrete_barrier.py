@@ -68,7 +68,7 @@ def _build(tree: Tree) -> None:
     terrain = tree.input("Terrain", "Object", description="Surface beside the road")
     barrier = _declare(tree)
     instance = tree.integer("Instance", 0, INSTANCES, description="Instance number of the faces")
-    material = tree.input("Material", "Material", description="Material of the barrier")
+    concrete = tree.input("Material", "Material", description="Material of the barrier")
 
     with tree.frame("Geometry"):
         axis = op.object_geometry(backbone)
@@ -88,7 +88,7 @@ def _build(tree: Tree) -> None:
     with tree.frame("Profile swept along the rows"):
         mesh = op.without_degenerate(_swept(tree, line, barrier))
     with tree.frame("Labels"):
-        mesh = op.label(mesh, class_id("barrier"), instance, material)
+        mesh = op.label(mesh, class_id("barrier"), instance, concrete)
     tree.output("Mesh", op.only_if(end - begin > 0.01, mesh), description="Barrier; its points carry their station")
 
 

@@ -75,21 +75,21 @@ def _body(tree: Tree, white: Value, black: Value) -> Value:
     return op.join(mesh, _set_material(op.set_position(lid, outline), white))
 
 
-def _front(tree: Tree, material: Value) -> Value:
+def _front(tree: Tree, glass: Value) -> Value:
     """Return the reflector on the face that approaching drivers see (-y)."""
     mesh, column, row = op.grid(tree, 2, 2)
     x = column * REFLECTOR[0] - REFLECTOR[0] / 2
     place = op.vector(tree, x, -_flank(x), row * REFLECTOR[1] - REFLECTOR[1] / 2 + _MIDDLE)
-    return _raised(op.set_position(mesh, place), material)
+    return _raised(op.set_position(mesh, place), glass)
 
 
-def _behind(tree: Tree, material: Value, above: float) -> Value:
+def _behind(tree: Tree, glass: Value, above: float) -> Value:
     """Return one of the round reflectors on the other face."""
     disc = tree.node("GeometryNodeMeshCircle", vertices=16, radius=0.03, fill_type="NGON").value
     place = op.position(tree)
     x = op.component(place, "X")
     place = op.vector(tree, -x, _flank(-x), op.component(place, "Y") + _MIDDLE + above)
-    return _raised(op.set_position(disc, place), material)
+    return _raised(op.set_position(disc, place), glass)
 
 
 def _flank(x: Value) -> Value:
@@ -97,10 +97,10 @@ def _flank(x: Value) -> Value:
     return (x + 0.045) * (-0.041 / 0.095) + (0.055 - _UNDER)
 
 
-def _raised(face: Value, material: Value) -> Value:
+def _raised(face: Value, glass: Value) -> Value:
     """Return a reflector as thick as it stands out of the post."""
     solid = face.tree.node("GeometryNodeExtrudeMesh", face, offset_scale=_UNDER + _PROUD, individual=False).value
-    return _set_material(solid, material)
+    return _set_material(solid, glass)
 
 
 def build_delineators(builder: ModelBuilder) -> None:

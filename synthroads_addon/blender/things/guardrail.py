@@ -103,7 +103,7 @@ def _build(tree: Tree) -> None:
     terrain = tree.input("Terrain", "Object", description="Surface beside the road")
     rail = _declare(tree)
     instance = tree.integer("Instance", 0, INSTANCES, description="Instance number of the faces")
-    material = tree.input("Material", "Material", description="Material of beams and posts")
+    steel = tree.input("Material", "Material", description="Material of beams and posts")
 
     with tree.frame("Geometry"):
         axis = op.object_geometry(backbone)
@@ -134,7 +134,7 @@ def _build(tree: Tree) -> None:
         posts = op.delete_points(posts, op.named(tree, "tall") < GUARDRAIL_LOWEST_POST)
         parts += _instances(tree, posts, rail.spacer, rail.beams)
     with tree.frame("Labels"):
-        mesh = op.label(op.realize(op.join(*parts)), class_id("guardrail"), instance, material)
+        mesh = op.label(op.realize(op.join(*parts)), class_id("guardrail"), instance, steel)
     tree.output("Mesh", mesh, description="Beams, posts and spacers")
 
 

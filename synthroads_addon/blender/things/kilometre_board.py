@@ -19,6 +19,10 @@ from .sign.face import declare_face, sign_face_group
 from .sign.looks import FaceStyle, face_inputs
 from .sign.posts import sign_posts_group
 
+_STYLE = FaceStyle("blue", "white", "white")
+_THICKNESS = 0.024
+"""Thickness of either half of a board, m."""
+
 
 def kilometre_board_group() -> bpy.types.NodeTree:
     """Return the group SR Kilometre Board."""
@@ -32,7 +36,7 @@ def _build(tree: Tree) -> None:
     lower_edge = tree.number(
         "Lower Edge", 1.2, (0.0, 10.0), unit="m", description="Lower edge of the board above the surface"
     )
-    material = tree.input("Post Material", "Material", description="Material of the post")
+    steel = tree.input("Post Material", "Material", description="Material of the post")
 
     with tree.frame("Two faces back to back around the post"):
         plate = tree.call(sign_face_group(), instance=standing.instance, **face).value
@@ -51,16 +55,11 @@ def _build(tree: Tree) -> None:
             terrain=standing.terrain,
             top=middle,
             post_diameter=KILOMETRE_POST,
-            material=material,
+            material=steel,
         ).value
     with tree.frame("Labels"):
         mesh = standing.labelled(op.join(mesh, post), class_id("road_sign"))
     tree.output("Mesh", mesh, description="Board with its post")
-
-
-_STYLE = FaceStyle("blue", "white", "white")
-_THICKNESS = 0.024
-"""Thickness of either half of a board, m."""
 
 
 def build_kilometre_boards(builder: ModelBuilder) -> None:

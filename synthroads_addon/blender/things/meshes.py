@@ -1,4 +1,4 @@
-"""Meshes that Python hands to the node groups: the backbone, the ground, and points with attributes."""
+"""Meshes that Python hands to the node groups: points with attributes, vertices, edges and faces."""
 
 from __future__ import annotations
 
@@ -9,76 +9,10 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from ...base.stepper import aside
-from ...road.alignment import clip_offset
 from ...road.geometry import RoadGeometry
-from ...road.parameters import PointObject, Terrain
-from ...road.terrain import GROUND_MARGIN, ground_elevation
-from .road.layout import varying_widths
+from ...road.parameters import PointObject
 
 Float = NDArray[np.float64]
-
-def backbone_mesh(geometry: RoadGeometry, station: Float, origin: Float, zero: float = 0.0) -> bpy.types.Mesh:
-    """Return a polyline with one vertex per station (N,) and the attributes that `nodes.backbone` lists.
-
-    Args:
-        geometry: the road.
-        station: (N,) m.
-        origin: (3,) local coordinates of the scene's origin, m.
-        zero: station (m) that the nodes count theirs from: as float32 they are exact near it only.
-    """
-    position, heading, curvature = geometry.alignment.frame(station)
-    elevation = geometry.profile.elevation(station)
-    values = {"station": station - zero, "curvature": curvature}
-    for side in ("left", "right"):
-        carriageway = geometry.parameters.carriageway(side)
-        values[f"crossfall_{side}"] = (
-            geometry.crossfall(carriageway, station) if carriageway else 0.0 * station
-        )
-    values |= varying_widths(geometry, station)
-    mesh = bpy.data.meshes.new("SR Backbone")
-    first = np.arange(len(station) - 1)
-    fill(mesh, np.column_stack([position, elevation]) - origin, edges=np.column_stack([first, first + 1]))
-    left = np.column_stack([-np.sin(heading), np.cos(heading), np.zeros(len(station))])
-    attribute(mesh, "left", left)
-    for name, value in values.items():
-        attribute(mesh, name, value)
-    return mesh
-
-
-def ground_mesh(
-    geometry: RoadGeometry, terrain: Terrain, tolerance: float, stretch: tuple[float, float], origin: Float
-) -> bpy.types.Mesh:
-    """Return the ground before the road was built: a grid of stations and offsets, wider than the terrain."""
-    vertices, faces = aside(lambda: _ground_grid(geometry, terrain, tolerance, stretch))
-    mesh = bpy.data.meshes.new("SR Ground")
-    fill(mesh, vertices - origin, faces=faces)
-    return mesh
-
-
-def _ground_grid(
-    geometry: RoadGeometry, terrain: Terrain, tolerance: float, stretch: tuple[float, float]
-) -> tuple[Float, NDArray[np.intp]]:
-    """Return the local vertices (V, 3) of the ground and its faces (F, 4)."""
-    bend = terrain.undulation * (2.0 * np.pi / terrain.wavelength) ** 2
-    spacing = float(np.clip(np.sqrt(8.0 * tolerance / max(bend, 1e-9)), 1.5, 4.0))
-
-    # Whole multiples of the spacing, so that a stretch of the road has the whole road's ground.
-    first, last = (stretch[0] - GROUND_MARGIN) // spacing, -((-stretch[1] - GROUND_MARGIN) // spacing)
-    ends = -GROUND_MARGIN, geometry.length + GROUND_MARGIN
-    station = np.clip(np.arange(first, last + 1) * spacing, *ends)
-    reach = terrain.half_width + GROUND_MARGIN
-    offset = np.linspace(-reach, reach, int(np.ceil(2.0 * reach / spacing)) + 1)
-    position, heading, curvature = geometry.alignment.frame(station)
-    offsets = clip_offset(offset[None, :], curvature[:, None])
-    left = np.stack([-np.sin(heading), np.cos(heading)], axis=-1)
-    plan = position[:, None, :] + offsets[:, :, None] * left[:, None, :]
-    stations = np.repeat(station, len(offset))
-    height = ground_elevation(geometry, terrain, stations, offsets.ravel())
-    corner = np.arange(len(station) - 1)[:, None] * len(offset) + np.arange(len(offset) - 1)
-    # Offsets grow to the left: forwards along the stations, then right, is seen from above against the clock.
-    faces = np.stack([corner, corner + len(offset), corner + len(offset) + 1, corner + 1], axis=-1)
-    return np.column_stack([plan.reshape(-1, 2), height]), faces.reshape(-1, 4)
 
 
 def points_mesh(

@@ -19,6 +19,9 @@ from ..nodes.builder import Tree, node_group
 from .meshes import attribute, fill_polygons, signed
 from .model_builder import ModelBuilder
 
+_LONGEST = 1.0
+"""Outlines are cut into pieces no longer than this (m), so that they follow the road's curves and its crossfall."""
+
 
 def painted_area_group() -> bpy.types.NodeTree:
     """Return the group SR Painted Area."""
@@ -50,10 +53,6 @@ def _build(tree: Tree) -> None:
         temporary = op.named(tree, "yellow") > 0.5
         mesh = tree.node("GeometryNodeSetMaterial", mesh, temporary, material=yellow).value
     tree.output("Mesh", mesh, description="Paint whose faces look up")
-
-
-_LONGEST = 1.0
-"""Outlines are cut into pieces no longer than this (m), so that they follow the road's curves and its crossfall."""
 
 
 def build_painted_areas(builder: ModelBuilder) -> None:

@@ -81,9 +81,9 @@ def _build(tree: Tree) -> None:
         marks = op.only_if(~barrier.plastic, painted(_reflectors(tree, barrier), glass))
     with tree.frame("Elements from foot to foot"):
         parts = []
-        for parity, material in enumerate((first, second)):
+        for parity, finish in enumerate((first, second)):
             chosen = op.separate(points, (op.named(tree, "number", "INT") % 2).equals(parity))
-            parts.append(_stood(tree, chosen, painted(body, material), True))
+            parts.append(_stood(tree, chosen, painted(body, finish), True))
             parts.append(_stood(tree, chosen, marks, False))
     with tree.frame("Labels"):
         mesh = op.realize(op.join(*parts))

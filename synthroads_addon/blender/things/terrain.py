@@ -4,15 +4,23 @@ from __future__ import annotations
 
 import bpy
 import numpy as np
+from numpy.typing import NDArray
 
 from ...base.classes import class_id
+from ...base.stepper import aside
+from ...road.alignment import clip_offset
+from ...road.geometry import RoadGeometry
+from ...road.parameters import Terrain
+from ...road.terrain import GROUND_MARGIN, ground_elevation
 from ..materials import material
 from ..nodes import operations as op
 from ..nodes.backbone import cut, row
 from ..nodes.builder import Tree, Value, node_group
 from ..nodes.strip import INSTANCES
-from .meshes import ground_mesh
+from .meshes import fill
 from .model_builder import ModelBuilder
+
+Float = NDArray[np.float64]
 
 _FINE = 0.12
 """Share of even spacing among the columns; the rest grows away from the road."""
@@ -38,7 +46,7 @@ def _build(tree: Tree) -> None:
         "Columns", 40, (3, 500), description="Points across each side, closer near the road"
     )
     instance = tree.integer("Instance", 0, INSTANCES, description="Instance number of the faces")
-    material = tree.input("Material", "Material", description="Material of the ground")
+    cover = tree.input("Material", "Material", description="Material of the ground")
 
     with tree.frame("Geometry"):
         axis, surface = op.object_geometry(backbone), op.object_geometry(ground)
@@ -59,7 +67,7 @@ def _build(tree: Tree) -> None:
                 columns=columns,
             ).value)  # fmt: skip
     with tree.frame("Labels"):
-        mesh = op.label(op.join(*sides), class_id("ground"), instance, material)
+        mesh = op.label(op.join(*sides), class_id("ground"), instance, cover)
     tree.output("Mesh", mesh, description="Terrain; its points carry their distance from the road")
 
 
@@ -116,7 +124,7 @@ def build_terrain(builder: ModelBuilder) -> None:
     terrain = builder.parameters.terrain
     if terrain is None:
         return
-    ground = ground_mesh(builder.geometry, terrain, builder.tolerance, builder.stretch, builder.origin)
+    ground = _ground_mesh(builder.geometry, terrain, builder.tolerance, builder.stretch, builder.origin)
     builder.add("Ground", ground, support=True)
     inputs = {
         **{role: builder.objects[role] for role in ("Backbone", "Road", "Ground")},
@@ -127,3 +135,38 @@ def build_terrain(builder: ModelBuilder) -> None:
         "Material": material("grass_ground"),
     }
     builder.add("Terrain", bpy.data.meshes.new("SR Terrain"), terrain_group(), inputs)
+
+
+def _ground_mesh(
+    geometry: RoadGeometry, terrain: Terrain, tolerance: float, stretch: tuple[float, float], origin: Float
+) -> bpy.types.Mesh:
+    """Return the ground before the road was built: a grid of stations and offsets, wider than the terrain."""
+    vertices, faces = aside(lambda: _ground_grid(geometry, terrain, tolerance, stretch))
+    mesh = bpy.data.meshes.new("SR Ground")
+    fill(mesh, vertices - origin, faces=faces)
+    return mesh
+
+
+def _ground_grid(
+    geometry: RoadGeometry, terrain: Terrain, tolerance: float, stretch: tuple[float, float]
+) -> tuple[Float, NDArray[np.intp]]:
+    """Return the local vertices (V, 3) of the ground and its faces (F, 4)."""
+    bend = terrain.undulation * (2.0 * np.pi / terrain.wavelength) ** 2
+    spacing = float(np.clip(np.sqrt(8.0 * tolerance / max(bend, 1e-9)), 1.5, 4.0))
+
+    # Whole multiples of the spacing, so that a stretch of the road has the whole road's ground.
+    first, last = (stretch[0] - GROUND_MARGIN) // spacing, -((-stretch[1] - GROUND_MARGIN) // spacing)
+    ends = -GROUND_MARGIN, geometry.length + GROUND_MARGIN
+    station = np.clip(np.arange(first, last + 1) * spacing, *ends)
+    reach = terrain.half_width + GROUND_MARGIN
+    offset = np.linspace(-reach, reach, int(np.ceil(2.0 * reach / spacing)) + 1)
+    position, heading, curvature = geometry.alignment.frame(station)
+    offsets = clip_offset(offset[None, :], curvature[:, None])
+    left = np.stack([-np.sin(heading), np.cos(heading)], axis=-1)
+    plan = position[:, None, :] + offsets[:, :, None] * left[:, None, :]
+    stations = np.repeat(station, len(offset))
+    height = ground_elevation(geometry, terrain, stations, offsets.ravel())
+    corner = np.arange(len(station) - 1)[:, None] * len(offset) + np.arange(len(offset) - 1)
+    # Offsets grow to the left: forwards along the stations, then right, is seen from above against the clock.
+    faces = np.stack([corner, corner + len(offset), corner + len(offset) + 1, corner + 1], axis=-1)
+    return np.column_stack([plan.reshape(-1, 2), height]), faces.reshape(-1, 4)

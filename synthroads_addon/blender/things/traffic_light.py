@@ -51,20 +51,20 @@ def _declare(tree: Tree) -> _Light:
     def metres(name: str, default: float, limits: tuple[float, float], description: str) -> Value:
         return tree.number(name, default, limits, unit="m", description=description)
 
-    def material(name: str, of: str) -> Value:
+    def finish(name: str, of: str) -> Value:
         return tree.input(f"{name} Material", "Material", description=f"Material of {of}")
 
     return _Light(
         height=metres("Height", 3.2, (1.0, 10.0), "Top above the surface"),
         count=tree.integer("Lights", 3, (1, 4), description="Number of lights"),
         diameter=metres("Light Diameter", 0.2, (0.05, 0.5), "Diameter of a light"),
-        steel=material("Post", "the post"),
-        housing=material("Housing", "housing, visors and board"),
-        rim=material("Rim", "the board's rim"),
+        steel=finish("Post", "the post"),
+        housing=finish("Housing", "housing, visors and board"),
+        rim=finish("Rim", "the board's rim"),
         lamps=(
-            material("Red", "the red light"),
-            material("Yellow", "yellow lights"),
-            material("Green", "the green light"),
+            finish("Red", "the red light"),
+            finish("Yellow", "yellow lights"),
+            finish("Green", "the green light"),
         ),
     )
 
@@ -123,8 +123,8 @@ def _lamps(tree: Tree, light: _Light) -> Value:
     number = op.named(tree, "number", "INT")
     red, yellow, green = light.lamps
     is_green = (number > 0) & number.equals(op.rounded_up(op.minimum(light.count, 3.0)) - 1)
-    for material, chosen in ((yellow, True), (red, number.equals(0)), (green, is_green)):
-        lamps = tree.node("GeometryNodeSetMaterial", lamps, chosen, material=material).value
+    for glass, chosen in ((yellow, True), (red, number.equals(0)), (green, is_green)):
+        lamps = tree.node("GeometryNodeSetMaterial", lamps, chosen, material=glass).value
     return lamps
 
 

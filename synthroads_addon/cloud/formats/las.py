@@ -1,15 +1,19 @@
-"""LAS 1.4 / LAZ, point format 7, written block by block under a temporary name.
+"""LAS and LAZ, block by block: written as version 1.4, point format 7, and read in any version and point format.
 
-Besides the standard fields each point has as extra bytes ``class_id`` (see `labels`; the standard field
-``classification`` holds its LAS code), ``instance_id`` and the attributes asked for (`attributes.COLUMNS`). The scale
+Besides the standard fields each written point has as extra bytes ``class_id`` (see `base.classes`; the standard field
+``classification`` holds its LAS code), ``instance_id`` and the attributes asked for (`layers.ATTRIBUTES`). The scale
 of the 16-bit intensity and the table of classes stand as JSON in the VLR ``SynthRoads`` 1.
 """
 
 from __future__ import annotations
 
+import json
+import struct
+from collections.abc import Iterator
 from contextlib import suppress
 from datetime import date
-from typing import Any
+from pathlib import Path
+from typing import Any, BinaryIO
 
 import laspy
 import lazrs
@@ -17,11 +21,13 @@ import numpy as np
 from laspy.vlrs.known import WktCoordinateSystemVlr
 from numpy.typing import NDArray
 
-from ...base.errors import OutputError
+from ...base.classes import asprs_scheme, class_scheme, stored_scheme
+from ...base.errors import InputError, OutputError
 from ...base.schema import canonical_json
-from ..layers import Column
+from ..layers import Column, attributes_of, columns, gather
 from ..points import PointBlock
-from .writer import CloudWriter
+from .base import BLOCK, CloudHeader, CloudReader, CloudWriter, damaged, epsg_of, intensity_scale
+from .laz_chunks import check_chunks
 
 SCALE = 0.001
 """Size of a coordinate's step, m."""
@@ -165,3 +171,211 @@ class LasWriter(CloudWriter):
         return laspy.ExtraBytesParams(
             column.name, column.dtype, column.description, offsets=[float(shift)], scales=[column.scale]
         )
+
+
+_FAULTS = (
+    *(laspy.errors.LaspyException, lazrs.LazrsError, ValueError, struct.error, OSError, EOFError, MemoryError),
+    *(LookupError, ArithmeticError, TypeError, RecursionError),
+)
+"""What laspy and lazrs raise where bytes aren't what they should be."""
+_READ = {
+    *("X", "Y", "Z", "intensity", "red", "green", "blue", "classification", "return_number", "number_of_returns"),
+    *("gps_time", "scan_angle", "scan_angle_rank", "point_source_id", "class_id", "instance_id"),
+}
+"""Dimensions that are read besides attributes."""
+_FLAGS = {
+    *("user_data", "synthetic", "key_point", "withheld", "overlap", "scanner_channel", "scan_direction_flag"),
+    "edge_of_flight_line",
+}
+"""Standard dimensions of LAS that the project has no use for."""
+
+
+class LasReader(CloudReader):
+    """Reads LAS and LAZ.
+
+    Args:
+        path: an existing file.
+
+    Raises:
+        InputError: it is no LAS file, or it is truncated.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self._file = path.open("rb")
+        try:
+            _check_start(path, self._file)
+            self._reader = laspy.LasReader(
+                self._file, closefd=False, read_evlrs=False, laz_backend=laspy.LazBackend.LazrsParallel
+            )
+            self.header = _header(path, self._reader.header)
+            self._check_size(path)
+        except InputError:
+            self._file.close()
+            raise
+        except _FAULTS as problem:
+            self._file.close()
+            raise InputError(str(path), None, f"is not a LAS file that can be read ({problem})") from None
+
+    def blocks(self, size: int = BLOCK) -> Iterator[PointBlock]:
+        """See `CloudReader`."""
+        done, path = 0, self.header.path
+        if self._reader.points_read:
+            self._reader.seek(0)
+        while done < self.header.count:
+            wanted = min(size, self.header.count - done)
+            try:
+                record = self._reader.read_points(wanted)
+            except _FAULTS:
+                raise damaged(path, done, self.header.count) from None
+            except BaseException as problem:
+                if type(problem).__name__ == "PanicException":  # the decompressor's own way to fail
+                    raise damaged(path, done, self.header.count) from None
+                raise
+            if len(record) != wanted:
+                raise damaged(path, done + len(record), self.header.count)
+            done += wanted
+            yield self._block(record)
+
+    def close(self) -> None:
+        """Close the file."""
+        self._file.close()
+
+    def _check_size(self, path: Path) -> None:
+        """Refuse a file that ends before its points do (LAS), or whose chunks don't fill it (LAZ), before any work."""
+        header, size = self._reader.header, path.stat().st_size
+        start = header.offset_to_point_data
+        if not header.are_points_compressed:
+            there = max(0, size - start) // header.point_format.size
+            if there < header.point_count:
+                raise damaged(path, there, header.point_count)
+        elif header.point_count:
+            check_chunks(path, start, header.vlrs.get("LasZipVlr")[0].record_data)
+
+    def _block(self, record: Any) -> PointBlock:
+        header, count = self._reader.header, len(record)
+        names = set(record.point_format.dimension_names)
+        raw = record.array
+        steps = np.stack([raw["X"], raw["Y"], raw["Z"]], axis=1)
+
+        def values(name: str, kind: Any) -> NDArray[Any]:
+            return np.asarray(record[name]).astype(kind) if name in names else np.zeros(count, dtype=kind)
+
+        scale = self.header.intensity_scale or 1.0
+        labels = "class_id" if self.header.labelled else "classification"
+        found = {c.name: np.asarray(record[c.name]) for c in columns(self.header.attributes) if c.name in names}
+        arrays = gather(found | {"class_id": values(labels, np.uint8)}, self.header.attributes, count)
+        return PointBlock(
+            xyz=steps * header.scales + header.offsets,
+            intensity=values("intensity", np.float64) / scale,
+            rgb=np.stack([values(name, np.uint16) for name in ("red", "green", "blue")], axis=1),
+            return_number=values("return_number", np.uint8),
+            number_of_returns=values("number_of_returns", np.uint8),
+            gps_time=values("gps_time", np.float64),
+            scan_angle_deg=_scan_angle(values, names),
+            strip=values("point_source_id", np.uint16) - np.uint16(1),
+            **arrays,
+        )
+
+
+def open_to_copy(path: Path) -> laspy.LasReader:
+    """Open a file that `LasReader` takes with laspy itself, the records behind its points included.
+
+    Raises:
+        InputError: these records are damaged, or a header can't be written again as it is.
+    """
+    reader = laspy.open(path, read_evlrs=False, laz_backend=laspy.LazBackend.LazrsParallel)
+    try:
+        _check_attributes(path, reader.header)
+        _check_records_behind(path, reader.header)
+        reader.read_evlrs()
+    except InputError:
+        reader.close()
+        raise
+    except _FAULTS as problem:
+        reader.close()
+        raise InputError(str(path), None, f"the records behind its points are damaged ({problem})") from None
+    return reader
+
+
+def _check_attributes(path: Path, header: laspy.LasHeader) -> None:
+    """Refuse attributes of no bytes: laspy has no type for them where it writes a header."""
+    for dimension in header.point_format.extra_dimensions:
+        if dimension.num_bits == 0:
+            raise InputError(str(path), None, f"can't be copied: its attribute {dimension.name!r} has no bytes")
+
+
+def _check_records_behind(path: Path, header: laspy.LasHeader) -> None:
+    """Refuse extended records that reach beyond the file: laspy would make as many, and as much room, as they claim."""
+    at, size = header.start_of_first_evlr or 0, path.stat().st_size
+    with path.open("rb") as file:
+        for _ in range(header.number_of_evlrs or 0):
+            file.seek(min(at + 20, size))
+            at += 60 + int.from_bytes(file.read(8), "little")
+            if at > size:
+                raise InputError(str(path), None, "is truncated: the records behind its points reach beyond its end")
+
+
+def _check_start(path: Path, file: BinaryIO) -> None:
+    """Refuse a header whose records can't all lie before the points: laspy would look for them one by one."""
+    start = file.read(104)
+    file.seek(0)
+    if start[:4] != b"LASF" or len(start) < 104:
+        raise InputError(str(path), None, "is not a LAS file")
+    header_size, points, records = struct.unpack_from("<HII", start, 94)
+    if not header_size + 54 * records <= points <= path.stat().st_size:
+        raise InputError(str(path), None, "is not a LAS file that can be read (its header is damaged or truncated)")
+
+
+def _scan_angle(values: Any, names: set[str]) -> NDArray[np.float32]:
+    if "scan_angle" in names:
+        return (values("scan_angle", np.float64) * SCAN_ANGLE_STEP).astype(np.float32)
+    return values("scan_angle_rank", np.float32)
+
+
+def _header(path: Path, las: laspy.LasHeader) -> CloudHeader:
+    names = set(las.point_format.dimension_names)
+    notes = next((v.record_data_bytes() for v in las.vlrs if v.user_id == "SynthRoads" and v.record_id == 1), None)
+    told = json.loads(notes) if notes else {}
+    if not isinstance(told, dict):
+        raise InputError(str(path), None, "its notes on intensity scale and classes are damaged")
+    if not (np.isfinite(las.offsets).all() and np.isfinite(las.scales).all() and np.all(las.scales != 0.0)):
+        scales = [*las.scales.tolist(), *las.offsets.tolist()]
+        raise InputError(f"{path}: scales and offsets", scales, "must be finite numbers, the scales not 0")
+    labelled = bool(told) and "class_id" in names
+    attributes = attributes_of(names) if told else ()
+    read = _READ | _FLAGS | {column.name for column in columns(attributes)}
+    if not labelled:
+        read -= {"class_id"}
+    scheme = asprs_scheme(range(256))
+    if labelled:
+        rows = told.get("classes")
+        scheme = stored_scheme(rows, str(path)) if isinstance(rows, dict) else class_scheme("17")
+    text = _crs_text(las)
+    return CloudHeader(
+        path,
+        f"LAS {las.version}, point format {las.point_format.id}, {'LAZ' if las.are_points_compressed else 'LAS'}",
+        int(las.point_count),
+        np.array(las.offsets, dtype=np.float64),
+        crs_text=text,
+        epsg=epsg_of(text) or _geotiff_epsg(las),
+        intensity_scale=intensity_scale(path, told) if told else None,
+        scheme=scheme,
+        labelled=labelled,
+        attributes=attributes,
+        has_color="red" in names,
+        left_out=tuple(sorted(names - read)),
+    )
+
+
+def _crs_text(las: laspy.LasHeader) -> str | None:
+    texts = [v.string for v in las.vlrs.get("WktCoordinateSystemVlr")]
+    return texts[0].rstrip("\0 ") or None if texts else None
+
+
+def _geotiff_epsg(las: laspy.LasHeader) -> int | None:
+    """Return the projected system's code (key 3072) of files before LAS 1.4."""
+    for record in las.vlrs.get("GeoKeyDirectoryVlr"):
+        for key in record.geo_keys:
+            if key.id == 3072 and key.tiff_tag_location == 0 and key.value_offset != 32767:
+                return int(key.value_offset)
+    return None

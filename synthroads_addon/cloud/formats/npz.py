@@ -26,8 +26,7 @@ from numpy.typing import NDArray
 from ...base.errors import InputError
 from ..layers import COLUMNS, columns, gather
 from ..points import PointBlock
-from .reader import BLOCK, CloudHeader, CloudReader, damaged, finite_coordinates, header_from_notes
-from .writer import CloudWriter
+from .base import BLOCK, CloudHeader, CloudReader, CloudWriter, damaged, finite_coordinates, header_from_notes
 
 _ALWAYS = {
     "xyz": ("<f8", 3),

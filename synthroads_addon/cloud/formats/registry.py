@@ -13,8 +13,7 @@ from ...base.classes import ClassScheme
 from ...base.errors import InputError, MissingFileError, nearest_name
 from ..layers import DEFAULT_ATTRIBUTES, Attribute
 from ..points import PointBlock
-from .reader import BLOCK, CloudReader
-from .writer import CloudWriter
+from .base import BLOCK, CloudReader, CloudWriter
 
 ENDINGS = (".laz", ".las", ".ply", ".e57", ".npz")
 """Endings of the files that can be written and read."""
@@ -56,14 +55,14 @@ def _writer_class(ending: str) -> type[CloudWriter]:
 
         return PlyWriter
     if ending == ".e57":
-        from .e57_writer import E57Writer
+        from .e57 import E57Writer
 
         return E57Writer
     if ending == ".npz":
         from .npz import NpzWriter
 
         return NpzWriter
-    from .las_writer import LasWriter
+    from .las import LasWriter
 
     return LasWriter
 
@@ -89,14 +88,14 @@ def open_cloud(path: Path) -> CloudReader:
 
         return PlyReader(path)
     if ending == ".e57":
-        from .e57_reader import E57Reader
+        from .e57 import E57Reader
 
         return E57Reader(path)
     if ending == ".npz":
         from .npz import NpzReader
 
         return NpzReader(path)
-    from .las_reader import LasReader
+    from .las import LasReader
 
     return LasReader(path)
 

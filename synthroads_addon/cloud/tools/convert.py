@@ -14,9 +14,8 @@ from ...base.classes import ClassScheme, class_scheme
 from ...base.errors import InputError, OutputError
 from ...base.files import output_folder
 from ...base.progress import Progress, silent
-from ..formats.reader import BLOCK, CloudReader
+from ..formats.base import BLOCK, CloudReader, CloudWriter
 from ..formats.registry import check_ending, open_cloud, open_writer
-from ..formats.writer import CloudWriter
 from ..points import PointBlock, concatenate
 from .previews import CrossSection, TopView
 from .quantile_mapping import IntensityMapping, steps_per_unit

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from ...base.classes import ClassScheme, PointClass
 from ...base.errors import InputError
 from ...base.random_streams import stream
-from ..formats.reader import CloudHeader
+from ..formats.base import CloudHeader
 from ..formats.registry import open_cloud
 from .picture import gray
 from .previews import Brightness

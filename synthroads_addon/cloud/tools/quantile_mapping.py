@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...base.errors import InputError
-from ..formats.reader import CloudReader
+from ..formats.base import CloudReader
 from ..points import PointBlock
 
 LEVELS = 65_536

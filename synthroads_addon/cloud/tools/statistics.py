@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..formats.reader import CloudReader
+from ..formats.base import CloudReader
 from ..points import PointBlock
 
 AREA_CELL = 1.0

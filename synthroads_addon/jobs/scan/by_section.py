@@ -98,7 +98,7 @@ class SectionScan:
     """
 
     def __init__(self, scenario: Scenario, parameters: RoadParameters) -> None:
-        from ...blender.things.vehicle.meshes import VehicleMeshes
+        from ...blender.scene.vehicle_meshes import VehicleMeshes
 
         self.scenario, self.parameters = scenario, parameters
         self.geometry = RoadGeometry(parameters)

@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...base.classes import classes
+from ...cloud.formats.base import CloudWriter
 from ...cloud.formats.registry import open_writer
-from ...cloud.formats.writer import CloudWriter
 from ...cloud.points import PointBlock
 from ...cloud.tools.previews import TopView
 from ...cloud.tools.subsample import GridSubsampler

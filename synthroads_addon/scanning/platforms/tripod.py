@@ -1,6 +1,8 @@
-"""A tripod beside the road: at each position it turns the scanner about the vertical, once if not told otherwise."""
+"""A tripod: beside a road, or at places of one's choice in any scene."""
 
 from __future__ import annotations
+
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -70,3 +72,35 @@ def _stations(platform: Platform, length: float) -> Float:
         field = f"scan.platform.stations[{outside[0]}]"
         raise InputError(field, float(station[outside[0]]), f"from 0 to {length:g} m, the length of the road")
     return station
+
+
+class PositionsPath:
+    """One strip at each position; the scanner stands upright, begins facing along x and turns counter-clockwise.
+
+    Attributes:
+        strips: in the order of the positions.
+        positions: (S, 3) local positions of the scanner, m.
+        knot_spacing: s, see `Path`.
+        typical_range: m, see `Path`.
+        deviation: 0.
+
+    Args:
+        platform: its turning and mounting.
+        positions: of the scanner itself, local, m; at least one.
+    """
+
+    deviation = 0.0
+
+    def __init__(self, platform: Platform, positions: Sequence[Sequence[float]]) -> None:
+        self.positions = np.array(positions, dtype=np.float64).reshape(-1, 3)
+        self._turning = turning(platform)
+        self._mounting = mounting(platform)
+        self.strips = strips_of([platform.turn_seconds] * len(self.positions))
+        self.knot_spacing = knots_for(KNOT_RANGE * self._turning**2)
+        self.typical_range = USUAL["tripod"].typical_range or USUAL["tripod"].height
+
+    def pose(self, strip: Strip, time: Float) -> tuple[Float, Float]:
+        """Return local positions (K, 3), m, and rotations (K, 3, 3) at times (K,) since the first strip's start."""
+        time = np.asarray(time, dtype=np.float64)
+        position = np.repeat(self.positions[strip.index][None], len(time), axis=0)
+        return position, rotation_matrix((time - strip.start_time) * self._turning) @ self._mounting

@@ -6,6 +6,7 @@ import os
 from collections.abc import Callable
 from importlib import import_module
 from inspect import signature
+from itertools import chain
 from pathlib import Path
 from pkgutil import walk_packages
 
@@ -47,7 +48,8 @@ WRITE = "SYNTHROADS_WRITE_SNAPSHOTS"
 def all_groups() -> list[bpy.types.NodeTree]:
     """Return every group of the road model, sub-groups included: each module's `..._group` function makes one."""
     road_group(LAYOUT)
-    for module in [info for package in (nodes, things) for info in walk_packages(package.__path__, f"{package.__name__}.")]:
+    packages = [walk_packages(package.__path__, f"{package.__name__}.") for package in (nodes, things)]
+    for module in chain.from_iterable(packages):
         loaded = import_module(module.name)
         for name, make in vars(loaded).items():
             own = getattr(make, "__module__", "") == loaded.__name__

@@ -13,14 +13,13 @@ from mathutils import Matrix
 from synthroads_addon.base.class_mapping import ClassMapping
 from synthroads_addon.base.classes import UNLABELLED, class_id, classes
 from synthroads_addon.base.errors import InputError
-from synthroads_addon.blender.materials import PROPERTY, constants, material
-from synthroads_addon.blender.scene import evaluated as scene
+from synthroads_addon.blender.materials import material
+from synthroads_addon.blender.scene import evaluated
 from synthroads_addon.blender.scene.evaluated import scanned_scene, scene_mesh
 from synthroads_addon.blender.scene.reading import Copied, copy_mesh
 from synthroads_addon.blender.things.meshes import fill
 from synthroads_addon.blender.things.model_builder import SUPPORT
-from synthroads_addon.materials.table import materials
-from synthroads_addon.scanning.scene.mesh import SceneMesh, empty_scene_mesh
+from synthroads_addon.scanning.scene.mesh import SceneMesh
 
 CUBE = [(x, y, z) for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (-1.0, 1.0)]
 FACES = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
@@ -358,7 +357,7 @@ class TestSize:
             read.append(name)
             return copy_mesh(name, *rest)
 
-        monkeypatch.setattr(scene, "copy_mesh", counted)
+        monkeypatch.setattr(evaluated, "copy_mesh", counted)
         whole = scene_mesh()
         assert len(read) == 1
         assert len(whole) == 12 * 500
@@ -388,76 +387,3 @@ class TestMaterials:
         twin.material_slots[0].material = material("leaves")
         mesh = scene_mesh()
         assert {mesh.materials[index] for index in mesh.material} == {"asphalt", "leaves"}
-
-    def test_blender_materials_have_the_tables_values(self) -> None:
-        for name, row in materials().items():
-            item = material(name)
-            assert material(name) == item
-            assert item[PROPERTY] == name
-            node = next(node for node in item.node_tree.nodes if node.type == "BSDF_PRINCIPLED")
-            assert node.inputs["Roughness"].default_value == pytest.approx(row.roughness)
-            assert node.inputs["Metallic"].default_value == pytest.approx(row.metallic)
-            assert node.inputs["Specular IOR Level"].default_value == pytest.approx(row.specular)
-            assert tuple(item.diffuse_color)[:3] == pytest.approx(row.base_color)
-
-    def test_reflectivities_are_plausible_at_905_nm(self) -> None:
-        wanted = {"asphalt": 0.18, "paint_white": 0.65, "grass": 0.5, "leaves": 0.5, "soil": 0.3}
-        wanted |= {"galvanised_steel": 0.5, "plastic_white": 0.7, "concrete": 0.37, "plastic_black": 0.06}
-        for name, reflectivity in wanted.items():
-            assert materials()[name].reflectivity == pytest.approx(reflectivity, abs=0.03), name
-        assert max(row.reflectivity for row in materials().values()) < 1.0
-
-    def test_constants_of_foreign_materials_are_read_from_their_shader(self) -> None:
-        item = bpy.data.materials.new("Car")
-        if item.node_tree is None:
-            item.use_nodes = True
-        node = next(node for node in item.node_tree.nodes if node.type == "BSDF_PRINCIPLED")
-        node.inputs["Base Color"].default_value = (0.5, 0.25, 0.125, 1.0)
-        node.inputs["Metallic"].default_value = 1.0
-        found = constants(["Car", "asphalt", "nobody's"])
-        assert found["Car"].base_color == pytest.approx((0.5, 0.25, 0.125))
-        assert found["Car"].metallic == 1.0
-        assert found["asphalt"] == materials()["asphalt"]
-        assert found["nobody's"] == materials()["unknown"]
-
-    def test_an_unknown_name_is_refused_with_the_nearest(self) -> None:
-        with pytest.raises(KeyError, match="asphalt"):
-            material("ashpalt")
-
-
-class TestSceneMesh:
-    def arrays(self) -> dict[str, Any]:
-        return {
-            "vertices": np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [2, 0, 0]], np.float32),
-            "triangles": np.array([[0, 1, 2], [0, 1, 3]], np.int32),
-            "class_id": np.zeros(2, np.uint8),
-            "instance_id": np.zeros(2, np.uint32),
-            "material": np.zeros(2, np.uint16),
-            "materials": ("asphalt",),
-            "origin": np.zeros(3),
-        }
-
-    def test_normals_and_areas(self) -> None:
-        mesh = SceneMesh(**self.arrays())
-        assert mesh.normals().tolist() == [[0.0, 0.0, 1.0], [0.0, 0.0, 0.0]]
-        assert mesh.areas().tolist() == [0.5, 0.0]
-        assert mesh.normals().dtype == np.float64
-        assert len(empty_scene_mesh(np.zeros(3)).normals()) == 0
-
-    @pytest.mark.parametrize(
-        ("field", "value"),
-        [
-            ("vertices", np.zeros((4, 3))),
-            ("vertices", np.full((4, 3), np.nan, np.float32)),
-            ("triangles", np.array([[0, 1, 2], [0, 1, 4]], np.int32)),
-            ("triangles", np.array([[0, 1, 2], [0, -1, 3]], np.int32)),
-            ("triangles", np.zeros((2, 4), np.int32)),
-            ("class_id", np.zeros(3, np.uint8)),
-            ("instance_id", np.zeros(2, np.int32)),
-            ("material", np.ones(2, np.uint16)),
-            ("origin", np.array([0.0, np.inf, 0.0])),
-        ],
-    )
-    def test_wrong_arrays_are_refused_by_name(self, field: str, value: object) -> None:
-        with pytest.raises(InputError, match=f"scene mesh: {field}"):
-            SceneMesh(**self.arrays() | {field: value})

@@ -21,7 +21,7 @@ from synthroads_addon.blender.things.sign.outline import SHAPES
 from synthroads_addon.blender.things.sign.pictograms import NAMES, PICTOGRAMS
 from synthroads_addon.blender.things.sign.writing import LETTERS, LINES
 from synthroads_addon.materials.table import materials
-from synthroads_addon.road import stretches as stretch
+from synthroads_addon.road import stretches
 from synthroads_addon.road.parameters import TrafficSign
 from synthroads_addon.road.things.body_shapes import SIGN_RAIL
 from synthroads_addon.road.things.signs import Pictogram, sign_catalogue
@@ -263,7 +263,7 @@ class TestEdits:
 
 
 def test_a_sign_stands_in_its_place_on_a_stretch_too(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(stretch, "FRAME", 50.0)
+    monkeypatch.setattr(stretches, "FRAME", 50.0)
     road = FurnishedRoad(SIGNS, {"signs"}, stretch=(195.0, 245.0))
     assert np.abs(road.origin).max() > 50.0
     sign = sign_of(road, "turned")

@@ -12,7 +12,7 @@ from synthroads_addon.base.classes import class_id
 from synthroads_addon.blender.scene.evaluated import scene_mesh
 from synthroads_addon.blender.things.gantry.gantry import gantry_group
 from synthroads_addon.blender.things.overpass.overpass import overpass_group
-from synthroads_addon.road import stretches as stretch
+from synthroads_addon.road import stretches
 from synthroads_addon.scanning.scene.mesh import SceneMesh
 from tests.helpers.scenes.furnished_road import (
     MEASURE,
@@ -409,7 +409,7 @@ def pieces_low(road: FurnishedRoad, name: str) -> float:
 
 
 def test_structures_of_a_stretch_stand_where_they_do_on_the_whole_road(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(stretch, "FRAME", 50.0)
+    monkeypatch.setattr(stretches, "FRAME", 50.0)
     objects = {"boards": GANTRIES["boards"], "skewed": bridge(150.0, **BRIDGES["skewed"])}
     whole = FurnishedRoad(objects, ("gantries", "overpasses"))
     wanted = {name: whole.mesh(name).vertices + whole.origin for name in objects}

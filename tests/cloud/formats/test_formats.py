@@ -17,8 +17,8 @@ from hypothesis import strategies as st
 
 from synthroads_addon.base.classes import class_scheme
 from synthroads_addon.base.errors import InputError, MissingFileError, OutputError
+from synthroads_addon.cloud.formats.base import CloudWriter
 from synthroads_addon.cloud.formats.registry import ENDINGS, open_cloud, open_writer, read_cloud
-from synthroads_addon.cloud.formats.writer import CloudWriter
 from synthroads_addon.cloud.layers import ATTRIBUTES, COLUMNS, DEFAULT_ATTRIBUTES, needs
 from synthroads_addon.cloud.points import PointBlock, concatenate
 from synthroads_addon.cloud.tools.convert import convert

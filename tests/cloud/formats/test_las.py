@@ -13,7 +13,7 @@ import pytest
 
 from synthroads_addon.base.classes import classes, las_codes
 from synthroads_addon.base.errors import InputError, OutputError
-from synthroads_addon.cloud.formats.las_writer import LasWriter
+from synthroads_addon.cloud.formats.las import LasWriter
 from synthroads_addon.cloud.layers import ATTRIBUTES, COLUMNS, columns
 from synthroads_addon.cloud.points import concatenate
 from tests.helpers.clouds.cloud_points import with_every_attribute
@@ -208,7 +208,7 @@ def test_many_blocks_of_odd_sizes_fill_whole_chunks(tmp_path: Path) -> None:
 
 
 def test_more_points_than_the_buffer_holds(tmp_path: Path, monkeypatch) -> None:
-    from synthroads_addon.cloud.formats import las_writer as las_module
+    from synthroads_addon.cloud.formats import las as las_module
     from tests.helpers.clouds.random_points import make_points
 
     block = make_points(5_000)

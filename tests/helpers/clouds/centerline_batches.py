@@ -8,8 +8,8 @@ from typing import Any
 import torch
 
 from ml.centerline.data.effects import Effects
-from ml.centerline.data.slices import SliceDataset, SliceSettings, collate
-from ml.centerline.networks.models import Batch, CenterlineModel, ModelOptions, build
+from ml.centerline.data.slices import Batch, SliceDataset, SliceSettings, collate
+from ml.centerline.networks.models import CenterlineModel, ModelOptions, build
 from tests.helpers.roads import analytic_roads
 
 torch.set_num_threads(1)

@@ -1,7 +1,6 @@
-"""Small inputs that several core tests share."""
+"""Random points with every attribute."""
 
 import numpy as np
-import pytest
 
 from synthroads_addon.cloud.points import PointBlock
 
@@ -24,8 +23,3 @@ def make_points(count: int, seed: int = 0, origin=(294_000.0, 5_628_000.0, 180.0
         range=rng.uniform(3, 150, count),
         incidence_deg=rng.uniform(0, 90, count).astype(np.float32),
     )
-
-
-@pytest.fixture
-def points() -> PointBlock:
-    return make_points(10_000)

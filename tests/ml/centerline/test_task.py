@@ -15,7 +15,7 @@ import torch
 from ml.centerline import task
 from ml.centerline.data.batches import Batches, BatchOptions, MeasuredRoad, Roads, read_roads
 from ml.centerline.data.effects import Effects
-from ml.centerline.networks.models import mirrored
+from ml.centerline.data.mirroring import mirrored
 from ml.configuration import from_data, load_configuration
 from ml.runs import CALIBRATION, METRICS, Run
 from ml.tasks import Evaluation, Prediction

@@ -11,7 +11,7 @@ from torch import Tensor
 from torch.utils.data import DataLoader
 
 from ml.cells import thin
-from ml.networks import neighbours as module
+from ml.networks import neighbours
 from ml.networks.neighbours import Neighbourhood, Neighbours, build_neighbours, farthest_sample
 from synthroads_addon.base.errors import InputError
 
@@ -192,7 +192,7 @@ def test_positions_are_counted_from_the_middle_of_the_extent() -> None:
 
 def test_many_queries_are_done_in_parts(monkeypatch: pytest.MonkeyPatch) -> None:
     whole = single(cloud(300), GIVEN)
-    monkeypatch.setattr(module, "_CHUNK", 7)
+    monkeypatch.setattr(neighbours, "_CHUNK", 7)
     parts = single(cloud(300), GIVEN)
     assert all(torch.equal(whole[name], parts[name]) for name in whole)
 

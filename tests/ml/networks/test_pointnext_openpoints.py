@@ -10,8 +10,15 @@ import pytest
 
 from ml.networks.pointnext import architecture
 from tests.judges import learning, require
-from tests.judges.pointnext_reference import CLASSES, INPUTS, PUBLISHED, Theirs, compared, same_as_theirs
-from tests.judges.pointnext_reference import theirs as loaded
+from tests.judges.pointnext_reference import (
+    CLASSES,
+    INPUTS,
+    PUBLISHED,
+    Theirs,
+    compared,
+    openpoints_modules,
+    same_as_theirs,
+)
 
 pytestmark = pytest.mark.slow  # it is downloaded
 
@@ -20,7 +27,7 @@ pytestmark = pytest.mark.slow  # it is downloaded
 def theirs() -> Iterator[types.SimpleNamespace]:
     """Their modules, gone from memory afterwards."""
     require("openpoints")
-    with loaded(learning.openpoints_folder()) as modules:
+    with openpoints_modules(learning.openpoints_folder()) as modules:
         yield modules
 
 

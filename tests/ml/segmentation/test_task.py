@@ -20,8 +20,8 @@ from headless import predict as predict_command
 from headless import train as train_command
 from ml.configuration import EXPERIMENTS, load_configuration
 from ml.runs import CHECKPOINT, PRETRAINING, Run
-from ml.segmentation import experiment as experiments
-from ml.segmentation import task
+from ml.segmentation import experiment, task
+from ml.segmentation.data.classes import IGNORED
 from ml.segmentation.data.crops import Item, Seeds
 from ml.segmentation.data.sources import Source, read_tiles
 from ml.segmentation.data.tiles import scalings
@@ -29,7 +29,6 @@ from ml.segmentation.experiment import configurations, load_experiment, table
 from ml.segmentation.loading import adaptation_batches, epoch_batches, read_domains
 from ml.segmentation.network import build
 from ml.segmentation.recipes import Data, SegmentationConfiguration
-from ml.segmentation.scores.metrics import IGNORED
 from ml.segmentation.training import smoothed_loss
 from ml.tasks import Evaluation, kinds
 from synthroads_addon.base.classes import class_scheme
@@ -224,16 +223,16 @@ def test_a_variant_is_tested_anew_when_its_network_or_its_settings_have_changed(
     configuration = small(data)
     run = shutil.copytree(trained(), tmp_path / "run")
     tested: list[int] = []
-    score = experiments.score_all
+    score = experiment.score_all
 
     def counted(*arguments: Any) -> Any:
         tested.append(len(tested))
         return score(*arguments)
 
-    monkeypatch.setattr(experiments, "score_all", counted)
+    monkeypatch.setattr(experiment, "score_all", counted)
 
     def scores(settings: SegmentationConfiguration) -> Any:
-        return experiments._tested(settings, run, tmp_path / "seed-1.json", silent)
+        return experiment._tested(settings, run, tmp_path / "seed-1.json", silent)
 
     first = scores(configuration)
     assert scores(configuration.model_copy(update={"threads": 2})) == first

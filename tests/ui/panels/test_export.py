@@ -14,7 +14,7 @@ from synthroads_addon.base.errors import InputError
 from synthroads_addon.blender.compat import set_modifier_input
 from synthroads_addon.blender.model.read_back import edited_parameters
 from synthroads_addon.blender.model.store import find_road, objects_of, recall_parameters
-from synthroads_addon.cloud.formats import writer as writing
+from synthroads_addon.cloud.formats import base as writing
 from synthroads_addon.cloud.formats.registry import ENDINGS
 from synthroads_addon.cloud.tools.convert import convert, subsample
 from synthroads_addon.twin import formats as twin

@@ -9,8 +9,9 @@ import numpy as np
 
 from ....base.stepper import aside
 from ...materials import material
-from ..meshes import attribute, backbone_mesh, fill
+from ..meshes import attribute, fill
 from ..model_builder import ModelBuilder
+from .backbone import backbone_mesh
 from .layout import detail_points, road_inputs, road_layout
 from .road import road_group
 

@@ -10,8 +10,9 @@ from ....road.lane_lines import LaneLine, lane_of
 from ....road.parameters import PointObject, Vehicle
 from ....road.things.chassis import wheel_base
 from ...materials import material
+from ...materials.vehicles import COLOR
 from ..model_builder import ModelBuilder
-from .vehicle import COLOR, vehicle_group
+from .vehicle import vehicle_group
 
 MATERIALS = {
     "Paint": "car_paint",

@@ -6,13 +6,12 @@ import bpy
 
 from ....base.classes import class_id
 from ....road.things.chassis import CHASSIS
+from ...materials.vehicles import COLOR
 from ...nodes import operations as op
 from ...nodes.builder import Tree, Value, node_group
 from .details import declare_materials
 from .models import model_group
 
-COLOR = "vehicle_color"
-"""Attribute of the points, and of the vehicles that stand on them, that the paint's base colour is read from."""
 _POINTS = (
     "One point per vehicle, below its middle, at any height, with heading (rad), grade of the road ahead (m/m), "
     f"{COLOR} and instance"

@@ -9,8 +9,9 @@ import torch
 from ml.centerline.data.axis import Axis
 from ml.centerline.data.corridor import CORRIDOR
 from ml.centerline.data.frames import along, displaced
+from ml.centerline.data.mirroring import mirrored
 from ml.centerline.networks.layers import DeformableKernelPoints, PointFeatures, cell_features, cell_sums
-from ml.centerline.networks.models import TARGETS, ModelOptions, both_ways, build, mirrored
+from ml.centerline.networks.models import TARGETS, ModelOptions, both_ways, build
 from ml.centerline.networks.refinement import parabola
 from ml.configuration import from_data
 from synthroads_addon.base.errors import InputError

@@ -7,7 +7,7 @@ import json
 import numpy as np
 import pytest
 
-from ml.centerline.scores.calibration import DEVIATIONS, LEVELS, Calibration, calibrated
+from ml.centerline.use.calibration import DEVIATIONS, LEVELS, Calibration, calibrated
 from synthroads_addon.base.random_streams import stream
 
 

@@ -16,9 +16,9 @@ from ml.centerline.data.corridor import CORRIDOR
 from ml.centerline.data.frames import Frames, along, displaced
 from ml.centerline.data.roads import Road
 from ml.centerline.networks.models import TARGETS
-from ml.centerline.scores.calibration import Calibration
+from ml.centerline.use.calibration import Calibration
+from ml.centerline.use.find_road import find_road
 from ml.centerline.use.predictor import CenterlinePredictor, Regression, UseOptions, errors, joined
-from ml.centerline.use.using import find_road
 from ml.centerline.use.writing import Found, corridor_json, geojson
 from synthroads_addon.base.errors import InputError, MissingFileError
 from tests.helpers.clouds.centerline_batches import SETTINGS, small

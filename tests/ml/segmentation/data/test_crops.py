@@ -9,6 +9,7 @@ import pytest
 import torch
 from torch.utils.data import DataLoader
 
+from ml.segmentation.data.classes import IGNORED
 from ml.segmentation.data.crops import (
     COORDINATE_SPAN,
     FEATURES,
@@ -29,7 +30,6 @@ from ml.segmentation.recipes import (
     mapped_intensities,
     plan,
 )
-from ml.segmentation.scores.metrics import IGNORED
 from synthroads_addon.base.errors import InputError
 from tests.helpers.clouds.segmentation_data import road_tile
 

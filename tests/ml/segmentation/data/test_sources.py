@@ -1,4 +1,4 @@
-"""Tiles, packing, classes and sources."""
+"""Tiles, classes and sources."""
 
 from __future__ import annotations
 
@@ -11,12 +11,9 @@ import numpy as np
 import pytest
 
 from ml.cells import thin
-from ml.segmentation.data import pack
-from ml.segmentation.data.classes import LabelMapping, load_mapping, table_between
-from ml.segmentation.data.packing import PackReader, pack_tile, unpack_tile, write_pack
+from ml.segmentation.data.classes import IGNORED, LabelMapping, load_mapping, table_between
 from ml.segmentation.data.sources import Source, read_tiles
 from ml.segmentation.data.tiles import Tile, robust_scaling, scalings
-from ml.segmentation.scores.metrics import IGNORED
 from synthroads_addon.base.classes import class_scheme
 from synthroads_addon.base.errors import InputError, MissingFileError
 from tests.helpers.clouds.segmentation_data import (
@@ -44,91 +41,6 @@ def test_thinning_keeps_one_point_per_cell_whatever_the_order() -> None:
     assert len(thin(np.zeros((0, 3)), 0.1)) == 0
     with pytest.raises(InputError, match="cells"):
         thin(np.array([[0.0, 0.0, 0.0], [1e9, 1e9, 1e9]]), 0.1)
-
-
-def test_packing_keeps_points_within_half_a_step() -> None:
-    tile = road_tile(4000)
-    labels = tile.segment.copy()
-    labels[::9] = IGNORED
-    tile = replace(tile, coord=tile.coord - np.float32(17.3), segment=labels)  # negative coordinates as well
-    packed = pack_tile(tile)
-    again = unpack_tile(packed)
-    where = np.lexsort(np.rint(tile.coord.astype(float) / 0.01).T)
-    there = np.lexsort(np.rint(again.coord.astype(float) / 0.01).T)
-    assert np.abs(tile.coord[where] - again.coord[there]).max() < 0.00501
-    assert (tile.segment[where] == again.segment[there]).all()
-    assert np.abs(tile.color[where].astype(int) - again.color[there]).max() <= 8
-    assert np.abs(tile.strength[where] - again.strength[there]).max() < 8.1 / 65535
-    assert (again.origin == tile.origin).all()
-    assert len(packed.content) <= 8 * len(tile) + 16 * packed.notes["cubes"] + 64
-
-
-def test_packing_keeps_what_is_missing_missing() -> None:
-    again = unpack_tile(pack_tile(replace(road_tile(500), color=None, strength=None)))
-    assert again.color is None
-    assert again.strength is None
-
-
-def test_packed_file_is_read_back_and_damage_is_told(tmp_path: Path) -> None:
-    tiles = [road_tile(3000, seed, f"scene{seed}") for seed in (1, 2)]
-    path = tmp_path / "pack.npz"
-    size = write_pack(path, [pack_tile(tile) for tile in tiles], class_scheme("5"), 0.1)
-    assert size == path.stat().st_size
-    before = path.read_bytes()
-    write_pack(path, [pack_tile(tile) for tile in tiles], class_scheme("5"), 0.1, overwrite=True)
-    assert path.read_bytes() == before
-    found = list(read_tiles(Source(path=str(path)), class_scheme("5"), None))
-    assert [tile.scene for tile in found] == ["scene1", "scene2"]
-    assert sum(map(len, found)) == 6000
-    middle = len(before) // 2
-    path.write_bytes(before[:middle] + bytes(200) + before[middle + 200 :])
-    with pytest.raises(InputError, match="damaged"):
-        [PackReader(path).tile(place) for place in range(2)]
-    path.write_bytes(before[: len(before) // 3])
-    with pytest.raises(InputError):
-        PackReader(path)
-
-
-def test_limit_takes_tiles_of_every_scene_alike() -> None:
-    packed = [pack_tile(road_tile(1500, seed, f"scene{seed % 3}")) for seed in range(12)]
-    limit = (1 << 16) + 6 * (len(packed[0].content) + 900)
-    chosen = pack.within(packed, limit, 1)
-    scenes = [tile.notes["scene"] for tile in chosen]
-    assert len(chosen) == 6
-    assert [scenes.count(f"scene{k}") for k in range(3)] == [2, 2, 2]
-    assert [tile.content for tile in chosen] == [tile.content for tile in pack.within(packed, limit, 1)]
-
-
-def test_command_packs_a_data_set(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    root = write_pointcept(tmp_path / "set", "train", [road_tile(5000, 1, "a"), road_tile(5000, 2, "b")])
-    target = tmp_path / "train.npz"
-    arguments = [str(root), "--split", "train", "--output", str(target), "--limit-mb", "0.5"]
-    assert pack.main(arguments) == 0
-    told = json.loads(capsys.readouterr().out)
-    assert told["bytes"] == target.stat().st_size <= 500_000
-    assert told["scenes"] == 2
-    assert told["crops"] == told["points"] // 24_000
-    assert pack.main(arguments) == 2
-    assert "--overwrite" in capsys.readouterr().err
-
-
-def test_corridor_of_a_scene_is_cut_along_its_road(tmp_path: Path) -> None:
-    home = tmp_path / "scenes" / "one"
-    home.mkdir(parents=True)
-    block = road_block(60_000, 3, length=150.0)
-    write_cloud(home / "cloud.laz", block)
-    line = [[4e5 - 5.0, 5.6e6 + 20.0, 100.0], [4e5 + 155.0, 5.6e6 + 20.0, 100.0]]
-    data = {"features": [{"geometry": {"type": "LineString", "coordinates": line}}]}
-    (home / "centerline.geojson").write_text(json.dumps(data))
-    tiles = list(pack.corridor_tiles(tmp_path, "one", class_scheme("5"), 0.2, 8.0))
-    assert len(tiles) == 3
-    north = np.concatenate([tile.coord[:, 1] + tile.origin[1] for tile in tiles])
-    assert 11.9 < north.min() - 5.6e6 < 12.3
-    assert 27.7 < north.max() - 5.6e6 < 28.1
-    lengths = [np.ptp(tile.coord[:, 0]) for tile in tiles]
-    assert lengths[1] == pytest.approx(60.0, abs=1.0)
-    names = {int(label) for tile in tiles for label in np.unique(tile.segment)}
-    assert names <= set(range(5))
 
 
 def test_seventeen_classes_become_five_by_name_and_never_the_other_way() -> None:
@@ -193,11 +105,6 @@ def test_tiles_of_a_data_set_that_are_links_are_read(tmp_path: Path) -> None:
     (root / "train" / "b-1").symlink_to(tmp_path / "b-1", target_is_directory=True)
     tiles = read_tiles(Source(path=str(tmp_path / "set"), split="train"), class_scheme("5"), None)
     assert [tile.scene for tile in tiles] == ["a", "b"]
-
-
-def test_short_options_of_packing_are_those_of_all_commands() -> None:
-    words = pack.parser().parse_args(["set", "-o", "train.npz", "-s", "3"])
-    assert (words.output, words.seed) == (Path("train.npz"), 3)
 
 
 def test_clouds_of_one_name_are_scenes_of_their_own(tmp_path: Path) -> None:

@@ -7,7 +7,8 @@ import json
 import numpy as np
 import pytest
 
-from ml.segmentation.scores.metrics import IGNORED, Confusion, mean, mean_and_deviation, score_table
+from ml.segmentation.data.classes import IGNORED
+from ml.segmentation.scores.metrics import Confusion, mean, mean_and_deviation, score_table
 from ml.segmentation.scores.tables import by_class, by_test
 from synthroads_addon.base.errors import InputError
 from tests.judges import require

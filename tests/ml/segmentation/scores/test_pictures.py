@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
+from ml.segmentation.data.classes import IGNORED
 from ml.segmentation.data.tiles import Tile
-from ml.segmentation.scores.metrics import IGNORED
 from ml.segmentation.scores.pictures import class_colors, comparison
 
 Floats = NDArray[np.float32]

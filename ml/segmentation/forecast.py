@@ -1,14 +1,12 @@
-"""Project how long a training takes on this machine: seconds per step, measured on a few, times all of its steps.
+"""How long a training takes on this machine: seconds per step, measured on a few, times all of its steps.
 
-Example: ``python -m ml.segmentation.projection segmentation --steps 3 --output projection.json``. Tiles in Pointcept's
-layout are counted, slivers included that a training leaves out; only a few are read. Scores after the epochs take more.
+Tiles in Pointcept's layout are counted, slivers included that a training leaves out; only a few are read. Scores after
+the epochs take more.
 """
 
 from __future__ import annotations
 
-import argparse
 import math
-import sys
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -18,11 +16,8 @@ from typing import Any
 import torch
 
 from synthroads_addon.base.errors import InputError
-from synthroads_addon.base.files import write_file
 from synthroads_addon.base.progress import peak_memory_mb
-from synthroads_addon.base.schema import canonical_json
 
-from ..configuration import load_configuration
 from ..fitting import chosen_device, optimizer_of, train_step
 from .data.classes import class_names
 from .data.crops import Item, Seeds
@@ -37,7 +32,7 @@ _TILES = 8
 """Tiles that the measured steps' crops are cut from."""
 
 
-def projection(configuration: SegmentationConfiguration, steps: int) -> dict[str, Any]:
+def forecast(configuration: SegmentationConfiguration, steps: int) -> dict[str, Any]:
     """Return seconds per step, the number of steps and the hours of a whole training, as JSON data.
 
     A step is all that a training does for a batch: crops cut out, neighbours found, loss, gradients, weights changed.
@@ -47,7 +42,7 @@ def projection(configuration: SegmentationConfiguration, steps: int) -> dict[str
         InputError: the data are missing, or their tiles have fewer points than a crop; or the set-up is fine-tuning.
     """
     if configuration.set_up == "fine_tuned":
-        raise InputError("set_up", configuration.set_up, "has two trainings: project each by itself")
+        raise InputError("set_up", configuration.set_up, "has two trainings: forecast each by itself")
     device = chosen_device(configuration)
     sources = [source for found in configuration.needed().values() for source in found]
     count = sum(tile_count(source, configuration) for source in sources)
@@ -119,37 +114,3 @@ def _endless(configuration: SegmentationConfiguration, tiles: list[Tile], device
     while True:
         yield from epoch_batches(enough, tiles, [len(tiles)], scaling, seeds, device, epoch)
         epoch += 1
-
-
-def parser() -> argparse.ArgumentParser:
-    """Return the parser of the command."""
-    made = argparse.ArgumentParser(prog="python -m ml.segmentation.projection", description=__doc__)
-    made.add_argument(
-        "configuration", metavar="CONFIGURATION", help="shipped configuration of a segmentation, or a file"
-    )
-    made.add_argument("--steps", type=int, default=3, metavar="N", help="steps that are measured (default: 3)")
-    made.add_argument("--set", action="append", default=[], metavar="PATH=VALUE", dest="changes", help="of a field")
-    made.add_argument("--output", type=Path, metavar="FILE", help="JSON file to write as well")
-    return made
-
-
-def main(argv: list[str] | None = None) -> int:
-    """Run the command; return its exit code."""
-    arguments = parser().parse_args(argv)
-    try:
-        if arguments.steps < 1:
-            raise InputError("--steps", arguments.steps, "must be 1 or more")
-        kinds = {"segmentation": SegmentationConfiguration}
-        configuration = load_configuration(arguments.configuration, kinds, arguments.changes)
-        text = canonical_json(projection(configuration, arguments.steps))
-        if arguments.output:
-            write_file(arguments.output, text.encode(), overwrite=True)
-    except InputError as error:
-        print(f"error: {error}", file=sys.stderr)
-        return 2
-    print(text)
-    return 0
-
-
-if __name__ == "__main__":
-    raise SystemExit(main())

@@ -25,7 +25,7 @@ from synthroads_addon.base.files import write_file
 from synthroads_addon.cloud.formats.npz import ARCHIVE_FAULTS
 
 from ...cells import cell_keys
-from ..scores.metrics import IGNORED
+from .classes import IGNORED
 from .tiles import Tile
 
 STEP = 0.01

@@ -9,9 +9,9 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from ...base.class_mapping import ClassMapping, NameClasses
-from ...base.classes import UNLABELLED, classes
-from ...base.errors import InputError, nearest_name
+from ..base.class_mapping import ClassMapping, NameClasses
+from ..base.classes import UNLABELLED, classes
+from ..base.errors import InputError, nearest_name
 
 CLASS_PROPERTY = "synthroads_class"
 """Custom property of any object: the name of its class."""

@@ -8,15 +8,15 @@ from dataclasses import replace
 import bpy
 import numpy as np
 
-from ....base.classes import class_id
-from ....road.parameters import Vehicle
-from ....scanning.scene.mesh import SceneMesh
-from ....scanning.scene.motion import Motion, MovingMesh, ScannedScene
-from ...compat import set_modifier_input
-from ...materials import material
-from ...scene.evaluated import scene_mesh
-from .build import MATERIALS
-from .models import model_group
+from ...base.classes import class_id
+from ...road.parameters import Vehicle
+from ...scanning.scene.mesh import SceneMesh
+from ...scanning.scene.motion import Motion, MovingMesh, ScannedScene
+from ..compat import set_modifier_input
+from ..materials import material
+from ..things.vehicle.build import MATERIALS
+from ..things.vehicle.models import model_group
+from .evaluated import scene_mesh
 
 
 class VehicleMeshes:

@@ -1,0 +1,60 @@
+"""Forecast how long a training of a segmentation takes on this machine, from a few of its steps.
+
+Seconds per step, measured, are multiplied by the steps of the whole training. Scores after the epochs take more.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+from typing import Any
+
+if __name__ == "__main__":
+    sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
+from headless.commands import Outcome, add_common_arguments, entry
+from ml.configuration import load_configuration
+from synthroads_addon.base.errors import InputError
+from synthroads_addon.base.files import write_file
+from synthroads_addon.base.schema import canonical_json
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments of `synthroads forecast`."""
+    text = "shipped configuration of a segmentation, or a YAML file"
+    parser.add_argument("configuration", metavar="CONFIGURATION", help=text)
+    text = "steps that are measured (%(default)s)"
+    parser.add_argument("--steps", type=int, default=3, metavar="N", help=text)
+    text = "change one field of the configuration, e.g. threads=1 (can be repeated)"
+    parser.add_argument("--set", action="append", default=[], metavar="PATH=VALUE", dest="changes", help=text)
+    parser.add_argument("--output", type=Path, metavar="FILE", help="JSON file to write as well")
+    add_common_arguments(parser)
+
+
+def run(arguments: argparse.Namespace) -> Outcome:
+    """Run `synthroads forecast`."""
+    if arguments.steps < 1:
+        raise InputError("--steps", arguments.steps, "must be 1 or more")
+    from ml.segmentation.forecast import forecast
+    from ml.segmentation.recipes import SegmentationConfiguration
+
+    kinds = {"segmentation": SegmentationConfiguration}
+    configuration = load_configuration(arguments.configuration, kinds, arguments.changes)
+    found = forecast(configuration, arguments.steps)
+    if arguments.output:
+        write_file(arguments.output, canonical_json(found).encode(), overwrite=True)
+    return 0, found, summary(found)
+
+
+def summary(found: dict[str, Any]) -> str:
+    """Return how long a training takes, for people."""
+    return (
+        f"{found['hours']:,.1f} hours for {found['steps']:,} steps of {found['seconds_per_step']:.2f} s, on "
+        f"{found['device']} with {found['threads']} threads ({found['tiles']:,} tiles, "
+        f"{found['batch_points']:,} points of a batch)"
+    )
+
+
+if __name__ == "__main__":
+    entry("forecast")

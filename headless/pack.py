@@ -1,0 +1,77 @@
+"""Pack the labelled points of a data set's roads into one small file, to be carried to where training is fast.
+
+What doesn't fit into the limit is left out, of each road as much.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+from typing import Any
+
+if __name__ == "__main__":
+    sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
+from headless.commands import Outcome, add_common_arguments, entry
+from synthroads_addon.base.errors import InputError, OutputError
+
+_LIMITS = {"voxel": (0.02, 10.0), "corridor": (5.0, 1000.0), "limit_mb": (0.5, 1e5)}
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments of `synthroads pack`."""
+    parser.add_argument("source", type=Path, metavar="DATASET", help="data set, or another source of labelled points")
+    parser.add_argument("--split", metavar="NAME", help="split to pack (all)")
+    parser.add_argument("--output", required=True, type=Path, metavar="FILE", help="file to write, .npz")
+    parser.add_argument("--classes", default="5", metavar="SCHEME", help="5, 17 or a JSON file (%(default)s)")
+    text = "edge of the grid's cells of which one point each is kept (%(default)s)"
+    parser.add_argument("--voxel", type=float, default=0.1, metavar="M", help=text)
+    text = "reach to either side of a road's centreline (%(default)s)"
+    parser.add_argument("--corridor", type=float, default=30.0, metavar="M", help=text)
+    text = "largest file, 1e6 bytes (%(default)s)"
+    parser.add_argument("--limit-mb", type=float, default=50.0, metavar="MB", help=text)
+    text = "seed of the choice of tiles (%(default)s)"
+    parser.add_argument("--seed", type=int, default=1, metavar="N", help=text)
+    parser.add_argument("--overwrite", action="store_true", help="replace a file that is there")
+    add_common_arguments(parser)
+
+
+def run(arguments: argparse.Namespace) -> Outcome:
+    """Run `synthroads pack`."""
+    _check(arguments)
+    from ml.segmentation.data.pack import packed_tiles, summary, within
+    from ml.segmentation.data.packed_file import write_pack
+    from synthroads_addon.base.classes import class_scheme
+
+    scheme = class_scheme(arguments.classes)
+    every = packed_tiles(arguments.source, arguments.split, scheme, arguments.voxel, arguments.corridor)
+    tiles = within(every, int(arguments.limit_mb * 1e6), arguments.seed)
+    size = write_pack(arguments.output, tiles, scheme, arguments.voxel, arguments.overwrite)
+    packed = summary([tile.notes for tile in tiles], size)
+    return 0, packed, f"written {arguments.output}: {contents(packed)}"
+
+
+def _check(arguments: argparse.Namespace) -> None:
+    """Raise `InputError` where an option can't be kept to, before hours of work."""
+    if arguments.output.suffix != ".npz":
+        raise InputError("--output", str(arguments.output), "must end in .npz")
+    if arguments.output.exists() and not arguments.overwrite:
+        raise OutputError("--output", str(arguments.output), "is there already; --overwrite replaces it")
+    if not 0 <= arguments.seed < 2**63:
+        raise InputError("--seed", arguments.seed, "must be a whole number from 0")
+    for name, (low, high) in _LIMITS.items():
+        if not low <= getattr(arguments, name) <= high:
+            raise InputError(f"--{name.replace('_', '-')}", getattr(arguments, name), f"must be {low} to {high:g}")
+
+
+def contents(packed: dict[str, Any]) -> str:
+    """Return what a packed file holds, for people."""
+    return (
+        f"{packed['bytes'] / 1e6:.1f} MB with {packed['tiles']:,} tiles of {packed['scenes']:,} scenes, "
+        f"{packed['points']:,} points ({packed['bytes_per_point']:.2f} bytes each), which are {packed['crops']:,} crops"
+    )
+
+
+if __name__ == "__main__":
+    entry("pack")
