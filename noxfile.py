@@ -100,7 +100,7 @@ def extension(session: nox.Session) -> None:
 
 @nox.session(python=False)
 def lint(session: nox.Session) -> None:
-    """Check the source: ruff and mypy."""
+    """Check the source: ruff, who imports whom, types."""
     session.run(python_of(session, f"tests-{HERE}"), "tools/lint.py")  # with its PyTorch: one is large enough
 
 

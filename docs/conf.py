@@ -33,16 +33,16 @@ myst_heading_anchors = 4  # links such as page.md#a-heading, as they work where 
 
 # The library's public part, read and never imported: neither Blender nor PyTorch is needed.
 PACKAGE = ROOT / "synthroads_addon"
-PUBLIC = {"__init__.py", "core", "pipeline.py"}
+PRIVATE = ("blender", "presets", "ui")
 autoapi_dirs = [str(PACKAGE), str(ROOT / "ml")]
-autoapi_ignore = [f"{path}*" for path in PACKAGE.iterdir() if path.name not in PUBLIC]
+autoapi_ignore = [f"{PACKAGE / name}*" for name in PRIVATE]
 autoapi_root = "reference/api"
 autoapi_options = ["members", "show-inheritance", "show-module-summary"]
 autoapi_member_order = "bysource"
 autoapi_add_toctree_entry = False
 autoapi_keep_files = False
 suppress_warnings = [
-    # It misses what is assigned several at a time (A, B = ...) and what `PUBLIC` leaves out; mypy looks after imports.
+    # It misses what is assigned several at a time (A, B = ...) and what `PRIVATE` names; mypy looks after imports.
     "autoapi.python_import_resolution",
     # A bare name in a docstring that several classes have: the link leads to the first of them.
     "ref.python",

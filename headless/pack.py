@@ -27,9 +27,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--classes", default="5", metavar="SCHEME", help="5, 17 or a JSON file (%(default)s)")
     text = "edge of the grid's cells of which one point each is kept (%(default)s)"
     parser.add_argument("--voxel", type=float, default=0.1, metavar="M", help=text)
-    text = "reach to either side of a road's centreline (%(default)s)"
+    text = "reach to either side of a road's centreline, m (30)"
     parser.add_argument("--corridor", type=float, default=30.0, metavar="M", help=text)
-    text = "largest file, 1e6 bytes (%(default)s)"
+    text = "largest file, 1e6 bytes (50)"
     parser.add_argument("--limit-mb", type=float, default=50.0, metavar="MB", help=text)
     text = "seed of the choice of tiles (%(default)s)"
     parser.add_argument("--seed", type=int, default=1, metavar="N", help=text)

@@ -15,6 +15,10 @@ MADE_BY_THE_BUILD = {"reference/api/synthroads_addon/index", "reference/api/ml/i
 
 _FENCE = re.compile(r"^(```+)(\S*)[^\n]*\n(.*?)^\1$", re.MULTILINE | re.DOTALL)
 _LINK = re.compile(r"!?\[(?:[^\]\[]|\[[^\]]*\])*\]\(([^)\s]+)\)")
+_IMPORT = re.compile(r"(?:^ *|`)((?:from|import) (?:synthroads_addon|headless|ml)\b[^`#\n]*)", re.MULTILINE)
+_MODULE = re.compile(r"(?<![\w./])(?:synthroads_addon|headless|ml)(?:\.[a-z]\w*)+(?:\.\w+)?")
+_FILE = re.compile(r"(?<![\w./-])(?:synthroads_addon|headless|ml|tests|tools|docs|presets)/[\w./-]*\w(?:::\w+)*")
+_OLD = re.compile(r"(?m)^\| `[^|]*\| (?=[^|]*\|$)")
 _SHELL = {"|", ">", ">>", "<", "&&", ";"}
 
 
@@ -29,6 +33,27 @@ def entries(page: Path) -> list[str]:
     named = [line.strip() for block in blocks for line in block.splitlines() if line.strip() and line[0] != ":"]
     folder = page.parent.relative_to(DOCS)
     return [name[1:] if name.startswith("/") else (folder / name).as_posix() for name in named]
+
+
+def current(page: Path) -> str:
+    """Return a page's text; of the changelog without the first of two columns, which says how something was called."""
+    text = page.read_text(encoding="utf-8")
+    return _OLD.sub("| ", text) if page.name == "CHANGELOG.md" else text
+
+
+def imports(text: str) -> list[str]:
+    """Return the import statements of ours that a page shows, in blocks and within lines."""
+    return [statement.strip() for statement in _IMPORT.findall(text)]
+
+
+def modules(text: str) -> set[str]:
+    """Return the modules of ours that a page names, some with a name in them."""
+    return {name for name in _MODULE.findall(text) if not name.endswith((".py", ".md"))}
+
+
+def files(text: str) -> set[str]:
+    """Return the files and folders of the repository that a page names, some with a test in them (FILE::NAME)."""
+    return set(_FILE.findall(text))
 
 
 def prose(text: str) -> str:

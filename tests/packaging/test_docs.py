@@ -8,6 +8,9 @@ from __future__ import annotations
 import argparse
 import ast
 import re
+import subprocess
+import sys
+import tomllib
 from collections import Counter
 from functools import cache
 from importlib.util import find_spec
@@ -19,10 +22,28 @@ import pytest
 from headless.cli import COMMANDS, build_parser
 from synthroads_addon.dataset.recipe import Recipe, scene_jobs
 from synthroads_addon.scenario.scenario import load_scenario, scenario_names
-from tests.packaging.docs_pages import DOCS, MADE_BY_THE_BUILD, PAGES, ROOT, anchors, commands, entries, fences, links
+from tests.packaging.docs_pages import (
+    DOCS,
+    MADE_BY_THE_BUILD,
+    PAGES,
+    ROOT,
+    anchors,
+    commands,
+    current,
+    entries,
+    fences,
+    files,
+    imports,
+    links,
+    modules,
+)
 from tools.reference_pages import FILES, GENERATED, MARK, filled, generated
 
 README = ROOT / "README.md"
+CHANGELOG = ROOT / "CHANGELOG.md"
+LAYOUT = DOCS / "extend" / "layout.md"
+ADDON = ROOT / "synthroads_addon"
+IMPORTS = sorted({statement for page in [README, CHANGELOG, *PAGES] for statement in imports(current(page))})
 WITH_PYTORCH = {f"fields-{name}" for name, classes in FILES.items() if any(c.startswith("ml.") for c in classes)}
 
 
@@ -30,7 +51,7 @@ def name_of(page: Path) -> str:
     return page.relative_to(ROOT).as_posix()
 
 
-every_page = pytest.mark.parametrize("page", [README, *PAGES], ids=name_of)
+every_page = pytest.mark.parametrize("page", [README, CHANGELOG, *PAGES], ids=name_of)
 
 
 def test_every_page_is_in_the_navigation_once() -> None:
@@ -109,11 +130,77 @@ def test_modules_and_targets_that_are_run_are_there(page: Path) -> None:
 
 
 @every_page
-def test_python_compiles_and_imports_what_is_there(page: Path) -> None:
+def test_python_compiles(page: Path) -> None:
     for block in fences(page.read_text(encoding="utf-8"), "python"):
-        for node in ast.walk(ast.parse(block)):
-            if isinstance(node, ast.ImportFrom) and node.module.split(".")[0] in ("synthroads_addon", "ml", "headless"):
-                assert {alias.name for alias in node.names} <= defined(node.module), node.module
+        ast.parse(block)
+
+
+def test_imports_are_found() -> None:
+    shown = set(imports(README.read_text(encoding="utf-8")))
+    assert "from synthroads_addon import Job, generate, load_scenario" in shown
+    assert "from synthroads_addon.core.errors import InputError" not in IMPORTS, "that is how it was called"
+    assert "from synthroads_addon.base.errors import InputError" in IMPORTS
+    assert [statement for statement in IMPORTS if not statement.isprintable()] == []
+
+
+@pytest.mark.parametrize(
+    ("package", "library"),
+    [
+        ("synthroads_addon", None),
+        pytest.param("ml", "torch", marks=pytest.mark.first_python),
+        ("synthroads_addon.blender", "bpy"),
+    ],
+)
+def test_imports_that_are_shown_work(package: str, library: str | None) -> None:
+    """Run every import statement of the pages, without Blender where it isn't of its packages."""
+    if library and find_spec(library) is None:
+        pytest.skip(f"needs {library}")
+    statements = [statement for statement in IMPORTS if package_of(statement) == package]
+    assert statements
+    code = f"""
+import os, sys
+if {library != "bpy"}:
+    sys.modules["bpy"] = None # importing it raises ImportError
+for statement in {statements!r}:
+    try:
+        exec(statement)
+    except ImportError as problem:
+        sys.exit(f"{{statement}}: {{problem}}")
+os._exit(0) # Blender's own teardown can crash
+"""
+    answer = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=False)
+    assert answer.returncode == 0, answer.stderr
+
+
+def package_of(statement: str) -> str:
+    """Return which package a statement is about: learning, the one that needs Blender, or the rest of the library."""
+    parts = statement.split()[1].split(".")
+    if parts[0] == "ml":
+        return "ml"
+    return "synthroads_addon.blender" if {"blender", "ui"} & set(parts[1:2]) else "synthroads_addon"
+
+
+@every_page
+def test_what_is_named_is_there(page: Path) -> None:
+    """Modules and the names in them, files, folders, and tests."""
+    text = current(page)
+    assert [name for name in sorted(modules(text)) if not is_there(name)] == []
+    for name in files(text):
+        file, *tests = name.split("::")
+        there = next((root / file for root in (ROOT, ADDON) if (root / file).exists()), None)
+        assert there, name
+        for test in tests:
+            assert re.search(rf"(def|class) {test}\b", there.read_text(encoding="utf-8")), name
+
+
+def is_there(name: str) -> bool:
+    """Return whether a dotted name is a module of ours, or something that a module of ours defines or imports."""
+    parts = name.split(".")
+    for count in range(len(parts), 0, -1):
+        path = ROOT.joinpath(*parts[:count])
+        if path.is_dir() or path.with_suffix(".py").is_file():
+            return count == len(parts) or parts[count] in defined(".".join(parts[:count]))
+    return False
 
 
 def defined(module: str) -> set[str]:
@@ -130,6 +217,31 @@ def defined(module: str) -> set[str]:
         elif isinstance(node, (ast.Import, ast.ImportFrom)):
             names |= {alias.asname or alias.name for alias in node.names}
     return names
+
+
+def test_the_layout_has_every_floor_in_its_place() -> None:
+    settings = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+    contracts = settings["tool"]["importlinter"]["contracts"]
+    floors = next(one["layers"] for one in contracts if one.get("containers") == ["synthroads_addon"])
+    text = LAYOUT.read_text(encoding="utf-8").partition("\n## Floors\n")[2].partition("\n## ")[0]
+    rows = re.findall(r"(?m)^\| (`\w+`(?:, `\w+`)*) \|", text)
+    assert [set(re.findall(r"\w+", row)) for row in rows] == [set(re.findall(r"\w+", floor)) for floor in floors]
+
+
+def test_the_layout_has_every_folder() -> None:
+    named = paths(LAYOUT)
+    folders = [path.parent.relative_to(ADDON).as_posix() for path in ADDON.glob("*/*/__init__.py")]
+    learning = [path.parent.relative_to(ROOT).as_posix() for path in (ROOT / "ml").rglob("*/__init__.py")]
+    assert sorted({*folders, *learning} - named - {"presets"}) == []
+
+
+def test_what_the_layout_names_is_there() -> None:
+    assert [name for name in sorted(paths(LAYOUT)) if not ((ROOT / name).exists() or (ADDON / name).exists())] == []
+
+
+def paths(page: Path) -> set[str]:
+    """Return what a page names with a slash in it."""
+    return {name for name in re.findall(r"`([\w./-]+)`", page.read_text(encoding="utf-8")) if "/" in name}
 
 
 def test_recipes_are_recipes() -> None:

@@ -50,6 +50,15 @@ def test_name_and_licence_agree() -> None:
     assert "GNU GENERAL PUBLIC LICENSE" in (ROOT / "LICENSE").read_text(encoding="utf-8")[:200]
 
 
+def test_citation_is_of_this_version() -> None:
+    citation = pytest.importorskip("yaml").safe_load((ROOT / "CITATION.cff").read_text(encoding="utf-8"))
+    assert citation["cff-version"] == "1.2.0"
+    assert citation["title"] == MANIFEST["name"]
+    assert citation["version"] == MANIFEST["version"]
+    assert citation["license"] == PYPROJECT["project"]["license"]
+    assert citation["authors"] == PYPROJECT["project"]["authors"]
+
+
 def test_manifest_as_committed_has_no_wheels() -> None:
     assert "wheels" not in MANIFEST
     assert "platforms" not in MANIFEST

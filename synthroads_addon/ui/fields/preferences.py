@@ -13,7 +13,7 @@ from ...scenario.scan import ScanScenario
 from ...scenario.scenario import Scenario
 from .wording import value_name
 
-PACKAGE = str(__package__).rpartition(".")[0]
+PACKAGE = str(__package__).removesuffix(".ui.fields")
 """The add-on's own name, under which Blender keeps its preferences."""
 _CASTERS = get_args(ScanScenario.model_fields["caster"].annotation)
 

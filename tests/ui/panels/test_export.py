@@ -14,7 +14,7 @@ from synthroads_addon.base.errors import InputError
 from synthroads_addon.blender.compat import set_modifier_input
 from synthroads_addon.blender.model.read_back import edited_parameters
 from synthroads_addon.blender.model.store import find_road, objects_of, recall_parameters
-from synthroads_addon.cloud.formats import base as writing
+from synthroads_addon.cloud.formats import registry
 from synthroads_addon.cloud.formats.registry import ENDINGS
 from synthroads_addon.cloud.tools.convert import convert, subsample
 from synthroads_addon.twin import formats as twin
@@ -184,7 +184,7 @@ def test_formats_that_cannot_be_written_say_what_they_need(monkeypatch: pytest.M
 
 def test_the_output_panel_says_what_chosen_formats_need(settings: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(twin, "_PACKAGES", {"ifc": "no_such_package"})
-    monkeypatch.setattr(writing, "_PACKAGES", {".e57": "nor_this"})
+    monkeypatch.setattr(registry, "_PACKAGES", {".e57": "nor_this"})
     settings.twin, settings.cloud.formats = {"cityjson", "ifc"}, {"laz", "e57"}
     panel = next(one for one in panels.CLASSES if one.bl_idname == "SYNTHROADS_PT_output")
     said = "\n".join(drawn(panel, bpy.context).lines)
