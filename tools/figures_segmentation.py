@@ -21,7 +21,6 @@ from typing import Any
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
 
-from ml.fitting import chosen_device  # noqa: E402
 from ml.runs import HISTORY, METRICS, PRETRAINING, Run  # noqa: E402
 from ml.segmentation.data.pack import CROP, summary  # noqa: E402
 from ml.segmentation.data.packed_file import PackReader  # noqa: E402
@@ -31,6 +30,7 @@ from ml.segmentation.recipes import SegmentationConfiguration  # noqa: E402
 from ml.segmentation.scores.evaluation import score, trained_model  # noqa: E402
 from ml.segmentation.scores.pictures import comparison  # noqa: E402
 from ml.segmentation.scores.tables import by_class, by_test, cell  # noqa: E402
+from ml.training_loop import chosen_device  # noqa: E402
 from synthroads_addon.base.errors import InputError, SynthRoadsError  # noqa: E402
 from synthroads_addon.base.files import write_file  # noqa: E402
 from synthroads_addon.base.marked_documents import fill  # noqa: E402

@@ -17,9 +17,9 @@ from synthroads_addon.base.progress import Progress, silent
 from synthroads_addon.base.schema import canonical_json, read_json
 
 from ..configuration import Configuration
-from ..fitting import chosen_device, fit
 from ..runs import CALIBRATION, Run, plain, stream_seed
 from ..tasks import Evaluation, Prediction
+from ..training_loop import chosen_device, fit
 from .data.batches import Batches, BatchOptions, DataOptions, Roads, fixed_batches, quiet, read_roads
 from .data.effects import Effects
 from .data.slices import Batch, SliceSettings

@@ -20,8 +20,8 @@ from synthroads_addon.dataset.manifest import checksum
 from synthroads_addon.scenario.scenario import apply_change, apply_values
 
 from ..configuration import EXPERIMENTS, experiment_names, load_configuration
-from ..fitting import chosen_device
 from ..runs import CHECKPOINT, CONFIGURATION, HISTORY, METRICS, PRETRAINING, Run, lasting
+from ..training_loop import chosen_device
 from .data.sources import Source
 from .recipes import Data, SegmentationConfiguration
 from .scores.evaluation import score_all, trained_model

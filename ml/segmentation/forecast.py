@@ -18,7 +18,7 @@ import torch
 from synthroads_addon.base.errors import InputError
 from synthroads_addon.base.progress import peak_memory_mb
 
-from ..fitting import chosen_device, optimizer_of, train_step
+from ..training_loop import chosen_device, optimizer_of, train_step
 from .data.classes import class_names
 from .data.crops import Item, Seeds
 from .data.sources import Source, pointcept_folders, pointcept_root

@@ -13,9 +13,9 @@ from synthroads_addon.base.progress import Progress, peak_memory_mb, silent
 from synthroads_addon.cloud.formats.registry import ENDINGS, open_cloud
 
 from ..configuration import Configuration
-from ..fitting import chosen_device
 from ..runs import Run
 from ..tasks import Evaluation, Prediction
+from ..training_loop import chosen_device
 from .data.sources import Source
 from .prediction import Labelling, predict_file
 from .recipes import SegmentationConfiguration

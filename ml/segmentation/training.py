@@ -14,8 +14,8 @@ from torch.nn import functional
 
 from synthroads_addon.base.progress import Progress, silent
 
-from ..fitting import Figures, chosen_device, fit
 from ..runs import PRETRAINING, Run
+from ..training_loop import Figures, chosen_device, fit
 from .data.classes import IGNORED, class_names
 from .data.crops import Item, Seeds
 from .data.tiles import Tile, scalings

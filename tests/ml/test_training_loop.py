@@ -11,8 +11,8 @@ import torch
 from torch import Tensor, nn
 
 from ml.configuration import Configuration, Schedule, load_configuration
-from ml.fitting import fit, learning_rate
 from ml.runs import CHECKPOINT, CURVES, METRICS, Run, stream_seed
+from ml.training_loop import fit, learning_rate
 from synthroads_addon.base.errors import InputError, MissingFileError, OutputError
 
 STEPS = 5
