@@ -1,1 +1,1 @@
-"""The only code that talks to Blender."""
+"""What is done in Blender: model, scenes, casters, cameras, views. Beside `ui` the only part that uses its modules."""

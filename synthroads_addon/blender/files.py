@@ -24,7 +24,7 @@ def save_scene(path: Path, compress: bool = True) -> None:
         OutputError: it can't be written.
     """
     try:
-        bpy.ops.wm.save_as_mainfile(filepath=str(path), copy=True, compress=compress, check_existing=False)
+        bpy.ops.wm.save_as_mainfile(filepath=str(path.absolute()), copy=True, compress=compress, check_existing=False)
     except RuntimeError as error:
         raise OutputError(str(path), None, f"cannot be written ({complaint(error)})") from None
 
