@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-import tomllib
 from functools import cache
-from importlib import metadata
 from pathlib import Path
 
 
 @cache
 def version() -> str:
     """Return the version from `blender_manifest.toml`: in the package in the extension, above it in a checkout."""
+    import tomllib
+    from importlib import metadata
+
     here = Path(__file__).parents[1]
     for folder in (here, here.parent):
         manifest = folder / "blender_manifest.toml"

@@ -42,7 +42,7 @@ class Fit:
 
     Attributes:
         level: factor on the material's linear intensities: the device's gain times the change of the brightness.
-        below, above: spreads, see `scanning.spread`.
+        below, above: spreads, see `materials.texture_spread`.
     """
 
     level: float

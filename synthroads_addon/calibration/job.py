@@ -223,7 +223,7 @@ def steps(job: CalibrationJob) -> Generator[float, None, Calibration]:
     """Compare, and fit if asked to; yield the share that is done, return the result.
 
     The classes share one gain. With a fit each takes the level that its quantiles need, and the gain is what they have
-    in common, see `calibration_fit.gain_of`; without, it is the one with which the medians come nearest.
+    in common, see `calibration.fit.gain_of`; without, it is the one with which the medians come nearest.
 
     Raises:
         InputError: an input is wrong, or the classes can't be explained by materials.

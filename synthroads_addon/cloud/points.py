@@ -17,7 +17,7 @@ class PointBlock:
         xyz: (N, 3) float64 map coordinates, m.
         intensity: (N,) float64; an ideal white target, struck at a right angle at 1 m, being 1.
         rgb: (N, 3) uint16 sRGB.
-        class_id: (N,) uint8, see `labels`.
+        class_id: (N,) uint8, see `base.classes`.
         instance_id: (N,) uint32, the object's instance in the parameter set; 0 for none.
         return_number: (N,) uint8 from 1.
         number_of_returns: (N,) uint8 of the same pulse.

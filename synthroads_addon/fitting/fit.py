@@ -1,7 +1,7 @@
 """A measured axis becomes an alignment of lines, arcs and clothoids and a vertical profile, within a tolerance.
 
 The axis is smoothed, cut into many elements of linear curvature (in height: of linear grade), and these are thinned,
-moved and snapped to lines and arcs while the tolerance holds (`axis_search`). Data without noise, such as points on
+moved and snapped to lines and arcs while the tolerance holds (`fitting.search`). Data without noise, such as points on
 another alignment, give its elements back. Long axes are fitted in overlapping windows: each begins with the pose and
 curvature at which the one before was left, so time and memory stay proportional to the length.
 """

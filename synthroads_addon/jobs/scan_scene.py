@@ -55,7 +55,7 @@ class SceneScan:
         classes: JSON file with classes by name, see `ClassMapping`.
         epsg: of the map; that of the scene's road, or unknown, if None.
         origin: map coordinates of the scene's own origin, m; those of the scene's road, or 0, if None.
-        up: see `blender.foreign.open_scene`.
+        up: see `blender.scene.foreign.open_scene`.
         overwrite: replace files that are already there.
         begun: when the job began, by `time.perf_counter`, for a time budget; when `scan_scene` is called if None.
     """

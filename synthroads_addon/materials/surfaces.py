@@ -108,7 +108,7 @@ def surfaces_of(
 
 
 def brightness_of(surfaces: Surfaces, material: Index, cosine: Float) -> Float:
-    """Return the brightness (N,) of surfaces before distance and attenuation, see `radiometry.returned_share`.
+    """Return the brightness (N,) of surfaces before distance and attenuation, see `reflectance.returned_share`.
 
     Args:
         surfaces: the materials.

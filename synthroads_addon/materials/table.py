@@ -14,8 +14,8 @@ What only the scanner reads is assumed as follows; `docs/radiometry.md` has the 
   paint, steel); else they follow from the roughness.
 - **Retro-reflection** is the effective reflectance of the retro term alone, pi times the coefficient of
   retro-reflection (cd/lx/m2) at a right angle; a perfect diffuser has 1.
-- **Spread** says how the brightness differs from place to place of one material, see `scanning.spread`. The shipped
-  table has none; `synthroads calibrate` fits it to real clouds.
+- **Spread** says how the brightness differs from place to place of one material, see `materials.texture_spread`. The
+  shipped table has none; `synthroads calibrate` fits it to real clouds.
 """
 
 from __future__ import annotations
@@ -71,7 +71,7 @@ class Material(Model):
 
     @property
     def reflectivity(self) -> float:
-        """Return R, see `radiometry.reflectivity`; of the light that doesn't go through."""
+        """Return R, see `materials.reflectance.reflectivity`; of the light that doesn't go through."""
         return float(reflectivity(self.base_color, self.metallic, self.specular))
 
     @property

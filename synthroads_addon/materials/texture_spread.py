@@ -6,7 +6,7 @@ field of mean 0 and variance 1, sigma ``spread_below`` where z is negative and `
 mean of the factor 1, so that a material's reflectivity stays the mean over its surface. Two spreads are what it takes
 to hold the quartiles and the 90th percentile of real asphalt and real markings; see `docs/calibration.md`.
 
-The field is `noise_field.field`, of position alone: a place has the same factor in every strip, for every scanner and
+The field is `base.noise.field`, of position alone: a place has the same factor in every strip, for every scanner and
 every order of the blocks. It is evaluated once per return, where the ray met the surface that gave most of it: the
 factor is that of the footprint as a whole, and grain much finer than the footprint is not described by it.
 """

@@ -107,7 +107,7 @@ def relief_of_roughness(row: Material) -> Relief:
 def heights(position: Float, amplitude: Float, wavelength: Float, seed: int, octaves: int = 4) -> Float:
     """Return the relief's height above the mean surface, along its normal.
 
-    Every value is drawn from one random field per wavelength, see `noise_field`: mean 0, standard deviation
+    Every value is drawn from one random field per wavelength, see `base.noise`: mean 0, standard deviation
     `amplitude`, correlation 1/e at 0.28 wavelengths (4 octaves). Materials of one wavelength share the field.
 
     Args:

@@ -14,7 +14,7 @@ Float = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Stretches:
-    """A path of which only stretches are flown; see `path_base.Path`.
+    """A path of which only stretches are flown; see `platforms.base.Path`.
 
     Attributes:
         whole: the path.

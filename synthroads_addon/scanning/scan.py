@@ -210,7 +210,7 @@ def _marks(scan: Scan, hits: Hits) -> Marks:
 
 
 def _uneven(scan: Scan, traced: Traced, echoes: Echoes, motions: list[Track]) -> Echoes:
-    """Return the echoes as bright as the places are that gave most of them, see `spread`."""
+    """Return the echoes as bright as the places are that gave most of them, see `materials.texture_spread`."""
     material = traced.pick("material", echoes.hit)
     own = np.flatnonzero(np.take(scan.surfaces.uneven, material, mode="clip"))
     if not len(own):

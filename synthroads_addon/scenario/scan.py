@@ -13,7 +13,7 @@ PlatformKind = Literal["uav", "vehicle", "tripod", "airborne", "trajectory"]
 
 
 class Platform(ScenarioModel):
-    """What carries the scanner, and where. What isn't given is usual for its kind (see `scanning.path.USUAL`)."""
+    """What carries the scanner, and where. What isn't given is usual for its kind (`scanning.platforms.base.USUAL`)."""
 
     kind: PlatformKind = Field("uav", description="Platform.")
     height: float | None = quantity(

@@ -17,7 +17,7 @@ from ..road.parameters import RoadParameters
 
 TwinFormat = Literal["cityjson", "ifc", "opendrive", "geojson"]
 TWIN_FORMATS: tuple[TwinFormat, ...] = get_args(TwinFormat)
-"""Every format; each is written by ``write_NAME(parameters, path, tolerance)`` of the module of its name."""
+"""Every format; each is written by ``write_NAME(parameters, path, tolerance)`` of its module in `_WRITERS`."""
 _WRITERS = {
     "cityjson": ".cityjson.writer",
     "ifc": ".ifc.writer",

@@ -63,7 +63,7 @@ class Regression:
 
 
 class CenterlinePredictor:
-    """A model with its calibration; called with a road and frames it gives what `evaluation` wants of a predictor.
+    """A model with its calibration; called with a road and frames it is a predictor for `scores.evaluation`.
 
     Args:
         model: trained.

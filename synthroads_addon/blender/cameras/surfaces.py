@@ -15,7 +15,7 @@ from ..materials import PROPERTY, constants, table_name
 NUMBER = "sr_material"
 """Output that shows the material's number, for renderers that have no pass for it."""
 _PRINCIPLED = {"base_color": "Base Color", "roughness": "Roughness", "metallic": "Metallic"}
-"""Inputs of a Principled BSDF by layer; its specular isn't the scanner's, see `materials.constants`."""
+"""Inputs of a Principled BSDF by layer; its specular isn't the scanner's, see `blender.materials.constants`."""
 
 
 def scene_constants(names: Sequence[str]) -> SurfaceConstants:

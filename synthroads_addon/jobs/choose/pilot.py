@@ -65,7 +65,7 @@ class Pilot:
         scene: what is scanned.
         scan: of the whole path, without noise.
         air: of the scene's road.
-        phase: see `stretches.scattered`: other phases are other stretches.
+        phase: see `scanning.samples.scattered`: other phases are other stretches.
         lines: of these is the error taken.
         clock: measures seconds.
     """

@@ -18,7 +18,7 @@ from .pilot import Air
 
 
 class RoadSite:
-    """A road that is built in the open file, one model in place of the other; see `choosing.Site`.
+    """A road that is built in the open file, one model in place of the other; see `jobs.choose.search.Site`.
 
     Attributes:
         model: that was built last.
@@ -47,7 +47,7 @@ class RoadSite:
 
 
 class SceneSite:
-    """A scene that is there already, of which nothing can be built otherwise; see `choosing.Site`."""
+    """A scene that is there already, of which nothing can be built otherwise; see `jobs.choose.search.Site`."""
 
     area = 0.0
 

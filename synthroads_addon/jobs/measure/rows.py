@@ -40,7 +40,7 @@ def measure_row(scenario_name: str, knob: str, value: Any) -> dict[str, Any]:
 
     Times are processor seconds, which other work on the machine hardly touches: building the model, building the
     caster's tree, rendering the images, and the rest of the job - scan, colours, relief, thinning out and the file -
-    projected from stretches of the path. Errors: see `measuring_errors`.
+    projected from stretches of the path. Errors: see `jobs.measure.errors`.
     """
     scenario = row_scenario(scenario_name, knob, value, _QUIET)
     if scenario.colour.source == "returns" and not HAS_RETURN_CAMERA:

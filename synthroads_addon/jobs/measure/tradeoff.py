@@ -130,7 +130,7 @@ ROW_TITLES = {
     "colour_95": "colour, CIEDE2000 95 %",
     "layers_rmse": "material layers, RMSE",
 }
-"""Errors against truth and how they are measured: see `measuring`."""
+"""Errors against truth and how they are measured: see `jobs.measure.rows`."""
 
 _COSTS = {
     "seconds": ("processor time (s)", ".1f"),
@@ -231,7 +231,7 @@ def front_lines(results: Sequence[Mapping[str, Any]]) -> list[str]:
 
 
 def markdown(results: Sequence[Mapping[str, Any]], scenario: str) -> str:
-    """Return the tables of rows as `measuring.measure_row` gives them, and what was left out of them and why."""
+    """Return the tables of rows by `jobs.measure.rows.measure_row`, and what was left out of them and why."""
     machines = dict.fromkeys(row["machine"] for row in results if "machine" in row)
     lines = [f"Scene `{scenario}`: `synthroads tradeoff --scenario {scenario} --output DIR`; {'; '.join(machines)}", ""]
     for table, costs in TABLES.items():

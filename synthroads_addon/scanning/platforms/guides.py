@@ -1,4 +1,4 @@
-"""What a path follows: the centreline of a road, any polyline (`path_polyline`), or polynomials fitted to either.
+"""What a path follows: the centreline of a road, any polyline (`platforms.polyline`), or polynomials fitted to either.
 
 A guide is a curve in plan, evaluated by station (m) in float64, with an elevation along it and a ground around it. Its
 offsets count to the left.

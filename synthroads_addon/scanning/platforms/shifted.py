@@ -15,7 +15,7 @@ Float = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class ShiftedPath:
-    """A path in a frame that begins elsewhere; see `path_base.Path`.
+    """A path in a frame that begins elsewhere; see `platforms.base.Path`.
 
     Attributes:
         whole: the path in the road's local frame.

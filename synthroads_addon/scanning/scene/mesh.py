@@ -28,7 +28,7 @@ class SceneMesh:
     Attributes:
         vertices: (V, 3) float32, local coordinates, m.
         triangles: (T, 3) int32 indices into `vertices`, against the clock seen from outside.
-        class_id: (T,) uint8, see `cloud.labels`; 255 is unlabelled.
+        class_id: (T,) uint8, see `base.classes`; 255 is unlabelled.
         instance_id: (T,) uint32, number of the object that the triangle belongs to; 0 is none.
         material: (T,) uint16 indices into `materials`.
         materials: names of materials, those of the material table or the scene's own.

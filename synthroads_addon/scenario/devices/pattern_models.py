@@ -1,7 +1,7 @@
 """How a scanner deflects its beam: the part of a device preset that each scan pattern needs.
 
 Angles of a line are counted from the nadir, positive to the right of the forward direction; azimuths of a rotating head
-from the forward direction, positive to the right. The functions of `pattern` turn a model into directions.
+from the forward direction, positive to the right. The functions of `scanning.patterns` turn a model into directions.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Fields of the schema as Blender properties: their limits, units, defaults and tooltips, and the way to JSON and back.
 
-Each `Field` keeps one field of a pydantic model in one or several properties of a property group. `field_groups`
+Each `Field` keeps one field of a pydantic model in one or several properties of a property group. `ui.fields.groups`
 chooses the kind by the field's type, so that a new field of the schema has its properties without more being written.
 Blender's numbers have 32 bits. What was loaded is kept beside (`base`), and given back where a property still shows it;
 a number typed in is the shortest decimal that stands for its 32 bits (0.1, not 0.10000000149).

@@ -89,7 +89,7 @@ def face_inputs(style: FaceStyle, shape: str, width: float, height: float, text:
 
     Args:
         style: colours and pictogram.
-        shape: outline, one of `nodes.sign_outline.SHAPES`.
+        shape: outline, one of `things.sign.outline.SHAPES`.
         width, height: of the face, m.
         text: lines of writing.
     """
