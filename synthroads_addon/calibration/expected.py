@@ -1,10 +1,10 @@
 """What intensities a material is expected to give, seen at given incidence angles and ranges.
 
 Everything that a scan does to a point's intensity is done here by the scanner's own functions: the surface
-(`materials.surfaces.brightness_of`), its variation (`materials.texture_spread`), the footprint's rays (`scanning.beam`),
-distance and air (`scanning.radiometry.received`). Only the casting is left out: what is seen is a plane of the material, or a
-strip of it on another one. Linear intensities are as in `PointBlock`: a white target struck at a right angle at 1 m
-gives 1; `Receiver` says what a device writes into its files for that.
+(`materials.surfaces.brightness_of`), its variation (`materials.texture_spread`), the footprint's rays
+(`scanning.beam`), distance and air (`scanning.radiometry.received`). Only the casting is left out: what is seen is a
+plane of the material, or a strip of it on another one. Linear intensities are as in `PointBlock`: a white target
+struck at a right angle at 1 m gives 1; `Receiver` says what a device writes into its files for that.
 """
 
 from __future__ import annotations

@@ -35,11 +35,11 @@ class ImageLayers:
     """Layers from images along the path, else from the materials. Can be used by many threads at once.
 
     A point takes the image whose ray differs least from the scanner's: the angle between both, plus `DISTANCE_WEIGHT`
-    times the logarithm of how much farther away the camera is. Where the point is hidden there, the next best, and
-    so on, through all images around. What none of them shows takes a place of its material close by, see
+    times the logarithm of how much farther away the camera is. Where the point is hidden there, the next best, and so
+    on, through all images around. What none of them shows takes a place of its material close by, see
     `scanning.colour.nearby`; in the end the material's means. Of the four pixels around the point's projection those
-    count that show the same material at the depth of the plane through the point, so that neither what stands before it nor what
-    lies behind an edge mixes in, and grazing views stay usable.
+    count that show the same material at the depth of the plane through the point, so that neither what stands before
+    it nor what lies behind an edge mixes in, and grazing views stay usable.
     """
 
     main_thread_only = False
