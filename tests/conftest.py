@@ -17,13 +17,13 @@ from zlib import crc32
 import hypothesis
 import pytest
 
+from tests.folders import BLENDER_TESTS
+
 if TYPE_CHECKING:
     from synthroads_addon.cloud.points import PointBlock
     from tests.helpers.scenes.kept_groups import KeptGroups
 
 TESTS = Path(__file__).resolve().parent
-BLENDER_TESTS = ("blender", "jobs", "ui")
-"""Folders of the tests that need Blender."""
 HAS_BPY = importlib.util.find_spec("bpy") is not None
 
 # Before anything imports bpy: it must not read the user's settings and extensions, whose wheels would shadow ours.

@@ -30,6 +30,10 @@ from cosmic_ray.mutating import mutate_code
 from cosmic_ray.plugins import get_operator, operator_names
 from coverage import CoverageData
 
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
+from tests.folders import BLENDER_TESTS
+
 ROOT = Path(__file__).resolve().parent.parent
 ADDON = "synthroads_addon"
 AREAS = {
@@ -38,7 +42,6 @@ AREAS = {
     "twin": [f"{ADDON}/twin/**/*.py"],
     "cloud": [f"{ADDON}/cloud/**/*.py"],
 }
-BLENDER_TESTS = ("tests/blender", "tests/jobs", "tests/ui")
 HARMLESS = ("BitOr", "RemoveDecorator", "ExceptionReplacer", "Variable")
 """Operators that are left out: most of theirs change an annotation or stop the import."""
 SECONDS = 1200.0
@@ -120,7 +123,7 @@ def _tests_on(lines: set[int], data: CoverageData, measured: str) -> set[str]:
 
 def run_tests(tests: list[str], options: list[str]) -> tuple[bool, str]:
     """Return whether one of the tests fails, and which; Blender's tests have a process of their own."""
-    blender = [test for test in tests if test.startswith(BLENDER_TESTS)]
+    blender = [test for test in tests if test.split("/")[1] in BLENDER_TESTS]
     for part in ([test for test in tests if test not in blender], blender):
         if not part:
             continue

@@ -118,6 +118,10 @@ def test_extras_are_those_of_the_package() -> None:
         assert noxfile.made_from(extras, ROOT)
 
 
+def test_nox_and_the_tests_agree_on_what_needs_blender() -> None:
+    assert tuple(f"tests/{name}" for name in BLENDER_TESTS) == noxfile.BLENDER_TESTS
+
+
 def test_blender_and_the_other_tests_have_processes_of_their_own(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(noxfile, "ONLY", {("3.13", "others"): "smoke or ui"})
     assert noxfile.pytest_runs("3.13", "not slow", ["-x"]) == [
@@ -146,6 +150,7 @@ def test_testing_nothing_is_a_failure() -> None:
 
 TESTS_THAT_SKIP = """
 import pytest
+from tests.folders import BLENDER_TESTS
 
 @pytest.mark.parametrize("number", range(3))
 def test_three(number):
