@@ -13,6 +13,7 @@ from pathlib import Path
 import pytest
 
 import noxfile
+from tests.folders import BLENDER_TESTS
 
 ROOT = Path(__file__).resolve().parents[2]
 MAKEFILE = (ROOT / "Makefile").read_text(encoding="utf-8")
@@ -150,7 +151,6 @@ def test_testing_nothing_is_a_failure() -> None:
 
 TESTS_THAT_SKIP = """
 import pytest
-from tests.folders import BLENDER_TESTS
 
 @pytest.mark.parametrize("number", range(3))
 def test_three(number):
