@@ -23,8 +23,8 @@ from synthroads_addon.road.geometry import RoadGeometry  # noqa: E402
 from synthroads_addon.road.parameters import AlignmentObject, HorizontalElement, VerticalPoint  # noqa: E402
 from synthroads_addon.sampling.road import sample_road  # noqa: E402
 from synthroads_addon.scanning.platforms.path import RoadGuide, make_path  # noqa: E402
+from synthroads_addon.scanning.platforms.platform import Platform  # noqa: E402
 from synthroads_addon.scenario.road import RoadScenario  # noqa: E402
-from synthroads_addon.scenario.scan import Platform  # noqa: E402
 
 TARGET = ROOT / "docs" / "pictures" / "scan-paths.png"
 PANELS: list[tuple[str, dict[str, Any]]] = [

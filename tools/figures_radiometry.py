@@ -25,12 +25,12 @@ from synthroads_addon.road.surroundings import Environment, MaterialVariation  #
 from synthroads_addon.scanning.beam import RINGS, beam_pattern, conical, cylindrical_offsets  # noqa: E402
 from synthroads_addon.scanning.weather import (  # noqa: E402
     USUAL_VISIBILITY,
+    Weather,
     attenuation,
     kim_exponent,
     kruse_exponent,
     visibility_extinction,
 )
-from synthroads_addon.scenario.scan import Weather  # noqa: E402
 
 mpl.use("Agg")
 from matplotlib import pyplot  # noqa: E402

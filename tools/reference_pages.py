@@ -28,7 +28,7 @@ FILES = {
     "scenario": ["synthroads_addon.scenario.scenario:Scenario"],
     "parameters": ["synthroads_addon.road.parameters:RoadParameters"],
     "recipe": ["synthroads_addon.dataset.recipe:Recipe"],
-    "device": ["synthroads_addon.scenario.devices.device:Device"],
+    "device": ["synthroads_addon.scanning.devices.device:Device"],
     "materials": ["synthroads_addon.materials.table:MaterialTable"],
     "classes": ["synthroads_addon.base.classes:ClassTable"],
     "mapping": ["ml.segmentation.data.classes:LabelMapping", "synthroads_addon.base.class_mapping:ClassMapping"],

@@ -11,7 +11,7 @@ import re
 from collections.abc import Sequence
 from functools import cache
 from pathlib import Path
-from typing import Any, ClassVar, TypeVar, get_args
+from typing import Annotated, Any, ClassVar, TypeVar, get_args
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 from pydantic.fields import FieldInfo
@@ -23,6 +23,8 @@ VENDOR_PREFIX = "+"
 """Keys that begin with this are a vendor's own: read, kept, written back, never interpreted (CityJSON's habit)."""
 LARGEST = 1e15
 """Limit, to either side, of a quantity that declares none: what is larger overflows somewhere later."""
+Finite = Annotated[float, Field(strict=True, ge=-1e8, le=1e8)]
+"""A coordinate or a distance in a list, which has no declaration of its own."""
 
 
 def quantity(
@@ -285,3 +287,9 @@ def _real_path(location: tuple[int | str, ...], data: Any, missing: bool) -> lis
                 continue
         path.append(str(part))
     return path
+
+
+class ClosedModel(Model):
+    """Model without vendor keys: every key that it doesn't declare is refused."""
+
+    vendor_keys_allowed: ClassVar[bool] = False

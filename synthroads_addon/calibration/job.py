@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from ..base.errors import InputError, nearest_name
 from ..materials.surfaces import Reflection
 from ..materials.table import Material, materials, read_material_table, write_material_table
-from ..scenario.devices.device import load_device
+from ..scanning.devices.device import load_device
 from .classes import RealClass, RealCloud, by_label, read_real, seen_from
 from .expected import Expectation, Receiver, Views, chosen_views
 from .fit import (

@@ -11,8 +11,7 @@ from typing import Any, Literal
 from pydantic import Field
 
 from ..base.errors import InputError
-from ..base.schema import canonical_json, quantity, read_json
-from ..scenario.road import ScenarioModel
+from ..base.schema import ClosedModel, canonical_json, quantity, read_json
 
 MANIFEST = "manifest.json"
 PUBLISHED = ("scenes/*", "pointcept/*/*/*", "semantickitti/*/sequences/*")
@@ -20,14 +19,14 @@ PUBLISHED = ("scenes/*", "pointcept/*/*/*", "semantickitti/*/sequences/*")
 _BLOCK = 1 << 20
 
 
-class FileEntry(ScenarioModel):
+class FileEntry(ClosedModel):
     """One file of a scene."""
 
     bytes: int = quantity(ge=0, unit="B", description="Size.")
     sha256: str = Field(pattern=r"^[0-9a-f]{64}$", description="Checksum.")
 
 
-class SceneEntry(ScenarioModel):
+class SceneEntry(ClosedModel):
     """One scene."""
 
     name: str = Field(description="Name.")
@@ -42,7 +41,7 @@ class SceneEntry(ScenarioModel):
     folders: tuple[str, ...] | None = Field(None, description="Its folders in the data set.")
 
 
-class Manifest(ScenarioModel):
+class Manifest(ClosedModel):
     """All scenes that were made or tried, in the recipe's order."""
 
     type: Literal["Manifest"] = "Manifest"

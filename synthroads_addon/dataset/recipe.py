@@ -11,8 +11,7 @@ from pydantic import Field, field_validator, model_validator
 from ..base.errors import InputError, nearest_name
 from ..base.files import PRESETS
 from ..base.random_streams import stream
-from ..base.schema import quantity, read_yaml
-from ..scenario.road import ScenarioModel
+from ..base.schema import ClosedModel, quantity, read_yaml
 from ..scenario.scenario import Scenario, load_scenario, with_changes
 
 RECIPES = PRESETS / "recipes"
@@ -27,7 +26,7 @@ _UNSTABLE = "scene"
 _LARGEST_SEED = 2**63
 
 
-class SceneGroup(ScenarioModel):
+class SceneGroup(ClosedModel):
     """Scenes that differ in their seeds and variants."""
 
     name: Name = Field(description="Name of the group; its scenes are NAME-01, NAME-02 and so on.")
@@ -54,7 +53,7 @@ class SceneGroup(ScenarioModel):
         return [name for name, count in self.split.items() for _ in range(count)]
 
 
-class Recipe(ScenarioModel):
+class Recipe(ClosedModel):
     """A data set."""
 
     type: Literal["Recipe"] = "Recipe"

@@ -13,8 +13,8 @@ from ..base.classes import class_scheme, scheme_names
 from ..base.files import PRESETS
 from ..dataset.recipe import RECIPES, load_recipe, recipe_names
 from ..materials.table import material_table_path, read_material_table
+from ..scanning.devices.device import DEVICES, device_names, load_device
 from ..scenario.assets import library_file, library_names, read_asset_library
-from ..scenario.devices.device import DEVICES, device_names, load_device
 from ..scenario.scenario import SCENARIOS, load_scenario, scenario_names
 
 

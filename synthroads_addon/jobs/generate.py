@@ -24,7 +24,7 @@ from ..road.geometry import RoadGeometry
 from ..road.parameters import RoadParameters, read_parameters
 from ..sampling.road import sample_road
 from ..scanning.scene.motion import ScannedScene
-from ..scenario.devices.device import scanner_setting
+from ..scenario.scan import scanner_setting
 from ..scenario.scenario import Scenario
 from ..twin.formats import check_formats, twin_file_names, write_twin
 from .road_files import write_road_files

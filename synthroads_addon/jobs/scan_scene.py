@@ -19,7 +19,7 @@ from ..base.files import output_folder
 from ..base.progress import Progress, StageTimer, silent
 from ..base.schema import canonical_json, read_json
 from ..cloud.tools.previews import TopView
-from ..fitting.read import read_axis
+from ..road.axis_file import read_axis
 from ..road.geometry import RoadGeometry
 from ..road.parameters import RoadParameters
 from ..scanning.platforms.path import USUAL, PolylineGuide, RoadGuide, make_path
@@ -29,7 +29,7 @@ from ..scanning.platforms.tripod import PositionsPath
 from ..scanning.scene.extent import bounds, elevation_at, middle_line
 from ..scanning.scene.mesh import SceneMesh
 from ..scanning.scene.motion import ScannedScene
-from ..scenario.devices.device import scanner_setting
+from ..scenario.scan import scanner_setting
 from ..scenario.scenario import Output, Scenario
 from .generate import closing, file_names, opening
 from .scan.files import colour_job, make_scan, scan_to_files, top_view

@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator
 from functools import lru_cache
 
 from ..base.errors import InputError
-from ..base.schema import Model
+from ..base.schema import ClosedModel, Model
 from ..road.guidelines import (
     CLEARANCE,
     EMERGENCY_BAY_LENGTH,
@@ -42,7 +42,7 @@ from ..road.parameters import (
     Vehicle,
 )
 from ..road.section import Marking
-from ..scenario.road import EnvironmentLimits, Interval, MaterialLimits, RoadScenario, ScenarioModel
+from ..scenario.road import EnvironmentLimits, Interval, MaterialLimits, RoadScenario
 from .placing.construction import SHORTEST_ALONG, TAPER_OUT, TAPERS_IN
 from .section import cross_section_of
 from .turnouts import RampLimits, features_of, may_change_lanes
@@ -244,7 +244,7 @@ def _short(path: str, limits: Interval, least: float, what: str) -> Iterator[str
         yield f"{path}.maximum is {limits.maximum:g} m, {what} needs {least:g} m"
 
 
-def _interval(scenario: ScenarioModel, path: str) -> Interval:
+def _interval(scenario: ClosedModel, path: str) -> Interval:
     value: object = scenario
     for name in path.split("."):
         value = getattr(value, name)

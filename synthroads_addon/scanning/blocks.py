@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ..scenario.devices.device import ScannerSetting
+from .devices.device import ScannerSetting
 from .patterns.pattern import shot_count, shots
 from .platforms.path import Path, Strip
 

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from ..cloud.points import PointBlock
 from ..materials.reflectance import reflectivity, returned_share
 from ..materials.surfaces import Surfaces, brightness_of
-from ..scenario.devices.device import ScannerSetting
 from .colour.colour import LayerSource, LayerValues, Targets
+from .devices.device import ScannerSetting
 from .radiometry import saturated
 from .relief import MicroRelief, adjusted
 from .returns import number_returns

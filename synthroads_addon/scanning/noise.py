@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from ..base.random_streams import stream
 from ..base.rotations import rotation_matrix
-from ..scenario.scan import Noise
+from ..base.schema import ClosedModel, quantity
 from .platforms.base import Strip
 
 Float = NDArray[np.float64]
@@ -33,6 +33,23 @@ BLOCK = 4096
 
 _AXES = 6
 _BLOCKS_KEPT = 8
+
+
+class Noise(ClosedModel):
+    """Random errors of the measurement, one sigma each; 0 is none."""
+
+    range_bias: float = quantity(0.0, ge=-1, le=1, unit="m", description="Systematic error of the range.")
+    range_sigma: float | None = quantity(
+        None, ge=0, le=1, unit="m", description="Standard deviation of the range; the device's if not given."
+    )
+    angle_sigma_mrad: float = quantity(0.0, ge=0, le=20, unit="mrad", description="Pointing error, each axis.")
+    position_sigma: float = quantity(0.0, ge=0, le=10, unit="m", description="Platform's position, each axis.")
+    attitude_sigma_deg: float = quantity(0.0, ge=0, le=5, unit="deg", description="Platform's roll and pitch.")
+    heading_sigma_deg: float = quantity(0.0, ge=0, le=5, unit="deg", description="Platform's heading.")
+    correlation_time: float = quantity(
+        30.0, gt=0, le=10_000, unit="s", description="Time in which a platform's errors fall to 1/e of correlation."
+    )
+    dropout: float = quantity(0.0, ge=0, le=1, unit="1", description="Share of the returns that is lost at random.")
 
 
 class TrajectoryNoise:

@@ -12,12 +12,12 @@ from numpy.typing import NDArray
 from ..cloud.points import PointBlock, concatenate
 from ..materials.surfaces import Surfaces, brightness_of
 from ..materials.texture_spread import spread_factors
-from ..scenario.devices.device import ScannerSetting
-from ..scenario.scan import Noise
 from .beam import BeamPattern, beam_pattern, conical, cylindrical_offsets
 from .blocks import Block, Blocks
 from .colour.colour import Targets, joined_targets
+from .devices.device import ScannerSetting
 from .knots import Track
+from .noise import Noise
 from .platforms.path import Path, Strip
 from .pulses import Errors, Poses, Pulses, make_pulses, reaching_scene
 from .radiometry import received, saturated

@@ -17,9 +17,12 @@ optical wireless, Proc. SPIE 3532 (1998); Recommendation ITU-R P.1814 (2007), fo
 from __future__ import annotations
 
 import math
+from typing import Literal
 
+from pydantic import Field, model_validator
+
+from ..base.schema import ClosedModel, quantity
 from ..road.surroundings import Environment
-from ..scenario.scan import Weather
 
 USUAL_VISIBILITY = {
     "clear": 23_000.0,
@@ -37,6 +40,26 @@ _REFERENCE = 550.0
 """Wavelength (nm) for which the visibility holds."""
 _PER_DECIBEL = math.log(10.0) / 10.0
 _PER_KILOMETRE = 1e-3
+
+
+class Weather(ClosedModel):
+    """What attenuates the beam, in place of the road's own weather."""
+
+    condition: Literal["clear", "haze", "fog", "rain", "snow", "dust"] = Field("clear", description="Weather.")
+    visibility: float | None = quantity(
+        None, ge=20, le=200_000, unit="m", description="Visibility; usual for the condition if not given."
+    )
+    rate_mm_h: float | None = quantity(
+        None, gt=0, le=200, unit="mm/h", description="Rain, or snow as water; instead of the visibility."
+    )
+
+    @model_validator(mode="after")
+    def _one_measure(self) -> Weather:
+        if self.rate_mm_h is not None and self.condition not in ("rain", "snow"):
+            raise ValueError(f"rate_mm_h can't be given for {self.condition}")
+        if self.rate_mm_h is not None and self.visibility is not None:
+            raise ValueError("rate_mm_h and visibility can't both be given")
+        return self
 
 
 def attenuation(weather: Weather, wavelength_nm: float) -> float:

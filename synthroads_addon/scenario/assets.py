@@ -12,8 +12,8 @@ from pydantic import Field, field_validator, model_validator
 from ..base.classes import classes
 from ..base.errors import InputError, MissingFileError, nearest_name
 from ..base.files import PRESETS, stamp
-from ..base.schema import quantity, read_json
-from .road import Interval, ScenarioModel, interval
+from ..base.schema import ClosedModel, quantity, read_json
+from .road import Interval, interval
 
 SUFFIXES = (".blend", ".glb", ".obj")
 LIBRARIES = PRESETS / "assets"
@@ -23,7 +23,7 @@ FARTHEST = 100.0
 _ALLOWED = {"distance": (0.0, 1000.0), "spacing": (0.5, 1e6), "per_km": (0.0, 1e4), "rotation_deg": (-360.0, 360.0)}
 
 
-class AssetPlacement(ScenarioModel):
+class AssetPlacement(ClosedModel):
     """Where copies of an asset stand."""
 
     side: Literal["left", "right", "both", "median"] = Field(description="Side of the road, or in the median.")
@@ -56,7 +56,7 @@ class AssetPlacement(ScenarioModel):
         return self
 
 
-class LibraryAsset(ScenarioModel):
+class LibraryAsset(ClosedModel):
     """One asset: its file, its semantic class, and how it is placed."""
 
     file: str = Field(description="File (.blend, .glb, .obj), relative to the library's folder, with / in between.")
@@ -92,7 +92,7 @@ class LibraryAsset(ScenarioModel):
         return self
 
 
-class AssetLibrary(ScenarioModel):
+class AssetLibrary(ClosedModel):
     """Assets by name."""
 
     type: Literal["AssetLibrary"] = "AssetLibrary"

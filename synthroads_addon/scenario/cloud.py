@@ -7,9 +7,8 @@ from typing import Literal, get_args
 from pydantic import Field, model_validator
 
 from ..base.classes import ClassScheme, class_scheme
-from ..base.schema import quantity
+from ..base.schema import ClosedModel, quantity
 from ..cloud.layers import DEFAULT_ATTRIBUTES, Attribute, needs
-from .road import ScenarioModel
 
 CloudFormat = Literal["laz", "las", "ply", "e57", "npz"]
 Intensity = Literal["received", "range_corrected"]
@@ -18,7 +17,7 @@ CLOUD_FORMATS: tuple[CloudFormat, ...] = get_args(CloudFormat)
 __all__ = ["CLOUD_FORMATS", "CloudFormat", "CloudScenario", "Intensity", "needs"]
 
 
-class CloudScenario(ScenarioModel):
+class CloudScenario(ClosedModel):
     """The cloud's files and their content."""
 
     formats: tuple[CloudFormat, ...] = Field(("laz",), min_length=1, description="Kinds of files.")

@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any, Literal
 
 from pydantic import Field, model_validator
 
-from ..base.schema import quantity
-from .road import ScenarioModel
+from ..base.schema import ClosedModel, quantity
+from ..scanning.colour.settings import ColourMode, ColourSettings
 
 ColourSource = Literal["auto", "images", "returns", "material"]
 Engine = Literal["cycles", "eevee"]
-ColourMode = Literal["lit", "unlit", "false_colour"]
 Lighting = Literal["direct", "path"]
 
 
@@ -26,7 +24,7 @@ def image_scale(typical_range: float) -> float:
     return max(typical_range / USUAL_RANGE, _LEAST_SCALE)
 
 
-class ColourScenario(ScenarioModel):
+class ColourScenario(ClosedModel):
     """Colours and material layers of the points. What isn't given is the fidelity's own value."""
 
     source: ColourSource = Field(
@@ -81,21 +79,6 @@ class ColourScenario(ScenarioModel):
             ground_sampling_distance=pick(self.ground_sampling_distance, preset.ground_sampling_distance * scale),
             samples=pick(self.samples, 1 if self.lighting == "direct" else preset.samples),
         )
-
-
-@dataclass(frozen=True)
-class ColourSettings:
-    """What trades speed for accuracy.
-
-    Attributes:
-        image_spacing: distance between two images along the path, m.
-        ground_sampling_distance: width of a pixel at the usual range, m.
-        samples: samples per pixel of the lit colours.
-    """
-
-    image_spacing: float
-    ground_sampling_distance: float
-    samples: int
 
 
 COLOUR_FIDELITIES = {

@@ -7,8 +7,7 @@ from typing import Any
 
 from ..base.errors import InputError
 from ..road.guidelines import SECTIONS_OF_CLASS
-from .devices.device import scanner_setting
-from .scan import ScanScenario
+from .scan import ScanScenario, scanner_setting
 
 _CLASS_AND_SECTION = ("design_class", "cross_section")
 _DEVICE_SETTINGS = ("pulse_rate_khz", "field_of_view_deg", "lines_per_second", "angle_step_deg")

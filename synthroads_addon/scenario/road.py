@@ -6,21 +6,13 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Discriminator, Field, Tag, model_validator
 
-from ..base.schema import Model, quantity
+from ..base.schema import ClosedModel, Finite, quantity
 from ..road.guidelines import SECTIONS_OF_CLASS, STANDARD_CROSS_SECTIONS, USUAL_SECTION, design_class_of
 from ..road.section import SHORTEST_DASH
 from ..road.surroundings import GRASSES, SHRUBS, TREES
 
-Finite = Annotated[float, Field(strict=True, ge=-1e8, le=1e8)]
 
-
-class ScenarioModel(Model):
-    """Base of the scenario's parts; a scenario has no vendor keys."""
-
-    vendor_keys_allowed = False
-
-
-class Interval(ScenarioModel):
+class Interval(ClosedModel):
     """Limits that a sampled value lies within."""
 
     minimum: Finite = Field(description="Smallest value.")
@@ -43,7 +35,7 @@ def share(default: float, description: str) -> Any:
     return quantity(default, ge=0, le=1, unit="1", description=description)
 
 
-class FreeCrossSection(ScenarioModel):
+class FreeCrossSection(ClosedModel):
     """One direction of a cross-section by hand, lanes from outside to inside."""
 
     lanes: tuple[Annotated[float, Field(strict=True, ge=2, le=6)], ...] = Field(
@@ -70,14 +62,14 @@ CrossSection = Annotated[
 """A standard cross-section's name, or one by hand."""
 
 
-class LaneChangeLimits(ScenarioModel):
+class LaneChangeLimits(ClosedModel):
     """Lane drops and gains."""
 
     share: float = share(0.25, "Probability that a carriageway of three lanes or more drops or gains one.")
     taper_length: Interval = interval(80.0, 200.0, "m", "Length over which a lane begins or ends.")
 
 
-class TurnoutLimits(ScenarioModel):
+class TurnoutLimits(ClosedModel):
     """Exits, entries and emergency bays."""
 
     exits: float = share(0.3, "Probability that a carriageway long enough has an exit.")
@@ -94,7 +86,7 @@ class TurnoutLimits(ScenarioModel):
     bay_width: Interval = interval(3.0, 3.5, "m", "Width of an emergency bay.")
 
 
-class PavementLimits(ScenarioModel):
+class PavementLimits(ClosedModel):
     """What the carriageways are paved with, and their damage."""
 
     concrete: float = share(0.2, "Probability of a concrete pavement.")
@@ -106,7 +98,7 @@ class PavementLimits(ScenarioModel):
     pothole_depth: Interval = interval(0.01, 0.06, "m", "Depth of potholes.")
 
 
-class MarkingLimits(ScenarioModel):
+class MarkingLimits(ClosedModel):
     """Line markings; what isn't given follows the RMS."""
 
     lane_dash: float | None = quantity(
@@ -118,7 +110,7 @@ class MarkingLimits(ScenarioModel):
     film_thickness: Interval = interval(0.0015, 0.004, "m", "Thickness of the film.")
 
 
-class BarrierLimits(ScenarioModel):
+class BarrierLimits(ClosedModel):
     """Guardrails, concrete barriers and noise barriers."""
 
     median: bool = Field(True, description="A barrier in the median.")
@@ -131,7 +123,7 @@ class BarrierLimits(ScenarioModel):
     noise_barrier_length: Interval = interval(100.0, 800.0, "m", "Length of noise barriers.")
 
 
-class FurnitureLimits(ScenarioModel):
+class FurnitureLimits(ClosedModel):
     """Signs, gantries and equipment."""
 
     signs: bool = Field(True, description="Traffic signs.")
@@ -157,7 +149,7 @@ class FurnitureLimits(ScenarioModel):
     construction_length: Interval = interval(120.0, 400.0, "m", "Length of a construction zone.")
 
 
-class VehicleLimits(ScenarioModel):
+class VehicleLimits(ClosedModel):
     """Traffic."""
 
     per_km: Interval = interval(0.0, 25.0, "1/km", "Vehicles per km of carriageway.")
@@ -165,7 +157,7 @@ class VehicleLimits(ScenarioModel):
     speed: Interval = interval(22.0, 36.0, "m/s", "Speed of cars; trucks drive at most 25 m/s.")
 
 
-class VegetationLimits(ScenarioModel):
+class VegetationLimits(ClosedModel):
     """Species and sizes of plants; their densities stand beside."""
 
     trees: tuple[Literal[TREES], ...] = Field(TREES, min_length=1, description="Species of trees.")  # type: ignore[valid-type]
@@ -176,7 +168,7 @@ class VegetationLimits(ScenarioModel):
     grass_height: Interval = interval(0.08, 0.5, "m", "Height of grass.")
 
 
-class EnvironmentLimits(ScenarioModel):
+class EnvironmentLimits(ClosedModel):
     """Light and weather."""
 
     sun_azimuth_deg: Interval = interval(0.0, 360.0, "deg", "Direction of the sun, clockwise from north.")
@@ -187,7 +179,7 @@ class EnvironmentLimits(ScenarioModel):
     bad_weather: float = share(0.15, "Probability of haze, fog, rain, snow or dust.")
 
 
-class MaterialLimits(ScenarioModel):
+class MaterialLimits(ClosedModel):
     """How much roads' materials differ."""
 
     asphalt_age: Interval = interval(0.0, 1.0, "1", "0 new and black, 1 old and bright.")
@@ -201,7 +193,7 @@ class MaterialLimits(ScenarioModel):
     soil_brightness: Interval = interval(0.8, 1.25, "1", "Factor on the base colour.")
 
 
-class RoadScenario(ScenarioModel):
+class RoadScenario(ClosedModel):
     """Limits that the road is sampled within."""
 
     design_class: Literal["EKA1A", "EKA1B", "EKA2", "EKA3"] = Field(

@@ -11,14 +11,14 @@ from pydantic import Field, field_validator
 
 from ..base.errors import InputError, nearest_name
 from ..base.files import PRESETS
-from ..base.schema import Model, quantity, read_json
+from ..base.schema import ClosedModel, Model, quantity, read_json
 from ..base.typed_text import typed_value
 from ..materials.table import Material, material_table_path, read_material_table
 from ..twin.formats import TwinFormat
 from .cloud import CloudScenario
 from .colour import ColourScenario
 from .giving_way import without_what_gives_way
-from .road import RoadScenario, ScenarioModel
+from .road import RoadScenario
 from .scan import ScanScenario
 from .tolerance import TIMES, Tolerance, with_unit
 
@@ -32,7 +32,7 @@ LONGEST_WHOLE, SECTION_LENGTH = 5000.0, 500.0
 """A longer road is built and scanned by sections of this length unless the scenario says otherwise, m."""
 
 
-class Scenario(ScenarioModel):
+class Scenario(ClosedModel):
     """One job: a road, a scan, the files wanted, and how faithful they are to be."""
 
     type: Literal["Scenario"] = "Scenario"

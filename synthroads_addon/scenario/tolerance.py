@@ -9,8 +9,7 @@ from typing import Any
 from pydantic import model_validator
 
 from ..base.errors import InputError, nearest_name
-from ..base.schema import quantity
-from .road import ScenarioModel
+from ..base.schema import ClosedModel, quantity
 
 LENGTHS = {"um": 1e-6, "µm": 1e-6, "mm": 1e-3, "cm": 1e-2, "m": 1.0}
 SHARES = {"": 1.0, "%": 0.01, "‰": 0.001}
@@ -49,7 +48,7 @@ KINDS: dict[str, Kind] = {
 """Kinds of errors by the names of `Tolerance`'s fields."""
 
 
-class Tolerance(ScenarioModel):
+class Tolerance(ClosedModel):
     """Largest errors that a cloud may have; what isn't given may be as large as the cheapest settings make it.
 
     As text each can have a unit: ``"5mm"``, ``"2 %"``.

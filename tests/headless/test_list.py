@@ -21,7 +21,7 @@ from synthroads_addon.base.errors import InputError
 from synthroads_addon.base.field_list import Field, fields_of
 from synthroads_addon.base.typed_text import alternatives
 from synthroads_addon.dataset.recipe import load_recipe, recipe_names, scene_jobs
-from synthroads_addon.scenario.devices.device import DEVICES, device_names, load_device
+from synthroads_addon.scanning.devices.device import DEVICES, device_names, load_device
 from synthroads_addon.scenario.scenario import Scenario, apply_values, scenario_names
 
 ROOT = Path(__file__).parents[2]

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from pydantic.fields import FieldInfo
 
-from synthroads_addon.base.schema import Model, unit_of
+from synthroads_addon.base.schema import ClosedModel, Model, unit_of
 from synthroads_addon.road.parameters import (
     Environment,
     GantrySign,
@@ -21,7 +21,7 @@ from synthroads_addon.road.parameters import (
     Ramp,
     Rut,
 )
-from synthroads_addon.scenario.road import Interval, RoadScenario, ScenarioModel
+from synthroads_addon.scenario.road import Interval, RoadScenario
 from tests.helpers.roads.parameter_sets import LIBRARY_ONLY, OBJECTS
 
 DOCS = Path(__file__).parents[2] / "docs"
@@ -30,7 +30,7 @@ DOCS = Path(__file__).parents[2] / "docs"
 def fields_of(model: type[Model], path: str = "") -> Iterator[tuple[str, FieldInfo]]:
     """Yield the dotted path of every limit of a scenario, intervals as a whole."""
     for name, field in model.model_fields.items():
-        if isinstance(field.default, ScenarioModel) and not isinstance(field.default, Interval):
+        if isinstance(field.default, ClosedModel) and not isinstance(field.default, Interval):
             yield from fields_of(type(field.default), f"{path}{name}.")
         else:
             yield path + name, field

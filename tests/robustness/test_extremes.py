@@ -25,8 +25,8 @@ from synthroads_addon.road.stretches import stretches
 from synthroads_addon.road.tessellation import sample_stations
 from synthroads_addon.road.things.signs import SignCatalogue
 from synthroads_addon.sampling.road import sample_road
+from synthroads_addon.scanning.devices.device import DEVICES, Device
 from synthroads_addon.scenario.assets import LIBRARIES, AssetLibrary
-from synthroads_addon.scenario.devices.device import DEVICES, Device
 from synthroads_addon.scenario.road import RoadScenario
 from synthroads_addon.scenario.scenario import SCENARIOS, Scenario
 from tests.helpers.roads.checker_full_road import full

@@ -24,18 +24,18 @@ from synthroads_addon.cloud.tools.convert import read_centerline
 from synthroads_addon.dataset.manifest import faults, read_manifest
 from synthroads_addon.dataset.recipe import RECIPES, load_recipe, scene_jobs
 from synthroads_addon.fitting.axis_object import fitted_axis
-from synthroads_addon.fitting.read import read_axis
 from synthroads_addon.materials.table import read_material_table
+from synthroads_addon.road.axis_file import read_axis
 from synthroads_addon.road.geometry import RoadGeometry
 from synthroads_addon.road.parameters import RoadParameters, read_parameters
 from synthroads_addon.road.things.signs import SignCatalogue
 from synthroads_addon.sampling.road import sample_road
+from synthroads_addon.scanning.devices.device import load_device, setting_of
 from synthroads_addon.scanning.platforms.path import make_path
+from synthroads_addon.scanning.platforms.platform import Platform
 from synthroads_addon.scanning.platforms.polyline import PolylineGuide
 from synthroads_addon.scenario.assets import LIBRARIES, read_asset_library
-from synthroads_addon.scenario.devices.device import load_device, setting_of
 from synthroads_addon.scenario.road import RoadScenario
-from synthroads_addon.scenario.scan import Platform
 from synthroads_addon.scenario.scenario import Scenario, apply_change, load_scenario, parsed_change
 from tests.helpers.files.mutations import accepted, cases, damaged, for_all, json_files, wrong_values, yaml_files
 from tests.helpers.roads.checker_full_road import full

@@ -11,11 +11,12 @@ import jsonschema
 import numpy as np
 import pytest
 
+from synthroads_addon.base.schema import ClosedModel
 from synthroads_addon.checking.checker import check
 from synthroads_addon.road.guidelines import SECTIONS_OF_CLASS
 from synthroads_addon.road.parameters import RoadParameters, parameters_schema
 from synthroads_addon.sampling.road import sample_road
-from synthroads_addon.scenario.road import Interval, RoadScenario, ScenarioModel
+from synthroads_addon.scenario.road import Interval, RoadScenario
 from tests.helpers.files.mutations import cases
 from tests.helpers.roads.drawn_values import (
     COUNTED,
@@ -86,7 +87,7 @@ def test_every_interval_has_its_extractor() -> None:
     assert set(EXTRACTORS) == set(intervals_of(RoadScenario))
 
 
-def narrowed(limits: ScenarioModel) -> Any:
+def narrowed(limits: ClosedModel) -> Any:
     """Return a scenario, or a part of it, with a tenth of every interval, and everything that may be there there."""
     changes: dict[str, Any] = {}
     for name, field in type(limits).model_fields.items():
@@ -94,7 +95,7 @@ def narrowed(limits: ScenarioModel) -> Any:
         if isinstance(value, Interval):
             width = value.maximum - value.minimum
             changes[name] = Interval(minimum=value.minimum + 0.7 * width, maximum=value.minimum + 0.8 * width)
-        elif isinstance(value, ScenarioModel):
+        elif isinstance(value, ClosedModel):
             changes[name] = narrowed(value)
         elif (field.description or "").startswith("Probability"):
             changes[name] = 1.0

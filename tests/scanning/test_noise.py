@@ -15,9 +15,8 @@ from hypothesis import strategies as st
 
 from synthroads_addon.base.rotations import rotation_matrix
 from synthroads_addon.scanning import noise as module
-from synthroads_addon.scanning.noise import BLOCK, KNOTS_PER_CORRELATION_TIME, TrajectoryNoise, measured_pose
+from synthroads_addon.scanning.noise import BLOCK, KNOTS_PER_CORRELATION_TIME, Noise, TrajectoryNoise, measured_pose
 from synthroads_addon.scanning.platforms.path import Strip
-from synthroads_addon.scenario.scan import Noise
 
 TAU = 30.0
 STRIP = Strip(3, 500.0, 36_000.0)

@@ -10,12 +10,12 @@ from hypothesis import strategies as st
 from synthroads_addon.materials.surfaces import surfaces_of
 from synthroads_addon.materials.table import materials
 from synthroads_addon.scanning.knots import Track
+from synthroads_addon.scanning.noise import Noise
 from synthroads_addon.scanning.scan import Scan, beam_rays, scan_block, scan_pulses
 from synthroads_addon.scanning.scene.mesh import SceneMesh
 from synthroads_addon.scanning.scene.motion import LinearMotion, MovingMesh
 from synthroads_addon.scanning.trace import trace
-from synthroads_addon.scanning.weather import attenuation
-from synthroads_addon.scenario.scan import Noise, Weather
+from synthroads_addon.scanning.weather import Weather, attenuation
 from tests.helpers.scenes.scan_scenes import (
     ORIGIN,
     Standing,

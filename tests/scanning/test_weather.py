@@ -10,6 +10,7 @@ from synthroads_addon.road.surroundings import Environment
 from synthroads_addon.sampling.surroundings import WEATHER
 from synthroads_addon.scanning.weather import (
     USUAL_VISIBILITY,
+    Weather,
     attenuation,
     extinction,
     kim_exponent,
@@ -19,7 +20,6 @@ from synthroads_addon.scanning.weather import (
     visibility_extinction,
     weather_of,
 )
-from synthroads_addon.scenario.scan import Weather
 
 CONDITIONS = list(USUAL_VISIBILITY)
 

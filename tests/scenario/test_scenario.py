@@ -4,7 +4,8 @@ import pytest
 
 from synthroads_addon.base.errors import InputError
 from synthroads_addon.road.guidelines import SECTIONS_OF_CLASS, STANDARD_CROSS_SECTIONS
-from synthroads_addon.scenario.devices.device import device_names, scanner_setting
+from synthroads_addon.scanning.devices.device import device_names
+from synthroads_addon.scenario.scan import scanner_setting
 from synthroads_addon.scenario.scenario import Scenario, apply_change, load_scenario, parsed_change, scenario_names
 
 

@@ -7,7 +7,7 @@ from typing import Any
 
 from ...scanning.patterns.pattern import shot_count
 from ...scanning.platforms.path import Path as ScanPath
-from ...scenario.devices.device import scanner_setting
+from ...scenario.scan import scanner_setting
 from ...scenario.scenario import Scenario
 from ..scan.files import wanted_layers
 from .pilot import Pilot

@@ -21,12 +21,12 @@ from ...blender.cameras import layer_source
 from ...cloud.points import PointBlock
 from ...road.surroundings import Environment, MaterialVariation
 from ...scanning.beam import RINGS
+from ...scanning.noise import Noise
 from ...scanning.platforms.path import Path as ScanPath
 from ...scanning.relief import adjusted, micro_relief
 from ...scanning.samples import Stretches, scattered
 from ...scanning.scan import BlockResult, Scan, joined_results, scan_block
 from ...scanning.scene.motion import ScannedScene
-from ...scenario.scan import Noise
 from ...scenario.scenario import Scenario
 from ..measure.errors import CONVERGED, paired
 from ..scan.files import ScanToFiles, colour_job, make_scan, material_rows

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from ...scanning.platforms.path import USUAL
+from ...scanning.platforms.platform import Platform
 from ...scenario.colour import USUAL_RANGE, image_scale
-from ...scenario.scan import Platform
 from ...scenario.scenario import Scenario, load_scenario
 
 SCENES = ("rq31-600m", "mobile-mapping-300m", "airborne-1000m")

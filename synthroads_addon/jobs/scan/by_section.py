@@ -26,7 +26,7 @@ from ...scanning.platforms.shifted import ShiftedMotion, ShiftedPath
 from ...scanning.scan import Scan
 from ...scanning.scene.motion import LaneMotion, ScannedScene, lane_motions
 from ...scanning.sections import Section, sections, shadow_length
-from ...scenario.devices.device import scanner_setting
+from ...scenario.scan import scanner_setting
 from ...scenario.scenario import Scenario
 from .cloud_files import CloudFiles
 from .files import colour_job, make_finish, make_scan, may_render, of_scan, road_path, scan_blocks, top_view

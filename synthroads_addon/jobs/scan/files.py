@@ -29,7 +29,7 @@ from ...scanning.scan import BlockResult, Scan, joined_results, scan_block
 from ...scanning.scene.motion import ScannedScene
 from ...scanning.scene.target import Target
 from ...scanning.weather import attenuation, weather_of
-from ...scenario.devices.device import scanner_setting
+from ...scenario.scan import scanner_setting
 from ...scenario.scenario import Scenario
 from .cloud_files import CloudFiles, ScanCounts
 

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...materials.table import Material
-from ...scenario.colour import ColourMode
 from .light import CloudShadows, SunAndSky
+from .settings import ColourMode
 
 Float = NDArray[np.float64]
 

@@ -9,8 +9,8 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from ...scenario.colour import ColourSettings
 from ..scene.mesh import SceneMesh
+from .settings import ColourSettings
 
 Float = NDArray[np.float64]
 

@@ -12,16 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ...scenario.devices.device import ScannerSetting
-from ...scenario.devices.pattern_models import (
-    FULL_TURN,
-    Grid,
-    OscillatingMirror,
-    PolygonMirror,
-    RotatingHead,
-    RotatingMirror,
-    WedgePrism,
-)
+from ..devices.device import ScannerSetting
+from .models import FULL_TURN, Grid, OscillatingMirror, PolygonMirror, RotatingHead, RotatingMirror, WedgePrism
 
 Float = NDArray[np.float64]
 Numbers = NDArray[np.int64]

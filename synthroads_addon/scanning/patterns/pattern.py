@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...base.rotations import rotation_matrix
-from ...scenario.devices.device import ScannerSetting
+from ..devices.device import ScannerSetting
 from .directions import Numbers, cycle_lines, rays
 
 Float = NDArray[np.float64]

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ...base.errors import InputError
 from ...base.rotations import rotation_matrix
-from ...scenario.scan import Platform, PlatformKind
+from .platform import Platform, PlatformKind
 
 Float = NDArray[np.float64]
 

@@ -8,9 +8,9 @@ import numpy as np
 
 from ...base.errors import InputError
 from ...base.rotations import rotation_matrix
-from ...scenario.scan import Platform
 from .base import KNOT_RANGE, USUAL, Strip, knots_for, mounting, strips_of
 from .guides import Float, Guide, SmoothedGuide
+from .platform import Platform
 from .strip_line import Eased, Sway, Track
 
 AXLES = 3.0

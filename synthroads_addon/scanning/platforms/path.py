@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from ...base.errors import InputError
-from ...scenario.scan import Platform
 from .base import KNOT_ERROR, KNOT_RANGE, TURNAROUND, USUAL, Path, Strip, Usual
 from .guides import Guide, RoadGuide, SmoothedGuide
 from .moving import MovingPath
+from .platform import Platform
 from .polyline import PolylineGuide
 from .trajectory import TrajectoryPath
 from .tripod import TripodPath

@@ -8,9 +8,9 @@ import numpy as np
 
 from ...base.errors import InputError
 from ...base.rotations import rotation_matrix
-from ...scenario.scan import Platform
 from .base import KNOT_RANGE, USUAL, Strip, knots_for, mounting, strips_of, turning
 from .guides import Float, Guide
+from .platform import Platform
 
 
 class TripodPath:

@@ -8,8 +8,8 @@ from pathlib import Path
 
 from ...base.errors import InputError
 from ...road.guidelines import SECTIONS_OF_CLASS, STANDARD_CROSS_SECTIONS
+from ...scanning.devices.device import Device, load_device
 from ...scanning.platforms.path import USUAL
-from ...scenario.devices.device import Device, load_device
 from ...scenario.scenario import FIDELITIES
 from .wording import value_name
 

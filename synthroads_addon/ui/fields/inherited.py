@@ -10,10 +10,10 @@ from ...base.errors import InputError
 from ...road.guidelines import LIMITS, STANDARD_CROSS_SECTIONS, StandardCrossSection
 from ...sampling.alignment import WIDEST_RADIUS
 from ...sampling.markings import LANE_DASH, LANE_GAP
+from ...scanning.devices.device import ScannerSetting, setting_of
 from ...scanning.platforms.path import USUAL
 from ...scanning.weather import USUAL_VISIBILITY
 from ...scenario.colour import USUAL_RANGE, ColourScenario
-from ...scenario.devices.device import ScannerSetting, setting_of
 from ...scenario.scan import ScanScenario
 from ...scenario.scenario import FIDELITIES
 from .choices import device_of

@@ -19,7 +19,7 @@ from ...calibration.pavement import RoadClasses
 from ...calibration.texture import texture_of
 from ...materials.surfaces import Reflection
 from ...materials.table import Material, materials
-from ...scenario.devices.device import device_names, load_device
+from ...scanning.devices.device import device_names, load_device
 
 _RAY = "RAY"
 

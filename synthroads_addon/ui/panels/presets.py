@@ -12,7 +12,7 @@ import bpy
 from ...base.errors import InputError
 from ...base.files import output_folder
 from ...base.random_streams import stream
-from ...scenario.devices.device import device_names, load_device
+from ...scanning.devices.device import device_names, load_device
 from ...scenario.scenario import load_scenario, scenario_names
 from ..fields.choices import device_of
 from ..fields.numbers import LARGEST_INTEGER

@@ -14,8 +14,8 @@ from synthroads_addon.blender.cameras.stage import Passes, stage
 from synthroads_addon.blender.materials import material as table_material
 from synthroads_addon.scanning.colour.colour import FROM_MATERIAL, FROM_RETURN, MATERIAL_LAYERS, NEARBY
 from synthroads_addon.scanning.colour.nearby import REACH
+from synthroads_addon.scanning.colour.settings import ColourSettings
 from synthroads_addon.scanning.colour.views import scene_sample, views_along
-from synthroads_addon.scenario.colour import ColourSettings
 from tests.helpers.scenes.coded_scene import (
     ENVIRONMENT,
     GREY,

@@ -10,11 +10,11 @@ from typing import Any, Literal, get_args, get_origin
 
 import numpy as np
 
-from synthroads_addon.base.schema import Model
+from synthroads_addon.base.schema import ClosedModel, Model
 from synthroads_addon.road.guidelines import LIMITS
 from synthroads_addon.road.parameters import RoadParameters
 from synthroads_addon.road.things.vehicles import VEHICLE_TYPES
-from synthroads_addon.scenario.road import Interval, RoadScenario, ScenarioModel
+from synthroads_addon.scenario.road import Interval, RoadScenario
 
 Objects = dict[str, list[Any]]
 """The objects of a set by type."""
@@ -36,7 +36,7 @@ def intervals_of(model: type[Model], path: str = "") -> Iterator[str]:
     for name, field in model.model_fields.items():
         if Interval in (field.annotation, *get_args(field.annotation)):
             yield path + name
-        elif isinstance(field.default, ScenarioModel):
+        elif isinstance(field.default, ClosedModel):
             yield from intervals_of(type(field.default), f"{path}{name}.")
 
 

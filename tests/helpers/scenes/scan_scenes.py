@@ -15,7 +15,7 @@ from synthroads_addon.scanning.scene.mesh import SceneMesh
 from synthroads_addon.scanning.scene.motion import ScannedScene
 from synthroads_addon.scanning.scene.target import Target
 from synthroads_addon.scanning.trace import trace
-from synthroads_addon.scenario.devices.device import scanner_setting
+from synthroads_addon.scenario.scan import scanner_setting
 from synthroads_addon.scenario.scenario import load_scenario
 
 ORIGIN = np.array([294_000.0, 5_628_000.0, 180.0])

@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from synthroads_addon.scenario.devices.device import Device, ScannerSetting, load_device, scanner_setting, setting_of
-from synthroads_addon.scenario.devices.pattern_models import WedgePrism
-from synthroads_addon.scenario.scan import ScanScenario
+from synthroads_addon.scanning.devices.device import Device, ScannerSetting, load_device, setting_of
+from synthroads_addon.scanning.patterns.models import WedgePrism
+from synthroads_addon.scenario.scan import ScanScenario, scanner_setting
 
 
 def preset(name: str, **scan: Any) -> ScannerSetting:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
-from synthroads_addon.scenario.devices.device import DEVICES
+from synthroads_addon.scanning.devices.device import DEVICES
 
 
 def sparse_scanner(folder: Path, kilohertz: float) -> str:

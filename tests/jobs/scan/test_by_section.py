@@ -30,8 +30,8 @@ from synthroads_addon.scanning.blocks import Blocks
 from synthroads_addon.scanning.colour.colour import FROM_MATERIAL
 from synthroads_addon.scanning.colour.difference import ciede2000, lab
 from synthroads_addon.scanning.sections import reach, sections
-from synthroads_addon.scenario.devices.device import scanner_setting
 from synthroads_addon.scenario.road import RoadScenario
+from synthroads_addon.scenario.scan import scanner_setting
 from synthroads_addon.scenario.scenario import Scenario
 from tests.helpers.scenes.sparse_scanner import sparse_scanner
 

@@ -22,8 +22,8 @@ from synthroads_addon.scanning.colour.colour import (
 from synthroads_addon.scanning.colour.images import ImageLayers, sample_image
 from synthroads_addon.scanning.colour.light import SunAndSky
 from synthroads_addon.scanning.colour.nearby import REACH
+from synthroads_addon.scanning.colour.settings import ColourSettings
 from synthroads_addon.scanning.colour.views import RenderedImage, View, views_along
-from synthroads_addon.scenario.colour import ColourSettings
 
 DOWN = np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
 ROWS = [materials()[name] for name in ("asphalt", "paint_white")]

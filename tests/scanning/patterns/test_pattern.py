@@ -12,9 +12,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from synthroads_addon.base.rotations import rotation_matrix
+from synthroads_addon.scanning.devices.device import Device, PulseMode, ScannerSetting, device_names, load_device
 from synthroads_addon.scanning.patterns.directions import rays
 from synthroads_addon.scanning.patterns.pattern import Shots, _table, shot_count, shots
-from synthroads_addon.scenario.devices.device import Device, PulseMode, ScannerSetting, device_names, load_device
 from tests.helpers.scenes.scanners import custom, mode, preset, wedges
 
 MODES = [(name, m) for name in device_names() for m in load_device(name).modes]

@@ -8,8 +8,8 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
+from synthroads_addon.scanning.devices.device import device_names, load_device
 from synthroads_addon.scanning.patterns.pattern import shots
-from synthroads_addon.scenario.devices.device import device_names, load_device
 from tests.helpers.scenes.scanners import custom, mode, preset, wedges
 
 WEDGES = [name for name in device_names() if load_device(name).pattern.type == "wedge_prism"]

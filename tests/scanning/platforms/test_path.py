@@ -32,10 +32,10 @@ from synthroads_addon.scanning.platforms.path import (
     TripodPath,
     make_path,
 )
+from synthroads_addon.scanning.platforms.platform import Platform
 from synthroads_addon.scanning.platforms.strip_line import Sway
 from synthroads_addon.scanning.platforms.tripod import PositionsPath
-from synthroads_addon.scenario.devices.device import scanner_setting
-from synthroads_addon.scenario.scan import Platform
+from synthroads_addon.scenario.scan import scanner_setting
 from synthroads_addon.scenario.scenario import load_scenario
 
 GAUSS = np.polynomial.legendre.leggauss(30)

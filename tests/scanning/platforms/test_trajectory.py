@@ -13,8 +13,8 @@ from scipy.spatial.transform import Rotation, Slerp
 from synthroads_addon.base.errors import InputError, MissingFileError
 from synthroads_addon.base.rotations import matrices, quaternions, rotation_matrix, slerp
 from synthroads_addon.scanning.platforms.path import KNOT_ERROR, PolylineGuide, TrajectoryPath, make_path
+from synthroads_addon.scanning.platforms.platform import Platform
 from synthroads_addon.scanning.platforms.trajectory import COLUMNS, read_trajectory
-from synthroads_addon.scenario.scan import Platform
 from tests.scanning.platforms.test_path import knot_error
 
 ORIGIN = (500_000.0, 5_600_000.0, 100.0)

@@ -6,10 +6,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from synthroads_addon.scanning.platforms.path import PolylineGuide, TripodPath
+from synthroads_addon.scanning.platforms.platform import Platform
 from synthroads_addon.scanning.platforms.tripod import PositionsPath
 from synthroads_addon.scanning.scene.extent import bounds, elevation_at, median_elevation, middle_line
 from synthroads_addon.scanning.scene.mesh import SceneMesh
-from synthroads_addon.scenario.scan import Platform
 
 
 def mesh(vertices: list[list[float]], triangles: list[list[int]]) -> SceneMesh:

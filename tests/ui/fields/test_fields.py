@@ -17,11 +17,11 @@ from pydantic import BaseModel, Field
 
 import synthroads_addon
 from synthroads_addon.base.errors import InputError
-from synthroads_addon.base.schema import quantity
+from synthroads_addon.base.schema import ClosedModel, quantity
 from synthroads_addon.road.guidelines import SECTIONS_OF_CLASS, STANDARD_CROSS_SECTIONS
+from synthroads_addon.scanning.devices.device import device_names, load_device
 from synthroads_addon.scanning.platforms.path import USUAL
-from synthroads_addon.scenario.devices.device import device_names, load_device
-from synthroads_addon.scenario.road import Interval, ScenarioModel, interval
+from synthroads_addon.scenario.road import Interval, interval
 from synthroads_addon.scenario.scenario import FIDELITIES, Scenario, load_scenario, scenario_names
 from synthroads_addon.ui.fields import fields as kinds
 from synthroads_addon.ui.fields.drawing import owner_of
@@ -294,7 +294,7 @@ def test_labels_are_for_people() -> None:
     assert raw == []
 
 
-class New(ScenarioModel):
+class New(ClosedModel):
     """A part of the schema that isn't there yet."""
 
     height: float = quantity(2.0, ge=1, le=3, unit="m", description="Height.")
@@ -327,7 +327,7 @@ EXPECTED = {
 
 
 def test_a_new_field_has_its_properties_by_itself() -> None:
-    whole = type("Whole", (ScenarioModel,), {"__annotations__": {"new": New}, "new": Field(New(), description="New.")})
+    whole = type("Whole", (ClosedModel,), {"__annotations__": {"new": New}, "new": Field(New(), description="New.")})
     made = make_fields(whole, {"new": json.loads(New().to_json())}, "", {})
     part = made["new"]
     assert isinstance(part, GroupField)

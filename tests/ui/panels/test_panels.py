@@ -15,7 +15,7 @@ import synthroads_addon
 from synthroads_addon.blender.model.build import build_road
 from synthroads_addon.blender.model.store import remember
 from synthroads_addon.sampling.road import sample_road
-from synthroads_addon.scenario.devices.device import DEVICES, device_names
+from synthroads_addon.scanning.devices.device import DEVICES, device_names
 from synthroads_addon.scenario.road import Interval
 from synthroads_addon.scenario.scenario import Scenario, load_scenario, scenario_names
 from synthroads_addon.ui.fields import preferences

@@ -13,7 +13,7 @@ import numpy as np
 
 from ..base.errors import InputError
 from ..base.files import read_text
-from ..road.alignment import FloatArray
+from .alignment import FloatArray
 
 FARTHEST = 1e8
 """Largest coordinate of a map, m: the reach of `RoadScenario.map_origin`."""

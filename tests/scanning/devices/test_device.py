@@ -11,16 +11,9 @@ import numpy as np
 import pytest
 
 from synthroads_addon.base.errors import InputError, MissingFileError
+from synthroads_addon.scanning.devices.device import SPEED_OF_LIGHT, Device, device_names, load_device, setting_of
 from synthroads_addon.scanning.patterns.pattern import shots
-from synthroads_addon.scenario.devices.device import (
-    SPEED_OF_LIGHT,
-    Device,
-    device_names,
-    load_device,
-    scanner_setting,
-    setting_of,
-)
-from synthroads_addon.scenario.scan import ScanScenario
+from synthroads_addon.scenario.scan import ScanScenario, scanner_setting
 from tests.helpers.scenes.scanners import custom, device, mode, preset
 
 DOCS = Path(__file__).parents[3] / "docs"
@@ -260,8 +253,8 @@ def test_the_documented_device_works() -> None:
 
 
 def test_every_field_is_documented() -> None:
-    from synthroads_addon.scenario.devices import pattern_models as patterns
-    from synthroads_addon.scenario.devices.device import Head, PulseMode
+    from synthroads_addon.scanning.devices.device import Head, PulseMode
+    from synthroads_addon.scanning.patterns import models as patterns
 
     text = (DOCS / "devices.md").read_text(encoding="utf-8")
     models = (Device, PulseMode, Head, patterns.Wedge, patterns.WedgePrism, patterns.RotatingHead, patterns.Grid)

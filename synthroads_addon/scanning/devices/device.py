@@ -12,9 +12,8 @@ from pydantic import Field, model_validator
 
 from ...base.errors import InputError, nearest_name
 from ...base.files import PRESETS
-from ...base.schema import Model, quantity, read_json
-from ..scan import ScanScenario
-from .pattern_models import PatternModel
+from ...base.schema import ClosedModel, Model, quantity, read_json
+from ..patterns.models import PatternModel
 
 DEVICES = PRESETS / "devices"
 SPEED_OF_LIGHT = 299_792_458.0
@@ -24,6 +23,18 @@ BRIGHTEST = 1000.0
 
 _Divergence = Annotated[float, Field(strict=True, ge=0, le=100)]
 _Lines = Annotated[float, Field(strict=True, gt=0, le=10_000)]
+
+
+class DeviceChoice(ClosedModel):
+    """A device and how it is set. What isn't given is the device's own value."""
+
+    device: str = Field("riegl-minivux-3uav", description="Device preset or file.")
+    pulse_rate_khz: float | None = quantity(None, gt=0, le=5000, unit="kHz", description="Pulse repetition rate.")
+    field_of_view_deg: float | None = quantity(None, gt=0, le=360, unit="deg", description="Field of view.")
+    lines_per_second: float | None = quantity(None, gt=0, le=1000, unit="1/s", description="Scan lines per second.")
+    angle_step_deg: float | None = quantity(
+        None, gt=0, le=90, unit="deg", description="Angle between two pulses; instead of the lines per second."
+    )
 
 
 class PulseMode(Model):
@@ -195,19 +206,15 @@ def load_device(name_or_file: str) -> Device:
     return Device.from_dict(read_json(path), source=str(name_or_file))
 
 
-def scanner_setting(scan: ScanScenario) -> ScannerSetting:
-    """Return the scenario's device as the scenario sets it; see `setting_of`.
+def setting_of(device: Device, scan: DeviceChoice, range_sigma: float | None = None) -> ScannerSetting:
+    """Return a device as a choice sets it, whichever device the choice names.
 
-    Raises:
-        InputError: there is no such device, it can't do it, or values contradict each other.
-    """
-    return setting_of(load_device(scan.device), scan)
+    What the choice leaves open is the device's: its first mode, the mode's field of view, the fastest scan.
 
-
-def setting_of(device: Device, scan: ScanScenario) -> ScannerSetting:
-    """Return a device as the scenario sets it, whichever device the scenario names.
-
-    What the scenario leaves open is the device's: its first mode, the mode's field of view, the fastest scan.
+    Args:
+        device: that is set.
+        scan: the settings.
+        range_sigma: standard deviation of the range, m; the device's own if None.
 
     Raises:
         InputError: the device can't do it, or values contradict each other; names field, value and what is allowed.
@@ -228,7 +235,7 @@ def setting_of(device: Device, scan: ScanScenario) -> ScannerSetting:
         maximum_range=min(math.sqrt(BRIGHTEST / threshold), device.unambiguous_range(rate)),
         threshold=threshold,
         saturation=threshold * 10.0 ** (device.dynamic_range_db / 10.0),
-        range_sigma=device.range_sigma if scan.noise.range_sigma is None else scan.noise.range_sigma,
+        range_sigma=device.range_sigma if range_sigma is None else range_sigma,
     )
     _check_step(setting, scan)
     return setting
@@ -257,7 +264,7 @@ def _field_of_view(device: Device, mode: PulseMode, wanted: float | None) -> flo
     return wanted
 
 
-def _lines(device: Device, mode: PulseMode, view: float, scan: ScanScenario) -> float:
+def _lines(device: Device, mode: PulseMode, view: float, scan: DeviceChoice) -> float:
     """Return the lines per second; from the angle step where only that is given."""
     slowest, fastest = device.lines_per_second
     step_of_a_line = math.degrees(device.pattern.sweep(view)) / (mode.pulse_rate_khz * 1e3)
@@ -284,7 +291,7 @@ def _lines(device: Device, mode: PulseMode, view: float, scan: ScanScenario) -> 
     return lines
 
 
-def _check_step(setting: ScannerSetting, scan: ScanScenario) -> None:
+def _check_step(setting: ScannerSetting, scan: DeviceChoice) -> None:
     """Refuse angles that are too fine for the device, and lines without a pulse."""
     device, step = setting.device, math.degrees(setting.angle_step)
     by_angle = scan.lines_per_second is None and scan.angle_step_deg is not None

@@ -1,1 +1,0 @@
-"""Laser scanners: presets and settings."""
