@@ -30,6 +30,7 @@ from synthroads_addon.jobs.choose.pilot import Pilot, beam_errors  # noqa: E402
 from synthroads_addon.jobs.choose.pilot_colour import colour_errors, image_seconds  # noqa: E402
 from synthroads_addon.jobs.choose.prior import FILE  # noqa: E402
 from synthroads_addon.jobs.choose.sites import RoadSite  # noqa: E402
+from synthroads_addon.road.geometry import RoadGeometry  # noqa: E402
 from synthroads_addon.sampling.road import sample_road  # noqa: E402
 from synthroads_addon.scanning.beam import RINGS  # noqa: E402
 from synthroads_addon.scenario.scenario import load_scenario  # noqa: E402
@@ -63,13 +64,13 @@ def measured(platform: str) -> dict[str, Any]:
     name, changes = SCENES[platform]
     scenario = load_scenario(name, [*changes, "cloud.point_spacing=null"])
     empty_file()
-    site = RoadSite(scenario, sample_road(scenario.road, scenario.seed))
+    site = RoadSite(scenario, RoadGeometry(sample_road(scenario.road, scenario.seed)))
     builds, few = [], None
     pilot = None
     site.scene(site.models({})[0])  # untimed: the first build pays for what Blender loads once
     for model in site.models({}):
         begin = time.process_time()
-        pilot = Pilot.on(scenario, site.scene(model), site.path, site.air)
+        pilot = Pilot.on(scenario, site.scene(model), site.path, site.conditions)
         pilot = replace(pilot, clock=time.process_time)
         builds.append(1e6 * (time.process_time() - begin) / site.area)
         if few is None:

@@ -9,7 +9,7 @@ from ...scanning.patterns.pattern import shot_count
 from ...scanning.platforms.path import Path as ScanPath
 from ...scenario.scan import scanner_setting
 from ...scenario.scenario import Scenario
-from ..scan.files import wanted_layers
+from ..scan.plan import coloured_layers
 from .pilot import Pilot
 from .pilot_colour import image_counts
 from .prior import Prior
@@ -37,7 +37,7 @@ class Costs:
 
     def __init__(self, scenario: Scenario, path: ScanPath, area: float, prior: Prior) -> None:
         self.scenario, self.path, self.area, self.prior = scenario, path, area, prior
-        self.wanted = wanted_layers(scenario)
+        self.wanted = coloured_layers(scenario)
         self.points, self.speed = 0, 1.0
 
     def relief_seconds(self, octaves: int) -> float:

@@ -9,7 +9,6 @@ from __future__ import annotations
 import tempfile
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -17,19 +16,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...base.machine import available_cores
-from ...blender.cameras import layer_source
+from ...base.progress import StageTimer
+from ...blender.services import BlenderServices
 from ...cloud.points import PointBlock
-from ...road.surroundings import Environment, MaterialVariation
-from ...scanning.beam import RINGS
+from ...scanning.beam import RINGS, beam_pattern
+from ...scanning.blocks import Blocks
 from ...scanning.noise import Noise
+from ...scanning.plan import ScanConditions, ScanPlan
 from ...scanning.platforms.path import Path as ScanPath
-from ...scanning.relief import adjusted, micro_relief
+from ...scanning.record import record_as_measured
+from ...scanning.relief import adjusted
 from ...scanning.samples import Stretches, scattered
-from ...scanning.scan import BlockResult, Scan, joined_results, scan_block
+from ...scanning.scan import BlockResult, joined_results
 from ...scanning.scene.motion import ScannedScene
 from ...scenario.scenario import Scenario
 from ..measure.errors import CONVERGED, paired
-from ..scan.files import ScanToFiles, colour_job, make_scan, material_rows
+from ..scan.files import CloudFiles, record_to_files
+from ..scan.plan import plan_scan
 from .choice import quantile_bound, ratio_bound
 
 Float = NDArray[np.float64]
@@ -48,14 +51,6 @@ _FINEST = 8
 """Octaves of the micro-relief that counts as truth."""
 
 
-@dataclass(frozen=True)
-class Air:
-    """What the road says of a scan beside its geometry."""
-
-    environment: Environment | None = None
-    variation: MaterialVariation | None = None
-
-
 @dataclass
 class Pilot:
     """A scene that is tried out.
@@ -64,7 +59,7 @@ class Pilot:
         scenario: the job.
         scene: what is scanned.
         scan: of the whole path, without noise.
-        air: of the scene's road.
+        conditions: of the scene's road.
         phase: see `scanning.samples.scattered`: other phases are other stretches.
         lines: of these is the error taken.
         clock: measures seconds.
@@ -72,42 +67,38 @@ class Pilot:
 
     scenario: Scenario
     scene: ScannedScene
-    scan: Scan
-    air: Air
+    scan: ScanPlan
+    conditions: ScanConditions
     phase: float = 0.5
     lines: int = LINES
     clock: Callable[[], float] = time.perf_counter
 
     @classmethod
     def on(
-        cls, scenario: Scenario, scene: ScannedScene, path: ScanPath, air: Air, phase: float = 0.5, lines: int = LINES
+        cls,
+        scenario: Scenario,
+        scene: ScannedScene,
+        path: ScanPath,
+        conditions: ScanConditions,
+        phase: float = 0.5,
+        lines: int = LINES,
     ) -> Pilot:
         """Prepare to scan a scene; builds the casters."""
         quiet = scenario.scan.model_copy(update={"noise": Noise(range_sigma=0.0)})
         colour = scenario.colour.model_copy(update={"intensity_from_layers": False})
         scenario = scenario.model_copy(update={"scan": quiet, "colour": colour})
-        scan = make_scan(scenario, scene, path, air.environment, None, air.variation)
-        return cls(scenario, scene, scan, air, phase, lines)
+        plan = plan_scan(scenario, scene, path, BlenderServices(), conditions)
+        return cls(scenario, scene, plan, conditions, phase, lines)
 
     def stretches(self) -> Stretches:
         """Return the stretches that errors are taken of."""
         return scattered(self.scan.path, self.lines, PULSES / self.scan.setting.shot_rate, self.phase)
 
-    def results(self, rings: tuple[int, ...], path: Stretches, targets: bool = False) -> list[BlockResult]:
-        """Scan stretches with a beam; return their points in their order."""
-        wanted = frozenset({"normal", "material"}) if targets else frozenset[str]()
-        scan = replace(self.scan, path=path, rings=rings, targets=targets, wanted=wanted)
-
-        def one(number: int) -> BlockResult:
-            # A path of its own: stretches of one strip can't be told from each other by its index.
-            part = replace(scan, path=Stretches(path.whole, (path.strips[number],)))
-            return joined_results([scan_block(part, *block) for block in part.blocks()])
-
-        numbers = range(len(path.strips))
-        if scan.target.caster.main_thread_only:
-            return [one(number) for number in numbers]
-        with ThreadPoolExecutor(available_cores()) as pool:
-            return list(pool.map(one, numbers))
+    def results(self, rings: tuple[int, ...], path: Stretches) -> list[BlockResult]:
+        """Scan stretches with a beam; return the points of each, with the places that were seen, in their order."""
+        results = iter(record_as_measured(replace(self.scan, path=path, rings=rings)))
+        blocks = Blocks(self.scan.setting, path, len(beam_pattern(rings).weights))
+        return [joined_results([next(results) for _ in blocks.of(strip)]) for strip in path.strips]
 
     def truth(self) -> list[PointBlock]:
         """Return the points of the stretches with the converged footprint."""
@@ -120,10 +111,9 @@ class Pilot:
 
     def relief_errors(self, octaves: Iterable[int]) -> dict[int, tuple[Errors, float]]:
         """Return the error of the micro-relief by octaves, and seconds per million points of one core."""
-        results = [one for one in self.results(RINGS[1], self.stretches(), targets=True) if len(one.points)]
-        materials = self.scan.target.materials
-        relief = micro_relief(materials, material_rows(materials))
-        strength, seed = self.scenario.scan.relief, self.scenario.seed
+        results = [one for one in self.results(RINGS[1], self.stretches()) if len(one.points)]
+        relief, strength, seed = self.scan.relief, self.scan.relief_strength, self.scan.seed
+        assert relief is not None
 
         def shifted(number: int) -> tuple[list[Float], float]:
             begin = self.clock()
@@ -150,22 +140,20 @@ class Pilot:
         """
         count = max(_TIMED, 2 * available_cores())
         path = scattered(self.scan.path, count, _TIMED_PULSES / self.scan.setting.shot_rate, 0.5, _TIMED_SHARE)
-        plain = self.scenario.colour.model_copy(update={"source": "material"})
-        scenario = self.scenario.model_copy(update={"colour": plain})
-        scenario = scenario.model_copy(update={"scan": scenario.scan.model_copy(update={"relief_octaves": 2})})
+        assert self.scan.request is not None
+        means = replace(self.scan.request.settings, source="material")
+        plain = replace(self.scan, relief_octaves=2, request=replace(self.scan.request, settings=means))
         # Pulses come in whole lines, so that stretches hold fewer of them than their duration says.
         share = sum(map(self.scan.pulses, path.strips)) / sum(map(self.scan.pulses, path.whole.strips))
         times, points = {}, 0
-        with layer_source(colour_job(scenario, self.scan, self.scene)) as source:
-            for number, rings in rays.items():
-                part = replace(self.scan, path=path, rings=rings)
-                with tempfile.TemporaryDirectory(prefix="synthroads-") as folder:
-                    task = ScanToFiles(scenario, part, source, Path(folder))
-                    begin = self.clock()
-                    for _ in task.run():
-                        pass
-                    times[number] = (self.clock() - begin) / share
-                points = round(task.counts.points / share)
+        for number, rings in rays.items():
+            plan = replace(plain, path=path, rings=rings)
+            with tempfile.TemporaryDirectory(prefix="synthroads-") as folder:
+                files = CloudFiles(self.scenario, Path(folder), plan.target.origin, path.typical_range)
+                begin = self.clock()
+                record_to_files([plan], files, StageTimer())
+                times[number] = (self.clock() - begin) / share
+            points = round(files.counts.points / share)
         return times, points
 
 

@@ -9,15 +9,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...blender.cameras import HAS_RETURN_CAMERA, ColourJob, image_views, layer_source
+from ...blender.cameras import HAS_RETURN_CAMERA, image_views, layer_source
 from ...scanning.beam import RINGS
 from ...scanning.colour.colour import FROM_MATERIAL, MATERIAL_LAYERS, NEARBY, LayerValues, Targets
 from ...scanning.colour.difference import ciede2000, lab
+from ...scanning.colour.request import LayerRequest
 from ...scanning.colour.views import View
 from ...scanning.samples import scattered
 from ...scenario.colour import image_scale
 from ..measure.tradeoff import DENSEST
-from ..scan.files import colour_job
 from .choice import quantile_bound, ratio_bound
 from .pilot import PULSES, Errors, Pilot
 
@@ -43,7 +43,7 @@ def colour_errors(pilot: Pilot, choices: Mapping[str, Mapping[str, Any]], wanted
         wanted: ``rgb`` and layers.
     """
     path = scattered(pilot.scan.path, _LINES, PULSES / pilot.scan.setting.shot_rate, pilot.phase)
-    found = pilot.results(RINGS[1], path, targets=True)
+    found = pilot.results(RINGS[1], path)
     lines = [one.seen for one in found if one.seen is not None and len(one.seen)]
     scale = image_scale(pilot.scan.path.typical_range)
     true: dict[str, Any] = {"source": "returns"} if HAS_RETURN_CAMERA else {"source": "images"}
@@ -61,15 +61,16 @@ def colour_errors(pilot: Pilot, choices: Mapping[str, Mapping[str, Any]], wanted
 def _values(
     pilot: Pilot, changes: Mapping[str, Any], lines: Sequence[Targets], wanted: frozenset[str]
 ) -> list[LayerValues]:
-    job = replace(_job(pilot, changes, wanted), pick=lambda views: near_lines(views, lines))
-    with layer_source(job) as source:
+    request = replace(_request(pilot, changes, wanted), pick=lambda views: near_lines(views, lines))
+    with layer_source(request) as source:
         return [source.sample(of.position, of.scanner, of.normal, of.material, of.time, wanted) for of in lines]
 
 
-def _job(pilot: Pilot, changes: Mapping[str, Any], wanted: frozenset[str]) -> ColourJob:
+def _request(pilot: Pilot, changes: Mapping[str, Any], wanted: frozenset[str]) -> LayerRequest:
     colour = type(pilot.scenario.colour).from_dict(pilot.scenario.colour.to_dict() | dict(changes))
-    scenario = pilot.scenario.model_copy(update={"colour": colour})
-    return replace(colour_job(scenario, pilot.scan, pilot.scene, pilot.air.environment), wanted=wanted)
+    settings = colour.settings(pilot.scenario.fidelity, pilot.scan.path.typical_range)
+    assert pilot.scan.request is not None
+    return replace(pilot.scan.request, settings=settings, wanted=wanted)
 
 
 def near_lines(views: Sequence[View], lines: Sequence[Targets]) -> list[View]:
@@ -116,7 +117,7 @@ def _rmse(
 def image_counts(pilot: Pilot, changes: Mapping[str, Any], wanted: frozenset[str]) -> tuple[int, float]:
     """Return how many images the whole path would have, and their megapixels."""
     own = {path.removeprefix("colour."): value for path, value in changes.items()}
-    views = image_views(_job(pilot, own, wanted))
+    views = image_views(_request(pilot, own, wanted))
     return len(views), sum(view.pixels for view in views) / 1e6
 
 
@@ -133,7 +134,7 @@ def image_seconds(pilot: Pilot, changes: Mapping[str, Any], wanted: frozenset[st
 
     stamps = [pilot.clock()]
     show: Callable[[float], None] = lambda share: stamps.append(pilot.clock())  # noqa: E731
-    with layer_source(replace(_job(pilot, own, wanted), pick=pick), progress=show):
+    with layer_source(replace(_request(pilot, own, wanted), pick=pick), progress=show):
         pass
     times = np.diff(stamps)
     if len(times) < 3:

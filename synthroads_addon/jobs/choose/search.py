@@ -16,11 +16,12 @@ from ...base.errors import InputError
 from ...blender.cameras import HAS_RETURN_CAMERA
 from ...scanning.beam import RINGS
 from ...scanning.colour.colour import MATERIAL_LAYERS
+from ...scanning.plan import ScanConditions
 from ...scanning.platforms.path import Path as ScanPath
 from ...scanning.scene.motion import ScannedScene
 from ...scenario.scenario import FIDELITIES, Scenario
 from ..measure.errors import CONVERGED
-from ..scan.files import may_render, wanted_layers
+from ..scan.plan import coloured_layers, may_render
 from .choice import Chosen, Ladder, Rung, best_in_time, cheapest, too_short
 from .costs import Costs, nearest, pulses_of
 from .knobs import (
@@ -33,7 +34,7 @@ from .knobs import (
     rays_choices,
     with_changes,
 )
-from .pilot import LINES, PULSES, Air, Errors, Pilot, beam_errors
+from .pilot import LINES, PULSES, Errors, Pilot, beam_errors
 from .pilot_colour import colour_errors, image_seconds
 from .prior import Prior, prior_of
 
@@ -54,12 +55,12 @@ class Site(Protocol):
 
     Attributes:
         path: the scanner's.
-        air: of the scene's road.
+        conditions: of the scene's road.
         area: of the model, m2; 0 if nothing is built.
     """
 
     path: ScanPath
-    air: Air
+    conditions: ScanConditions
     area: float
 
     def models(self, limits: Mapping[str, float]) -> Sequence[ModelKnobs | None]:
@@ -333,7 +334,7 @@ class _Choice:
     def _try(self, model: ModelKnobs | None) -> _Tried:
         begin = time.perf_counter()
         scene = self.site.scene(model)
-        pilot = Pilot.on(self.scenario, scene, self.site.path, self.site.air)
+        pilot = Pilot.on(self.scenario, scene, self.site.path, self.site.conditions)
         self.tried.append(_Tried(model, pilot, time.perf_counter() - begin))
         return self.tried[-1]
 
@@ -412,7 +413,7 @@ class _Choice:
 
 def has_kind(scenario: Scenario, kind: str) -> bool:
     """Return whether points of a job have what a kind of error of colours is of: ``colour`` or ``layers``."""
-    wanted = wanted_layers(scenario)
+    wanted = coloured_layers(scenario)
     return "rgb" in wanted if kind == "colour" else bool(set(MATERIAL_LAYERS) & wanted)
 
 

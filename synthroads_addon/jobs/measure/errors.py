@@ -16,21 +16,21 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...blender.cameras import HAS_RETURN_CAMERA, ColourJob, layer_source
+from ...blender.cameras import HAS_RETURN_CAMERA, layer_source
+from ...blender.services import BlenderServices
 from ...cloud.points import PointBlock
 from ...road.geometry import RoadGeometry
-from ...road.parameters import RoadParameters
 from ...scanning.beam import RINGS
 from ...scanning.colour.colour import FROM_MATERIAL, MATERIAL_LAYERS, NEARBY, LayerValues, source_name
 from ...scanning.colour.difference import ciede2000, lab
+from ...scanning.colour.request import LayerRequest
+from ...scanning.plan import ScanPlan
+from ...scanning.record import record_as_measured
 from ...scanning.relief import adjusted, micro_relief
 from ...scanning.samples import middle
-from ...scanning.scan import BlockResult, Scan, joined_results, scan_block
+from ...scanning.scan import BlockResult, joined_results
 from ...scanning.scene.motion import ScannedScene
-from ...scanning.scene.target import Target
 from ...scenario.colour import image_scale
-from ...scenario.scenario import Scenario
-from ..scan.files import material_rows
 from .mesh_errors import mesh_height_errors
 from .tradeoff import DENSEST, TRUE_SAMPLES, Knob
 
@@ -51,24 +51,25 @@ class Sample:
     """What a row's errors are taken of.
 
     Attributes:
-        scan: of stretches of the path.
+        plan: of stretches of the path.
+        request: for the colours and layers of all of the path.
         result: its points as measured, with normals and materials, and where they were seen.
         values: their colours and layers; None without.
         written: points in the file.
-        truth: returns the scan of the same stretches with the converged footprint among all plants, or None if `scan`
+        truth: returns the plan of the same stretches with the converged footprint among all plants, or None if `plan`
             is that itself. It may build that scene in place of the one scanned.
     """
 
-    scenario: Scenario
     scene: ScannedScene
-    scan: Scan
+    plan: ScanPlan
+    request: LayerRequest
     result: BlockResult
     values: LayerValues | None
     written: int
-    truth: Callable[[], Scan | None]
+    truth: Callable[[], ScanPlan | None]
 
 
-def errors_of(knob: Knob, sample: Sample, parameters: RoadParameters, job: ColourJob) -> dict[str, Any]:
+def errors_of(knob: Knob, sample: Sample, road: RoadGeometry) -> dict[str, Any]:
     """Return ``errors`` by name of `tradeoff.ROW_TITLES`, and of colours ``colour_truth`` and ``errors_by_source``.
 
     The former is what they were compared with, the latter their errors by what gave them to the points.
@@ -76,12 +77,12 @@ def errors_of(knob: Knob, sample: Sample, parameters: RoadParameters, job: Colou
     errors: dict[str, float] = {}
     more: dict[str, Any] = {}
     if "height" in knob.errors:
-        heights = mesh_height_errors(sample.scene.static, RoadGeometry(parameters))
+        heights = mesh_height_errors(sample.scene.static, road)
         errors["height_mm"] = 1e3 * float(np.abs(heights).max())
     if "relief" in knob.errors:
         errors["relief_mm"] = _relief_error(sample)
     if "colour" in knob.errors:
-        truth, more["colour_truth"], chosen = _true_colours(knob, sample, job)
+        truth, more["colour_truth"], chosen = _true_colours(knob, sample)
         of_all, more["errors_by_source"] = _compared(sample.values, truth, chosen)
         errors |= of_all
     if "beam" in knob.errors:  # last, as its truth may be another scene
@@ -89,14 +90,10 @@ def errors_of(knob: Knob, sample: Sample, parameters: RoadParameters, job: Colou
     return {"errors": {name: round(error, 6) for name, error in errors.items()}, **more}
 
 
-def _scanned(scan: Scan) -> BlockResult:
-    return joined_results([scan_block(scan, *block) for block in scan.blocks()])
-
-
 def _beam_errors(sample: Sample) -> dict[str, float]:
     """Compare first returns with those of the converged footprint, pulse by pulse (told by their time)."""
     mine, converged = sample.result.points, sample.truth()
-    truth = mine if converged is None else _scanned(converged).points
+    truth = mine if converged is None else joined_results(record_as_measured(converged)).points
     return beam_errors(*paired(mine, truth)) | {"density_percent": 100.0 * (1.0 - sample.written / len(truth))}
 
 
@@ -116,52 +113,40 @@ def beam_errors(mine: PointBlock, truth: PointBlock) -> dict[str, float]:
     }
 
 
-def fast_target(scan: Scan, scene: ScannedScene) -> Target:
-    """Return a fast target for the truth."""
-    from ...blender.casters import make_caster
-
-    if scan.target.caster.name == "embree":
-        return scan.target
-    return Target(scene, lambda mesh: make_caster("auto", mesh))
-
-
 def _relief_error(sample: Sample) -> float:
     """Return how far the points' micro-relief is from the finest, mm, 95th percentile."""
-    scan, seen, points = sample.scan, sample.result.seen, sample.result.points
+    plan, seen, points = sample.plan, sample.result.seen, sample.result.points
     assert seen is not None
-    relief = micro_relief(scan.target.materials, material_rows(scan.target.materials))
+    if plan.relief is None:
+        relief = micro_relief(plan.target.materials, BlenderServices().materials(plan.target.materials))
+    else:
+        relief = plan.relief
     mine, finest = (
-        adjusted(points, seen.position, relief, strength, sample.scenario.seed, octaves).xyz
-        for strength, octaves in (
-            (sample.scenario.scan.relief, sample.scenario.settings().relief_octaves),
-            (1.0, _OCTAVES),
-        )
+        adjusted(points, seen.position, relief, strength, plan.seed, octaves).xyz
+        for strength, octaves in ((plan.relief_strength, plan.relief_octaves), (1.0, _OCTAVES))
     )
     return 1e3 * float(np.quantile(np.linalg.norm(mine - finest, axis=1), 0.95))
 
 
-def _true_colours(
-    knob: Knob, sample: Sample, job: ColourJob
-) -> tuple[LayerValues, str, NDArray[np.intp]]:
+def _true_colours(knob: Knob, sample: Sample) -> tuple[LayerValues, str, NDArray[np.intp]]:
     """Return colours and layers rendered as well as can be, what they are, and which points (K,) they are of."""
-    seen = sample.result.seen
+    seen, request = sample.result.seen, sample.request
     assert seen is not None
-    colour = job.scenario.to_dict() | {"source": "returns", "lighting": "direct", "samples": None}
+    settings = replace(request.settings, source="returns", lighting="direct", samples=1)
     chosen, name = np.arange(len(seen)), "a pixel per return"
     if knob.whole_paths:
-        colour |= {"lighting": "path", "samples": TRUE_SAMPLES}
+        settings = replace(settings, lighting="path", samples=TRUE_SAMPLES)
         chosen, name = chosen[::_TENTH], f"a pixel per return with {TRUE_SAMPLES} samples of whole light paths"
     elif not HAS_RETURN_CAMERA:
-        scale = image_scale(job.path.typical_range)
-        densest = {name: scale * length for name, length in DENSEST.items()}
-        colour |= {"source": "images"} | densest
-        part = middle(job.path, _MIDDLE)  # type: ignore[arg-type]
-        job = replace(job, path=part)
+        scale = image_scale(request.path.typical_range)
+        distance, spacing = (scale * DENSEST[name] for name in ("ground_sampling_distance", "image_spacing"))
+        settings = replace(settings, source="images", ground_sampling_distance=distance, image_spacing=spacing)
+        part = middle(request.path, _MIDDLE)  # type: ignore[arg-type]
+        request = replace(request, path=part)
         within = [(strip.start_time, strip.start_time + strip.duration) for strip in part.strips]
         chosen = np.flatnonzero(np.any([(low <= seen.time) & (seen.time <= high) for low, high in within], axis=0))
-        distance, spacing = densest["ground_sampling_distance"], densest["image_spacing"]
         name = f"images of {distance:g} m pixels every {spacing:g} m, of the points that these show"
-    with layer_source(replace(job, scenario=job.scenario.from_dict(colour), wanted=LAYERS)) as source:
+    with layer_source(replace(request, settings=settings, wanted=LAYERS)) as source:
         of = seen.select(chosen)
         truth = source.sample(of.position, of.scanner, of.normal, of.material, of.time, LAYERS)
     return truth, name, chosen

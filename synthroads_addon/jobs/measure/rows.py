@@ -5,27 +5,31 @@ from __future__ import annotations
 import sys
 import tempfile
 import time
+from collections.abc import Callable
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from ...base.machine import machine
-from ...base.progress import peak_memory_mb
+from ...base.progress import StageTimer, peak_memory_mb
 from ...blender.cameras import HAS_RETURN_CAMERA, layer_source, takes_returns
 from ...blender.cameras.returns import RENDERINGS_KEPT
-from ...blender.model.build import build_road
-from ...blender.scene.evaluated import scanned_scene
+from ...blender.services import BlenderServices
 from ...road.geometry import RoadGeometry
-from ...road.parameters import RoadParameters
 from ...sampling.road import sample_road
 from ...scanning.beam import RINGS
 from ...scanning.colour.colour import LayerSource, LayerValues, Targets, shares_by_source
+from ...scanning.colour.request import LayerRequest
+from ...scanning.plan import ScanPlan
+from ...scanning.record import RETURNS_AT_ONCE, record_as_measured
 from ...scanning.samples import spread
-from ...scanning.scan import BlockResult, Scan, joined_results, scan_block
+from ...scanning.scan import joined_results
 from ...scanning.scene.motion import ScannedScene
 from ...scenario.scenario import Scenario, load_scenario
-from ..scan.files import RETURNS_AT_ONCE, ScanToFiles, colour_job, make_scan, road_path
-from .errors import CONVERGED, LAYERS, Sample, errors_of, fast_target
+from ..road_scene import build_model, plan_road_scan, read_scene
+from ..scan.files import CloudFiles, ScanCounts, record_to_files
+from .errors import CONVERGED, LAYERS, Sample, errors_of
 from .tradeoff import KNOBS, row_scenario
 
 _STRETCHES, _SECONDS = 16, 0.08
@@ -45,17 +49,15 @@ def measure_row(scenario_name: str, knob: str, value: Any) -> dict[str, Any]:
     scenario = row_scenario(scenario_name, knob, value, _QUIET)
     if scenario.colour.source == "returns" and not HAS_RETURN_CAMERA:
         return {"knob": knob, "value": value, "left_out": "a pixel per return needs Blender 5.0 or newer"}
-    parameters = sample_road(scenario.road, scenario.seed)
-    geometry = RoadGeometry(parameters)
+    road = RoadGeometry(sample_road(scenario.road, scenario.seed))
     start = time.process_time()
-    settings = scenario.settings()
-    build_road(parameters, settings.tolerance, settings.vegetation_detail)
-    scene = scanned_scene(geometry=geometry, speed_factor=scenario.scan.traffic_speed_factor)
+    build_model(scenario, road)
+    scene = read_scene(scenario, road)
     built = time.process_time()
-    scan = make_scan(scenario, scene, road_path(scenario, geometry), parameters.environment)
+    plan = plan_road_scan(scenario, road, scene)
     ready = time.process_time()
     whole = load_scenario(scenario_name).vegetation_detail or 1.0
-    cost, errors = _run(scenario, knob, parameters, scene, scan, whole)
+    cost, errors = _run(scenario, knob, road, scene, plan, whole)
     return {
         "knob": knob,
         "value": value,
@@ -66,7 +68,7 @@ def measure_row(scenario_name: str, knob: str, value: Any) -> dict[str, Any]:
         "scan_seconds": round(cost.scan_seconds, 3),
         "rays_per_second": cost.rays_per_second,
         "peak_memory_mb": cost.peak_memory_mb,
-        "triangles": scan.target.triangles,
+        "triangles": plan.target.triangles,
         "images": cost.rendered.get("images", 0),
         "megapixels": round(cost.rendered.get("pixels", 0) / 1e6, 3),
         "shares": cost.shares,
@@ -96,7 +98,7 @@ class _Cost:
 
 
 def _run(
-    scenario: Scenario, knob: str, parameters: RoadParameters, scene: ScannedScene, scan: Scan, plants: float
+    scenario: Scenario, knob: str, road: RoadGeometry, scene: ScannedScene, plan: ScanPlan, plants: float
 ) -> tuple[_Cost, dict[str, Any]]:
     """Do the job on stretches of the path; return what it costs and the errors.
 
@@ -104,73 +106,78 @@ def _run(
         plants: share of the plants that the truth has.
     """
     coloured = "colour" in KNOBS[knob].errors
-    job = colour_job(scenario, scan, scene, parameters.environment)
+    request = plan.request
+    assert request is not None
     if coloured:
-        job = replace(job, wanted=LAYERS)
-    path = spread(scan.path, _STRETCHES, _SECONDS)
-    part = replace(scan, path=path)
-    result = _measured(part)
+        request = replace(request, wanted=LAYERS)
+    path = spread(plan.path, _STRETCHES, _SECONDS)
+    part = replace(plan, path=path)
+    result = joined_results(record_as_measured(part))
     start = time.process_time()
-    with layer_source(job) as source:
+    with layer_source(request) as source:
         if coloured and result.seen is not None:
             _coloured(source, result.seen.select(slice(0, _FEW)))
         prepared, rendered = time.process_time(), dict(source.report)
-        task = _to_file(scenario, part, source)
+        counts = _count_points_in_file(scenario, part, source)
         done = time.process_time()
         peak = peak_memory_mb()
         values = _coloured(source, result.seen) if coloured and result.seen is not None else None
     seconds, images = done - prepared, prepared - start
     restarts = 0
-    if coloured and takes_returns(scenario.colour):  # stretches are too few for the renderer to begin anew
-        restarts = int(task.counts.points / path.share / RETURNS_AT_ONCE / RENDERINGS_KEPT)
+    if coloured and takes_returns(request.settings):  # stretches are too few for the renderer to begin anew
+        restarts = int(counts.points / path.share / RETURNS_AT_ONCE / RENDERINGS_KEPT)
     cost = _Cost(
         image_seconds=images,
         scan_seconds=seconds / path.share + restarts * images,
-        rays_per_second=round(task.counts.rays / seconds),
+        rays_per_second=round(counts.rays / seconds),
         peak_memory_mb=peak,
         rendered=rendered,
-        shares=shares_by_source(task.counts.by_source),
+        shares=shares_by_source(counts.by_source),
     )
 
-    def truth() -> Scan | None:
-        return _truth(scenario, parameters, scene, part, plants)
+    def truth() -> ScanPlan | None:
+        return _truth(scenario, road, part, plants)
 
-    sample = Sample(scenario, scene, part, result, values, task.counts.points, truth)
-    return cost, errors_of(KNOBS[knob], sample, parameters, job)
-
-
-def _truth(
-    scenario: Scenario, parameters: RoadParameters, scene: ScannedScene, part: Scan, plants: float
-) -> Scan | None:
-    """Return the scan that counts as true, see `Sample.truth`; builds the road anew if it lacks plants."""
-    settings = scenario.settings()
-    if settings.vegetation_detail == plants:
-        if part.rays_per_pulse == CONVERGED:
-            return None
-        return replace(part, rings=RINGS[CONVERGED], target=fast_target(part, scene), targets=False)
-    build_road(parameters, settings.tolerance, plants)
-    geometry = RoadGeometry(parameters)
-    scene = scanned_scene(geometry=geometry, speed_factor=scenario.scan.traffic_speed_factor)
-    data = scenario.to_dict()
-    data["scan"] |= {"caster": "auto"}
-    scan = make_scan(Scenario.from_dict(data), scene, part.path, parameters.environment)
-    return replace(scan, rings=RINGS[CONVERGED], targets=False)
+    sample = Sample(scene, part, request, result, values, counts.points, truth)
+    return cost, errors_of(KNOBS[knob], sample, road)
 
 
-def _measured(part: Scan) -> BlockResult:
-    """Return the points, with all that errors are taken of, as they are before anything is done to them."""
-    part = replace(part, targets=True, wanted=part.wanted | {"normal", "material"})
-    return joined_results([scan_block(part, *block) for block in part.blocks()])
+def _truth(scenario: Scenario, road: RoadGeometry, part: ScanPlan, plants: float) -> ScanPlan | None:
+    """Return the plan that counts as true, see `Sample.truth`; builds the road anew if it lacks plants."""
+    detail = scenario.settings().vegetation_detail
+    if detail == plants and part.rays_per_pulse == CONVERGED:
+        return None
+    fast = scenario.model_copy(
+        update={"scan": scenario.scan.model_copy(update={"caster": "auto"}), "vegetation_detail": plants}
+    )
+    if detail != plants:
+        build_model(fast, road)
+    elif part.target.caster.name == "embree":
+        return replace(part, rings=RINGS[CONVERGED])
+    plan = plan_road_scan(fast, road, read_scene(fast, road))
+    return replace(plan, path=part.path, rings=RINGS[CONVERGED])
 
 
 def _coloured(source: LayerSource, seen: Targets) -> LayerValues:
     return source.sample(seen.position, seen.scanner, seen.normal, seen.material, seen.time, LAYERS)
 
 
-def _to_file(scenario: Scenario, part: Scan, source: LayerSource) -> ScanToFiles:
-    """Scan into a file that is thrown away."""
+class _OpenedLayers(BlenderServices):
+    """Blender's services, with a source of layers that is open already."""
+
+    def __init__(self, source: LayerSource) -> None:
+        self._source = source
+
+    def layers(
+        self, request: LayerRequest, progress: Callable[[float], None]
+    ) -> AbstractContextManager[LayerSource]:
+        """Return the open source."""
+        return nullcontext(self._source)
+
+
+def _count_points_in_file(scenario: Scenario, part: ScanPlan, source: LayerSource) -> ScanCounts:
+    """Scan into a file that is thrown away; return what was counted."""
     with tempfile.TemporaryDirectory(prefix="synthroads-") as folder:
-        task = ScanToFiles(scenario, part, source, Path(folder))
-        for _ in task.run():
-            pass
-    return task
+        files = CloudFiles(scenario, Path(folder), part.target.origin, part.path.typical_range)
+        record_to_files([replace(part, services=_OpenedLayers(source))], files, StageTimer())
+    return files.counts

@@ -196,7 +196,7 @@ def errors_afterwards(scenario: Scenario) -> dict[str, float]:
 
     def points(detail: float, rays: int) -> list[PointBlock]:
         scene = site.scene(ModelKnobs(settings.tolerance, detail))
-        pilot = Pilot.on(scenario, scene, site.path, site.air, phase=0.0, lines=160)
+        pilot = Pilot.on(scenario, scene, site.path, site.conditions, phase=0.0, lines=160)
         return [one.points for one in pilot.results(RINGS[rays], pilot.stretches())]
 
     mine = points(settings.vegetation_detail, settings.rays_per_pulse)
