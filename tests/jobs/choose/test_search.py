@@ -191,7 +191,7 @@ def errors_afterwards(scenario: Scenario) -> dict[str, float]:
     The truth has the geometric tolerance of the job: plants stand elsewhere on a mesh that is tessellated otherwise.
     """
     parameters, settings = sample_road(scenario.road, scenario.seed), scenario.settings()
-    site = RoadSite(scenario, parameters)
+    site = RoadSite(scenario, RoadGeometry(parameters))
     empty_file()
 
     def points(detail: float, rays: int) -> list[PointBlock]:
