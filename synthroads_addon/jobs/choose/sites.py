@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from typing import Protocol
 
 from ...blender.model.build import RoadModel
 from ...road.geometry import RoadGeometry
@@ -15,8 +16,30 @@ from ..scan.plan import road_path
 from .knobs import ModelKnobs, model_knobs
 
 
+class Site(Protocol):
+    """A scene that may be built in several ways.
+
+    Attributes:
+        path: the scanner's.
+        conditions: of the scene's road.
+        area: of the model, m2; 0 if nothing is built.
+    """
+
+    path: ScanPath
+    conditions: ScanConditions
+    area: float
+
+    def models(self, limits: Mapping[str, float]) -> Sequence[ModelKnobs | None]:
+        """Return the models to choose from, the cheapest first; None for a scene that is there."""
+        ...
+
+    def scene(self, model: ModelKnobs | None) -> ScannedScene:
+        """Return the scene of a model, built in place of that before."""
+        ...
+
+
 class RoadSite:
-    """A road that is built in the open file, one model in place of the other; see `jobs.choose.search.Site`.
+    """A road that is built in the open file, one model in place of the other; see `Site`.
 
     Attributes:
         model: that was built last.
@@ -43,7 +66,7 @@ class RoadSite:
 
 
 class SceneSite:
-    """A scene that is there already, of which nothing can be built otherwise; see `jobs.choose.search.Site`."""
+    """A scene that is there already, of which nothing can be built otherwise; see `Site`."""
 
     area = 0.0
 

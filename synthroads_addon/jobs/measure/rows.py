@@ -11,6 +11,9 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from ...base.machine import machine
 from ...base.progress import StageTimer, peak_memory_mb
 from ...blender.cameras import HAS_RETURN_CAMERA, layer_source, takes_returns
@@ -19,22 +22,42 @@ from ...blender.services import BlenderServices
 from ...road.geometry import RoadGeometry
 from ...sampling.road import sample_road
 from ...scanning.beam import RINGS
-from ...scanning.colour.colour import LayerSource, LayerValues, Targets, shares_by_source
+from ...scanning.colour.colour import MATERIAL_LAYERS, LayerSource, LayerValues, shares_by_source, source_name
 from ...scanning.colour.request import LayerRequest
 from ...scanning.plan import ScanPlan
 from ...scanning.record import RETURNS_AT_ONCE, record_as_measured
-from ...scanning.samples import spread
-from ...scanning.scan import joined_results
+from ...scanning.relief import micro_relief
+from ...scanning.samples import middle, spread
+from ...scanning.scan import BlockResult, joined_results
 from ...scanning.scene.motion import ScannedScene
 from ...scenario.scenario import Scenario, load_scenario
 from ..road_scene import build_model, plan_road_scan, read_scene
 from ..scan.files import CloudFiles, ScanCounts, record_to_files
-from .errors import CONVERGED, LAYERS, Sample, errors_of
-from .tradeoff import KNOBS, row_scenario
+from .errors import (
+    CONVERGED,
+    FINEST,
+    QUANTILE,
+    beam_errors,
+    colour_difference,
+    known_rows,
+    relief_errors,
+    sample_layers,
+    shift_points,
+    squared_error,
+    truest_settings,
+)
+from .mesh_errors import mesh_height_errors
+from .tradeoff import KNOBS, TRUE_SAMPLES, Knob, row_scenario
 
 _STRETCHES, _SECONDS = 16, 0.08
 """Stretches of each strip that are scanned, spread evenly over it, and the duration of each."""
 _QUIET = ("scan.noise.range_sigma=0", 'outputs=["cloud"]')
+_TENTH = 10
+"""One in so many points is compared with whole light paths."""
+_MIDDLE = 0.2
+"""Share of each strip that the densest images are rendered of."""
+LAYERS = frozenset({"rgb", *MATERIAL_LAYERS})
+"""Colours and all layers, which the rows on colours ask for."""
 _FEW = 64
 """Points that bring the scene into a renderer."""
 
@@ -44,7 +67,9 @@ def measure_row(scenario_name: str, knob: str, value: Any) -> dict[str, Any]:
 
     Times are processor seconds, which other work on the machine hardly touches: building the model, building the
     caster's tree, rendering the images, and the rest of the job - scan, colours, relief, thinning out and the file -
-    projected from stretches of the path. Errors: see `jobs.measure.errors`.
+    projected from stretches of the path. Errors: see
+    `jobs.measure.errors`; height is the largest vertical distance of 100,000 random points of the road's mesh from the
+    analytic surface, and points in the file count for the density.
     """
     scenario = row_scenario(scenario_name, knob, value, _QUIET)
     if scenario.colour.source == "returns" and not HAS_RETURN_CAMERA:
@@ -75,6 +100,30 @@ def measure_row(scenario_name: str, knob: str, value: Any) -> dict[str, Any]:
         "machine": machine({"Blender": sys.modules["bpy"].app.version_string}),
         **errors,
     }
+
+
+@dataclass(frozen=True)
+class Sample:
+    """Points of stretches of a path, of which a row's errors are taken.
+
+    Attributes:
+        scene: that was scanned.
+        plan: of the stretches.
+        request: for the colours and layers of all of the path.
+        result: the points as measured, with normals and materials, and where they were seen.
+        values: their colours and layers; None without.
+        written: points in the file.
+        truth: returns the plan of the same stretches with the converged footprint among all plants, or None if `plan`
+            is that itself. It may build that scene in place of the one scanned.
+    """
+
+    scene: ScannedScene
+    plan: ScanPlan
+    request: LayerRequest
+    result: BlockResult
+    values: LayerValues | None
+    written: int
+    truth: Callable[[], ScanPlan | None]
 
 
 @dataclass(frozen=True)
@@ -116,12 +165,12 @@ def _run(
     start = time.process_time()
     with layer_source(request) as source:
         if coloured and result.seen is not None:
-            _coloured(source, result.seen.select(slice(0, _FEW)))
+            sample_layers(source, result.seen.select(slice(0, _FEW)), LAYERS)
         prepared, rendered = time.process_time(), dict(source.report)
         counts = _count_points_in_file(scenario, part, source)
         done = time.process_time()
         peak = peak_memory_mb()
-        values = _coloured(source, result.seen) if coloured and result.seen is not None else None
+        values = sample_layers(source, result.seen, LAYERS) if coloured and result.seen is not None else None
     seconds, images = done - prepared, prepared - start
     restarts = 0
     if coloured and takes_returns(request.settings):  # stretches are too few for the renderer to begin anew
@@ -139,7 +188,7 @@ def _run(
         return _truth(scenario, road, part, plants)
 
     sample = Sample(scene, part, request, result, values, counts.points, truth)
-    return cost, errors_of(KNOBS[knob], sample, road)
+    return cost, _errors(KNOBS[knob], sample, road)
 
 
 def _truth(scenario: Scenario, road: RoadGeometry, part: ScanPlan, plants: float) -> ScanPlan | None:
@@ -158,8 +207,87 @@ def _truth(scenario: Scenario, road: RoadGeometry, part: ScanPlan, plants: float
     return replace(plan, path=part.path, rings=RINGS[CONVERGED])
 
 
-def _coloured(source: LayerSource, seen: Targets) -> LayerValues:
-    return source.sample(seen.position, seen.scanner, seen.normal, seen.material, seen.time, LAYERS)
+def _errors(knob: Knob, sample: Sample, road: RoadGeometry) -> dict[str, Any]:
+    """Return ``errors`` by name of `tradeoff.ROW_TITLES`, and of colours ``colour_truth`` and ``errors_by_source``.
+
+    The former is what they were compared with, the latter their errors by what gave them to the points.
+    """
+    errors: dict[str, float] = {}
+    more: dict[str, Any] = {}
+    if "height" in knob.errors:
+        heights = mesh_height_errors(sample.scene.static, road)
+        errors["height_mm"] = 1e3 * float(np.abs(heights).max())
+    if "relief" in knob.errors:
+        errors["relief_mm"] = 1e3 * _relief_error(sample)
+    if "colour" in knob.errors:
+        truth, more["colour_truth"], chosen = _true_colours(knob, sample)
+        of_all, more["errors_by_source"] = _colour_errors(sample.values, truth, chosen)
+        errors |= of_all
+    if "beam" in knob.errors:  # last, as its truth may be another scene
+        errors |= _beam_errors(sample)
+    return {"errors": {name: round(error, 6) for name, error in errors.items()}, **more}
+
+
+def _beam_errors(sample: Sample) -> dict[str, float]:
+    """Compare first returns with those of the converged footprint; points with those in the file."""
+    mine, plan = sample.result.points, sample.truth()
+    truth = mine if plan is None else joined_results(record_as_measured(plan)).points
+    found = beam_errors([mine], [truth])
+    return {
+        "position_mm": 1e3 * found["position"][0],
+        "intensity_percent": 100.0 * found["intensity"][0],
+        "labels_percent": 100.0 * found["labels"][0],
+        "density_percent": 100.0 * (1.0 - sample.written / len(truth)),
+    }
+
+
+def _relief_error(sample: Sample) -> float:
+    """Return how far the points' micro-relief is from the finest with full strength, m, 95th percentile."""
+    plan = sample.plan
+    materials = plan.target.materials
+    relief = plan.relief or micro_relief(materials, BlenderServices().materials(materials))
+    mine = shift_points([sample.result], relief, plan.relief_strength, plan.seed, plan.relief_octaves)
+    return relief_errors(mine, shift_points([sample.result], relief, 1.0, plan.seed, FINEST))["relief"][0]
+
+
+def _true_colours(knob: Knob, sample: Sample) -> tuple[LayerValues, str, NDArray[np.intp]]:
+    """Return colours and layers rendered as well as can be, what they are, and which points (K,) they are of."""
+    seen, request = sample.result.seen, sample.request
+    assert seen is not None
+    settings, chosen, name = truest_settings(request), np.arange(len(seen)), "a pixel per return"
+    if knob.whole_paths:
+        settings = replace(settings, lighting="path", samples=TRUE_SAMPLES)
+        chosen, name = chosen[::_TENTH], f"a pixel per return with {TRUE_SAMPLES} samples of whole light paths"
+    elif not HAS_RETURN_CAMERA:
+        part = middle(request.path, _MIDDLE)  # type: ignore[arg-type]
+        request = replace(request, path=part)
+        within = [(strip.start_time, strip.start_time + strip.duration) for strip in part.strips]
+        chosen = np.flatnonzero(np.any([(low <= seen.time) & (seen.time <= high) for low, high in within], axis=0))
+        pixel, spacing = settings.ground_sampling_distance, settings.image_spacing
+        name = f"images of {pixel:g} m pixels every {spacing:g} m, of the points that these show"
+    with layer_source(replace(request, settings=settings, wanted=LAYERS)) as source:
+        return sample_layers(source, seen.select(chosen), LAYERS), name, chosen
+
+
+def _colour_errors(
+    values: LayerValues | None, truth: LayerValues, chosen: NDArray[np.intp]
+) -> tuple[dict[str, float], dict[str, dict[str, float]]]:
+    """Return the errors of colours and layers, of all points and by what gave them to these."""
+    assert values is not None
+    mine = LayerValues({name: array[chosen] for name, array in values.arrays.items()}, values.source[chosen])
+    known = known_rows(truth)
+    difference = colour_difference(mine, truth, known)
+    squares = [squared_error(name, mine, truth, known) for name in MATERIAL_LAYERS]
+
+    def of(rows: NDArray[np.bool_]) -> dict[str, float]:
+        return {
+            "colour_median": round(float(np.median(difference[rows])), 6),
+            "colour_95": round(float(np.quantile(difference[rows], QUANTILE)), 6),
+            "layers_rmse": round(max(float(np.sqrt(square[rows].mean())) for square in squares), 6),
+        }
+
+    names = np.array([source_name(number) for number in range(256)])[mine.source[known]]
+    return of(np.ones(len(difference), bool)), {str(name): of(names == name) for name in np.unique(names)}
 
 
 class _OpenedLayers(BlenderServices):
