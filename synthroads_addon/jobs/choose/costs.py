@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from ...scanning.patterns.pattern import shot_count
+from ...scanning.devices.shots import shot_count
 from ...scanning.platforms.path import Path as ScanPath
 from ...scenario.scan import scanner_setting
 from ...scenario.scenario import Scenario
