@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..cloud.points import PointBlock
+from ..cloud.points import NO_MATERIAL, PointBlock
 from ..materials.reflectance import reflectivity, returned_share
 from ..materials.surfaces import Surfaces, brightness_of
-from .colour.colour import LayerSource, LayerValues, Targets
+from .colour.colour import LayerSource, LayerValues, Targets, sample_targets
 from .devices.device import ScannerSetting
 from .radiometry import saturated
 from .relief import MicroRelief, adjusted
@@ -73,7 +73,7 @@ class Finish:
 
     def _coloured(self, result: BlockResult, seen: Targets) -> BlockResult:
         layers = self.wanted | (_OF_INTENSITY if self.intensity_from_layers else frozenset())
-        values = self.source.sample(seen.position, seen.scanner, seen.normal, seen.material, seen.time, layers)
+        values = sample_targets(self.source, seen, layers)
         changes: dict[str, Any] = {name: values.arrays[name] for name in self.wanted}
         changes["color_source"] = values.source
         if self.intensity_from_layers:
@@ -87,14 +87,17 @@ class Finish:
     def _brighter(self, points: PointBlock, seen: Targets, values: LayerValues) -> NDArray[np.float64]:
         """Return how many times as bright points are by their own layers as by their materials' means (N,).
 
-        A return has the layers of what gave most of it. What beads and prisms send back doesn't depend on them.
+        A return has the layers of what gave most of it. What beads and prisms send back doesn't depend on them, nor
+        does what comes from the air.
         """
         own = reflectivity(*(values.arrays[name] for name in ("base_color", "metallic", "specular")))
-        factor = np.asarray(own / np.maximum(self.surfaces.reflectivity[seen.material], _DARKEST))
+        usual = np.take(self.surfaces.reflectivity, seen.material, mode="clip")
+        factor = np.asarray(own / np.maximum(usual, _DARKEST))
+        factor[seen.material == NO_MATERIAL] = 1.0
         of = self.scanned
         if not of.retroreflective:
             return factor
-        shining = np.flatnonzero(of.shining[seen.material])
+        shining = np.flatnonzero(np.append(of.shining, False).take(seen.material, mode="clip"))
         material = seen.material[shining]
         cosine = np.cos(np.deg2rad(points.incidence_deg[shining].astype(np.float64)))
         usual = brightness_of(of, material, cosine)

@@ -9,6 +9,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from ..base.random_streams import stream
 from ..cloud.points import PointBlock, concatenate
 from ..materials.surfaces import Surfaces, brightness_of
 from ..materials.texture_spread import spread_factors
@@ -16,12 +17,14 @@ from .beam import BeamPattern, beam_pattern, conical, cylindrical_offsets
 from .blocks import Block, Blocks
 from .colour.colour import Targets, joined_targets
 from .devices.device import ScannerSetting
+from .effects.apply import BothMarks, apply_effects
+from .effects.base import EchoEffect
 from .knots import Track
 from .noise import Noise
 from .platforms.path import Path, Strip
 from .pulses import Errors, Poses, Pulses, make_pulses, reaching_scene
 from .radiometry import received, saturated
-from .returns import Echoes, Marks, chosen_echoes, group_returns, number_returns
+from .returns import UNCOUNTED, Echoes, Marks, chosen_echoes, group_returns, number_returns
 from .scene.target import Target
 from .trace import Hits, Rays, Traced, trace
 
@@ -33,8 +36,6 @@ LENIENT = 0.25
 times as bright as its material's mean makes it."""
 _SPARE = 2
 """Factor on the returns of a pulse that are kept meanwhile: some are lost to the threshold later."""
-_UNCOUNTED = 1e-6
-"""Least reflectance that a hit has in a return's mean range, so that black surfaces have a range as well."""
 
 
 @dataclass(frozen=True)
@@ -43,6 +44,7 @@ class Scan:
 
     Attributes:
         attenuation: 1/m of range.
+        effects: what changes the echoes of pulses, in this order.
         wanted: names of `PointBlock`'s optional arrays to be filled.
         targets: whether to say where each point was seen, for colours and relief: `BlockResult.seen`.
         detects_later: intensities are yet to change, see `finish`: every echo that may pass the detector is kept, and
@@ -61,6 +63,7 @@ class Scan:
     seed: int
     noise: Noise = Noise()  # noqa: RUF009 (frozen)
     attenuation: float = 0.0
+    effects: tuple[EchoEffect, ...] = ()
     beam: Literal["conical", "cylindrical"] = "conical"
     wanted: frozenset[str] = frozenset()
     targets: bool = False
@@ -153,7 +156,9 @@ def scan_pulses(scan: Scan, strip: Strip, first: int, count: int, key: int = 0) 
     poses = Poses.between(scan, strip, *(scan.cut.time(strip, i) for i in (first, first + count - 1)))
     pulses = make_pulses(scan, strip, poses, errors.angle, first, count)
     number = np.arange(count)  # of each pulse within the block
-    towards = reaching_scene(scan, pulses, poses.motions)
+    # In the air, echoes come from pulses into the sky as well.
+    in_air = bool(scan.effects and scan.target.triangles)
+    towards = None if in_air else reaching_scene(scan, pulses, poses.motions)
     if towards is not None:
         number = np.flatnonzero(towards)
         pulses = pulses.select(number)
@@ -161,7 +166,18 @@ def scan_pulses(scan: Scan, strip: Strip, first: int, count: int, key: int = 0) 
     traced = trace(
         scan.target, scan.surfaces, rays, poses.motions, scan.setting.minimum_range, scan.setting.maximum_range
     )
-    echoes = echoes_of(scan, traced)
+    marks = hit_marks(scan, traced)
+    if in_air:
+        traced, marks = apply_effects(
+            scan.effects,
+            pulses,
+            traced,
+            marks,
+            scan.setting,
+            scan.attenuation,
+            lambda purpose: stream(scan.seed, purpose, strip.index, key),
+        )
+    echoes = group_returns(*marks, traced.pulse, scan.setting.range_resolution)
     if scan.surfaces.varying:
         echoes = _uneven(scan, traced, echoes, poses.motions)
     threshold = scan.setting.threshold * (LENIENT if scan.detects_later else 1.0)
@@ -193,10 +209,9 @@ def beam_rays(scan: Scan, pulses: Pulses, motions: list[Track]) -> Rays:
     return Rays(origin + offsets, direction, share, pulses.time)
 
 
-def echoes_of(scan: Scan, traced: Traced) -> Echoes:
-    """Return the returns of traced rays, before the threshold."""
-    first, behind = (_marks(scan, hits) for hits in (traced.first, traced.behind))
-    return group_returns(first, behind, traced.pulse, scan.setting.range_resolution)
+def hit_marks(scan: Scan, traced: Traced) -> BothMarks:
+    """Return what the hits of traced rays add to returns: what each ray meets first, and what lies behind."""
+    return _marks(scan, traced.first), _marks(scan, traced.behind)
 
 
 def _marks(scan: Scan, hits: Hits) -> Marks:
@@ -204,7 +219,7 @@ def _marks(scan: Scan, hits: Hits) -> Marks:
     surfaces, material = scan.surfaces, hits.material.ravel()
     brightness = brightness_of(surfaces, material, np.abs(hits.along.ravel())).reshape(hits.face.shape)
     brightness *= hits.share
-    weight = np.maximum(np.take(surfaces.reflectivity, material), _UNCOUNTED).reshape(hits.face.shape)
+    weight = np.maximum(np.take(surfaces.reflectivity, material), UNCOUNTED).reshape(hits.face.shape)
     weight *= hits.share
     return Marks(hits.distance, weight, received(brightness, hits.distance, scan.attenuation))
 
@@ -213,6 +228,8 @@ def _uneven(scan: Scan, traced: Traced, echoes: Echoes, motions: list[Track]) ->
     """Return the echoes as bright as the places are that gave most of them, see `materials.texture_spread`."""
     material = traced.pick("material", echoes.hit)
     own = np.flatnonzero(np.take(scan.surfaces.uneven, material, mode="clip"))
+    if scan.effects:
+        own = own[traced.pick("face", echoes.hit[own]) >= 0]
     if not len(own):
         return echoes
     hit = echoes.hit[own]
@@ -265,12 +282,15 @@ def _points(
     normal = None
     if scan.targets or "normal" in scan.wanted:
         normal = target.normals(face, along, pulses.time[pulse], motions)
+        if scan.effects:
+            air = np.flatnonzero(face < 0)
+            normal[:, air] = -np.take(traced.rays.direction.reshape(3, -1), traced.ray_of(hit[air]), axis=1)
     points = PointBlock(
         xyz=_places(pulses.measured_origin, pulses.measured_direction, pulse, distance, target.origin),
         intensity=intensity,
         rgb=np.zeros((len(pulse), 3), dtype=np.uint16),
-        class_id=target.class_id[face],
-        instance_id=target.instance_id[face],
+        class_id=target.of_faces("class_id", face),
+        instance_id=target.of_faces("instance_id", face),
         return_number=number,
         number_of_returns=returns,
         gps_time=pulses.time[pulse],
@@ -303,7 +323,7 @@ def _seen(
         position=np.ascontiguousarray(position.T),
         scanner=np.ascontiguousarray(scanner.T),
         normal=np.ascontiguousarray(normal.T),
-        material=target.material[face],
+        material=target.of_faces("material", face),
         time=time,
     )
 
@@ -334,4 +354,4 @@ def _optional(
     if "true_xyz" in wanted:
         yield "true_xyz", _places(pulses.origin, pulses.direction, pulse, distance, origin)
     if "material" in wanted:
-        yield "material", scan.target.material[face]
+        yield "material", scan.target.of_faces("material", face)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ...blender.cameras import HAS_RETURN_CAMERA, ColourJob, image_views, layer_source
 from ...scanning.beam import RINGS
-from ...scanning.colour.colour import FROM_MATERIAL, MATERIAL_LAYERS, NEARBY, LayerValues, Targets
+from ...scanning.colour.colour import FROM_MATERIAL, MATERIAL_LAYERS, NEARBY, LayerValues, Targets, sample_targets
 from ...scanning.colour.difference import ciede2000, lab
 from ...scanning.colour.views import View
 from ...scanning.samples import scattered
@@ -63,7 +63,7 @@ def _values(
 ) -> list[LayerValues]:
     job = replace(_job(pilot, changes, wanted), pick=lambda views: near_lines(views, lines))
     with layer_source(job) as source:
-        return [source.sample(of.position, of.scanner, of.normal, of.material, of.time, wanted) for of in lines]
+        return [sample_targets(source, of, wanted) for of in lines]
 
 
 def _job(pilot: Pilot, changes: Mapping[str, Any], wanted: frozenset[str]) -> ColourJob:

@@ -21,7 +21,7 @@ from ...cloud.points import PointBlock
 from ...road.geometry import RoadGeometry
 from ...road.parameters import RoadParameters
 from ...scanning.beam import RINGS
-from ...scanning.colour.colour import FROM_MATERIAL, MATERIAL_LAYERS, NEARBY, LayerValues, source_name
+from ...scanning.colour.colour import FROM_MATERIAL, MATERIAL_LAYERS, NEARBY, LayerValues, sample_targets, source_name
 from ...scanning.colour.difference import ciede2000, lab
 from ...scanning.relief import adjusted, micro_relief
 from ...scanning.samples import middle
@@ -163,7 +163,7 @@ def _true_colours(
         name = f"images of {distance:g} m pixels every {spacing:g} m, of the points that these show"
     with layer_source(replace(job, scenario=job.scenario.from_dict(colour), wanted=LAYERS)) as source:
         of = seen.select(chosen)
-        truth = source.sample(of.position, of.scanner, of.normal, of.material, of.time, LAYERS)
+        truth = sample_targets(source, of, LAYERS)
     return truth, name, chosen
 
 

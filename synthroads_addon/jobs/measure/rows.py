@@ -19,7 +19,7 @@ from ...road.geometry import RoadGeometry
 from ...road.parameters import RoadParameters
 from ...sampling.road import sample_road
 from ...scanning.beam import RINGS
-from ...scanning.colour.colour import LayerSource, LayerValues, Targets, shares_by_source
+from ...scanning.colour.colour import LayerSource, sample_targets, shares_by_source
 from ...scanning.samples import spread
 from ...scanning.scan import BlockResult, Scan, joined_results, scan_block
 from ...scanning.scene.motion import ScannedScene
@@ -113,12 +113,12 @@ def _run(
     start = time.process_time()
     with layer_source(job) as source:
         if coloured and result.seen is not None:
-            _coloured(source, result.seen.select(slice(0, _FEW)))
+            sample_targets(source, result.seen.select(slice(0, _FEW)), LAYERS)
         prepared, rendered = time.process_time(), dict(source.report)
         task = _to_file(scenario, part, source)
         done = time.process_time()
         peak = peak_memory_mb()
-        values = _coloured(source, result.seen) if coloured and result.seen is not None else None
+        values = sample_targets(source, result.seen, LAYERS) if coloured and result.seen is not None else None
     seconds, images = done - prepared, prepared - start
     restarts = 0
     if coloured and takes_returns(scenario.colour):  # stretches are too few for the renderer to begin anew
@@ -161,10 +161,6 @@ def _measured(part: Scan) -> BlockResult:
     """Return the points, with all that errors are taken of, as they are before anything is done to them."""
     part = replace(part, targets=True, wanted=part.wanted | {"normal", "material"})
     return joined_results([scan_block(part, *block) for block in part.blocks()])
-
-
-def _coloured(source: LayerSource, seen: Targets) -> LayerValues:
-    return source.sample(seen.position, seen.scanner, seen.normal, seen.material, seen.time, LAYERS)
 
 
 def _to_file(scenario: Scenario, part: Scan, source: LayerSource) -> ScanToFiles:

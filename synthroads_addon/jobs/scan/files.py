@@ -28,7 +28,7 @@ from ...scanning.relief import micro_relief
 from ...scanning.scan import BlockResult, Scan, joined_results, scan_block
 from ...scanning.scene.motion import ScannedScene
 from ...scanning.scene.target import Target
-from ...scanning.weather import attenuation, weather_of
+from ...scanning.weather.registry import weather_of
 from ...scenario.scan import scanner_setting
 from ...scenario.scenario import Scenario
 from .cloud_files import CloudFiles, ScanCounts
@@ -62,7 +62,8 @@ def make_scan(
     for number, name in enumerate(scene.static.materials):
         if name in own:
             rows[number] = varied(name, variation or MaterialVariation(), environment or Environment(), own)
-    rings = scenario.scan.beam_rings
+    rings, given = scenario.scan.beam_rings, scenario.scan.attenuation
+    weather = scenario.scan.weather or weather_of(environment or Environment())
     return Scan(
         target=Target(scene, lambda mesh: make_caster(scenario.scan.caster, mesh)),
         # The layers of each point have the variation of their own already.
@@ -72,7 +73,8 @@ def make_scan(
         rings=RINGS[settings.rays_per_pulse] if rings is None else rings,
         seed=scenario.seed,
         noise=scenario.scan.noise,
-        attenuation=_attenuation(scenario, environment, setting.device.wavelength_nm),
+        attenuation=weather.attenuation(setting.device.wavelength_nm) if given is None else given,
+        effects=weather.effects() if given is None else (),
         beam=scenario.scan.beam,
         wanted=measured_arrays(scenario),
         targets=needs_targets(scenario),
@@ -160,13 +162,6 @@ def material_rows(names: Sequence[str]) -> list[Material]:
     from ...blender.materials import constants
 
     return list(constants(names).values())
-
-
-def _attenuation(scenario: Scenario, environment: Environment | None, wavelength_nm: float) -> float:
-    """Return the attenuation per metre of range: given, of the scan's weather, or of the road's."""
-    if scenario.scan.attenuation is not None:
-        return scenario.scan.attenuation
-    return attenuation(scenario.scan.weather or weather_of(environment or Environment()), wavelength_nm)
 
 
 def scan_blocks(scan: Scan, threads: int = 0, finish: Finish | None = None) -> Iterator[BlockResult]:

@@ -8,6 +8,7 @@ from typing import Any
 
 import bpy
 
+from ...scanning.weather.registry import WEATHERS
 from .fields import (
     AUTOMATIC,
     ChoiceField,
@@ -193,7 +194,7 @@ RELEVANT: dict[str, Callable[[Any], bool]] = {
     "scan.platform.turn_seconds": _on("tripod"),
     "scan.platform.turn_deg": _on("tripod"),
     "scan.platform.file": _on("trajectory"),
-    "scan.weather.rate_mm_h": lambda settings: settings.scan.weather.condition in ("rain", "snow"),
+    "scan.weather.rate_mm_h": lambda settings: "rate_mm_h" in WEATHERS[settings.scan.weather.condition].model_fields,
     "colour.engine": _rendered,
     "colour.mode": lambda settings: settings.colour.rgb,
     "colour.lighting": _rendered,

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping
 from typing import Annotated, Any, Literal, Union, get_args, get_origin
 
 import bpy
-from pydantic import BaseModel
+from pydantic import BaseModel, create_model
 from pydantic.fields import FieldInfo
 
 from ...scenario.road import Interval
@@ -127,6 +127,9 @@ def make_field(path: str, info: FieldInfo, default: Any, hooks: Hooks) -> Field 
     if path in NOT_HERE:
         return None
     kind, optional = _without_none(info.annotation)
+    tag = _tag(info.annotation)
+    if tag:
+        kind = _kinds_as_one(kind, tag)
     if get_origin(kind) is Union or isinstance(kind, types.UnionType):
         models = [part for part in map(_bare, get_args(kind)) if _is_model(part)]
         if path in STANDARD_PARTS and len(models) == 1 and not optional:
@@ -203,6 +206,25 @@ def _without_none(kind: Any) -> tuple[Any, bool]:
         optional = len(parts) < len(get_args(kind))
         return (_bare(parts[0]) if len(parts) == 1 else Union[tuple(parts)]), optional  # noqa: UP007
     return kind, False
+
+
+def _tag(kind: Any) -> str:
+    """Return the field by which the models of a union differ, e.g. ``condition``; empty if it is no such union."""
+    for part in [kind, *get_args(kind)]:
+        for note in get_args(part)[1:] if get_origin(part) is Annotated else ():
+            if isinstance(note, FieldInfo) and isinstance(note.discriminator, str):
+                return note.discriminator
+    return ""
+
+
+def _kinds_as_one(union: Any, tag: str) -> type[BaseModel]:
+    """Return a model with the fields of all models of a union; what tells them apart is a choice of theirs."""
+    models = get_args(union)
+    fields = {name: (info.annotation, info) for model in reversed(models) for name, info in model.model_fields.items()}
+    first = models[0].model_fields[tag]
+    names = tuple(model.model_fields[tag].default for model in models)
+    fields[tag] = (Literal[names], FieldInfo(default=first.default, description=first.description))
+    return create_model(models[0].__name__, **fields)
 
 
 def _bare(kind: Any) -> Any:

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from typing import Any
 
 from ...road.guidelines import SECTIONS_OF_CLASS, design_class_of
+from ...scanning.weather.registry import WEATHERS
 from .fields import AUTOMATIC, own
 from .groups import BY_HAND
 from .inherited import BEGINNINGS, begin_with_inherited
@@ -48,7 +49,7 @@ def _section_for_class(road: Any, context: Any) -> None:
 
 
 def _no_rate(weather: Any, context: Any) -> None:
-    if weather.condition not in ("rain", "snow"):
+    if "rate_mm_h" not in WEATHERS[weather.condition].model_fields:
         weather.own_rate_mm_h = False
 
 

@@ -9,8 +9,8 @@ from synthroads_addon.materials.table import materials
 from synthroads_addon.scanning.beam import RINGS
 from synthroads_addon.scanning.platforms.path import Strip
 from synthroads_addon.scanning.pulses import Poses, Pulses, make_pulses
-from synthroads_addon.scanning.returns import Echoes
-from synthroads_addon.scanning.scan import Scan, beam_rays, echoes_of, scan_pulses
+from synthroads_addon.scanning.returns import Echoes, group_returns
+from synthroads_addon.scanning.scan import Scan, beam_rays, hit_marks, scan_pulses
 from synthroads_addon.scanning.scene.mesh import SceneMesh
 from synthroads_addon.scanning.scene.motion import ScannedScene
 from synthroads_addon.scanning.scene.target import Target
@@ -106,4 +106,4 @@ def echoes_and_pulses(scan: Scan, first: int, count: int) -> tuple[Echoes, Pulse
     strip = scan.path.strips[0]
     pulses = make_pulses(scan, strip, Poses.between(scan, strip, 0.0, 80.0), None, first, count)
     traced = trace(scan.target, scan.surfaces, beam_rays(scan, pulses, []), [], 0.0, scan.setting.maximum_range)
-    return echoes_of(scan, traced), pulses
+    return group_returns(*hit_marks(scan, traced), traced.pulse, scan.setting.range_resolution), pulses
