@@ -210,8 +210,8 @@ def print_tables() -> None:
     """Print the tables of the documentation."""
     print("| weather | measure | extinction at 905 nm (1/km) | at 1550 nm | left over 50 m at 905 nm | over 100 m |")
     print("|---|---|---|---|---|---|")
-    for model in WEATHERS.values():
-        _print_weather(model())
+    for condition, model in WEATHERS.items():
+        _print_weather(model(condition=condition))
     _print_weather(Fog(visibility=100))
     for rate in (5, 25, 50):
         _print_weather(Rain(rate_mm_h=rate))

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import fields, replace
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..devices.device import ScannerSetting
 from ..pulses import Pulses
@@ -79,7 +81,7 @@ def _brightness(marks: Marks, attenuation: float) -> Float:
     return np.divide(marks.intensity, white, out=np.zeros_like(white), where=white > 0.0)
 
 
-def _check(name: str, changes: EchoChanges, shape: tuple[int, int]) -> None:
+def _check(name: str, changes: EchoChanges, shape: tuple[int, ...]) -> None:
     if not len(changes.pulse) == len(changes.ray) == len(changes.distance) == len(changes.brightness):
         raise ValueError(f"effect {name}: pulse, ray, distance and brightness must be as many")
     for index, count in ((changes.ray, shape[0]), (changes.pulse, shape[1])):
@@ -124,6 +126,6 @@ def _add(
     return traced, (first, behind)
 
 
-def _joined(one: Hits | Marks, other: Hits | Marks) -> list[Float]:
+def _joined(one: Hits | Marks, other: Hits | Marks) -> list[NDArray[Any]]:
     """Return the arrays of two of a kind, one after the other."""
     return [np.concatenate([getattr(one, field.name), getattr(other, field.name)]) for field in fields(one)]

@@ -36,7 +36,7 @@ class LinePattern(Pattern):
         time = line / timing.lines_per_second + within / timing.pulse_rate
         angle = self.angles(timing, line, within - (timing.pulses_per_line - 1) / 2.0)
         angle += math.radians(self.centre_from_nadir_deg)
-        return _fan(time, angle, self.tilts(line), with_frame)
+        return make_rays(time, angle, self.tilts(line), with_frame)
 
     def angles(self, timing: PulseTiming, line: Numbers, place: Float) -> Float:
         """Return the angles (P,) of pulses from the middle of the field of view, rad.
@@ -53,7 +53,7 @@ class LinePattern(Pattern):
         return None
 
 
-def _fan(time: Float, angle: Float, forward: Float | None, with_frame: bool) -> Rays:
+def make_rays(time: Float, angle: Float, forward: Float | None, with_frame: bool) -> Rays:
     """Return rays at angles (P,) from the nadir, in planes that are tilted forward by angles (P,), None for 0.
 
     direction = cos(angle) down + sin(angle) right, where down = (sin(forward), 0, -cos(forward)).

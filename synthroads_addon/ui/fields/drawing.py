@@ -8,7 +8,6 @@ from typing import Any
 
 import bpy
 
-from ...scanning.weather.registry import WEATHERS
 from .fields import (
     AUTOMATIC,
     ChoiceField,
@@ -135,7 +134,7 @@ def _group(layout: bpy.types.UILayout, settings: Any, owner: Any, field: GroupFi
         _own(layout, settings, owner, field)
         if not getattr(owner, field.own):
             return
-    for inner in field.fields.values():
+    for inner in field.fields_in_use(owner).values():
         draw_field(layout, settings, inner)
 
 
@@ -194,7 +193,6 @@ RELEVANT: dict[str, Callable[[Any], bool]] = {
     "scan.platform.turn_seconds": _on("tripod"),
     "scan.platform.turn_deg": _on("tripod"),
     "scan.platform.file": _on("trajectory"),
-    "scan.weather.rate_mm_h": lambda settings: "rate_mm_h" in WEATHERS[settings.scan.weather.condition].model_fields,
     "colour.engine": _rendered,
     "colour.mode": lambda settings: settings.colour.rgb,
     "colour.lighting": _rendered,

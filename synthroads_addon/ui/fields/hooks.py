@@ -6,7 +6,6 @@ from collections.abc import Callable
 from typing import Any
 
 from ...road.guidelines import SECTIONS_OF_CLASS, design_class_of
-from ...scanning.weather.registry import WEATHERS
 from .fields import AUTOMATIC, own
 from .groups import BY_HAND
 from .inherited import BEGINNINGS, begin_with_inherited
@@ -48,11 +47,6 @@ def _section_for_class(road: Any, context: Any) -> None:
         road.cross_section = allowed[0]
 
 
-def _no_rate(weather: Any, context: Any) -> None:
-    if "rate_mm_h" not in WEATHERS[weather.condition].model_fields:
-        weather.own_rate_mm_h = False
-
-
 def _no_samples(colour: Any, context: Any) -> None:
     if colour.lighting == "direct":
         colour.own_samples = False
@@ -84,7 +78,6 @@ HOOKS: dict[str, Hook] = {own(path): begin_with_inherited(path) for path in BEGI
     "scan.platform.kind": _clear("own_height", "own_speed", "lateral_offsets", "stations", "file"),
     "scan.own_weather": _instead("own_weather", "own_attenuation"),
     "scan.own_attenuation": _instead("own_attenuation", "own_weather"),
-    "scan.weather.condition": _no_rate,
     "scan.weather.own_rate_mm_h": _instead("own_rate_mm_h", "own_visibility"),
     "scan.beam_rings": _no_rays,
     "scan.rays_per_pulse": _no_rings,
