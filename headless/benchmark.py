@@ -16,15 +16,15 @@ from typing import Any
 if __name__ == "__main__":
     sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
+from headless.benchmark_table import DEMO, QUICK, TABLE, judged, markdown
 from headless.commands import Outcome, add_changes_argument, add_common_arguments, entry
+from headless.marked_documents import fill
 from headless.messages import progress_bar
+from headless.waves import CELLS, write_waves
 from synthroads_addon.base.errors import InputError
 from synthroads_addon.base.files import output_folder
 from synthroads_addon.base.machine import available_cores, machine
-from synthroads_addon.base.marked_documents import fill
 from synthroads_addon.base.schema import canonical_json
-from synthroads_addon.jobs.measure.benchmark_table import DEMO, QUICK, TABLE, judged, markdown
-from synthroads_addon.jobs.measure.waves import CELLS, write_waves
 from synthroads_addon.scenario.scenario import Scenario, load_scenario
 
 _FILES = ["benchmark.json", "benchmark.md"]
@@ -80,7 +80,7 @@ def run(arguments: argparse.Namespace) -> Outcome:
 
 
 def _all(arguments: argparse.Namespace) -> dict[str, Any]:
-    """Measure every number of cores; return what `jobs.measure.benchmark_table` makes tables of."""
+    """Measure every number of cores; return what `headless.benchmark_table` makes tables of."""
     with tempfile.TemporaryDirectory(prefix="synthroads-") as folder:
         scene = Path(folder) / "waves.obj"
         triangles = write_waves(scene, _QUICK_CELLS if arguments.quick else CELLS)

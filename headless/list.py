@@ -13,12 +13,12 @@ if __name__ == "__main__":
     sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 import ml.catalogue
+from headless import catalogue
 from headless.commands import Outcome, add_common_arguments, entry
 from synthroads_addon.base.catalogue import Kind, entries
 from synthroads_addon.base.errors import InputError, nearest_name
 from synthroads_addon.base.field_list import Field, fields_of
 from synthroads_addon.base.text_table import text_table
-from synthroads_addon.jobs import catalogue
 from synthroads_addon.scenario.scenario import Scenario
 
 _FIELDS = "fields"

@@ -88,7 +88,7 @@ def _comparison(truth: Path | None) -> Callable[[RoadParameters], dict[str, Any]
 
         parameters = read_parameters(truth)
         return lambda found: compare(found, parameters)
-    from synthroads_addon.road.axis_file import read_axis
+    from synthroads_addon.road.centerline import read_axis
 
     axis = read_axis(truth)
     return lambda found: compare_axis(found, axis)
@@ -96,7 +96,7 @@ def _comparison(truth: Path | None) -> Callable[[RoadParameters], dict[str, Any]
 
 def _options(arguments: argparse.Namespace, cloud: RoadCloud, folder: Path) -> Options:
     from synthroads_addon.reconstruction.reconstruct import Options
-    from synthroads_addon.road.axis_file import read_axis
+    from synthroads_addon.road.centerline import read_axis
 
     course = read_axis(arguments.path)[:, :2] - cloud.origin[:2] if arguments.path else None
     predictor = None

@@ -15,15 +15,16 @@ if __name__ == "__main__":
     sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from headless.commands import Outcome, add_common_arguments, entry
+from headless.marked_documents import fill
 from headless.messages import progress_bar
 from headless.tradeoff_plot import plot
+from headless.tradeoff_table import markdown
 from synthroads_addon.base.errors import InputError, OutputError, nearest_name
 from synthroads_addon.base.files import write_file
-from synthroads_addon.base.marked_documents import fill
 from synthroads_addon.base.progress import Progress
 from synthroads_addon.base.schema import canonical_json, read_json
 from synthroads_addon.base.version import generator
-from synthroads_addon.jobs.measure.tradeoff import KNOBS, REPEATED, SCENES, markdown, row_scenario, rows
+from synthroads_addon.jobs.measure.tradeoff import KNOBS, REPEATED, SCENES, row_scenario, rows
 from synthroads_addon.scenario.scenario import load_scenario
 
 _ROW = "--row"

@@ -6,8 +6,9 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from headless.tradeoff_table import ROW_TITLES, measured_of
 from synthroads_addon.base.errors import InputError
-from synthroads_addon.jobs.measure.tradeoff import KNOBS, ROW_TITLES, measured_of
+from synthroads_addon.jobs.measure.tradeoff import KNOBS
 
 Row = Mapping[str, Any]
 _ORDER = list(KNOBS)

@@ -25,12 +25,12 @@ from numpy.typing import NDArray
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
+from headless.waves import waves
 from synthroads_addon.base.progress import peak_memory_mb
 from synthroads_addon.base.random_streams import stream
 from synthroads_addon.blender.casters.bvhtree import BVHTreeCaster
 from synthroads_addon.blender.casters.embree import EmbreeCaster
 from synthroads_addon.blender.casters.measure import CHUNK, agreement, bare_rate
-from synthroads_addon.jobs.measure.waves import waves
 from synthroads_addon.scanning.scene.caster import Caster
 from synthroads_addon.scanning.scene.mesh import SceneMesh
 from tools.raycast_nodes import RaycastNodesCaster

@@ -26,6 +26,7 @@ import numpy as np
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
 
+from headless.marked_documents import fill  # noqa: E402
 from ml.centerline.data.batches import DataOptions  # noqa: E402
 from ml.centerline.data.corridor import TRUTH_KINDS, TruthKind  # noqa: E402
 from ml.centerline.data.roads import Road, read_measured, read_scene, scene_folders  # noqa: E402
@@ -52,7 +53,6 @@ from ml.runs import Run  # noqa: E402
 from ml.tasks import kinds  # noqa: E402
 from synthroads_addon.base.errors import SynthRoadsError  # noqa: E402
 from synthroads_addon.base.files import write_file  # noqa: E402
-from synthroads_addon.base.marked_documents import fill  # noqa: E402
 
 Measured = dict[str, dict[str, dict[str, Spread]]]
 AnyPart = TypeVar("AnyPart", bound=Part)

@@ -22,7 +22,7 @@ mpl.use("Agg")
 import matplotlib.pyplot as plt  # noqa: E402
 
 from synthroads_addon.scanning.devices.device import Device, load_device, setting_of  # noqa: E402
-from synthroads_addon.scanning.patterns.pattern import shot_count, shots  # noqa: E402
+from synthroads_addon.scanning.devices.shots import shot_count, shots  # noqa: E402
 from synthroads_addon.scenario.scan import ScanScenario  # noqa: E402
 
 Float = NDArray[np.float64]

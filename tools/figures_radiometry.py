@@ -23,14 +23,20 @@ from synthroads_addon.materials.table import Material, materials  # noqa: E402
 from synthroads_addon.materials.variation import varied  # noqa: E402
 from synthroads_addon.road.surroundings import Environment, MaterialVariation  # noqa: E402
 from synthroads_addon.scanning.beam import RINGS, beam_pattern, conical, cylindrical_offsets  # noqa: E402
-from synthroads_addon.scanning.weather import (  # noqa: E402
-    USUAL_VISIBILITY,
-    Weather,
-    attenuation,
+from synthroads_addon.scanning.weather.base import Weather  # noqa: E402
+from synthroads_addon.scanning.weather.clear import Clear  # noqa: E402
+from synthroads_addon.scanning.weather.dust import Dust  # noqa: E402
+from synthroads_addon.scanning.weather.extinction import (  # noqa: E402
     kim_exponent,
     kruse_exponent,
     visibility_extinction,
 )
+from synthroads_addon.scanning.weather.fog import Fog  # noqa: E402
+from synthroads_addon.scanning.weather.haze import Haze  # noqa: E402
+from synthroads_addon.scanning.weather.precipitation import Precipitation  # noqa: E402
+from synthroads_addon.scanning.weather.rain import Rain  # noqa: E402
+from synthroads_addon.scanning.weather.registry import WEATHERS  # noqa: E402
+from synthroads_addon.scanning.weather.snow import Snow  # noqa: E402
 
 mpl.use("Agg")
 from matplotlib import pyplot  # noqa: E402
@@ -38,15 +44,15 @@ from matplotlib.patches import Circle  # noqa: E402
 
 BLUE, ORANGE, GREEN, RED, VIOLET, GREY = "#2a6f97", "#d9822b", "#4a8c4a", "#b3413a", "#7a5195", "#6b6b6b"
 CONDITIONS: list[tuple[str, Weather, str]] = [
-    ("clear, 23 km", Weather(condition="clear"), BLUE),
-    ("rain, 7 km", Weather(condition="rain"), "#58a4b0"),
-    ("haze, 4 km", Weather(condition="haze"), GREEN),
-    ("dust, 2 km", Weather(condition="dust"), ORANGE),
-    ("rain, 25 mm/h", Weather(condition="rain", rate_mm_h=25), "#1b4965"),
-    ("snow, 1.5 km", Weather(condition="snow"), VIOLET),
-    ("snow, 5 mm/h", Weather(condition="snow", rate_mm_h=5), "#a05195"),
-    ("fog, 400 m", Weather(condition="fog"), GREY),
-    ("fog, 100 m", Weather(condition="fog", visibility=100), "#222222"),
+    ("clear, 23 km", Clear(), BLUE),
+    ("rain, 7 km", Rain(), "#58a4b0"),
+    ("haze, 4 km", Haze(), GREEN),
+    ("dust, 2 km", Dust(), ORANGE),
+    ("rain, 25 mm/h", Rain(rate_mm_h=25), "#1b4965"),
+    ("snow, 1.5 km", Snow(), VIOLET),
+    ("snow, 5 mm/h", Snow(rate_mm_h=5), "#a05195"),
+    ("fog, 400 m", Fog(), GREY),
+    ("fog, 100 m", Fog(visibility=100), "#222222"),
 ]
 _SPECIES = ("maple", "birch", "poplar", "pine", "hawthorn", "hazel", "blackthorn")
 _ALIKE = {*(f"{species}_leaves" for species in _SPECIES), "meadow", "ryegrass", "reed"}
@@ -136,7 +142,7 @@ def weather() -> Any:
     figure, (left, right) = pyplot.subplots(1, 2, figsize=(10.5, 4.4), layout="constrained")
     ranges = np.linspace(0.0, 250.0, 300)
     for label, condition, color in CONDITIONS:
-        back = np.exp(-attenuation(condition, 905.0) * ranges)
+        back = np.exp(-condition.attenuation(905.0) * ranges)
         left.plot(ranges, 100 * back, color=color, linewidth=1.6, label=label)
     left.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), frameon=False, fontsize=8)
     left.set(xlabel="range (m)", ylabel="light left, there and back (%)", ylim=(0, 102), xlim=(0, 250))
@@ -204,13 +210,13 @@ def print_tables() -> None:
     """Print the tables of the documentation."""
     print("| weather | measure | extinction at 905 nm (1/km) | at 1550 nm | left over 50 m at 905 nm | over 100 m |")
     print("|---|---|---|---|---|---|")
-    for condition in USUAL_VISIBILITY:
-        _print_weather(Weather(condition=condition))
-    _print_weather(Weather(condition="fog", visibility=100))
+    for condition, model in WEATHERS.items():
+        _print_weather(model(condition=condition))
+    _print_weather(Fog(visibility=100))
     for rate in (5, 25, 50):
-        _print_weather(Weather(condition="rain", rate_mm_h=rate))
+        _print_weather(Rain(rate_mm_h=rate))
     for rate in (1, 5):
-        _print_weather(Weather(condition="snow", rate_mm_h=rate))
+        _print_weather(Snow(rate_mm_h=rate))
     print()
     print("| material | R | facet slope (rad) | transmission | retro-reflection | lobe (deg) | 0° | 30° | 60° | 85° |")
     print("|---|---|---|---|---|---|---|---|---|---|")
@@ -220,10 +226,11 @@ def print_tables() -> None:
 
 
 def _print_weather(weather: Weather) -> None:
-    usual = USUAL_VISIBILITY[weather.condition] if weather.visibility is None else weather.visibility
-    measure = f"{usual:,.0f} m" if weather.rate_mm_h is None else f"{weather.rate_mm_h:g} mm/h"
-    there_and_back = attenuation(weather, 905.0)
-    extinctions = [500.0 * attenuation(weather, wavelength) for wavelength in (905.0, 1550.0)]
+    usual = weather.usual_visibility if weather.visibility is None else weather.visibility
+    rate = weather.rate_mm_h if isinstance(weather, Precipitation) else None
+    measure = f"{usual:,.0f} m" if rate is None else f"{rate:g} mm/h"
+    there_and_back = weather.attenuation(905.0)
+    extinctions = [500.0 * weather.attenuation(wavelength) for wavelength in (905.0, 1550.0)]
     left = [100.0 * math.exp(-there_and_back * distance) for distance in (50.0, 100.0)]
     print(
         f"| {weather.condition} | {measure} | {extinctions[0]:.3g} | {extinctions[1]:.3g} "

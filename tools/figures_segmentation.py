@@ -21,6 +21,7 @@ from typing import Any
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
 
+from headless.marked_documents import fill  # noqa: E402
 from ml.runs import HISTORY, METRICS, PRETRAINING, Run  # noqa: E402
 from ml.segmentation.data.pack import CROP, summary  # noqa: E402
 from ml.segmentation.data.packed_file import PackReader  # noqa: E402
@@ -33,7 +34,6 @@ from ml.segmentation.scores.tables import by_class, by_test, cell  # noqa: E402
 from ml.training_loop import chosen_device  # noqa: E402
 from synthroads_addon.base.errors import InputError, SynthRoadsError  # noqa: E402
 from synthroads_addon.base.files import write_file  # noqa: E402
-from synthroads_addon.base.marked_documents import fill  # noqa: E402
 from synthroads_addon.base.schema import read_json  # noqa: E402
 
 REAL_CLOUDS = {"semantickitti": "semkitti_seq00_000000.laz", "ign": "ign_lidarhd_street.laz"}

@@ -125,8 +125,22 @@ def _fields(schema: Rule, parts: Mapping[str, Rule], outer: Field | None) -> Ite
         inner = [parts[class_of(choice)] for choice in _choices(rule) if "$ref" in choice]
         made = _field(name, rule, schema, inner, outer)
         yield made
-        for part in inner:
+        for part in _kinds_as_one(inner):
             yield from _fields(part, parts, made)
+
+
+def _kinds_as_one(classes: Sequence[Rule]) -> Sequence[Rule]:
+    """Return classes, a field being of one of them, as one: the constants by which they differ become a choice."""
+    if len(classes) < 2:
+        return classes
+    properties: dict[str, Rule] = {}
+    for name, rule in ((name, rule) for one in classes for name, rule in one["properties"].items()):
+        known = properties.setdefault(name, rule)
+        if "const" in rule:
+            values = [*known.get("enum", []), rule["const"]]
+            properties[name] = {key: value for key, value in known.items() if key != "const"} | {"enum": values}
+    required = set.intersection(*(set(one.get("required", ())) for one in classes))
+    return [{"properties": properties, "required": required}]
 
 
 def _field(name: str, rule: Rule, schema: Rule, inner: Sequence[Rule], outer: Field | None) -> Field:
@@ -161,7 +175,8 @@ def _field(name: str, rule: Rule, schema: Rule, inner: Sequence[Rule], outer: Fi
 
 def _choices(rule: Rule) -> Sequence[Rule]:
     """Return the rules of which a field follows one."""
-    return rule.get("anyOf") or rule.get("oneOf") or [rule]
+    several = rule.get("anyOf") or rule.get("oneOf")
+    return [inner for choice in several for inner in _choices(choice)] if several else [rule]
 
 
 def _limits(rule: Rule) -> dict[str, float]:

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from ..base.errors import InputError
 from ..base.thresholds import otsu
-from ..road.axis_file import read_axis
+from ..road.centerline import read_axis
 from .classes import RealClass, RealCloud, points_of
 
 Float = NDArray[np.float64]

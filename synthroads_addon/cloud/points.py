@@ -8,6 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+NO_MATERIAL = 65535
+"""`PointBlock.material` of points in the air, which lie on no surface."""
+
 
 @dataclass(frozen=True)
 class PointBlock:
@@ -29,7 +32,7 @@ class PointBlock:
 
     Only where something asks for them, else None:
         normal: (N, 3) float32 unit normals towards the scanner.
-        material: (N,) uint16 index into the scene mesh's materials.
+        material: (N,) uint16 index into the scene mesh's materials; `NO_MATERIAL` in the air.
         scanner: (N, 3) float64 map coordinates of where the pulse left the scanner.
         true_range: (N,) float64 without any error, m.
         true_xyz: (N, 3) float64 without any error.

@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 
 from ..base.errors import InputError
 from ..road.alignment import Alignment, Element, FloatArray, IntArray, finite_array
-from ..road.axis_file import read_axis
+from ..road.centerline import read_axis
 from ..road.profile import IntersectionPoint, Profile
 from .chain import FREE, Chain, Data, Fit, Heights, Plan, elevations, refine
 from .search import Goal, descent, improved, independent

@@ -8,7 +8,7 @@ from __future__ import annotations
 import time
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -18,12 +18,8 @@ from ..base.errors import InputError
 from ..base.files import output_folder
 from ..base.progress import Progress, StageTimer, silent
 from ..base.schema import read_json
-from ..blender.model.store import open_road
-from ..blender.scene.evaluated import scanned_scene
-from ..blender.scene.foreign import UpAxis, check_scene_file, open_scene, open_scene_warnings
-from ..blender.services import BlenderServices
 from ..cloud.tools.previews import TopView
-from ..road.axis_file import read_axis
+from ..road.centerline import read_axis
 from ..road.geometry import RoadGeometry
 from ..road.parameters import RoadParameters
 from ..scanning.plan import ScanConditions
@@ -36,12 +32,12 @@ from ..scanning.scene.mesh import SceneMesh
 from ..scanning.scene.motion import ScannedScene
 from ..scenario.scan import scanner_setting
 from ..scenario.scenario import Output, Scenario
-from .choose import search
-from .choose.search import decide
-from .choose.sites import SceneSite
 from .report import file_names, report_footer, report_header, write_report
 from .scan.files import CloudFiles, record_to_files
 from .scan.plan import plan_scan, road_view
+
+if TYPE_CHECKING:
+    from ..blender.scene.foreign import UpAxis
 
 OUTPUTS: tuple[Output, ...] = ("cloud", "previews")
 """What a scan of a scene writes beside ``report.json``, as far as the scenario asks for it."""
@@ -94,6 +90,12 @@ def scan_scene(job: SceneScan, progress: Progress = silent) -> dict[str, Any]:
     Raises:
         InputError: an input is wrong or the output can't be written; nothing is left half-written.
     """
+    # Blender takes a second to start: whoever imports the names of this module needs none.
+    from ..blender.scene.foreign import open_scene
+    from ..blender.services import BlenderServices
+    from .choose.search import decide
+    from .choose.sites import SceneSite
+
     begun = job.begun or time.perf_counter()
     mapping = check_scene_scan(job)
     scenario = job.scenario
@@ -126,6 +128,9 @@ def scan_scene(job: SceneScan, progress: Progress = silent) -> dict[str, Any]:
 
 def check_scene_scan(job: SceneScan) -> ClassMapping | None:
     """Refuse a job that can't be done before any work starts; return the classes by name."""
+    from ..blender.scene.foreign import check_scene_file  # see `scan_scene`
+    from .choose import search
+
     search.check(job.scenario, foreign=True)
     platform = job.scenario.scan.platform
     if job.scene is not None:
@@ -153,6 +158,10 @@ def check_scene_scan(job: SceneScan) -> ClassMapping | None:
 
 def _read(job: SceneScan, mapping: ClassMapping | None) -> _Read:
     """Return the open scene's triangles and road; refuse a scene in which there is nothing to scan."""
+    from ..blender.model.store import open_road  # see `scan_scene`
+    from ..blender.scene.evaluated import scanned_scene
+    from ..blender.scene.foreign import open_scene_warnings
+
     road = open_road()
     if road and job.origin is not None:
         raise InputError("--origin", list(job.origin), "can't be given: the road in the scene has one of its own")

@@ -1,13 +1,201 @@
-"""The centreline as GeoJSON in map coordinates."""
+"""Centrelines in files: a road's as GeoJSON in map coordinates, and a measured axis from CSV or GeoJSON.
+
+Every fault of a file that is read is one line that names the file, the line and the value.
+"""
 
 from __future__ import annotations
 
+import csv
+import json
+import math
+import os
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..base.errors import InputError
+from ..base.files import read_text
+from .alignment import FloatArray
 from .geometry import RoadGeometry
+
+FARTHEST = 1e8
+"""Largest coordinate of a map, m: the reach of `RoadScenario.map_origin`."""
+_LONGEST_STEP = 20_000.0
+_LONG_STEP, _SHARPEST = 500.0, -0.5
+"""Points (m) so far apart don't lie in a bend, least of all one by more than 120 degrees (its cosine)."""
+_TWO = "at least two distinct points are needed"
+
+
+def read_axis(path: str | os.PathLike[str]) -> FloatArray:
+    """Return the points (N, 3) of an axis, m, in the file's order.
+
+    CSV (comma, semicolon, tab or spaces): with a header that names at least x and y (z optional, other columns
+    ignored, any order, any case), or without one as x, y and, optionally, z. Empty lines and lines that begin with #
+    are skipped. GeoJSON: a LineString, alone, as a Feature, or as the only feature of a collection. Without z the
+    elevation is 0. Coordinates are metres of a projected system; longitudes and latitudes are refused.
+
+    Raises:
+        MissingFileError: the file doesn't exist or cannot be read.
+        InputError: anything in it is not as above, or there are fewer than two distinct points.
+    """
+    name = os.fspath(path)
+    kind = "this is no text: CSV with columns x, y, z or GeoJSON is needed"
+    text = read_text(name, kind, "an axis file is needed here", encoding="utf-8-sig")
+    rows = _read_json(name, text) if text.lstrip().startswith(("{", "[")) else _read_csv(name, text)
+    points = np.array(rows, dtype=np.float64).reshape(-1, 3)
+    if len(np.unique(points[:, :2], axis=0)) < 2:
+        raise InputError(name, None, f"{_TWO}, the file has {len(points)} points in all")
+    _refuse_slips(name, points)
+    return points
+
+
+def _refuse_slips(name: str, points: FloatArray) -> None:
+    """Refuse a point (of N, 3) far from its neighbours: it lacks a digit, and the fit would look for a road there."""
+    steps = np.diff(points[:, :2], axis=0)
+    length = np.hypot(*steps.T)
+    if length.max() > _LONGEST_STEP:
+        place = int(length.argmax())
+        allowed = f"is {length[place] / 1000.0:.0f} km from the point before, at most {_LONGEST_STEP / 1000.0:g} km"
+        raise InputError(f"{name}: point {place + 2}", points[place + 1].tolist(), allowed)
+    moved = np.flatnonzero(length > 0.0)
+    before, after = steps[moved[:-1]], steps[moved[1:]]
+    cosine = (before * after).sum(axis=1) / (length[moved[:-1]] * length[moved[1:]])
+    back = (cosine < _SHARPEST) & (np.maximum(length[moved[:-1]], length[moved[1:]]) > _LONG_STEP)
+    if back.any():
+        place = int(moved[1:][back.argmax()])
+        allowed = f"the axis turns back after a step of more than {_LONG_STEP:g} m: is a digit of a point missing?"
+        raise InputError(f"{name}: point {place + 1}", points[place].tolist(), allowed)
+
+
+def _read_csv(name: str, text: str) -> list[tuple[float, float, float]]:
+    lines = [(number, line) for number, line in enumerate(text.splitlines(), 1) if line.strip()]
+    lines = [(number, line) for number, line in lines if not line.lstrip().startswith("#")]
+    if not lines:
+        raise InputError(name, None, f"the file is empty: {_TWO}")
+    separator = next((mark for mark in (";", ",", "\t") if mark in lines[0][1]), " ")
+    head = fields_of(lines[0][1], separator, f"{name}:{lines[0][0]}")
+    columns, body = [0, 1, 2], lines
+    if not all(_is_number(entry) for entry in head):
+        columns, body = _columns(f"{name}:{lines[0][0]}", head), lines[1:]
+    elif len(head) < 2:
+        raise InputError(f"{name}:{lines[0][0]}", lines[0][1], "x, y and, optionally, z are needed")
+    elif len(head) == 2:
+        columns = [0, 1]
+    places = ((f"{name}:{number}", line) for number, line in body)
+    return [_row(place, fields_of(line, separator, place), columns) for place, line in places]
+
+
+def fields_of(line: str, separator: str, place: str) -> list[str]:
+    """Return the entries of a line of CSV.
+
+    Args:
+        line: the line; a record of several lines isn't known here.
+        separator: between entries; a space stands for any number of them.
+        place: file and number of the line, for messages.
+
+    Raises:
+        InputError: an entry is longer than any number or name.
+    """
+    if separator == " ":
+        return line.split()
+    try:
+        return [entry.strip() for entry in next(csv.reader([line], delimiter=separator))]
+    except csv.Error as error:
+        raise InputError(place, line, f"a line of CSV is needed ({error})") from None
+
+
+def _is_number(entry: str) -> bool:
+    try:
+        float(entry)
+    except ValueError:
+        return False
+    return True
+
+
+def _columns(place: str, head: list[str]) -> list[int]:
+    """Return the places of x, y and, where there is one, z."""
+    names = [entry.lower() for entry in head]
+    for wanted in ("x", "y"):
+        if wanted not in names:
+            raise InputError(place, ", ".join(head), f"a header with columns x, y (z optional): {wanted} is missing")
+    for wanted in ("x", "y", "z"):
+        if names.count(wanted) > 1:
+            raise InputError(place, ", ".join(head), f"each column once: {wanted} is there {names.count(wanted)} times")
+    return [names.index(wanted) for wanted in ("x", "y", "z") if wanted in names]
+
+
+def _row(place: str, entries: list[str], columns: list[int]) -> tuple[float, float, float]:
+    if len(entries) <= max(columns):
+        allowed = f"at least {max(columns) + 1} columns are needed, this line has {len(entries)}"
+        raise InputError(place, " ".join(entries), allowed)
+    return _point(place, [entries[column] for column in columns])
+
+
+def _point(place: str, entries: list[object]) -> tuple[float, float, float]:
+    values = []
+    for axis, entry in zip("xyz", entries, strict=False):
+        try:
+            value = math.nan if isinstance(entry, bool) else float(entry)  # type: ignore[arg-type]
+        except (TypeError, ValueError, OverflowError):
+            value = math.nan
+        if not abs(value) <= FARTHEST:
+            raise InputError(f"{place} {axis}", entry, f"a finite number of at most {FARTHEST:g} m is needed")
+        values.append(value)
+    return values[0], values[1], values[2] if len(values) > 2 else 0.0
+
+
+def _read_json(name: str, text: str) -> list[tuple[float, float, float]]:
+    try:
+        document = json.loads(text)
+    except json.JSONDecodeError as error:
+        raise InputError(f"{name}:{error.lineno}", None, f"valid JSON is needed ({error.msg})") from None
+    except (ValueError, RecursionError) as error:  # numbers of thousands of digits, brackets within brackets
+        raise InputError(name, None, f"valid JSON is needed ({error})") from None
+    lines = list(_line_strings(name, document))
+    if len(lines) != 1:
+        raise InputError(name, len(lines), "exactly one LineString is needed")
+    coordinates = lines[0].get("coordinates")
+    if not isinstance(coordinates, list):
+        raise InputError(f"{name} coordinates", coordinates, "a list of positions is needed")
+    rows = []
+    for number, position in enumerate(coordinates):
+        place = f"{name} coordinates[{number}]"
+        if not isinstance(position, list) or len(position) < 2:
+            raise InputError(place, position, "a list of two or three numbers is needed")
+        rows.append(_point(place, position))
+    _refuse_degrees(name, document, rows)
+    return rows
+
+
+def _line_strings(name: str, node: object) -> Iterator[dict[str, Any]]:
+    """Yield every LineString in a GeoJSON document; refuse what is no GeoJSON and lines of several parts."""
+    member = node if isinstance(node, dict) else {}
+    kind = member.get("type")
+    if kind == "FeatureCollection" and isinstance(member.get("features"), list):
+        for feature in member["features"]:
+            yield from _line_strings(name, feature)
+    elif kind == "Feature":
+        if member.get("geometry") is not None:
+            yield from _line_strings(name, member["geometry"])
+    elif kind == "LineString":
+        yield member
+    elif kind == "MultiLineString":
+        raise InputError(f"{name} type", kind, "one LineString is needed, in one part")
+    elif kind not in ("Point", "MultiPoint", "Polygon", "MultiPolygon"):
+        raise InputError(f"{name} type", kind, "GeoJSON with a LineString is needed")
+
+
+def _refuse_degrees(name: str, document: dict[str, Any], rows: list[tuple[float, float, float]]) -> None:
+    """Refuse geographic coordinates: by the file's own word, or where it says nothing, by their size and extent."""
+    system = json.dumps(document.get("crs")) if document.get("crs") else ""
+    said = any(word in system for word in ("CRS84", "4326", "4258"))
+    plan = np.array(rows).reshape(-1, 3)[:, :2]
+    seems = len(plan) > 0 and bool((np.abs(plan) <= (180.0, 90.0)).all()) and np.ptp(plan, axis=0).max() < 2.0
+    if said or (not system and seems):
+        first = list(rows[0][:2]) if rows else None
+        raise InputError(f"{name} coordinates", first, "metres of a projected system are needed, not degrees")
 
 
 def centerline_geojson(geometry: RoadGeometry, stations: NDArray[np.float64]) -> dict[str, Any]:

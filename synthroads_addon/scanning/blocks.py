@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from .devices.device import ScannerSetting
-from .patterns.pattern import shot_count, shots
+from .devices.shots import shot_count, shots
 from .platforms.path import Path, Strip
 
 RAYS_PER_BLOCK = 2**18

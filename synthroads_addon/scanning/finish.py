@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..cloud.points import PointBlock
+from ..cloud.points import NO_MATERIAL, PointBlock
 from ..materials.reflectance import reflectivity, returned_share
 from ..materials.surfaces import brightness_of
-from .colour.colour import LayerSource, LayerValues, Targets
+from .colour.colour import LayerSource, LayerValues, Targets, sample_targets
 from .devices.device import ScannerSetting
 from .plan import ScanPlan
 from .radiometry import saturated
@@ -48,7 +48,7 @@ def finish(plan: ScanPlan, source: LayerSource, result: BlockResult) -> BlockRes
 def _with_layers(plan: ScanPlan, source: LayerSource, result: BlockResult, seen: Targets) -> BlockResult:
     """Return a block with its points' colours and layers, and with the intensities that follow from these."""
     layers = plan.coloured | (_OF_INTENSITY if plan.detects_later else frozenset())
-    values = source.sample(seen.position, seen.scanner, seen.normal, seen.material, seen.time, layers)
+    values = sample_targets(source, seen, layers)
     changes: dict[str, Any] = {name: values.arrays[name] for name in plan.coloured}
     changes["color_source"] = values.source
     if plan.detects_later:
@@ -65,15 +65,18 @@ def _relative_brightness(
 ) -> NDArray[np.float64]:
     """Return how many times as bright points are by their own layers as by their materials' means (N,).
 
-    A return has the layers of what gave most of it. What beads and prisms send back doesn't depend on them.
+    A return has the layers of what gave most of it. What beads and prisms send back doesn't depend on them, nor does
+    what comes from the air.
     """
     assert plan.means is not None
     own = reflectivity(*(values.arrays[name] for name in ("base_color", "metallic", "specular")))
-    factor = np.asarray(own / np.maximum(plan.means.reflectivity[seen.material], _DARKEST))
+    usual = np.take(plan.means.reflectivity, seen.material, mode="clip")
+    factor = np.asarray(own / np.maximum(usual, _DARKEST))
+    factor[seen.material == NO_MATERIAL] = 1.0
     of = plan.surfaces
     if not of.retroreflective:
         return factor
-    shining = np.flatnonzero(of.shining[seen.material])
+    shining = np.flatnonzero(np.append(of.shining, False).take(seen.material, mode="clip"))
     material = seen.material[shining]
     cosine = np.cos(np.deg2rad(points.incidence_deg[shining].astype(np.float64)))
     usual = brightness_of(of, material, cosine)

@@ -19,6 +19,7 @@ from .blocks import Block, Blocks
 from .colour.colour import LayerSource
 from .colour.request import LayerRequest
 from .devices.device import ScannerSetting
+from .effects.base import EchoEffect
 from .noise import Noise
 from .platforms.path import Path, Strip
 from .relief import MicroRelief
@@ -82,6 +83,7 @@ class ScanPlan:
         rings: rays on each ring around the beam's axis.
         seed: of everything random.
         attenuation: 1/m of range.
+        effects: what changes the echoes of pulses, in this order.
         wanted: names of the optional per-point layers that the scan itself fills.
         targets: whether to say where each point was seen, for colours and relief: `BlockResult.seen`.
         detects_later: intensities are yet to change, see `finish`: every echo that may pass the detector is kept, and
@@ -111,6 +113,7 @@ class ScanPlan:
     seed: int
     noise: Noise = Noise()  # noqa: RUF009 (frozen)
     attenuation: float = 0.0
+    effects: tuple[EchoEffect, ...] = ()
     beam: Literal["conical", "cylindrical"] = "conical"
     wanted: frozenset[str] = frozenset()
     targets: bool = False

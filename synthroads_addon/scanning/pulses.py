@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..base.random_streams import stream
+from .devices.shots import shots
 from .knots import Track
 from .noise import TrajectoryNoise, measured_pose
-from .patterns.pattern import shots
 from .plan import ScanPlan
 from .platforms.path import Strip
 
@@ -119,7 +119,7 @@ class Pulses:
 
     Attributes:
         time: (P,) s since the first strip's start.
-        scan_angle: (P,) rad, see `pattern.Shots`.
+        scan_angle: (P,) rad, see `shots.Shots`.
         origin: (3, P) where each leaves the scanner, m.
         direction: (3, P) unit vectors of the beam's axis.
         in_plane: (3, P) unit vectors across the beam, in the scan plane; None for a single ray.

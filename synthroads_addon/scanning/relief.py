@@ -151,7 +151,8 @@ def adjusted(
         return points
     if points.normal is None or points.material is None:
         raise ValueError("the roughness adjustment needs the points' normals and materials")
-    found = np.flatnonzero(relief.amplitude[points.material])
+    # Points in the air, whose number is beyond all materials', have none.
+    found = np.flatnonzero(np.take(np.append(relief.amplitude, 0.0), points.material, mode="clip"))
     if len(found) == 0:
         return points
     rough = found if len(found) < len(points) else slice(None)

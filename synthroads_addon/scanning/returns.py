@@ -10,6 +10,9 @@ from numpy.typing import NDArray
 Float = NDArray[np.float64]
 Index = NDArray[np.intp]
 
+UNCOUNTED = 1e-6
+"""Least reflectance that a hit has in a return's mean range, so that black surfaces have a range as well."""
+
 
 @dataclass(frozen=True)
 class Echoes:

@@ -9,9 +9,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..base.random_streams import stream
 from ..cloud.points import PointBlock, concatenate
 from ..materials.surfaces import brightness_of
 from ..materials.texture_spread import spread_factors
+from .apply_effects import BothMarks, apply_effects
 from .beam import conical, cylindrical_offsets
 from .colour.colour import Targets, joined_targets
 from .knots import Track
@@ -19,7 +21,7 @@ from .plan import ScanPlan
 from .platforms.path import Strip
 from .pulses import Errors, Poses, Pulses, make_pulses, reaching_scene
 from .radiometry import received, saturated
-from .returns import Echoes, Marks, chosen_echoes, group_returns, number_returns
+from .returns import UNCOUNTED, Echoes, Marks, chosen_echoes, group_returns, number_returns
 from .trace import Hits, Rays, Traced, trace
 
 Float = NDArray[np.float64]
@@ -28,8 +30,6 @@ Index = NDArray[np.intp]
 LENIENT = 0.25
 """Share of the threshold that is enough for an echo whose intensity is yet to change: none is expected to become four
 times as bright as its material's mean makes it."""
-_UNCOUNTED = 1e-6
-"""Least reflectance that a hit has in a return's mean range, so that black surfaces have a range as well."""
 
 
 @dataclass(frozen=True)
@@ -88,7 +88,9 @@ def scan_pulses(scan: ScanPlan, strip: Strip, first: int, count: int, key: int =
     poses = Poses.between(scan, strip, *(scan.cut.time(strip, i) for i in (first, first + count - 1)))
     pulses = make_pulses(scan, strip, poses, errors.angle, first, count)
     number = np.arange(count)  # of each pulse within the block
-    towards = reaching_scene(scan, pulses, poses.motions)
+    # In the air, echoes come from pulses into the sky as well.
+    in_air = bool(scan.effects and scan.target.triangles)
+    towards = None if in_air else reaching_scene(scan, pulses, poses.motions)
     if towards is not None:
         number = np.flatnonzero(towards)
         pulses = pulses.select(number)
@@ -96,7 +98,18 @@ def scan_pulses(scan: ScanPlan, strip: Strip, first: int, count: int, key: int =
     traced = trace(
         scan.target, scan.surfaces, rays, poses.motions, scan.setting.minimum_range, scan.setting.maximum_range
     )
-    echoes = echoes_of(scan, traced)
+    marks = hit_marks(scan, traced)
+    if in_air:
+        traced, marks = apply_effects(
+            scan.effects,
+            pulses,
+            traced,
+            marks,
+            scan.setting,
+            scan.attenuation,
+            lambda purpose: stream(scan.seed, purpose, strip.index, key),
+        )
+    echoes = group_returns(*marks, traced.pulse, scan.setting.range_resolution)
     if scan.surfaces.varying:
         echoes = _uneven(scan, traced, echoes, poses.motions)
     threshold = scan.setting.threshold * (LENIENT if scan.detects_later else 1.0)
@@ -128,10 +141,9 @@ def beam_rays(scan: ScanPlan, pulses: Pulses, motions: list[Track]) -> Rays:
     return Rays(origin + offsets, direction, share, pulses.time)
 
 
-def echoes_of(scan: ScanPlan, traced: Traced) -> Echoes:
-    """Return the returns of traced rays, before the threshold."""
-    first, behind = (_marks(scan, hits) for hits in (traced.first, traced.behind))
-    return group_returns(first, behind, traced.pulse, scan.setting.range_resolution)
+def hit_marks(scan: ScanPlan, traced: Traced) -> BothMarks:
+    """Return what the hits of traced rays add to returns: what each ray meets first, and what lies behind."""
+    return _marks(scan, traced.first), _marks(scan, traced.behind)
 
 
 def _marks(scan: ScanPlan, hits: Hits) -> Marks:
@@ -139,7 +151,7 @@ def _marks(scan: ScanPlan, hits: Hits) -> Marks:
     surfaces, material = scan.surfaces, hits.material.ravel()
     brightness = brightness_of(surfaces, material, np.abs(hits.along.ravel())).reshape(hits.face.shape)
     brightness *= hits.share
-    weight = np.maximum(np.take(surfaces.reflectivity, material), _UNCOUNTED).reshape(hits.face.shape)
+    weight = np.maximum(np.take(surfaces.reflectivity, material), UNCOUNTED).reshape(hits.face.shape)
     weight *= hits.share
     return Marks(hits.distance, weight, received(brightness, hits.distance, scan.attenuation))
 
@@ -148,6 +160,8 @@ def _uneven(scan: ScanPlan, traced: Traced, echoes: Echoes, motions: list[Track]
     """Return the echoes as bright as the places are that gave most of them, see `materials.texture_spread`."""
     material = traced.pick("material", echoes.hit)
     own = np.flatnonzero(np.take(scan.surfaces.uneven, material, mode="clip"))
+    if scan.effects:
+        own = own[traced.pick("face", echoes.hit[own]) >= 0]
     if not len(own):
         return echoes
     hit = echoes.hit[own]
@@ -200,12 +214,15 @@ def _points(
     normal = None
     if scan.targets or "normal" in scan.wanted:
         normal = target.normals(face, along, pulses.time[pulse], motions)
+        if scan.effects:
+            air = np.flatnonzero(face < 0)
+            normal[:, air] = -np.take(traced.rays.direction.reshape(3, -1), traced.ray_of(hit[air]), axis=1)
     points = PointBlock(
         xyz=_places(pulses.measured_origin, pulses.measured_direction, pulse, distance, target.origin),
         intensity=intensity,
         rgb=np.zeros((len(pulse), 3), dtype=np.uint16),
-        class_id=target.class_id[face],
-        instance_id=target.instance_id[face],
+        class_id=target.of_faces("class_id", face),
+        instance_id=target.of_faces("instance_id", face),
         return_number=number,
         number_of_returns=returns,
         gps_time=pulses.time[pulse],
@@ -238,7 +255,7 @@ def _seen(
         position=np.ascontiguousarray(position.T),
         scanner=np.ascontiguousarray(scanner.T),
         normal=np.ascontiguousarray(normal.T),
-        material=target.material[face],
+        material=target.of_faces("material", face),
         time=time,
     )
 
@@ -269,4 +286,4 @@ def _optional(
     if "true_xyz" in wanted:
         yield "true_xyz", _places(pulses.origin, pulses.direction, pulse, distance, origin)
     if "material" in wanted:
-        yield "material", scan.target.material[face]
+        yield "material", scan.target.of_faces("material", face)

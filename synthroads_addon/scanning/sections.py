@@ -18,7 +18,7 @@ from ..road.geometry import RoadGeometry
 from ..road.parameters import Overpass, Vegetation
 from ..road.surface import surface_elevation
 from .blocks import Block, Blocks
-from .patterns.pattern import shots
+from .devices.shots import shots
 from .platforms.path import Strip
 
 Float = NDArray[np.float64]

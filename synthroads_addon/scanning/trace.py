@@ -46,7 +46,7 @@ class Hits:
     """Surfaces that rays meet; all arrays have one shape.
 
     Attributes:
-        face: number among all faces of the target; -1 for none.
+        face: number among all faces of the target; -1 for none, as in the air where an effect has added an echo.
         material: of the face; any for none. As wide as indices are: looking tables up is several times faster then.
         distance: range from the ray's origin, m; inf for none, or where it is out of the device's reach.
         along: n . d of the face's normal and the ray.

@@ -10,7 +10,7 @@ from ..base.schema import quantity
 from ..scanning.devices.device import DeviceChoice, ScannerSetting, load_device, setting_of
 from ..scanning.noise import Noise
 from ..scanning.platforms.platform import Platform
-from ..scanning.weather import Weather
+from ..scanning.weather.registry import WeatherModel
 
 _RingRays = Annotated[int, Field(ge=3, le=60)]
 
@@ -30,7 +30,7 @@ class ScanScenario(DeviceChoice):
     attenuation: float | None = quantity(
         None, ge=0, le=1, unit="1/m", description="Attenuation per metre of range (there and back); else the weather's."
     )
-    weather: Weather | None = Field(None, description="Weather; the road's own if not given.")
+    weather: WeatherModel | None = Field(None, description="Weather; the road's own if not given.")
     rays_per_pulse: Literal[1, 7, 19, 37, 61] | None = Field(
         None, description="Rays that sample a pulse's footprint; the fidelity's if not given."
     )

@@ -9,7 +9,7 @@ import pytest
 
 from headless.cli import main
 from synthroads_addon.reconstruction.comparison import compare_axis
-from synthroads_addon.road.axis_file import read_axis
+from synthroads_addon.road.centerline import read_axis
 from synthroads_addon.road.geometry import RoadGeometry
 from synthroads_addon.road.parameters import read_parameters
 from tests.helpers.clouds.road_clouds import cloud_of, road, write

@@ -16,13 +16,13 @@ from synthroads_addon.base.errors import InputError
 from synthroads_addon.blender.services import BlenderServices
 from synthroads_addon.cloud.points import concatenate
 from synthroads_addon.jobs.generate import FILES, Job, generate
-from synthroads_addon.jobs.measure.mesh_errors import misplaced_points
 from synthroads_addon.jobs.scan.plan import plan_scan, road_path
 from synthroads_addon.road.geometry import RoadGeometry
 from synthroads_addon.road.parameters import read_parameters
 from synthroads_addon.scanning.pulses import Poses, make_pulses
 from synthroads_addon.scanning.scan import scan_block
 from synthroads_addon.scenario.scenario import load_scenario
+from tests.helpers.label_truth import misplaced_points
 
 ROOT = Path(__file__).parents[2]
 REAL_AXIS = ROOT.parent / "shared" / "real" / "als_rural2lane_t211-278_axis.csv"

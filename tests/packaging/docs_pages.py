@@ -62,6 +62,11 @@ def prose(text: str) -> str:
     return re.sub(r"`[^`\n]*`", "``", re.sub(r"(?m)^(    |\t).*$", "", text))
 
 
+def saved_files(page: Path) -> set[str]:
+    """Return the files that a reader is told to write."""
+    return set(re.findall(r"[Ss]ave (?:this|it)(?: \w+)? as\s+`([^`]+)`", page.read_text(encoding="utf-8")))
+
+
 def links(text: str) -> list[str]:
     """Return where a page's links and pictures lead, but for those to other sites."""
     return [target for target in _LINK.findall(prose(text)) if not re.match(r"https?:|mailto:", target)]

@@ -25,7 +25,7 @@ from synthroads_addon.dataset.manifest import faults, read_manifest
 from synthroads_addon.dataset.recipe import RECIPES, load_recipe, scene_jobs
 from synthroads_addon.fitting.axis_object import fitted_axis
 from synthroads_addon.materials.table import read_material_table
-from synthroads_addon.road.axis_file import read_axis
+from synthroads_addon.road.centerline import read_axis
 from synthroads_addon.road.geometry import RoadGeometry
 from synthroads_addon.road.parameters import RoadParameters, read_parameters
 from synthroads_addon.road.things.signs import SignCatalogue

@@ -16,7 +16,7 @@ from synthroads_addon.scanning.scan import beam_rays, scan_block, scan_pulses
 from synthroads_addon.scanning.scene.mesh import SceneMesh
 from synthroads_addon.scanning.scene.motion import LinearMotion, MovingMesh
 from synthroads_addon.scanning.trace import trace
-from synthroads_addon.scanning.weather import Weather, attenuation
+from synthroads_addon.scanning.weather.fog import Fog
 from tests.helpers.scenes.scan_scenes import (
     ORIGIN,
     Standing,
@@ -201,7 +201,7 @@ def test_weather_thins_far_and_dark_points_as_the_threshold_says() -> None:
     mesh = replace(mesh, material=np.array([0, 0, 1, 1], dtype=np.uint16), materials=names)
     widths = {}
     for visibility in (23_000.0, 1_000.0, 300.0):
-        extinction = attenuation(Weather(condition="fog", visibility=visibility), 905.0)
+        extinction = Fog(visibility=visibility).attenuation(905.0)
         scan = replace(scan_of(mesh, threshold=0.2 / 113.0**2), attenuation=extinction)
         points = scan_pulses(scan, scan.path.strips[0], 0, 1000).points
         for side, name in ((-1.0, "asphalt"), (1.0, "concrete")):

@@ -10,8 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from headless.commands import choice_changes
+from headless.tradeoff_table import ROW_TITLES
 from synthroads_addon.base.errors import InputError
-from synthroads_addon.jobs.measure.tradeoff import ROW_TITLES
 from synthroads_addon.scenario.scenario import load_scenario
 from synthroads_addon.scenario.tolerance import KINDS, TIMES, Tolerance, parse_tolerance, shown, with_unit
 

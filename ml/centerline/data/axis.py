@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from synthroads_addon.base.errors import InputError
-from synthroads_addon.road.axis_file import read_axis
+from synthroads_addon.road.centerline import read_axis
 from synthroads_addon.road.geometry import RoadGeometry
 
 if TYPE_CHECKING:

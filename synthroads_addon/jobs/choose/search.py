@@ -18,7 +18,7 @@ from ...blender.cameras import HAS_RETURN_CAMERA
 from ...scanning.beam import RINGS
 from ...scanning.colour.colour import MATERIAL_LAYERS
 from ...scanning.devices.device import ScannerSetting
-from ...scanning.patterns.pattern import shot_count
+from ...scanning.devices.shots import shot_count
 from ...scanning.scene.motion import ScannedScene
 from ...scenario.scan import scanner_setting
 from ...scenario.scenario import FIDELITIES, Scenario

@@ -22,7 +22,7 @@ from ...blender.services import BlenderServices
 from ...cloud.points import PointBlock
 from ...scanning.beam import RINGS, beam_pattern
 from ...scanning.blocks import Blocks
-from ...scanning.colour.colour import LayerValues, Targets
+from ...scanning.colour.colour import LayerValues, Targets, sample_targets
 from ...scanning.colour.request import LayerRequest
 from ...scanning.colour.settings import ColourSettings
 from ...scanning.colour.views import View
@@ -40,7 +40,6 @@ from ..measure.errors import (
     Errors,
     colour_errors,
     relief_errors,
-    sample_layers,
     shift_points,
     truest_settings,
 )
@@ -152,7 +151,7 @@ class Trial:
             self.plan.request, settings=settings, wanted=wanted, pick=lambda views: views_near_lines(views, lines)
         )
         with layer_source(request) as source:
-            return [sample_layers(source, seen, wanted) for seen in lines]
+            return [sample_targets(source, seen, wanted) for seen in lines]
 
     def count_images(self, changes: Mapping[str, Any]) -> tuple[int, float]:
         """Return how many images the whole path would have, and their megapixels; 0 where none are rendered."""

@@ -49,7 +49,7 @@ def measure_demo(scenario: Scenario) -> dict[str, Any]:
 
     Returns:
         ``cores``; ``stages`` with seconds and peak memory; ``lines`` by the names of
-        `jobs.measure.benchmark_table.LIMITS`;
+        `headless.benchmark_table.LIMITS`;
         ``floors``: name, unit, ours and floor.
     """
     timer = StageTimer()

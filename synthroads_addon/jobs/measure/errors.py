@@ -22,7 +22,7 @@ from ...base.random_streams import stream
 from ...blender.cameras import HAS_RETURN_CAMERA
 from ...cloud.points import PointBlock
 from ...scanning.beam import RINGS
-from ...scanning.colour.colour import FROM_MATERIAL, MATERIAL_LAYERS, NEARBY, LayerSource, LayerValues, Targets
+from ...scanning.colour.colour import FROM_MATERIAL, MATERIAL_LAYERS, NEARBY, LayerValues
 from ...scanning.colour.difference import ciede2000, lab
 from ...scanning.colour.request import LayerRequest
 from ...scanning.colour.settings import ColourSettings
@@ -101,11 +101,6 @@ def truest_settings(request: LayerRequest) -> ColourSettings:
     scale = image_scale(request.path.typical_range)
     lengths = {name: scale * length for name, length in DENSEST.items()}
     return replace(true, source="images", **lengths)  # type: ignore[arg-type]
-
-
-def sample_layers(source: LayerSource, seen: Targets, wanted: frozenset[str]) -> LayerValues:
-    """Return the wanted layers of points."""
-    return source.sample(seen.position, seen.scanner, seen.normal, seen.material, seen.time, wanted)
 
 
 def known_rows(truth: LayerValues) -> NDArray[np.bool_]:

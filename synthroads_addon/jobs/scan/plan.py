@@ -17,7 +17,7 @@ from ...scanning.platforms.path import RoadGuide, make_path
 from ...scanning.relief import micro_relief
 from ...scanning.scene.motion import ScannedScene
 from ...scanning.scene.target import Target
-from ...scanning.weather import attenuation, weather_of
+from ...scanning.weather.registry import weather_of
 from ...scenario.scan import scanner_setting
 from ...scenario.scenario import Scenario
 
@@ -50,9 +50,7 @@ def plan_scan(
         varied(name, conditions.variation, conditions.environment, table) if name in table else mean
         for name, mean in zip(materials, means, strict=True)
     ]
-    loss = scan.attenuation
-    if loss is None:
-        loss = attenuation(scan.weather or weather_of(conditions.environment), setting.device.wavelength_nm)
+    weather, given = scan.weather or weather_of(conditions.environment), scan.attenuation
     coloured, shifts = coloured_layers(scenario), scan.relief > 0.0
     colour = scenario.colour.settings(scenario.fidelity, path.typical_range)
     return ScanPlan(
@@ -64,7 +62,8 @@ def plan_scan(
         rings=RINGS[settings.rays_per_pulse] if scan.beam_rings is None else scan.beam_rings,
         seed=scenario.seed,
         noise=scan.noise,
-        attenuation=loss,
+        attenuation=weather.attenuation(setting.device.wavelength_nm) if given is None else given,
+        effects=weather.effects() if given is None else (),
         beam=scan.beam,
         wanted=(kept - set(LAYERS) - {"color_source"}) | ({"normal", "material"} if shifts else set()),
         targets=bool(coloured) or by_layers or shifts,

@@ -9,6 +9,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from ...cloud.points import NO_MATERIAL
 from ...materials.table import Material
 from .light import CloudShadows, SunAndSky
 from .settings import ColourMode
@@ -172,6 +173,23 @@ class Targets:
 def joined_targets(parts: Sequence[Targets]) -> Targets:
     """Return the points of several parts, in order; at least one part is needed."""
     return Targets(*(np.concatenate([getattr(part, f.name) for part in parts]) for f in fields(Targets)))
+
+
+def sample_targets(source: LayerSource, points: Targets, wanted: frozenset[str]) -> LayerValues:
+    """Return the wanted layers of points; 0, as if of a material, for those in the air."""
+    solid = np.flatnonzero(points.material != NO_MATERIAL)
+    on = points if len(solid) == len(points) else points.select(solid)
+    values = source.sample(on.position, on.scanner, on.normal, on.material, on.time, wanted)
+    if on is points:
+        return values
+
+    def spread(array: NDArray[np.generic], rest: int) -> NDArray[Any]:
+        result = np.full((len(points), *array.shape[1:]), rest, array.dtype)
+        result[solid] = array
+        return result
+
+    arrays = {name: spread(array, 0) for name, array in values.arrays.items()}
+    return LayerValues(arrays, spread(values.source, FROM_MATERIAL))
 
 
 class MaterialLayers:

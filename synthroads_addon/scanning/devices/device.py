@@ -13,7 +13,8 @@ from pydantic import Field, model_validator
 from ...base.errors import InputError, nearest_name
 from ...base.files import PRESETS
 from ...base.schema import ClosedModel, Model, quantity, read_json
-from ..patterns.models import PatternModel
+from ..patterns.base import PulseTiming
+from ..patterns.registry import PatternModel
 
 DEVICES = PRESETS / "devices"
 SPEED_OF_LIGHT = 299_792_458.0
@@ -188,6 +189,12 @@ class ScannerSetting:
         share = pattern.firing_share(self.field_of_view)
         sequences = math.floor(share * self.pulse_rate / (self.lines_per_second * pattern.beams) + 1e-9)
         return sequences * pattern.beams
+
+    @property
+    def timing(self) -> PulseTiming:
+        """Return how fast each head fires and scans."""
+        lines, view = self.lines_per_second, self.field_of_view
+        return PulseTiming(self.pulse_rate, lines, view, self.angle_step, self.pulses_per_line)
 
 
 def device_names() -> list[str]:

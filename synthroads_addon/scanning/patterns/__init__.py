@@ -1,1 +1,1 @@
-"""Scan patterns: when each pulse is fired, and where to."""
+"""Scan patterns: when each pulse of a head is fired, and where to. One file each."""

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from ...base.errors import InputError
 from ...base.rotations import wrapped
 from ...road.alignment import CURVATURE_LIMIT, Alignment, Element, finite_array
-from ...road.axis_file import read_axis
+from ...road.centerline import read_axis
 from ...road.profile import IntersectionPoint, Profile
 
 Float = NDArray[np.float64]

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from ...base.errors import InputError, nearest_name
 from ...base.files import read_text
 from ...base.rotations import angle_between, matrices, quaternions, rotation_matrix, slerp
-from ...road.axis_file import FARTHEST, fields_of
+from ...road.centerline import FARTHEST, fields_of
 from .base import KNOT_RANGE, Strip, knots_for, mounting, strips_of
 from .guides import Float, Guide
 from .platform import Platform

@@ -9,6 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ...base.classes import UNLABELLED
+from ...cloud.points import NO_MATERIAL
 from ..knots import KeptPoses, Track, track_knots
 from .bundles import Bundles
 from .caster import Caster, FacePlanes
@@ -20,6 +22,8 @@ Faces = NDArray[np.intp]
 
 CLEARANCE = np.array([2.5, 1.0, 3.0])
 """What a vehicle that carries the scanner takes up around it: half its length and width, and its height, m."""
+
+_OF_NO_FACE = {"class_id": UNLABELLED, "instance_id": 0, "material": NO_MATERIAL}
 
 
 @dataclass(frozen=True)
@@ -94,6 +98,15 @@ class Target:
             if len(static.vertices)
             else None
         )
+
+    def of_faces(self, name: str, faces: Faces) -> NDArray[Any]:
+        """Return ``class_id``, ``instance_id`` or ``material`` of faces (H,); of -1 what stands for none."""
+        values = getattr(self, name)
+        if not len(faces) or faces.min() >= 0:
+            return np.asarray(values[faces])
+        result = values[np.maximum(faces, 0)]
+        result[faces < 0] = _OF_NO_FACE[name]
+        return np.asarray(result)
 
     def motions(self, begin: float, end: float, spacing: float, driven: Track | None = None) -> list[Track]:
         """Return the moving parts' poses between two times, on knots ``spacing`` (s) apart.

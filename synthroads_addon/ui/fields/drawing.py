@@ -134,7 +134,7 @@ def _group(layout: bpy.types.UILayout, settings: Any, owner: Any, field: GroupFi
         _own(layout, settings, owner, field)
         if not getattr(owner, field.own):
             return
-    for inner in field.fields.values():
+    for inner in field.fields_in_use(owner).values():
         draw_field(layout, settings, inner)
 
 
@@ -193,7 +193,6 @@ RELEVANT: dict[str, Callable[[Any], bool]] = {
     "scan.platform.turn_seconds": _on("tripod"),
     "scan.platform.turn_deg": _on("tripod"),
     "scan.platform.file": _on("trajectory"),
-    "scan.weather.rate_mm_h": lambda settings: settings.scan.weather.condition in ("rain", "snow"),
     "colour.engine": _rendered,
     "colour.mode": lambda settings: settings.colour.rgb,
     "colour.lighting": _rendered,

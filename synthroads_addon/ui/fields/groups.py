@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping
 from typing import Annotated, Any, Literal, Union, get_args, get_origin
 
 import bpy
-from pydantic import BaseModel
+from pydantic import BaseModel, create_model
 from pydantic.fields import FieldInfo
 
 from ...scenario.road import Interval
@@ -49,7 +49,11 @@ class GroupField(Field):
         """Return the part's data without fields that aren't given."""
         if self.optional and not getattr(owner, self.own):
             return None
-        return read_fields(self.fields, getattr(owner, self.name), base)
+        return read_fields(self.fields_in_use(owner), getattr(owner, self.name), base)
+
+    def fields_in_use(self, owner: Any) -> Mapping[str, Field]:
+        """Return the fields that have a meaning as the part is set."""
+        return self.fields
 
     def write(self, owner: Any, value: Any) -> None:
         """Show the part's data."""
@@ -63,6 +67,32 @@ class GroupField(Field):
         for field in self.fields.values():
             yield from field.classes()
         yield self.group
+
+
+class KindField(GroupField):
+    """A part of one of several kinds: the fields of all kinds in one group, of which those of the chosen one count.
+
+    Attributes:
+        tag: name of the field that says the kind.
+        kinds: names of each kind's fields, by its value of the tag.
+    """
+
+    def __init__(
+        self, path: str, info: FieldInfo, union: Any, tag: str, optional: bool, default: Any, hooks: Hooks
+    ) -> None:
+        models = get_args(union)
+        self.tag, self.kinds = tag, {model.model_fields[tag].default: set(model.model_fields) for model in models}
+        every = [field for model in reversed(models) for field in model.model_fields.items()]
+        fields: dict[str, Any] = {name: (info.annotation, info) for name, info in every}
+        first = models[0].model_fields[tag]
+        choice = FieldInfo(default=first.default, description=first.description)
+        fields[tag] = (Literal[tuple(self.kinds)], choice)
+        super().__init__(path, info, create_model(models[0].__name__, **fields), optional, default, hooks)
+
+    def fields_in_use(self, owner: Any) -> Mapping[str, Field]:
+        """Return the fields of the kind that is chosen."""
+        kind = self.kinds[getattr(getattr(owner, self.name), self.tag)]
+        return {name: field for name, field in self.fields.items() if name in kind}
 
 
 class NamedOrByHandField(Field):
@@ -127,6 +157,9 @@ def make_field(path: str, info: FieldInfo, default: Any, hooks: Hooks) -> Field 
     if path in NOT_HERE:
         return None
     kind, optional = _without_none(info.annotation)
+    tag = _tag(info.annotation)
+    if tag:
+        return KindField(path, info, kind, tag, optional, default, hooks)
     if get_origin(kind) is Union or isinstance(kind, types.UnionType):
         models = [part for part in map(_bare, get_args(kind)) if _is_model(part)]
         if path in STANDARD_PARTS and len(models) == 1 and not optional:
@@ -203,6 +236,15 @@ def _without_none(kind: Any) -> tuple[Any, bool]:
         optional = len(parts) < len(get_args(kind))
         return (_bare(parts[0]) if len(parts) == 1 else Union[tuple(parts)]), optional  # noqa: UP007
     return kind, False
+
+
+def _tag(kind: Any) -> str:
+    """Return the field by which the models of a union differ, e.g. ``condition``; empty if it is no such union."""
+    for part in [kind, *get_args(kind)]:
+        for note in get_args(part)[1:] if get_origin(part) is Annotated else ():
+            if isinstance(note, FieldInfo) and isinstance(note.discriminator, str):
+                return note.discriminator
+    return ""
 
 
 def _bare(kind: Any) -> Any:

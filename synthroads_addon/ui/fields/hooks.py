@@ -47,11 +47,6 @@ def _section_for_class(road: Any, context: Any) -> None:
         road.cross_section = allowed[0]
 
 
-def _no_rate(weather: Any, context: Any) -> None:
-    if weather.condition not in ("rain", "snow"):
-        weather.own_rate_mm_h = False
-
-
 def _no_samples(colour: Any, context: Any) -> None:
     if colour.lighting == "direct":
         colour.own_samples = False
@@ -83,7 +78,6 @@ HOOKS: dict[str, Hook] = {own(path): begin_with_inherited(path) for path in BEGI
     "scan.platform.kind": _clear("own_height", "own_speed", "lateral_offsets", "stations", "file"),
     "scan.own_weather": _instead("own_weather", "own_attenuation"),
     "scan.own_attenuation": _instead("own_attenuation", "own_weather"),
-    "scan.weather.condition": _no_rate,
     "scan.weather.own_rate_mm_h": _instead("own_rate_mm_h", "own_visibility"),
     "scan.beam_rings": _no_rays,
     "scan.rays_per_pulse": _no_rings,

@@ -12,7 +12,7 @@ from ...sampling.alignment import WIDEST_RADIUS
 from ...sampling.markings import LANE_DASH, LANE_GAP
 from ...scanning.devices.device import ScannerSetting, setting_of
 from ...scanning.platforms.path import USUAL
-from ...scanning.weather import USUAL_VISIBILITY
+from ...scanning.weather.registry import WEATHERS
 from ...scenario.colour import USUAL_RANGE, ColourScenario
 from ...scenario.scan import ScanScenario
 from ...scenario.scenario import FIDELITIES
@@ -124,7 +124,7 @@ def _of_images(name: str) -> Callable[[Any], Value]:
 
 
 def _visibility(settings: Any) -> Value:
-    return USUAL_VISIBILITY[settings.scan.weather.condition]
+    return WEATHERS[settings.scan.weather.condition].usual_visibility
 
 
 def _steepest(settings: Any) -> Value:

@@ -10,8 +10,8 @@ from synthroads_addon.scanning.beam import RINGS
 from synthroads_addon.scanning.plan import ScanPlan
 from synthroads_addon.scanning.platforms.path import Strip
 from synthroads_addon.scanning.pulses import Poses, Pulses, make_pulses
-from synthroads_addon.scanning.returns import Echoes
-from synthroads_addon.scanning.scan import beam_rays, echoes_of, scan_pulses
+from synthroads_addon.scanning.returns import Echoes, group_returns
+from synthroads_addon.scanning.scan import beam_rays, hit_marks, scan_pulses
 from synthroads_addon.scanning.scene.mesh import SceneMesh
 from synthroads_addon.scanning.scene.motion import ScannedScene
 from synthroads_addon.scanning.scene.target import Target
@@ -107,4 +107,4 @@ def echoes_and_pulses(scan: ScanPlan, first: int, count: int) -> tuple[Echoes, P
     strip = scan.path.strips[0]
     pulses = make_pulses(scan, strip, Poses.between(scan, strip, 0.0, 80.0), None, first, count)
     traced = trace(scan.target, scan.surfaces, beam_rays(scan, pulses, []), [], 0.0, scan.setting.maximum_range)
-    return echoes_of(scan, traced), pulses
+    return group_returns(*hit_marks(scan, traced), traced.pulse, scan.setting.range_resolution), pulses

@@ -6,7 +6,7 @@ import math
 from typing import Any
 
 from synthroads_addon.scanning.devices.device import Device, ScannerSetting, load_device, setting_of
-from synthroads_addon.scanning.patterns.models import WedgePrism
+from synthroads_addon.scanning.patterns.wedge_prism import WedgePrism
 from synthroads_addon.scenario.scan import ScanScenario, scanner_setting
 
 

@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
+from headless.benchmark_table import LIMITS, TABLE, judged, markdown
 from headless.cli import main
-from synthroads_addon.base.marked_documents import BEGIN, END
-from synthroads_addon.jobs.measure.benchmark_table import LIMITS, TABLE, judged, markdown
+from headless.marked_documents import BEGIN, END
 
 pytestmark = pytest.mark.any_blender
 

@@ -12,13 +12,14 @@ import numpy as np
 import pytest
 
 from headless import commands
+from headless.tradeoff_table import ROW_TITLES
 from synthroads_addon.base.schema import canonical_json
 from synthroads_addon.blender.cameras import HAS_RETURN_CAMERA
 from synthroads_addon.blender.model.build import build_road
 from synthroads_addon.blender.scene.evaluated import scanned_scene
 from synthroads_addon.jobs.measure.mesh_errors import mesh_height_errors
 from synthroads_addon.jobs.measure.rows import measure_row
-from synthroads_addon.jobs.measure.tradeoff import KNOBS, ROW_TITLES, SCENES, row_scenario, rows
+from synthroads_addon.jobs.measure.tradeoff import KNOBS, SCENES, row_scenario, rows
 from synthroads_addon.road.geometry import RoadGeometry
 from synthroads_addon.sampling.road import sample_road
 from synthroads_addon.scenario.scenario import load_scenario

@@ -11,8 +11,18 @@ import numpy as np
 import pytest
 
 from synthroads_addon.base.errors import InputError, MissingFileError
-from synthroads_addon.scanning.devices.device import SPEED_OF_LIGHT, Device, device_names, load_device, setting_of
-from synthroads_addon.scanning.patterns.pattern import shots
+from synthroads_addon.scanning.devices.device import (
+    SPEED_OF_LIGHT,
+    Device,
+    Head,
+    PulseMode,
+    device_names,
+    load_device,
+    setting_of,
+)
+from synthroads_addon.scanning.devices.shots import shots
+from synthroads_addon.scanning.patterns.registry import PATTERNS
+from synthroads_addon.scanning.patterns.wedge_prism import Wedge
 from synthroads_addon.scenario.scan import ScanScenario, scanner_setting
 from tests.helpers.scenes.scanners import custom, device, mode, preset
 
@@ -20,15 +30,7 @@ DOCS = Path(__file__).parents[3] / "docs"
 
 
 def test_every_pattern_has_a_preset() -> None:
-    patterns = {load_device(name).pattern.type for name in device_names()}
-    assert patterns == {
-        "grid",
-        "oscillating_mirror",
-        "polygon_mirror",
-        "rotating_head",
-        "rotating_mirror",
-        "wedge_prism",
-    }
+    assert {load_device(name).pattern.type for name in device_names()} == set(PATTERNS)
 
 
 @pytest.mark.parametrize("name", device_names())
@@ -253,11 +255,8 @@ def test_the_documented_device_works() -> None:
 
 
 def test_every_field_is_documented() -> None:
-    from synthroads_addon.scanning.devices.device import Head, PulseMode
-    from synthroads_addon.scanning.patterns import models as patterns
 
     text = (DOCS / "devices.md").read_text(encoding="utf-8")
-    models = (Device, PulseMode, Head, patterns.Wedge, patterns.WedgePrism, patterns.RotatingHead, patterns.Grid)
-    models += (patterns.OscillatingMirror, patterns.PolygonMirror, patterns.RotatingMirror)
+    models = (Device, PulseMode, Head, Wedge, *PATTERNS.values())
     names = {name for model in models for name in model.model_fields}
     assert [name for name in sorted(names) if f"`{name}`" not in text and f'"{name}"' not in text] == []

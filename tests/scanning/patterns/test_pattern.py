@@ -13,8 +13,7 @@ from hypothesis import strategies as st
 
 from synthroads_addon.base.rotations import rotation_matrix
 from synthroads_addon.scanning.devices.device import Device, PulseMode, ScannerSetting, device_names, load_device
-from synthroads_addon.scanning.patterns.directions import rays
-from synthroads_addon.scanning.patterns.pattern import Shots, _table, shot_count, shots
+from synthroads_addon.scanning.devices.shots import Shots, _table, shot_count, shots
 from tests.helpers.scenes.scanners import custom, mode, preset, wedges
 
 MODES = [(name, m) for name in device_names() for m in load_device(name).modes]
@@ -226,7 +225,7 @@ def test_cycles_repeat(name: str) -> None:
     """What is looked up in a table of one cycle is what the pulse's own number gives."""
     s = any_setting(name)
     first = 3 * shot_count(s, 700 / s.lines_per_second) + 17
-    shot, alone = shots(s, first, 500), rays(s, np.arange(first, first + 500), False)
+    shot, alone = shots(s, first, 500), s.device.pattern.rays(s.timing, np.arange(first, first + 500), False)
     np.testing.assert_allclose(shot.time, alone.time, rtol=1e-15)
     np.testing.assert_allclose(shot.scan_angle, alone.scan_angle, atol=1e-12)
     np.testing.assert_allclose(shot.direction, alone.direction, atol=1e-12)

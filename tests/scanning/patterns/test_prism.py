@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from synthroads_addon.scanning.devices.device import device_names, load_device
-from synthroads_addon.scanning.patterns.pattern import shots
+from synthroads_addon.scanning.devices.shots import shots
 from tests.helpers.scenes.scanners import custom, mode, preset, wedges
 
 WEDGES = [name for name in device_names() if load_device(name).pattern.type == "wedge_prism"]

@@ -18,7 +18,7 @@ from synthroads_addon.road.alignment import Alignment, Element
 from synthroads_addon.road.geometry import RoadGeometry
 from synthroads_addon.road.parameters import AlignmentObject, HorizontalElement, RoadParameters, VerticalPoint
 from synthroads_addon.sampling.road import sample_road
-from synthroads_addon.scanning.patterns.pattern import shot_count, shots
+from synthroads_addon.scanning.devices.shots import shot_count, shots
 from synthroads_addon.scanning.platforms.path import (
     KNOT_ERROR,
     TURNAROUND,

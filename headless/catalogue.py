@@ -8,14 +8,14 @@ from __future__ import annotations
 from collections import Counter
 from pathlib import Path
 
-from ..base.catalogue import Entry, Kind, figures, plain, preset, span
-from ..base.classes import class_scheme, scheme_names
-from ..base.files import PRESETS
-from ..dataset.recipe import RECIPES, load_recipe, recipe_names
-from ..materials.table import material_table_path, read_material_table
-from ..scanning.devices.device import DEVICES, device_names, load_device
-from ..scenario.assets import library_file, library_names, read_asset_library
-from ..scenario.scenario import SCENARIOS, load_scenario, scenario_names
+from synthroads_addon.base.catalogue import Entry, Kind, figures, plain, preset, span
+from synthroads_addon.base.classes import class_scheme, scheme_names
+from synthroads_addon.base.files import PRESETS
+from synthroads_addon.dataset.recipe import RECIPES, load_recipe, recipe_names
+from synthroads_addon.materials.table import material_table_path, read_material_table
+from synthroads_addon.scanning.devices.device import DEVICES, device_names, load_device
+from synthroads_addon.scenario.assets import library_file, library_names, read_asset_library
+from synthroads_addon.scenario.scenario import SCENARIOS, load_scenario, scenario_names
 
 
 def _scenario(name: str) -> Entry:
@@ -35,7 +35,7 @@ def _scenario(name: str) -> Entry:
 def _device(name: str) -> Entry:
     made = load_device(name)
     told = {
-        "pattern": made.pattern.type,
+        "pattern": made.pattern.name,
         "heads": len(made.heads),
         "beams": made.channels,
         "wavelength_nm": made.wavelength_nm,

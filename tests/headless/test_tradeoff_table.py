@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from synthroads_addon.jobs.measure.tradeoff import KNOBS, TABLES, better_row, markdown, row_scenario, rows, time_noise
+from headless.tradeoff_table import TABLES, better_row, markdown, time_noise
+from synthroads_addon.jobs.measure.tradeoff import KNOBS, row_scenario, rows
 from synthroads_addon.scanning.platforms.path import Strip
 from synthroads_addon.scanning.samples import middle, spread
 from synthroads_addon.scenario.scenario import load_scenario

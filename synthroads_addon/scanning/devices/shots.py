@@ -1,4 +1,4 @@
-"""Scan patterns: when each pulse is fired, and where to."""
+"""Shots of a device: when each pulse of its heads is fired, and where to."""
 
 from __future__ import annotations
 
@@ -11,10 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...base.rotations import rotation_matrix
-from ..devices.device import ScannerSetting
-from .directions import Numbers, cycle_lines, rays
-
-Float = NDArray[np.float64]
+from ..patterns.base import Float, Numbers
+from .device import ScannerSetting
 
 _LARGEST_TABLE = 2**18
 """Shots of a cycle that are kept at most: with the axes across the beam 23 MB."""
@@ -49,7 +47,7 @@ def shot_count(setting: ScannerSetting, duration: float) -> int:
     A wedge prism has no lines: whole pulses.
     """
     heads = len(setting.device.heads)
-    if cycle_lines(setting) == 0:
+    if setting.device.pattern.cycle_lines == 0:
         return heads * max(1, math.floor(duration * setting.pulse_rate + 1e-9))
     return heads * max(1, math.floor(duration * setting.lines_per_second + 1e-9)) * setting.pulses_per_line
 
@@ -64,7 +62,7 @@ def shots(setting: ScannerSetting, first: int, count: int, with_frame: bool = Fa
         with_frame: whether the axes across the beam are wanted.
     """
     number = np.arange(first, first + count, dtype=np.int64)
-    lines = cycle_lines(setting)
+    lines = setting.device.pattern.cycle_lines
     if lines == 0:
         return _shots(setting, number, with_frame)
     length = lines * setting.pulses_per_line * len(setting.device.heads)
@@ -101,7 +99,7 @@ def _columns(vectors: Float, number: Numbers) -> Float:
 @lru_cache(maxsize=4)
 def _table(setting: ScannerSetting, with_frame: bool) -> Shots:
     """Return the shots of one cycle: mirrors and heads repeat themselves, and looking up is cheaper than a sine."""
-    length = cycle_lines(setting) * setting.pulses_per_line * len(setting.device.heads)
+    length = setting.device.pattern.cycle_lines * setting.pulses_per_line * len(setting.device.heads)
     return _shots(setting, np.arange(length, dtype=np.int64), with_frame)
 
 
@@ -109,7 +107,7 @@ def _shots(setting: ScannerSetting, number: Numbers, with_frame: bool) -> Shots:
     """Return shots by their numbers (P,)."""
     heads = len(setting.device.heads)
     pulse, head = np.divmod(number, heads) if heads > 1 else (number, None)
-    part = rays(setting, pulse, with_frame)
+    part = setting.device.pattern.rays(setting.timing, pulse, with_frame)
     channel = np.zeros(len(number), dtype=np.int64) if part.beam is None else part.beam
     if head is not None:
         channel = channel + head * setting.device.pattern.beams

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 
-from .errors import InputError
-from .files import write_file
+from synthroads_addon.base.errors import InputError
+from synthroads_addon.base.files import write_file
 
 BEGIN, END = "<!-- table: {} -->", "<!-- end of table -->"
 

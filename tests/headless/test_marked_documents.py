@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
+from headless.marked_documents import BEGIN, END, fill, replaced
 from synthroads_addon.base.errors import InputError
-from synthroads_addon.base.marked_documents import BEGIN, END, fill, replaced
 
 
 def test_only_what_stands_between_markers_is_replaced() -> None:

@@ -1,0 +1,50 @@
+"""Models that are found by the files of a folder, so that a new file is all that a new kind costs."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from importlib import import_module
+from pkgutil import iter_modules
+from typing import TypeVar
+
+from pydantic import BaseModel
+
+M = TypeVar("M", bound=BaseModel)
+_LAST = 1000
+"""Order of a model that has none."""
+
+
+def discover_models(package: str, base: type[M], tag: str) -> dict[str, type[M]]:
+    """Return the models that the files of a folder define, by the one value that their field ``tag`` can have.
+
+    They are ordered by their attribute ``order``; those without one come last, by name.
+
+    Args:
+        package: full name of the folder's package.
+        base: class that all of them are made from.
+        tag: field by which JSON data names the model, e.g. ``type``; a class without a value for it is none.
+
+    Raises:
+        ValueError: two models have the same value.
+    """
+    models: dict[str, type[M]] = {}
+    for name, model in sorted(_tagged_models(package, base, tag), key=_place):
+        if name in models:
+            raise ValueError(f"{models[name].__module__} and {model.__module__} both have the {tag} {name!r}")
+        models[name] = model
+    return models
+
+
+def _place(pair: tuple[str, type[BaseModel]]) -> tuple[int, str]:
+    """Return the sort key of a name and its model."""
+    return getattr(pair[1], "order", _LAST), pair[0]
+
+
+def _tagged_models(package: str, base: type[M], tag: str) -> Iterator[tuple[str, type[M]]]:
+    for file in iter_modules(import_module(package).__path__):
+        module = import_module(f"{package}.{file.name}")
+        for model in vars(module).values():
+            if isinstance(model, type) and issubclass(model, base) and model.__module__ == module.__name__:
+                field = model.model_fields.get(tag)
+                if field is not None and isinstance(field.default, str):
+                    yield field.default, model

@@ -1,0 +1,131 @@
+"""Effects applied to a block of traced pulses: echoes added, what is met weakened."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import fields, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .devices.device import ScannerSetting
+from .effects.base import EchoChanges, EchoEffect, Float, PulseHits
+from .pulses import Pulses
+from .radiometry import received
+from .returns import UNCOUNTED, Marks
+from .trace import Hits, Traced
+
+BothMarks = tuple[Marks, Marks]
+"""Marks of what rays meet first, and of what they meet behind it."""
+
+
+def apply_effects(
+    effects: Sequence[EchoEffect],
+    pulses: Pulses,
+    traced: Traced,
+    marks: BothMarks,
+    setting: ScannerSetting,
+    attenuation: float,
+    source: Callable[[str], np.random.Generator],
+) -> tuple[Traced, BothMarks]:
+    """Return what the rays of a block meet, and its marks, after effects, one after the other.
+
+    Echoes that are added join what lies behind permeable surfaces, with the face -1.
+
+    Args:
+        effects: in their order; each sees what those before it have left.
+        pulses: the block's.
+        traced: what their rays meet.
+        marks: what that adds to returns.
+        setting: the scanner's.
+        attenuation: 1/m of range.
+        source: gives the random numbers of a purpose.
+
+    Raises:
+        ValueError: an effect's echoes are of no ray, or not finite numbers.
+    """
+    for effect in effects:
+        hits = _pulse_hits(pulses, traced, marks, setting, attenuation)
+        changes = effect.change_echoes(hits, source(f"effect {effect.name}"))
+        _check(effect.name, changes, hits.distance.shape)
+        if changes.transmission is not None:
+            traced, marks = _weaken(traced, marks, np.broadcast_to(changes.transmission, hits.distance.shape))
+        traced, marks = _add(traced, marks, changes, setting, attenuation)
+    return traced, marks
+
+
+def _pulse_hits(
+    pulses: Pulses, traced: Traced, marks: BothMarks, setting: ScannerSetting, attenuation: float
+) -> PulseHits:
+    first, behind = marks
+    ray, pulse = np.divmod(traced.ray, len(pulses.time))
+    return PulseHits(
+        time=pulses.time,
+        origin=pulses.origin,
+        direction=pulses.direction,
+        share=traced.rays.share[:, 0],
+        distance=first.distance,
+        brightness=_brightness(first, attenuation),
+        behind_pulse=pulse,
+        behind_ray=ray,
+        behind_distance=behind.distance,
+        behind_brightness=_brightness(behind, attenuation),
+        setting=setting,
+    )
+
+
+def _brightness(marks: Marks, attenuation: float) -> Float:
+    """Return what a surface sends back, from the intensity that is received of it; 0 where nothing is."""
+    white = received(1.0, marks.distance, attenuation)
+    return np.divide(marks.intensity, white, out=np.zeros_like(white), where=white > 0.0)
+
+
+def _check(name: str, changes: EchoChanges, shape: tuple[int, ...]) -> None:
+    if not len(changes.pulse) == len(changes.ray) == len(changes.distance) == len(changes.brightness):
+        raise ValueError(f"effect {name}: pulse, ray, distance and brightness must be as many")
+    for index, count in ((changes.ray, shape[0]), (changes.pulse, shape[1])):
+        if len(index) and not 0 <= index.min() <= index.max() < count:
+            raise ValueError(f"effect {name}: echoes must be of one of {shape[0]} rays of {shape[1]} pulses")
+    if not (np.isfinite(changes.distance).all() and np.isfinite(changes.brightness).all()):
+        raise ValueError(f"effect {name}: distances and brightnesses must be finite numbers")
+
+
+def _weaken(traced: Traced, marks: BothMarks, transmission: Float) -> tuple[Traced, BothMarks]:
+    """Return everything with factors (K, P) on its brightness, without what none of the light comes back from."""
+    first, behind = marks
+    left = transmission.ravel()[traced.ray]
+    seen = np.flatnonzero(left > 0.0)
+    first = Marks(
+        distance=np.where(transmission > 0.0, first.distance, np.inf),
+        weight=np.where(transmission > 0.0, first.weight * transmission, first.weight),
+        intensity=first.intensity * transmission,
+    )
+    behind = Marks(
+        behind.distance[seen], behind.weight[seen] * left[seen], behind.intensity[seen] * left[seen]
+    )
+    kept = Hits(*(getattr(traced.behind, field.name)[seen] for field in fields(Hits)))
+    return replace(traced, behind=kept, ray=traced.ray[seen]), (first, behind)
+
+
+def _add(
+    traced: Traced, marks: BothMarks, changes: EchoChanges, setting: ScannerSetting, attenuation: float
+) -> tuple[Traced, BothMarks]:
+    """Return everything with the echoes of an effect that the scanner records."""
+    distance = np.asarray(changes.distance, dtype=np.float64)
+    here = np.flatnonzero((distance >= setting.minimum_range) & (distance <= setting.maximum_range))
+    distance, brightness = distance[here], np.asarray(changes.brightness, dtype=np.float64)[here]
+    none = np.zeros(len(here), dtype=np.intp)
+    # In the air there is no face; it counts as one that lies across the beam.
+    hits = Hits(none - 1, none, distance, none - 1.0, brightness)
+    added = Marks(distance, np.maximum(brightness, UNCOUNTED), received(brightness, distance, attenuation))
+    first, behind = marks
+    behind = Marks(*_joined(behind, added))
+    ray = changes.ray[here] * len(traced.rays.time) + changes.pulse[here]
+    traced = replace(traced, behind=Hits(*_joined(traced.behind, hits)), ray=np.concatenate([traced.ray, ray]))
+    return traced, (first, behind)
+
+
+def _joined(one: Hits | Marks, other: Hits | Marks) -> list[NDArray[Any]]:
+    """Return the arrays of two of a kind, one after the other."""
+    return [np.concatenate([getattr(one, field.name), getattr(other, field.name)]) for field in fields(one)]

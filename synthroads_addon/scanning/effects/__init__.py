@@ -1,0 +1,1 @@
+"""Effects that change what a pulse meets before its returns are formed."""

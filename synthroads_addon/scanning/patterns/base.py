@@ -1,0 +1,110 @@
+"""What every scan pattern is: the part of a device preset that says how the beam is deflected, and its directions.
+
+Angles of a line are counted from the nadir, positive to the right of the forward direction; azimuths of a rotating head
+from the forward direction, positive to the right. Directions are those in the frame of the pattern's head: x forward,
+y left, z up. Every pulse is worked out from its own number: nothing is summed up from pulse to pulse, so that the
+billionth is as exact as the first.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...base.schema import Model
+
+Float = NDArray[np.float64]
+Numbers = NDArray[np.int64]
+
+FULL_TURN = 2.0 * math.pi
+
+
+@dataclass(frozen=True)
+class PulseTiming:
+    """How fast one head fires and scans; angles in radians.
+
+    Attributes:
+        pulse_rate: pulses per second, all beams together.
+        lines_per_second: lines, as the pattern counts them.
+        field_of_view: angle within which the head fires.
+        angle_step: angle between two pulses, see `Pattern.sweep`.
+        pulses_per_line: pulses of a line: a whole number of firing sequences.
+    """
+
+    pulse_rate: float
+    lines_per_second: float
+    field_of_view: float
+    angle_step: float
+    pulses_per_line: int
+
+
+@dataclass(frozen=True)
+class Rays:
+    """What is known of P pulses of a head.
+
+    Attributes:
+        time: (P,) s since the head began to scan.
+        scan_angle: (P,) rad, see `devices.shots.Shots`.
+        direction: (3, P) unit vectors.
+        in_plane, across: (3, P) unit vectors across the beam; None if not asked for.
+        beam: (P,) number of the beam; None if there is only one.
+    """
+
+    time: Float
+    scan_angle: Float
+    direction: Float
+    in_plane: Float | None = None
+    across: Float | None = None
+    beam: Numbers | None = None
+
+
+class Pattern(Model):
+    """Base of the scan patterns. A pattern's field ``type`` is the name that presets call it by.
+
+    Attributes:
+        order: place among the patterns in lists, if it has one; else they are listed by name.
+        beams: pulses that share one step of the mirror or of the head.
+        fixed_view: the optics alone decide on the field of view: it can't be narrowed.
+        cycle_lines: lines after which a head's directions repeat; 0 if they don't.
+    """
+
+    fixed_view: ClassVar[bool] = False
+
+    @property
+    def name(self) -> str:
+        """Return the name that presets call it by."""
+        return str(type(self).model_fields["type"].default)
+
+    @property
+    def beams(self) -> int:
+        return 1
+
+    @property
+    def cycle_lines(self) -> int:
+        return 1
+
+    def sweep(self, field_of_view: float) -> float:
+        """Return the angle (rad) swept per line at the speed of the line's middle: step = sweep x lines/s / rate."""
+        raise NotImplementedError
+
+    def firing_share(self, field_of_view: float) -> float:
+        """Return the share of the time, 0 to 1, in which the laser fires."""
+        return 1.0
+
+    def fault(self, field_of_view_deg: float, pulse_rate: float) -> str:
+        """Return why the pattern can't have a field of view (deg) and a pulse rate (1/s), or an empty string."""
+        return ""
+
+    def rays(self, timing: PulseTiming, pulse: Numbers, with_frame: bool) -> Rays:
+        """Return pulses (P,) of a head by their numbers from 0.
+
+        Args:
+            timing: the head's.
+            pulse: numbers of the pulses.
+            with_frame: whether the axes across the beam are wanted.
+        """
+        raise NotImplementedError

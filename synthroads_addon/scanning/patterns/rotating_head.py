@@ -1,0 +1,88 @@
+"""Several beams on a head that turns."""
+
+from __future__ import annotations
+
+from typing import Annotated, ClassVar, Literal
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from .base import FULL_TURN, Numbers, Pattern, PulseTiming, Rays
+
+_Elevation = Annotated[float, Field(strict=True, gt=-90, lt=90)]
+_Microseconds = Annotated[float, Field(strict=True, ge=0, le=1e6)]
+
+
+class RotatingHead(Pattern):
+    """Several beams, each at its elevation, on a head that turns about the body's vertical axis, to the right.
+
+    A line is a turn of the head. All beams fire once per firing sequence, which lasts beams / pulse rate.
+    """
+
+    order: ClassVar[int] = 6
+    type: Literal["rotating_head"] = "rotating_head"
+    elevations_deg: tuple[_Elevation, ...] = Field(
+        min_length=1,
+        max_length=256,
+        description="Elevation of each beam above the horizon; its place in the list is its channel.",
+        json_schema_extra={"unit": "deg"},
+    )
+    firing_times_us: tuple[_Microseconds, ...] | None = Field(
+        None,
+        description="When each beam fires within the sequence; one after the other at equal intervals if not given.",
+        json_schema_extra={"unit": "us"},
+    )
+
+    @model_validator(mode="after")
+    def _a_time_for_each(self) -> RotatingHead:
+        if self.firing_times_us is not None and len(self.firing_times_us) != len(self.elevations_deg):
+            raise ValueError(f"firing_times_us must be {len(self.elevations_deg)} times, one for each beam")
+        return self
+
+    @property
+    def beams(self) -> int:
+        """Return the number of beams, each of which fires once per step."""
+        return len(self.elevations_deg)
+
+    def sweep(self, field_of_view: float) -> float:
+        """Return a turn for each beam, as the pulses of a sequence share a step."""
+        return FULL_TURN * self.beams
+
+    def firing_share(self, field_of_view: float) -> float:
+        """Return the share of the turn that lies within the field of view."""
+        return field_of_view / FULL_TURN
+
+    def fault(self, field_of_view_deg: float, pulse_rate: float) -> str:
+        """Refuse firing times that don't fit into the sequence."""
+        sequence = self.beams / pulse_rate * 1e6
+        if self.firing_times_us and max(self.firing_times_us) >= sequence:
+            return f"goes with a firing sequence of {sequence:.4g} us: a beam fires after its end"
+        return ""
+
+    def rays(self, timing: PulseTiming, pulse: Numbers, with_frame: bool) -> Rays:
+        """Return pulses of a rotating head.
+
+        Turn k begins at k / lines per second. Its S firing sequences begin a step apart, from S / 2 steps left of the
+        forward direction on; the head turns on while the beams of a sequence fire.
+        """
+        sequence_time = self.beams / timing.pulse_rate
+        delays = np.arange(self.beams) * (sequence_time / self.beams)
+        if self.firing_times_us is not None:
+            delays = np.array(self.firing_times_us) * 1e-6
+        order = np.argsort(delays, kind="stable")
+        turn, within = np.divmod(pulse, timing.pulses_per_line)
+        sequence, place = np.divmod(within, self.beams)
+        beam = order[place]
+        since = sequence * sequence_time + delays[beam]
+        middle = timing.pulses_per_line / self.beams / 2.0
+        azimuth = (sequence - middle) * timing.angle_step + delays[beam] * (FULL_TURN * timing.lines_per_second)
+        elevation = np.deg2rad(self.elevations_deg)
+        up, out = np.sin(elevation)[beam], np.cos(elevation)[beam]
+        sine, cosine = np.sin(azimuth), np.cos(azimuth)
+        time = turn / timing.lines_per_second + since
+        direction = np.stack([out * cosine, -out * sine, up])
+        if not with_frame:
+            return Rays(time, azimuth, direction, beam=beam)
+        in_plane = np.stack([-sine, -cosine, np.zeros_like(sine)])
+        across = np.stack([-up * cosine, up * sine, out])
+        return Rays(time, azimuth, direction, in_plane, across, beam)

@@ -1,0 +1,1 @@
+"""Weather: what it does to the beam. One file each."""

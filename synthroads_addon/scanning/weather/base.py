@@ -1,0 +1,45 @@
+"""What every weather is: its fields in a scenario, how it attenuates the beam, and echoes of its own if it has any."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+from ...base.schema import ClosedModel, quantity
+from ..effects.base import EchoEffect
+from .extinction import visibility_extinction
+
+
+class Weather(ClosedModel):
+    """What attenuates the beam. A weather's field ``condition`` is the name that scenarios call it by.
+
+    Attributes:
+        order: place among the weathers in lists, if it has one; else they are listed by name.
+        usual_visibility: m, where none is given; the same as of sampled roads.
+    """
+
+    usual_visibility: ClassVar[float]
+
+    condition: str
+    visibility: float | None = quantity(
+        None, ge=20, le=200_000, unit="m", description="Visibility; usual for the condition if not given."
+    )
+
+    def attenuation(self, wavelength_nm: float) -> float:
+        """Return the attenuation per metre of range, 1/m: the light goes there and back, so twice the extinction."""
+        return 2.0 * self.extinction(wavelength_nm)
+
+    def extinction(self, wavelength_nm: float) -> float:
+        """Return the extinction coefficient of the air at a wavelength of the laser, 1/m of path."""
+        visibility = self.usual_visibility if self.visibility is None else self.visibility
+        return visibility_extinction(visibility, wavelength_nm, self.exponent(visibility))
+
+    def exponent(self, visibility: float) -> float:
+        """Return by which power of the wavelength the extinction falls at a visibility (m).
+
+        0, the same at every wavelength, for drops that are larger than the wavelength.
+        """
+        return 0.0
+
+    def effects(self) -> tuple[EchoEffect, ...]:
+        """Return what the weather does to the echoes besides attenuating them: usually nothing."""
+        return ()

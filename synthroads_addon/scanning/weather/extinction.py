@@ -1,0 +1,59 @@
+"""Extinction of the air by visibility, 1/m of path.
+
+Absorption by gases is left out (905, 1064 and 1550 nm lie in windows of the atmosphere), and so is the light that
+droplets scatter back into the receiver.
+
+Sources: Kruse, McGlauchlin, McQuistan: Elements of Infrared Technology (1962); Kim, McArthur, Korevaar: Comparison of
+laser beam propagation at 785 nm and 1550 nm in fog and haze, Proc. SPIE 4214 (2001); Pierce, Ramaprasad, Eisenberg:
+Optical attenuation in fog and clouds, Proc. SPIE 4530 (2001); Carbonneau, Wisely: Opportunities and challenges for
+optical wireless, Proc. SPIE 3532 (1998); Recommendation ITU-R P.1814 (2007), for snow.
+"""
+
+from __future__ import annotations
+
+import math
+
+CONTRAST = 0.02
+"""Contrast at which a black object is still seen against the horizon: what defines the visibility (Koschmieder)."""
+_REFERENCE = 550.0
+"""Wavelength (nm) for which the visibility holds."""
+_PER_DECIBEL = math.log(10.0) / 10.0
+_PER_KILOMETRE = 1e-3
+
+
+def visibility_extinction(visibility: float, wavelength_nm: float, exponent: float) -> float:
+    """Return the extinction -ln(0.02) / V (wavelength / 550 nm)^-q, 1/m (3.912 / V or 17.0 dB at 550 nm).
+
+    Args:
+        visibility: V, m.
+        wavelength_nm: of the laser.
+        exponent: q, see `kim_exponent` and `kruse_exponent`; 0 for drops that are larger than the wavelength.
+    """
+    return -math.log(CONTRAST) / visibility * (wavelength_nm / _REFERENCE) ** -exponent
+
+
+def kim_exponent(visibility: float) -> float:
+    """Return q of Kim, McArthur and Korevaar: 0 below 500 m, then growing to 1.3 at 6 km; 1.6 above 50 km."""
+    kilometres = visibility * _PER_KILOMETRE
+    if kilometres < 0.5:
+        return 0.0
+    if kilometres < 1.0:
+        return kilometres - 0.5
+    if kilometres < 6.0:
+        return 0.16 * kilometres + 0.34
+    return _clear_exponent(kilometres)
+
+
+def kruse_exponent(visibility: float) -> float:
+    """Return q of Kruse: 0.585 V^(1/3) below 6 km, with V in km, then 1.3, and 1.6 above 50 km."""
+    kilometres = visibility * _PER_KILOMETRE
+    return 0.585 * kilometres ** (1.0 / 3.0) if kilometres < 6.0 else _clear_exponent(kilometres)
+
+
+def _clear_exponent(kilometres: float) -> float:
+    return 1.6 if kilometres > 50.0 else 1.3
+
+
+def per_metre(decibels_per_kilometre: float) -> float:
+    """Return the extinction (1/m) of an attenuation in dB/km."""
+    return decibels_per_kilometre * _PER_DECIBEL * _PER_KILOMETRE

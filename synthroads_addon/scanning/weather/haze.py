@@ -1,0 +1,23 @@
+"""Haze."""
+
+from __future__ import annotations
+
+from typing import ClassVar, Literal
+
+from pydantic import Field
+
+from .base import Weather
+from .extinction import kruse_exponent
+
+
+class Haze(Weather):
+    """Haze, by its visibility."""
+
+    order: ClassVar[int] = 2
+    usual_visibility: ClassVar[float] = 4000.0
+
+    condition: Literal["haze"] = Field("haze", description="Weather.")
+
+    def exponent(self, visibility: float) -> float:
+        """Return Kruse's exponent, made for small particles of haze and dust."""
+        return kruse_exponent(visibility)
