@@ -19,19 +19,23 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
 
 from synthroads_addon.base.schema import canonical_json, read_json  # noqa: E402
-from synthroads_addon.blender.cameras import HAS_RETURN_CAMERA  # noqa: E402
+from synthroads_addon.blender.cameras import HAS_RETURN_CAMERA, layer_source  # noqa: E402
 from synthroads_addon.blender.files import empty_file, save_scene  # noqa: E402
 from synthroads_addon.jobs.choose.knobs import colour_choices  # noqa: E402
-from synthroads_addon.jobs.choose.pilot import Pilot, beam_errors  # noqa: E402
-from synthroads_addon.jobs.choose.pilot_colour import colour_errors, image_seconds  # noqa: E402
-from synthroads_addon.jobs.choose.prior import FILE  # noqa: E402
 from synthroads_addon.jobs.choose.sites import RoadSite  # noqa: E402
+from synthroads_addon.jobs.choose.table import FILE  # noqa: E402
+from synthroads_addon.jobs.choose.trial import Trial  # noqa: E402
+from synthroads_addon.jobs.measure.errors import beam_errors, shift_points  # noqa: E402
+from synthroads_addon.road.geometry import RoadGeometry  # noqa: E402
 from synthroads_addon.sampling.road import sample_road  # noqa: E402
 from synthroads_addon.scanning.beam import RINGS  # noqa: E402
+from synthroads_addon.scanning.colour.views import View  # noqa: E402
 from synthroads_addon.scenario.scenario import load_scenario  # noqa: E402
 
 SCENES: dict[str, tuple[str, Sequence[str]]] = {
@@ -46,6 +50,8 @@ OCTAVES = (2, 4, 6)
 WANTED = frozenset({"rgb", "roughness", "metallic", "specular"})
 SAMPLE = {"images": 0.7, "returns": 3.7}
 """Microseconds per point that takes its colour from images, and that is rendered by itself (`synthroads tradeoff`)."""
+TIMED = 3
+"""Images that are timed in full size; all but the first in a quarter of it as well."""
 PREVIEWS = 0.1
 """Microseconds per point of the previews."""
 
@@ -63,39 +69,67 @@ def measured(platform: str) -> dict[str, Any]:
     name, changes = SCENES[platform]
     scenario = load_scenario(name, [*changes, "cloud.point_spacing=null"])
     empty_file()
-    site = RoadSite(scenario, sample_road(scenario.road, scenario.seed))
+    site = RoadSite(scenario, RoadGeometry(sample_road(scenario.road, scenario.seed)))
     builds, few = [], None
-    pilot = None
+    trial = None
     site.scene(site.models({})[0])  # untimed: the first build pays for what Blender loads once
     for model in site.models({}):
         begin = time.process_time()
-        pilot = Pilot.on(scenario, site.scene(model), site.path, site.air)
-        pilot = replace(pilot, clock=time.process_time)
+        trial = Trial.of(scenario, site.scene(model), site.path, site.conditions)
+        trial.clock = time.process_time
         builds.append(1e6 * (time.process_time() - begin) / site.area)
-        if few is None:
-            few = [one.points for one in pilot.results(RINGS[1], pilot.stretches())]
-    assert pilot is not None
+        few = few or trial.points(RINGS[1])
+    assert trial is not None
     assert few is not None
-    truth = pilot.truth()
-    seconds, _points = pilot.scan_seconds(dict(RINGS))
-    pulses = sum(pilot.scan.pulses(strip) for strip in site.path.strips)
+    truth = trial.points()
+    seconds = {rays: trial.time_scan(rings)[0] for rays, rings in RINGS.items()}
     colours = colour_choices(scenario, site.path.typical_range, returns=False)
-    sources = {key: _expected(pair) for key, pair in colour_errors(pilot, colours, WANTED).items()}
-    relief = pilot.relief_errors(OCTAVES)
-    first, each, pixel = image_seconds(pilot, colours["standard"], WANTED)
+    sources = {key: _expected(pair) for key, pair in trial.colour_errors(colours, WANTED).items()}
+    relief = {str(octaves): _short(found["relief"][0]) for octaves, found in trial.relief_errors(OCTAVES).items()}
+    first, each, pixel = image_seconds(trial, colours["standard"])
     return {
-        "beam": {str(rays): _expected(pilot.beam_errors(rings, truth)) for rays, rings in RINGS.items()},
+        "beam": {str(rays): _expected(beam_errors(trial.points(rings), truth)) for rays, rings in RINGS.items()},
         "few_plants": _expected(beam_errors(few, truth)),
-        "relief": {str(number): _short(errors["relief"][0]) for number, (errors, _) in relief.items()},
+        "relief": relief,
         "colour": sources | {"returns": {"colour": 0.0, "layers": 0.0}},
-        "pulse": {str(rays): _short(1e6 * value / pulses / CORES) for rays, value in seconds.items()},
+        "pulse": {str(rays): _short(1e6 * value / trial.pulses / CORES) for rays, value in seconds.items()},
         "model": [_short(value) for value in builds],
-        "octave": {str(number): _short(value) for number, (_, value) in relief.items()},
+        "octave": {str(octaves): _short(octave_seconds(trial, octaves)) for octaves in OCTAVES},
         "image": [_short(first), _short(each / CORES), _short(pixel / CORES)],
         "sample": SAMPLE,
         "scene_file": _short(_saving(site.area)),
         "previews": PREVIEWS,
     }
+
+
+def octave_seconds(trial: Trial, octaves: int) -> float:
+    """Return the microseconds that the micro-relief takes per point."""
+    plan, results = trial.plan, [one for one in trial.scan_lines(RINGS[1]) if len(one.points)]
+    assert plan.relief is not None
+    begin = trial.clock()
+    places = shift_points(results, plan.relief, plan.relief_strength, plan.seed, octaves)
+    return 1e6 * (trial.clock() - begin) / max(1, sum(map(len, places)))
+
+
+def image_seconds(trial: Trial, changes: Mapping[str, Any]) -> tuple[float, float, float]:
+    """Render a few images; return seconds before the first, of each image, and of each megapixel."""
+    sizes: list[float] = []
+
+    def pick(views: list[View]) -> list[View]:
+        middle = [views[len(views) * (2 * number + 1) // (2 * TIMED)] for number in range(TIMED)]
+        small = [replace(view, size=(max(view.size[0] // 4, 1), max(view.size[1] // 4, 1))) for view in middle[1:]]
+        sizes.extend(view.pixels / 1e6 for view in [*middle, *small])
+        return [*middle, *small]
+
+    stamps = [trial.clock()]
+    request = replace(trial.layer_request(changes), wanted=WANTED, pick=pick)
+    with layer_source(request, progress=lambda share: stamps.append(trial.clock())):
+        pass
+    times = np.diff(stamps)
+    table = np.stack([np.ones(len(sizes) - 1), np.array(sizes[1:])], axis=1)
+    (each, pixel), *_ = np.linalg.lstsq(table, times[1:], rcond=None)
+    each, pixel = max(float(each), 0.0), max(float(pixel), 0.0)
+    return max(float(times[0]) - each - pixel * sizes[0], 0.0), each, pixel
 
 
 def _saving(area: float) -> float:

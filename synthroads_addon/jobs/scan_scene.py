@@ -8,7 +8,7 @@ from __future__ import annotations
 import time
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -17,11 +17,16 @@ from ..base.crs import wkt
 from ..base.errors import InputError
 from ..base.files import output_folder
 from ..base.progress import Progress, StageTimer, silent
-from ..base.schema import canonical_json, read_json
+from ..base.schema import read_json
+from ..blender.model.store import open_road
+from ..blender.scene.evaluated import scanned_scene
+from ..blender.scene.foreign import UpAxis, check_scene_file, open_scene, open_scene_warnings
+from ..blender.services import BlenderServices
 from ..cloud.tools.previews import TopView
 from ..road.axis_file import read_axis
 from ..road.geometry import RoadGeometry
 from ..road.parameters import RoadParameters
+from ..scanning.plan import ScanConditions
 from ..scanning.platforms.path import USUAL, PolylineGuide, RoadGuide, make_path
 from ..scanning.platforms.path import Path as ScanPath
 from ..scanning.platforms.trajectory import read_trajectory
@@ -31,11 +36,12 @@ from ..scanning.scene.mesh import SceneMesh
 from ..scanning.scene.motion import ScannedScene
 from ..scenario.scan import scanner_setting
 from ..scenario.scenario import Output, Scenario
-from .generate import closing, file_names, opening
-from .scan.files import colour_job, make_scan, scan_to_files, top_view
-
-if TYPE_CHECKING:
-    from ..blender.scene.foreign import UpAxis
+from .choose import search
+from .choose.search import decide
+from .choose.sites import SceneSite
+from .report import file_names, report_footer, report_header, write_report
+from .scan.files import CloudFiles, record_to_files
+from .scan.plan import plan_scan, road_view
 
 OUTPUTS: tuple[Output, ...] = ("cloud", "previews")
 """What a scan of a scene writes beside ``report.json``, as far as the scenario asks for it."""
@@ -88,51 +94,39 @@ def scan_scene(job: SceneScan, progress: Progress = silent) -> dict[str, Any]:
     Raises:
         InputError: an input is wrong or the output can't be written; nothing is left half-written.
     """
-    from .choose.pilot import Air
-    from .choose.search import decide
-    from .choose.sites import SceneSite
-
-    begun = time.perf_counter()
+    begun = job.begun or time.perf_counter()
     mapping = check_scene_scan(job)
     scenario = job.scenario
     wanted = tuple(name for name in OUTPUTS if name in scenario.outputs)
-    names = file_names(scenario, wanted)
-    timer = StageTimer(progress)
-    report = opening()
-    with output_folder(job.output, names, job.overwrite) as folder:
+    timer, report = StageTimer(progress), report_header()
+    with output_folder(job.output, file_names(scenario, wanted), job.overwrite) as folder:
         with timer.stage("scene"):
-            _open(job)
+            if job.scene is not None:
+                open_scene(job.scene, job.up)
         with timer.stage("scene mesh"):
-            found = _read(job, mapping)
-        static = found.scene.static
-        geometry = RoadGeometry(found.road) if found.road else None
-        path = scene_path(job, static, geometry)
-        air, variation = (found.road.environment, found.road.materials) if found.road else (None, None)
+            read = _read(job, mapping)
+        mesh, road = read.scene.static, RoadGeometry(read.road) if read.road else None
+        path, conditions = scene_path(job, mesh, road), ScanConditions.of(read.road)
         if scenario.chooses:
             with timer.stage("choice"):
-                site = SceneSite(found.scene, path, Air(air, variation))
-                decision = decide(scenario, site, job.begun or begun)
+                decision = decide(scenario, SceneSite(read.scene, path, conditions), begun)
                 scenario, report["choice"] = decision.scenario, decision.report
         with timer.stage("caster"):
-            scan = make_scan(scenario, found.scene, path, air, variation=variation)
-        epsg = found.road.metadata.epsg if found.road and job.epsg is None else job.epsg
-        view = None if "previews" not in wanted else top_view(geometry) if geometry else scene_view(static)
-        cameras = colour_job(scenario, scan, found.scene, found.road.environment if found.road else None)
-        counts = scan_to_files(scenario, scan, cameras, folder, epsg, view, timer)
+            plan = plan_scan(scenario, read.scene, path, BlenderServices(), conditions)
+        view = None if "previews" not in wanted else road_view(road) if road else scene_view(mesh)
+        epsg = conditions.epsg if job.epsg is None else job.epsg
+        files = CloudFiles(scenario, folder, mesh.origin, path.typical_range, epsg, view)
+        counts = record_to_files([plan], files, timer)
         report |= {"scene": job.scene.name if job.scene else None, "counts": counts}
-        report["warnings"] = found.warnings + _of_counts(counts)
-        report |= closing(scenario, timer)
+        report["warnings"] = read.warnings + _warnings_of_counts(counts)
+        report |= report_footer(scenario, timer)
         report["scenario"] = {name: value for name, value in report["scenario"].items() if name != "road"}
-        (folder / "report.json").write_text(canonical_json(report), encoding="utf-8")
-    return report
+        return write_report(folder, report)
 
 
 def check_scene_scan(job: SceneScan) -> ClassMapping | None:
     """Refuse a job that can't be done before any work starts; return the classes by name."""
-    from ..blender.scene.foreign import check_scene_file
-    from .choose import search as choosing
-
-    choosing.check(job.scenario, foreign=True)
+    search.check(job.scenario, foreign=True)
     platform = job.scenario.scan.platform
     if job.scene is not None:
         check_scene_file(job.scene, job.up)
@@ -157,19 +151,8 @@ def check_scene_scan(job: SceneScan) -> ClassMapping | None:
     return ClassMapping.from_dict(read_json(job.classes), source=str(job.classes))
 
 
-def _open(job: SceneScan) -> None:
-    from ..blender.scene.foreign import open_scene
-
-    if job.scene is not None:
-        open_scene(job.scene, job.up)
-
-
 def _read(job: SceneScan, mapping: ClassMapping | None) -> _Read:
     """Return the open scene's triangles and road; refuse a scene in which there is nothing to scan."""
-    from ..blender.model.store import open_road
-    from ..blender.scene.evaluated import scanned_scene
-    from ..blender.scene.foreign import open_scene_warnings
-
     road = open_road()
     if road and job.origin is not None:
         raise InputError("--origin", list(job.origin), "can't be given: the road in the scene has one of its own")
@@ -225,7 +208,7 @@ def scene_view(mesh: SceneMesh) -> TopView:
     return TopView(start, end, -reach, reach)
 
 
-def _of_counts(counts: dict[str, Any]) -> list[str]:
+def _warnings_of_counts(counts: dict[str, Any]) -> list[str]:
     if not counts["points"]:
         return ["not one pulse came back: is the scene within the scanner's range and field of view?"]
     unlabelled = int(counts["points_by_class"].get("unlabelled", 0))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -10,11 +10,12 @@ from numpy.typing import NDArray
 
 from ..cloud.points import NO_MATERIAL, PointBlock
 from ..materials.reflectance import reflectivity, returned_share
-from ..materials.surfaces import Surfaces, brightness_of
+from ..materials.surfaces import brightness_of
 from .colour.colour import LayerSource, LayerValues, Targets, sample_targets
 from .devices.device import ScannerSetting
+from .plan import ScanPlan
 from .radiometry import saturated
-from .relief import MicroRelief, adjusted
+from .relief import adjusted
 from .returns import number_returns
 from .scan import BlockResult
 
@@ -24,86 +25,64 @@ _OF_INTENSITY = frozenset({"base_color", "metallic", "specular"})
 _DARKEST = 1e-9
 
 
-@dataclass(frozen=True)
-class Finish:
-    """The work on points that are measured already; the same for every block, whatever the order.
+def finish(plan: ScanPlan, source: LayerSource, result: BlockResult) -> BlockResult:
+    """Return a block, or several joined, with colours, layers, micro-relief and final intensities.
 
-    Attributes:
+    Args:
+        plan: the scan's.
         source: of colours and layers.
-        wanted: ``rgb`` and `LAYERS` that the points get.
-        surfaces: the means of the scene's materials, which the layers vary around.
-        scanned: the materials' means that the scan was made with.
-        setting: the scanner's, for its detector.
-        intensity_from_layers: each point's intensity is that of its own layers; the scan left the detector to this.
-        range_corrected: intensities are multiplied by the squared range, after the detector.
-        relief: of the materials; None without.
-        strength: of the relief.
-        octaves: of the relief.
-        seed: of the relief.
-        frame: (3,) m, of the relief; see `Scan`.
-        kept: `PointBlock`'s optional arrays that stay; the others were needed on the way.
+        result: points as they were measured.
     """
+    if result.seen is not None and (plan.coloured or plan.detects_later):
+        result = _with_layers(plan, source, result, result.seen)
+    points = result.points
+    if result.seen is not None and plan.relief is not None and plan.relief_strength > 0.0:
+        place = result.seen.position + plan.frame
+        points = adjusted(points, place, plan.relief, plan.relief_strength, plan.seed, plan.relief_octaves)
+    changes: dict[str, Any] = {name: None for name in OPTIONAL if name not in plan.kept}
+    if plan.range_corrected:
+        changes["intensity"] = points.intensity * points.range**2
+    return replace(result, points=replace(points, **changes), seen=None)
 
-    source: LayerSource
-    wanted: frozenset[str]
-    surfaces: Surfaces
-    scanned: Surfaces
-    setting: ScannerSetting
-    intensity_from_layers: bool
-    range_corrected: bool
-    relief: MicroRelief | None
-    strength: float
-    octaves: int
-    seed: int
-    kept: frozenset[str]
-    frame: NDArray[np.float64] = field(default_factory=lambda: np.zeros(3))
 
-    def __call__(self, result: BlockResult) -> BlockResult:
-        """Return a block, or several joined, with its points finished."""
-        if result.seen is not None and (self.wanted or self.intensity_from_layers):
-            result = self._coloured(result, result.seen)
-        points = result.points
-        if result.seen is not None and self.relief is not None and self.strength > 0.0:
-            place = result.seen.position + self.frame
-            points = adjusted(points, place, self.relief, self.strength, self.seed, self.octaves)
-        changes: dict[str, Any] = {name: None for name in OPTIONAL if name not in self.kept}
-        if self.range_corrected:
-            changes["intensity"] = points.intensity * points.range**2
-        return replace(result, points=replace(points, **changes), seen=None)
+def _with_layers(plan: ScanPlan, source: LayerSource, result: BlockResult, seen: Targets) -> BlockResult:
+    """Return a block with its points' colours and layers, and with the intensities that follow from these."""
+    layers = plan.coloured | (_OF_INTENSITY if plan.detects_later else frozenset())
+    values = sample_targets(source, seen, layers)
+    changes: dict[str, Any] = {name: values.arrays[name] for name in plan.coloured}
+    changes["color_source"] = values.source
+    if plan.detects_later:
+        changes["intensity"] = result.points.intensity * _relative_brightness(plan, result.points, seen, values)
+    result = replace(result, points=replace(result.points, **changes))
+    if plan.detects_later:
+        result = detected(result, plan.setting)
+    assert result.points.color_source is not None
+    return replace(result, sources=np.bincount(result.points.color_source, minlength=256))
 
-    def _coloured(self, result: BlockResult, seen: Targets) -> BlockResult:
-        layers = self.wanted | (_OF_INTENSITY if self.intensity_from_layers else frozenset())
-        values = sample_targets(self.source, seen, layers)
-        changes: dict[str, Any] = {name: values.arrays[name] for name in self.wanted}
-        changes["color_source"] = values.source
-        if self.intensity_from_layers:
-            changes["intensity"] = result.points.intensity * self._brighter(result.points, seen, values)
-        result = replace(result, points=replace(result.points, **changes))
-        if self.intensity_from_layers:
-            result = detected(result, self.setting)
-        assert result.points.color_source is not None
-        return replace(result, sources=np.bincount(result.points.color_source, minlength=256))
 
-    def _brighter(self, points: PointBlock, seen: Targets, values: LayerValues) -> NDArray[np.float64]:
-        """Return how many times as bright points are by their own layers as by their materials' means (N,).
+def _relative_brightness(
+    plan: ScanPlan, points: PointBlock, seen: Targets, values: LayerValues
+) -> NDArray[np.float64]:
+    """Return how many times as bright points are by their own layers as by their materials' means (N,).
 
-        A return has the layers of what gave most of it. What beads and prisms send back doesn't depend on them, nor
-        does what comes from the air.
-        """
-        own = reflectivity(*(values.arrays[name] for name in ("base_color", "metallic", "specular")))
-        usual = np.take(self.surfaces.reflectivity, seen.material, mode="clip")
-        factor = np.asarray(own / np.maximum(usual, _DARKEST))
-        factor[seen.material == NO_MATERIAL] = 1.0
-        of = self.scanned
-        if not of.retroreflective:
-            return factor
-        shining = np.flatnonzero(np.append(of.shining, False).take(seen.material, mode="clip"))
-        material = seen.material[shining]
-        cosine = np.cos(np.deg2rad(points.incidence_deg[shining].astype(np.float64)))
-        usual = brightness_of(of, material, cosine)
-        beads = usual - returned_share(cosine, of.reflectivity[material], of.facet_a[material], of.facet_b[material])
-        factor[shining] = (factor[shining] * (usual - beads) + beads) / np.maximum(usual, _DARKEST)
+    A return has the layers of what gave most of it. What beads and prisms send back doesn't depend on them, nor does
+    what comes from the air.
+    """
+    assert plan.means is not None
+    own = reflectivity(*(values.arrays[name] for name in ("base_color", "metallic", "specular")))
+    usual = np.take(plan.means.reflectivity, seen.material, mode="clip")
+    factor = np.asarray(own / np.maximum(usual, _DARKEST))
+    factor[seen.material == NO_MATERIAL] = 1.0
+    of = plan.surfaces
+    if not of.retroreflective:
         return factor
+    shining = np.flatnonzero(np.append(of.shining, False).take(seen.material, mode="clip"))
+    material = seen.material[shining]
+    cosine = np.cos(np.deg2rad(points.incidence_deg[shining].astype(np.float64)))
+    usual = brightness_of(of, material, cosine)
+    beads = usual - returned_share(cosine, of.reflectivity[material], of.facet_a[material], of.facet_b[material])
+    factor[shining] = (factor[shining] * (usual - beads) + beads) / np.maximum(usual, _DARKEST)
+    return factor
 
 
 def detected(result: BlockResult, setting: ScannerSetting) -> BlockResult:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,10 +12,8 @@ from ..base.random_streams import stream
 from .devices.shots import shots
 from .knots import Track
 from .noise import TrajectoryNoise, measured_pose
+from .plan import ScanPlan
 from .platforms.path import Strip
-
-if TYPE_CHECKING:
-    from .scan import Scan
 
 Float = NDArray[np.float64]
 Index = NDArray[np.intp]
@@ -41,7 +39,7 @@ class Errors:
     lost: NDArray[np.bool_] | None
 
     @classmethod
-    def drawn(cls, scan: Scan, strip: Strip, count: int, key: int) -> Errors:
+    def drawn(cls, scan: ScanPlan, strip: Strip, count: int, key: int) -> Errors:
         """Draw the errors of a block."""
 
         def source(purpose: str) -> np.random.Generator:
@@ -92,7 +90,7 @@ class Poses:
     motions: list[Track]
 
     @classmethod
-    def between(cls, scan: Scan, strip: Strip, begin: float, end: float) -> Poses:
+    def between(cls, scan: ScanPlan, strip: Strip, begin: float, end: float) -> Poses:
         """Return the poses between two times."""
         spacing = scan.path.knot_spacing
 
@@ -150,7 +148,7 @@ class Pulses:
         return Pulses(**chosen)
 
 
-def make_pulses(scan: Scan, strip: Strip, poses: Poses, angle: Float | None, first: int, count: int) -> Pulses:
+def make_pulses(scan: ScanPlan, strip: Strip, poses: Poses, angle: Float | None, first: int, count: int) -> Pulses:
     """Return pulses ``first`` to ``first + count`` of a strip.
 
     Args:
@@ -189,7 +187,7 @@ def _turned(rotation: Float, vectors: Float) -> Float:
     return result
 
 
-def reaching_scene(scan: Scan, pulses: Pulses, motions: list[Track]) -> NDArray[np.bool_] | None:
+def reaching_scene(scan: ScanPlan, pulses: Pulses, motions: list[Track]) -> NDArray[np.bool_] | None:
     """Return which pulses (P,) may hit anything at all, as those into the sky don't; None if all may."""
     boxes = [] if scan.target.bounds is None else [scan.target.bounds]
     boxes += scan.target.moving_bounds(motions)

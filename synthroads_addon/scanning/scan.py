@@ -3,28 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field, replace
-from typing import Any, Literal
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..cloud.points import PointBlock, concatenate
-from ..materials.surfaces import Surfaces, brightness_of
+from ..materials.surfaces import brightness_of
 from ..materials.texture_spread import spread_factors
-from .beam import BeamPattern, beam_pattern, conical, cylindrical_offsets
-from .blocks import Block, Blocks
+from .apply_effects import BothMarks, apply_effects
+from .beam import conical, cylindrical_offsets
 from .colour.colour import Targets, joined_targets
-from .devices.device import ScannerSetting
-from .effects.apply import BothMarks, apply_effects
-from .effects.base import EchoEffect
 from .knots import Track
-from .noise import Noise
-from .platforms.path import Path, Strip
+from .plan import ScanPlan
+from .platforms.path import Strip
 from .pulses import Errors, Poses, Pulses, make_pulses, reaching_scene
 from .radiometry import received, saturated
 from .returns import UNCOUNTED, Echoes, Marks, chosen_echoes, group_returns, number_returns
-from .scene.target import Target
 from .trace import Hits, Rays, Traced, trace
 
 Float = NDArray[np.float64]
@@ -33,70 +29,6 @@ Index = NDArray[np.intp]
 LENIENT = 0.25
 """Share of the threshold that is enough for an echo whose intensity is yet to change: none is expected to become four
 times as bright as its material's mean makes it."""
-_SPARE = 2
-"""Factor on the returns of a pulse that are kept meanwhile: some are lost to the threshold later."""
-
-
-@dataclass(frozen=True)
-class Scan:
-    """All that the blocks of one scan share.
-
-    Attributes:
-        attenuation: 1/m of range.
-        effects: what changes the echoes of pulses, in this order.
-        wanted: names of `PointBlock`'s optional arrays to be filled.
-        targets: whether to say where each point was seen, for colours and relief: `BlockResult.seen`.
-        detects_later: intensities are yet to change, see `finish`: every echo that may pass the detector is kept, and
-            nothing saturates.
-        frame: (3,) where the scene's local frame begins, in the coordinates of the surfaces' random fields, m: those of
-            the whole road where only a section of it is scanned.
-        only: blocks that are scanned, in their order; all if None.
-        driven: whether a vehicle carries the scanner.
-    """
-
-    target: Target
-    surfaces: Surfaces
-    setting: ScannerSetting
-    path: Path
-    rings: tuple[int, ...]
-    seed: int
-    noise: Noise = Noise()  # noqa: RUF009 (frozen)
-    attenuation: float = 0.0
-    effects: tuple[EchoEffect, ...] = ()
-    beam: Literal["conical", "cylindrical"] = "conical"
-    wanted: frozenset[str] = frozenset()
-    targets: bool = False
-    detects_later: bool = False
-    frame: Float = field(default_factory=lambda: np.zeros(3))
-    only: tuple[Block, ...] | None = None
-    driven: bool = False
-    pattern: BeamPattern = field(init=False)
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "pattern", beam_pattern(self.rings))
-
-    @property
-    def rays_per_pulse(self) -> int:
-        """Return how many rays sample a pulse."""
-        return len(self.pattern.weights)
-
-    @property
-    def most_returns(self) -> int:
-        """Return how many returns of a pulse are kept at most."""
-        return self.setting.device.maximum_returns * (_SPARE if self.detects_later else 1)
-
-    @property
-    def cut(self) -> Blocks:
-        """Return how the pulses are cut into blocks."""
-        return Blocks(self.setting, self.path, self.rays_per_pulse)
-
-    def pulses(self, strip: Strip) -> int:
-        """Return how many pulses a strip has."""
-        return self.cut.pulses(strip)
-
-    def blocks(self) -> list[Block]:
-        """Return (strip, number) of every block that is scanned, in the order of time."""
-        return self.cut.all() if self.only is None else list(self.only)
 
 
 @dataclass(frozen=True)
@@ -140,13 +72,13 @@ def joined_results(results: list[BlockResult]) -> BlockResult:
     )
 
 
-def scan_block(scan: Scan, strip: Strip, block: int) -> BlockResult:
-    """Scan one block; blocks can be computed in any order and by any worker."""
+def scan_block(scan: ScanPlan, strip: Strip, block: int) -> BlockResult:
+    """ScanPlan one block; blocks can be computed in any order and by any worker."""
     return scan_pulses(scan, strip, *scan.cut.pulses_of(strip, block), block)
 
 
-def scan_pulses(scan: Scan, strip: Strip, first: int, count: int, key: int = 0) -> BlockResult:
-    """Scan pulses ``first`` to ``first + count`` of a strip at once; ``key`` is that of their random numbers.
+def scan_pulses(scan: ScanPlan, strip: Strip, first: int, count: int, key: int = 0) -> BlockResult:
+    """ScanPlan pulses ``first`` to ``first + count`` of a strip at once; ``key`` is that of their random numbers.
 
     A block isn't cut any smaller, though its arrays leave the processor's cache: blocks are scanned side by side in
     threads that take turns in Python, so that few long calls beat many short ones.
@@ -182,7 +114,7 @@ def scan_pulses(scan: Scan, strip: Strip, first: int, count: int, key: int = 0) 
     return BlockResult(points, seen, count, traced.first.face.size, weak, clipped)
 
 
-def beam_rays(scan: Scan, pulses: Pulses, motions: list[Track]) -> Rays:
+def beam_rays(scan: ScanPlan, pulses: Pulses, motions: list[Track]) -> Rays:
     """Return the rays that sample the pulses' footprints."""
     origin, share = pulses.origin[:, None, :], scan.pattern.weights[:, None]
     if scan.rays_per_pulse == 1:
@@ -200,12 +132,12 @@ def beam_rays(scan: Scan, pulses: Pulses, motions: list[Track]) -> Rays:
     return Rays(origin + offsets, direction, share, pulses.time)
 
 
-def hit_marks(scan: Scan, traced: Traced) -> BothMarks:
+def hit_marks(scan: ScanPlan, traced: Traced) -> BothMarks:
     """Return what the hits of traced rays add to returns: what each ray meets first, and what lies behind."""
     return _marks(scan, traced.first), _marks(scan, traced.behind)
 
 
-def _marks(scan: Scan, hits: Hits) -> Marks:
+def _marks(scan: ScanPlan, hits: Hits) -> Marks:
     """Return what hits add to returns."""
     surfaces, material = scan.surfaces, hits.material.ravel()
     brightness = brightness_of(surfaces, material, np.abs(hits.along.ravel())).reshape(hits.face.shape)
@@ -215,7 +147,7 @@ def _marks(scan: Scan, hits: Hits) -> Marks:
     return Marks(hits.distance, weight, received(brightness, hits.distance, scan.attenuation))
 
 
-def _uneven(scan: Scan, traced: Traced, echoes: Echoes, motions: list[Track]) -> Echoes:
+def _uneven(scan: ScanPlan, traced: Traced, echoes: Echoes, motions: list[Track]) -> Echoes:
     """Return the echoes as bright as the places are that gave most of them, see `materials.texture_spread`."""
     material = traced.pick("material", echoes.hit)
     own = np.flatnonzero(np.take(scan.surfaces.uneven, material, mode="clip"))
@@ -250,7 +182,7 @@ def _kept(echoes: Echoes, lost: NDArray[np.bool_]) -> Echoes:
 
 
 def _points(
-    scan: Scan,
+    scan: ScanPlan,
     strip: Strip,
     pulses: Pulses,
     traced: Traced,
@@ -299,7 +231,7 @@ def _points(
 
 
 def _seen(
-    scan: Scan, rays: Rays, ray: Index, reach: Float, face: Index, normal: Float, motions: list[Track]
+    scan: ScanPlan, rays: Rays, ray: Index, reach: Float, face: Index, normal: Float, motions: list[Track]
 ) -> Targets:
     """Return where the points were seen, in the scene as it stands at the time 0: as it is rendered.
 
@@ -332,7 +264,7 @@ def _places(origin: Float, direction: Float, pulse: Index, distance: Float, map_
 
 
 def _optional(
-    scan: Scan, pulses: Pulses, pulse: Index, distance: Float, face: Index, normal: Float | None
+    scan: ScanPlan, pulses: Pulses, pulse: Index, distance: Float, face: Index, normal: Float | None
 ) -> Iterator[tuple[str, Any]]:
     """Yield the optional arrays that are wanted, by name."""
     wanted, origin = scan.wanted, scan.target.origin

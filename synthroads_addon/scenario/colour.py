@@ -2,17 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Any, Literal
+from typing import Any
 
 from pydantic import Field, model_validator
 
 from ..base.schema import ClosedModel, quantity
-from ..scanning.colour.settings import ColourMode, ColourSettings
-
-ColourSource = Literal["auto", "images", "returns", "material"]
-Engine = Literal["cycles", "eevee"]
-Lighting = Literal["direct", "path"]
-
+from ..scanning.colour.settings import ColourMode, ColourSettings, ColourSource, Engine, Lighting
 
 USUAL_RANGE = 60.0
 """Range that the fidelities' spacings and pixels are meant for, m."""
@@ -78,6 +73,11 @@ class ColourScenario(ClosedModel):
             image_spacing=pick(self.image_spacing, preset.image_spacing * scale),
             ground_sampling_distance=pick(self.ground_sampling_distance, preset.ground_sampling_distance * scale),
             samples=pick(self.samples, 1 if self.lighting == "direct" else preset.samples),
+            source=self.source,
+            engine=self.engine,
+            mode=self.mode,
+            lighting=self.lighting,
+            max_resolution=self.max_resolution,
         )
 
 

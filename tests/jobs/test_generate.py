@@ -13,10 +13,11 @@ import pytest
 
 from headless import commands
 from synthroads_addon.base.errors import InputError
+from synthroads_addon.blender.services import BlenderServices
 from synthroads_addon.cloud.points import concatenate
 from synthroads_addon.jobs.generate import FILES, Job, generate
 from synthroads_addon.jobs.measure.mesh_errors import misplaced_points
-from synthroads_addon.jobs.scan.files import make_scan, road_path
+from synthroads_addon.jobs.scan.plan import plan_scan, road_path
 from synthroads_addon.road.geometry import RoadGeometry
 from synthroads_addon.road.parameters import read_parameters
 from synthroads_addon.scanning.pulses import Poses, make_pulses
@@ -101,7 +102,7 @@ def demo():
 
 
 def scan_of(scenario, geometry, scene):
-    return make_scan(scenario, scene, road_path(scenario, geometry))
+    return plan_scan(scenario, scene, road_path(scenario, geometry), BlenderServices())
 
 
 @pytest.mark.keep_scene

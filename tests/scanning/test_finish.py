@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -11,8 +13,9 @@ import pytest
 from synthroads_addon.materials.reflectance import reflectivity
 from synthroads_addon.materials.table import materials
 from synthroads_addon.scanning.colour.colour import MaterialLayers, surface_constants
-from synthroads_addon.scanning.finish import Finish
-from synthroads_addon.scanning.scan import BlockResult, Scan
+from synthroads_addon.scanning.finish import finish
+from synthroads_addon.scanning.plan import ScanPlan
+from synthroads_addon.scanning.scan import BlockResult
 from tests.helpers.scenes.scan_scenes import mesh_of, middle_pulses, plane, scan_of
 
 KEPT = frozenset({"color_source", "true_xyz", "normal", "material", "scanner", "true_range"})
@@ -34,12 +37,11 @@ class Striped:
         return values
 
 
-def finish_of(scan: Scan, source: Any, by_layers: bool = True, corrected: bool = False) -> Finish:
-    of = (scan.surfaces, scan.surfaces, scan.setting)
-    return Finish(source, frozenset(), *of, by_layers, corrected, None, 0.0, 4, 1, KEPT)
+def finish_of(scan: ScanPlan, source: Any, corrected: bool = False) -> Callable[[BlockResult], BlockResult]:
+    return partial(finish, replace(scan, means=scan.surfaces, range_corrected=corrected, kept=KEPT), source)
 
 
-def finished(scan: Scan, dark: float, bright: float, material: str = "asphalt") -> BlockResult:
+def finished(scan: ScanPlan, dark: float, bright: float, material: str = "asphalt") -> BlockResult:
     later = replace(scan, targets=True, detects_later=True, wanted=scan.wanted | {"material"})
     return finish_of(later, Striped(material, dark, bright))(middle_pulses(later, 200))
 
@@ -49,7 +51,7 @@ def local_x(result: BlockResult) -> np.ndarray:
     return result.points.true_xyz[:, 0] - 294_000.0
 
 
-def flying(**changes: Any) -> Scan:
+def flying(**changes: Any) -> ScanPlan:
     """Return a scan of a plane, half of whose points have negative x."""
     scan = scan_of(plane(), **changes)
     scan.path.pose = lambda strip, time: (  # type: ignore[method-assign]

@@ -11,7 +11,8 @@ from synthroads_addon.materials.surfaces import surfaces_of
 from synthroads_addon.materials.table import materials
 from synthroads_addon.scanning.knots import Track
 from synthroads_addon.scanning.noise import Noise
-from synthroads_addon.scanning.scan import Scan, beam_rays, scan_block, scan_pulses
+from synthroads_addon.scanning.plan import ScanPlan
+from synthroads_addon.scanning.scan import beam_rays, scan_block, scan_pulses
 from synthroads_addon.scanning.scene.mesh import SceneMesh
 from synthroads_addon.scanning.scene.motion import LinearMotion, MovingMesh
 from synthroads_addon.scanning.trace import trace
@@ -28,7 +29,7 @@ from tests.helpers.scenes.scan_scenes import (
 )
 
 
-def gaussian_mean(scan: Scan, angle: float, slope: tuple[float, float], height: float) -> float:
+def gaussian_mean(scan: ScanPlan, angle: float, slope: tuple[float, float], height: float) -> float:
     """Return the mean range over a Gaussian footprint on the plane z = a x + b y - height, by 2D Gauss-Hermite nodes.
 
     The beam leaves the origin, ``angle`` right of the nadir while heading along x.
@@ -83,7 +84,7 @@ def test_a_tilted_plane_converges_with_rays_per_pulse() -> None:
 # --- footprint ------------------------------------------------------------------------------------------------------
 
 
-def footprint(scan: Scan) -> tuple[float, float]:
+def footprint(scan: ScanPlan) -> tuple[float, float]:
     """Return the widths at 1/e^2 on the ground, in the scan plane and across it, from the rays' own second moments."""
     _, pulses = echoes_and_pulses(scan, 500, 1)
     rays = beam_rays(scan, pulses, [])
@@ -126,7 +127,7 @@ def test_a_pole_before_a_wall() -> None:
     assert points.return_number.tolist() == [1, 2]
 
 
-def leaf_scan(transmission: float, layers: int = 1, rays: int = 7, **changes) -> Scan:
+def leaf_scan(transmission: float, layers: int = 1, rays: int = 7, **changes) -> ScanPlan:
     """Return a scan of leaf layers 2 m apart, from 4 m up, above asphalt."""
     levels = [0.0, *(4.0 + 2.0 * i for i in range(layers))]
     corners = [(x, y, z) for z in levels for x, y in ((-90, -90), (90, -90), (90, 90), (-90, 90))]

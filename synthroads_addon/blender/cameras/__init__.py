@@ -4,17 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass
 
 import bpy
 
 from ...base.errors import InputError
-from ...road.surroundings import Environment
-from ...scanning.colour.colour import LayerSource, MaterialLayers, Shading, SurfaceConstants, needed_layers
-from ...scanning.colour.light import CloudShadows, SunAndSky
-from ...scanning.colour.views import Poses, View, scene_sample, views_along
-from ...scanning.scene.mesh import SceneMesh
-from ...scenario.colour import ColourScenario
+from ...scanning.colour.colour import LayerSource, SurfaceConstants, needed_layers
+from ...scanning.colour.light import SunAndSky
+from ...scanning.colour.request import LayerRequest, material_layers
+from ...scanning.colour.settings import ColourSettings
+from ...scanning.colour.views import View, scene_sample, views_along
 from .images import RenderedLayers
 from .light import daylight
 from .returns import ReturnCamera
@@ -24,13 +22,11 @@ from .versions import HAS_RETURN_CAMERA
 
 __all__ = [
     "HAS_RETURN_CAMERA",
-    "ColourJob",
     "RenderedLayers",
     "ReturnCamera",
     "check_colour",
     "image_views",
     "layer_source",
-    "material_layers",
     "takes_returns",
 ]
 
@@ -38,92 +34,62 @@ _BOUNCES = 3
 """Reflections that whole light paths are followed over."""
 
 
-@dataclass(frozen=True)
-class ColourJob:
-    """What colours and layers are wanted, and of what.
-
-    Attributes:
-        scenario: how.
-        fidelity: draft, standard or high.
-        wanted: layers: ``rgb``, ``base_color``, ``roughness``, ``metallic``, ``specular``.
-        mesh: what is scanned, without what moves.
-        environment: light and weather.
-        path: the scanner's.
-        field_of_view: the scanner's, rad.
-        seed: of the clouds.
-        frame: where (3,) the scene's local frame begins in that of the clouds, m.
-        pick: which of the images along the path are rendered, and what of them; None for all.
-    """
-
-    scenario: ColourScenario
-    fidelity: str
-    wanted: frozenset[str]
-    mesh: SceneMesh
-    environment: Environment
-    path: Poses
-    field_of_view: float
-    seed: int = 0
-    frame: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    pick: Callable[[list[View]], list[View]] | None = None
-
-
-def check_colour(scenario: ColourScenario) -> None:
+def check_colour(settings: ColourSettings) -> None:
     """Refuse what this Blender can't do.
 
     Raises:
         InputError: a pixel per return in a Blender before 5.0 or without OSL, or with EEVEE; EEVEE with whole light
             paths.
     """
-    if scenario.source == "returns" and not HAS_RETURN_CAMERA:
+    if settings.source == "returns" and not HAS_RETURN_CAMERA:
         raise InputError("colour: source", "returns", "needs Blender 5.0 or newer, with OSL; this one has images")
-    if scenario.source == "returns" and scenario.engine != "cycles":
-        raise InputError("colour: engine", scenario.engine, "must be cycles for a pixel per return")
-    if scenario.lighting == "path" and scenario.engine != "cycles":
-        raise InputError("colour: lighting", scenario.lighting, "must be direct for eevee")
+    if settings.source == "returns" and settings.engine != "cycles":
+        raise InputError("colour: engine", settings.engine, "must be cycles for a pixel per return")
+    if settings.lighting == "path" and settings.engine != "cycles":
+        raise InputError("colour: lighting", settings.lighting, "must be direct for eevee")
 
 
-def takes_returns(scenario: ColourScenario) -> bool:
+def takes_returns(settings: ColourSettings) -> bool:
     """Return whether what is rendered is a pixel per return here, and not images."""
-    return scenario.source == "returns" or (
-        scenario.source == "auto" and scenario.engine == "cycles" and HAS_RETURN_CAMERA
+    return settings.source == "returns" or (
+        settings.source == "auto" and settings.engine == "cycles" and HAS_RETURN_CAMERA
     )
 
 
 @contextmanager
 def layer_source(
-    job: ColourJob, source: bpy.types.Scene | None = None, progress: Callable[[float], None] = lambda share: None
+    request: LayerRequest, source: bpy.types.Scene | None = None, progress: Callable[[float], None] = lambda share: None
 ) -> Iterator[LayerSource]:
     """Yield what gives the points their layers; images are rendered before. The scene is as it was afterwards.
 
     Must be called on Blender's main thread. `ReturnCamera` must be used there as well; the others by any threads.
 
     Args:
-        job: what is wanted.
+        request: what is wanted.
         source: the scene that is scanned; the current one if None.
         progress: called with the share of the images that is rendered.
     """
-    check_colour(job.scenario)
-    constants = scene_constants(job.mesh.materials)
-    passes = _passes(job, constants)
-    lit = "rgb" in job.wanted and job.scenario.mode == "lit"
+    check_colour(request.settings)
+    constants = scene_constants(request.mesh.materials)
+    passes = _passes(request, constants)
     with ExitStack() as stack:
         light, exposure, world = SunAndSky(), 1.0, None
         lamps: tuple[bpy.types.Object, ...] = ()
-        if lit and job.scenario.source != "material":
-            day = stack.enter_context(daylight(job.environment, job.scenario.lighting == "direct"))
+        if request.lit and request.settings.source != "material":
+            day = stack.enter_context(daylight(request.environment, request.settings.lighting == "direct"))
             light, exposure, lamps = day.light, day.exposure, (day.sun,)
             world = day.world if passes.sky else None
-        fallback = material_layers(job.scenario, constants, lit, job.environment, job.seed, light, job.frame)
-        if job.scenario.source == "material" or not passes.channels:
+        fallback = material_layers(request, constants, light)
+        if request.settings.source == "material" or not passes.channels:
             yield fallback
             return
         set_up = stack.enter_context(
-            stage(source or bpy.context.scene, job.mesh.materials, passes, lamps, world, job.scenario.engine)
+            stage(source or bpy.context.scene, request.mesh.materials, passes, lamps, world, request.settings.engine)
         )
         if passes.position:
             yield ReturnCamera(set_up, fallback, exposure)
             return
-        views = image_views(job)
+        views = image_views(request)
         images = RenderedLayers(set_up, views, fallback, exposure)
         try:
             images.render(progress)
@@ -134,54 +100,27 @@ def layer_source(
             images.close()
 
 
-def image_views(job: ColourJob) -> list[View]:
-    """Return the cameras of a job's images."""
-    settings = job.scenario.settings(job.fidelity, job.path.typical_range)
-    views = views_along(job.path, scene_sample(job.mesh), settings, job.field_of_view, job.scenario.max_resolution)
-    return views if job.pick is None else job.pick(views)
+def image_views(request: LayerRequest) -> list[View]:
+    """Return the cameras of a request's images."""
+    settings, points = request.settings, scene_sample(request.mesh)
+    views = views_along(request.path, points, settings, request.field_of_view, settings.max_resolution)
+    return views if request.pick is None else request.pick(views)
 
 
-def material_layers(
-    scenario: ColourScenario,
-    constants: SurfaceConstants,
-    lit: bool,
-    environment: Environment,
-    seed: int,
-    light: SunAndSky | None = None,
-    frame: tuple[float, float, float] = (0.0, 0.0, 0.0),
-) -> MaterialLayers:
-    """Return the materials' own values: all of it where nothing is rendered, else for what no image shows.
-
-    It touches no data of Blender.
-
-    Args:
-        scenario: how.
-        constants: means of the scene's materials.
-        lit: lit colours are wanted.
-        environment: its clouds drift over the scene.
-        seed: of the clouds.
-        light: that of the images; the usual one if None.
-        frame: see `ColourJob`.
-    """
-    clouds = CloudShadows(environment, seed, frame) if lit and environment.cloud_cover > 0.0 else None
-    return MaterialLayers(constants, Shading(scenario.mode, light or SunAndSky(), clouds))
-
-
-def _passes(job: ColourJob, constants: SurfaceConstants) -> Passes:
+def _passes(request: LayerRequest, constants: SurfaceConstants) -> Passes:
     """Return what must be rendered: no layer that isn't wanted, and none that is constant on every material."""
-    scenario = job.scenario
-    lit = "rgb" in job.wanted and scenario.mode == "lit"
-    whole = lit and scenario.lighting == "path" and scenario.engine == "cycles"
-    needed = needed_layers(job.wanted, scenario.mode)
+    settings, lit = request.settings, request.lit
+    whole = lit and settings.lighting == "path" and settings.engine == "cycles"
+    needed = needed_layers(request.wanted, settings.mode)
     if whole:
-        needed -= {"base_color"} - job.wanted
-    returns = takes_returns(scenario)
+        needed -= {"base_color"} - request.wanted
+    returns = takes_returns(settings)
     return Passes(
         layers=constants.varying(needed),
         lit=lit,
         sky=whole,
         depth=not returns,
         position=returns,
-        samples=scenario.settings(job.fidelity).samples,
+        samples=settings.samples,
         bounces=_BOUNCES if whole else 0,
     )

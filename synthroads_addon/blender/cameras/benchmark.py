@@ -11,10 +11,11 @@ from typing import Any
 import bpy
 
 from ...road.parameters import RoadParameters, Vegetation
+from ...scanning.colour.request import LayerRequest
 from ...scanning.colour.views import View
 from ..compat import modifier_input, set_modifier_input
 from ..model.build import RoadModel
-from . import ColourJob, image_views, layer_source
+from . import image_views, layer_source
 from .images import aim
 from .light import daylight
 from .stage import Passes, Stage, stage
@@ -30,17 +31,17 @@ def seconds_of(work: Callable[[], object]) -> float:
     return time.perf_counter() - begin
 
 
-def rendering(job: ColourJob, count: int) -> dict[str, Any]:
+def rendering(request: LayerRequest, count: int) -> dict[str, Any]:
     """Return the rendering of all layers beside that of nothing but the picture, of the same images.
 
     Both are without what the first image costs, which brings the scene into the renderer.
 
     Args:
-        job: whose images are rendered, whatever its colours come from.
+        request: whose images are rendered, whatever its colours come from.
         count: about so many of them.
     """
-    job = replace(job, scenario=job.scenario.model_copy(update={"source": "images"}))
-    every = image_views(job)
+    request = replace(request, settings=replace(request.settings, source="images"))
+    every = image_views(request)
     views = every[:: max(1, len(every) // count)]
     stamps: list[float] = []
 
@@ -50,16 +51,16 @@ def rendering(job: ColourJob, count: int) -> dict[str, Any]:
     def stamp(_: float) -> None:
         stamps.append(time.perf_counter())
 
-    with layer_source(replace(job, pick=pick), progress=stamp):
+    with layer_source(replace(request, pick=pick), progress=stamp):
         ours = stamps[-1] - stamps[0]
     pixels = sum(view.pixels for view in views) / 1e6
-    rates = {"ours": pixels / ours, "floor": pixels / _bare_seconds(job, views)}
+    rates = {"ours": pixels / ours, "floor": pixels / _bare_seconds(request, views)}
     return {"name": "rendering, all layers; Cycles, the picture alone", "unit": "million samples/s", **rates, "rays": 0}
 
 
-def _bare_seconds(job: ColourJob, views: list[View]) -> float:
+def _bare_seconds(request: LayerRequest, views: list[View]) -> float:
     """Return the seconds that the picture alone of some images takes."""
-    with daylight(job.environment, True) as day:
+    with daylight(request.environment, True) as day:
         passes = Passes((), lit=True)
         with stage(bpy.context.scene, (), passes, (day.sun,), None) as bare:
             aim(bare.camera, views[0])

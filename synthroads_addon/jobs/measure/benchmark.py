@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import tempfile
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -18,21 +17,20 @@ from numpy.typing import NDArray
 
 from ...base.machine import available_cores
 from ...base.progress import StageTimer, peak_memory_mb
-from ...blender.cameras import layer_source
 from ...blender.cameras.benchmark import panel_edit, rendering, seconds_of
 from ...blender.casters.measure import bare_rate
 from ...blender.files import empty_file
-from ...blender.model.build import build_road
-from ...blender.scene.evaluated import scanned_scene
 from ...road.geometry import RoadGeometry
 from ...sampling.road import sample_road
 from ...scanning.beam import RINGS
-from ...scanning.colour.colour import LayerSource
-from ...scanning.scan import Scan, scan_block
+from ...scanning.plan import ScanPlan
+from ...scanning.record import CollectedBlocks, record, scan_blocks
+from ...scanning.scan import scan_block
 from ...scanning.scene.caster import Caster
 from ...scenario.scenario import Scenario
 from ..road_files import write_road_files
-from ..scan.files import ScanToFiles, colour_job, make_scan, road_path, scan_blocks
+from ..road_scene import build_model, plan_road_scan, read_scene, road_cloud_files
+from ..scan.files import CloudFiles, record_to_files
 
 _CAST_BLOCKS, _WRITTEN_BLOCKS = 48, 96
 """Blocks, spread over the scan, on which casting and writing are measured beside their floors: so many that what is
@@ -54,42 +52,35 @@ def measure_demo(scenario: Scenario) -> dict[str, Any]:
         `jobs.measure.benchmark_table.LIMITS`;
         ``floors``: name, unit, ours and floor.
     """
-    timer, settings = StageTimer(), scenario.settings()
+    timer = StageTimer()
     empty_file()
     with tempfile.TemporaryDirectory(prefix="synthroads-") as text:
         folder = Path(text)
         with timer.stage("parameters"):
-            parameters = sample_road(scenario.road, scenario.seed, scenario.title)
-            geometry = RoadGeometry(parameters)
-            write_road_files(folder, scenario.outputs, parameters, geometry, scenario)
+            road = RoadGeometry(sample_road(scenario.road, scenario.seed, scenario.title))
+            write_road_files(folder, scenario, road, timer)
         with timer.stage("model"):
-            model = build_road(parameters, settings.tolerance, settings.vegetation_detail)
+            model = build_model(scenario, road)
         with timer.stage("scene mesh"):
-            scene = scanned_scene(geometry=geometry, speed_factor=scenario.scan.traffic_speed_factor)
+            scene = read_scene(scenario, road)
         with timer.stage("caster"):
-            path = road_path(scenario, geometry)
-            scan = make_scan(scenario, scene, path, parameters.environment, variation=parameters.materials)
-        job = colour_job(scenario, scan, scene, parameters.environment)
-        with ExitStack() as stack:
-            with timer.stage("images"):
-                source = stack.enter_context(layer_source(job))
-            with timer.stage("scan and files"):
-                task = ScanToFiles(scenario, scan, source, folder, parameters.metadata.epsg)
-                for _ in task.run():
-                    pass
-            seconds, memory = timer.seconds, peak_memory_mb()
-            floors = [*_casting(scan), _writing(scan, source, task, folder)]
-        if job.scenario.source != "material":
-            floors.append(rendering(job, _VIEWS))
-    own = next(row for row in floors if row["rays"] == scan.rays_per_pulse)
+            plan = plan_road_scan(scenario, road, scene)
+        files = road_cloud_files(scenario, road, folder, plan)
+        record_to_files([plan], files, timer)
+        seconds, memory = timer.seconds, peak_memory_mb()
+        floors = [*_casting(plan), _writing(plan, files, folder)]
+        assert plan.request is not None
+        if scenario.colour.source != "material":
+            floors.append(rendering(plan.request, _VIEWS))
+    own = next(row for row in floors if row["rays"] == plan.rays_per_pulse)
     writing = next(row for row in floors if row["name"].startswith("writing"))
     lines = {
-        "points": task.counts.points / 1e6,
+        "points": files.counts.points / 1e6,
         "seconds": seconds,
         "memory_mb": memory,
         "parameters": timer.stages["parameters"]["seconds"],
         "model": timer.stages["model"]["seconds"],
-        "panel_edit": panel_edit(model, parameters),
+        "panel_edit": panel_edit(model, road.parameters),
         "casting": 100.0 * own["ours"] / own["floor"],
         "writing": writing["ours"],
     }
@@ -98,9 +89,9 @@ def measure_demo(scenario: Scenario) -> dict[str, Any]:
     return {"cores": available_cores(), "stages": timer.stages, "lines": lines, "floors": floors}
 
 
-def _spread(scan: Scan, count: int) -> list[Any]:
+def _spread(plan: ScanPlan, count: int) -> list[Any]:
     """Return so many whole blocks, spread over a scan."""
-    blocks = scan.blocks()
+    blocks = plan.blocks()
     return [blocks[i] for i in np.unique(np.linspace(0, len(blocks) - 1, count + 2).astype(int)[1:-1])]
 
 
@@ -123,38 +114,38 @@ class _KeptRays:
         return self._caster.cast(origins, directions, maximum_range)
 
 
-def _casting(scan: Scan) -> Iterator[Rate]:
+def _casting(plan: ScanPlan) -> Iterator[Rate]:
     """Yield casting and radiometry beside the bare caster on the same rays, for several numbers of rays per pulse."""
     for rays in _RAYS:
         # The scene, its caster and the materials are the same.
-        yield _cast_beside(replace(scan, rings=RINGS[rays], targets=False, wanted=frozenset()))
+        yield _cast_beside(replace(plan, rings=RINGS[rays], targets=False, wanted=frozenset()))
 
 
-def _cast_beside(scan: Scan) -> Rate:
-    threads, blocks = available_cores(), _spread(scan, _CAST_BLOCKS)
-    part = scan.target._parts[0]
+def _cast_beside(plan: ScanPlan) -> Rate:
+    threads, blocks = available_cores(), _spread(plan, _CAST_BLOCKS)
+    part = plan.target._parts[0]
     caster, kept = part.caster, _KeptRays(part.caster)
     object.__setattr__(part, "caster", kept)
     try:
         for block in blocks:
-            scan_block(scan, *block)
+            scan_block(plan, *block)
     finally:
         object.__setattr__(part, "caster", caster)
     origins, directions = np.concatenate(kept.origins), np.concatenate(kept.directions)
-    few = replace(scan, only=tuple(blocks))
+    few = replace(plan, only=tuple(blocks), threads=threads)
 
     def ours() -> float:
-        return len(origins) / seconds_of(lambda: _exhaust(scan_blocks(few, threads)))
+        return len(origins) / seconds_of(lambda: _exhaust(scan_blocks(few)))
 
     def floor() -> float:
-        limit = scan.setting.maximum_range
+        limit = plan.setting.maximum_range
         return bare_rate(caster, origins, directions, limit, threads, repeats=1).rays_per_second
 
     return {
-        "name": f"casting and radiometry, {scan.rays_per_pulse} rays per pulse; Embree",
+        "name": f"casting and radiometry, {plan.rays_per_pulse} rays per pulse; Embree",
         "unit": "million rays/s",
         **_best_of_both(ours, floor),
-        "rays": scan.rays_per_pulse,
+        "rays": plan.rays_per_pulse,
     }
 
 
@@ -164,18 +155,16 @@ def _best_of_both(ours: Callable[[], float], floor: Callable[[], float]) -> dict
     return {"ours": max(own for own, _ in rates) / 1e6, "floor": max(bare for _, bare in rates) / 1e6}
 
 
-def _writing(scan: Scan, source: LayerSource, task: ScanToFiles, folder: Path) -> Rate:
+def _writing(plan: ScanPlan, files: CloudFiles, folder: Path) -> Rate:
     """Return the writing of LAZ beside the mere compression of the same records by lazrs through laspy."""
-    from ...cloud.formats.registry import open_writer
-
-    few = replace(scan, only=tuple(_spread(scan, _WRITTEN_BLOCKS)))
-    blocks = [result.points for result in scan_blocks(few, 0, task.finish)]
+    few = replace(plan, only=tuple(_spread(plan, _WRITTEN_BLOCKS)))
+    kept = CollectedBlocks()
+    record(few, kept)
+    blocks = [result.points for result in kept.results]
     count = sum(len(block) for block in blocks)
-    scenario = task.files.scenario
-    options = (None, scan.target.origin, task.files.intensity_scale, scenario.cloud.attributes, scenario.cloud.scheme())
 
     def ours() -> None:
-        with open_writer(folder / "ours.laz", *options) as writer:
+        with files.open_writer("ours.laz") as writer:
             for block in blocks:
                 writer.write(block)
 

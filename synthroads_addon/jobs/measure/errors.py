@@ -1,190 +1,182 @@
-"""Errors of a job's points against the analytic road, the converged footprint, and colours rendered as well as can be.
+"""Errors of points against truth: beam, micro-relief and colours, each with an upper confidence bound.
 
-- *height*: largest vertical distance of 100,000 random points of the road's mesh from the analytic surface;
 - *beam*: position and intensity of first returns against those of the same pulses with 61 rays among all plants, 95th
-  percentile; share of the first returns whose class is another; and how many points fewer there are in the file;
-- *relief*: distance of the shifted points from those that all octaves shift with full strength, 95th percentile;
-- *colour*: CIEDE2000 from the true colours, and the largest root mean square error of a material layer.
+  percentile; share of the first returns whose class is another; and how many points are missing or too many;
+- *relief*: distance of the shifted points from those that all octaves shift, 95th percentile;
+- *colour*: CIEDE2000 from colours rendered as well as can be, 95th percentile;
+- *layers*: the largest root mean square error of a material layer.
+
+Points come in parts, short stretches of a path: values within a part are alike, so that the confidence of an error
+follows from the number of parts. Kinds, units and names are those of `scenario.tolerance.KINDS`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, replace
-from typing import Any
+from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ...blender.cameras import HAS_RETURN_CAMERA, ColourJob, layer_source
+from ...base.random_streams import stream
+from ...blender.cameras import HAS_RETURN_CAMERA
 from ...cloud.points import PointBlock
-from ...road.geometry import RoadGeometry
-from ...road.parameters import RoadParameters
 from ...scanning.beam import RINGS
-from ...scanning.colour.colour import FROM_MATERIAL, MATERIAL_LAYERS, NEARBY, LayerValues, sample_targets, source_name
+from ...scanning.colour.colour import FROM_MATERIAL, MATERIAL_LAYERS, NEARBY, LayerValues
 from ...scanning.colour.difference import ciede2000, lab
-from ...scanning.relief import adjusted, micro_relief
-from ...scanning.samples import middle
-from ...scanning.scan import BlockResult, Scan, joined_results, scan_block
-from ...scanning.scene.motion import ScannedScene
-from ...scanning.scene.target import Target
+from ...scanning.colour.request import LayerRequest
+from ...scanning.colour.settings import ColourSettings
+from ...scanning.relief import MicroRelief, adjusted
+from ...scanning.scan import BlockResult
 from ...scenario.colour import image_scale
-from ...scenario.scenario import Scenario
-from ..scan.files import material_rows
-from .mesh_errors import mesh_height_errors
-from .tradeoff import DENSEST, TRUE_SAMPLES, Knob
 
-LAYERS = frozenset({"rgb", *MATERIAL_LAYERS})
-"""Colours and all layers, which the rows on colours ask for."""
+Float = NDArray[np.float64]
+Errors = dict[str, tuple[float, float]]
+"""Kind of error -> estimate, and its upper bound with the confidence `LEVEL`."""
+
+LEVEL = 0.95
+"""Confidence of the upper bounds that tolerances are held against."""
+QUANTILE = 0.95
 CONVERGED = max(RINGS)
 """Rays per pulse of the footprint that counts as truth."""
-_OCTAVES = 8
-"""Of the micro-relief that counts as truth."""
-_TENTH = 10
-"""One in so many points is compared with whole light paths."""
-_MIDDLE = 0.2
-"""Share of each strip that the densest images are rendered of."""
+FINEST = 8
+"""Octaves of the micro-relief that counts as truth."""
+DENSEST = {"image_spacing": 7.5, "ground_sampling_distance": 0.03}
+"""Images that count as true where Blender has no pixel per return: for a range of 60 m. Denser than any preset's."""
+_DRAWS = 400
+_STEPS = 512
+"""Places at which a distribution's shares are counted."""
+_LEAST = 1e-9
 
 
-@dataclass(frozen=True)
-class Sample:
-    """What a row's errors are taken of.
-
-    Attributes:
-        scan: of stretches of the path.
-        result: its points as measured, with normals and materials, and where they were seen.
-        values: their colours and layers; None without.
-        written: points in the file.
-        truth: returns the scan of the same stretches with the converged footprint among all plants, or None if `scan`
-            is that itself. It may build that scene in place of the one scanned.
-    """
-
-    scenario: Scenario
-    scene: ScannedScene
-    scan: Scan
-    result: BlockResult
-    values: LayerValues | None
-    written: int
-    truth: Callable[[], Scan | None]
-
-
-def errors_of(knob: Knob, sample: Sample, parameters: RoadParameters, job: ColourJob) -> dict[str, Any]:
-    """Return ``errors`` by name of `tradeoff.ROW_TITLES`, and of colours ``colour_truth`` and ``errors_by_source``.
-
-    The former is what they were compared with, the latter their errors by what gave them to the points.
-    """
-    errors: dict[str, float] = {}
-    more: dict[str, Any] = {}
-    if "height" in knob.errors:
-        heights = mesh_height_errors(sample.scene.static, RoadGeometry(parameters))
-        errors["height_mm"] = 1e3 * float(np.abs(heights).max())
-    if "relief" in knob.errors:
-        errors["relief_mm"] = _relief_error(sample)
-    if "colour" in knob.errors:
-        truth, more["colour_truth"], chosen = _true_colours(knob, sample, job)
-        of_all, more["errors_by_source"] = _compared(sample.values, truth, chosen)
-        errors |= of_all
-    if "beam" in knob.errors:  # last, as its truth may be another scene
-        errors |= _beam_errors(sample)
-    return {"errors": {name: round(error, 6) for name, error in errors.items()}, **more}
-
-
-def _scanned(scan: Scan) -> BlockResult:
-    return joined_results([scan_block(scan, *block) for block in scan.blocks()])
-
-
-def _beam_errors(sample: Sample) -> dict[str, float]:
-    """Compare first returns with those of the converged footprint, pulse by pulse (told by their time)."""
-    mine, converged = sample.result.points, sample.truth()
-    truth = mine if converged is None else _scanned(converged).points
-    return beam_errors(*paired(mine, truth)) | {"density_percent": 100.0 * (1.0 - sample.written / len(truth))}
-
-
-def paired(mine: PointBlock, truth: PointBlock) -> tuple[PointBlock, PointBlock]:
-    """Return the first returns of the pulses that both have, in one order."""
+def match_pulses(mine: PointBlock, truth: PointBlock) -> tuple[PointBlock, PointBlock]:
+    """Return the first returns of the pulses that both have, in one order; pulses are known by their time."""
     a, b = (points.select(points.return_number == 1) for points in (mine, truth))
     _times, first, second = np.intersect1d(a.gps_time, b.gps_time, return_indices=True)
     return a.select(first), b.select(second)
 
 
-def beam_errors(mine: PointBlock, truth: PointBlock) -> dict[str, float]:
-    """Return the errors of first returns against those of the same pulses, see `paired`; by name of the table."""
+def beam_errors(mine: Sequence[PointBlock], truth: Sequence[PointBlock]) -> Errors:
+    """Return position (m), intensity, labels and density (shares) of parts of a cloud against the truth."""
+    pairs = [match_pulses(a, b) for a, b in zip(mine, truth, strict=True)]
+    position = [np.linalg.norm(a.xyz - b.xyz, axis=1) for a, b in pairs]
+    intensity = [np.abs(a.intensity / b.intensity - 1.0) for a, b in pairs]
+    wrong = np.array([float((a.class_id != b.class_id).sum()) for a, b in pairs])
+    number = np.array([float(len(a)) for a, _ in pairs])
+    points, true = (np.array([float(len(one)) for one in several]) for several in (mine, truth))
+    fewer, more = ratio_bound(true - points, true, "density"), ratio_bound(points - true, true, "density")
     return {
-        "position_mm": 1e3 * float(np.quantile(np.linalg.norm(mine.xyz - truth.xyz, axis=1), 0.95)),
-        "intensity_percent": 100.0 * float(np.quantile(np.abs(mine.intensity / truth.intensity - 1.0), 0.95)),
-        "labels_percent": 100.0 * float(np.mean(mine.class_id != truth.class_id)),
+        "position": quantile_bound(position, QUANTILE, "position"),
+        "intensity": quantile_bound(intensity, QUANTILE, "intensity"),
+        "labels": ratio_bound(wrong, number, "labels"),
+        "density": (max(fewer[0], more[0]), max(fewer[1], more[1])),
     }
 
 
-def fast_target(scan: Scan, scene: ScannedScene) -> Target:
-    """Return a fast target for the truth."""
-    from ...blender.casters import make_caster
-
-    if scan.target.caster.name == "embree":
-        return scan.target
-    return Target(scene, lambda mesh: make_caster("auto", mesh))
-
-
-def _relief_error(sample: Sample) -> float:
-    """Return how far the points' micro-relief is from the finest, mm, 95th percentile."""
-    scan, seen, points = sample.scan, sample.result.seen, sample.result.points
-    assert seen is not None
-    relief = micro_relief(scan.target.materials, material_rows(scan.target.materials))
-    mine, finest = (
-        adjusted(points, seen.position, relief, strength, sample.scenario.seed, octaves).xyz
-        for strength, octaves in (
-            (sample.scenario.scan.relief, sample.scenario.settings().relief_octaves),
-            (1.0, _OCTAVES),
-        )
-    )
-    return 1e3 * float(np.quantile(np.linalg.norm(mine - finest, axis=1), 0.95))
+def shift_points(
+    results: Sequence[BlockResult], relief: MicroRelief, strength: float, seed: int, octaves: int
+) -> list[Float]:
+    """Return the places (N, 3) of the points of each part as micro-relief shifts them, m."""
+    return [
+        adjusted(one.points, one.seen.position, relief, strength, seed, octaves).xyz
+        for one in results
+        if one.seen is not None
+    ]
 
 
-def _true_colours(
-    knob: Knob, sample: Sample, job: ColourJob
-) -> tuple[LayerValues, str, NDArray[np.intp]]:
-    """Return colours and layers rendered as well as can be, what they are, and which points (K,) they are of."""
-    seen = sample.result.seen
-    assert seen is not None
-    colour = job.scenario.to_dict() | {"source": "returns", "lighting": "direct", "samples": None}
-    chosen, name = np.arange(len(seen)), "a pixel per return"
-    if knob.whole_paths:
-        colour |= {"lighting": "path", "samples": TRUE_SAMPLES}
-        chosen, name = chosen[::_TENTH], f"a pixel per return with {TRUE_SAMPLES} samples of whole light paths"
-    elif not HAS_RETURN_CAMERA:
-        scale = image_scale(job.path.typical_range)
-        densest = {name: scale * length for name, length in DENSEST.items()}
-        colour |= {"source": "images"} | densest
-        part = middle(job.path, _MIDDLE)  # type: ignore[arg-type]
-        job = replace(job, path=part)
-        within = [(strip.start_time, strip.start_time + strip.duration) for strip in part.strips]
-        chosen = np.flatnonzero(np.any([(low <= seen.time) & (seen.time <= high) for low, high in within], axis=0))
-        distance, spacing = densest["ground_sampling_distance"], densest["image_spacing"]
-        name = f"images of {distance:g} m pixels every {spacing:g} m, of the points that these show"
-    with layer_source(replace(job, scenario=job.scenario.from_dict(colour), wanted=LAYERS)) as source:
-        of = seen.select(chosen)
-        truth = sample_targets(source, of, LAYERS)
-    return truth, name, chosen
+def relief_errors(mine: Sequence[Float], truth: Sequence[Float]) -> Errors:
+    """Return the error of parts of shifted points (N, 3) against others, m."""
+    parts = [np.linalg.norm(a - b, axis=1) for a, b in zip(mine, truth, strict=True)]
+    return {"relief": quantile_bound(parts, QUANTILE, "relief")}
 
 
-def _compared(
-    values: LayerValues | None, truth: LayerValues, chosen: NDArray[np.intp]
-) -> tuple[dict[str, float], dict[str, dict[str, float]]]:
-    """Return the errors of colours and layers, of all points and by what gave them to these."""
-    assert values is not None
-    known = ~np.isin(truth.source, (FROM_MATERIAL, NEARBY))
-    mine: dict[str, Any] = {name: array[chosen][known] for name, array in values.arrays.items()}
-    true: dict[str, Any] = {name: array[known] for name, array in truth.arrays.items()}
-    difference = ciede2000(lab(mine["rgb"]), lab(true["rgb"]))
-    apart = [mine[name].astype(np.float64) - true[name] for name in MATERIAL_LAYERS]
-    squares = [np.square(error).reshape(len(difference), -1) for error in apart]
+def truest_settings(request: LayerRequest) -> ColourSettings:
+    """Return the settings of a request whose colours count as true, under direct light.
 
-    def of(rows: NDArray[np.bool_]) -> dict[str, float]:
-        return {
-            "colour_median": round(float(np.median(difference[rows])), 6),
-            "colour_95": round(float(np.quantile(difference[rows], 0.95)), 6),
-            "layers_rmse": round(max(float(np.sqrt(square[rows].mean())) for square in squares), 6),
-        }
+    That is a pixel per return where Blender has it, else the densest images, for the points that these show.
+    """
+    true = replace(request.settings, lighting="direct", samples=1)
+    if HAS_RETURN_CAMERA:
+        return replace(true, source="returns")
+    scale = image_scale(request.path.typical_range)
+    lengths = {name: scale * length for name, length in DENSEST.items()}
+    return replace(true, source="images", **lengths)  # type: ignore[arg-type]
 
-    names = np.array([source_name(number) for number in range(256)])[values.source[chosen][known]]
-    return of(np.ones(len(difference), bool)), {str(name): of(names == name) for name in np.unique(names)}
+
+def known_rows(truth: LayerValues) -> NDArray[np.bool_]:
+    """Return which points (N,) the truth was rendered for."""
+    return ~np.isin(truth.source, (FROM_MATERIAL, NEARBY))
+
+
+def colour_difference(mine: LayerValues, truth: LayerValues, rows: NDArray[np.bool_]) -> Float:
+    """Return CIEDE2000 between the colours of chosen points (N,)."""
+    return ciede2000(lab(mine.arrays["rgb"][rows]), lab(truth.arrays["rgb"][rows]))  # type: ignore[arg-type]
+
+
+def squared_error(name: str, mine: LayerValues, truth: LayerValues, rows: NDArray[np.bool_]) -> Float:
+    """Return the squared errors of a material layer at chosen points (N, components)."""
+    difference = mine.arrays[name][rows].astype(np.float64) - truth.arrays[name][rows].astype(np.float64)
+    return np.square(difference).reshape(len(difference), -1)
+
+
+def colour_errors(mine: Sequence[LayerValues], truth: Sequence[LayerValues], wanted: frozenset[str]) -> Errors:
+    """Return the errors of the wanted colours and layers of parts of a cloud, of the points whose truth is known."""
+    parts = [(a, b, known_rows(b)) for a, b in zip(mine, truth, strict=True)]
+    result: Errors = {}
+    if "rgb" in wanted:
+        result["colour"] = quantile_bound([colour_difference(*part) for part in parts], QUANTILE, "colour")
+    layers = []
+    for name in sorted(wanted & set(MATERIAL_LAYERS)):
+        squares = [squared_error(name, *part) for part in parts]
+        total, number = np.array([s.sum() for s in squares]), np.array([float(s.size) for s in squares])
+        layers.append(ratio_bound(total, number, name))
+    if layers:
+        estimate, bound = max(layers, key=lambda pair: pair[1])
+        result["layers"] = float(np.sqrt(estimate)), float(np.sqrt(bound))
+    return result
+
+
+def quantile_bound(parts: Sequence[Float], quantile: float, key: str = "") -> tuple[float, float]:
+    """Return a quantile of all values and its upper confidence bound, drawn from whole parts.
+
+    The parts (stretches of a path) are drawn anew, with replacement: values within a part are alike, so that their
+    number says less than that of the parts. Efron & Tibshirani 1993, An Introduction to the Bootstrap.
+
+    Args:
+        parts: values (N,) of each part.
+        quantile: 0 to 1.
+        key: of the random numbers.
+    """
+    every = np.concatenate([*parts, np.empty(0)])
+    if not len(every):
+        return 0.0, 0.0
+    estimate = float(np.quantile(every, quantile))
+    places = np.unique(np.quantile(every, np.linspace(0.0, 1.0, _STEPS)))
+    below = np.stack([np.searchsorted(np.sort(part), places, side="right") for part in parts]).astype(np.float64)
+    total = np.array([len(part) for part in parts], dtype=np.float64)
+    weights = _draw_parts(len(parts), key)
+    share = (weights @ below) / np.maximum(weights @ total, 1.0)[:, None]
+    first = np.minimum((share < quantile).sum(axis=1), len(places) - 1)
+    return estimate, max(estimate, float(np.quantile(places[first], LEVEL)))
+
+
+def ratio_bound(above: Float, below: Float, key: str = "") -> tuple[float, float]:
+    """Return the ratio of two sums over parts, and its upper confidence bound; see `quantile_bound`.
+
+    Args:
+        above, below: (S,) of each part.
+        key: of the random numbers.
+    """
+    if not below.sum() > 0.0:
+        return 0.0, 0.0
+    estimate = float(above.sum() / below.sum())
+    weights = _draw_parts(len(below), key)
+    ratios = (weights @ above) / np.maximum(weights @ below, _LEAST)
+    ratios = ratios[weights @ below > 0.0]
+    return estimate, max(estimate, float(np.quantile(ratios, LEVEL)))
+
+
+def _draw_parts(parts: int, key: str) -> Float:
+    """Return how often each part is drawn (draws, parts)."""
+    rng = stream(0, "choice", key)
+    return rng.multinomial(parts, np.full(parts, 1.0 / parts), size=_DRAWS).astype(np.float64)

@@ -5,32 +5,65 @@ from __future__ import annotations
 import sys
 import tempfile
 import time
+from collections.abc import Callable
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from ...base.machine import machine
-from ...base.progress import peak_memory_mb
+from ...base.progress import StageTimer, peak_memory_mb
 from ...blender.cameras import HAS_RETURN_CAMERA, layer_source, takes_returns
 from ...blender.cameras.returns import RENDERINGS_KEPT
-from ...blender.model.build import build_road
-from ...blender.scene.evaluated import scanned_scene
+from ...blender.services import BlenderServices
 from ...road.geometry import RoadGeometry
-from ...road.parameters import RoadParameters
 from ...sampling.road import sample_road
 from ...scanning.beam import RINGS
-from ...scanning.colour.colour import LayerSource, sample_targets, shares_by_source
-from ...scanning.samples import spread
-from ...scanning.scan import BlockResult, Scan, joined_results, scan_block
+from ...scanning.colour.colour import (
+    MATERIAL_LAYERS,
+    LayerSource,
+    LayerValues,
+    sample_targets,
+    shares_by_source,
+    source_name,
+)
+from ...scanning.colour.request import LayerRequest
+from ...scanning.plan import ScanPlan
+from ...scanning.record import RETURNS_AT_ONCE, record_as_measured
+from ...scanning.relief import micro_relief
+from ...scanning.samples import middle, spread
+from ...scanning.scan import BlockResult, joined_results
 from ...scanning.scene.motion import ScannedScene
 from ...scenario.scenario import Scenario, load_scenario
-from ..scan.files import RETURNS_AT_ONCE, ScanToFiles, colour_job, make_scan, road_path
-from .errors import CONVERGED, LAYERS, Sample, errors_of, fast_target
-from .tradeoff import KNOBS, row_scenario
+from ..road_scene import build_model, plan_road_scan, read_scene
+from ..scan.files import CloudFiles, ScanCounts, record_to_files
+from .errors import (
+    CONVERGED,
+    FINEST,
+    QUANTILE,
+    beam_errors,
+    colour_difference,
+    known_rows,
+    relief_errors,
+    shift_points,
+    squared_error,
+    truest_settings,
+)
+from .mesh_errors import mesh_height_errors
+from .tradeoff import KNOBS, TRUE_SAMPLES, Knob, row_scenario
 
 _STRETCHES, _SECONDS = 16, 0.08
 """Stretches of each strip that are scanned, spread evenly over it, and the duration of each."""
 _QUIET = ("scan.noise.range_sigma=0", 'outputs=["cloud"]')
+_TENTH = 10
+"""One in so many points is compared with whole light paths."""
+_MIDDLE = 0.2
+"""Share of each strip that the densest images are rendered of."""
+LAYERS = frozenset({"rgb", *MATERIAL_LAYERS})
+"""Colours and all layers, which the rows on colours ask for."""
 _FEW = 64
 """Points that bring the scene into a renderer."""
 
@@ -40,22 +73,22 @@ def measure_row(scenario_name: str, knob: str, value: Any) -> dict[str, Any]:
 
     Times are processor seconds, which other work on the machine hardly touches: building the model, building the
     caster's tree, rendering the images, and the rest of the job - scan, colours, relief, thinning out and the file -
-    projected from stretches of the path. Errors: see `jobs.measure.errors`.
+    projected from stretches of the path. Errors: see
+    `jobs.measure.errors`; height is the largest vertical distance of 100,000 random points of the road's mesh from the
+    analytic surface, and points in the file count for the density.
     """
     scenario = row_scenario(scenario_name, knob, value, _QUIET)
     if scenario.colour.source == "returns" and not HAS_RETURN_CAMERA:
         return {"knob": knob, "value": value, "left_out": "a pixel per return needs Blender 5.0 or newer"}
-    parameters = sample_road(scenario.road, scenario.seed)
-    geometry = RoadGeometry(parameters)
+    road = RoadGeometry(sample_road(scenario.road, scenario.seed))
     start = time.process_time()
-    settings = scenario.settings()
-    build_road(parameters, settings.tolerance, settings.vegetation_detail)
-    scene = scanned_scene(geometry=geometry, speed_factor=scenario.scan.traffic_speed_factor)
+    build_model(scenario, road)
+    scene = read_scene(scenario, road)
     built = time.process_time()
-    scan = make_scan(scenario, scene, road_path(scenario, geometry), parameters.environment)
+    plan = plan_road_scan(scenario, road, scene)
     ready = time.process_time()
     whole = load_scenario(scenario_name).vegetation_detail or 1.0
-    cost, errors = _run(scenario, knob, parameters, scene, scan, whole)
+    cost, errors = _run(scenario, knob, road, scene, plan, whole)
     return {
         "knob": knob,
         "value": value,
@@ -66,13 +99,37 @@ def measure_row(scenario_name: str, knob: str, value: Any) -> dict[str, Any]:
         "scan_seconds": round(cost.scan_seconds, 3),
         "rays_per_second": cost.rays_per_second,
         "peak_memory_mb": cost.peak_memory_mb,
-        "triangles": scan.target.triangles,
+        "triangles": plan.target.triangles,
         "images": cost.rendered.get("images", 0),
         "megapixels": round(cost.rendered.get("pixels", 0) / 1e6, 3),
         "shares": cost.shares,
         "machine": machine({"Blender": sys.modules["bpy"].app.version_string}),
         **errors,
     }
+
+
+@dataclass(frozen=True)
+class Sample:
+    """Points of stretches of a path, of which a row's errors are taken.
+
+    Attributes:
+        scene: that was scanned.
+        plan: of the stretches.
+        request: for the colours and layers of all of the path.
+        result: the points as measured, with normals and materials, and where they were seen.
+        values: their colours and layers; None without.
+        written: points in the file.
+        truth: returns the plan of the same stretches with the converged footprint among all plants, or None if `plan`
+            is that itself. It may build that scene in place of the one scanned.
+    """
+
+    scene: ScannedScene
+    plan: ScanPlan
+    request: LayerRequest
+    result: BlockResult
+    values: LayerValues | None
+    written: int
+    truth: Callable[[], ScanPlan | None]
 
 
 @dataclass(frozen=True)
@@ -96,7 +153,7 @@ class _Cost:
 
 
 def _run(
-    scenario: Scenario, knob: str, parameters: RoadParameters, scene: ScannedScene, scan: Scan, plants: float
+    scenario: Scenario, knob: str, road: RoadGeometry, scene: ScannedScene, plan: ScanPlan, plants: float
 ) -> tuple[_Cost, dict[str, Any]]:
     """Do the job on stretches of the path; return what it costs and the errors.
 
@@ -104,69 +161,157 @@ def _run(
         plants: share of the plants that the truth has.
     """
     coloured = "colour" in KNOBS[knob].errors
-    job = colour_job(scenario, scan, scene, parameters.environment)
+    request = plan.request
+    assert request is not None
     if coloured:
-        job = replace(job, wanted=LAYERS)
-    path = spread(scan.path, _STRETCHES, _SECONDS)
-    part = replace(scan, path=path)
-    result = _measured(part)
+        request = replace(request, wanted=LAYERS)
+    path = spread(plan.path, _STRETCHES, _SECONDS)
+    part = replace(plan, path=path)
+    result = joined_results(record_as_measured(part))
     start = time.process_time()
-    with layer_source(job) as source:
+    with layer_source(request) as source:
         if coloured and result.seen is not None:
             sample_targets(source, result.seen.select(slice(0, _FEW)), LAYERS)
         prepared, rendered = time.process_time(), dict(source.report)
-        task = _to_file(scenario, part, source)
+        counts = _count_points_in_file(scenario, part, source)
         done = time.process_time()
         peak = peak_memory_mb()
         values = sample_targets(source, result.seen, LAYERS) if coloured and result.seen is not None else None
     seconds, images = done - prepared, prepared - start
     restarts = 0
-    if coloured and takes_returns(scenario.colour):  # stretches are too few for the renderer to begin anew
-        restarts = int(task.counts.points / path.share / RETURNS_AT_ONCE / RENDERINGS_KEPT)
+    if coloured and takes_returns(request.settings):  # stretches are too few for the renderer to begin anew
+        restarts = int(counts.points / path.share / RETURNS_AT_ONCE / RENDERINGS_KEPT)
     cost = _Cost(
         image_seconds=images,
         scan_seconds=seconds / path.share + restarts * images,
-        rays_per_second=round(task.counts.rays / seconds),
+        rays_per_second=round(counts.rays / seconds),
         peak_memory_mb=peak,
         rendered=rendered,
-        shares=shares_by_source(task.counts.by_source),
+        shares=shares_by_source(counts.by_source),
     )
 
-    def truth() -> Scan | None:
-        return _truth(scenario, parameters, scene, part, plants)
+    def truth() -> ScanPlan | None:
+        return _truth(scenario, road, part, plants)
 
-    sample = Sample(scenario, scene, part, result, values, task.counts.points, truth)
-    return cost, errors_of(KNOBS[knob], sample, parameters, job)
-
-
-def _truth(
-    scenario: Scenario, parameters: RoadParameters, scene: ScannedScene, part: Scan, plants: float
-) -> Scan | None:
-    """Return the scan that counts as true, see `Sample.truth`; builds the road anew if it lacks plants."""
-    settings = scenario.settings()
-    if settings.vegetation_detail == plants:
-        if part.rays_per_pulse == CONVERGED:
-            return None
-        return replace(part, rings=RINGS[CONVERGED], target=fast_target(part, scene), targets=False)
-    build_road(parameters, settings.tolerance, plants)
-    geometry = RoadGeometry(parameters)
-    scene = scanned_scene(geometry=geometry, speed_factor=scenario.scan.traffic_speed_factor)
-    data = scenario.to_dict()
-    data["scan"] |= {"caster": "auto"}
-    scan = make_scan(Scenario.from_dict(data), scene, part.path, parameters.environment)
-    return replace(scan, rings=RINGS[CONVERGED], targets=False)
+    sample = Sample(scene, part, request, result, values, counts.points, truth)
+    return cost, _errors(KNOBS[knob], sample, road)
 
 
-def _measured(part: Scan) -> BlockResult:
-    """Return the points, with all that errors are taken of, as they are before anything is done to them."""
-    part = replace(part, targets=True, wanted=part.wanted | {"normal", "material"})
-    return joined_results([scan_block(part, *block) for block in part.blocks()])
+def _truth(scenario: Scenario, road: RoadGeometry, part: ScanPlan, plants: float) -> ScanPlan | None:
+    """Return the plan that counts as true, see `Sample.truth`; builds the road anew if it lacks plants."""
+    detail = scenario.settings().vegetation_detail
+    if detail == plants and part.rays_per_pulse == CONVERGED:
+        return None
+    fast = scenario.model_copy(
+        update={"scan": scenario.scan.model_copy(update={"caster": "auto"}), "vegetation_detail": plants}
+    )
+    if detail != plants:
+        build_model(fast, road)
+    elif part.target.caster.name == "embree":
+        return replace(part, rings=RINGS[CONVERGED])
+    plan = plan_road_scan(fast, road, read_scene(fast, road))
+    return replace(plan, path=part.path, rings=RINGS[CONVERGED])
 
 
-def _to_file(scenario: Scenario, part: Scan, source: LayerSource) -> ScanToFiles:
-    """Scan into a file that is thrown away."""
+def _errors(knob: Knob, sample: Sample, road: RoadGeometry) -> dict[str, Any]:
+    """Return ``errors`` by name of `tradeoff.ROW_TITLES`, and of colours ``colour_truth`` and ``errors_by_source``.
+
+    The former is what they were compared with, the latter their errors by what gave them to the points.
+    """
+    errors: dict[str, float] = {}
+    more: dict[str, Any] = {}
+    if "height" in knob.errors:
+        heights = mesh_height_errors(sample.scene.static, road)
+        errors["height_mm"] = 1e3 * float(np.abs(heights).max())
+    if "relief" in knob.errors:
+        errors["relief_mm"] = 1e3 * _relief_error(sample)
+    if "colour" in knob.errors:
+        truth, more["colour_truth"], chosen = _true_colours(knob, sample)
+        of_all, more["errors_by_source"] = _colour_errors(sample.values, truth, chosen)
+        errors |= of_all
+    if "beam" in knob.errors:  # last, as its truth may be another scene
+        errors |= _beam_errors(sample)
+    return {"errors": {name: round(error, 6) for name, error in errors.items()}, **more}
+
+
+def _beam_errors(sample: Sample) -> dict[str, float]:
+    """Compare first returns with those of the converged footprint; points with those in the file."""
+    mine, plan = sample.result.points, sample.truth()
+    truth = mine if plan is None else joined_results(record_as_measured(plan)).points
+    found = beam_errors([mine], [truth])
+    return {
+        "position_mm": 1e3 * found["position"][0],
+        "intensity_percent": 100.0 * found["intensity"][0],
+        "labels_percent": 100.0 * found["labels"][0],
+        "density_percent": 100.0 * (1.0 - sample.written / len(truth)),
+    }
+
+
+def _relief_error(sample: Sample) -> float:
+    """Return how far the points' micro-relief is from the finest with full strength, m, 95th percentile."""
+    plan = sample.plan
+    materials = plan.target.materials
+    relief = plan.relief or micro_relief(materials, BlenderServices().materials(materials))
+    mine = shift_points([sample.result], relief, plan.relief_strength, plan.seed, plan.relief_octaves)
+    return relief_errors(mine, shift_points([sample.result], relief, 1.0, plan.seed, FINEST))["relief"][0]
+
+
+def _true_colours(knob: Knob, sample: Sample) -> tuple[LayerValues, str, NDArray[np.intp]]:
+    """Return colours and layers rendered as well as can be, what they are, and which points (K,) they are of."""
+    seen, request = sample.result.seen, sample.request
+    assert seen is not None
+    settings, chosen, name = truest_settings(request), np.arange(len(seen)), "a pixel per return"
+    if knob.whole_paths:
+        settings = replace(settings, lighting="path", samples=TRUE_SAMPLES)
+        chosen, name = chosen[::_TENTH], f"a pixel per return with {TRUE_SAMPLES} samples of whole light paths"
+    elif not HAS_RETURN_CAMERA:
+        part = middle(request.path, _MIDDLE)  # type: ignore[arg-type]
+        request = replace(request, path=part)
+        within = [(strip.start_time, strip.start_time + strip.duration) for strip in part.strips]
+        chosen = np.flatnonzero(np.any([(low <= seen.time) & (seen.time <= high) for low, high in within], axis=0))
+        pixel, spacing = settings.ground_sampling_distance, settings.image_spacing
+        name = f"images of {pixel:g} m pixels every {spacing:g} m, of the points that these show"
+    with layer_source(replace(request, settings=settings, wanted=LAYERS)) as source:
+        return sample_targets(source, seen.select(chosen), LAYERS), name, chosen
+
+
+def _colour_errors(
+    values: LayerValues | None, truth: LayerValues, chosen: NDArray[np.intp]
+) -> tuple[dict[str, float], dict[str, dict[str, float]]]:
+    """Return the errors of colours and layers, of all points and by what gave them to these."""
+    assert values is not None
+    mine = LayerValues({name: array[chosen] for name, array in values.arrays.items()}, values.source[chosen])
+    known = known_rows(truth)
+    difference = colour_difference(mine, truth, known)
+    squares = [squared_error(name, mine, truth, known) for name in MATERIAL_LAYERS]
+
+    def of(rows: NDArray[np.bool_]) -> dict[str, float]:
+        return {
+            "colour_median": round(float(np.median(difference[rows])), 6),
+            "colour_95": round(float(np.quantile(difference[rows], QUANTILE)), 6),
+            "layers_rmse": round(max(float(np.sqrt(square[rows].mean())) for square in squares), 6),
+        }
+
+    names = np.array([source_name(number) for number in range(256)])[mine.source[known]]
+    return of(np.ones(len(difference), bool)), {str(name): of(names == name) for name in np.unique(names)}
+
+
+class _OpenedLayers(BlenderServices):
+    """Blender's services, with a source of layers that is open already."""
+
+    def __init__(self, source: LayerSource) -> None:
+        self._source = source
+
+    def layers(
+        self, request: LayerRequest, progress: Callable[[float], None]
+    ) -> AbstractContextManager[LayerSource]:
+        """Return the open source."""
+        return nullcontext(self._source)
+
+
+def _count_points_in_file(scenario: Scenario, part: ScanPlan, source: LayerSource) -> ScanCounts:
+    """Scan into a file that is thrown away; return what was counted."""
     with tempfile.TemporaryDirectory(prefix="synthroads-") as folder:
-        task = ScanToFiles(scenario, part, source, Path(folder))
-        for _ in task.run():
-            pass
-    return task
+        files = CloudFiles(scenario, Path(folder), part.target.origin, part.path.typical_range)
+        record_to_files([replace(part, services=_OpenedLayers(source))], files, StageTimer())
+    return files.counts

@@ -19,13 +19,11 @@ IMAGES = ("scan.relief=0", "colour.source=images")
 WHOLE_PATHS = ("scan.relief=0", "colour.source=returns", "colour.lighting=path")
 TRUE_SAMPLES = 256
 """Samples per pixel of the light that counts as true beside whole light paths."""
-DENSEST = {"image_spacing": 7.5, "ground_sampling_distance": 0.03}
-"""Images that count as true where Blender has no pixel per return: for a range of 60 m. Denser than any preset's."""
 REPEATED = {"fidelity": 2}
 """Knobs whose rows are measured several times; the least time counts, and they say how far times scatter."""
 ALIKE = 0.05
 """Errors count as equal up to this share: they are of stretches, and plants on another mesh stand elsewhere."""
-_LENGTHS_OF_IMAGES = tuple(f"colour.{name}" for name in DENSEST)
+_LENGTHS_OF_IMAGES = ("colour.image_spacing", "colour.ground_sampling_distance")
 
 
 @dataclass(frozen=True)

@@ -6,8 +6,8 @@ The points are those of the road built whole. They come section by section, and 
 from __future__ import annotations
 
 import gc
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Generator, Iterator
+from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -15,21 +15,20 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...base.errors import InputError
 from ...base.progress import StageTimer
 from ...road.geometry import RoadGeometry
 from ...road.parameters import RoadParameters
 from ...scanning.beam import RINGS, beam_pattern
 from ...scanning.blocks import Block, Blocks
+from ...scanning.plan import ScanConditions, ScanPlan
 from ...scanning.platforms.path import Strip
 from ...scanning.platforms.shifted import ShiftedMotion, ShiftedPath
-from ...scanning.scan import Scan
 from ...scanning.scene.motion import LaneMotion, ScannedScene, lane_motions
 from ...scanning.sections import Section, sections, shadow_length
 from ...scenario.scan import scanner_setting
 from ...scenario.scenario import Scenario
-from .cloud_files import CloudFiles
-from .files import colour_job, make_finish, make_scan, may_render, of_scan, road_path, scan_blocks, top_view
+from .files import CloudFiles, record_to_files
+from .plan import may_render, plan_scan, road_path, road_view
 
 Float = NDArray[np.float64]
 
@@ -37,26 +36,6 @@ _LOOK = 1.0
 """Seconds between two looks at where a vehicle is."""
 _AROUND = 60.0
 """A vehicle counts as near a section up to so far beyond it: more than it drives and reaches between two looks, m."""
-
-
-def check_by_section(scenario: Scenario, length: float) -> None:
-    """Refuse what needs the whole model of a road of a length (m) that is built by section."""
-    section = scenario.section_length(length)
-    if section is not None and scenario.chooses:
-        name = "time_budget" if scenario.tolerance is None else "tolerance"
-        raise InputError(
-            name,
-            getattr(scenario, name),
-            f"can't be kept on a road of {length:g} m, which is built by sections of {section:g} m: choose on a "
-            "shorter road, and set what was chosen",
-        )
-    if section is not None and "scene" in scenario.outputs:
-        raise InputError(
-            "outputs",
-            list(scenario.outputs),
-            f"can't have scene: a road of {length:g} m is built by sections of {section:g} m; leave "
-            f"scene out, or set scan.section_length to {length / 2.0:g} or more",
-        )
 
 
 def scan_by_section(
@@ -70,31 +49,24 @@ def scan_by_section(
         the counts, as JSON data.
 
     Raises:
-        InputError: see `make_scan` and `check_colour`.
+        InputError: see `plan_scan` and `check_colour`.
     """
     work = SectionScan(scenario, parameters)
-    view = top_view(work.geometry) if "previews" in scenario.outputs else None
+    view = road_view(work.geometry) if "previews" in scenario.outputs else None
     origin = np.array(parameters.transform.translate)
     files = CloudFiles(scenario, folder, origin, work.cut.path.typical_range, parameters.metadata.epsg, view)
-    totals = _Totals()
-    with files.opened():
-        done, number = 0, len(work.cut.all())
-        for section in work.sections():
-            with work.prepared(section, timer) as (scan, finish):
-                with timer.stage("scan"):
-                    for blocks in files.take(scan_blocks(scan, scenario.scan.threads, finish)):
-                        done += blocks
-                        timer.progress("scan", done / number)
-                totals.add(scan, finish.source.report)
-    return totals.summary(files)
+    with closing(work.plans(timer)) as plans:
+        counts = record_to_files(plans, files, timer)
+    return counts | {"sections": work.scanned}
 
 
 class SectionScan:
-    """What all sections of a road have in common.
+    """The plans of a road's sections, which are built one after the other.
 
     Attributes:
         geometry: the road's.
         cut: the scan's blocks.
+        scanned: sections that are done.
     """
 
     def __init__(self, scenario: Scenario, parameters: RoadParameters) -> None:
@@ -109,6 +81,7 @@ class SectionScan:
         self._motions = {name: motion for name, motion in every.items() if not motion.stands}
         self._vehicles = VehicleMeshes()
         standing = {name: item for name, item in parameters.objects.items() if name not in self._motions}
+        self.scanned = 0
         self._standing = parameters.model_copy(update={"objects": standing})
 
     def sections(self) -> Iterator[Section]:
@@ -117,29 +90,34 @@ class SectionScan:
         length = self.geometry.length
         return sections(self.cut, self.geometry, self.scenario.section_length(length) or length, shadows)
 
-    @contextmanager
-    def prepared(self, section: Section, timer: StageTimer) -> Iterator[tuple[Scan, Any]]:
-        """Build a section; yield its scan and what is done to its points; drop it afterwards."""
-        from ...blender.cameras import layer_source
+    def plans(self, timer: StageTimer) -> Generator[ScanPlan, None, None]:
+        """Build one section after the other and yield its plan; afterwards the section is dropped."""
         from ...blender.model.build import remove_road
 
-        try:
-            with timer.stage("model"):
-                scene, frame = self._built(section)
-            environment = self.parameters.environment
-            path = ShiftedPath(self.cut.path, frame, self.cut.path.strips)
-            with timer.stage("caster"):
-                scan = make_scan(self.scenario, scene, path, environment, variation=self.parameters.materials)
-                scan = replace(scan, frame=frame, only=section.blocks)
-            cameras = colour_job(self.scenario, scan, scene, environment)
-            strips = _strips(self.cut, section.blocks)
-            cameras = replace(cameras, path=replace(path, strips=strips), frame=(frame[0], frame[1], frame[2]))
-            del scene
-            with layer_source(cameras, progress=lambda share: timer.progress("images", share)) as source:
-                yield scan, make_finish(self.scenario, scan, source)
-        finally:
-            remove_road()
-            gc.collect()
+        done, total = 0, len(self.cut.all())
+        for section in self.sections():
+            shares = done / total, (done + len(section.blocks)) / total
+            try:
+                yield replace(self.plan(section, timer), progress=shares)
+            finally:
+                remove_road()
+                gc.collect()
+            done += len(section.blocks)
+            self.scanned += 1
+
+    def plan(self, section: Section, timer: StageTimer) -> ScanPlan:
+        """Build a section and return the plan of its blocks."""
+        from ...blender.services import BlenderServices
+
+        with timer.stage("model"):
+            scene, frame = self._built(section)
+        path = ShiftedPath(self.cut.path, frame, self.cut.path.strips)
+        with timer.stage("caster"):
+            plan = plan_scan(self.scenario, scene, path, BlenderServices(), ScanConditions.of(self.parameters))
+        assert plan.request is not None
+        seen_from = replace(path, strips=_strips(self.cut, section.blocks))
+        request = replace(plan.request, path=seen_from, frame=(frame[0], frame[1], frame[2]))
+        return replace(plan, frame=frame, only=section.blocks, request=request)
 
     def _built(self, section: Section) -> tuple[ScannedScene, Float]:
         """Return what is scanned of a section, and where its frame begins in the road's."""
@@ -191,26 +169,3 @@ def _strips(cut: Blocks, blocks: tuple[Block, ...]) -> tuple[Strip, ...]:
             begin, end = cut.time(strip, first), cut.time(strip, last + count - 1)
             parts.append(Strip(strip.index, begin, end - begin))
     return tuple(parts)
-
-
-class _Totals:
-    """What is counted over all sections."""
-
-    def __init__(self) -> None:
-        self._sections = 0
-        self._largest: dict[str, Any] = {"triangles": 0, "vertices": 0}
-        self._rendered: dict[str, Any] = {}
-
-    def add(self, scan: Scan, rendered: Mapping[str, Any]) -> None:
-        self._sections += 1
-        counts = of_scan(scan)
-        for name in ("triangles", "vertices"):
-            counts[name] = max(counts[name], self._largest[name])
-        self._largest = counts
-        for name, value in rendered.items():
-            number = isinstance(value, int | float) and name in self._rendered
-            self._rendered[name] = self._rendered[name] + value if number else value
-
-    def summary(self, files: CloudFiles) -> dict[str, Any]:
-        """Return the counts as JSON data: triangles and vertices are those of the largest section."""
-        return self._largest | files.summary() | {"rendered": self._rendered, "sections": self._sections}

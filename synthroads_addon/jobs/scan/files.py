@@ -1,328 +1,166 @@
-"""A scan into files: what a scenario asks the scanner for, its blocks side by side, and the cloud that they become."""
+"""A scan into files: the cloud and the previews while blocks of points are written to them."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator, Iterator, Sequence
-from concurrent.futures import Future, ThreadPoolExecutor
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager
-from itertools import islice
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from ...base.machine import available_cores
+from ...base.classes import classes
 from ...base.progress import StageTimer
+from ...cloud.formats.base import CloudWriter
+from ...cloud.formats.registry import open_writer
+from ...cloud.points import PointBlock
 from ...cloud.tools.previews import TopView
-from ...materials.surfaces import surfaces_of
-from ...materials.table import Material
-from ...materials.variation import varied
-from ...road.geometry import RoadGeometry
-from ...road.surroundings import Environment, MaterialVariation
-from ...scanning.beam import RINGS
-from ...scanning.colour.colour import LayerSource
-from ...scanning.finish import LAYERS, OPTIONAL, Finish
-from ...scanning.platforms.path import Path as ScanPath
-from ...scanning.platforms.path import RoadGuide, Strip, make_path
-from ...scanning.relief import micro_relief
-from ...scanning.scan import BlockResult, Scan, joined_results, scan_block
-from ...scanning.scene.motion import ScannedScene
-from ...scanning.scene.target import Target
-from ...scanning.weather.registry import weather_of
-from ...scenario.scan import scanner_setting
+from ...cloud.tools.subsample import GridSubsampler
+from ...scanning.colour.colour import shares_by_source
+from ...scanning.plan import ScanPlan
+from ...scanning.record import record
+from ...scanning.scan import BlockResult
 from ...scenario.scenario import Scenario
-from .cloud_files import CloudFiles, ScanCounts
-
-if TYPE_CHECKING:
-    from ...blender.cameras import ColourJob
 
 
-def make_scan(
-    scenario: Scenario,
-    scene: ScannedScene,
-    path: ScanPath,
-    environment: Environment | None = None,
-    rows: Sequence[Material] | None = None,
-    variation: MaterialVariation | None = None,
-) -> Scan:
-    """Return the scan that a scenario asks for, ready to be cut into blocks; builds the casters.
+@dataclass
+class ScanCounts:
+    """What was counted while scanning."""
 
-    Args:
-        scene: what is scanned.
-        path: the scanner's.
-        environment: the road's, for its weather and wetness; clear and dry if None.
-        rows: the materials' means, see `material_rows`: without them the open file is asked, in the main thread.
-        variation: of the road's materials, for those of the scenario's own table.
-    """
-    from ...blender.casters import make_caster
+    pulses: int = 0
+    rays: int = 0
+    points: int = 0
+    below_threshold: int = 0
+    saturated: int = 0
+    intensity_clipped: int = 0
+    by_class: np.ndarray = field(default_factory=lambda: np.zeros(256, dtype=np.int64))
+    by_source: np.ndarray = field(default_factory=lambda: np.zeros(256, dtype=np.int64))
 
-    settings, setting = scenario.settings(), scanner_setting(scenario.scan)
-    rows = list(material_rows(scene.static.materials) if rows is None else rows)
-    own = scenario.own_materials()
-    for number, name in enumerate(scene.static.materials):
-        if name in own:
-            rows[number] = varied(name, variation or MaterialVariation(), environment or Environment(), own)
-    rings, given = scenario.scan.beam_rings, scenario.scan.attenuation
-    weather = scenario.scan.weather or weather_of(environment or Environment())
-    return Scan(
-        target=Target(scene, lambda mesh: make_caster(scenario.scan.caster, mesh)),
-        # The layers of each point have the variation of their own already.
-        surfaces=surfaces_of(rows, scenario.scan.reflection, spread=not scenario.colour.intensity_from_layers),
-        setting=setting,
-        path=path,
-        rings=RINGS[settings.rays_per_pulse] if rings is None else rings,
-        seed=scenario.seed,
-        noise=scenario.scan.noise,
-        attenuation=weather.attenuation(setting.device.wavelength_nm) if given is None else given,
-        effects=weather.effects() if given is None else (),
-        beam=scenario.scan.beam,
-        wanted=measured_arrays(scenario),
-        targets=needs_targets(scenario),
-        detects_later=scenario.colour.intensity_from_layers,
-        driven=scenario.scan.platform.kind == "vehicle",
-    )
+    def add(self, result: BlockResult) -> None:
+        """Add one block."""
+        self.pulses += result.pulses
+        self.rays += result.rays
+        self.below_threshold += result.below_threshold
+        self.saturated += result.saturated
+        self.points += len(result.points)
+        self.by_class += np.bincount(result.points.class_id, minlength=256)
+        if result.sources is not None:
+            self.by_source += result.sources
 
 
-def kept_arrays(scenario: Scenario) -> frozenset[str]:
-    """Return the names of `PointBlock`'s optional arrays that the files hold."""
-    return scenario.cloud.arrays() & frozenset(OPTIONAL) if "cloud" in scenario.outputs else frozenset()
-
-
-def measured_arrays(scenario: Scenario) -> frozenset[str]:
-    """Return the names of `PointBlock`'s optional arrays that the scan itself must fill."""
-    relief = {"normal", "material"} if scenario.scan.relief > 0.0 else set()
-    return (kept_arrays(scenario) - set(LAYERS) - {"color_source"}) | relief
-
-
-def wanted_layers(scenario: Scenario) -> frozenset[str]:
-    """Return what the points get besides what the scanner measures: ``rgb`` and material layers."""
-    rgb = {"rgb"} if scenario.colour.rgb else set()
-    return frozenset(rgb | (kept_arrays(scenario) & set(LAYERS)))
-
-
-def _camera_layers(scenario: Scenario) -> frozenset[str]:
-    """Return what the cameras are asked for."""
-    return wanted_layers(scenario) | ({"base_color"} if scenario.colour.intensity_from_layers else frozenset())
-
-
-def may_render(scenario: Scenario) -> bool:
-    """Return whether a scan may have to render: whether it does depends on the scene's materials as well."""
-    points = bool(set(scenario.outputs) & {"cloud", "previews"})
-    return points and scenario.colour.source != "material" and bool(_camera_layers(scenario))
-
-
-def needs_targets(scenario: Scenario) -> bool:
-    """Return whether the scan must say where its points were seen."""
-    layers = bool(wanted_layers(scenario)) or scenario.colour.intensity_from_layers
-    return layers or scenario.scan.relief > 0.0
-
-
-def make_finish(
-    scenario: Scenario, scan: Scan, source: LayerSource, rows: Sequence[Material] | None = None
-) -> Finish:
-    """Return what is done to the points after the scan; `rows` as in `make_scan`."""
-    rows = material_rows(scan.target.materials) if rows is None else rows
-    return Finish(
-        source=source,
-        wanted=wanted_layers(scenario),
-        surfaces=surfaces_of(rows),
-        scanned=scan.surfaces,
-        setting=scan.setting,
-        intensity_from_layers=scenario.colour.intensity_from_layers,
-        range_corrected=scenario.cloud.intensity == "range_corrected",
-        relief=micro_relief(scan.target.materials, rows) if scenario.scan.relief > 0.0 else None,
-        strength=scenario.scan.relief,
-        octaves=scenario.settings().relief_octaves,
-        seed=scenario.seed,
-        kept=kept_arrays(scenario),
-        frame=scan.frame,
-    )
-
-
-def colour_job(
-    scenario: Scenario, scan: Scan, scene: ScannedScene, environment: Environment | None = None
-) -> ColourJob:
-    """Return what the cameras are asked for."""
-    from ...blender.cameras import ColourJob
-
-    return ColourJob(
-        scenario=scenario.colour,
-        fidelity=scenario.fidelity,
-        wanted=_camera_layers(scenario),
-        mesh=scene.static,
-        environment=environment or Environment(),
-        path=scan.path,
-        field_of_view=scan.setting.field_of_view,
-        seed=scenario.seed,
-    )
-
-
-def material_rows(names: Sequence[str]) -> list[Material]:
-    """Return the means of materials of the open file."""
-    from ...blender.materials import constants
-
-    return list(constants(names).values())
-
-
-def scan_blocks(scan: Scan, threads: int = 0, finish: Finish | None = None) -> Iterator[BlockResult]:
-    """Yield the blocks of a scan in their order, computed side by side; only a few are held at a time.
-
-    Where colours are rendered return by return, several blocks come as one.
-
-    Args:
-        scan: see `make_scan`.
-        threads: as many blocks are worked on at once; 0 for every core.
-        finish: what is done to the points; where its source renders, that happens in the calling thread.
-    """
-    tasks = iter(scan.blocks())
-    renders = finish is not None and finish.source.main_thread_only
-
-    def work(strip: Strip, block: int) -> BlockResult:
-        result = scan_block(scan, strip, block)
-        return result if finish is None or renders else finish(result)
-
-    if scan.target.caster.main_thread_only:
-        results: Iterator[BlockResult] = (work(*task) for task in tasks)
-    else:
-        results = _side_by_side(work, tasks, threads or available_cores())
-    if finish is None or not renders:
-        yield from results
-        return
-    for result in _in_batches(results):
-        yield finish(result)
-
-
-RETURNS_AT_ONCE = 400_000
-"""Points that are rendered together: each rendering takes a tenth of a second whatever their number."""
-
-
-def _in_batches(results: Iterator[BlockResult]) -> Iterator[BlockResult]:
-    """Yield blocks joined until they have `RETURNS_AT_ONCE`."""
-    batch: list[BlockResult] = []
-    for result in results:
-        batch.append(result)
-        if sum(len(one.points) for one in batch) >= RETURNS_AT_ONCE:
-            yield joined_results(batch)
-            batch = []
-    if batch:
-        yield joined_results(batch)
-
-
-def _side_by_side(
-    work: Callable[[Strip, int], BlockResult], tasks: Iterator[tuple[Strip, int]], workers: int
-) -> Iterator[BlockResult]:
-    with _pool(workers) as pool:
-        pending: list[Future[BlockResult]] = [pool.submit(work, *task) for task in islice(tasks, workers + 1)]
-        while pending:
-            yield pending.pop(0).result()
-            pending += [pool.submit(work, *task) for task in islice(tasks, 1)]
-
-
-@contextmanager
-def _pool(workers: int) -> Iterator[ThreadPoolExecutor]:
-    """Yield a thread pool that drops what it has not begun when the work is stopped."""
-    pool = ThreadPoolExecutor(workers)
-    try:
-        yield pool
-    finally:
-        pool.shutdown(wait=True, cancel_futures=True)
-
-
-def scan_to_files(
-    scenario: Scenario,
-    scan: Scan,
-    cameras: ColourJob,
-    folder: Path,
-    epsg: int | None,
-    view: TopView | None,
-    timer: StageTimer,
-) -> dict[str, Any]:
-    """Render what the colours need, scan, and write the cloud and the previews; return the counts as JSON data."""
-    from ...blender.cameras import layer_source
-
-    with ExitStack() as stack:
-        with timer.stage("images"):
-            source = stack.enter_context(
-                layer_source(cameras, progress=lambda share: timer.progress("images", share))
-            )
-        with timer.stage("scan"):
-            task = ScanToFiles(scenario, scan, source, folder, epsg, view)
-            for share in task.run():
-                timer.progress("scan", share)
-        return task.summary()
-
-
-class ScanToFiles:
-    """A scan into the cloud and the previews, a block at a time, so that its caller can show progress or stop it.
+class CloudFiles:
+    """Sink that writes the cloud and the previews, of one scan or of one section after the other.
 
     Args:
         scenario: says which files are wanted.
-        scan: see `make_scan`.
-        source: of colours and layers.
         folder: where the files go.
+        origin: (3,) map coordinates near the points, m.
+        typical_range: usual distance to what is scanned, m.
         epsg: map coordinate system; None if unknown.
-        view: raster for the previews; None without.
-        rows: the materials' means, see `make_scan`.
+        view: raster for the previews, which are written if it is given.
+
+    Attributes:
+        counts: what was counted so far.
+        intensity_scale: 16-bit steps per unit of intensity.
     """
 
     def __init__(
         self,
         scenario: Scenario,
-        scan: Scan,
-        source: LayerSource,
         folder: Path,
+        origin: NDArray[np.float64],
+        typical_range: float,
         epsg: int | None = None,
         view: TopView | None = None,
-        rows: Sequence[Material] | None = None,
     ) -> None:
-        self.scan, self._threads = scan, scenario.scan.threads
-        self.finish = make_finish(scenario, scan, source, rows)
-        self.files = CloudFiles(scenario, folder, scan.target.origin, scan.path.typical_range, epsg, view)
+        self.scenario, self.folder, self.view = scenario, folder, view
+        self.counts = ScanCounts()
+        self._epsg, self._origin = epsg, origin
+        self._writers: list[CloudWriter] = []
+        self._grid: GridSubsampler | None = None
+        # 16 bits are full for a white target at a right angle at half the usual range: only what is nearer or a
+        # retro-reflector is brighter, and the weakest echoes still have hundreds of steps.
+        corrected = scenario.cloud.intensity == "range_corrected"
+        usual = 65535.0 / 4.0 * (1.0 if corrected else max(2.0, typical_range) ** 2)
+        self.intensity_scale = scenario.cloud.intensity_scale or usual
 
-    @property
-    def counts(self) -> ScanCounts:
-        """Return what was counted so far."""
-        return self.files.counts
+    @contextmanager
+    def opened(self) -> Iterator[None]:
+        """Open the files; they are complete, and under their names, when the context ends without an exception."""
+        with ExitStack() as stack:
+            self._open(stack)
+            yield
+            for block in self._grid.blocks() if self._grid else ():
+                self._keep(block)
+        if self._writers:
+            self.counts.points, self.counts.intensity_clipped = self._writers[0].count, self._writers[0].clipped
+        if self.view:
+            self.view.save(self.folder, self._epsg)
 
-    def run(self) -> Generator[float, None, None]:
-        """Scan; yield the share that is done after each block. The files are complete when the iteration ends."""
-        total, done = len(self.scan.blocks()), 0
-        with self.files.opened():
-            for blocks in self.files.take(scan_blocks(self.scan, self._threads, self.finish)):
-                done += blocks
-                yield done / total
+    def write(self, result: BlockResult) -> None:
+        """Write a block of a scan."""
+        self.counts.add(result)
+        if self._grid:
+            self._grid.add(result.points)
+        else:
+            self._keep(result.points)
+
+    def open_writer(self, name: str) -> CloudWriter:
+        """Open a file of the cloud as the scenario asks for it."""
+        cloud, path = self.scenario.cloud, self.folder / name
+        return open_writer(path, self._epsg, self._origin, self.intensity_scale, cloud.attributes, cloud.scheme())
+
+    def _keep(self, points: PointBlock) -> None:
+        for writer in self._writers:
+            writer.write(points)
+        if self.view:
+            self.view.add(points)
+
+    def _open(self, stack: ExitStack) -> None:
+        cloud = self.scenario.cloud
+        if "cloud" in self.scenario.outputs:
+            self._writers = [stack.enter_context(self.open_writer(name)) for name in cloud.file_names()]
+        if cloud.point_spacing:
+            self._grid = stack.enter_context(GridSubsampler(cloud.point_spacing, self.folder))
 
     def summary(self) -> dict[str, Any]:
         """Return the counts as JSON data."""
-        return of_scan(self.scan) | self.files.summary() | {"rendered": self.finish.source.report}
+        names = {row.id: row.name for row in classes()} | {255: "unlabelled"}
+        by_class = {names.get(i, str(i)): int(n) for i, n in enumerate(self.counts.by_class) if n}
+        return {
+            **{name: value for name, value in asdict(self.counts).items() if not name.startswith("by_")},
+            "intensity_scale": self.intensity_scale,
+            "points_by_class": by_class,
+            "points_by_colour_source": shares_by_source(self.counts.by_source),
+        }
 
 
-def of_scan(scan: Scan) -> dict[str, Any]:
-    """Return what is counted of a scan before it begins, as JSON data."""
-    target = scan.target
-    return {
-        "triangles": target.triangles,
-        "vertices": target.vertices,
-        "caster": target.caster.name,
-        "attenuation": scan.attenuation,
-    }
+def record_to_files(plans: Iterable[ScanPlan], files: CloudFiles, timer: StageTimer) -> dict[str, Any]:
+    """Scan one plan after the other into the cloud and the previews.
+
+    The stage ``files`` is what is left to be written at the end. Where something is rendered, it must run in the main
+    thread.
+
+    Returns:
+        the counts, as JSON data; triangles and vertices are those of the largest scene.
+    """
+    figures: dict[str, Any] = {"triangles": 0, "vertices": 0}
+    rendered: dict[str, Any] = {}
+    with ExitStack() as stack:
+        stack.enter_context(files.opened())
+        for plan in plans:
+            largest = {name: max(figures[name], plan.summary()[name]) for name in ("triangles", "vertices")}
+            figures = plan.summary() | largest
+            _add_up(rendered, record(plan, files, timer))
+            del plan  # its scene, before the next one is built
+        with timer.stage("files"):
+            stack.close()
+    return figures | files.summary() | {"rendered": rendered}
 
 
-def road_path(scenario: Scenario, geometry: RoadGeometry) -> ScanPath:
-    """Return the scanner's path along a road."""
-    return make_path(scenario.scan.platform, RoadGuide(geometry))
-
-
-def top_view(geometry: RoadGeometry) -> TopView:
-    """Return a raster that holds the whole swath."""
-    origin = np.array(geometry.parameters.transform.translate)[:2]
-    stations = np.linspace(0.0, geometry.length, 50)
-    terrain = geometry.parameters.terrain
-    reach = terrain.half_width if terrain else float(np.abs(geometry.offsets(stations)).max())
-    plan, heading, _ = geometry.alignment.frame(stations)
-    left = np.stack([-np.sin(heading), np.cos(heading)], axis=1)
-    chord = plan[-1] - plan[0]
-    normal = np.array([-chord[1], chord[0]]) / max(np.hypot(*chord), 1e-9)
-    edges = np.concatenate([plan + reach * left, plan - reach * left])
-    across = (edges - plan[0]) @ normal
-    return TopView(plan[0] + origin, plan[-1] + origin, float(across.min()) - 2, float(across.max()) + 2)
+def _add_up(sums: dict[str, Any], figures: Mapping[str, Any]) -> None:
+    """Add figures to sums of the same names; what is no number takes the place of what was there."""
+    for name, value in figures.items():
+        sums[name] = sums[name] + value if isinstance(value, int | float) and name in sums else value

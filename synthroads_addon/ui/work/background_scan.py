@@ -18,9 +18,9 @@ import bpy
 from ...base.errors import InputError
 from ...base.progress import Progress, StageTimer
 from ...blender.cameras import takes_returns
-from ...jobs.generate import scan_open_road
+from ...jobs.road_scene import scan_road
+from ...road.geometry import RoadGeometry
 from ...road.parameters import RoadParameters
-from ...scenario.colour import ColourScenario
 from ...scenario.scenario import Scenario
 
 MARK = "synthroads-scan: "
@@ -50,22 +50,26 @@ def _scan(job: dict[str, Any]) -> dict[str, Any]:
     window = bpy.context.window_manager.windows[0]
     window.scene, window.view_layer = scene, scene.view_layers[job["view_layer"]]
     scenario = Scenario.from_dict(job["scenario"])
-    parameters = RoadParameters.from_dict(job["parameters"])
-    timer = StageTimer(_shown(scenario.colour))
+    road = RoadGeometry(RoadParameters.from_dict(job["parameters"]))
+    timer = StageTimer(_shown(takes_returns(scenario.colour.settings(scenario.fidelity))))
     with bpy.context.temp_override(window=window):
-        counts = scan_open_road(scenario, parameters, Path(job["folder"]), timer)
+        counts = scan_road(scenario, road, Path(job["folder"]), timer)
     return {"counts": counts, "stages": timer.stages}
 
 
-def _shown(colour: ColourScenario) -> Progress:
-    """Return what says how much of the whole is done, from the share of a stage."""
-    # Images are rendered before the scan, a pixel per return is during the scan.
-    rendered = 0.1 if takes_returns(colour) else 0.6
+def _shown(by_return: bool) -> Progress:
+    """Map stage progress to overall progress.
+
+    Args:
+        by_return: whether a pixel per return is rendered, during the scan; images are rendered before.
+    """
+    rendered = 0.1 if by_return else 0.6
     spans = {
         "scene mesh": (0.0, 0.05),
         "caster": (0.05, 0.1),
         "images": (0.1, rendered),
         "scan": (rendered, 1.0),
+        "files": (1.0, 1.0),
     }
 
     def say(stage: str, share: float) -> None:

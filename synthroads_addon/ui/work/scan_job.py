@@ -8,26 +8,27 @@ from __future__ import annotations
 
 from collections.abc import Callable, Generator
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any, TypeAlias
 
 from ...base.files import output_folder
 from ...base.progress import StageTimer
-from ...base.schema import canonical_json
-from ...blender.cameras import material_layers
-from ...blender.cameras.surfaces import scene_constants
 from ...blender.files import save_scene
 from ...blender.scene.evaluated import CopiedScene, scanned_scene_steps
+from ...blender.services import SnapshotServices
 from ...jobs.generate import Job as PipelineJob
-from ...jobs.generate import check, check_not_empty, closing, file_names, opening
+from ...jobs.generate import check
+from ...jobs.report import file_names, report_footer, report_header, write_report
 from ...jobs.road_files import write_road_files
-from ...jobs.scan.files import ScanToFiles, make_scan, material_rows, may_render, road_path, top_view, wanted_layers
-from ...materials.table import Material
+from ...jobs.road_scene import refuse_empty, road_cloud_files
+from ...jobs.scan.files import record_to_files
+from ...jobs.scan.plan import may_render, plan_scan, road_path
 from ...road.geometry import RoadGeometry
 from ...road.parameters import RoadParameters
-from ...scanning.colour.colour import LayerSource
+from ...scanning.plan import ScanConditions
 from ...scenario.scenario import Scenario
-from ...twin.formats import twin_file_names, write_twin
+from ...twin.formats import twin_file_names
 from .job import Aside, Report, Step, Work
 from .rendered_scan import SavedScene, save_open_scene
 
@@ -47,6 +48,11 @@ class RoadScan:
     parameters: RoadParameters
     target: Path
     overwrite: bool
+
+    @cached_property
+    def road(self) -> RoadGeometry:
+        """The road that the scene shows."""
+        return RoadGeometry(self.parameters)
 
 
 @dataclass(frozen=True)
@@ -116,13 +122,10 @@ def _read(scan: RoadScan, timer: StageTimer) -> Generator[Step, None, _Measure]:
     """Read the open scene; return what scans it."""
     speed_factor = scan.scenario.scan.traffic_speed_factor
     with timer.stage("scene mesh"):
-        steps = scanned_scene_steps(geometry=RoadGeometry(scan.parameters), speed_factor=speed_factor)
+        steps = scanned_scene_steps(geometry=scan.road, speed_factor=speed_factor)
         copied = yield from _shares(steps)
-    rows, constants = material_rows(copied.materials), scene_constants(copied.materials)
-    # The materials' own: what is rendered takes the other way.
-    lit = "rgb" in wanted_layers(scan.scenario) and scan.scenario.colour.mode == "lit"
-    source = material_layers(scan.scenario.colour, constants, lit, scan.parameters.environment, scan.scenario.seed)
-    return lambda output: _scan_copied(scan, copied, (rows, source), output)
+    services = SnapshotServices(copied.materials)
+    return lambda output: _scan_copied(scan, copied, services, output)
 
 
 def _shares(steps: Generator[float, None, CopiedScene]) -> Generator[Step, None, CopiedScene]:
@@ -138,39 +141,30 @@ def _shares(steps: Generator[float, None, CopiedScene]) -> Generator[Step, None,
 
 
 def _scan_copied(
-    scan: RoadScan, copied: CopiedScene, materials: tuple[list[Material], LayerSource], output: _Output
+    scan: RoadScan, copied: CopiedScene, services: SnapshotServices, output: _Output
 ) -> dict[str, Any]:
     """Scan what was read."""
-    scenario, parameters, timer, (rows, source) = scan.scenario, scan.parameters, output.timer, materials
-    geometry = RoadGeometry(parameters)
+    scenario, road, timer = scan.scenario, scan.road, output.timer
     with timer.stage("scene mesh"):
         scene = copied.put_together()
-    check_not_empty(scene)
+    refuse_empty(scene)
     output.report(0.02)
     with timer.stage("caster"):
-        path = road_path(scenario, geometry)
-        prepared = make_scan(scenario, scene, path, parameters.environment, rows, parameters.materials)
+        path = road_path(scenario, road)
+        plan = plan_scan(scenario, scene, path, services, ScanConditions.of(scan.parameters))
     del scene
-    output.report(0.05)
-    view = top_view(geometry) if "previews" in scenario.outputs else None
-    task = ScanToFiles(scenario, prepared, source, output.folder, parameters.metadata.epsg, view, rows)
-    with timer.stage("scan"):
-        for share in task.run():
-            output.report(0.05 + 0.95 * share)
-    return task.summary()
+    shares = {"images": (0.05, 0.05), "scan": (0.05, 1.0), "files": (1.0, 1.0)}
+    timer.progress = lambda stage, share: output.report(shares[stage][0] * (1.0 - share) + shares[stage][1] * share)
+    return record_to_files([plan], road_cloud_files(scenario, road, output.folder, plan), timer)
 
 
 def _write_files(scan: RoadScan, measure: _Measure, output: _Output) -> int:
     """Write all files; return the number of points. Runs in a thread: it touches no data of Blender."""
-    scenario, parameters = scan.scenario, scan.parameters
-    write_road_files(output.folder, scenario.outputs, parameters, RoadGeometry(parameters), scenario)
-    if scenario.twin:
-        with output.timer.stage("twin"):
-            write_twin(parameters, output.folder, scenario.twin, scenario.settings().tolerance)
-    report = opening()
+    scenario = scan.scenario
+    write_road_files(output.folder, scenario, scan.road, output.timer)
+    report = report_header()
     if set(scenario.outputs) & {"cloud", "previews"}:
         report["counts"] = measure(output)
     points = report.get("counts", {}).get("points", 0)
-    report |= closing(scenario, output.timer)
-    (output.folder / "report.json").write_text(canonical_json(report), encoding="utf-8")
+    write_report(output.folder, report | report_footer(scenario, output.timer))
     return int(points)

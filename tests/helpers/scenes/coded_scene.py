@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import bpy
 import numpy as np
 
-from synthroads_addon.blender.cameras import ColourJob
 from synthroads_addon.blender.scene.evaluated import scene_mesh
 from synthroads_addon.road.surroundings import Environment
+from synthroads_addon.scanning.colour.request import LayerRequest
 from synthroads_addon.scanning.scene.mesh import SceneMesh
 from synthroads_addon.scenario.colour import ColourScenario
 
@@ -135,12 +135,11 @@ class OverPath:
         return position, np.broadcast_to(np.eye(3), (len(time), 3, 3))
 
 
-def job(mesh: SceneMesh, wanted: set[str], environment: Environment = ENVIRONMENT, **scenario: object) -> ColourJob:
-    """Return the job of colouring points of a mesh."""
+def job(mesh: SceneMesh, wanted: set[str], environment: Environment = ENVIRONMENT, **scenario: object) -> LayerRequest:
+    """Return a request for colours and layers of a mesh."""
     settings: dict[str, object] = {"image_spacing": 5.0, "ground_sampling_distance": 0.05}
-    return ColourJob(
-        ColourScenario.from_dict(settings | scenario),
-        "standard",
+    return LayerRequest(
+        ColourScenario.from_dict(settings | scenario).settings("standard", OverPath.typical_range),
         frozenset(wanted),
         mesh,
         environment,

@@ -7,10 +7,11 @@ import numpy as np
 from synthroads_addon.materials.surfaces import surfaces_of
 from synthroads_addon.materials.table import materials
 from synthroads_addon.scanning.beam import RINGS
+from synthroads_addon.scanning.plan import ScanPlan
 from synthroads_addon.scanning.platforms.path import Strip
 from synthroads_addon.scanning.pulses import Poses, Pulses, make_pulses
 from synthroads_addon.scanning.returns import Echoes, group_returns
-from synthroads_addon.scanning.scan import Scan, beam_rays, hit_marks, scan_pulses
+from synthroads_addon.scanning.scan import beam_rays, hit_marks, scan_pulses
 from synthroads_addon.scanning.scene.mesh import SceneMesh
 from synthroads_addon.scanning.scene.motion import ScannedScene
 from synthroads_addon.scanning.scene.target import Target
@@ -87,21 +88,21 @@ def plane(size: float = 5000.0, slope: tuple[float, float] = (0.0, 0.0)) -> Scen
     return mesh_of(corners, [(0, 2, 3), (0, 3, 1)])
 
 
-def scan_of(mesh: SceneMesh, rays: int = 1, path: Standing | None = None, moving=(), **changes) -> Scan:
+def scan_of(mesh: SceneMesh, rays: int = 1, path: Standing | None = None, moving=(), **changes) -> ScanPlan:
     setting = scanner_setting(load_scenario("rq31-600m").scan)
     setting = replace(setting, **{"range_sigma": 0.0, "threshold": 0.0, "saturation": np.inf, **changes})
     surfaces = surfaces_of(materials()[name] for name in mesh.materials)
     target = Target(ScannedScene(mesh, tuple(moving)), BruteForce)
     wanted = frozenset({"rgb", "normal", "true_range", "true_xyz", "scanner"})
-    return Scan(target, surfaces, setting, path or Standing(), RINGS[rays], seed=3, wanted=wanted)
+    return ScanPlan(target, surfaces, setting, path or Standing(), RINGS[rays], seed=3, wanted=wanted)
 
 
-def middle_pulses(scan: Scan, count: int = 100):
+def middle_pulses(scan: ScanPlan, count: int = 100):
     """Scan pulses around the nadir of the first line."""
     return scan_pulses(scan, scan.path.strips[0], 500 - count // 2, count)
 
 
-def echoes_and_pulses(scan: Scan, first: int, count: int) -> tuple[Echoes, Pulses]:
+def echoes_and_pulses(scan: ScanPlan, first: int, count: int) -> tuple[Echoes, Pulses]:
     """Return the echoes of some pulses of the first strip, before any threshold, and the pulses."""
     strip = scan.path.strips[0]
     pulses = make_pulses(scan, strip, Poses.between(scan, strip, 0.0, 80.0), None, first, count)

@@ -17,10 +17,11 @@ from synthroads_addon.blender.model.build import build_road
 from synthroads_addon.blender.scene.evaluated import scanned_scene
 from synthroads_addon.cloud.points import PointBlock
 from synthroads_addon.jobs.choose.knobs import ModelKnobs
-from synthroads_addon.jobs.choose.pilot import Pilot, beam_errors
-from synthroads_addon.jobs.choose.prior import prior_of
 from synthroads_addon.jobs.choose.sites import RoadSite
+from synthroads_addon.jobs.choose.table import table_of
+from synthroads_addon.jobs.choose.trial import Trial
 from synthroads_addon.jobs.generate import Job, generate
+from synthroads_addon.jobs.measure.errors import beam_errors
 from synthroads_addon.jobs.measure.mesh_errors import mesh_height_errors
 from synthroads_addon.jobs.scan_scene import SceneScan, scan_scene
 from synthroads_addon.road.geometry import RoadGeometry
@@ -47,18 +48,10 @@ def report_of(folder: Path, *changes: str) -> dict[str, Any]:
     return generate(job)
 
 
-class FewLines(Pilot):
-    """Pilot measurements on fewer scan lines than usual."""
-
-    @classmethod
-    def on(cls, *arguments: Any, **options: Any) -> Pilot:
-        return super().on(*arguments, **{"lines": 24, **options})
-
-
 @pytest.fixture
 def few_lines(monkeypatch: pytest.MonkeyPatch) -> None:
     """Let settings be chosen by fewer scan lines."""
-    monkeypatch.setattr("synthroads_addon.jobs.choose.search.Pilot", FewLines)
+    monkeypatch.setattr("synthroads_addon.jobs.choose.trial.LINES", 24)
 
 
 @pytest.mark.usefixtures("few_lines")
@@ -110,20 +103,17 @@ def test_what_cannot_be_kept_is_refused_with_the_best(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_much_time_takes_the_best_by_pilots_and_else_by_the_shipped_table(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    words = ("tolerance=height=5mm", "time_budget=1e5", "colour.rgb=false")
-    by_pilots = report_of(tmp_path, *words)["choice"]
-    monkeypatch.setattr("synthroads_addon.jobs.choose.search._PILOT_SHARE", 0.0)
-    by_table = report_of(tmp_path, *words)["choice"]
+def test_much_time_takes_the_best_by_trials_for_a_tolerance_and_else_by_the_shipped_table(tmp_path: Path) -> None:
+    words = ("time_budget=1e5", "colour.rgb=false")
+    by_pilots = report_of(tmp_path, "tolerance=height=5mm,position=1m", *words)["choice"]
+    by_table = report_of(tmp_path, "tolerance=height=5mm", *words)["choice"]
     for choice, said in ((by_pilots, "pilot measurements"), (by_table, "shipped table")):
         assert choice["by"].startswith(said)
         assert choice["chosen"]["scan.rays_per_pulse"] == 61
         assert choice["chosen"]["vegetation_detail"] == 1.0
         assert choice["chosen"]["scan.relief_octaves"] == 6
         assert choice["chosen"]["geometric_tolerance"] <= 0.005
-    assert by_table["expected"]["errors"]["relief"] == prior_of("uav").relief["6"]
+    assert by_table["expected"]["errors"]["relief"] == table_of("uav").relief["6"]
 
 
 def test_the_command_says_what_it_chose(tmp_path: Path) -> None:
@@ -191,13 +181,14 @@ def errors_afterwards(scenario: Scenario) -> dict[str, float]:
     The truth has the geometric tolerance of the job: plants stand elsewhere on a mesh that is tessellated otherwise.
     """
     parameters, settings = sample_road(scenario.road, scenario.seed), scenario.settings()
-    site = RoadSite(scenario, parameters)
+    site = RoadSite(scenario, RoadGeometry(parameters))
     empty_file()
 
     def points(detail: float, rays: int) -> list[PointBlock]:
         scene = site.scene(ModelKnobs(settings.tolerance, detail))
-        pilot = Pilot.on(scenario, scene, site.path, site.air, phase=0.0, lines=160)
-        return [one.points for one in pilot.results(RINGS[rays], pilot.stretches())]
+        trial = Trial.of(scenario, scene, site.path, site.conditions)
+        trial.phase, trial.lines = 0.0, 160
+        return trial.points(RINGS[rays])
 
     mine = points(settings.vegetation_detail, settings.rays_per_pulse)
     errors = {name: pair[0] for name, pair in beam_errors(mine, points(1.0, 61)).items()}

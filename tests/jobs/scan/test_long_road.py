@@ -6,6 +6,7 @@ import json
 import subprocess
 import sys
 from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -16,12 +17,14 @@ from numpy.typing import NDArray
 
 from synthroads_addon.base.classes import class_id
 from synthroads_addon.base.progress import StageTimer
+from synthroads_addon.blender.model.build import remove_road
 from synthroads_addon.jobs.scan.by_section import SectionScan
 from synthroads_addon.road.geometry import RoadGeometry
 from synthroads_addon.road.parameters import read_parameters
 from synthroads_addon.road.tessellation import sample_stations
+from synthroads_addon.scanning.plan import ScanPlan
 from synthroads_addon.scanning.pulses import Poses, make_pulses
-from synthroads_addon.scanning.scan import Scan, scan_pulses
+from synthroads_addon.scanning.scan import scan_pulses
 from synthroads_addon.scenario.scenario import Scenario
 from tests.helpers.scenes.sparse_scanner import sparse_scanner
 
@@ -60,7 +63,7 @@ def generated(folder: Path, length: float) -> dict[str, Any]:
     return report
 
 
-def exact_triangles(geometry: RoadGeometry, low: float, high: float, scan: Scan, frame: Float) -> Float:
+def exact_triangles(geometry: RoadGeometry, low: float, high: float, scan: ScanPlan, frame: Float) -> Float:
     """Return the triangles (T, 3, 3) of a section's pavement in the road's frame, their corners in float64.
 
     They are the model's; only where its corners lie is worked out anew, from the road's rows and boundaries.
@@ -101,19 +104,28 @@ def met(triangles: Float, origin: Float, direction: Float) -> Iterator[float]:
         yield float(distance[inside].min(initial=np.inf))
 
 
+@contextmanager
+def build_section(work: SectionScan, section: Any) -> Iterator[ScanPlan]:
+    """Build a section and yield its plan; drop it afterwards."""
+    try:
+        yield work.plan(section, StageTimer())
+    finally:
+        remove_road()
+
+
 def errors_of_a_section(work: SectionScan, section: Any, monkeypatch: pytest.MonkeyPatch) -> Float:
     """Return how far (m) returns from the pavement lie from where exact rays meet the exact triangles."""
     from synthroads_addon.jobs.scan import by_section as section_scan
 
-    make = section_scan.make_scan
+    make = section_scan.plan_scan
     meshes = []
 
-    def keep(scenario: Any, scene: Any, *rest: Any, **more: Any) -> Scan:
+    def keep(scenario: Any, scene: Any, *rest: Any, **more: Any) -> ScanPlan:
         meshes.append(scene.static)
         return make(scenario, scene, *rest, **more)
 
-    monkeypatch.setattr(section_scan, "make_scan", keep)
-    with work.prepared(section, StageTimer()) as (scan, _):
+    monkeypatch.setattr(section_scan, "plan_scan", keep)
+    with build_section(work, section) as scan:
         MESH[id(scan)] = meshes[-1]
         triangles = exact_triangles(work.geometry, section.low, section.high, scan, scan.frame)
         strip, block = section.blocks[len(section.blocks) // 2]

@@ -16,14 +16,16 @@ from synthroads_addon.base.errors import InputError
 from synthroads_addon.blender.materials import material
 from synthroads_addon.blender.model.build import build_road
 from synthroads_addon.blender.scene.evaluated import scanned_scene, scene_mesh
+from synthroads_addon.blender.services import BlenderServices
 from synthroads_addon.cloud.points import PointBlock, concatenate
-from synthroads_addon.jobs.scan.files import make_scan, scan_blocks
+from synthroads_addon.jobs.scan.plan import plan_scan
 from synthroads_addon.road import stretches as stretch
 from synthroads_addon.road.geometry import RoadGeometry
 from synthroads_addon.road.parameters import RoadParameters, Vehicle
 from synthroads_addon.road.things.chassis import CHASSIS
 from synthroads_addon.road.things.vehicles import VEHICLE_TYPES
 from synthroads_addon.scanning.platforms.path import Strip
+from synthroads_addon.scanning.record import scan_blocks
 from synthroads_addon.scanning.scene.mesh import SceneMesh
 from synthroads_addon.scanning.scene.motion import LaneMotion, MovingMesh, ScannedScene
 from synthroads_addon.scenario.scenario import load_scenario
@@ -323,10 +325,10 @@ def on_mesh(mesh: SceneMesh, points: Float) -> Float:
 def scanned(scene: ScannedScene, geometry: RoadGeometry, *changes: str) -> PointBlock:
     options = ["scan.noise.range_sigma=0", "scan.rays_per_pulse=1", 'cloud.attributes=["noise_free"]', "scan.threads=1"]
     scenario = load_scenario("rq31-600m", [*options, *changes])
-    scan = make_scan(scenario, scene, _Drone(geometry))
+    scan = plan_scan(scenario, scene, _Drone(geometry), BlenderServices())
     # What a pulse meets behind a window is a return of its own, and no return lies between two surfaces.
     scan = replace(scan, setting=replace(scan.setting, range_resolution=0.0))
-    return concatenate([result.points for result in scan_blocks(scan, 1)])
+    return concatenate([result.points for result in scan_blocks(scan)])
 
 
 @pytest.fixture(scope="module")

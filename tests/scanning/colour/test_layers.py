@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -184,7 +185,7 @@ def test_clouds_repeat_with_their_seed() -> None:
 
 
 def test_the_fidelity_gives_what_the_scenario_leaves_open() -> None:
-    assert ColourScenario(lighting="path").settings("high") == COLOUR_FIDELITIES["high"]
+    assert ColourScenario(lighting="path").settings("high") == replace(COLOUR_FIDELITIES["high"], lighting="path")
     own = ColourScenario(image_spacing=7.0).settings("draft")
     assert own.image_spacing == 7.0
     assert own.ground_sampling_distance == COLOUR_FIDELITIES["draft"].ground_sampling_distance

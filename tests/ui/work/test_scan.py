@@ -257,7 +257,7 @@ def test_a_defect_in_the_thread_is_kept_and_leaves_nothing(
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(scan_job, "make_scan", lambda *arguments: 1 / 0)
+    monkeypatch.setattr(scan_job, "plan_scan", lambda *arguments: 1 / 0)
     job = job_of_the_panel()
     tick_to_the_end(job)
     assert isinstance(job.error, ZeroDivisionError)

@@ -3,28 +3,26 @@
 from __future__ import annotations
 
 from dataclasses import fields, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ...base.random_streams import stream
-from ..platforms.path import Strip
-from ..pulses import Pulses
-from ..radiometry import received
-from ..returns import UNCOUNTED, Marks
-from ..trace import Hits, Traced
-from .base import EchoChanges, Float, PulseHits
-
-if TYPE_CHECKING:
-    from ..scan import Scan
+from ..base.random_streams import stream
+from .effects import EchoChanges, Float, PulseHits
+from .plan import ScanPlan
+from .platforms.path import Strip
+from .pulses import Pulses
+from .radiometry import received
+from .returns import UNCOUNTED, Marks
+from .trace import Hits, Traced
 
 BothMarks = tuple[Marks, Marks]
 """Marks of what rays meet first, and of what they meet behind it."""
 
 
 def apply_effects(
-    scan: Scan, strip: Strip, key: int, pulses: Pulses, traced: Traced, marks: BothMarks
+    scan: ScanPlan, strip: Strip, key: int, pulses: Pulses, traced: Traced, marks: BothMarks
 ) -> tuple[Traced, BothMarks]:
     """Return what the rays of a block meet, and its marks, after the scan's effects, one after the other.
 
@@ -50,7 +48,7 @@ def apply_effects(
     return traced, marks
 
 
-def _pulse_hits(scan: Scan, pulses: Pulses, traced: Traced, marks: BothMarks) -> PulseHits:
+def _pulse_hits(scan: ScanPlan, pulses: Pulses, traced: Traced, marks: BothMarks) -> PulseHits:
     first, behind = marks
     ray, pulse = np.divmod(traced.ray, len(pulses.time))
     return PulseHits(
@@ -99,7 +97,7 @@ def _weaken(traced: Traced, marks: BothMarks, transmission: Float) -> tuple[Trac
     return replace(traced, behind=kept, ray=traced.ray[seen]), (first, behind)
 
 
-def _add(scan: Scan, traced: Traced, marks: BothMarks, changes: EchoChanges) -> tuple[Traced, BothMarks]:
+def _add(scan: ScanPlan, traced: Traced, marks: BothMarks, changes: EchoChanges) -> tuple[Traced, BothMarks]:
     """Return everything with the echoes of an effect that the scanner records."""
     distance = np.asarray(changes.distance, dtype=np.float64)
     here = np.flatnonzero((distance >= scan.setting.minimum_range) & (distance <= scan.setting.maximum_range))

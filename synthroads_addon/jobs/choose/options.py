@@ -1,0 +1,156 @@
+"""Choosing among options: the cheapest that keep a tolerance, or the best that fit a time.
+
+Each kind of error depends on the options of one knob alone, and the costs of several knobs add up, so that the cheapest
+settings within a tolerance are the cheapest option of every knob that keeps its own.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from ...base.errors import InputError
+from ...scenario.tolerance import shown
+from ..measure.errors import Errors
+
+_LEAST = 1e-9
+
+
+@dataclass(frozen=True)
+class Option:
+    """One setting of a knob.
+
+    Attributes:
+        changes: of the scenario: dotted path -> value.
+        found: expected error and its upper bound by `tolerance.KINDS`; a kind that isn't there has none.
+        cost: what tells cheap from dear: the same on every machine, unlike the time.
+        seconds: expected on this machine; None if not known.
+    """
+
+    changes: Mapping[str, Any]
+    found: Errors
+    cost: float
+    seconds: float | None = None
+
+    def bound(self, kind: str) -> float:
+        """Return the upper bound of a kind of error."""
+        return self.found.get(kind, (0.0, 0.0))[1]
+
+    def keeps(self, limits: Mapping[str, float]) -> bool:
+        """Return whether all errors are within their limits."""
+        return all(self.bound(kind) <= limit for kind, limit in limits.items())
+
+
+@dataclass(frozen=True)
+class Choice:
+    """One option of every knob.
+
+    Attributes:
+        options: by name of the knob.
+        fixed_seconds: of what no knob changes.
+    """
+
+    options: Mapping[str, Option]
+    fixed_seconds: float = field(default=0.0)
+
+    @property
+    def changes(self) -> dict[str, Any]:
+        """Return the changes of the scenario."""
+        return {path: value for option in self.options.values() for path, value in option.changes.items()}
+
+    @property
+    def found(self) -> Errors:
+        """Return the expected errors and their bounds by kind."""
+        return {kind: pair for option in self.options.values() for kind, pair in option.found.items()}
+
+    @property
+    def seconds(self) -> float | None:
+        """Return the expected time, if it is known."""
+        parts = [option.seconds for option in self.options.values()]
+        return None if None in parts else self.fixed_seconds + sum(part for part in parts if part is not None)
+
+
+Knobs = Mapping[str, Sequence[Option]]
+"""Options by name of the knob."""
+
+
+def options_within(knobs: Knobs, limits: Mapping[str, float]) -> dict[str, list[Option]]:
+    """Return the options that keep a tolerance.
+
+    Raises:
+        InputError: a knob has none; says what is the best to be had.
+    """
+    kept = {name: [option for option in options if option.keeps(limits)] for name, options in knobs.items()}
+    for name, options in kept.items():
+        if not options:
+            raise _impossible(knobs[name], limits)
+    return kept
+
+
+def _impossible(options: Sequence[Option], limits: Mapping[str, float]) -> InputError:
+    """Return the error for a tolerance that no option keeps: the best of each kind, or of all together."""
+    for kind, limit in limits.items():
+        best = min(option.bound(kind) for option in options)
+        if best > limit:
+            text = f"can't be kept here: the best to be had is {shown(kind, best)}"
+            return InputError(f"tolerance.{kind}", limit, text)
+    kinds = [kind for kind in limits if any(kind in option.found for option in options)]
+    nearest = min(options, key=lambda option: max(option.bound(kind) / max(limits[kind], _LEAST) for kind in kinds))
+    said = ", ".join(f"{kind}={shown(kind, nearest.bound(kind))}" for kind in kinds)
+    return InputError("tolerance", None, f"{' and '.join(kinds)} can't be kept together: the nearest is {said}")
+
+
+def cheapest(knobs: Knobs, limits: Mapping[str, float]) -> Choice:
+    """Return the cheapest settings that keep a tolerance.
+
+    Raises:
+        InputError: there are none; says what is the best to be had.
+    """
+    kept = options_within(knobs, limits)
+    return Choice({name: min(options, key=lambda option: option.cost) for name, options in kept.items()})
+
+
+def best_in_time(
+    knobs: Knobs,
+    seconds: float,
+    reference: Mapping[str, float],
+    limits: Mapping[str, float] | None = None,
+    fixed_seconds: float = 0.0,
+) -> Choice:
+    """Return the best settings that fit a time: their largest error, as a multiple of a reference, is the smallest.
+
+    Of several as good in that, those whose errors' sum is the smallest, and of these the fastest.
+
+    Args:
+        knobs: all options' seconds are known.
+        seconds: that the job may take.
+        reference: error of each kind that is as bad as the others'; a kind without one doesn't count.
+        limits: a tolerance that is to be kept as well.
+        fixed_seconds: see `Choice`.
+
+    Raises:
+        InputError: not even the fastest settings fit, or none keeps the tolerance.
+    """
+    kept = options_within(knobs, limits or {})
+    choices = [
+        Choice(dict(zip(kept, options, strict=True)), fixed_seconds) for options in itertools.product(*kept.values())
+    ]
+    fitting = [choice for choice in choices if (choice.seconds or 0.0) <= seconds]
+    if not fitting:
+        raise too_short(seconds, min(choice.seconds or 0.0 for choice in choices), bool(limits))
+    return min(fitting, key=lambda choice: _loss(choice, reference))
+
+
+def too_short(seconds: float, fastest: float, tolerance: bool = False) -> InputError:
+    """Return the error for a time that nothing fits."""
+    which = "that keep the tolerance " if tolerance else ""
+    left = f"{max(seconds, 0.0):.0f} s of it can still be used"
+    text = f"too short: {left}, and the fastest settings {which}take about {fastest:.0f} s"
+    return InputError("time_budget", None, text)
+
+
+def _loss(choice: Choice, reference: Mapping[str, float]) -> tuple[float, float, float]:
+    ratios = [choice.found.get(kind, (0.0, 0.0))[0] / max(base, _LEAST) for kind, base in reference.items()]
+    return round(max(ratios, default=0.0), 6), round(sum(ratios), 6), choice.seconds or 0.0

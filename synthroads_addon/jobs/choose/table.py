@@ -1,0 +1,137 @@
+"""The shipped table of times and errors, and the times of a job by it at the speed that this machine has shown.
+
+Made by ``python tools/make_tradeoff_prior.py`` on one built-in scenario of each platform.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cache
+from itertools import pairwise
+from typing import Any
+
+from ...base.files import PRESETS
+from ...base.schema import read_json
+from ...scenario.scenario import Scenario
+
+FILE = PRESETS / "tradeoff_prior.json"
+_IMAGE = 0.3
+"""Megapixels whose rendering costs as much as it costs to begin an image."""
+_RETURN = 1.6
+"""Megapixels that cost as much as a million returns with a pixel each."""
+
+
+@dataclass(frozen=True)
+class Table:
+    """Errors by `tolerance.KINDS`, and seconds on the machine that they were measured on.
+
+    Attributes:
+        beam: errors by rays per pulse, among all plants.
+        few_plants: errors of one ray among few plants.
+        relief: error by octaves.
+        colour: errors by name of `knobs.colour_choices`.
+        pulse: microseconds per pulse by rays, to the file.
+        model: microseconds per square metre of the model, its search trees included: with few plants and with all.
+        octave: microseconds per point by octaves.
+        image: seconds before the first image, of each image, of each megapixel.
+        sample: microseconds per point that takes its colour from images, or is rendered by itself.
+        scene_file, previews: microseconds per square metre of the model, and per point.
+        cores: that the machine of the measurements used; times per octave are of one of them.
+    """
+
+    beam: Mapping[str, Mapping[str, float]]
+    few_plants: Mapping[str, float]
+    relief: Mapping[str, float]
+    colour: Mapping[str, Mapping[str, float]]
+    pulse: Mapping[str, float]
+    model: tuple[float, float]
+    octave: Mapping[str, float]
+    image: tuple[float, float, float]
+    sample: Mapping[str, float]
+    scene_file: float
+    previews: float
+    cores: int
+
+    def pulse_seconds(self, rays: int) -> float:
+        """Return the seconds of a pulse of so many rays, linear between what was measured."""
+        known = sorted((int(number), 1e-6 * value) for number, value in self.pulse.items())
+        if rays <= known[0][0]:
+            return known[0][1]
+        (a, low), (b, high) = next(
+            (pair for pair in pairwise(known) if rays <= pair[1][0]), (known[-2], known[-1])
+        )
+        return low + (high - low) * (rays - a) / (b - a)
+
+
+@cache
+def table_of(platform: str) -> Table:
+    """Return the table of a kind of platform; a trajectory has the UAV's."""
+    data: dict[str, Any] = read_json(FILE)
+    platforms = data["platforms"]
+    return Table(**platforms.get(platform, platforms["uav"]), cores=data["cores"])
+
+
+def nearest_row(rows: Mapping[str, Any], number: int) -> Any:
+    """Return the row of the number nearest to one."""
+    return rows[min(rows, key=lambda key: abs(int(key) - number))]
+
+
+@dataclass
+class JobTimes:
+    """Expected times of a job's parts on this machine, s: those of the table, scaled by one short run.
+
+    Attributes:
+        table: the platform's.
+        area: of the model, m2.
+        pulses: of the whole path.
+        points: of the whole scan, once they are known.
+        speed: seconds here for a second of the table, once that is known.
+    """
+
+    table: Table
+    area: float
+    pulses: int
+    points: int = 0
+    speed: float = 1.0
+
+    def calibrate(self, rays: int, seconds: float, points: int) -> None:
+        """Take over what the scan takes at so many rays per pulse, and how many points it has."""
+        self.speed = seconds / max(self.pulses * self.table.pulse_seconds(rays), 1e-9)
+        self.points = points
+
+    def scan(self, rays: int) -> float:
+        """Return the time of the scan into files, with the coarsest relief and the materials' colours."""
+        return self.pulses * self.table.pulse_seconds(rays) * self.speed
+
+    def model(self, number: int) -> float:
+        """Return the time of building a model: 0 is that with few plants, 1 that with all."""
+        return 1e-6 * self.table.model[number] * self.area * self.speed
+
+    def relief(self, octaves: int) -> float:
+        """Return what octaves take beyond the two that are part of `scan`.
+
+        The table has processor seconds, and `speed` is a second here for one of the table's cores together.
+        """
+        extra = nearest_row(self.table.octave, octaves) - nearest_row(self.table.octave, 2)
+        return max(0.0, extra) * 1e-6 * self.points * self.speed / self.table.cores
+
+    def colour(self, source: str, images: int, megapixels: float) -> float:
+        """Return the time of a source of colours beyond the materials' means."""
+        if source == "material":
+            return 0.0
+        first, each, pixel = self.table.image if source == "images" else (0.0, 0.0, 0.0)
+        rendered = first + each * images + pixel * megapixels
+        return (rendered + 1e-6 * self.table.sample[source] * self.points) * self.speed
+
+    def colour_cost(self, source: str, images: int, megapixels: float) -> float:
+        """Return the cost of a source of colours in megapixels, which is the same on every machine."""
+        if source == "images":
+            return 1.0 + _IMAGE * images + megapixels
+        return 0.0 if source == "material" else _RETURN * 1e-6 * self.pulses
+
+    def fixed(self, scenario: Scenario) -> float:
+        """Return the time of what no knob changes, beyond the scan."""
+        seconds = 1e-6 * self.table.scene_file * self.area if "scene" in scenario.outputs else 0.0
+        seconds += 1e-6 * self.table.previews * self.points if "previews" in scenario.outputs else 0.0
+        return seconds * self.speed

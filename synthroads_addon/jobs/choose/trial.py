@@ -1,0 +1,192 @@
+"""Trials: short stretches of a scan, by which errors on the user's own scene and the machine's speed are measured.
+
+Errors are taken of single scan lines scattered over the path, against the same pulses with the converged footprint;
+the time of longer stretches that go through the whole job to a file. Noise of the scanner is left out of the errors.
+"""
+
+from __future__ import annotations
+
+import tempfile
+import time
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ...base.machine import available_cores
+from ...base.progress import StageTimer
+from ...blender.cameras import image_views, layer_source
+from ...blender.services import BlenderServices
+from ...cloud.points import PointBlock
+from ...scanning.beam import RINGS, beam_pattern
+from ...scanning.blocks import Blocks
+from ...scanning.colour.colour import LayerValues, Targets, sample_targets
+from ...scanning.colour.request import LayerRequest
+from ...scanning.colour.settings import ColourSettings
+from ...scanning.colour.views import View
+from ...scanning.noise import Noise
+from ...scanning.plan import ScanConditions, ScanPlan
+from ...scanning.platforms.path import Path as ScanPath
+from ...scanning.record import record_as_measured
+from ...scanning.samples import scattered
+from ...scanning.scan import BlockResult, joined_results
+from ...scanning.scene.motion import ScannedScene
+from ...scenario.scenario import Scenario
+from ..measure.errors import (
+    CONVERGED,
+    FINEST,
+    Errors,
+    colour_errors,
+    relief_errors,
+    shift_points,
+    truest_settings,
+)
+from ..scan.files import CloudFiles, record_to_files
+from ..scan.plan import plan_scan
+
+LINES, PULSES = 64, 1024
+"""Stretches that errors are taken of, and the pulses of each."""
+_TIMED_PULSES = 1 << 15
+"""Pulses of each stretch that is timed: as many as blocks are worth."""
+_TIMED = 8
+_TIMED_SHARE = 0.1
+"""Stretches that are timed, and the largest share of the path that they may be."""
+_COLOURED = 8
+"""Scan lines that errors of colours are taken of."""
+_NEAREST = 3
+"""Places of images, nearest in time to a line, that are rendered of each strip."""
+_MARGIN = 24
+"""Border of what is rendered around a line, px: what is hidden takes its colour from close by."""
+
+
+@dataclass
+class Trial:
+    """A scene that is tried out.
+
+    Attributes:
+        scenario: the job, without noise.
+        scene: what is scanned.
+        plan: of the whole path.
+        phase: see `scanning.samples.scattered`: other phases are other stretches.
+        lines: of these is the error taken.
+        clock: measures seconds.
+    """
+
+    scenario: Scenario
+    scene: ScannedScene
+    plan: ScanPlan
+    phase: float = 0.5
+    lines: int = field(default_factory=lambda: LINES)
+    clock: Callable[[], float] = time.perf_counter
+
+    @classmethod
+    def of(cls, scenario: Scenario, scene: ScannedScene, path: ScanPath, conditions: ScanConditions) -> Trial:
+        """Prepare to scan a scene; builds the casters."""
+        quiet = scenario.scan.model_copy(update={"noise": Noise(range_sigma=0.0)})
+        colour = scenario.colour.model_copy(update={"intensity_from_layers": False})
+        scenario = scenario.model_copy(update={"scan": quiet, "colour": colour})
+        return cls(scenario, scene, plan_scan(scenario, scene, path, BlenderServices(), conditions))
+
+    @property
+    def pulses(self) -> int:
+        """Return how many pulses the whole path has."""
+        return sum(map(self.plan.pulses, self.plan.path.strips))
+
+    def scan_lines(self, rings: tuple[int, ...], lines: int = 0) -> list[BlockResult]:
+        """Scan the stretches that errors are taken of with a beam; return the points of each, and where they are."""
+        path = scattered(self.plan.path, lines or self.lines, PULSES / self.plan.setting.shot_rate, self.phase)
+        results = iter(record_as_measured(replace(self.plan, path=path, rings=rings)))
+        blocks = Blocks(self.plan.setting, path, len(beam_pattern(rings).weights))
+        return [joined_results([next(results) for _ in blocks.of(strip)]) for strip in path.strips]
+
+    def points(self, rings: tuple[int, ...] = RINGS[CONVERGED]) -> list[PointBlock]:
+        """Return the points of the stretches with a beam: the converged one, which is the truth, if none is given."""
+        return [result.points for result in self.scan_lines(rings)]
+
+    def relief_errors(self, octaves: Iterable[int]) -> dict[int, Errors]:
+        """Return the error of the micro-relief by octaves."""
+        plan, results = self.plan, [one for one in self.scan_lines(RINGS[1]) if len(one.points)]
+        assert plan.relief is not None
+
+        def shifted(number: int) -> list[Any]:
+            return shift_points(results, plan.relief, plan.relief_strength, plan.seed, number)  # type: ignore[arg-type]
+
+        truth = shifted(FINEST)
+        return {number: relief_errors(shifted(number), truth) for number in octaves}
+
+    def colour_errors(self, choices: Mapping[str, Mapping[str, Any]], wanted: frozenset[str]) -> dict[str, Errors]:
+        """Return the errors of colours and layers by where they come from, see `knobs.colour_choices`.
+
+        Of each image only what shows a scan line is rendered.
+
+        Args:
+            choices: name -> changes of the scenario.
+            wanted: ``rgb`` and layers.
+        """
+        seen = [one.seen for one in self.scan_lines(RINGS[1], _COLOURED) if one.seen is not None and len(one.seen)]
+        true = truest_settings(self.layer_request({}))
+        truth = self._layers(true, seen, wanted)
+        errors = {}
+        for name, changes in choices.items():
+            settings = self.layer_request(changes).settings
+            mine = truth if settings == true else self._layers(settings, seen, wanted)
+            errors[name] = colour_errors(mine, truth, wanted)
+        return errors
+
+    def layer_request(self, changes: Mapping[str, Any]) -> LayerRequest:
+        """Return the request for colours with changes of the scenario."""
+        given = {path.removeprefix("colour."): value for path, value in changes.items()}
+        colour = type(self.scenario.colour).from_dict(self.scenario.colour.to_dict() | given)
+        assert self.plan.request is not None
+        settings = colour.settings(self.scenario.fidelity, self.plan.path.typical_range)
+        return replace(self.plan.request, settings=settings)
+
+    def _layers(
+        self, settings: ColourSettings, lines: Sequence[Targets], wanted: frozenset[str]
+    ) -> list[LayerValues]:
+        assert self.plan.request is not None
+        request = replace(
+            self.plan.request, settings=settings, wanted=wanted, pick=lambda views: views_near_lines(views, lines)
+        )
+        with layer_source(request) as source:
+            return [sample_targets(source, seen, wanted) for seen in lines]
+
+    def count_images(self, changes: Mapping[str, Any]) -> tuple[int, float]:
+        """Return how many images the whole path would have, and their megapixels; 0 where none are rendered."""
+        if changes["colour.source"] != "images":
+            return 0, 0.0
+        views = image_views(self.layer_request(changes))
+        return len(views), sum(view.pixels for view in views) / 1e6
+
+    def time_scan(self, rings: tuple[int, ...]) -> tuple[float, int]:
+        """Return the seconds of the whole scan into files with a beam, projected from stretches, and its points.
+
+        Colours are the materials' means and the relief is the coarsest: what more than that costs is known apart.
+        """
+        count = max(_TIMED, 2 * available_cores())
+        path = scattered(self.plan.path, count, _TIMED_PULSES / self.plan.setting.shot_rate, 0.5, _TIMED_SHARE)
+        # Pulses come in whole lines, so that stretches hold fewer of them than their duration says.
+        share = sum(map(self.plan.pulses, path.strips)) / self.pulses
+        request = self.layer_request({"colour.source": "material"})
+        plan = replace(self.plan, path=path, rings=rings, relief_octaves=2, request=request)
+        with tempfile.TemporaryDirectory(prefix="synthroads-") as folder:
+            files = CloudFiles(self.scenario, Path(folder), plan.target.origin, path.typical_range)
+            begin = self.clock()
+            record_to_files([plan], files, StageTimer())
+            seconds = self.clock() - begin
+        return seconds / share, round(files.counts.points / share)
+
+
+def views_near_lines(views: Sequence[View], lines: Sequence[Targets]) -> list[View]:
+    """Return what the nearest images show of each scan line: parts of them."""
+    parts: list[View | None] = []
+    for line in lines:
+        away = np.array([np.linalg.norm(view.position - line.scanner.mean(axis=0)) for view in views])
+        places = np.unique(np.round(away, 6))[:_NEAREST]
+        if not len(places):
+            continue
+        near = np.flatnonzero(away <= places[-1] + 1e-5)
+        parts += [views[number].around(line.position, _MARGIN) for number in near]
+    return [part for part in parts if part is not None]

@@ -1,0 +1,128 @@
+"""A scenario resolved into a `ScanPlan`: every default of fidelity, device, platform and weather is filled in here."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...cloud.tools.previews import TopView
+from ...materials.surfaces import surfaces_of
+from ...materials.variation import varied
+from ...road.geometry import RoadGeometry
+from ...scanning.beam import RINGS
+from ...scanning.colour.request import LayerRequest
+from ...scanning.finish import LAYERS, OPTIONAL
+from ...scanning.plan import ScanConditions, ScanPlan, SceneServices
+from ...scanning.platforms.path import Path as ScanPath
+from ...scanning.platforms.path import RoadGuide, make_path
+from ...scanning.relief import micro_relief
+from ...scanning.scene.motion import ScannedScene
+from ...scanning.scene.target import Target
+from ...scanning.weather.registry import weather_of
+from ...scenario.scan import scanner_setting
+from ...scenario.scenario import Scenario
+
+
+def plan_scan(
+    scenario: Scenario,
+    scene: ScannedScene,
+    path: ScanPath,
+    services: SceneServices,
+    conditions: ScanConditions | None = None,
+) -> ScanPlan:
+    """Return the scan that a scenario asks for, with nothing left open; builds the casters.
+
+    Args:
+        scenario: the job.
+        scene: what is scanned.
+        path: the scanner's.
+        services: of the program that shows the scene.
+        conditions: the road's; those of no road if None.
+
+    Raises:
+        InputError: the device can't do what the scenario asks for, or its table of materials can't be read.
+    """
+    conditions = conditions or ScanConditions()
+    scan, settings, setting = scenario.scan, scenario.settings(), scanner_setting(scenario.scan)
+    materials, kept = scene.static.materials, kept_layers(scenario)
+    means, by_layers = services.materials(materials), scenario.colour.intensity_from_layers
+    table = scenario.own_materials()
+    scanned = [
+        varied(name, conditions.variation, conditions.environment, table) if name in table else mean
+        for name, mean in zip(materials, means, strict=True)
+    ]
+    loss, weather = scan.attenuation, scan.weather or weather_of(conditions.environment)
+    coloured, shifts = coloured_layers(scenario), scan.relief > 0.0
+    colour = scenario.colour.settings(scenario.fidelity, path.typical_range)
+    return ScanPlan(
+        target=Target(scene, lambda mesh: services.caster(scan.caster, mesh)),
+        # The layers of each point have the variation of their own already.
+        surfaces=surfaces_of(scanned, scan.reflection, spread=not by_layers),
+        setting=setting,
+        path=path,
+        rings=RINGS[settings.rays_per_pulse] if scan.beam_rings is None else scan.beam_rings,
+        seed=scenario.seed,
+        noise=scan.noise,
+        attenuation=weather.attenuation(setting.device.wavelength_nm) if loss is None else loss,
+        effects=weather.effects() if loss is None else (),
+        beam=scan.beam,
+        wanted=(kept - set(LAYERS) - {"color_source"}) | ({"normal", "material"} if shifts else set()),
+        targets=bool(coloured) or by_layers or shifts,
+        detects_later=by_layers,
+        driven=scan.platform.kind == "vehicle",
+        coloured=coloured,
+        kept=kept,
+        means=surfaces_of(means),
+        range_corrected=scenario.cloud.intensity == "range_corrected",
+        relief=micro_relief(materials, means) if shifts else None,
+        relief_strength=scan.relief,
+        relief_octaves=settings.relief_octaves,
+        threads=scan.threads,
+        request=LayerRequest(
+            settings=colour,
+            wanted=coloured | ({"base_color"} if by_layers else set()),
+            mesh=scene.static,
+            environment=conditions.environment,
+            path=path,
+            field_of_view=setting.field_of_view,
+            seed=scenario.seed,
+        ),
+        services=services,
+    )
+
+
+def kept_layers(scenario: Scenario) -> frozenset[str]:
+    """Return the names of the optional per-point layers that the files hold."""
+    return scenario.cloud.arrays() & frozenset(OPTIONAL) if "cloud" in scenario.outputs else frozenset()
+
+
+def coloured_layers(scenario: Scenario) -> frozenset[str]:
+    """Return the layers that points get besides what the scanner measures: ``rgb`` and material layers."""
+    rgb = {"rgb"} if scenario.colour.rgb else set()
+    return frozenset(rgb | (kept_layers(scenario) & set(LAYERS)))
+
+
+def may_render(scenario: Scenario) -> bool:
+    """Return whether a scan may have to render: whether it does depends on the scene's materials as well."""
+    points = bool(set(scenario.outputs) & {"cloud", "previews"})
+    asked = bool(coloured_layers(scenario)) or scenario.colour.intensity_from_layers
+    return points and asked and scenario.colour.source != "material"
+
+
+def road_path(scenario: Scenario, geometry: RoadGeometry) -> ScanPath:
+    """Return the scanner's path along a road."""
+    return make_path(scenario.scan.platform, RoadGuide(geometry))
+
+
+def road_view(geometry: RoadGeometry) -> TopView:
+    """Return a raster for the previews that holds the whole swath of a road."""
+    origin = np.array(geometry.parameters.transform.translate)[:2]
+    stations = np.linspace(0.0, geometry.length, 50)
+    terrain = geometry.parameters.terrain
+    reach = terrain.half_width if terrain else float(np.abs(geometry.offsets(stations)).max())
+    plan, heading, _ = geometry.alignment.frame(stations)
+    left = np.stack([-np.sin(heading), np.cos(heading)], axis=1)
+    chord = plan[-1] - plan[0]
+    normal = np.array([-chord[1], chord[0]]) / max(np.hypot(*chord), 1e-9)
+    edges = np.concatenate([plan + reach * left, plan - reach * left])
+    across = (edges - plan[0]) @ normal
+    return TopView(plan[0] + origin, plan[-1] + origin, float(across.min()) - 2, float(across.max()) + 2)

@@ -1,0 +1,61 @@
+"""`LayerRequest`: which colours and layers are wanted, of which scene."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from ...road.surroundings import Environment
+from ..scene.mesh import SceneMesh
+from .colour import MaterialLayers, Shading, SurfaceConstants
+from .light import CloudShadows, SunAndSky
+from .settings import ColourSettings
+from .views import Poses, View
+
+
+@dataclass(frozen=True)
+class LayerRequest:
+    """Colours and layers that are wanted of a scene.
+
+    Attributes:
+        settings: how they are rendered.
+        wanted: layers: ``rgb``, ``base_color``, ``roughness``, ``metallic``, ``specular``.
+        mesh: what is scanned, without what moves.
+        environment: light and weather.
+        path: the scanner's.
+        field_of_view: the scanner's, rad.
+        seed: of the clouds.
+        frame: where (3,) the scene's local frame begins in that of the clouds, m.
+        pick: which of the images along the path are rendered, and what of them; None for all.
+    """
+
+    settings: ColourSettings
+    wanted: frozenset[str]
+    mesh: SceneMesh
+    environment: Environment
+    path: Poses
+    field_of_view: float
+    seed: int = 0
+    frame: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    pick: Callable[[list[View]], list[View]] | None = None
+
+    @property
+    def lit(self) -> bool:
+        """Return whether colours under sun and sky are wanted."""
+        return "rgb" in self.wanted and self.settings.mode == "lit"
+
+
+def material_layers(
+    request: LayerRequest, constants: SurfaceConstants, light: SunAndSky | None = None
+) -> MaterialLayers:
+    """Return the materials' own values: all of it where nothing is rendered, else for what no image shows.
+
+    Args:
+        request: colours and layers that are wanted.
+        constants: means of the scene's materials.
+        light: that of the images; the usual one if None.
+    """
+    clouds = None
+    if request.lit and request.environment.cloud_cover > 0.0:
+        clouds = CloudShadows(request.environment, request.seed, request.frame)
+    return MaterialLayers(constants, Shading(request.settings.mode, light or SunAndSky(), clouds))

@@ -1,0 +1,170 @@
+"""`ScanPlan`: everything that a scan was asked for, decided once, and the interfaces of what it is carried out with."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from contextlib import AbstractContextManager
+from dataclasses import dataclass, field
+from typing import Any, Literal, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..materials.surfaces import Surfaces
+from ..materials.table import Material
+from ..road.parameters import RoadParameters
+from ..road.surroundings import Environment, MaterialVariation
+from .beam import BeamPattern, beam_pattern
+from .blocks import Block, Blocks
+from .colour.colour import LayerSource
+from .colour.request import LayerRequest
+from .devices.device import ScannerSetting
+from .effects import EchoEffect
+from .noise import Noise
+from .platforms.path import Path, Strip
+from .relief import MicroRelief
+from .scene.caster import Caster
+from .scene.mesh import SceneMesh
+from .scene.target import Target
+
+Float = NDArray[np.float64]
+
+_SPARE = 2
+"""Factor on the returns of a pulse that are kept meanwhile: some are lost to the threshold later."""
+
+
+class SceneServices(Protocol):
+    """Services of the program that shows the scene: Blender's own, or stand-ins where nothing is rendered."""
+
+    def caster(self, name: str, mesh: SceneMesh) -> Caster:
+        """Return a ray caster over a mesh by its name in `ScanScenario.caster`."""
+        ...
+
+    def materials(self, names: Sequence[str]) -> list[Material]:
+        """Return the means of the scene's materials, in the order of the names."""
+        ...
+
+    def layers(
+        self, request: LayerRequest, progress: Callable[[float], None]
+    ) -> AbstractContextManager[LayerSource]:
+        """Open a source of colours and layers; images are rendered first, and progress gets the share of them."""
+        ...
+
+
+@dataclass(frozen=True)
+class ScanConditions:
+    """Properties of the road that a scan depends on besides its geometry; clear and dry weather if there is no road.
+
+    Attributes:
+        environment: light and weather.
+        variation: of the road's materials.
+        epsg: map coordinate system; None if unknown.
+    """
+
+    environment: Environment = field(default_factory=Environment)
+    variation: MaterialVariation = field(default_factory=MaterialVariation)
+    epsg: int | None = None
+
+    @classmethod
+    def of(cls, road: RoadParameters | None) -> ScanConditions:
+        """Return the conditions of a road."""
+        return cls() if road is None else cls(road.environment, road.materials, road.metadata.epsg)
+
+
+@dataclass(frozen=True)
+class ScanPlan:
+    """Everything that the blocks of one scan share.
+
+    Attributes:
+        target: the scene with its casters.
+        surfaces: means of the scene's materials, as the beam meets them.
+        setting: the scanner's.
+        path: the scanner's.
+        rings: rays on each ring around the beam's axis.
+        seed: of everything random.
+        attenuation: 1/m of range.
+        effects: what changes the echoes of pulses, in this order.
+        wanted: names of the optional per-point layers that the scan itself fills.
+        targets: whether to say where each point was seen, for colours and relief: `BlockResult.seen`.
+        detects_later: intensities are yet to change, see `finish`: every echo that may pass the detector is kept, and
+            nothing saturates.
+        frame: (3,) where the scene's local frame begins, in the coordinates of the surfaces' random fields, m: those of
+            the whole road where only a section of it is scanned.
+        only: blocks that are scanned, in their order; all if None.
+        driven: whether a vehicle carries the scanner.
+        coloured: ``rgb`` and material layers that the points get.
+        kept: optional per-point layers that the sink gets; the others are needed on the way.
+        means: of the materials, which the layers of single points vary around.
+        range_corrected: intensities are multiplied by the squared range, after the detector.
+        relief: micro-relief of the materials; None without.
+        relief_strength: factor on it.
+        relief_octaves: of it.
+        threads: blocks that are worked on at once; 0 for every core.
+        request: colours and layers that are asked of the scene.
+        services: of the program that shows the scene, for these; None where points stay as they are measured.
+        progress: shares of a larger scan that are done before this one, and after it.
+    """
+
+    target: Target
+    surfaces: Surfaces
+    setting: ScannerSetting
+    path: Path
+    rings: tuple[int, ...]
+    seed: int
+    noise: Noise = Noise()  # noqa: RUF009 (frozen)
+    attenuation: float = 0.0
+    effects: tuple[EchoEffect, ...] = ()
+    beam: Literal["conical", "cylindrical"] = "conical"
+    wanted: frozenset[str] = frozenset()
+    targets: bool = False
+    detects_later: bool = False
+    frame: Float = field(default_factory=lambda: np.zeros(3))
+    only: tuple[Block, ...] | None = None
+    driven: bool = False
+    coloured: frozenset[str] = frozenset()
+    kept: frozenset[str] = frozenset()
+    means: Surfaces | None = None
+    range_corrected: bool = False
+    relief: MicroRelief | None = None
+    relief_strength: float = 0.0
+    relief_octaves: int = 4
+    threads: int = 0
+    request: LayerRequest | None = None
+    services: SceneServices | None = None
+    progress: tuple[float, float] = (0.0, 1.0)
+    pattern: BeamPattern = field(init=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "pattern", beam_pattern(self.rings))
+
+    @property
+    def rays_per_pulse(self) -> int:
+        """Return how many rays sample a pulse."""
+        return len(self.pattern.weights)
+
+    @property
+    def most_returns(self) -> int:
+        """Return how many returns of a pulse are kept at most."""
+        return self.setting.device.maximum_returns * (_SPARE if self.detects_later else 1)
+
+    @property
+    def cut(self) -> Blocks:
+        """Return how the pulses are cut into blocks."""
+        return Blocks(self.setting, self.path, self.rays_per_pulse)
+
+    def pulses(self, strip: Strip) -> int:
+        """Return how many pulses a strip has."""
+        return self.cut.pulses(strip)
+
+    def blocks(self) -> list[Block]:
+        """Return (strip, number) of every block that is scanned, in the order of time."""
+        return self.cut.all() if self.only is None else list(self.only)
+
+    def summary(self) -> dict[str, Any]:
+        """Return the figures that are known before the scan begins, as JSON data."""
+        return {
+            "triangles": self.target.triangles,
+            "vertices": self.target.vertices,
+            "caster": self.target.caster.name,
+            "attenuation": self.attenuation,
+        }
