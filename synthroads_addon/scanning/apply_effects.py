@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
 from dataclasses import fields, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .devices.device import ScannerSetting
-from .effects.base import EchoChanges, EchoEffect, Float, PulseHits
+from ..base.random_streams import stream
+from .effects import EchoChanges, Float, PulseHits
+from .plan import ScanPlan
+from .platforms.path import Strip
 from .pulses import Pulses
 from .radiometry import received
 from .returns import UNCOUNTED, Marks
@@ -21,43 +22,33 @@ BothMarks = tuple[Marks, Marks]
 
 
 def apply_effects(
-    effects: Sequence[EchoEffect],
-    pulses: Pulses,
-    traced: Traced,
-    marks: BothMarks,
-    setting: ScannerSetting,
-    attenuation: float,
-    source: Callable[[str], np.random.Generator],
+    scan: ScanPlan, strip: Strip, key: int, pulses: Pulses, traced: Traced, marks: BothMarks
 ) -> tuple[Traced, BothMarks]:
-    """Return what the rays of a block meet, and its marks, after effects, one after the other.
+    """Return what the rays of a block meet, and its marks, after the scan's effects, one after the other.
 
     Echoes that are added join what lies behind permeable surfaces, with the face -1.
 
     Args:
-        effects: in their order; each sees what those before it have left.
+        scan: with the effects in their order; each sees what those before it have left.
+        strip, key: of the block, for its random numbers.
         pulses: the block's.
         traced: what their rays meet.
         marks: what that adds to returns.
-        setting: the scanner's.
-        attenuation: 1/m of range.
-        source: gives the random numbers of a purpose.
 
     Raises:
         ValueError: an effect's echoes are of no ray, or not finite numbers.
     """
-    for effect in effects:
-        hits = _pulse_hits(pulses, traced, marks, setting, attenuation)
-        changes = effect.change_echoes(hits, source(f"effect {effect.name}"))
+    for effect in scan.effects:
+        hits = _pulse_hits(scan, pulses, traced, marks)
+        changes = effect.change_echoes(hits, stream(scan.seed, f"effect {effect.name}", strip.index, key))
         _check(effect.name, changes, hits.distance.shape)
         if changes.transmission is not None:
             traced, marks = _weaken(traced, marks, np.broadcast_to(changes.transmission, hits.distance.shape))
-        traced, marks = _add(traced, marks, changes, setting, attenuation)
+        traced, marks = _add(scan, traced, marks, changes)
     return traced, marks
 
 
-def _pulse_hits(
-    pulses: Pulses, traced: Traced, marks: BothMarks, setting: ScannerSetting, attenuation: float
-) -> PulseHits:
+def _pulse_hits(scan: ScanPlan, pulses: Pulses, traced: Traced, marks: BothMarks) -> PulseHits:
     first, behind = marks
     ray, pulse = np.divmod(traced.ray, len(pulses.time))
     return PulseHits(
@@ -66,12 +57,12 @@ def _pulse_hits(
         direction=pulses.direction,
         share=traced.rays.share[:, 0],
         distance=first.distance,
-        brightness=_brightness(first, attenuation),
+        brightness=_brightness(first, scan.attenuation),
         behind_pulse=pulse,
         behind_ray=ray,
         behind_distance=behind.distance,
-        behind_brightness=_brightness(behind, attenuation),
-        setting=setting,
+        behind_brightness=_brightness(behind, scan.attenuation),
+        setting=scan.setting,
     )
 
 
@@ -101,29 +92,24 @@ def _weaken(traced: Traced, marks: BothMarks, transmission: Float) -> tuple[Trac
         weight=np.where(transmission > 0.0, first.weight * transmission, first.weight),
         intensity=first.intensity * transmission,
     )
-    behind = Marks(
-        behind.distance[seen], behind.weight[seen] * left[seen], behind.intensity[seen] * left[seen]
-    )
+    behind = Marks(behind.distance[seen], behind.weight[seen] * left[seen], behind.intensity[seen] * left[seen])
     kept = Hits(*(getattr(traced.behind, field.name)[seen] for field in fields(Hits)))
     return replace(traced, behind=kept, ray=traced.ray[seen]), (first, behind)
 
 
-def _add(
-    traced: Traced, marks: BothMarks, changes: EchoChanges, setting: ScannerSetting, attenuation: float
-) -> tuple[Traced, BothMarks]:
+def _add(scan: ScanPlan, traced: Traced, marks: BothMarks, changes: EchoChanges) -> tuple[Traced, BothMarks]:
     """Return everything with the echoes of an effect that the scanner records."""
     distance = np.asarray(changes.distance, dtype=np.float64)
-    here = np.flatnonzero((distance >= setting.minimum_range) & (distance <= setting.maximum_range))
+    here = np.flatnonzero((distance >= scan.setting.minimum_range) & (distance <= scan.setting.maximum_range))
     distance, brightness = distance[here], np.asarray(changes.brightness, dtype=np.float64)[here]
     none = np.zeros(len(here), dtype=np.intp)
     # In the air there is no face; it counts as one that lies across the beam.
     hits = Hits(none - 1, none, distance, none - 1.0, brightness)
-    added = Marks(distance, np.maximum(brightness, UNCOUNTED), received(brightness, distance, attenuation))
+    added = Marks(distance, np.maximum(brightness, UNCOUNTED), received(brightness, distance, scan.attenuation))
     first, behind = marks
-    behind = Marks(*_joined(behind, added))
     ray = changes.ray[here] * len(traced.rays.time) + changes.pulse[here]
     traced = replace(traced, behind=Hits(*_joined(traced.behind, hits)), ray=np.concatenate([traced.ray, ray]))
-    return traced, (first, behind)
+    return traced, (first, Marks(*_joined(behind, added)))
 
 
 def _joined(one: Hits | Marks, other: Hits | Marks) -> list[NDArray[Any]]:

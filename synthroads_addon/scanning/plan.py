@@ -19,7 +19,7 @@ from .blocks import Block, Blocks
 from .colour.colour import LayerSource
 from .colour.request import LayerRequest
 from .devices.device import ScannerSetting
-from .effects.base import EchoEffect
+from .effects import EchoEffect
 from .noise import Noise
 from .platforms.path import Path, Strip
 from .relief import MicroRelief

@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..base.random_streams import stream
 from ..cloud.points import PointBlock, concatenate
 from ..materials.surfaces import brightness_of
 from ..materials.texture_spread import spread_factors
@@ -100,15 +99,7 @@ def scan_pulses(scan: ScanPlan, strip: Strip, first: int, count: int, key: int =
     )
     marks = hit_marks(scan, traced)
     if in_air:
-        traced, marks = apply_effects(
-            scan.effects,
-            pulses,
-            traced,
-            marks,
-            scan.setting,
-            scan.attenuation,
-            lambda purpose: stream(scan.seed, purpose, strip.index, key),
-        )
+        traced, marks = apply_effects(scan, strip, key, pulses, traced, marks)
     echoes = group_returns(*marks, traced.pulse, scan.setting.range_resolution)
     if scan.surfaces.varying:
         echoes = _uneven(scan, traced, echoes, poses.motions)

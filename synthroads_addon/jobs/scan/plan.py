@@ -50,7 +50,7 @@ def plan_scan(
         varied(name, conditions.variation, conditions.environment, table) if name in table else mean
         for name, mean in zip(materials, means, strict=True)
     ]
-    weather, given = scan.weather or weather_of(conditions.environment), scan.attenuation
+    loss, weather = scan.attenuation, scan.weather or weather_of(conditions.environment)
     coloured, shifts = coloured_layers(scenario), scan.relief > 0.0
     colour = scenario.colour.settings(scenario.fidelity, path.typical_range)
     return ScanPlan(
@@ -62,8 +62,8 @@ def plan_scan(
         rings=RINGS[settings.rays_per_pulse] if scan.beam_rings is None else scan.beam_rings,
         seed=scenario.seed,
         noise=scan.noise,
-        attenuation=weather.attenuation(setting.device.wavelength_nm) if given is None else given,
-        effects=weather.effects() if given is None else (),
+        attenuation=weather.attenuation(setting.device.wavelength_nm) if loss is None else loss,
+        effects=weather.effects() if loss is None else (),
         beam=scan.beam,
         wanted=(kept - set(LAYERS) - {"color_source"}) | ({"normal", "material"} if shifts else set()),
         targets=bool(coloured) or by_layers or shifts,

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import ClassVar
 
 from ...base.schema import ClosedModel, quantity
-from ..effects.base import EchoEffect
+from ..effects import EchoEffect
 from .extinction import visibility_extinction
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 if TYPE_CHECKING:
-    from ..devices.device import ScannerSetting
+    from .devices.device import ScannerSetting
 
 Float = NDArray[np.float64]
 Index = NDArray[np.intp]

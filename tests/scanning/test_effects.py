@@ -12,10 +12,11 @@ from synthroads_addon.cloud.points import NO_MATERIAL, PointBlock
 from synthroads_addon.materials.surfaces import surfaces_of
 from synthroads_addon.materials.table import materials
 from synthroads_addon.scanning.colour.colour import MaterialLayers, surface_constants
-from synthroads_addon.scanning.effects.base import EchoChanges, PulseHits
+from synthroads_addon.scanning.effects import EchoChanges, PulseHits
 from synthroads_addon.scanning.finish import finish
+from synthroads_addon.scanning.plan import ScanPlan
 from synthroads_addon.scanning.relief import micro_relief
-from synthroads_addon.scanning.scan import BlockResult, Scan, scan_block, scan_pulses
+from synthroads_addon.scanning.scan import BlockResult, scan_block, scan_pulses
 from synthroads_addon.scanning.scene.mesh import SceneMesh, empty_scene_mesh
 from tests.helpers.scenes.scan_scenes import ORIGIN, Standing, mesh_of, plane, scan_of
 
@@ -58,14 +59,14 @@ def everything(points: PointBlock) -> bytes:
     return b"".join(array.tobytes() for array in points.attributes().values())
 
 
-def scan_with(*effects: object, mesh: SceneMesh | None = None, rays: int = 1, **changes: object) -> Scan:
+def scan_with(*effects: object, mesh: SceneMesh | None = None, rays: int = 1, **changes: object) -> ScanPlan:
     """Return a scan of a plane with effects, its points told where they were seen."""
     scan = scan_of(plane(100.0) if mesh is None else mesh, rays)
     wanted = scan.wanted | {"material"}
     return replace(scan, effects=effects, targets=True, wanted=wanted, **changes)
 
 
-def line(scan: Scan, key: int = 0) -> BlockResult:
+def line(scan: ScanPlan, key: int = 0) -> BlockResult:
     """Scan the first line, from the horizon over the ground to the horizon."""
     return scan_pulses(scan, scan.path.strips[0], 0, FULL_LINE, key)
 
@@ -183,7 +184,7 @@ def test_points_in_the_air_go_through_colours_and_relief(by_layers: bool) -> Non
         rows = [materials()[name]]
         varying = surfaces_of(rows, spread=not by_layers)
         scan = scan_with(HalfRange(), mesh=mesh, surfaces=varying, detects_later=by_layers, seed=3)
-        plan = replace(
+        scan = replace(
             scan,
             coloured=frozenset({"rgb", "roughness"}),
             kept=frozenset({"material", "color_source", "true_range", "roughness"}),
@@ -192,8 +193,7 @@ def test_points_in_the_air_go_through_colours_and_relief(by_layers: bool) -> Non
             relief_strength=1.0,
             relief_octaves=2,
         )
-        raw = line(scan)
-        points = finish(plan, MaterialLayers(surface_constants(rows)), raw).points
+        points = finish(scan, MaterialLayers(surface_constants(rows)), line(scan)).points
         air = points.material == NO_MATERIAL
         assert 50 < air.sum() < 150
         assert not points.rgb[air].any()

@@ -1,1 +1,0 @@
-"""Effects that change what a pulse meets before its returns are formed."""
