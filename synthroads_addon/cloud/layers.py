@@ -1,29 +1,18 @@
-"""What a cloud's files can hold of each point, beyond what they always hold: one table for every format."""
+"""THE table of per-point layers: what a cloud's files can hold of each point beyond what they always hold.
+
+A layer is a row of `LAYERS`. All else follows from it: what a scenario may ask for, which arrays the scan fills, the
+columns of all formats, and the labels in the panel.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, Literal, get_args
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .points import PointBlock
-
-Attribute = Literal[
-    "range",
-    "incidence",
-    "normal",
-    "roughness",
-    "metallic",
-    "specular",
-    "noise_free",
-    "material",
-    "scanner",
-    "color_source",
-]
-ATTRIBUTES: tuple[Attribute, ...] = get_args(Attribute)
-DEFAULT_ATTRIBUTES: tuple[Attribute, ...] = ("range", "incidence")
+from .points import FIELDS, PointBlock
 
 
 @dataclass(frozen=True)
@@ -52,12 +41,12 @@ class Column:
 
     @property
     def whole(self) -> bool:
-        """Whether the values are whole numbers."""
+        """Return whether the values are whole numbers."""
         return self.scale is None
 
     def of(self, block: PointBlock) -> NDArray[Any]:
         """Return the column (N,) of a block; KeyError if the block doesn't have it."""
-        array = getattr(block, self.array)
+        array = block.array(self.array)
         if array is None:
             raise KeyError(self.array)
         return array if self.component is None else array[:, self.component]
@@ -74,43 +63,124 @@ def _vector(names: tuple[str, ...], array: str, dtype: str, scale: float, unit: 
     )
 
 
+Filled = Literal["scan", "material", "colour"]
+"""Who fills a layer: the scan (`scanning.point_layers`), the materials' layers, or the source of colours."""
+
+
+@dataclass(frozen=True)
+class Layer:
+    """A layer that files hold where it is asked for.
+
+    Attributes:
+        label: for people.
+        columns: in files, in their order.
+        types: of the `PointBlock` arrays that they are of.
+        filled: who fills them.
+        always: the arrays are there in any case, whether files hold them or not.
+    """
+
+    label: str
+    columns: tuple[Column, ...]
+    types: dict[str, str]
+    filled: Filled = "scan"
+    always: bool = False
+
+
 LABELS: tuple[Column, ...] = (
     *_scalar("class_id", "class_id", "uint8", None, "1", "class, see VLR SynthRoads 1"),
     *_scalar("instance_id", "instance_id", "uint32", None, "1", "object's instance number"),
 )
 """Columns that every file has, though LAS has no field for them."""
 
-COLUMNS: dict[Attribute, tuple[Column, ...]] = {
-    "range": _scalar("range", "range", "uint32", 1e-4, "m", "measured range, m"),
-    "incidence": _scalar("incidence", "incidence_deg", "uint16", 0.01, "deg", "incidence angle, deg"),
-    "normal": _vector(("NormalX", "NormalY", "NormalZ"), "normal", "int16", 1e-4, "1", "unit normal"),
-    "roughness": _scalar("roughness", "roughness", "uint16", 1e-4, "1", "material roughness, 0 to 1"),
-    "metallic": _scalar("metallic", "metallic", "uint16", 1e-4, "1", "material metallic, 0 to 1"),
-    "specular": _scalar("specular", "specular", "uint16", 1e-4, "1", "material specular, 0 to 1"),
-    "noise_free": (
-        *_scalar("true_range", "true_range", "uint32", 1e-4, "m", "range without noise, m"),
-        *_vector(("true_x", "true_y", "true_z"), "true_xyz", "int32", 1e-4, "m", "position without noise, m,"),
+
+def _material_layer(name: str) -> Layer:
+    column = _scalar(name, name, "uint16", 1e-4, "1", f"material {name}, 0 to 1")
+    return Layer(name.capitalize(), column, {name: "float32"}, filled="material")
+
+
+LAYERS: dict[str, Layer] = {
+    "range": Layer(
+        "Range", _scalar("range", "range", "uint32", 1e-4, "m", "measured range, m"), {"range": "float64"}, always=True
     ),
-    "material": _scalar("material", "material", "uint16", None, "1", "index of the material"),
-    "scanner": _vector(("scanner_x", "scanner_y", "scanner_z"), "scanner", "int32", 1e-3, "m", "pulse's origin, m,"),
-    "color_source": _scalar("color_source", "color_source", "uint8", None, "1", "image that gave the colour"),
+    "incidence": Layer(
+        "Incidence",
+        _scalar("incidence", "incidence_deg", "uint16", 0.01, "deg", "incidence angle, deg"),
+        {"incidence_deg": "float32"},
+        always=True,
+    ),
+    # These names are those that PDAL and CloudCompare look for.
+    "normal": Layer(
+        "Normal",
+        _vector(("NormalX", "NormalY", "NormalZ"), "normal", "int16", 1e-4, "1", "unit normal"),
+        {"normal": "float32"},
+    ),
+    "roughness": _material_layer("roughness"),
+    "metallic": _material_layer("metallic"),
+    "specular": _material_layer("specular"),
+    "noise_free": Layer(
+        "Noise-Free Position",
+        (
+            *_scalar("true_range", "true_range", "uint32", 1e-4, "m", "range without noise, m"),
+            *_vector(("true_x", "true_y", "true_z"), "true_xyz", "int32", 1e-4, "m", "position without noise, m,"),
+        ),
+        {"true_range": "float64", "true_xyz": "float64"},
+    ),
+    "material": Layer(
+        "Material",
+        _scalar("material", "material", "uint16", None, "1", "index of the material"),
+        {"material": "uint16"},
+    ),
+    "scanner": Layer(
+        "Scanner",
+        _vector(("scanner_x", "scanner_y", "scanner_z"), "scanner", "int32", 1e-3, "m", "pulse's origin, m,"),
+        {"scanner": "float64"},
+    ),
+    "color_source": Layer(
+        "Colour Source",
+        _scalar("color_source", "color_source", "uint8", None, "1", "image that gave the colour"),
+        {"color_source": "uint8"},
+        filled="colour",
+    ),
 }
-"""Columns of each attribute. The names of the normal's are those that PDAL and CloudCompare look for."""
+"""Layers by the name by which a scenario asks for them (`CloudScenario.attributes`)."""
+
+if TYPE_CHECKING:
+    Attribute = str
+else:
+    Attribute = Literal[tuple(LAYERS)]
+ATTRIBUTES: tuple[Attribute, ...] = tuple(LAYERS)
+DEFAULT_ATTRIBUTES: tuple[Attribute, ...] = tuple(name for name, layer in LAYERS.items() if layer.always)
+_TYPES = {"class_id": "uint8", "instance_id": "uint32"} | {
+    array: kind for layer in LAYERS.values() for array, kind in layer.types.items()
+}
 
 
-def needs(attribute: Attribute) -> frozenset[str]:
+def optional_arrays(*filled: Filled) -> frozenset[str]:
+    """Return the names of the arrays that a block may lack: of all layers, or of those that one of these fills."""
+    rows = (layer for layer in LAYERS.values() if not layer.always and (not filled or layer.filled in filled))
+    return frozenset(array for layer in rows for array in layer.types)
+
+
+def layer_arrays() -> dict[str, tuple[str, int]]:
+    """Return type and width (components) of the `PointBlock` arrays of all layers, in the order of the block's fields."""
+    rows = {array: (kind, layer) for layer in LAYERS.values() for array, kind in layer.types.items()}
+    names = [name for name in FIELDS if name in rows] + [name for name in rows if name not in FIELDS]
+    return {name: (rows[name][0], sum(column.array == name for column in rows[name][1].columns)) for name in names}
+
+
+def arrays_of(attribute: Attribute) -> frozenset[str]:
     """Return the names of the `PointBlock` arrays that an attribute is made of."""
-    return frozenset(column.array for column in COLUMNS[attribute])
+    return frozenset(LAYERS[attribute].types)
 
 
 def columns(attributes: tuple[Attribute, ...]) -> tuple[Column, ...]:
     """Return the columns that a file with these attributes has beyond the fields of LAS, in their order."""
-    return LABELS + tuple(column for name in ATTRIBUTES if name in attributes for column in COLUMNS[name])
+    return LABELS + tuple(column for name in ATTRIBUTES if name in attributes for column in LAYERS[name].columns)
 
 
 def attributes_of(names: set[str]) -> tuple[Attribute, ...]:
     """Return the attributes all of whose columns are among a file's names."""
-    return tuple(name for name in ATTRIBUTES if {column.name for column in COLUMNS[name]} <= names)
+    return tuple(name for name in ATTRIBUTES if {column.name for column in LAYERS[name].columns} <= names)
 
 
 def gather(values: dict[str, NDArray[Any]], attributes: tuple[Attribute, ...], count: int) -> dict[str, NDArray[Any]]:
@@ -119,10 +189,9 @@ def gather(values: dict[str, NDArray[Any]], attributes: tuple[Attribute, ...], c
     Arrays that a block always has and the file hasn't are NaN, or 0 where they are whole numbers.
     """
     arrays: dict[str, NDArray[Any]] = {
-        "range": np.full(count, np.nan),
-        "incidence_deg": np.full(count, np.nan, dtype=np.float32),
-        "class_id": np.zeros(count, dtype=np.uint8),
-        "instance_id": np.zeros(count, dtype=np.uint32),
+        name: np.full(count, np.nan if np.dtype(kind).kind == "f" else 0, dtype=kind)
+        for name, kind in _TYPES.items()
+        if name not in optional_arrays()
     }
     parts: dict[str, list[NDArray[Any]]] = {}
     for column in columns(attributes):
@@ -130,19 +199,5 @@ def gather(values: dict[str, NDArray[Any]], attributes: tuple[Attribute, ...], c
             parts.setdefault(column.array, []).append(values[column.name])
     for array, found in parts.items():
         joined = found[0] if len(found) == 1 else np.stack(found, axis=1)
-        arrays[array] = joined.astype(_TYPES.get(array, np.float64), copy=False)
+        arrays[array] = joined.astype(_TYPES[array], copy=False)
     return arrays
-
-
-_TYPES: dict[str, Any] = {
-    "incidence_deg": np.float32,
-    "normal": np.float32,
-    "roughness": np.float32,
-    "metallic": np.float32,
-    "specular": np.float32,
-    "material": np.uint16,
-    "color_source": np.uint8,
-    "class_id": np.uint8,
-    "instance_id": np.uint32,
-}
-"""Types of `PointBlock` arrays that aren't float64."""

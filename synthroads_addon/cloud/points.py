@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields
 from typing import Any
 
 import numpy as np
@@ -38,6 +39,7 @@ class PointBlock:
         true_xyz: (N, 3) float64 without any error.
         roughness, metallic, specular: (N,) float32 material layers.
         color_source: (N,) uint8, which image, or the material, gave colour and layers.
+        more: (N, ...) arrays of other layers of `cloud.layers`, by name.
     """
 
     xyz: NDArray[np.float64]
@@ -61,20 +63,40 @@ class PointBlock:
     metallic: NDArray[np.float32] | None = None
     specular: NDArray[np.float32] | None = None
     color_source: NDArray[np.uint8] | None = None
+    more: Mapping[str, NDArray[Any]] = field(default_factory=dict)
 
     def __len__(self) -> int:
         return len(self.xyz)
 
     def select(self, keep: NDArray[np.bool_] | NDArray[np.intp] | slice) -> PointBlock:
         """Return the points chosen by a mask, indices or a slice."""
-        return PointBlock(**{name: array[keep] for name, array in self.attributes().items()})
+        return make_block(**{name: array[keep] for name, array in self.attributes().items()})
 
     def attributes(self) -> dict[str, NDArray[Any]]:
         """Return the arrays that are there, by name."""
-        return {f.name: array for f in fields(self) if (array := getattr(self, f.name)) is not None}
+        named = {name: array for name in FIELDS if (array := getattr(self, name)) is not None}
+        return named | dict(self.more)
+
+    def array(self, name: str) -> NDArray[Any] | None:
+        """Return an array by its name; None if it isn't there."""
+        return getattr(self, name) if name in FIELDS else self.more.get(name)
+
+    def with_arrays(self, arrays: Mapping[str, NDArray[Any] | None]) -> PointBlock:
+        """Return the block with arrays put in place of those of the same names; None takes one away."""
+        kept = {name: array for name, array in {**self.attributes(), **arrays}.items() if array is not None}
+        return make_block(**kept)
+
+
+FIELDS = tuple(f.name for f in fields(PointBlock) if f.name != "more")
+
+
+def make_block(**arrays: NDArray[Any]) -> PointBlock:
+    """Return the block that arrays make up, those of `cloud.layers` that have no field of their own included."""
+    more = {name: array for name, array in arrays.items() if name not in FIELDS}
+    return PointBlock(**{name: array for name, array in arrays.items() if name in FIELDS}, more=more)
 
 
 def concatenate(blocks: list[PointBlock]) -> PointBlock:
     """Return one block of all points, in order; at least one block is needed, and all have the same attributes."""
-    names = blocks[0].attributes()
-    return PointBlock(**{name: np.concatenate([getattr(block, name) for block in blocks]) for name in names})
+    parts = [block.attributes() for block in blocks]
+    return make_block(**{name: np.concatenate([part[name] for part in parts]) for name in parts[0]})

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..cloud.points import PointBlock
+from ..cloud.points import PointBlock, make_block
 
 
 @dataclass(frozen=True)
@@ -85,6 +85,6 @@ class TileSorter:
         """Yield the tiles by row and column."""
         for row, column in sorted(self._tiles):
             record = np.fromfile(self._tiles[row, column], dtype=self._type)
-            points = PointBlock(**{name: np.ascontiguousarray(record[name]) for name in self._names})
+            points = make_block(**{name: np.ascontiguousarray(record[name]) for name in self._names})
             corner = self.origin + np.array([column * self.edge, row * self.edge, 0.0])
             yield Tile(row, column, corner, points)

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..cloud.layers import optional_arrays
 from ..cloud.points import NO_MATERIAL, PointBlock
 from ..materials.reflectance import reflectivity, returned_share
 from ..materials.surfaces import brightness_of
@@ -19,10 +20,9 @@ from .relief import adjusted
 from .returns import number_returns
 from .scan import BlockResult
 
-LAYERS = ("roughness", "metallic", "specular")
-"""Material layers that points can keep."""
 _OF_INTENSITY = frozenset({"base_color", "metallic", "specular"})
 _DARKEST = 1e-9
+OPTIONAL = optional_arrays()
 
 
 def finish(plan: ScanPlan, source: LayerSource, result: BlockResult) -> BlockResult:
@@ -39,10 +39,10 @@ def finish(plan: ScanPlan, source: LayerSource, result: BlockResult) -> BlockRes
     if result.seen is not None and plan.relief is not None and plan.relief_strength > 0.0:
         place = result.seen.position + plan.frame
         points = adjusted(points, place, plan.relief, plan.relief_strength, plan.seed, plan.relief_octaves)
-    changes: dict[str, Any] = {name: None for name in OPTIONAL if name not in plan.kept}
+    changes: dict[str, NDArray[Any] | None] = dict.fromkeys(points.attributes().keys() & OPTIONAL - plan.kept)
     if plan.range_corrected:
         changes["intensity"] = points.intensity * points.range**2
-    return replace(result, points=replace(points, **changes), seen=None)
+    return replace(result, points=points.with_arrays(changes), seen=None)
 
 
 def _with_layers(plan: ScanPlan, source: LayerSource, result: BlockResult, seen: Targets) -> BlockResult:
@@ -53,7 +53,7 @@ def _with_layers(plan: ScanPlan, source: LayerSource, result: BlockResult, seen:
     changes["color_source"] = values.source
     if plan.detects_later:
         changes["intensity"] = result.points.intensity * _relative_brightness(plan, result.points, seen, values)
-    result = replace(result, points=replace(result.points, **changes))
+    result = replace(result, points=result.points.with_arrays(changes))
     if plan.detects_later:
         result = detected(result, plan.setting)
     assert result.points.color_source is not None
@@ -108,16 +108,3 @@ def detected(result: BlockResult, setting: ScannerSetting) -> BlockResult:
         saturated=clipped,
     )
 
-
-OPTIONAL = (
-    "normal",
-    "material",
-    "scanner",
-    "true_range",
-    "true_xyz",
-    "roughness",
-    "metallic",
-    "specular",
-    "color_source",
-)
-"""Arrays of `PointBlock` that may be None."""

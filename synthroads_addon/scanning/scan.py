@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..cloud.points import PointBlock, concatenate
+from ..cloud.points import PointBlock, concatenate, make_block
 from ..materials.surfaces import brightness_of
 from ..materials.texture_spread import spread_factors
 from .apply_effects import BothMarks, apply_effects
@@ -18,6 +16,7 @@ from .colour.colour import Targets, joined_targets
 from .knots import Track
 from .plan import ScanPlan
 from .platforms.path import Strip
+from .point_layers import MeasuredPoints, fill_layers, place_points
 from .pulses import Errors, Poses, Pulses, make_pulses, reaching_scene
 from .radiometry import received, saturated
 from .returns import UNCOUNTED, Echoes, Marks, chosen_echoes, group_returns, number_returns
@@ -208,8 +207,9 @@ def _points(
         if scan.effects:
             air = np.flatnonzero(face < 0)
             normal[:, air] = -np.take(traced.rays.direction.reshape(3, -1), traced.ray_of(hit[air]), axis=1)
-    points = PointBlock(
-        xyz=_places(pulses.measured_origin, pulses.measured_direction, pulse, distance, target.origin),
+    measured = MeasuredPoints(scan, pulses, pulse, echoes.range, echoes.intensity, face, normal)
+    points = make_block(
+        xyz=place_points(pulses.measured_origin, pulses.measured_direction, pulse, distance, target.origin),
         intensity=intensity,
         rgb=np.zeros((len(pulse), 3), dtype=np.uint16),
         class_id=target.of_faces("class_id", face),
@@ -221,7 +221,7 @@ def _points(
         strip=np.full(len(pulse), strip.index, dtype=np.uint16),
         range=distance,
         incidence_deg=np.rad2deg(np.arccos(np.minimum(np.abs(along), 1.0))).astype(np.float32),
-        **dict(_optional(scan, pulses, pulse, echoes.range, face, normal)),
+        **fill_layers(measured),
     )
     seen = None
     if scan.targets and normal is not None:
@@ -249,32 +249,3 @@ def _seen(
         material=target.of_faces("material", face),
         time=time,
     )
-
-
-def _places(origin: Float, direction: Float, pulse: Index, distance: Float, map_origin: Float) -> Float:
-    """Return (N, 3) map coordinates."""
-    result = np.empty((len(pulse), 3))
-    for axis in range(3):
-        place = np.take(direction[axis], pulse)
-        place *= distance
-        place += np.take(origin[axis], pulse)
-        place += map_origin[axis]
-        result[:, axis] = place
-    return result
-
-
-def _optional(
-    scan: ScanPlan, pulses: Pulses, pulse: Index, distance: Float, face: Index, normal: Float | None
-) -> Iterator[tuple[str, Any]]:
-    """Yield the optional arrays that are wanted, by name."""
-    wanted, origin = scan.wanted, scan.target.origin
-    if "normal" in wanted and normal is not None:
-        yield "normal", np.ascontiguousarray(normal.T, dtype=np.float32)
-    if "scanner" in wanted:
-        yield "scanner", pulses.origin.T[pulse] + origin
-    if "true_range" in wanted:
-        yield "true_range", distance
-    if "true_xyz" in wanted:
-        yield "true_xyz", _places(pulses.origin, pulses.direction, pulse, distance, origin)
-    if "material" in wanted:
-        yield "material", scan.target.of_faces("material", face)

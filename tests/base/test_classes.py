@@ -133,12 +133,12 @@ def test_documentation_has_every_class() -> None:
 
 
 def test_documentation_has_every_column() -> None:
-    from synthroads_addon.cloud.layers import ATTRIBUTES, COLUMNS, LABELS
+    from synthroads_addon.cloud.layers import ATTRIBUTES, LABELS, LAYERS
 
     text = (PRESETS.parents[1] / "docs" / "cloud.md").read_text(encoding="utf-8")
     rows = {cells[2].strip(" `"): cells for line in text.splitlines() if len(cells := line.split("|")) == 8}
     for attribute in (None, *ATTRIBUTES):
-        for column in COLUMNS[attribute] if attribute else LABELS:
+        for column in LAYERS[attribute].columns if attribute else LABELS:
             scale = f"{column.scale:g}" if column.scale else "1"
             shown = [rows[column.name][i].strip(" `") for i in (1, 3, 4, 5)]
             assert shown == [attribute or "always", column.dtype, scale, column.unit], column.name

@@ -16,8 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...base.errors import InputError
-from ..layers import COLUMNS, Column, columns, gather
-from ..points import PointBlock
+from ..layers import LAYERS, Column, columns, gather
+from ..points import PointBlock, make_block
 from .base import BLOCK, CloudHeader, CloudReader, CloudWriter, damaged, finite_coordinates, header_from_notes
 
 SCALE = 1e-4
@@ -250,7 +250,7 @@ class E57Reader(CloudReader):
         if sum(counts) and not all({"cartesianX", "cartesianY", "cartesianZ"} <= fields for fields in self._fields):
             self.close()
             raise InputError(str(path), None, "has no Cartesian coordinates")
-        known = {column.name for group in COLUMNS.values() for column in group if e57_name(column) in names}
+        known = {column.name for layer in LAYERS.values() for column in layer.columns if e57_name(column) in names}
         header = header_from_notes(path, "E57", sum(counts), known, notes)
         read = _STANDARD | {e57_name(column) for column in columns(header.attributes)}
         self._counts = counts
@@ -309,7 +309,7 @@ class E57Reader(CloudReader):
         found = gather(
             {c.name: arrays[e57_name(c)].copy() for c in own if e57_name(c) in arrays}, self.header.attributes, count
         )
-        return PointBlock(
+        return make_block(
             xyz=local @ rotation.T + translation,
             intensity=values("intensity", np.float64),
             rgb=np.stack([values(f"color{c}", np.uint16) * np.uint16(257) for c in ("Red", "Green", "Blue")], axis=1),

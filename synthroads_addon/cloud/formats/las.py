@@ -25,7 +25,7 @@ from ...base.classes import asprs_scheme, class_scheme, stored_scheme
 from ...base.errors import InputError, OutputError
 from ...base.schema import canonical_json
 from ..layers import Column, attributes_of, columns, gather
-from ..points import PointBlock
+from ..points import PointBlock, make_block
 from .base import BLOCK, CloudHeader, CloudReader, CloudWriter, damaged, epsg_of, intensity_scale
 from .laz_chunks import check_chunks
 
@@ -264,7 +264,7 @@ class LasReader(CloudReader):
         labels = "class_id" if self.header.labelled else "classification"
         found = {c.name: np.asarray(record[c.name]) for c in columns(self.header.attributes) if c.name in names}
         arrays = gather(found | {"class_id": values(labels, np.uint8)}, self.header.attributes, count)
-        return PointBlock(
+        return make_block(
             xyz=steps * header.scales + header.offsets,
             intensity=values("intensity", np.float64) / scale,
             rgb=np.stack([values(name, np.uint16) for name in ("red", "green", "blue")], axis=1),

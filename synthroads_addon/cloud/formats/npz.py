@@ -15,7 +15,6 @@ import zipfile
 import zlib
 from collections.abc import Iterator
 from contextlib import suppress
-from dataclasses import MISSING, fields
 from pathlib import Path
 from typing import IO, Any
 
@@ -24,8 +23,8 @@ from numpy.lib import format as npy
 from numpy.typing import NDArray
 
 from ...base.errors import InputError
-from ..layers import COLUMNS, columns, gather
-from ..points import PointBlock
+from ..layers import LAYERS, columns, gather, layer_arrays
+from ..points import PointBlock, make_block
 from .base import BLOCK, CloudHeader, CloudReader, CloudWriter, damaged, finite_coordinates, header_from_notes
 
 _ALWAYS = {
@@ -40,19 +39,7 @@ _ALWAYS = {
     "scan_angle_deg": ("<f4", 1),
     "strip": ("<u2", 1),
 }
-_ON_REQUEST = {
-    "range": ("<f8", 1),
-    "incidence_deg": ("<f4", 1),
-    "normal": ("<f4", 3),
-    "material": ("<u2", 1),
-    "scanner": ("<f8", 3),
-    "true_range": ("<f8", 1),
-    "true_xyz": ("<f8", 3),
-    "roughness": ("<f4", 1),
-    "metallic": ("<f4", 1),
-    "specular": ("<f4", 1),
-    "color_source": ("|u1", 1),
-}
+_ON_REQUEST = {name: (np.dtype(kind).str, width) for name, (kind, width) in layer_arrays().items()}
 ARCHIVE_FAULTS = (
     *(KeyError, ValueError, EOFError, OSError, RuntimeError, MemoryError, SyntaxError, OverflowError),
     *(zipfile.BadZipFile, zlib.error, struct.error, tokenize.TokenError),
@@ -78,7 +65,7 @@ class NpzWriter(CloudWriter):
 
     def _append(self, block: PointBlock) -> None:
         for name, (kind, _) in self._arrays.items():
-            values = self.own_class_ids(block) if name == "class_id" else getattr(block, name)
+            values = self.own_class_ids(block) if name == "class_id" else block.array(name)
             if np.dtype(kind).kind == "u":
                 values = self.integers(values, kind, name)
             self._files[name].write(np.ascontiguousarray(self.finite(values, name), dtype=kind).data)
@@ -133,7 +120,7 @@ class NpzReader(CloudReader):
             self.close()
             raise
         arrays = set(self._kinds)
-        names = {c.name for group in COLUMNS.values() for c in group if c.array in arrays}
+        names = {c.name for layer in LAYERS.values() for c in layer.columns if c.array in arrays}
         header = header_from_notes(path, "NPZ", self._kinds["xyz"][0][0], names, notes)
         others = {name.removesuffix(".npy") for name in self._archive.namelist()} - arrays - {"notes"}
         self.header = CloudHeader(
@@ -180,13 +167,12 @@ class NpzReader(CloudReader):
             if name not in ("class_id", "instance_id"):
                 shape = (count, width) if width > 1 else (count,)
                 found[name] = arrays[name].astype(kind) if name in arrays else np.zeros(shape, dtype=kind)
-        return PointBlock(**found)
+        return make_block(**found)
 
     def _read_kinds(self, path: Path) -> dict[str, tuple[tuple[int, ...], np.dtype[Any]]]:
         """Return shape and type of each array that is known here."""
         kinds = {}
-        names = [field.name for field in fields(PointBlock) if field.default is MISSING or field.default is None]
-        for name in names:
+        for name in _ALWAYS | _ON_REQUEST:
             if f"{name}.npy" in self._archive.namelist():
                 with self._archive.open(f"{name}.npy") as member:
                     kinds[name] = _npy_header(member)

@@ -17,8 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...base.errors import InputError
-from ..layers import COLUMNS, Column, columns, gather
-from ..points import PointBlock
+from ..layers import LAYERS, Column, columns, gather
+from ..points import PointBlock, make_block
 from .base import BLOCK, CloudHeader, CloudReader, CloudWriter, damaged, finite_coordinates, header_from_notes
 
 _NAMES = {"NormalX": "nx", "NormalY": "ny", "NormalZ": "nz"}
@@ -138,7 +138,7 @@ class PlyReader(CloudReader):
         except BaseException:
             self._file.close()
             raise
-        own = {column.name for group in COLUMNS.values() for column in group if ply_name(column) in self._names}
+        own = {column.name for layer in LAYERS.values() for column in layer.columns if ply_name(column) in self._names}
         header = header_from_notes(path, "PLY", count, own, notes)
         read = {name for name, _ in _FIXED} | {ply_name(c) for c in columns(header.attributes)} | {*_CLASS_NAMES}
         self.header = CloudHeader(
@@ -178,7 +178,7 @@ class PlyReader(CloudReader):
             name = next((name for name in _CLASS_NAMES if name in self._names), "")
             found["class_id"] = values(name, np.uint8)
         arrays = gather(found, self.header.attributes, count)
-        return PointBlock(
+        return make_block(
             xyz=finite_coordinates(
                 self.header.path, done, np.stack([values(name, np.float64) for name in "xyz"], axis=1)
             ),

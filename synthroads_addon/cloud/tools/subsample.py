@@ -10,7 +10,6 @@ from __future__ import annotations
 import shutil
 import tempfile
 from collections.abc import Iterator
-from dataclasses import fields
 from pathlib import Path
 from types import TracebackType
 from typing import Any
@@ -19,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...base.errors import InputError
-from ..points import PointBlock
+from ..points import PointBlock, make_block
 
 _CELLS_ACROSS_TILE = 512
 _SMALLEST_TILE = 20.0
@@ -128,5 +127,4 @@ def _records(block: PointBlock) -> NDArray[Any]:
 
 
 def _block(record: NDArray[Any]) -> PointBlock:
-    names = [field.name for field in fields(PointBlock) if field.name in (record.dtype.names or ())]
-    return PointBlock(**{name: np.ascontiguousarray(record[name]) for name in names})
+    return make_block(**{name: np.ascontiguousarray(record[name]) for name in record.dtype.names or ()})

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
+from ...cloud.layers import optional_arrays
 from ...cloud.tools.previews import TopView
 from ...materials.surfaces import surfaces_of
 from ...materials.variation import varied
 from ...road.geometry import RoadGeometry
 from ...scanning.beam import RINGS
 from ...scanning.colour.request import LayerRequest
-from ...scanning.finish import LAYERS, OPTIONAL
 from ...scanning.plan import ScanConditions, ScanPlan, SceneServices
 from ...scanning.platforms.path import Path as ScanPath
 from ...scanning.platforms.path import RoadGuide, make_path
@@ -65,7 +65,7 @@ def plan_scan(
         attenuation=weather.attenuation(setting.device.wavelength_nm) if loss is None else loss,
         effects=weather.effects() if loss is None else (),
         beam=scan.beam,
-        wanted=(kept - set(LAYERS) - {"color_source"}) | ({"normal", "material"} if shifts else set()),
+        wanted=(kept & optional_arrays("scan")) | ({"normal", "material"} if shifts else set()),
         targets=bool(coloured) or by_layers or shifts,
         detects_later=by_layers,
         driven=scan.platform.kind == "vehicle",
@@ -92,13 +92,13 @@ def plan_scan(
 
 def kept_layers(scenario: Scenario) -> frozenset[str]:
     """Return the names of the optional per-point layers that the files hold."""
-    return scenario.cloud.arrays() & frozenset(OPTIONAL) if "cloud" in scenario.outputs else frozenset()
+    return scenario.cloud.arrays() & optional_arrays() if "cloud" in scenario.outputs else frozenset()
 
 
 def coloured_layers(scenario: Scenario) -> frozenset[str]:
     """Return the layers that points get besides what the scanner measures: ``rgb`` and material layers."""
     rgb = {"rgb"} if scenario.colour.rgb else set()
-    return frozenset(rgb | (kept_layers(scenario) & set(LAYERS)))
+    return frozenset(rgb | (kept_layers(scenario) & optional_arrays("material")))
 
 
 def may_render(scenario: Scenario) -> bool:

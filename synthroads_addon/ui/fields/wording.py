@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from ...cloud.layers import LAYERS
+
 LABELS = {
     "road.lane_changes.share": "Lane Drops and Gains",
     "road.lane_changes.taper_length": "Their Taper",
@@ -93,8 +95,6 @@ NAMES = {
     "false_colour": "Material Layers",
     "direct": "Direct",
     "path": "Whole Light Paths",
-    "noise_free": "Noise-Free Position",
-    "color_source": "Colour Source",
     "scene": "Blender File",
     "parameters": "Parameter Set",
     "cloud": "Point Cloud",
@@ -144,6 +144,8 @@ def label(path: str, unit: str) -> str:
 
 def value_name(path: str, value: str) -> str:
     """Return what the panel calls a value of a choice."""
+    if path == "cloud.attributes":
+        return LAYERS[value].label
     return OWN_NAMES.get(path, {}).get(value) or NAMES.get(value) or title_case(value)
 
 

@@ -19,7 +19,7 @@ from synthroads_addon.base.classes import class_scheme
 from synthroads_addon.base.errors import InputError, MissingFileError, OutputError
 from synthroads_addon.cloud.formats.base import CloudWriter
 from synthroads_addon.cloud.formats.registry import ENDINGS, open_cloud, open_writer, read_cloud
-from synthroads_addon.cloud.layers import ATTRIBUTES, COLUMNS, DEFAULT_ATTRIBUTES, needs
+from synthroads_addon.cloud.layers import ATTRIBUTES, DEFAULT_ATTRIBUTES, LAYERS, arrays_of
 from synthroads_addon.cloud.points import PointBlock, concatenate
 from synthroads_addon.cloud.tools.convert import convert
 from tests.helpers.clouds.cloud_points import with_every_attribute
@@ -121,7 +121,7 @@ def test_any_points_in_any_blocks_round_trip(tmp_path: Path, data, count, wanted
     parts = [block.select(slice(a, b)) for a, b in pairwise(edges)]
     path = tmp_path / f"cloud{suffix}"
     write(path, block.select(slice(0, 0)), *parts, attributes=tuple(wanted))
-    arrays = {c.array for name in wanted for c in COLUMNS[name]} | {
+    arrays = {c.array for name in wanted for c in LAYERS[name].columns} | {
         *("xyz", "intensity", "rgb", "class_id", "instance_id", "return_number", "number_of_returns", "gps_time"),
         *("scan_angle_deg", "strip"),
     }
@@ -150,9 +150,9 @@ def test_only_what_is_asked_for_is_stored(tmp_path: Path, points, ending: str) -
 
 
 def test_needs_names_arrays_of_points() -> None:
-    assert needs("noise_free") == {"true_range", "true_xyz"}
-    assert needs("normal") == {"normal"}
-    assert set().union(*map(needs, ATTRIBUTES)) <= set(PointBlock.__dataclass_fields__)
+    assert arrays_of("noise_free") == {"true_range", "true_xyz"}
+    assert arrays_of("normal") == {"normal"}
+    assert set().union(*map(arrays_of, ATTRIBUTES)) <= set(PointBlock.__dataclass_fields__)
 
 
 def test_empty_cloud(tmp_path: Path, points, ending: str) -> None:

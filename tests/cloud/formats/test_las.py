@@ -14,7 +14,7 @@ import pytest
 from synthroads_addon.base.classes import classes, las_codes
 from synthroads_addon.base.errors import InputError, OutputError
 from synthroads_addon.cloud.formats.las import LasWriter
-from synthroads_addon.cloud.layers import ATTRIBUTES, COLUMNS, columns
+from synthroads_addon.cloud.layers import ATTRIBUTES, LAYERS, columns
 from synthroads_addon.cloud.points import concatenate
 from tests.helpers.clouds.cloud_points import with_every_attribute
 from tests.judges import require
@@ -190,7 +190,7 @@ def test_an_independent_reader_reads_every_attribute(tmp_path: Path, points) -> 
     assert np.abs(las.xyz - block.xyz).max() <= 0.0005 + 1e-9
     np.testing.assert_array_equal(las.gps_time, block.gps_time)
     for attribute in ATTRIBUTES:
-        for column in COLUMNS[attribute]:
+        for column in LAYERS[attribute].columns:
             error = np.abs(np.asarray(las[column.name]) - column.of(block)).max()
             rounding = 8e-6  # of angles in single precision
             assert error <= (0 if column.whole else column.scale / 2 + rounding), column.name

@@ -1,0 +1,99 @@
+"""Per-point layers that the scan itself fills: one function for each `PointBlock` array, see `cloud.layers`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .plan import ScanPlan
+from .pulses import Pulses
+
+Float = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class MeasuredPoints:
+    """N points of a block, of P pulses, at the time when their layers are filled.
+
+    Attributes:
+        plan: the scan's.
+        pulses: the block's.
+        pulse: (N,) pulse of each point.
+        distance: (N,) range without errors, m.
+        intensity: (N,) before the detector saturates.
+        face: (N,) triangle that gave most of each return; -1 in the air.
+        normal: (3, N) unit normals towards the scanner; None where nothing asks for them.
+    """
+
+    plan: ScanPlan
+    pulses: Pulses
+    pulse: NDArray[np.intp]
+    distance: Float
+    intensity: Float
+    face: NDArray[np.intp]
+    normal: Float | None
+
+
+Filler = Callable[[MeasuredPoints], NDArray[Any]]
+FILLERS: dict[str, Filler] = {}
+"""Function that fills an array, by the array's name."""
+
+
+def fills(array: str) -> Callable[[Filler], Filler]:
+    """Register the function that fills a `PointBlock` array."""
+
+    def register(filler: Filler) -> Filler:
+        FILLERS[array] = filler
+        return filler
+
+    return register
+
+
+def fill_layers(points: MeasuredPoints) -> dict[str, NDArray[Any]]:
+    """Return the arrays that the plan wants of points, by name."""
+    return {array: filler(points) for array, filler in FILLERS.items() if array in points.plan.wanted}
+
+
+def place_points(
+    origin: Float, direction: Float, pulse: NDArray[np.intp], distance: Float, map_origin: Float
+) -> Float:
+    """Return the map coordinates (N, 3) of points at a distance (N,) along the beams (3, P) of their pulses, m."""
+    result = np.empty((len(pulse), 3))
+    for axis in range(3):
+        place = np.take(direction[axis], pulse)
+        place *= distance
+        place += np.take(origin[axis], pulse)
+        place += map_origin[axis]
+        result[:, axis] = place
+    return result
+
+
+@fills("normal")
+def _normal(points: MeasuredPoints) -> NDArray[Any]:
+    assert points.normal is not None
+    return np.ascontiguousarray(points.normal.T, dtype=np.float32)
+
+
+@fills("scanner")
+def _scanner(points: MeasuredPoints) -> NDArray[Any]:
+    return points.pulses.origin.T[points.pulse] + points.plan.target.origin
+
+
+@fills("true_range")
+def _true_range(points: MeasuredPoints) -> NDArray[Any]:
+    return points.distance
+
+
+@fills("true_xyz")
+def _true_xyz(points: MeasuredPoints) -> NDArray[Any]:
+    pulses, origin = points.pulses, points.plan.target.origin
+    return place_points(pulses.origin, pulses.direction, points.pulse, points.distance, origin)
+
+
+@fills("material")
+def _material(points: MeasuredPoints) -> NDArray[Any]:
+    return points.plan.target.of_faces("material", points.face)
