@@ -162,7 +162,7 @@ def optional_arrays(*filled: Filled) -> frozenset[str]:
 
 
 def layer_arrays() -> dict[str, tuple[str, int]]:
-    """Return type and width (components) of the `PointBlock` arrays of all layers, in the order of the block's fields."""
+    """Return type and number of components of the arrays of all layers, in the order of the block's fields."""
     rows = {array: (kind, layer) for layer in LAYERS.values() for array, kind in layer.types.items()}
     names = [name for name in FIELDS if name in rows] + [name for name in rows if name not in FIELDS]
     return {name: (rows[name][0], sum(column.array == name for column in rows[name][1].columns)) for name in names}

@@ -77,7 +77,7 @@ class PointBlock:
         named = {name: array for name in FIELDS if (array := getattr(self, name)) is not None}
         return named | dict(self.more)
 
-    def array(self, name: str) -> NDArray[Any] | None:
+    def array(self, name: str) -> Any:
         """Return an array by its name; None if it isn't there."""
         return getattr(self, name) if name in FIELDS else self.more.get(name)
 

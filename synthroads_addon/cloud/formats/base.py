@@ -100,7 +100,7 @@ class CloudWriter(ABC):
         if len(block) == 0:
             return
         for column in self.columns:
-            if getattr(block, column.array) is None:
+            if block.array(column.array) is None:
                 raise OutputError(str(self.path), column.array, "is to be written, but the points don't have it")
         try:
             self._append(block)
