@@ -1,4 +1,4 @@
-"""What `synthroads benchmark` measures, the limits that it is held against, and its tables."""
+"""Lines of `synthroads benchmark`, the limits that they are held against, and the tables."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 TABLE = "benchmark"
-"""What the tables are called in a document."""
+"""Name of the tables in a document."""
 CORES = 2
 """Cores that the limits are for."""
 

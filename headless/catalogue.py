@@ -1,4 +1,4 @@
-"""What comes under a name, kind by kind, with its key figures: scenarios, laser scanners, recipes, classes, and others.
+"""Catalogue of shipped names, with key figures: scenarios, laser scanners, recipes, classes, and others.
 
 Files of one's own are described in the same way.
 """
@@ -150,4 +150,4 @@ KINDS = {
         lambda one: [[name, f"{value:.3f}"] for name, value in one.figures["materials"].items()],
     ),
 }
-"""What can be listed of scenes and scans, by the name of its kind; `ml.catalogue` has the rest."""
+"""Kinds of scenes and scans that can be listed, by name; `ml.catalogue` has the rest."""

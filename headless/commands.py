@@ -43,7 +43,7 @@ except ModuleNotFoundError as error:  # Blender itself has none of the packages 
     raise SystemExit(2) from None
 
 Outcome = tuple[int, dict[str, Any], str | Iterator[str]]
-"""What a sub-command returns: exit code, result as JSON data, result as text or lines of it."""
+"""Outcome of a sub-command: exit code, result as JSON data, result as text or lines of it."""
 
 SHORT_OPTIONS = {
     "--count": "-n",

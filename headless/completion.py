@@ -1,4 +1,4 @@
-"""What a shell completes after `synthroads`: commands, options, names and files, as a script for the shell.
+"""Completion of the shell after `synthroads`: commands, options, names and files, as a script for the shell.
 
 The scripts are made by `shtab` from the parsers: a shell that has read one asks no program at each press of the key.
 """

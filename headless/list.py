@@ -41,7 +41,7 @@ _OWNERS: dict[str, Callable[[], Any]] = {
     "segmentation": _learned("segmentation"),
     "centerline": _learned("centerline"),
 }
-"""What has fields that ``--set`` takes, and its class: of `train` and `experiment` the task's."""
+"""Things that have fields which ``--set`` takes, with their classes: of `train` and `experiment` the task's."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

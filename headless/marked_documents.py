@@ -12,7 +12,7 @@ BEGIN, END = "<!-- table: {} -->", "<!-- end of table -->"
 
 
 FIELD = "--document"
-"""What the commands call the document."""
+"""Option by which the commands name the document."""
 
 
 def replaced(document: str, tables: Mapping[str, str]) -> str:

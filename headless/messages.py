@@ -1,4 +1,4 @@
-"""What a command says on standard error while it works: messages, progress, and details with ``--verbose``.
+"""Messages of a command on standard error while it works: progress, and details with ``--verbose``.
 
 All of it goes through one logger: errors and failures are always shown, notes and progress unless ``--quiet`` is given,
 details with ``--verbose`` only. Standard output is left to results.
@@ -27,10 +27,10 @@ INTERVAL = 10.0
 PATIENCE = 2.0
 """Seconds until the first of these lines."""
 _PACKAGES = ("bpy", "numpy", "embreex", "laspy", "lazrs", "pydantic", "torch", "scipy")
-"""What results and their speed depend on."""
+"""Packages that results and their speed depend on."""
 
 _endings: list[Callable[[], None]] = []
-"""What ends the progress that is shown: the bar, and the stage that is timed."""
+"""Functions that end the progress which is shown: the bar, and the stage that is timed."""
 
 
 @contextmanager

@@ -31,7 +31,7 @@ _ROW = "--row"
 _ROWS = "rows"
 """Folder, within the output's, of what is measured already."""
 _TABLE = "tradeoff {}"
-"""What a scene's table is called in the document."""
+"""Name of a scene's table in the document."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

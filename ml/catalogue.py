@@ -1,4 +1,4 @@
-"""What of learning comes under a name, with its key figures; read without PyTorch."""
+"""Catalogue of learning, with key figures; read without PyTorch."""
 
 from __future__ import annotations
 
@@ -94,4 +94,4 @@ KINDS = {
         figures("field", "classes"),
     ),
 }
-"""What can be listed of learning, by the name of its kind."""
+"""Kinds of learning that can be listed, by name."""

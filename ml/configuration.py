@@ -44,7 +44,7 @@ class Schedule(Part):
 
 
 class Configuration(Part):
-    """What the configurations of all tasks have in common."""
+    """Base of the configurations of all tasks."""
 
     task: str = Field(description="What is learned: centerline or segmentation.")
     title: str = Field("", description="Title for people.")

@@ -18,9 +18,9 @@ from synthroads_addon.cloud.points import PointBlock
 Float = NDArray[np.float64]
 
 GROUND_CLASSES = ("ground", "road", "road_marking", "roadside", "road_surface")
-"""What a road and the ground beside it are called, in the project's own schemes and in LAS's codes (ASPRS)."""
+"""Names of a road and the ground beside it, in the project's own schemes and in LAS's codes (ASPRS)."""
 UNSORTED_CLASSES = ("never_classified", "unclassified")
-"""What points are called that nobody has sorted."""
+"""Names of points that nobody has sorted."""
 ROAD_CLASSES = ("road", "road_marking", "road_surface")
 SIXTEEN_BITS = 65535.0
 _EIGHT_BITS = 255.0

@@ -1,4 +1,4 @@
-"""What each learning task offers to the commands."""
+"""Learning tasks, as the commands see them."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ TASKS = {"centerline": "ml.centerline.task", "segmentation": "ml.segmentation.ta
 
 @dataclass(frozen=True)
 class Evaluation:
-    """What a trained run is measured on.
+    """Data that a trained run is measured on.
 
     Attributes:
         data: folders of data sets, or cloud files with what they need beside them.
@@ -35,7 +35,7 @@ class Evaluation:
 
 @dataclass(frozen=True)
 class Prediction:
-    """What a trained run is used on.
+    """Cloud that a trained run is used on.
 
     Attributes:
         cloud: file to be read.

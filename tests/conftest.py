@@ -1,4 +1,4 @@
-"""What all tests share: a Blender that is nobody's own, an empty scene for each test, and a way out without a crash."""
+"""Set-up of all tests: a Blender that is nobody's own, an empty scene for each test, and a way out without a crash."""
 
 from __future__ import annotations
 

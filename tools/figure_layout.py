@@ -36,7 +36,7 @@ LINE, LETTER = 0.165, 0.0725
 
 @dataclass(frozen=True)
 class Rules:
-    """What the contracts say of packages.
+    """Packages as the contracts name them.
 
     Attributes:
         floors: of the add-on from top to bottom, each the packages side by side on it.

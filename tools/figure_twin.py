@@ -43,7 +43,7 @@ COLOURS = {
     "bridge": "#d99058",
 }
 SPAN = 45.0
-"""What is drawn reaches this far (m) across the road to either side of the middle of the picture."""
+"""Distance (m) across the road to either side of the middle of the picture that is drawn."""
 
 
 def surfaces(data: dict[str, Any]) -> Iterator[tuple[str, Float]]:

@@ -129,7 +129,7 @@ READERS = {
     "packed": packed,
     "forecast": forecast,
 }
-"""What makes a table out of a folder or file; the names are those of the options and of the tables."""
+"""Functions that make a table out of a folder or file; the names are those of the options and of the tables."""
 
 
 def expected(arguments: argparse.Namespace) -> list[str]:

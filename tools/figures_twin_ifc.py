@@ -52,7 +52,7 @@ _ALIKE = {"IfcBeam": "IfcColumn", "IfcLightFixture": "IfcColumn", "IfcAudioVisua
 _LIGHT = np.array([0.3, -0.35, 0.89])
 _NEAR = 1.0
 _BIAS = {"IfcGeographicElement": 12.0, "IfcEarthworksFill": 6.0, "IfcCourse": 6.0, "IfcSurfaceFeature": -2.0}
-"""What lies flat is drawn before what stands on it: class -> distance (m) that it is moved back by in the order."""
+"""Flat things are drawn before what stands on them: class -> distance (m) that it is moved back by in the order."""
 
 
 def main(folder: Path) -> None:

@@ -25,7 +25,7 @@ from .neighbours import Neighbourhood, Neighbours
 
 @dataclass(frozen=True)
 class Architecture:
-    """What a network is made of.
+    """Architecture of a network.
 
     Attributes:
         in_channels: features of a point.

@@ -42,7 +42,7 @@ BLOCK = 500_000
 TILE = 48.0
 """Edge of the tiles, m."""
 MARGIN = 6.0
-"""What a tile sees of the tiles around it, m: at least that of the pieces within."""
+"""Width that a tile sees of the tiles around it, m: at least that of the pieces within."""
 _RECORD = np.dtype([("place", "<f4", 3), ("rgb", "<u2", 3), ("intensity", "<u2"), ("index", "<i8")])
 
 _COPC = "copc"
@@ -51,7 +51,7 @@ _COPC = "copc"
 
 @dataclass(frozen=True)
 class Labelling:
-    """What labels points.
+    """Predictor that labels points.
 
     Attributes:
         classifier: scores of a batch.

@@ -36,7 +36,7 @@ class Network(Part):
 
 
 class Adaptation(Part):
-    """What brings domains nearer to each other."""
+    """Adaptation that brings domains nearer to each other."""
 
     adabn: bool = Field(False, description="Before a test, take the norms' statistics from its points (no labels).")
     adabn_crops: int = quantity(40, ge=1, le=100_000, unit="1", description="Crops that they are taken from.")

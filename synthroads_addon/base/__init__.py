@@ -1,1 +1,1 @@
-"""What every other part stands on: errors, schemas, files, classes, random streams."""
+"""Foundations that every other part stands on: errors, schemas, files, classes, random streams."""

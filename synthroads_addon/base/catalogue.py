@@ -1,4 +1,4 @@
-"""What comes under a name, kind by kind: shipped things and files of one's own, with their key figures."""
+"""Catalogue of things that have a name, kind by kind: shipped ones and files of one's own, with their key figures."""
 
 from __future__ import annotations
 

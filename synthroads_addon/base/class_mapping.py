@@ -12,7 +12,7 @@ from .errors import nearest_name
 from .schema import Model
 
 KINDS = ("objects", "materials", "collections")
-"""What can be named, the stronger first."""
+"""Kinds of things that can be named, the stronger first."""
 
 
 class ClassMapping(Model):

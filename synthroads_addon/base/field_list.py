@@ -15,7 +15,7 @@ from pydantic import BaseModel
 from .schema import LARGEST
 
 Rule = Mapping[str, Any]
-"""What JSON Schema says of a field."""
+"""JSON Schema of a field."""
 _LIMITS = {"minimum": "from", "exclusiveMinimum": "above", "maximum": "to", "exclusiveMaximum": "below"}
 _TYPES = {"integer": "whole number", "number": "number", "string": "text"}
 

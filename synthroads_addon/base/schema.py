@@ -1,4 +1,4 @@
-"""What every JSON file of the project has in common: strict models, one-line errors, byte-stable writing.
+"""Base of all JSON files of the project: strict models, one-line errors, byte-stable writing.
 
 The models are pydantic's, because it names field, value and limit of every fault, makes the JSON Schema from the same
 declarations, and its limits, units and descriptions can be read back by the panel. All numbers must be finite.

@@ -38,7 +38,7 @@ _SHORT = 0.005
 
 
 class _State(Enum):
-    """What a work does: it waits for its turn, has it, computes what needs none, or has ended."""
+    """State of a work: it waits for its turn, has it, computes without it, or has ended."""
 
     WAITING = 0
     WORKING = 1

@@ -1,4 +1,4 @@
-"""What a text that somebody typed for a field stands for, by the type that the field is declared with."""
+"""Values of texts that somebody typed for a field, by the type that the field is declared with."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""What is done in Blender: model, scenes, casters, cameras, views. Beside `ui` the only part that uses its modules."""
+"""Work done in Blender: model, scenes, casters, cameras, views. Beside `ui` the only part that uses its modules."""

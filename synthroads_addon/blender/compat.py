@@ -1,4 +1,4 @@
-"""What differs between Blender 4.5 LTS and 5.2 LTS, and nothing else."""
+"""Differences between Blender 4.5 LTS and 5.2 LTS, and nothing else."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What objects, ours or a user's, say about themselves: class, instance number, velocity."""
+"""Labels of objects, ours or a user's: class, instance number, velocity."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ VELOCITY_PROPERTY = "synthroads_velocity"
 
 @dataclass(frozen=True)
 class Label:
-    """What an object's faces are if they don't say so themselves.
+    """Label of an object's faces where these have none of their own.
 
     Attributes:
         own: class that the object has, stronger than its materials'; -1 for none.

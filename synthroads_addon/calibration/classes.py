@@ -24,7 +24,7 @@ FEWEST = 200
 
 @dataclass(frozen=True)
 class RealCloud:
-    """What of a cloud the calibration needs; (N,) arrays.
+    """Points of a cloud as the calibration needs them; (N,) arrays.
 
     Attributes:
         xyz: (N, 3) map coordinates, m.

@@ -1,4 +1,4 @@
-"""What intensities a material is expected to give, seen at given incidence angles and ranges.
+"""Intensities that a material is expected to give, seen at given incidence angles and ranges.
 
 Everything that a scan does to a point's intensity is done here by the scanner's own functions: the surface
 (`materials.surfaces.brightness_of`), its variation (`materials.texture_spread`), the footprint's rays
@@ -49,7 +49,7 @@ class Views:
 
 @dataclass(frozen=True)
 class Receiver:
-    """What a device makes of the light that comes back.
+    """Response of a device to the light that comes back.
 
     Attributes:
         divergence: full angles of the beam at 1/e^2, rad.

@@ -38,7 +38,7 @@ _FEWEST_PAIRS = 50
 
 @dataclass(frozen=True)
 class Fit:
-    """What fits a class.
+    """Fitted material of a class.
 
     Attributes:
         level: factor on the material's linear intensities: the device's gain times the change of the brightness.

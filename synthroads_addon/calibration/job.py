@@ -60,7 +60,7 @@ class Wanted:
 
 @dataclass(frozen=True)
 class CalibrationJob:
-    """What is to be compared, and how it was seen.
+    """Request for a calibration: what is to be compared, and how it was seen.
 
     Attributes:
         wanted: materials with their classes; a strip's is compared after the one that lies beside it.

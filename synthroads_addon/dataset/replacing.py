@@ -18,7 +18,7 @@ from .manifest import MANIFEST, PUBLISHED, Manifest, SceneEntry, read_manifest, 
 REPLACED = ".replaced.json"
 """The paths that are to be removed, as long as they aren't."""
 _DESCRIPTIONS = {"pointcept": "classes.json", "semantickitti": "synthroads.yaml"}
-"""What stands in the root of a layout beside its scenes."""
+"""Description that lies in the root of a layout beside its scenes."""
 
 
 def made_by(folder: Path, manifest: Manifest) -> list[str]:

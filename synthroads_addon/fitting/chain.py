@@ -1,4 +1,4 @@
-"""What a measured axis is fitted with: a chain of linear functions of the station, and its least-squares refinement.
+"""Model fitted to a measured axis: a chain of linear functions of the station, and its least-squares refinement.
 
 In plan the chain is the curvature (integrated twice it is the position), in height the grade (integrated once it is
 the elevation). An element is FREE (a clothoid; a parabola), EQUAL (its value is constant: an arc; a constant grade) or

@@ -60,7 +60,7 @@ Condition = tuple[Edit, FloatArray, FloatArray]
 
 @dataclass(frozen=True)
 class Goal:
-    """What the search is after.
+    """Goal of the search.
 
     Attributes:
         rms, p95: bounds of the residuals, m.

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 @dataclass
 class Job:
-    """What `generate` is asked for.
+    """Request to `generate`.
 
     Attributes:
         scenario: limits, scan, fidelity and outputs.

@@ -40,13 +40,13 @@ if TYPE_CHECKING:
     from ..blender.scene.foreign import UpAxis
 
 OUTPUTS: tuple[Output, ...] = ("cloud", "previews")
-"""What a scan of a scene writes beside ``report.json``, as far as the scenario asks for it."""
+"""Files that a scan of a scene writes beside ``report.json``, as far as the scenario asks for them."""
 _BORDER = 2.0  # m, of the previews
 
 
 @dataclass(frozen=True)
 class SceneScan:
-    """What `scan_scene` is asked for.
+    """Request to `scan_scene`.
 
     Attributes:
         scenario: scan, fidelity and seed; its road is not looked at.
@@ -77,7 +77,7 @@ class SceneScan:
 
 @dataclass(frozen=True)
 class _Read:
-    """What was read of a scene."""
+    """Scene as it was read."""
 
     scene: ScannedScene
     road: RoadParameters | None

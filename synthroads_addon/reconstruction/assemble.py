@@ -1,4 +1,4 @@
-"""What was measured, as a parameter set: the same kind that is sampled or written by hand."""
+"""Measurements as a parameter set: the same kind that is sampled or written by hand."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ _ROUND = 4  # digits of lengths: a tenth of a millimetre
 
 @dataclass(frozen=True)
 class Ground:
-    """What lies beside the road: reach, mean height of the centreline above it, its spread, the verge's width (m)."""
+    """Ground beside the road: reach, mean height of the centreline above it, its spread, the verge's width (m)."""
 
     half_width: float
     embankment_height: float

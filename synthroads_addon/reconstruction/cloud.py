@@ -25,7 +25,7 @@ _UNSORTED_SHARE = 0.5  # of the points without any class: the cloud has to be so
 
 
 class Kind(IntEnum):
-    """What a point is, as far as the reconstruction asks."""
+    """Class of a point, as far as the reconstruction asks."""
 
     OTHER = 0
     UNSORTED = 1
@@ -41,9 +41,9 @@ class Kind(IntEnum):
 
 
 SURFACE = (Kind.GROUND, Kind.VERGE, Kind.PAVEMENT, Kind.MARKING)
-"""What lies flat."""
+"""Classes that lie flat."""
 STANDING = (Kind.GUARDRAIL, Kind.BARRIER, Kind.NOISE_BARRIER, Kind.POST, Kind.FURNITURE)
-"""What stands on the road or beside it, and is looked for."""
+"""Classes that stand on the road or beside it, and are looked for."""
 
 KIND_OF_CLASS = {
     "ground": Kind.GROUND,

@@ -74,7 +74,7 @@ class Band:
 
 @dataclass(frozen=True)
 class Layout:
-    """What kind of road it is.
+    """Layout of a road: kind and number of its carriageways and lanes.
 
     Attributes:
         kind: dual carriageway, or a single one.

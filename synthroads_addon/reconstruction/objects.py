@@ -1,4 +1,4 @@
-"""What stands along the road: barriers as linear clusters, delineators as small ones. Their classes say what; if the
+"""Objects along the road: barriers as linear clusters, delineators as small ones. Their classes say what; if the
 class only says that something stands there, its shape does."""
 
 from __future__ import annotations

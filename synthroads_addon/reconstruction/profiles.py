@@ -49,7 +49,7 @@ class SurfacePoints:
 
 @dataclass(frozen=True)
 class Profiles:
-    """What is known of S metres along and U bins across a path. Bins without points hold NaN.
+    """Profiles of S metres along and U bins across a path. Bins without points hold NaN.
 
     Attributes:
         path: what they are measured along.

@@ -39,7 +39,7 @@ _SIDES: tuple[Side, ...] = ("right", "left")
 
 @dataclass(frozen=True)
 class Options:
-    """What can be asked for.
+    """Settings of a reconstruction.
 
     Attributes:
         road: dual or single carriageway, where it is known.

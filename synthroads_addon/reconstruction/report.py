@@ -1,4 +1,4 @@
-"""What `reconstruction.json` says: where the cloud is from the reconstructed road, and how sure each number is."""
+"""Content of `reconstruction.json`: where the cloud is from the reconstructed road, and how sure each number is."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What lies and stands beside the pavement, in the road's frame: ground, verge, and points above them."""
+"""Surroundings of the pavement, in the road's frame: ground, verge, and points above them."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""What a road is, exactly: parameter set, analytic geometry, guidelines. Nothing here is random."""
+"""The road, exactly: parameter set, analytic geometry, guidelines. Nothing here is random."""

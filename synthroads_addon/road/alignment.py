@@ -74,7 +74,7 @@ class Element:
 
     @property
     def kind(self) -> Kind:
-        """What the element is, told by angles (`FLAT_CLOTHOID`, `FLAT_ARC`), so that it doesn't depend on scale.
+        """Kind of the element, told by angles (`FLAT_CLOTHOID`, `FLAT_ARC`), so that it doesn't depend on scale.
 
         What is no clothoid is well represented by `mean_curvature`, which is not zero where the kind is "arc".
         """

@@ -1,4 +1,4 @@
-"""What the objects of a parameter set have in common: instance number, place along the road, width by station."""
+"""Base of the objects of a parameter set: instance number, place along the road, width by station."""
 
 from __future__ import annotations
 

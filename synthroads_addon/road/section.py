@@ -54,7 +54,7 @@ class Pothole(Model):
 
 
 class Pavement(Model):
-    """What a carriageway is paved with, and its damage, which is exact geometry."""
+    """Pavement of a carriageway, and its damage, which is exact geometry."""
 
     kind: Literal["asphalt", "concrete"] = Field("asphalt", description="Surface course.")
     slab_length: float = quantity(5.0, ge=2, le=20, unit="m", description="Distance of a concrete pavement's joints.")
@@ -176,7 +176,7 @@ class Turnout(RoadObject):
 
 
 class Marking(Model):
-    """What every marking has: its colour and the thickness of its film."""
+    """Base of all markings: colour and the thickness of the film."""
 
     color: Literal["white", "yellow"] = Field("white", description="Yellow is temporary and overrides white (RMS).")
     film_thickness: float = quantity(

@@ -20,7 +20,7 @@ from .parameters import LineMarking, LineObject, PointObject, RoadParameters, Te
 LONGEST = 500.0
 """Length of a stretch unless something else is asked for, m."""
 BEYOND = 1000.0
-"""What runs along the road is cut so far (m) outside of a stretch, so that no terminal is made up inside of it."""
+"""Distance outside of a stretch at which things along the road are cut, so that no terminal is made up inside, m."""
 FRAME = 1000.0
 """Places and stations of frames are whole multiples of this, m. Within the stretch and its frame float32 numbers are
 then rounded by less than 0.1 mm, wherever it lies; stretches of one kilometre share a frame."""

@@ -1,4 +1,4 @@
-"""What surrounds the road: terrain, vegetation, vehicles; and the light, weather and materials of the scene."""
+"""Surroundings of the road: terrain, vegetation, vehicles; and the light, weather and materials of the scene."""
 
 from __future__ import annotations
 

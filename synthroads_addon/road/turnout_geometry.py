@@ -13,7 +13,7 @@ from .section import Carriageway, Ramp, Turnout
 Float = NDArray[np.float64]
 
 STEP = 0.05
-"""What changes at once (pavement at the nose and at a ramp's end) does so over this length, m.
+"""Length over which sudden changes happen (pavement at the nose and at a ramp's end), m.
 
 Long enough that coordinates of 32 bits don't turn the faces over: they lie skew, some metres to one side."""
 NOSE_WIDTH = 1.0

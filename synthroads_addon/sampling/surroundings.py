@@ -1,4 +1,4 @@
-"""What surrounds a sampled road: ground, plants, traffic, light and weather, materials. Nothing drawn is rejected."""
+"""Surroundings of a sampled road: ground, plants, traffic, light and weather, materials. Nothing drawn is rejected."""
 
 from __future__ import annotations
 

@@ -48,7 +48,7 @@ _INTERCHANGE_EVERY, _BAY_EVERY = 3000.0, 1000.0  # a long road may have another 
 
 @dataclass(frozen=True)
 class Feature:
-    """What one kind of turnout, or a lane change, needs along a carriageway.
+    """Room that one kind of turnout, or a lane change, needs along a carriageway.
 
     Attributes:
         kind: what it is.

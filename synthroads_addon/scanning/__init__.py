@@ -1,1 +1,1 @@
-"""What a scanner does: pulses, returns, radiometry, noise, weather."""
+"""The scanner: pulses, returns, radiometry, noise, weather."""

@@ -1,4 +1,4 @@
-"""What an effect is: something between tracing and returns, such as drops in the air, that changes a pulse's echoes."""
+"""Effects between tracing and returns, such as drops in the air, that change a pulse's echoes."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ Index = NDArray[np.intp]
 
 @dataclass(frozen=True)
 class PulseHits:
-    """What the K rays of each of P pulses meet, before returns are formed of it.
+    """Hits of the K rays of each of P pulses, before returns are formed of them.
 
     Brightness is the share of the pulse's energy that a surface sends back: 1 for an ideal white target that all of
     the beam strikes at a right angle. What it makes of the intensity, by range and weather, isn't in it.
@@ -58,7 +58,7 @@ def _no_float() -> Float:
 
 @dataclass(frozen=True)
 class EchoChanges:
-    """What an effect does to the pulses of a block.
+    """Changes that an effect makes to the pulses of a block.
 
     Attributes:
         pulse, ray: (N,) pulse and ray of each echo that is added, as indices into `PulseHits.distance`.

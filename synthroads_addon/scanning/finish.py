@@ -1,4 +1,4 @@
-"""What is done to a block's points after the scan: colours and layers, intensities from these, micro-relief."""
+"""Finish of a block's points after the scan: colours and layers, intensities from these, micro-relief."""
 
 from __future__ import annotations
 

@@ -36,7 +36,7 @@ class Echoes:
 
 @dataclass(frozen=True)
 class Marks:
-    """What hits add to returns; all arrays have one shape.
+    """Contributions of hits to returns; all arrays have one shape.
 
     Attributes:
         distance: m; inf where nothing is hit.

@@ -24,7 +24,7 @@ from .platforms.path import Strip
 Float = NDArray[np.float64]
 
 BORDER = 25.0
-"""What is built beyond the reach of a section's rays (m), so that where the model is cut lies beyond it as well."""
+"""Length built beyond the reach of a section's rays (m), so that where the model is cut lies beyond it as well."""
 
 _PLACES = 8
 """Blocks of a section at whose beginning, middle and end its rays are looked at, for each strip."""
@@ -37,7 +37,7 @@ _TALLEST = 30.0
 _BRIDGE_SIDE = 160.0
 """Offset to which an overpass's approaches reach, m."""
 _UNEVEN = 5.0
-"""What the ground between the places that are looked at may lie beside them, m."""
+"""Largest deviation of the ground between the places that are looked at, m."""
 
 
 @dataclass(frozen=True)

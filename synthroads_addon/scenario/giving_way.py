@@ -1,4 +1,4 @@
-"""What a scenario says itself and what gives way to changes: a new device can't keep the pulse rate of the old one."""
+"""Settings of a scenario that give way to changes: a new device can't keep the pulse rate of the old one."""
 
 from __future__ import annotations
 

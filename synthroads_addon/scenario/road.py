@@ -87,7 +87,7 @@ class TurnoutLimits(ClosedModel):
 
 
 class PavementLimits(ClosedModel):
-    """What the carriageways are paved with, and their damage."""
+    """Pavement of the carriageways, and its damage."""
 
     concrete: float = share(0.2, "Probability of a concrete pavement.")
     rutted: float = share(0.3, "Probability that a carriageway's outer lane is rutted.")

@@ -113,7 +113,7 @@ class Scenario(ClosedModel):
 
 @dataclass(frozen=True)
 class Settings:
-    """What trades speed for accuracy.
+    """Settings that trade speed for accuracy.
 
     Attributes:
         tolerance: largest chord error of the model's road surface, m.

@@ -1,4 +1,4 @@
-"""What a format without classes of its own for roads keeps of an object: its parameters, as attributes."""
+"""Attributes that keep an object's parameters in a format without classes of its own for roads."""
 
 from __future__ import annotations
 

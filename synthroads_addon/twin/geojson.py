@@ -53,7 +53,7 @@ def write_geojson(parameters: RoadParameters, path: Path, tolerance: float) -> N
 
 
 class _Writer:
-    """What the features of one road are made from."""
+    """Writer of the features of one road."""
 
     def __init__(self, geometry: RoadGeometry, stations: Float, tolerance: float) -> None:
         self.geometry = geometry

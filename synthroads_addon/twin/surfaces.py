@@ -1,4 +1,4 @@
-"""What lies on the road as polygons on its analytic surface: markings, potholes; and where lines need their points."""
+"""Surfaces on the road as polygons on its analytic surface: markings, potholes; and where lines need their points."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a command prints besides its result: with and without `--quiet` and `--verbose`, in a terminal and elsewhere."""
+"""Messages of a command besides its result: with and without `--quiet` and `--verbose`, in a terminal and elsewhere."""
 
 from __future__ import annotations
 

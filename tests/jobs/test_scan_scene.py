@@ -422,7 +422,7 @@ def test_output_is_not_replaced_unasked(
 
 
 AS_BLENDER = "import runpy, sys; sys.argv[0] = 'blender'; runpy.run_path('headless/scan.py', run_name='__main__')"
-"""What ``blender -b -P headless/scan.py -- ...`` comes down to."""
+"""Runs the equivalent of ``blender -b -P headless/scan.py -- ...``."""
 
 
 @pytest.mark.parametrize("words", [["-m", "headless.scan"], ["-c", AS_BLENDER, "-b", "-P", "headless/scan.py", "--"]])

@@ -23,7 +23,7 @@ _SHOWN = 5
 
 @dataclass(frozen=True)
 class Verdict:
-    """What a judge said.
+    """Verdict of a judge.
 
     Attributes:
         name, manager, install, judges: as in `Judge`.

@@ -1,4 +1,4 @@
-"""What learns: scores judged by scikit-learn, the network by its authors' openpoints."""
+"""Judges of learning: scores judged by scikit-learn, the network by its authors' openpoints."""
 
 from __future__ import annotations
 

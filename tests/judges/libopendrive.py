@@ -16,7 +16,7 @@ SOURCE = "../shared/readers"
 """Where its source is looked for, from the repository's folder, with what builds it and prints a surface."""
 _FOLDER = bringing.BUILD / "libopendrive"
 _NO_SHAPE = "Lateral Profile Shape not supported"
-"""What it says of every file with a lateral shape: its surface is level across but for lanes with a height."""
+"""Message for every file with a lateral shape: its surface is level across but for lanes with a height."""
 _MILLIMETRE = 1e-3
 
 

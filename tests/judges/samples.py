@@ -40,7 +40,7 @@ class Samples:
 
     @cached_property
     def points(self) -> PointBlock:
-        """What the clouds hold."""
+        """Content of the clouds."""
         from tests.helpers.clouds.random_points import make_points
 
         return make_points(5_000)

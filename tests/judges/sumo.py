@@ -40,7 +40,7 @@ _CAR = 4.0
 
 @dataclass(frozen=True)
 class Net:
-    """What netconvert made of a file.
+    """Network that netconvert made of a file.
 
     Attributes:
         path: the network.

@@ -30,7 +30,7 @@ def returned(material: Material, degrees: float) -> float:
 
 
 def test_no_surface_gives_back_more_than_it_gets() -> None:
-    """What goes through and what is scattered share the light; retro-reflection only gathers it in one direction."""
+    """Transmitted and scattered light share the light; retro-reflection only gathers it in one direction."""
     for name, material in materials().items():
         taken = 1.0 - material.transmission
         assert taken * material.reflectivity + material.transmission < 1.0, name

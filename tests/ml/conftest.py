@@ -1,4 +1,4 @@
-"""What tests of trainings share: curves that aren't drawn, as drawing takes longer than a toy's training."""
+"""Set-up of tests of trainings: curves that aren't drawn, as drawing takes longer than a toy's training."""
 
 from __future__ import annotations
 

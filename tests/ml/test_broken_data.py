@@ -1,4 +1,4 @@
-"""What is learned from and used on, cut or flipped: taken or refused in one line, by every reader of its own."""
+"""Data for learning and use, cut or flipped: taken or refused in one line, by every reader of its own."""
 
 from __future__ import annotations
 

@@ -69,7 +69,7 @@ def test_mappings_of_classes(body: Any, count: int) -> None:
 
 @cases(10, 500)
 def test_folders_of_runs(tmp_path: Path, count: int) -> None:
-    """What lies where a run's files should: opened and resumed, or refused."""
+    """Damaged files of a run: opened and resumed, or refused."""
     known = kinds()
     sound = load_configuration("segmentation-small", known)
     (tmp_path / CHECKPOINT).write_bytes(b"no checkpoint")

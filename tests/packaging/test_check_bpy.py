@@ -1,4 +1,4 @@
-"""What is said where Blender's Python package doesn't load."""
+"""Messages where Blender's Python package doesn't load."""
 
 from __future__ import annotations
 

@@ -25,7 +25,7 @@ function_name=$(complete -p synthroads | sed 's/.*-F \([^ ]*\).*/\1/')
 "$function_name" synthroads "${COMP_WORDS[COMP_CWORD]}" "${COMP_WORDS[COMP_CWORD-1]}"
 printf '%s\n' "${COMPREPLY[@]}"
 """
-"""What bash does when the key is pressed: sets these variables, calls the function, offers what it leaves."""
+"""Imitation of bash when the key is pressed: sets these variables, calls the function, offers what it leaves."""
 FILES = ("mine.json", "scene.glb", "recipe.yaml", "clouds")
 CASES = {
     "gen": {"generate"},
@@ -50,12 +50,12 @@ CASES = {
     "parameters --cross-section RQ4": {"RQ43.5"},
     "--print-completion ": {"bash", "fish", "zsh"},
 }
-"""What is typed after `synthroads`, and what is offered: all of it, but for an option's bare dash."""
+"""Words typed after `synthroads`, and what is offered: all of it, but for an option's bare dash."""
 
 
 ENDS = {"gen": "erate", "generate --fi": "delity", "generate -f d": "raft", "generate --scenario min": "e.json"}
 ENDS |= {"generate -o cl": "ouds", "dataset ref": "erence", "scan x -d velodyne-v": "lp-16", "cloud conv": "ert"}
-"""What is typed, and what is put behind it as it alone fits."""
+"""Beginnings that are typed, and what is put behind them as it alone fits."""
 
 
 def script(shell: str, folder: Path, capsys: pytest.CaptureFixture[str]) -> Path:

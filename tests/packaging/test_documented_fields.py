@@ -1,4 +1,4 @@
-"""What the documentation says of objects, limits and conditions is what the code has."""
+"""Objects, limits and conditions in the documentation are those of the code."""
 
 from __future__ import annotations
 

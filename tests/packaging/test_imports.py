@@ -1,4 +1,4 @@
-"""What imports what beyond the contracts of `make lint`: the add-on has any name, and needs Blender late."""
+"""Imports beyond the contracts of `make lint`: the add-on has any name, and needs Blender late."""
 
 from __future__ import annotations
 

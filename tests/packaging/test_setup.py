@@ -1,4 +1,4 @@
-"""What `make` and nox do: finding a Python, saying what is missing, failing where nothing was tested."""
+"""Work of `make` and nox: finding a Python, saying what is missing, failing where nothing was tested."""
 
 from __future__ import annotations
 

@@ -171,7 +171,7 @@ def test_only_what_a_road_needs_is_read(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("cell", [1.0, 5.0, 50.0])
 def test_every_height_within_reach_has_its_cells(tmp_path: Path, cell: float) -> None:
-    """What `Corridor.points` looks at are all cells that a height within the reach is interpolated from."""
+    """`Corridor.points` looks at all cells that a height within the reach is interpolated from."""
     elements = [Element(120.0, 0.0, 1 / 300), Element(200.0, 1 / 300, 1 / 300), Element(150.0, 1 / 300, -1 / 280)]
     alignment = Alignment(elements, heading=0.7)
     side = int(1200 / cell)

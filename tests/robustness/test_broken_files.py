@@ -28,7 +28,7 @@ from tests.road.test_elevation_model import EPSG, ascii_grid, centres, corridor,
 ORIGIN = np.array([294_000.0, 5_628_000.0, 180.0])
 SHORT = [token for token in TOKENS if len(token) < 100]
 PEAK_MB = 400
-"""What reading a file of a few hundred kilobytes may take at most."""
+"""Largest time of reading a file of a few hundred kilobytes."""
 
 
 def cloud(path: Path, count: int = 3000) -> Path:

@@ -97,7 +97,7 @@ def test_commands(tmp_path: Path, count: int) -> None:
 
 
 def test_names_of_files_that_are_no_text(tmp_path: Path) -> None:
-    """What the file system holds needn't be UTF-8; it is shown escaped."""
+    """Names in the file system needn't be UTF-8; they are shown escaped."""
     road = tmp_path / "road.json"
     road.write_text(json.dumps(ROAD))
     folder = str(tmp_path / "out-\udcff")

@@ -119,7 +119,7 @@ def test_scenarios(put: Put, count: int) -> None:
 
 @cases(10, 1000)
 def test_roads_sampled_from_scenarios(count: int) -> None:
-    """What passes the checks is sampled, or refused because limits contradict each other."""
+    """Limits that pass the checks are sampled, or refused because they contradict each other."""
     documents = [
         {"length": 150.0, **scenario.get("road", {}), "elevation_model": None} for scenario in every("scenarios/*.json")
     ]

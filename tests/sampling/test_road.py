@@ -136,7 +136,7 @@ def test_the_share_of_trucks_varies_between_its_limits() -> None:
 
 
 class Census:
-    """What many roads have in common."""
+    """Statistics of many roads."""
 
     def __init__(self) -> None:
         self.roads = 0

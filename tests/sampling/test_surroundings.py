@@ -1,4 +1,4 @@
-"""What surrounds a sampled road: all within its limits, covering them, and nothing in each other's way."""
+"""Surroundings of a sampled road: all within its limits, covering them, and nothing in each other's way."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is done to points after the scan: intensities from layers meet the detector as any others do."""
+"""Finish of points after the scan: intensities from layers meet the detector as any others do."""
 
 from __future__ import annotations
 

@@ -40,7 +40,7 @@ class MeasuredRoad(Part):
 
 
 class DataOptions(Part):
-    """What is learned from. Paths count from the working folder."""
+    """Training data. Paths count from the working folder."""
 
     data_sets: tuple[str, ...] = Field((), description="Folders that `synthroads dataset` made.")
     train_split: str = Field("train", description="Split of the data sets that weights are learned from.")

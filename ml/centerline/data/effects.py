@@ -50,7 +50,7 @@ class Crop(Part):
 
 
 class Effects(Part):
-    """What is done to a sequence while training. Strengths are the largest; each sample draws its own below them."""
+    """Effects on a sequence while training. Strengths are the largest; each sample draws its own below them."""
 
     mirror: float = quantity(0.5, ge=0, le=1, unit="1", description="Probability of left and right being swapped.")
     turn_round: float = quantity(0.5, ge=0, le=1, unit="1", description="Probability of running against the path.")

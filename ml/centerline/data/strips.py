@@ -34,7 +34,7 @@ _STORED = np.dtype([("xyz", "<f8", 3), ("intensity", "<f4"), ("rgb", "<u2", 3), 
 
 @dataclass(frozen=True)
 class Ground:
-    """What a first reading of a cloud found.
+    """Findings of a first reading of a cloud.
 
     Attributes:
         header: of the cloud.

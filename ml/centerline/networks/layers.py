@@ -1,4 +1,4 @@
-"""What the centreline models are built from: kernel points across the road, and layers over slices x kernel points.
+"""Layers of the centreline models: kernel points across the road, and layers over slices x kernel points.
 
 A slice is a metre of road seen as a set of points. Kernel points lie on its orthogonal (x = 0) at equal spacing; a
 token is what one of them gathers from the points around it. A painted line is a tenth of that spacing wide, so where it
@@ -24,7 +24,7 @@ _FEW = 0.25
 
 @dataclass
 class Tokens:
-    """What the K kernel points of N slices gathered.
+    """Features gathered by the K kernel points of N slices.
 
     Attributes:
         features: (N, K, C).

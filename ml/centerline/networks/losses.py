@@ -1,4 +1,4 @@
-"""What the centreline models are trained with: a Gaussian likelihood of what is known, and where the lines lie."""
+"""Losses of the centreline models: a Gaussian likelihood of what is known, and where the lines lie."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ Figures = dict[str, float]
 
 
 class LossOptions(Part):
-    """What counts how much."""
+    """Weights of the losses."""
 
     beta: float = quantity(
         0.5,

@@ -46,12 +46,12 @@ from .refinement import Refinement, parabola
 Output = dict[str, Tensor]
 
 LINES = ("center", "left_edge", "right_edge")
-"""What is found by soft-argmax over the kernel points."""
+"""Targets found by soft-argmax over the kernel points."""
 TARGETS = ("center", *CORRIDOR)
 SCALE = (1.0, 1.0, 1.0, 0.5, 0.2, 0.05, 0.1)
 """Of `TARGETS`: errors of this size weigh alike; m, and what lanes and headings are measured in."""
 _MIDDLE = {"lanes": 4.0, "lane_width": 3.5, "heading": 0.0}
-"""What the scalars are without any evidence."""
+"""Values of the scalars without any evidence."""
 _NATURAL = {"lanes": 2.0, "lane_width": 0.3, "heading": 0.05}
 """Size of their deviations from it."""
 _LARGEST_LOG = 5.0
@@ -114,7 +114,7 @@ class Heads(nn.Module):
 
 
 class CenterlineModel(nn.Module):
-    """What the models share: the points' features, the fixed kernel points' tokens and the heads."""
+    """Base of the models: the points' features, the fixed kernel points' tokens and the heads."""
 
     def __init__(self, options: ModelOptions, half_width: float, slices: int) -> None:
         super().__init__()

@@ -235,7 +235,7 @@ def along_parabolas(predictor: Predictor, length: float) -> Predictor:
 
 @dataclass(frozen=True)
 class GridSearch:
-    """What was tried for the baseline, and what is best.
+    """Variants tried for the baseline, and the best.
 
     Attributes:
         best: of the settings that find at least `FOUND` of the slices, the one with the smallest mean distance.

@@ -42,7 +42,7 @@ if TYPE_CHECKING:
 Float = NDArray[np.float64]
 
 AXIS_ENDINGS = ("_axis.csv", ".geojson")
-"""What follows a cloud's name without ending in that of its axis."""
+"""Ending of the name of a cloud's axis, after the cloud's name."""
 PICTURES = 3
 """Roads that are drawn."""
 _VIEW = 200.0

@@ -45,7 +45,7 @@ _AROUND = np.ones((3, 3), dtype=bool)
 
 @dataclass(frozen=True)
 class SkeletonSettings:
-    """What a grid search chooses.
+    """Settings that a grid search chooses.
 
     Attributes:
         raster: width of a pixel, m.

@@ -27,7 +27,7 @@ Rule = Callable[[Float, Float], float]
 SEQUENCE = 10.0
 """m."""
 SPAN = 37.0
-"""What ten slices of 1 m span that are 4 m apart, m."""
+"""Length that ten slices of 1 m span which are 4 m apart, m."""
 FEWEST = 5
 STRIP = 0.25
 """m."""

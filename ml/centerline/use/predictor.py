@@ -41,7 +41,7 @@ class UseOptions(Part):
 
 @dataclass(frozen=True)
 class Regression:
-    """What was found in M frames; T are the `TARGETS`, the centre first.
+    """Predictions in M frames; T are the `TARGETS`, the centre first.
 
     Attributes:
         frames: where.

@@ -1,4 +1,4 @@
-"""What a model found along a road, as GeoJSON lines and as a table of the corridor, both in map coordinates."""
+"""Predictions along a road, as GeoJSON lines and as a table of the corridor, both in map coordinates."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ UNITS = {
 
 @dataclass(frozen=True)
 class Found:
-    """What was found in M frames of a whole road, map coordinates; T are the `TARGETS`.
+    """Predictions in M frames of a whole road, map coordinates; T are the `TARGETS`.
 
     Attributes:
         frames: where.

@@ -46,7 +46,7 @@ class Crop:
 
 
 class Effects(Part):
-    """What happens to crops. All of it off leaves them as they are; the defaults are the recipe's."""
+    """Effects on crops. All of it off leaves them as they are; the defaults are the recipe's."""
 
     rotation: bool = Field(True, description="Turn about the vertical by any angle.")
     smallest_scale: float = quantity(0.9, gt=0, le=1, unit="1", description="Smallest factor on the coordinates.")

@@ -23,14 +23,14 @@ from .metrics import Confusion
 EDGE = 24.0
 """Edge of the pieces that are predicted at a time, m: about as wide as a crop of training."""
 MARGIN = 4.0
-"""What is seen around a piece, m."""
+"""Width that is seen around a piece, m."""
 LARGEST = 100_000
 """Points of a piece, margin included; what has more is cut in four, down to `_SMALLEST_EDGE`."""
 _SMALLEST_EDGE = 1.5
 
 
 class Classifier(Protocol):
-    """What turns a batch of one item into the scores of its points."""
+    """Function that turns a batch of one item into the scores of its points."""
 
     def __call__(self, batch: Item) -> torch.Tensor: ...
 

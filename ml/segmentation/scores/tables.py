@@ -9,7 +9,7 @@ from typing import Any
 from .metrics import mean_and_deviation
 
 Scores = Mapping[str, Any]
-"""What `Confusion.to_dict` returns."""
+"""Result of `Confusion.to_dict`."""
 NOTE = "mean (standard deviation, ddof = 1) over seeds; - where undefined"
 
 

@@ -1,4 +1,4 @@
-"""What the benchmark needs of Blender: rendering beside bare rendering, and the time that an edit takes."""
+"""Measurements of the benchmark in Blender: rendering beside bare rendering, and the time that an edit takes."""
 
 from __future__ import annotations
 

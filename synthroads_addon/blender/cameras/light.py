@@ -68,7 +68,7 @@ def daylight(environment: Environment, sharp: bool) -> Iterator[Daylight]:
 
 
 class _Sky(NamedTuple):
-    """What a sky depends on: angles of the sun (degrees), and its strength."""
+    """Parameters of a sky: angles of the sun (degrees), and its strength."""
 
     elevation: float
     azimuth: float

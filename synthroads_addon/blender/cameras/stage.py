@@ -28,7 +28,7 @@ _POSITION, _DEPTH = "Position", "Depth"
 
 @dataclass(frozen=True)
 class Passes:
-    """What is rendered.
+    """Channels that are rendered.
 
     Attributes:
         layers: of the materials, see `MATERIAL_LAYERS`.

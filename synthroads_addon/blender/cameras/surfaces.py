@@ -1,4 +1,4 @@
-"""What of the materials varies over their surfaces, and the outputs (AOVs) that show it."""
+"""Material layers that vary over surfaces, and the outputs (AOVs) that show them."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What rendering needs that differs between Blender versions."""
+"""Rendering features that differ between Blender versions."""
 
 from __future__ import annotations
 

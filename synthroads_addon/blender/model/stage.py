@@ -1,4 +1,4 @@
-"""What is made while a road is being built, so that nothing of it is left when the build is given up."""
+"""Data made while a road is being built, so that nothing of it is left when the build is given up."""
 
 from __future__ import annotations
 

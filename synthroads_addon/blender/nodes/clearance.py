@@ -1,4 +1,4 @@
-"""What spans the road: how high the pavement lies below it."""
+"""Clearance of structures that span the road: how high the pavement lies below them."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What stands at one place: points on the surface, and bodies put on them."""
+"""Objects that stand at one place: points on the surface, and bodies put on them."""
 
 from __future__ import annotations
 

@@ -154,7 +154,7 @@ def _put_together(reading: _Reading, origin: Float, number_objects: bool) -> Sca
 
 @dataclass(frozen=True)
 class CopiedScene:
-    """What `scanned_scene_steps` has read.
+    """Copy of a scene that `scanned_scene_steps` has read.
 
     Attributes:
         materials: the scene's, in the order of the indices in its meshes.
@@ -182,7 +182,7 @@ def _moving(reading: _Reading, carrier: Hashable, motion: Motion, whole: Whole) 
 
 @dataclass(frozen=True)
 class _Known:
-    """What all uses of one mesh by one object have in common.
+    """Properties that all uses of one mesh by one object have in common.
 
     Attributes:
         part: key of the mesh's part.

@@ -59,7 +59,7 @@ class Places:
 
 @dataclass(frozen=True)
 class Whole:
-    """What the meshes of a scene have in common.
+    """Tables that the meshes of a scene have in common.
 
     Attributes:
         labels: of all objects.
@@ -83,7 +83,7 @@ def slot_names(item: bpy.types.Object) -> list[str]:
 
 @dataclass
 class Copied:
-    """What is copied of an evaluated mesh, as fast as memory allows; `part` makes the rest of it without Blender.
+    """Copy of an evaluated mesh, as fast as memory allows; `part` makes the rest of it without Blender.
 
     Attributes:
         name: of its object, for messages.

@@ -21,7 +21,7 @@ BURIED = 0.5
 _PLINTH, _LID = 0.12, 0.03
 """Height of the plinth above the surface, and of the lid, m."""
 _OVERHANG, _DOOR, _GAP = 0.02, 0.012, 0.006
-"""What the lid reaches beyond the body, how far doors stand out, and the joint around them, m."""
+"""Overhang of the lid beyond the body, depth by which doors stand out, and the joint around them, m."""
 _SLOTS = 5
 _WIDE = 0.7
 """Width from which a cabinet has two doors, m."""

@@ -1,4 +1,4 @@
-"""What the parts of a model are built with."""
+"""Builder of the parts of a model."""
 
 from __future__ import annotations
 

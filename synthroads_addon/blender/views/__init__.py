@@ -1,1 +1,1 @@
-"""What is shown: clouds over the 3D views, pictures of scenes, the gallery."""
+"""Views: clouds over the 3D views, pictures of scenes, the gallery."""

@@ -33,7 +33,7 @@ EYE = 1.2
 """Height of a driver's eyes, m."""
 _TOLERANCE = 0.005
 _NEAR = 5.0
-"""What of an object lies nearer than this to its middle is shown close up, m."""
+"""Distance from an object's middle within which its parts are shown close up, m."""
 _PITCH = 1.6
 """Distance of the materials' cubes from middle to middle, m."""
 _DAYLIGHT = Environment(sun_azimuth_deg=215.0, sun_elevation_deg=42.0)

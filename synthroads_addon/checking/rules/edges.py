@@ -73,7 +73,7 @@ class Across(NamedTuple):
 
 
 class TurnoutEdges:
-    """What a turnout adds to its carriageway.
+    """Width that a turnout adds to its carriageway.
 
     Along it counts w (m): for an exit from its beginning in the direction of traffic, for an entry backwards from its
     end; so both begin with their taper and end with their ramp. For an emergency bay it counts as for an exit.

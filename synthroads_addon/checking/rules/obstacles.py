@@ -1,4 +1,4 @@
-"""What stands on the road as boxes along station, offset and height, and where it stands beside the carriageways."""
+"""Obstacles on the road as boxes along station, offset and height, and where they stand beside the carriageways."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the checker's rules have in common: rule, finding, and the road as arrays.
+"""Base of the checker's rules: rule, finding, and the road as arrays.
 
 Nothing here or in the rules is shared with the sampler but the table of limits, so that an error in one shows in the
 other. Geometry is worked out anew from the parameter set, and no valid set makes a rule fail with an error: stations
@@ -39,7 +39,7 @@ SAME_CROSSFALL = 1e-6
 
 
 class Finding(NamedTuple):
-    """What a rule found: `Violation` without what its rule knows."""
+    """Finding of a rule: `Violation` without what its rule knows."""
 
     object: str
     station: float
@@ -186,7 +186,7 @@ class Road:
 
     @cached_property
     def bodies(self) -> Bodies:
-        """What stands on the road as boxes."""
+        """Obstacles on the road as boxes."""
         return Bodies(self.parameters)
 
     @cached_property

@@ -46,7 +46,7 @@ class CloudWriter(ABC):
     """
 
     faults: tuple[type[Exception], ...] = (OSError,)
-    """What the library beneath raises where it can't write."""
+    """Errors that the library beneath raises where it can't write."""
 
     def __init__(
         self,
@@ -193,7 +193,7 @@ _LARGEST_SCALE = 1e300
 
 @dataclass(frozen=True)
 class CloudHeader:
-    """What a cloud's file says of itself.
+    """Header of a cloud's file.
 
     Attributes:
         path: the file.

@@ -177,7 +177,7 @@ _FAULTS = (
     *(laspy.errors.LaspyException, lazrs.LazrsError, ValueError, struct.error, OSError, EOFError, MemoryError),
     *(LookupError, ArithmeticError, TypeError, RecursionError),
 )
-"""What laspy and lazrs raise where bytes aren't what they should be."""
+"""Errors that laspy and lazrs raise where bytes aren't what they should be."""
 _READ = {
     *("X", "Y", "Z", "intensity", "red", "green", "blue", "classification", "return_number", "number_of_returns"),
     *("gps_time", "scan_angle", "scan_angle_rank", "point_source_id", "class_id", "instance_id"),

@@ -44,7 +44,7 @@ ARCHIVE_FAULTS = (
     *(KeyError, ValueError, EOFError, OSError, RuntimeError, MemoryError, SyntaxError, OverflowError),
     *(zipfile.BadZipFile, zlib.error, struct.error, tokenize.TokenError),
 )
-"""What reading a damaged archive may raise: encrypted or unknown members, broken headers, lengths of any size."""
+"""Errors of reading a damaged archive: encrypted or unknown members, broken headers, lengths of any size."""
 _LONGEST_NOTES = 1 << 26
 _TIME = (1980, 1, 1, 0, 0, 0)
 """No wall clock in files."""

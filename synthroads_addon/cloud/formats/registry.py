@@ -18,7 +18,7 @@ from .base import BLOCK, CloudReader, CloudWriter
 ENDINGS = (".laz", ".las", ".ply", ".e57", ".npz")
 """Endings of the files that can be written and read."""
 _PACKAGES = {".e57": "pye57"}
-"""What is asked of packages that not every installation has."""
+"""Package that a format needs and that not every installation has, by ending."""
 
 
 def missing_package(ending: str) -> str | None:

@@ -1,4 +1,4 @@
-"""What can be done with a cloud's file: convert, thin out, map intensities, draw. All in memory that stays the same."""
+"""Operations on a cloud's file: convert, thin out, map intensities, draw. All in memory that stays the same."""
 
 from __future__ import annotations
 

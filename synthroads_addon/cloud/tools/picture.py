@@ -20,7 +20,7 @@ Color = tuple[int, int, int]
 
 @dataclass(frozen=True)
 class GrayBar:
-    """What black and white stand for.
+    """Values that black and white stand for.
 
     Attributes:
         low, high: values of black and white.

@@ -148,7 +148,7 @@ class CrossSection:
 
 
 class Brightness:
-    """What is drawn as intensity: times the squared range where the points have one, so that nearness doesn't show.
+    """Values drawn as intensity: times the squared range where the points have one, so that nearness doesn't show.
 
     Attributes:
         text: what it is.

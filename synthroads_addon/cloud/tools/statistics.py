@@ -97,7 +97,7 @@ class Moments:
 
 
 class _FirstPass:
-    """What one look at each point gives: moments, bounds, area, and the points to measure roughness at."""
+    """Statistics of one pass over the points: moments, bounds, area, and the points to measure roughness at."""
 
     def __init__(self, cloud: CloudReader, samples: int) -> None:
         header = cloud.header

@@ -1,4 +1,4 @@
-"""What settings are chosen for: a road that is built for it, or a scene that is there."""
+"""Sites that settings are chosen for: a road that is built for it, or a scene that is there."""
 
 from __future__ import annotations
 

@@ -134,7 +134,7 @@ class Sample:
 
 @dataclass(frozen=True)
 class _Cost:
-    """What the job after the caster costs.
+    """Cost of the job after the caster is built.
 
     Attributes:
         image_seconds: before the first point.

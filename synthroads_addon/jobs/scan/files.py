@@ -27,7 +27,7 @@ from ...scenario.scenario import Scenario
 
 @dataclass
 class ScanCounts:
-    """What was counted while scanning."""
+    """Counts of a scan."""
 
     pulses: int = 0
     rays: int = 0

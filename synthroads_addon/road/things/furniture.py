@@ -1,4 +1,4 @@
-"""What stands on and beside the road: barriers, signs, posts, gantries, equipment, bridges, and free assets."""
+"""Furniture on and beside the road: barriers, signs, posts, gantries, equipment, bridges, and free assets."""
 
 from __future__ import annotations
 

@@ -41,7 +41,7 @@ VEHICLE_GAP = 15.0
 VEHICLE_LANE_WIDTH = 2.5
 """Nobody drives where the lane is narrower, m."""
 VEHICLE_ROOM = 1.5
-"""What a vehicle needs to either side of its lane's centre, m."""
+"""Room that a vehicle needs to either side of its lane's centre, m."""
 
 COLORS = {
     (0.30, 0.31, 0.32): 0.31,  # grey and silver

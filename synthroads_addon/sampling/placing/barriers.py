@@ -44,7 +44,7 @@ _IN_SLOT = 0.6  # share of the slots that get one
 
 @dataclass(frozen=True)
 class BarrierSystem:
-    """What one side's barriers are: concrete, or steel of one system.
+    """Barriers of one side: concrete, or steel of one system.
 
     Attributes:
         concrete: profile, height and width of its foot (m); None for guardrails.

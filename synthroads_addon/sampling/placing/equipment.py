@@ -25,7 +25,7 @@ LIGHTING_DIAMETER, SURVEILLANCE_DIAMETER = 0.18, 0.25
 """Diameters of poles at their foot, m."""
 _BOARD_WIDTH, _PHONE_WIDTH = 0.55, 0.3  # m across the road
 LIGHT_WIDTH = 0.4
-"""What a traffic light takes across the road, m."""
+"""Room that a traffic light takes across the road, m."""
 _HALF = 0.5  # m that a thing takes to either side along the road
 _CABINET_HALF = 1.0  # m
 

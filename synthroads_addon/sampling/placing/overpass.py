@@ -21,7 +21,7 @@ DECK_THICKNESSES = (1.0, 1.2, 1.5)
 ABUTMENT_DISTANCE = 1.5
 """From the verge's outer edge, and from piers beside the carriageways, to an abutment, m at least."""
 ABUTMENT_SPANS = (0.0, 2.0, 4.0, 8.0)
-"""What the abutments stand farther out than they must, m."""
+"""Distance by which the abutments stand farther out than they must, m."""
 FARTHEST_ABUTMENT = 16.0
 """From the main road's paved edge to the farthest abutment of a bridge at right angles, m."""
 _SMALL_THINGS = 2.0  # m across the road, for what stands before an abutment

@@ -26,7 +26,7 @@ SIGNS_PER_KM, BOARDS_PER_KM, PHONES_PER_KM, DELINEATORS_PER_KM, BARRIERS_PER_KM 
 BARRIER_LENGTHS = (8.0, 200.0)
 """Shortest and longest barrier, m."""
 SHIFTS, BARRIER_SHIFTS = (0.0, 0.1, 0.2, 0.3, 0.4), (0.0, 0.05, 0.1, 0.15)
-"""What small things, and barriers, stand farther out than they must, within their zones, m."""
+"""Distances by which small things, and barriers, stand farther out than they must, within their zones, m."""
 DELINEATOR_DISTANCES = (0.2, 0.35, 0.5, 0.7, 0.9, 1.1)
 """From the paved edge to delineators, m."""
 _HALF = 0.5  # m that a small thing takes to either side along the road

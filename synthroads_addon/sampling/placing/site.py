@@ -1,4 +1,4 @@
-"""What the placement of furniture needs to know of a road that is being sampled."""
+"""Site of furniture: what its placement needs to know of a road that is being sampled."""
 
 from __future__ import annotations
 

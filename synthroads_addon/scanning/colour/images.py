@@ -21,7 +21,7 @@ TRIES = 3
 ALL_CANDIDATES = 24
 """As `CANDIDATES`, of the points that none of the best shows; of these images all are looked into."""
 DISTANCE_WEIGHT = 0.25
-"""What twice the scanner's range counts for in the choice of an image, rad: ln 2 times this."""
+"""Weight of twice the scanner's range in the choice of an image, rad: ln 2 times this."""
 TOLERANCE = 0.03
 """Depth that a surface may differ by from the plane through the point, m, beside half a pixel's own width."""
 _STEEPEST = 0.02

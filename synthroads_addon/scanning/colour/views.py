@@ -29,7 +29,7 @@ _NADIR = np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
 
 
 class Poses(Protocol):
-    """What is needed of a scanner's path: strips with ``start_time`` and ``duration``, and poses."""
+    """Scanner's path as cameras need it: strips with ``start_time`` and ``duration``, and poses."""
 
     @property
     def strips(self) -> tuple[Any, ...]:

@@ -1,4 +1,4 @@
-"""What every scan pattern is: the part of a device preset that says how the beam is deflected, and its directions.
+"""Base of the scan patterns: the part of a device preset that says how the beam is deflected, and its directions.
 
 Angles of a line are counted from the nadir, positive to the right of the forward direction; azimuths of a rotating head
 from the forward direction, positive to the right. Directions are those in the frame of the pattern's head: x forward,
@@ -44,7 +44,7 @@ class PulseTiming:
 
 @dataclass(frozen=True)
 class Rays:
-    """What is known of P pulses of a head.
+    """Directions of P pulses of a head.
 
     Attributes:
         time: (P,) s since the head began to scan.

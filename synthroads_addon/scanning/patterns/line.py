@@ -1,4 +1,4 @@
-"""What patterns of lines across the forward direction have in common."""
+"""Base of the patterns of lines across the forward direction."""
 
 from __future__ import annotations
 

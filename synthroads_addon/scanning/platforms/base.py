@@ -1,4 +1,4 @@
-"""What every path has: strips, poses, and knots between which poses may be interpolated."""
+"""Base of all paths: strips, poses, and knots between which poses may be interpolated."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ Float = NDArray[np.float64]
 TURNAROUND = 10.0
 """Seconds between two strips."""
 KNOT_ERROR = 2e-5
-"""What interpolation between two knots may err, m, in the place of a point at `KNOT_RANGE` from the scanner."""
+"""Largest error of interpolation between two knots, m, in the place of a point at `KNOT_RANGE` from the scanner."""
 KNOT_RANGE = 100.0
 """m."""
 
@@ -86,7 +86,7 @@ class Path(Protocol):
 
 @dataclass(frozen=True)
 class Usual:
-    """What is usual for a kind of platform.
+    """Usual values of a kind of platform.
 
     Attributes:
         height: m; above the centreline (uav, airborne), the road surface (vehicle), or the ground (tripod).

@@ -1,4 +1,4 @@
-"""What a path follows: the centreline of a road, any polyline (`platforms.polyline`), or polynomials fitted to either.
+"""Guides of paths: the centreline of a road, any polyline (`platforms.polyline`), or polynomials fitted to either.
 
 A guide is a curve in plan, evaluated by station (m) in float64, with an elevation along it and a ground around it. Its
 offsets count to the left.
@@ -24,7 +24,7 @@ _FULL_LANE = 1.99  # m; what is narrower is a lane that begins or ends
 
 
 class Guide(Protocol):
-    """What a path follows."""
+    """Line that a path follows."""
 
     @property
     def length(self) -> float:

@@ -12,7 +12,7 @@ PlatformKind = Literal["uav", "vehicle", "tripod", "airborne", "trajectory"]
 
 
 class Platform(ClosedModel):
-    """What carries the scanner, and where. What isn't given is usual for its kind (`scanning.platforms.base.USUAL`)."""
+    """Carrier of the scanner and its place. What isn't given is usual for its kind (`scanning.platforms.base.USUAL`)."""
 
     kind: PlatformKind = Field("uav", description="Platform.")
     height: float | None = quantity(

@@ -1,1 +1,1 @@
-"""What rays can meet: triangles, and what moves."""
+"""Scenes that rays can meet: triangles, and what moves."""

@@ -1,4 +1,4 @@
-"""What a ray caster is, and what every caster shares: the range from the face's plane in float64."""
+"""Interface of ray casters, and what every caster shares: the range from the face's plane in float64."""
 
 from __future__ import annotations
 

@@ -34,7 +34,7 @@ _WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT2": 4, "MAT3": 9, "
 _LONGEST_HEADER = 1 << 20
 _FEW = 16
 _FAULTS = (ValueError, LookupError, TypeError, ArithmeticError, AttributeError, RecursionError, struct.error)
-"""What looking into a file raises whose content isn't what it should be."""
+"""Errors of looking into a file whose content isn't what it should be."""
 _MOST_VALUES = 1 << 24
 """Values of a glTF accessor without a buffer, which are all zero."""
 

@@ -1,4 +1,4 @@
-"""What moves in a scene, and how: vehicles along their lanes, other things straight on."""
+"""Motions in a scene: vehicles along their lanes, other things straight on."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ class MovingMesh:
 
 @dataclass(frozen=True)
 class ScannedScene:
-    """What a scan meets. All meshes have the same tuple of materials.
+    """Scene that a scan meets. All meshes have the same tuple of materials.
 
     Attributes:
         static: what stands, in the local frame.

@@ -1,4 +1,4 @@
-"""What rays can meet: the static scene and what moves in it, their faces numbered one after the other."""
+"""Target of rays: the static scene and what moves in it, their faces numbered one after the other."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ Float = NDArray[np.float64]
 Faces = NDArray[np.intp]
 
 CLEARANCE = np.array([2.5, 1.0, 3.0])
-"""What a vehicle that carries the scanner takes up around it: half its length and width, and its height, m."""
+"""Room that a vehicle which carries the scanner takes around it: half its length and width, and its height, m."""
 
 _OF_NO_FACE = {"class_id": UNLABELLED, "instance_id": 0, "material": NO_MATERIAL}
 
@@ -47,7 +47,7 @@ class _Part:
 
 @dataclass(frozen=True)
 class Met:
-    """What rays meet first; one value per ray, in the shape of the rays.
+    """First hits of rays; one value per ray, in the shape of the rays.
 
     Attributes:
         face: number among all faces of the target, -1 for none.

@@ -1,4 +1,4 @@
-"""What every weather is: its fields in a scenario, how it attenuates the beam, and echoes of its own if it has any."""
+"""Base of all weathers: fields in a scenario, attenuation of the beam, and echoes of their own if they have any."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from .extinction import visibility_extinction
 
 
 class Weather(ClosedModel):
-    """What attenuates the beam. A weather's field ``condition`` is the name that scenarios call it by.
+    """Weather that attenuates the beam. Its field ``condition`` is the name that scenarios call it by.
 
     Attributes:
         order: place among the weathers in lists, if it has one; else they are listed by name.

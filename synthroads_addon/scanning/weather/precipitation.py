@@ -1,4 +1,4 @@
-"""What rain and snow have in common: a rate may be given instead of the visibility."""
+"""Base of rain and snow: a rate may be given instead of the visibility."""
 
 from __future__ import annotations
 

@@ -132,7 +132,7 @@ def write_alignment(ifc: IfcFile, geometry: RoadGeometry) -> Axis:
 
 
 class _Layout:
-    """What plan and profile have in common: segments, and an end of length 0 as IFC wants it."""
+    """Base of plan and profile: segments, and an end of length 0 as IFC wants it."""
 
     entity: str
 

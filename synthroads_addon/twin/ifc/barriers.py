@@ -1,4 +1,4 @@
-"""What runs along the road in IFC 4.3: guardrails and concrete barriers (IfcRailing), noise barriers (IfcWall).
+"""Barriers along the road in IFC 4.3: guardrails and concrete barriers (IfcRailing), noise barriers (IfcWall).
 
 Each is placed along the alignment at its beginning; its body is swept along the road on the surface below it.
 """

@@ -1,4 +1,4 @@
-"""What stands at one place in IFC 4.3: signs, posts, poles, lights, cabinets, beacons, assets.
+"""Furniture at one place in IFC 4.3: signs, posts, poles, lights, cabinets, beacons, assets.
 
 Each stands on an IfcLinearPlacement at its station, offset and height. Objects of the same size and rotation share one
 body.

@@ -1,4 +1,4 @@
-"""What the writers of an IFC file share: the road, where its parts are, and how an object is put into the file."""
+"""Scene that the writers of an IFC file share: the road, where its parts are, how an object is put into the file."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What surrounds the road in IFC 4.3: terrain, vegetation, vehicles."""
+"""Surroundings of the road in IFC 4.3: terrain, vegetation, vehicles."""
 
 from __future__ import annotations
 

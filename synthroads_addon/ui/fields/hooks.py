@@ -1,4 +1,4 @@
-"""What follows from a change in the panel: settings that belonged to the choice before, or exclude each other."""
+"""Consequences of a change in the panel: settings that belonged to the choice before, or exclude each other."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a setting that isn't given follows: the fidelity, the device, the platform, the design class. Shown greyed."""
+"""Values that settings follow while they aren't given: by fidelity, device, platform, design class. Shown greyed."""
 
 from __future__ import annotations
 

@@ -20,7 +20,7 @@ _CASTERS = get_args(ScanScenario.model_fields["caster"].annotation)
 
 @dataclass(frozen=True)
 class Preferences:
-    """What the preferences say.
+    """Preferences of the extension.
 
     Attributes:
         cores: threads that a scan uses where its scenario doesn't say; 0 for every core.

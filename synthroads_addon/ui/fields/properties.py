@@ -21,11 +21,11 @@ from .preferences import preferences
 FIRST = "rq31-600m"
 """The built-in scenario that the settings are at first."""
 _PANELS_OWN = {"fidelity": "draft", "outputs": ["parameters", "cloud", "centerline", "previews"]}
-"""What the panel begins with otherwise: the first road and scan are to come fast, and the scene is open already."""
+"""Defaults of the panel where the scenario has others: the first road and scan come fast, the scene is open already."""
 _KEPT = ("seed", "fidelity", "outputs")
 """Choosing a built-in scenario leaves these as they are: they say which, how fine and where, not what."""
 _OF_ROAD = ("title", "seed", "fidelity", "geometric_tolerance", "vegetation_detail", "road")
-"""What a road is built from."""
+"""Fields that a road is built from."""
 
 FIRST_DATA = load_scenario(FIRST).to_dict() | _PANELS_OWN
 FIELDS = make_fields(Scenario, FIRST_DATA, "", HOOKS)
@@ -38,7 +38,7 @@ _Generated: Any = type(
 
 
 class SYNTHROADS_PG_settings(_Generated, bpy.types.PropertyGroup):
-    """What the panel shows; `scenario` turns it into the same description of a job that the command line takes."""
+    """State of the panel; `scenario` turns it into the same description of a job that the command line takes."""
 
     preset: bpy.props.StringProperty(
         name="Scenario", default=FIRST, description="Scenario that these settings were taken from, built-in or a file"

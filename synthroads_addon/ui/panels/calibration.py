@@ -22,7 +22,7 @@ from .calibration_settings import file_of
 
 
 class _Calibrates(LongOperator):
-    """What the two buttons that calibrate share."""
+    """Base of the two buttons that calibrate."""
 
     fit = False
 

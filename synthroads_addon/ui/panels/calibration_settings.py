@@ -1,4 +1,4 @@
-"""What the panel "Calibration" asks for: materials with their classes, a real cloud, how it was seen, what is fitted.
+"""Settings of the panel "Calibration": materials with their classes, a real cloud, how it was seen, what is fitted.
 
 It is no part of a job's description: it is kept with the window, not with the file.
 
@@ -57,7 +57,7 @@ class SYNTHROADS_PG_calibration_class(bpy.types.PropertyGroup):
 
 
 class SYNTHROADS_PG_calibration(bpy.types.PropertyGroup):
-    """What is compared, and how it was seen; `job` turns it into what the command line takes."""
+    """Settings of a calibration; `job` turns them into what the command line takes."""
 
     classes: bpy.props.CollectionProperty(type=SYNTHROADS_PG_calibration_class)
     active: bpy.props.IntProperty()

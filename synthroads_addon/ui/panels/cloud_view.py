@@ -38,7 +38,7 @@ _LABELS: dict[ColourBy, tuple[str, str]] = {
 _GRADIENT_STEPS = 10
 
 view = CloudView()
-"""What is drawn over the 3D views."""
+"""Cloud that is drawn over the 3D views."""
 
 
 def last_cloud(context: bpy.types.Context) -> Path | None:

@@ -83,7 +83,7 @@ def part_name(role: str) -> str:
 
 
 _items: list[tuple[str, str, str, str, int]] = []
-"""What Blender shows at present: it doesn't keep the texts itself."""
+"""Texts that Blender shows at present: it doesn't keep them itself."""
 
 
 def _part_items(state: Any, context: Any) -> list[tuple[str, str, str, str, int]]:

@@ -41,7 +41,7 @@ class SheetPanel(Sidebar):
 
 
 class MainPanel(SheetPanel):
-    """What everything starts from."""
+    """Panel of the scenario that everything starts from."""
 
     def draw(self, context: bpy.types.Context) -> None:
         """Show which scenario the settings were taken from, and how fine all is."""
@@ -51,7 +51,7 @@ class MainPanel(SheetPanel):
 
 
 class RoadPanel(SheetPanel):
-    """What the road is, and the buttons that build it."""
+    """Panel of the road, with the buttons that build it."""
 
     def draw(self, context: bpy.types.Context) -> None:
         """Show the fields, whether the road is older than they are, and the buttons."""
@@ -75,7 +75,7 @@ class RoadPanel(SheetPanel):
 
 
 class ScannerPanel(SheetPanel):
-    """What scans, and the button that scans."""
+    """Panel of the scanner, with the button that scans."""
 
     def draw_fields(self, layout: bpy.types.UILayout, settings: Any) -> None:
         """Show the fields; devices have a menu."""

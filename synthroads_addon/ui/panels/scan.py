@@ -1,4 +1,4 @@
-"""What the Scanner panel has below its fields: where the files go, the button, and how far the scan is."""
+"""Lower part of the Scanner panel: where the files go, the button, and how far the scan is."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What `rendered_scan` runs in a Blender of its own, without a window: the scan of a road in a copy of the user's file.
+"""Scan in a Blender of its own, without a window, started by `rendered_scan`: of a road in a copy of the user's file.
 
 It says on its standard output, in lines of JSON after `MARK`, how far it is and how it ended.
 """

@@ -1,4 +1,4 @@
-"""What the panel's modules share: where panels stand, how buttons and messages look, when a button may be pressed."""
+"""Parts that the panel's modules share: places of panels, buttons and messages, when a button may be pressed."""
 
 from __future__ import annotations
 

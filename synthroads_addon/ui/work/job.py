@@ -33,7 +33,7 @@ BUDGET = 0.05
 
 @dataclass(frozen=True)
 class Aside:
-    """What a job does in a thread; the generator gets what it returns.
+    """Part of a job that is done in a thread; the generator gets what it returns.
 
     Attributes:
         work: gets a `Report` to call now and then; touches no data-block of Blender.
@@ -56,7 +56,7 @@ class Step:
 
 
 Work: TypeAlias = Generator[float | Step | Aside | None, Any, T]
-"""What a job does. ``None`` means that there is nothing to do in the main thread just now."""
+"""Work of a job. ``None`` means that there is nothing to do in the main thread just now."""
 
 
 class Job(Generic[T]):

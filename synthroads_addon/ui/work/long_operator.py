@@ -1,4 +1,4 @@
-"""What operators that take long have in common: the window lives on, the status bar shows how far they are, Esc stops.
+"""Base of operators that take long: the window lives on, the status bar shows how far they are, Esc stops.
 
 A subclass says what is to be done in `job`, and what to say at the end in `succeed`; its annotations and `poll` are its
 own. Called from Python (``bpy.ops.synthroads.scan()``) it does the same at once.
@@ -21,7 +21,7 @@ class LongOperator:
     """Base of an operator whose work is a `Job`. Give it `bl_options` without REGISTER: Repeat Last would block."""
 
     nothing_done = "nothing was changed"
-    """What is said after the job was cancelled."""
+    """Message after the job was cancelled."""
 
     if TYPE_CHECKING:
 

@@ -29,7 +29,7 @@ _JOB, _LINES, _ERRORS = "job.json", "lines.txt", "errors.txt"
 
 @dataclass(frozen=True)
 class Scanned:
-    """What the other Blender says at its end: the counts as JSON data, and its stages, see `StageTimer`."""
+    """Result of the other Blender: the counts as JSON data, and its stages, see `StageTimer`."""
 
     counts: dict[str, Any]
     stages: dict[str, Any]
@@ -112,7 +112,7 @@ class SavedScene:
 
 @dataclass
 class _Told:
-    """What the other Blender has said so far.
+    """Messages of the other Blender so far.
 
     Attributes:
         share: of the scan that is done.

@@ -35,7 +35,7 @@ from .rendered_scan import SavedScene, save_open_scene
 
 @dataclass(frozen=True)
 class RoadScan:
-    """What is scanned, and where the files go.
+    """Request for a scan, and where the files go.
 
     Attributes:
         scenario: the road's and the scan's settings.
@@ -57,7 +57,7 @@ class RoadScan:
 
 @dataclass(frozen=True)
 class Written:
-    """What a scan has written: so many points into a folder."""
+    """Result of a scan: so many points into a folder."""
 
     points: int
     target: Path

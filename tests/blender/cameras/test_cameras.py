@@ -92,7 +92,7 @@ def test_a_wall_is_seen_in_its_own_colours() -> None:
 
 
 def test_places_lie_in_their_pixels() -> None:
-    """What a pixel shows is projected back into it, with an off-centre principal point as well."""
+    """A pixel's content is projected back into it, with an off-centre principal point as well."""
     mesh = build_coded_scene()
     settings = ColourSettings(7.0, 0.06, 1)
     views = views_along(OverPath(), scene_sample(mesh), settings, np.deg2rad(70.0), 4096)

@@ -36,7 +36,7 @@ from synthroads_addon.scenario.scenario import load_scenario
 
 TOLERANCE = 0.005
 ROUNDING = 2e-4
-"""What float32 coordinates of some hundred metres may cost, m."""
+"""Error of float32 coordinates of some hundred metres, m."""
 BUILT = {"road", "terrain", "guardrails", "delineators"}
 
 Float = NDArray[np.float64]

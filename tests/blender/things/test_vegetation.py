@@ -27,7 +27,7 @@ MOST_TRIANGLES = {"tree": 3000, "shrub": 1100, "grass": 12}
 TREE_HEIGHT, SHRUB_HEIGHT, GRASS_HEIGHT = (6.0, 9.0), (1.0, 2.0), (0.1, 0.4)
 LENGTH = 120.0
 MARGIN = 0.05
-"""What a leaning plant may be taller or lower than it would be upright, as a share of its height."""
+"""Difference in height of a leaning plant from an upright one, as a share of its height."""
 
 
 def plants(kind: str, name: str, density: float, band: tuple[float, float], heights: tuple[float, float]) -> Data:

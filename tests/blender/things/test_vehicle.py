@@ -33,7 +33,7 @@ from tests.helpers.scenes.furnished_road import (
 
 MODELS = tuple(VEHICLE_TYPES)
 ON_ROAD = 0.01
-"""What the wheels may be above or below the road, m."""
+"""Distance that the wheels may be above or below the road, m."""
 MOST_TRIANGLES = 3000
 
 

@@ -53,7 +53,7 @@ TOKENS: tuple[bytes, ...] = (
     ),
     *(b'{"a":' * 20_000, b"null", b"true", b";", b"\t", b" ", b"x" * 200_000, b'"' + b"y" * 200_000, b"\xe2\x80\xa8"),
 )
-"""What is put into the middle of a text."""
+"""Text that is put into the middle of a text."""
 
 YAML_TOKENS: tuple[bytes, ...] = (
     *(b"&a ", b"*a", b"<<: *a", b"!!python/object/apply:os.system ['true']\n", b"!!binary aGk=", b"!!set {a, b}"),

@@ -1,4 +1,4 @@
-"""What a sampled road says of its scenario's intervals, and of every choice that a class offers: for statistics."""
+"""Values of a sampled road for its scenario's intervals, and for every choice that a class offers: for statistics."""
 
 from __future__ import annotations
 

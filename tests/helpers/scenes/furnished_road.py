@@ -23,7 +23,7 @@ from synthroads_addon.scanning.scene.mesh import SceneMesh
 Float = NDArray[np.float64]
 Data = dict[str, Any]
 MEASURE = 0.005
-"""What sizes on the built mesh may differ from the parameters, m."""
+"""Difference that sizes on the built mesh may have from the parameters, m."""
 
 
 def road_data(objects: Data, length: float = 300.0, curvature: float = 1 / 1200, grade: float = 0.03) -> Data:

@@ -1,4 +1,4 @@
-"""What the tests of the panel's buttons share: the add-on registered, a small scene, a file."""
+"""Set-up of the tests of the panel's buttons: the add-on registered, a small scene, a file."""
 
 from __future__ import annotations
 

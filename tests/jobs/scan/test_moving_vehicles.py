@@ -35,7 +35,7 @@ from tests.helpers.scenes.furnished_road import Data, Float, road_data
 FINE = 1e-4
 """Tolerance (m) of a road whose mesh is hardly farther from the analytic surface than 32 bits make it."""
 HEIGHTS = 5e-5
-"""What the nodes' heights below a wheel are off, m: they cast rays from 500 m above in 32 bits."""
+"""Error of the nodes' heights below a wheel, m: they cast rays from 500 m above in 32 bits."""
 
 
 def build(objects: Data, tolerance: float = FINE, **road: Any) -> RoadGeometry:

@@ -222,7 +222,7 @@ def test_slices_equal_the_whole(name: str, data: st.DataObject) -> None:
 
 @pytest.mark.parametrize("name", [name for name in EVERY if len(any_setting(name).device.heads) == 1])
 def test_cycles_repeat(name: str) -> None:
-    """What is looked up in a table of one cycle is what the pulse's own number gives."""
+    """Shots looked up in a table of one cycle are those of the pulses' own numbers."""
     s = any_setting(name)
     first = 3 * shot_count(s, 700 / s.lines_per_second) + 17
     shot, alone = shots(s, first, 500), s.device.pattern.rays(s.timing, np.arange(first, first + 500), False)

@@ -357,7 +357,7 @@ def test_referents_say_crossfall_and_width(road) -> None:
 
 
 def _check_places(file: Any, parameters: RoadParameters, geometry: RoadGeometry) -> None:
-    """What stands on the road stands where the parameter set says, upright, for both kinds of readers."""
+    """Furniture on the road stands where the parameter set says, upright, for both kinds of readers."""
     products = {item.Name: item for item in file.by_type("IfcProduct") if item.ObjectPlacement is not None}
     inside = 0
     for name, item in parameters.of_type(PointObject).items():

@@ -90,7 +90,7 @@ def test_nothing_edited_is_nothing_changed() -> None:
 
 
 def test_every_input_that_is_shown_is_carried_back() -> None:
-    """What the panel lets one edit is in the parameter set that is saved, and so in the labels of a scan."""
+    """Edits in the panel are in the parameter set that is saved, and so in the labels of a scan."""
     parameters = recall_parameters(find_road(bpy.context.scene))
     count = 0
     for item in road_parts().values():

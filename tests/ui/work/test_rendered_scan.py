@@ -90,7 +90,7 @@ def test_nothing_is_rendered_where_no_colour_is_wanted(road: Any, started: list[
 
 
 def test_the_scene_that_the_window_shows_is_scanned_as_it_is_now(road: Any, tmp_path: Path) -> None:  # noqa: F811
-    """What was changed and not saved counts, in the view layer at hand; the file stays unsaved and its own."""
+    """Unsaved changes count, in the view layer at hand; the file stays unsaved and its own."""
     choose(road, **NO_PICTURES)
     name, saved = bpy.data.filepath, Path(bpy.data.filepath).read_bytes()
     assert bpy.ops.synthroads.scan() == {"FINISHED"}

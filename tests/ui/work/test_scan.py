@@ -171,7 +171,7 @@ def test_a_scan_beside_the_window_gives_the_same_bytes(road: Any, tmp_path: Path
 
 
 def test_the_thread_touches_no_data_of_blender(road: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:  # noqa: F811
-    """What was read is all that is needed: the file may be emptied, as by an undo, while the thread is at work."""
+    """Once read, nothing more of the file is needed: it may be emptied, as by an undo, while the thread is at work."""
     job = job_of_the_panel()
     job.start()
     while job.touches_scene:

@@ -1,4 +1,4 @@
-"""What the nodes of SR Road depend on, and the values of its inputs and of the backbone's attributes."""
+"""Layout of SR Road: the counts that its nodes depend on, the values of its inputs and of the backbone's attributes."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ TURNOUT_NAMES = tuple(kind.replace("_", " ").title() for kind in TURNOUT_STRIPS)
 
 @dataclass(frozen=True)
 class MarkingLayout:
-    """What the nodes of a line marking depend on."""
+    """Properties of a line marking that its nodes depend on."""
 
     name: str
     kind: str
@@ -35,7 +35,7 @@ class MarkingLayout:
 
 @dataclass(frozen=True)
 class SideLayout:
-    """What the nodes of one carriageway depend on.
+    """Properties of one carriageway that its nodes depend on.
 
     Attributes:
         side: ``Left`` or ``Right``.

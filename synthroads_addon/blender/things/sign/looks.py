@@ -1,4 +1,4 @@
-"""What a sign's face looks like: from its shape, colours, writing and pictogram to the inputs of SR Sign Face."""
+"""Look of a sign's face: from its shape, colours, writing and pictogram to the inputs of SR Sign Face."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ Box = tuple[float, float, float, float]
 
 @dataclass(frozen=True)
 class FaceStyle:
-    """What is on a face.
+    """Content of a sign's face.
 
     Attributes:
         ground, border, writing: colours, as `presets/signs.json` names them.

@@ -1,4 +1,4 @@
-"""What grass and trees share: where plants grow, and how they are put there.
+"""Placement of grass and trees: where plants grow, and how they are put there.
 
 A plant's place, size and turn follow from its seed and its number, and its number from the metre of road that it stands
 beside: a stretch of a road has the whole road's plants.

@@ -1,4 +1,4 @@
-"""What vehicles have beside their bodies: wheels, boxes such as lights and plates, and round parts."""
+"""Details of vehicles beside their bodies: wheels, boxes such as lights and plates, and round parts."""
 
 from __future__ import annotations
 

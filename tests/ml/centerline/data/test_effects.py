@@ -459,7 +459,7 @@ def test_colours() -> None:
 
 
 def test_some_intensities_stay_as_they_are() -> None:
-    """What a noiseless simulation delivers is among what is learned."""
+    """A noiseless simulation's clouds are among the training data."""
     plain = cut().intensity
     same_as_before = 0
     for seed in range(40):

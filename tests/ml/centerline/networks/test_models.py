@@ -108,7 +108,7 @@ def test_mirrored_twice_is_the_same():
 
 @torch.no_grad()
 def test_shift_by_a_kernel_point_carries_over(model):
-    """What the soft-argmax is taken of moves by one kernel point, but for what layers see of the slice's ends."""
+    """Scores under the soft-argmax move by one kernel point, but for what layers see of the slice's ends."""
     one = batch(4)
     keep = one["coord"][..., 1].abs() < 6.0
     one = dict(one, mask=one["mask"] & keep, coord=one["coord"] * keep[..., None])

@@ -1,4 +1,4 @@
-"""What of a data set is packed, and the command that packs it."""
+"""Parts of a data set that are packed, and the command that packs it."""
 
 from __future__ import annotations
 

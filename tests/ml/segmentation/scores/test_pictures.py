@@ -1,4 +1,4 @@
-"""What the pictures of a segmentation show."""
+"""Content of the pictures of a segmentation."""
 
 from __future__ import annotations
 
