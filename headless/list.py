@@ -17,7 +17,7 @@ from headless import catalogue
 from headless.commands import Outcome, add_common_arguments, entry
 from synthroads_addon.base.catalogue import Kind, entries
 from synthroads_addon.base.errors import InputError, nearest_name
-from synthroads_addon.base.field_list import Field, fields_of
+from synthroads_addon.base.field_list import FieldEntry, fields_of
 from synthroads_addon.base.text_table import text_table
 from synthroads_addon.scenario.scenario import Scenario
 
@@ -97,7 +97,7 @@ def _fields(owner: str, wanted: Sequence[str]) -> Outcome:
     return 0, {_FIELDS: [one.to_dict() for one in found]}, "\n".join(text_table(("path", "default", "meaning"), rows))
 
 
-def _row(one: Field) -> tuple[str, str, str]:
+def _row(one: FieldEntry) -> tuple[str, str, str]:
     """Return the cells of a field; an interval's two fields stand in one line."""
     if one.interval:
         given = f"{one.default['minimum']:g} to {one.default['maximum']:g} {one.unit}" if one.default else ""

@@ -29,7 +29,7 @@ sys.path.insert(0, str(ROOT))
 from headless.marked_documents import fill  # noqa: E402
 from ml.centerline.data.batches import DataOptions  # noqa: E402
 from ml.centerline.data.corridor import TRUTH_KINDS, TruthKind  # noqa: E402
-from ml.centerline.data.roads import Road, read_measured, read_scene, scene_folders  # noqa: E402
+from ml.centerline.data.roads import LearningRoad, read_measured, read_scene, scene_folders  # noqa: E402
 from ml.centerline.data.slices import SliceSettings  # noqa: E402
 from ml.centerline.scores import pictures, tables  # noqa: E402
 from ml.centerline.scores.evaluation import (  # noqa: E402
@@ -161,7 +161,7 @@ def baselines(search: GridSearch, half_width: float = HALF_WIDTH) -> dict[str, l
     return {tuned: [skeleton_predictor(best)], plain: [skeleton_predictor(reference)], **trivial_predictors(half_width)}
 
 
-def synthetic_roads(texts: Sequence[str], kind: TruthKind) -> list[Road]:
+def synthetic_roads(texts: Sequence[str], kind: TruthKind) -> list[LearningRoad]:
     """Return the roads of data sets' splits, given as FOLDER or FOLDER:SPLIT."""
     parts = [text.partition(":") for text in texts]
     scenes = [scene for folder, _, split in parts for scene in scene_folders(Path(folder), split or "test")]
@@ -177,7 +177,7 @@ def searched(shown: Sequence[Case], masks: Sequence[str], file: Path) -> GridSea
     return search
 
 
-def shown_by(roads: Sequence[Road], cropping: Cropping | None, estimated: bool) -> Callable[[int], list[Case]]:
+def shown_by(roads: Sequence[LearningRoad], cropping: Cropping | None, estimated: bool) -> Callable[[int], list[Case]]:
     """Return what shows the roads as a seed has them."""
     return lambda seed: [case(road, seed, cropping=cropping, estimated=estimated) for road in roads]
 
@@ -244,7 +244,7 @@ def by_title(texts: Sequence[str]) -> dict[str, list[str]]:
 
 
 def recalibrated(
-    seeds: Sequence[int], learned: Mapping[str, Sequence[Predictor]], roads: Sequence[Road]
+    seeds: Sequence[int], learned: Mapping[str, Sequence[Predictor]], roads: Sequence[LearningRoad]
 ) -> dict[str, list[Predictor]]:
     """Return the models with one factor each on their deviations, found on a few roads of another scanner."""
     found: dict[str, list[Predictor]] = {}
@@ -313,7 +313,7 @@ def real(arguments: argparse.Namespace, trained: Mapping[str, Sequence[Model]]) 
 
 def measure_painted(
     seeds: Sequence[int],
-    road: Road,
+    road: LearningRoad,
     cropping: Cropping | None,
     trained: Mapping[str, Sequence[Model]],
     search: GridSearch,
@@ -333,14 +333,14 @@ def measure_painted(
     )
 
 
-def axis_predictor(known: Road) -> Predictor:
+def axis_predictor(known: LearningRoad) -> Predictor:
     """Return what predicts a road's measured axis."""
     return lambda road, frames: truth_of(known).axis.crossing(frames.position, frames.direction)[0][:, None]
 
 
 def measure_real(
     seeds: Sequence[int],
-    roads: Mapping[str, Road],
+    roads: Mapping[str, LearningRoad],
     cropping: Cropping | None,
     trained: Mapping[str, Sequence[Model]],
     search: GridSearch,
@@ -356,7 +356,7 @@ def measure_real(
 
 
 def draw_synthetic(
-    arguments: argparse.Namespace, road: Road, versions: Mapping[str, Sequence[Predictor]], search: GridSearch
+    arguments: argparse.Namespace, road: LearningRoad, versions: Mapping[str, Sequence[Predictor]], search: GridSearch
 ) -> None:
     """Draw centrelines and a corridor over a synthetic road."""
     shown = case(road, arguments.seeds[0], cropping=None, estimated=False)
@@ -371,7 +371,7 @@ def draw_synthetic(
 
 
 def draw_real(
-    arguments: argparse.Namespace, road: Road, trained: Mapping[str, Sequence[Model]], search: GridSearch
+    arguments: argparse.Namespace, road: LearningRoad, trained: Mapping[str, Sequence[Model]], search: GridSearch
 ) -> None:
     """Draw centrelines over a real road with cropped slices."""
     kind = REAL_ROADS[road.name][1]
@@ -388,7 +388,7 @@ def draw_lines(
     shown: Case,
     learned: Mapping[str, Predictor],
     search: GridSearch,
-    view: pictures.View,
+    view: pictures.PictureView,
     title: str,
 ) -> None:
     """Draw the learned lines, the tuned baseline and the best known trivial one."""
@@ -401,10 +401,10 @@ def draw_lines(
     write_file(path, pictures.lines_picture(shown, lines, view, title, height), overwrite=True)
 
 
-def middle(road: Road, length: float) -> pictures.View:
+def middle(road: LearningRoad, length: float) -> pictures.PictureView:
     """Return the view of some metres in the middle of a road."""
     whole = road.reference.length
-    return pictures.View(max(0.0, (whole - length) / 2.0), min(whole, (whole + length) / 2.0))
+    return pictures.PictureView(max(0.0, (whole - length) / 2.0), min(whole, (whole + length) / 2.0))
 
 
 def arguments_of(words: Sequence[str] | None) -> argparse.Namespace:

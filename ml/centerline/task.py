@@ -21,12 +21,12 @@ from ..runs import CALIBRATION, Run, plain, stream_seed
 from ..tasks import Evaluation, Prediction
 from ..training_loop import chosen_device, fit
 from .data.batches import Batches, BatchOptions, DataOptions, Roads, fixed_batches, quiet, read_roads
-from .data.effects import Effects
+from .data.effects import SequenceEffects
 from .data.slices import Batch, SliceSettings
 from .networks.losses import LossOptions, centerline_loss
 from .networks.models import TARGETS, CenterlineModel, ModelOptions, build
 from .scores.evaluation import Cropping, case
-from .use.calibration import DEVIATIONS, Calibration
+from .use.calibration import DEVIATIONS, IntervalCalibration
 from .use.predictor import CenterlinePredictor, UseOptions
 
 _FIRST_WEIGHTS = "first weights"
@@ -38,7 +38,9 @@ class CenterlineConfiguration(Configuration):
     task: Literal["centerline"] = Field("centerline", description="What is learned.")
     data: DataOptions = Field(description="What is learned from.")
     slices: SliceSettings = Field(default=SliceSettings(), description="How slices are cut.")
-    effects: Effects = Field(default=Effects(), description="What is done to the samples of the training.")
+    effects: SequenceEffects = Field(
+        default=SequenceEffects(), description="What is done to the samples of the training."
+    )
     model: ModelOptions = Field(default=ModelOptions(), description="Which model.")
     loss: LossOptions = Field(default=LossOptions(), description="What it is trained with.")
     batches: BatchOptions = Field(default=BatchOptions(), description="How much an epoch sees.")
@@ -146,7 +148,7 @@ def predictor(run: Run[CenterlineConfiguration]) -> CenterlinePredictor:
         raise InputError(str(run.folder), None, "its training isn't finished; `synthroads train --resume` goes on")
     model = _empty_model(configuration).to(device)
     model.load_state_dict(state["model"])
-    calibration = {name: Calibration.from_dict(one) for name, one in read_json(path).items()}
+    calibration = {name: IntervalCalibration.from_dict(one) for name, one in read_json(path).items()}
     return CenterlinePredictor(model, configuration.slices, configuration.use, calibration)
 
 

@@ -22,7 +22,7 @@ from ..training_loop import chosen_device, optimizer_of, train_step
 from .data.classes import class_names
 from .data.crops import Item, Seeds
 from .data.sources import Source, pointcept_folders, pointcept_root
-from .data.tiles import Tile, scalings
+from .data.tiles import CloudTile, scalings
 from .loading import epoch_batches, thinned
 from .network import build
 from .recipes import SegmentationConfiguration
@@ -74,9 +74,9 @@ def tile_count(source: Source, configuration: SegmentationConfiguration) -> int:
     return sum(1 for _ in thinned([source], configuration, "counted"))
 
 
-def _first_tiles(sources: list[Source], configuration: SegmentationConfiguration) -> list[Tile]:
+def _first_tiles(sources: list[Source], configuration: SegmentationConfiguration) -> list[CloudTile]:
     """Return the first tiles with as many points as a crop has."""
-    found: list[Tile] = []
+    found: list[CloudTile] = []
     for tile in thinned(sources, configuration, "first"):
         if len(tile) >= configuration.crop_points:
             found.append(tile)
@@ -88,7 +88,7 @@ def _first_tiles(sources: list[Source], configuration: SegmentationConfiguration
 
 
 def timed_steps(
-    configuration: SegmentationConfiguration, tiles: list[Tile], steps: int, device: torch.device
+    configuration: SegmentationConfiguration, tiles: list[CloudTile], steps: int, device: torch.device
 ) -> tuple[float, float]:
     """Return the median seconds of a step, and those of the processor."""
     model = build(configuration).to(device).train()
@@ -105,7 +105,7 @@ def timed_steps(
     return median(wall[1:]), median(cpu[1:])
 
 
-def _endless(configuration: SegmentationConfiguration, tiles: list[Tile], device: torch.device) -> Iterator[Item]:
+def _endless(configuration: SegmentationConfiguration, tiles: list[CloudTile], device: torch.device) -> Iterator[Item]:
     """Yield whole batches, epoch after epoch."""
     enough = configuration.model_copy(update={"crops_per_tile": configuration.batch})
     seeds = Seeds(tiles, len(class_names(configuration.scheme())), configuration.balanced)

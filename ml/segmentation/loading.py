@@ -20,7 +20,7 @@ from synthroads_addon.base.random_streams import stream
 from .adaptation import laid_over
 from .data.crops import CropDataset, Draw, Item, Seeds, collate
 from .data.sources import Source, read_tiles
-from .data.tiles import Scaling, Tile, scalings
+from .data.tiles import CloudTile, Scaling, scalings
 from .network import on_device, plan_of, prepared
 from .recipes import SegmentationConfiguration, mapped_intensities, plan
 
@@ -28,7 +28,7 @@ SMALLEST_SHARE = 0.25
 """Of a crop's points: tiles with fewer are left out of training, unless all have."""
 
 
-def read_domains(configuration: SegmentationConfiguration) -> dict[str, list[Tile]]:
+def read_domains(configuration: SegmentationConfiguration) -> dict[str, list[CloudTile]]:
     """Return the training tiles by domain, thinned out; intensities mapped where the set-up says so.
 
     A grid of tiles cuts slivers off at a road's ends. As every tile has as many crops, they would take up half of a
@@ -37,7 +37,7 @@ def read_domains(configuration: SegmentationConfiguration) -> dict[str, list[Til
     Raises:
         InputError: there are none, or they don't fit the configuration.
     """
-    domains: dict[str, list[Tile]] = {}
+    domains: dict[str, list[CloudTile]] = {}
     for domain, sources in configuration.needed().items():
         tiles = list(thinned(sources, configuration, domain))
         least = SMALLEST_SHARE * configuration.crop_points
@@ -48,7 +48,7 @@ def read_domains(configuration: SegmentationConfiguration) -> dict[str, list[Til
     return domains
 
 
-def thinned(sources: Sequence[Source], configuration: SegmentationConfiguration, title: str) -> Iterator[Tile]:
+def thinned(sources: Sequence[Source], configuration: SegmentationConfiguration, title: str) -> Iterator[CloudTile]:
     """Yield the tiles of sources with one point per training voxel.
 
     Scenes of two sources may have one name: here they have others, so that their intensities are scaled apart.
@@ -60,7 +60,7 @@ def thinned(sources: Sequence[Source], configuration: SegmentationConfiguration,
 
 def epoch_batches(
     configuration: SegmentationConfiguration,
-    tiles: Sequence[Tile],
+    tiles: Sequence[CloudTile],
     domains: Sequence[int],
     scaling: dict[str, Scaling],
     seeds: Seeds,
@@ -164,7 +164,7 @@ class Collate:
         return float(stream(self.configuration.seed, "mix3d", self.epoch, content).random())
 
 
-def adaptation_batches(tiles: list[Tile], configuration: SegmentationConfiguration) -> Iterator[Item]:
+def adaptation_batches(tiles: list[CloudTile], configuration: SegmentationConfiguration) -> Iterator[Item]:
     """Yield batches of a test's points without effects, from which the norms' statistics are taken."""
     if not tiles:
         return

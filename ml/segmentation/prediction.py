@@ -31,7 +31,7 @@ from ..cells import thin
 from .data.classes import IGNORED
 from .data.crops import CropSettings
 from .data.sources import FULL
-from .data.tiles import Scaling, Tile, eight_bits
+from .data.tiles import CloudTile, Scaling, eight_bits
 from .scores.scoring import Classifier, label_tile
 
 HEADER_TEXTS = range(26, 90)
@@ -184,7 +184,7 @@ class TileStore:
         low, middle, high = (int(np.searchsorted(share, at)) / FULL for at in (0.1, 0.5, 0.9))
         return Scaling(middle, high - low if high > low else 1.0)
 
-    def tiles(self) -> Iterator[tuple[Tile, NDArray[np.bool_], NDArray[np.int64]]]:
+    def tiles(self) -> Iterator[tuple[CloudTile, NDArray[np.bool_], NDArray[np.int64]]]:
         """Yield each tile with what lies around it, which points are its own, and where those stand in the file."""
         for row, column in sorted(self._known):
             parts, cores = [], []
@@ -195,7 +195,7 @@ class TileStore:
                     cores.append(np.full(len(record), north == 0 and east == 0))
             record, core = np.concatenate(parts), np.concatenate(cores)
             strength = (record["intensity"] / np.float32(FULL)).astype(np.float32)
-            tile = Tile(
+            tile = CloudTile(
                 "",
                 self._corner(np.array([[column, row]]))[0],
                 np.ascontiguousarray(record["place"]),

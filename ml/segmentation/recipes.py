@@ -19,7 +19,7 @@ from ..configuration import Configuration, Part, Schedule
 from .data.crops import FEATURES, CropSettings, Draw, Feature
 from .data.effects import Effects
 from .data.sources import FULL, Source
-from .data.tiles import Tile
+from .data.tiles import CloudTile
 
 SetUp = Literal["real", "synthetic", "mixed", "mixed_mapped", "fine_tuned"]
 
@@ -120,7 +120,7 @@ class SegmentationConfiguration(Configuration):
         return {domain: found[domain] for domain in wanted}
 
 
-def class_shares(tiles: Sequence[Tile], classes: int) -> NDArray[np.float64]:
+def class_shares(tiles: Sequence[CloudTile], classes: int) -> NDArray[np.float64]:
     """Return the share of the labelled points that each class has (C,).
 
     Raises:
@@ -138,7 +138,7 @@ def class_weights(shares: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.asarray(weights / weights.mean(), dtype=np.float64)
 
 
-def mapped_intensities(synthetic: Sequence[Tile], real: Sequence[Tile]) -> list[Tile]:
+def mapped_intensities(synthetic: Sequence[CloudTile], real: Sequence[CloudTile]) -> list[CloudTile]:
     """Return synthetic tiles whose intensities are distributed as those of the real ones, quantile on quantile.
 
     Both are training data: nothing of a test is looked at.
@@ -158,12 +158,12 @@ def mapped_intensities(synthetic: Sequence[Tile], real: Sequence[Tile]) -> list[
     ]
 
 
-def _levels(tile: Tile) -> NDArray[np.intp]:
+def _levels(tile: CloudTile) -> NDArray[np.intp]:
     assert tile.strength is not None
     return np.rint(np.clip(tile.strength, 0.0, 1.0) * FULL).astype(np.intp)
 
 
-def _histogram(tiles: Sequence[Tile], where: str) -> NDArray[np.int64]:
+def _histogram(tiles: Sequence[CloudTile], where: str) -> NDArray[np.int64]:
     counts = np.zeros(LEVELS, dtype=np.int64)
     for tile in tiles:
         if tile.strength is not None:

@@ -18,7 +18,7 @@ from ..runs import PRETRAINING, Run
 from ..training_loop import Figures, chosen_device, fit
 from .data.classes import IGNORED, class_names
 from .data.crops import Item, Seeds
-from .data.tiles import Tile, scalings
+from .data.tiles import CloudTile, scalings
 from .loading import epoch_batches, read_domains, thinned, watched_workers
 from .network import build, scores_of
 from .recipes import SegmentationConfiguration, class_shares, class_weights
@@ -26,7 +26,7 @@ from .scores.evaluation import classifier
 from .scores.metrics import Confusion, mean
 from .scores.scoring import label_tile
 
-Domains = dict[str, list[Tile]]
+Domains = dict[str, list[CloudTile]]
 
 
 def trained(run: Run[SegmentationConfiguration], progress: Progress = silent) -> tuple[nn.Module, Domains]:
@@ -60,7 +60,7 @@ def _fit(
     model: nn.Module,
     run: Run[SegmentationConfiguration],
     domains: Domains,
-    validation: list[Tile],
+    validation: list[CloudTile],
     progress: Progress,
 ) -> None:
     """Train on given domains by the run's schedule; afterwards the model has the run's last weights."""
@@ -108,7 +108,7 @@ def smoothed_loss(scores: Tensor, truth: Tensor, weights: Tensor, smoothing: flo
 
 
 def objective(
-    configuration: SegmentationConfiguration, tiles: Sequence[Tile], device: torch.device
+    configuration: SegmentationConfiguration, tiles: Sequence[CloudTile], device: torch.device
 ) -> Callable[[nn.Module, Item], tuple[Tensor, Figures]]:
     """Return what is minimised, its classes weighed by their shares of the training tiles.
 
@@ -130,7 +130,7 @@ def objective(
 
 
 def _validation(
-    configuration: SegmentationConfiguration, tiles: list[Tile], device: torch.device
+    configuration: SegmentationConfiguration, tiles: list[CloudTile], device: torch.device
 ) -> Callable[[nn.Module, int], Figures]:
     scaling = scalings(tiles, configuration.intensity)
 

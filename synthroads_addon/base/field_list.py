@@ -21,7 +21,7 @@ _TYPES = {"integer": "whole number", "number": "number", "string": "text"}
 
 
 @dataclass(frozen=True)
-class Field:
+class FieldEntry:
     """A field as ``--set`` takes it.
 
     Attributes:
@@ -111,13 +111,13 @@ def class_of(rule: Rule) -> str:
     return str(rule["$ref"]).rpartition("/")[2]
 
 
-def fields_of(model: type[BaseModel]) -> Iterator[Field]:
+def fields_of(model: type[BaseModel]) -> Iterator[FieldEntry]:
     """Yield the fields of a class and of all that lie in them, each before its own; those of one value are left out."""
     schema = model.model_json_schema()
     yield from _fields(schema, schema.get("$defs", {}), None)
 
 
-def _fields(schema: Rule, parts: Mapping[str, Rule], outer: Field | None) -> Iterator[Field]:
+def _fields(schema: Rule, parts: Mapping[str, Rule], outer: FieldEntry | None) -> Iterator[FieldEntry]:
     """Yield the fields of a class, which lies in a field or (None) in nothing."""
     for name, rule in schema["properties"].items():
         if "const" in rule:
@@ -143,7 +143,7 @@ def _kinds_as_one(classes: Sequence[Rule]) -> Sequence[Rule]:
     return [{"properties": properties, "required": required}]
 
 
-def _field(name: str, rule: Rule, schema: Rule, inner: Sequence[Rule], outer: Field | None) -> Field:
+def _field(name: str, rule: Rule, schema: Rule, inner: Sequence[Rule], outer: FieldEntry | None) -> FieldEntry:
     """Return a field of a class; what lies in an interval has its unit and its meaning.
 
     Args:
@@ -160,7 +160,7 @@ def _field(name: str, rule: Rule, schema: Rule, inner: Sequence[Rule], outer: Fi
     if outer and outer.interval:
         unit, said = outer.unit, f"{outer.description} {said}"
     choice = next((choice for choice in _choices(rule) if choice.get("type") != "null"), rule)
-    return Field(
+    return FieldEntry(
         path=f"{outer.path}.{name}" if outer else name,
         value=PLAIN.value(rule),
         unit="" if unit == "1" else unit,

@@ -111,7 +111,7 @@ class Chain:
         return Alignment([Element(float(n), float(a), float(b)) for n, a, b in rows], x, y, heading)
 
 
-class Data(Protocol):
+class AxisData(Protocol):
     """Points to be fitted: what `refine` and the search need of them."""
 
     @property
@@ -252,7 +252,7 @@ def elevations(chain: Chain, stations: FloatArray) -> FloatArray:
 
 
 @dataclass
-class Fit:
+class ChainFit:
     """A chain with the points' stations and residuals on it."""
 
     chain: Chain
@@ -273,7 +273,7 @@ class Fit:
     def p95(self) -> float:
         return float(np.percentile(np.abs(self.residuals), 95))
 
-    def linear(self, data: Data) -> tuple[FloatArray, FloatArray]:
+    def linear(self, data: AxisData) -> tuple[FloatArray, FloatArray]:
         """Return R (F, F) and (F,): the sum of squares is that of R d + the vector, but for a constant."""
         if self._linear is None:
             q, r = np.linalg.qr(data.jacobian(self.chain, self.stations))
@@ -288,7 +288,7 @@ def room(chain: Chain, least: float) -> FloatArray:
     return 0.5 * np.minimum(spare[:-1], spare[1:])
 
 
-def stepped(data: Data, chain: Chain, step: FloatArray) -> Chain:
+def stepped(data: AxisData, chain: Chain, step: FloatArray) -> Chain:
     """Return the chain after a step (F,) of all parameters, its knots kept apart."""
     values = np.clip(chain.values + step[chain.value_columns], -data.limit, data.limit)
     spare = _SHARE * np.maximum(np.diff(chain.knots) - data.least, 0.0)
@@ -303,7 +303,7 @@ def least_squares(matrix: FloatArray, wanted: FloatArray) -> FloatArray:
     return np.linalg.solve(r, q.T @ wanted)
 
 
-def knot_penalty(data: Data, chain: Chain, width: int) -> FloatArray:
+def knot_penalty(data: AxisData, chain: Chain, width: int) -> FloatArray:
     """Return (M - 1, width) rows that measure steps of the knots, the last of `width` parameters, by their room.
 
     Far from its place a knot's linear effect is worth nothing: without this, every knot would seem dispensable.
@@ -314,12 +314,12 @@ def knot_penalty(data: Data, chain: Chain, width: int) -> FloatArray:
     return rows
 
 
-def refine(data: Data, chain: Chain, stations: FloatArray, free_knots: bool, steps: int) -> Fit:
+def refine(data: AxisData, chain: Chain, stations: FloatArray, free_knots: bool, steps: int) -> ChainFit:
     """Levenberg-Marquardt: improve all free parameters at once, at most `steps` times.
 
     The damping holds knots by their room, scaled by the present sum of squares: exact data end quadratically.
     """
-    fit = Fit(chain, *data.measure(chain, stations))
+    fit = ChainFit(chain, *data.measure(chain, stations))
     basis = chain.basis(free_knots)
     damping, system = 1.0, _system(data, fit, basis, free_knots)
     for _ in range(steps if basis.shape[1] else 0):
@@ -328,7 +328,7 @@ def refine(data: Data, chain: Chain, stations: FloatArray, free_knots: bool, ste
         rows = np.vstack((r, weight * held, np.sqrt(1e-7 * damping) * np.eye(r.shape[1])))
         step = least_squares(rows, np.concatenate((wanted, np.zeros(len(rows) - len(wanted))))) / scale
         trial_chain = stepped(data, fit.chain, basis @ step)
-        trial = Fit(trial_chain, *data.measure(trial_chain, fit.stations))
+        trial = ChainFit(trial_chain, *data.measure(trial_chain, fit.stations))
         if trial.square < fit.square:
             gain = 1.0 - trial.square / fit.square
             fit, damping = trial, max(0.2 * damping, 1e-6)
@@ -342,7 +342,7 @@ def refine(data: Data, chain: Chain, stations: FloatArray, free_knots: bool, ste
     return fit
 
 
-def _system(data: Data, fit: Fit, basis: FloatArray, free_knots: bool) -> tuple[FloatArray, ...]:
+def _system(data: AxisData, fit: ChainFit, basis: FloatArray, free_knots: bool) -> tuple[FloatArray, ...]:
     """Return R (P, P), the right side (P,), the knots' penalty (M - 1, P) and the scale (P,) of the linear problem."""
     matrix = data.jacobian(fit.chain, fit.stations) @ basis
     scale = column_scale(matrix)

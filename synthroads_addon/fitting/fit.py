@@ -18,7 +18,7 @@ from ..base.errors import InputError
 from ..road.alignment import Alignment, Element, FloatArray, IntArray, finite_array
 from ..road.centerline import read_axis
 from ..road.profile import IntersectionPoint, Profile
-from .chain import FREE, Chain, Data, Fit, Heights, Plan, elevations, refine
+from .chain import FREE, AxisData, Chain, ChainFit, Heights, Plan, elevations, refine
 from .search import Goal, descent, improved, independent
 from .start import Start, start_heights, start_plan
 
@@ -148,7 +148,7 @@ class _Part(Protocol):
 
     spacing: ClassVar[_Spacing]
 
-    def begin(self, chosen: IntArray, spacing: float, start: Start | None, origin: float) -> tuple[Data, Fit]:
+    def begin(self, chosen: IntArray, spacing: float, start: Start | None, origin: float) -> tuple[AxisData, ChainFit]:
         """Return the points' data and their fit by fixed knots `spacing` apart."""
 
     def leave(self, chain: Chain, cut: float) -> Start:
@@ -161,7 +161,7 @@ class _PlanPart:
     weights: FloatArray
     spacing: ClassVar[_Spacing] = _Spacing(7.0, _SPACING, 5.0)
 
-    def begin(self, chosen: IntArray, spacing: float, start: Start | None, origin: float) -> tuple[Data, Fit]:
+    def begin(self, chosen: IntArray, spacing: float, start: Start | None, origin: float) -> tuple[AxisData, ChainFit]:
         data = Plan(self.points[chosen], self.weights[chosen], 0.4 * spacing, max(_NEAR, 2.0 * spacing))
         chain, station = start_plan(data.points, spacing, start)
         return data, refine(data, chain, station, False, 8)
@@ -178,7 +178,7 @@ class _HeightPart:
     weights: FloatArray
     spacing: ClassVar[_Spacing] = _Spacing(20.0, 40.0, 40.0)
 
-    def begin(self, chosen: IntArray, spacing: float, start: Start | None, origin: float) -> tuple[Data, Fit]:
+    def begin(self, chosen: IntArray, spacing: float, start: Start | None, origin: float) -> tuple[AxisData, ChainFit]:
         data = Heights(self.heights[chosen], self.weights[chosen], 0.8 * spacing)
         station = self.station[chosen] - origin
         return data, refine(data, start_heights(station, data.heights, spacing, start), station, False, 8)
@@ -229,7 +229,9 @@ def _walk(part: _Part, run: FloatArray, tolerance: float) -> tuple[Chain, FloatA
         first, origin = int(chosen[np.argmax(fit.stations >= cut)]), origin + cut
 
 
-def _solve(part: _Part, chosen: IntArray, start: Start | None, origin: float, length: float, tolerance: float) -> Fit:
+def _solve(
+    part: _Part, chosen: IntArray, start: Start | None, origin: float, length: float, tolerance: float
+) -> ChainFit:
     """Fit one window: as exact data if they are, else with knots as dense as the tolerance needs."""
     scale = 2.5 * length / len(chosen)  # knots need data between them
     count = independent(length, len(chosen))
@@ -253,7 +255,7 @@ def _solve(part: _Part, chosen: IntArray, start: Start | None, origin: float, le
     return improved(data, min(descent(data, rich, goal), key=goal.rank), goal)
 
 
-def _exactly(fit: Fit) -> bool:
+def _exactly(fit: ChainFit) -> bool:
     """Tell whether nothing but rounding is left of the residuals."""
     r = fit.residuals
     return fit.rms < _EXACT or (fit.rms < _ROUNDED and float(r[1:] @ r[:-1]) < _RANDOM * fit.square)

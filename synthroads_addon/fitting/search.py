@@ -24,9 +24,9 @@ from .chain import (
     EQUAL,
     FREE,
     ZERO,
+    AxisData,
     Chain,
-    Data,
-    Fit,
+    ChainFit,
     column_scale,
     knot_penalty,
     least_squares,
@@ -75,10 +75,10 @@ class Goal:
     count: float
     most: int
 
-    def met(self, fit: Fit) -> bool:
+    def met(self, fit: ChainFit) -> bool:
         return fit.rms <= self.rms and fit.p95 <= self.p95
 
-    def score(self, fit: Fit) -> float:
+    def score(self, fit: ChainFit) -> float:
         return self.expected(fit.square, fit.chain, len(fit.residuals))
 
     def expected(self, square: float, chain: Chain, points: int) -> float:
@@ -86,7 +86,7 @@ class Goal:
         misfit = np.log(max(square, 0.0) / points + self.floor**2)
         return self.count * misfit + (chain.freedom() + 0.5 * chain.size) * np.log(self.count)
 
-    def rank(self, fit: Fit) -> tuple[bool, bool, float]:
+    def rank(self, fit: ChainFit) -> tuple[bool, bool, float]:
         """Key that is least for the best fit: bounds first, then the number of elements, then the score."""
         return (not self.met(fit), fit.chain.size > self.most, self.score(fit))
 
@@ -148,7 +148,7 @@ def _lift(chain: Chain, new: Chain, keep: list[int]) -> FloatArray:
     return lift
 
 
-def foresee(data: Data, fit: Fit, edits: Sequence[Edit], free_knots: bool, goal: Goal) -> tuple[Chain, float]:
+def foresee(data: AxisData, fit: ChainFit, edits: Sequence[Edit], free_knots: bool, goal: Goal) -> tuple[Chain, float]:
     """Return the edited chain at the optimum of the linearised problem, and the sum of squares expected there."""
     new, keep = edited(fit.chain, edits)
     new = new.tied()
@@ -168,12 +168,12 @@ def foresee(data: Data, fit: Fit, edits: Sequence[Edit], free_knots: bool, goal:
     return stepped(data, new, basis @ (scaled / scale)), square
 
 
-def _allowance(fit: Fit, goal: Goal) -> float:
+def _allowance(fit: ChainFit, goal: Goal) -> float:
     """Return what a knot's step over its whole room costs, m: as much as all residuals."""
     return float(np.sqrt(fit.square + len(fit.residuals) * goal.floor**2))
 
 
-def _covariance_root(data: Data, fit: Fit, free_knots: bool, goal: Goal) -> FloatArray:
+def _covariance_root(data: AxisData, fit: ChainFit, free_knots: bool, goal: Goal) -> FloatArray:
     """Return W with W.T @ W the free parameters' covariance for unit noise."""
     basis = fit.chain.basis(free_knots)
     rows = fit.linear(data)[0] @ basis
@@ -184,7 +184,7 @@ def _covariance_root(data: Data, fit: Fit, free_knots: bool, goal: Goal) -> Floa
     return np.linalg.solve(root, np.eye(len(scale))).T / scale
 
 
-def options(data: Data, fit: Fit, free_knots: bool, goal: Goal) -> list[tuple[float, Edit]]:
+def options(data: AxisData, fit: ChainFit, free_knots: bool, goal: Goal) -> list[tuple[float, Edit]]:
     """Return (expected change of score, edit), cheapest first, by each edit's own Wald statistic."""
     chain, present = fit.chain, goal.score(fit)
     root = _covariance_root(data, fit, free_knots, goal)
@@ -223,7 +223,7 @@ def _merges(chain: Chain, basis: FloatArray, free_knots: bool) -> Iterator[Condi
             yield Edit("merge", i), condition[None], np.array([values[i] - values[i - 1] - share * change])
 
 
-def _snaps(data: Data, chain: Chain, basis: FloatArray) -> Iterator[Condition]:
+def _snaps(data: AxisData, chain: Chain, basis: FloatArray) -> Iterator[Condition]:
     """Yield for each element that its ends' values are equal, and that they are zero."""
     rows = basis[chain.value_columns]
     for e, kind in enumerate(chain.kinds):
@@ -254,11 +254,11 @@ def _several(options_: list[tuple[float, Edit]], most: int, gain: float) -> list
     return chosen
 
 
-def _refined(data: Data, fit: Fit, chain: Chain, free_knots: bool) -> Fit:
+def _refined(data: AxisData, fit: ChainFit, chain: Chain, free_knots: bool) -> ChainFit:
     return refine(data, chain, fit.stations, free_knots, 12)
 
 
-def simplified(data: Data, fit: Fit, free_knots: bool, goal: Goal) -> Fit | None:
+def simplified(data: AxisData, fit: ChainFit, free_knots: bool, goal: Goal) -> ChainFit | None:
     """Return the fit after the edit, or the edits at once, that cost least; None if there is nothing to take away."""
     ways = options(data, fit, free_knots, goal)
     batch = _several(ways, max(1, fit.chain.size // 3), 0.5 * np.log(goal.count))
@@ -277,7 +277,7 @@ def simplified(data: Data, fit: Fit, free_knots: bool, goal: Goal) -> Fit | None
     return min(trials, key=goal.score, default=None)
 
 
-def _trials(data: Data, fit: Fit, edits: list[Edit], free_knots: bool, goal: Goal) -> Iterator[Fit]:
+def _trials(data: AxisData, fit: ChainFit, edits: list[Edit], free_knots: bool, goal: Goal) -> Iterator[ChainFit]:
     """Foresee every edit and refine the most promising ones, best first."""
     foreseen = [foresee(data, fit, [edit], free_knots, goal) for edit in edits]
     scores = [goal.expected(square, chain, len(fit.residuals)) for chain, square in foreseen]
@@ -285,7 +285,7 @@ def _trials(data: Data, fit: Fit, edits: list[Edit], free_knots: bool, goal: Goa
         yield _refined(data, fit, foreseen[i][0], free_knots)
 
 
-def descent(data: Data, fit: Fit, goal: Goal) -> list[Fit]:
+def descent(data: AxisData, fit: ChainFit, goal: Goal) -> list[ChainFit]:
     """Return all fits from a rich chain down to few elements: first with fixed knots, then with free ones.
 
     It goes on past the bounds, since a poor removal may be made good by the next, but not hopelessly far.
@@ -303,7 +303,7 @@ def descent(data: Data, fit: Fit, goal: Goal) -> list[Fit]:
     return path
 
 
-def splits(data: Data, fit: Fit) -> list[Chain]:
+def splits(data: AxisData, fit: ChainFit) -> list[Chain]:
     """Return chains with one element more, or one freer, the one that would help most first."""
     chain = fit.chain
     cuts = np.linspace(0.0, 1.0, _PARTS + 1)[:-1]
@@ -344,7 +344,7 @@ def _gain(columns: list[FloatArray], q: FloatArray, rest: FloatArray) -> float:
     return float(rest @ (new @ solution))
 
 
-def improved(data: Data, fit: Fit, goal: Goal, steps: int = 60) -> Fit:
+def improved(data: AxisData, fit: ChainFit, goal: Goal, steps: int = 60) -> ChainFit:
     """Return a fit that no single edit improves: grown until the bounds are met, then changed while the rank falls."""
     for _ in range(steps):
         while goal.met(fit):
@@ -367,7 +367,7 @@ def improved(data: Data, fit: Fit, goal: Goal, steps: int = 60) -> Fit:
     return fit
 
 
-def _better(new: Fit, old: Fit, goal: Goal) -> bool:
+def _better(new: ChainFit, old: ChainFit, goal: Goal) -> bool:
     """Tell whether a fit beats another: by its bounds or number of elements, or by a score worth it."""
     coarse_new, coarse_old = goal.rank(new)[:2], goal.rank(old)[:2]
     return coarse_new < coarse_old or (coarse_new == coarse_old and goal.score(new) < goal.score(old) - _WORTH)

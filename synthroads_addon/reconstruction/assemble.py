@@ -31,7 +31,7 @@ from ..road.parameters import (
 from ..road.things.furniture import ConcreteBarrier, Guardrail, NoiseBarrier
 from .lines import Line
 from .objects import FoundBarrier, FoundPost
-from .section import Section, Side, SideSection, line_width
+from .section import MeasuredSection, Side, SideSection, line_width
 
 Float = NDArray[np.float64]
 RotationAxis = Literal["carriageway_axis", "inner_edge"]
@@ -46,7 +46,7 @@ _ROUND = 4  # digits of lengths: a tenth of a millimetre
 
 
 @dataclass(frozen=True)
-class Ground:
+class GroundShape:
     """Ground beside the road: reach, mean height of the centreline above it, its spread, the verge's width (m)."""
 
     half_width: float
@@ -77,13 +77,13 @@ class Measured:
     fit: AxisFit
     origin: Float
     epsg: int | None
-    section: Section
+    section: MeasuredSection
     stations: Float
     crossfall: dict[Side, Float]
     rotation: RotationAxis
     barriers: list[FoundBarrier]
     posts: list[FoundPost]
-    ground: Ground
+    ground: GroundShape
     marked: bool
     title: str
 
@@ -289,7 +289,7 @@ def barrier_object(barrier: FoundBarrier, start: float, end: float, length: floa
     return Guardrail(**ends, height=height, faces=barrier.faces, terminal_length=terminal)
 
 
-def _terrain(ground: Ground) -> Terrain:
+def _terrain(ground: GroundShape) -> Terrain:
     return Terrain(
         instance=1,
         half_width=_length(float(np.clip(ground.half_width, 5.0, 1000.0))),

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .layout import Layout
+from .layout import RoadLayout
 from .lines import USUAL, Line
 from .path import SPACING
 from .profiles import STRETCH
@@ -37,7 +37,7 @@ class Centre:
     raw: Float
 
 
-def centre_of(layout: Layout) -> Centre:
+def centre_of(layout: RoadLayout) -> Centre:
     """Return the axis of a layout.
 
     Of a dual carriageway it is the middle between its two innermost lines, of a single one the line in its middle; for
@@ -66,7 +66,7 @@ def centre_of(layout: Layout) -> Centre:
     return Centre(stations, held, np.hypot(smoothed.std, level_std), raw)
 
 
-def axis_guides(layout: Layout) -> tuple[Line, ...]:
+def axis_guides(layout: RoadLayout) -> tuple[Line, ...]:
     """Return the lines, or edges, whose mean is the axis."""
     if layout.kind == "dual":
         right, left = layout.bands

@@ -14,7 +14,7 @@ from ..base.classes import ClassScheme
 from ..base.errors import InputError
 from ..cloud.formats.registry import open_cloud
 from .ground import above_ground
-from .path import Path
+from .path import CloudPath
 
 Float = NDArray[np.float64]
 
@@ -24,7 +24,7 @@ _LABELLED_SHARE = 0.01  # of the surface's points must be labelled pavement for 
 _UNSORTED_SHARE = 0.5  # of the points without any class: the cloud has to be sorted by height
 
 
-class Kind(IntEnum):
+class PointKind(IntEnum):
     """Class of a point, as far as the reconstruction asks."""
 
     OTHER = 0
@@ -40,25 +40,25 @@ class Kind(IntEnum):
     FURNITURE = 10
 
 
-SURFACE = (Kind.GROUND, Kind.VERGE, Kind.PAVEMENT, Kind.MARKING)
+SURFACE = (PointKind.GROUND, PointKind.VERGE, PointKind.PAVEMENT, PointKind.MARKING)
 """Classes that lie flat."""
-STANDING = (Kind.GUARDRAIL, Kind.BARRIER, Kind.NOISE_BARRIER, Kind.POST, Kind.FURNITURE)
+STANDING = (PointKind.GUARDRAIL, PointKind.BARRIER, PointKind.NOISE_BARRIER, PointKind.POST, PointKind.FURNITURE)
 """Classes that stand on the road or beside it, and are looked for."""
 
 KIND_OF_CLASS = {
-    "ground": Kind.GROUND,
-    "roadside": Kind.VERGE,
-    "road": Kind.PAVEMENT,
-    "road_surface": Kind.PAVEMENT,
-    "road_marking": Kind.MARKING,
-    "guardrail": Kind.GUARDRAIL,
-    "barrier": Kind.BARRIER,
-    "noise_barrier": Kind.NOISE_BARRIER,
-    "warning_post": Kind.POST,
-    "road_furniture": Kind.FURNITURE,
-    "never_classified": Kind.UNSORTED,
-    "unclassified": Kind.UNSORTED,
-    "unlabelled": Kind.UNSORTED,
+    "ground": PointKind.GROUND,
+    "roadside": PointKind.VERGE,
+    "road": PointKind.PAVEMENT,
+    "road_surface": PointKind.PAVEMENT,
+    "road_marking": PointKind.MARKING,
+    "guardrail": PointKind.GUARDRAIL,
+    "barrier": PointKind.BARRIER,
+    "noise_barrier": PointKind.NOISE_BARRIER,
+    "warning_post": PointKind.POST,
+    "road_furniture": PointKind.FURNITURE,
+    "never_classified": PointKind.UNSORTED,
+    "unclassified": PointKind.UNSORTED,
+    "unlabelled": PointKind.UNSORTED,
 }
 """Names of classes of the project and of LAS; what isn't here is not used."""
 
@@ -70,7 +70,7 @@ class RoadCloud:
     Attributes:
         xyz: (N, 3) m, less the origin.
         intensity: (N,) float32, in the file's own unit.
-        kind: (N,) uint8 of `Kind`; none is OTHER.
+        kind: (N,) uint8 of `PointKind`; none is OTHER.
         origin: (3,) map coordinates, m, whole metres.
         epsg: code of the map system, or None.
         labelled: whether pavement is told from ground by class.
@@ -94,12 +94,12 @@ class RoadCloud:
         """Return the indices of the points that lie flat."""
         return np.flatnonzero(self.of(*SURFACE))
 
-    def near(self, path: Path, distance: float) -> RoadCloud:
+    def near(self, path: CloudPath, distance: float) -> RoadCloud:
         """Return the points within a distance (m) of a path, roughly."""
         kept = path.within(self.xyz[:, :2], distance)
         return replace(self, xyz=self.xyz[kept], intensity=self.intensity[kept], kind=self.kind[kept])
 
-    def of(self, *kinds: Kind) -> NDArray[np.bool_]:
+    def of(self, *kinds: PointKind) -> NDArray[np.bool_]:
         """Return the mask (N,) of some kinds."""
         return np.isin(self.kind, kinds)
 
@@ -123,7 +123,7 @@ def read_road_cloud(path: FilePath) -> RoadCloud:
         for block in cloud.blocks():
             kind = table[block.class_id]
             counts += np.bincount(block.class_id, minlength=256)
-            kept = kind != Kind.OTHER
+            kept = kind != PointKind.OTHER
             parts.append((block.xyz[kept], block.intensity[kept].astype(np.float32), kind[kept]))
     if not sum(len(part[0]) for part in parts):
         known = ", ".join(KIND_OF_CLASS)
@@ -136,10 +136,10 @@ def read_road_cloud(path: FilePath) -> RoadCloud:
 
 
 def kind_table(scheme: ClassScheme) -> NDArray[np.uint8]:
-    """Return the (256,) table from a scheme's ids to `Kind`."""
-    table = np.full(256, Kind.OTHER, dtype=np.uint8)
+    """Return the (256,) table from a scheme's ids to `PointKind`."""
+    table = np.full(256, PointKind.OTHER, dtype=np.uint8)
     for number, name in scheme.names().items():
-        table[number] = KIND_OF_CLASS.get(name, Kind.OTHER)
+        table[number] = KIND_OF_CLASS.get(name, PointKind.OTHER)
     return table
 
 
@@ -152,19 +152,19 @@ def _sorted_cloud(
 ) -> RoadCloud:
     """Return the cloud after what has no class was sorted by height, or left out."""
     origin, epsg, classes = told
-    unsorted = kind == Kind.UNSORTED
+    unsorted = kind == PointKind.UNSORTED
     surface = np.isin(kind, SURFACE)
     if unsorted.mean() > _UNSORTED_SHARE and surface.sum() < FEWEST_POINTS:
         height = above_ground(xyz)
-        kind = np.where(unsorted & (np.abs(height) < 0.12), Kind.GROUND, kind).astype(np.uint8)
-        kind = np.where(unsorted & (height >= 0.2) & (height < 8.0), Kind.FURNITURE, kind).astype(np.uint8)
-    kept = kind != Kind.UNSORTED
+        kind = np.where(unsorted & (np.abs(height) < 0.12), PointKind.GROUND, kind).astype(np.uint8)
+        kind = np.where(unsorted & (height >= 0.2) & (height < 8.0), PointKind.FURNITURE, kind).astype(np.uint8)
+    kept = kind != PointKind.UNSORTED
     xyz, intensity, kind = xyz[kept], intensity[kept], kind[kept]
     surface = np.isin(kind, SURFACE)
     if surface.sum() < FEWEST_POINTS:
         allowed = f"at least {FEWEST_POINTS} points of ground or road are needed"
         raise InputError(str(path), int(surface.sum()), allowed)
-    paved = np.isin(kind, (Kind.PAVEMENT, Kind.MARKING))
+    paved = np.isin(kind, (PointKind.PAVEMENT, PointKind.MARKING))
     labelled = bool(paved.sum() > _LABELLED_SHARE * surface.sum())
-    marked = labelled and bool((kind == Kind.MARKING).sum() > 0.001 * paved.sum())
+    marked = labelled and bool((kind == PointKind.MARKING).sum() > 0.001 * paved.sum())
     return RoadCloud(xyz, intensity, kind, origin, epsg, labelled, marked, sum(classes.values()), classes)

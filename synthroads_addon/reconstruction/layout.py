@@ -73,7 +73,7 @@ class Band:
 
 
 @dataclass(frozen=True)
-class Layout:
+class RoadLayout:
     """Layout of a road: kind and number of its carriageways and lanes.
 
     Attributes:
@@ -89,7 +89,7 @@ class Layout:
     notes: tuple[str, ...]
 
 
-def find_layout(profiles: Profiles, lines: list[Line], wanted: RoadKind | None = None) -> Layout:
+def find_layout(profiles: Profiles, lines: list[Line], wanted: RoadKind | None = None) -> RoadLayout:
     """Return the layout of profiles with lines.
 
     Args:
@@ -118,7 +118,7 @@ def find_layout(profiles: Profiles, lines: list[Line], wanted: RoadKind | None =
     chosen = pair or (max(bands, key=lambda band: (len(band.lines), band.width)),)
     if len(bands) > len(chosen):
         notes.append(f"{len(bands) - len(chosen)} other strips of pavement were left out")
-    return Layout("dual" if pair else "single", chosen, paved, tuple(notes))
+    return RoadLayout("dual" if pair else "single", chosen, paved, tuple(notes))
 
 
 def covered(profiles: Profiles) -> float:

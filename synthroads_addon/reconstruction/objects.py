@@ -14,7 +14,7 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from ..road.things.body_shapes import GUARDRAIL_BEAM, GUARDRAIL_POST, GUARDRAIL_SPACER
-from .cloud import Kind
+from .cloud import PointKind
 from .smoothing import mean_with_std
 
 Float = NDArray[np.float64]
@@ -32,7 +32,7 @@ _FEWEST_OF_BARRIER = 10
 _POST_APART = 0.4  # m: points nearer than this belong to one post
 _FEWEST_OF_POST = 2
 _POST_WIDEST = 0.7  # m, of a post's points from side to side, position errors of strips included
-_POST_HEIGHTS = {Kind.POST: (0.1, 2.0), Kind.FURNITURE: (0.45, 1.3)}
+_POST_HEIGHTS = {PointKind.POST: (0.1, 2.0), PointKind.FURNITURE: (0.45, 1.3)}
 USUAL_POST = 1.0
 """Height of a delineator, m: the highest of a few points on it lies lower."""
 _BARRIER_HEIGHTS = (0.25, 1.6)
@@ -42,13 +42,13 @@ _BEAM = GUARDRAIL_POST[0] / 2.0 + 0.5 * max(point[0] for point in GUARDRAIL_BEAM
 
 
 @dataclass(frozen=True)
-class Standing:
+class StandingObject:
     """Points of what stands, in the road's frame.
 
     Attributes:
         station, offset: (N,) m.
         height: (N,) above the road's surface or the ground, m.
-        kind: (N,) of `Kind`.
+        kind: (N,) of `PointKind`.
     """
 
     station: Float
@@ -56,9 +56,9 @@ class Standing:
     height: Float
     kind: NDArray[np.uint8]
 
-    def chosen(self, mask: NDArray[np.bool_] | NDArray[np.intp]) -> Standing:
+    def chosen(self, mask: NDArray[np.bool_] | NDArray[np.intp]) -> StandingObject:
         """Return some of the points."""
-        return Standing(self.station[mask], self.offset[mask], self.height[mask], self.kind[mask])
+        return StandingObject(self.station[mask], self.offset[mask], self.height[mask], self.kind[mask])
 
 
 @dataclass(frozen=True)
@@ -86,11 +86,11 @@ class FoundPost:
     points: int
 
 
-def find_barriers(standing: Standing) -> tuple[list[FoundBarrier], NDArray[np.bool_]]:
+def find_barriers(standing: StandingObject) -> tuple[list[FoundBarrier], NDArray[np.bool_]]:
     """Return the barriers along the road, and which points (N,) belong to one."""
     found: list[FoundBarrier] = []
     used = np.zeros(len(standing.station), dtype=bool)
-    for kind in (Kind.GUARDRAIL, Kind.BARRIER, Kind.NOISE_BARRIER, Kind.FURNITURE):
+    for kind in (PointKind.GUARDRAIL, PointKind.BARRIER, PointKind.NOISE_BARRIER, PointKind.FURNITURE):
         own = np.flatnonzero(standing.kind == kind)
         for members in _linear(standing.station[own], standing.offset[own]):
             part = standing.chosen(own[members])
@@ -119,7 +119,7 @@ def _linear(station: Float, offset: Float) -> list[NDArray[np.intp]]:
     return [g for g in groups if len(g) >= _FEWEST_OF_BARRIER and np.ptp(station[g]) >= SHORTEST_BARRIER]
 
 
-def _pieces(part: Standing) -> list[NDArray[np.bool_]]:
+def _pieces(part: StandingObject) -> list[NDArray[np.bool_]]:
     """Return masks of the pieces of a linear cluster along which its offset stays the same."""
     index = np.floor((part.station - part.station.min()) / _STRETCH).astype(np.int64)
     order = np.argsort(index, kind="stable")
@@ -135,7 +135,7 @@ def _pieces(part: Standing) -> list[NDArray[np.bool_]]:
     return [owner[index] == piece for piece in range(int(owner.max()) + 1)]
 
 
-def _barrier(part: Standing, kind: Kind) -> FoundBarrier | None:
+def _barrier(part: StandingObject, kind: PointKind) -> FoundBarrier | None:
     """Return the barrier of some points; None where they are too few, too short, or shaped otherwise."""
     count = len(part.station)
     if count < _FEWEST_OF_BARRIER:
@@ -148,8 +148,8 @@ def _barrier(part: Standing, kind: Kind) -> FoundBarrier | None:
     upper = part.height > 0.4 * height
     middles = np.array([np.median(part.offset[upper & (index == i)]) for i in np.unique(index[upper])])
     offset, std = mean_with_std(middles)
-    told: BarrierKind = {Kind.BARRIER: "concrete", Kind.NOISE_BARRIER: "noise"}.get(kind, "guardrail")  # type: ignore[assignment]
-    if kind == Kind.FURNITURE:
+    told: BarrierKind = {PointKind.BARRIER: "concrete", PointKind.NOISE_BARRIER: "noise"}.get(kind, "guardrail")  # type: ignore[assignment]
+    if kind == PointKind.FURNITURE:
         if not _BARRIER_HEIGHTS[0] < height or np.std(part.offset[upper]) > 0.35:
             return None
         told = "noise" if height > _NOISE_FROM else "guardrail"
@@ -174,7 +174,7 @@ def facing(barrier: FoundBarrier, side: Literal["left", "right", "both"]) -> Fou
     )
 
 
-def find_posts(standing: Standing, barrier_points: NDArray[np.bool_]) -> list[FoundPost]:
+def find_posts(standing: StandingObject, barrier_points: NDArray[np.bool_]) -> list[FoundPost]:
     """Return the delineators: small clusters of their class, or lone ones of their height where the class is unknown.
 
     Args:
@@ -182,11 +182,11 @@ def find_posts(standing: Standing, barrier_points: NDArray[np.bool_]) -> list[Fo
         barrier_points: (N,) which of them belong to barriers.
     """
     posts: list[FoundPost] = []
-    for kind in (Kind.POST, Kind.FURNITURE):
+    for kind in (PointKind.POST, PointKind.FURNITURE):
         own = np.flatnonzero((standing.kind == kind) & ~barrier_points)
         part = standing.chosen(np.isin(np.arange(len(standing.kind)), own))
         clusters = _clusters(part)
-        tree = cKDTree(np.column_stack([standing.station, standing.offset])) if kind == Kind.FURNITURE else None
+        tree = cKDTree(np.column_stack([standing.station, standing.offset])) if kind == PointKind.FURNITURE else None
         for members in clusters:
             post = _post(part.chosen(members), kind)
             if post is not None and (tree is None or _stands_alone(tree, post, int(members.sum()))):
@@ -194,7 +194,7 @@ def find_posts(standing: Standing, barrier_points: NDArray[np.bool_]) -> list[Fo
     return sorted(posts, key=lambda item: (item.station, item.offset))
 
 
-def _clusters(part: Standing) -> list[NDArray[np.bool_]]:
+def _clusters(part: StandingObject) -> list[NDArray[np.bool_]]:
     """Return masks of the clusters of points that hang together."""
     if not len(part.station):
         return []
@@ -212,7 +212,7 @@ def _clusters(part: Standing) -> list[NDArray[np.bool_]]:
     return masks
 
 
-def _post(part: Standing, kind: Kind) -> FoundPost | None:
+def _post(part: StandingObject, kind: PointKind) -> FoundPost | None:
     """Return the post of a cluster, or None if it is no post's size."""
     count = len(part.station)
     top = float(part.height.max())

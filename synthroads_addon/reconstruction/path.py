@@ -32,7 +32,7 @@ SHORTEST = 50.0
 
 
 @dataclass(frozen=True)
-class Path:
+class CloudPath:
     """A line by running length, with a point each metre.
 
     Attributes:
@@ -91,14 +91,14 @@ class Path:
         _, nearest = cKDTree(self.points).query(middles)
         return np.asarray(SPACING * nearest[owner].astype(np.float64))
 
-    def moved(self, offset: Float) -> Path:
+    def moved(self, offset: Float) -> CloudPath:
         """Return the path through what lies an offset (M,) to the left of each point."""
         return path_through(self.place(self.stations, offset))
 
-    def cut(self, low: float, high: float) -> Path:
+    def cut(self, low: float, high: float) -> CloudPath:
         """Return the part between two stations, beginning at station 0."""
         kept = (self.stations >= low - 1e-9) & (self.stations <= high + 1e-9)
-        return Path(self.points[kept], self.heading[kept])
+        return CloudPath(self.points[kept], self.heading[kept])
 
 
 def _cells(points: Float) -> tuple[Float, NDArray[np.intp]]:
@@ -132,7 +132,7 @@ def _project(frames: Float, points: Float, along: Float) -> tuple[Float, Float]:
     return along, offset
 
 
-def path_through(points: Float) -> Path:
+def path_through(points: Float) -> CloudPath:
     """Return a path through a polyline (K, 2), a point each metre.
 
     Raises:
@@ -147,17 +147,17 @@ def path_through(points: Float) -> Path:
     station = np.arange(0.0, run[-1], SPACING)
     even = np.column_stack([np.interp(station, run, points[:, i]) for i in range(2)])
     change = np.gradient(even, axis=0)
-    return Path(even, np.unwrap(np.arctan2(change[:, 1], change[:, 0])))
+    return CloudPath(even, np.unwrap(np.arctan2(change[:, 1], change[:, 0])))
 
 
-def alignment_path(alignment: Alignment) -> Path:
+def alignment_path(alignment: Alignment) -> CloudPath:
     """Return an alignment as a path, with the alignment's own stations; the last point may lie just beyond its end."""
     station = np.arange(0.0, np.ceil(alignment.length) + 0.5, SPACING)
     position, heading, _ = alignment.frame(station)
-    return Path(position, heading)
+    return CloudPath(position, heading)
 
 
-def first_path(xy: Float) -> Path:
+def first_path(xy: Float) -> CloudPath:
     """Return a path along the middle of a surface of which there are points (N, 2), in any order.
 
     Metre cells, not points, count, so that neither density nor overlapping strips pull the path. It begins in the
@@ -178,7 +178,7 @@ def first_path(xy: Float) -> Path:
     return smoothed_path(path_through(line), _WAVELENGTH)
 
 
-def smoothed_path(path: Path, wavelength: float) -> Path:
+def smoothed_path(path: CloudPath, wavelength: float) -> CloudPath:
     """Return a path without its swings that are shorter than a wavelength (m)."""
     kept = path.points[::5]
     weights = np.ones(len(kept))

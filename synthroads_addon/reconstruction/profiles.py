@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from .cloud import Kind, RoadCloud
-from .path import SPACING, Path
+from .cloud import PointKind, RoadCloud
+from .path import SPACING, CloudPath
 
 Float = NDArray[np.float64]
 Grid = NDArray[np.float32]
@@ -63,7 +63,7 @@ class Profiles:
         points: the surface's points themselves; None if classes don't tell, or nobody asked for them.
     """
 
-    path: Path
+    path: CloudPath
     stations: Float
     offsets: Float
     count: Grid
@@ -78,7 +78,7 @@ class Profiles:
         return int(np.clip(round((offset - self.offsets[0]) / ACROSS), 0, len(self.offsets) - 1))
 
 
-def make_profiles(cloud: RoadCloud, path: Path, half_width: float, exact: bool = False) -> Profiles:
+def make_profiles(cloud: RoadCloud, path: CloudPath, half_width: float, exact: bool = False) -> Profiles:
     """Return the profiles of a cloud along a path, up to half a width (m) to either side.
 
     Args:
@@ -103,8 +103,8 @@ def make_profiles(cloud: RoadCloud, path: Path, half_width: float, exact: bool =
     with np.errstate(invalid="ignore", divide="ignore"):
         height = total(cloud.xyz[surface, 2][inside]) / count
         brightness = total(cloud.intensity[surface][inside]) / count
-        paved = total(np.isin(kind, (Kind.PAVEMENT, Kind.MARKING))) / count if cloud.labelled else None
-        marked = total(kind == Kind.MARKING) / count if cloud.marked else None
+        paved = total(np.isin(kind, (PointKind.PAVEMENT, PointKind.MARKING))) / count if cloud.labelled else None
+        marked = total(kind == PointKind.MARKING) / count if cloud.marked else None
     paint = painted(brightness, paved) if marked is None else marked
     stations = path.start + SPACING * (np.arange(rows) + 0.5)
     offsets = ACROSS * (np.arange(columns) - columns // 2 + 0.5)
@@ -124,8 +124,8 @@ def _by_stretch(
         begins=begins,
         station=station[order].astype(np.float32),
         offset=offset[order].astype(np.float32),
-        paved=np.isin(kind[order], (Kind.PAVEMENT, Kind.MARKING)),
-        marked=kind[order] == Kind.MARKING,
+        paved=np.isin(kind[order], (PointKind.PAVEMENT, PointKind.MARKING)),
+        marked=kind[order] == PointKind.MARKING,
     )
 
 

@@ -14,20 +14,20 @@ from ..fitting.fit import AxisFit, fit_axis
 from ..road.parameters import RoadParameters
 from .assemble import Measured, RotationAxis, assembled
 from .axis import Centre, centre_of
-from .cloud import Kind, RoadCloud
+from .cloud import PointKind, RoadCloud
 from .edges import Surface, paved_edge, stretch_middles, surface
-from .layout import Layout, RoadKind, find_layout
+from .layout import RoadKind, RoadLayout, find_layout
 from .lines import find_lines
 from .objects import find_barriers, find_posts
-from .path import SPACING, Path, alignment_path, first_path, path_through
+from .path import SPACING, CloudPath, alignment_path, first_path, path_through
 from .profiles import STRETCH, Profiles, make_profiles
 from .registration import registered
-from .section import Section, Side, SideSection, measure_section, snapped
+from .section import MeasuredSection, Side, SideSection, measure_section, snapped
 from .smoothing import smooth
 from .surroundings import faced, measure_ground, standing_points
 
 Float = NDArray[np.float64]
-Predictor = Callable[[RoadCloud, Path], tuple[Float, Float]]
+Predictor = Callable[[RoadCloud, CloudPath], tuple[Float, Float]]
 """Returns offset and standard deviation (M,) of the axis at each point of a path; NaN where it knows none."""
 
 _HALF_WIDTHS = (12.0, 45.0)  # m: least and largest reach of profiles
@@ -75,9 +75,9 @@ class Reconstruction:
     parameters: RoadParameters
     measured: Measured
     centre: Centre
-    path: Path
+    path: CloudPath
     profiles: Profiles
-    layout: Layout
+    layout: RoadLayout
     surfaces: dict[Side, Surface]
     notes: list[str] = field(default_factory=list)
 
@@ -129,9 +129,9 @@ def reconstruct(cloud: RoadCloud, options: Options | None = None, progress: Prog
     return Reconstruction(parameters, measured, centre, path, profiles, layout, surfaces, notes)
 
 
-def straightened(cloud: RoadCloud, options: Options) -> tuple[Path, float]:
+def straightened(cloud: RoadCloud, options: Options) -> tuple[CloudPath, float]:
     """Return a path parallel to the road, and how far to either side of it there is something to see (m)."""
-    xy = cloud.xyz[cloud.of(Kind.PAVEMENT, Kind.MARKING) if cloud.labelled else cloud.surface, :2]
+    xy = cloud.xyz[cloud.of(PointKind.PAVEMENT, PointKind.MARKING) if cloud.labelled else cloud.surface, :2]
     path = path_through(options.path) if options.path is not None else first_path(xy)
     _, offset = path.project(xy[:: max(1, len(xy) // 200_000)])
     near = np.abs(offset)[np.abs(offset) < _HALF_WIDTHS[1]]
@@ -143,14 +143,14 @@ def straightened(cloud: RoadCloud, options: Options) -> tuple[Path, float]:
     return path, half
 
 
-def _axis(cloud: RoadCloud, path: Path, half: float, options: Options) -> tuple[Profiles, Layout, Centre]:
+def _axis(cloud: RoadCloud, path: CloudPath, half: float, options: Options) -> tuple[Profiles, RoadLayout, Centre]:
     """Return profiles along a path, which lines they show, and where the axis lies."""
     profiles = make_profiles(cloud, path, half, exact=True)
     layout = find_layout(profiles, find_lines(profiles), options.road)
     return profiles, layout, _centre(cloud, profiles, layout, options)
 
 
-def _centre(cloud: RoadCloud, profiles: Profiles, layout: Layout, options: Options) -> Centre:
+def _centre(cloud: RoadCloud, profiles: Profiles, layout: RoadLayout, options: Options) -> Centre:
     """Return the axis along the path: from the lines, or from a learned predictor."""
     by_lines = centre_of(layout)
     if options.predictor is None:
@@ -169,7 +169,7 @@ def _centre(cloud: RoadCloud, profiles: Profiles, layout: Layout, options: Optio
     return Centre(stations, smoothed.values, smoothed.std, np.where(inside, raw, np.nan))
 
 
-def fitted(profiles: Profiles, layout: Layout, centre: Centre, tolerance: float) -> tuple[AxisFit, RotationAxis]:
+def fitted(profiles: Profiles, layout: RoadLayout, centre: Centre, tolerance: float) -> tuple[AxisFit, RotationAxis]:
     """Return alignment and profile through the axis, and the line about which the crossfall turns.
 
     The profile is the height of that line, the same for both carriageways: of the two lines that a parameter set can
@@ -202,7 +202,7 @@ def _as_measured(raw: Float, smoothed: Float) -> Float:
     return np.where(np.isfinite(raw) & (apart <= 4.0 * max(usual, 1e-3)), raw, smoothed)
 
 
-def _heights(profiles: Profiles, layout: Layout, centre: Centre, rotation: str) -> tuple[Float, Float]:
+def _heights(profiles: Profiles, layout: RoadLayout, centre: Centre, rotation: str) -> tuple[Float, Float]:
     """Return the heights (K,) of the right and left carriageway at the line that the crossfall turns about."""
     result = []
     axis = centre.offsets
@@ -229,7 +229,7 @@ def _apart(heights: tuple[Float, Float]) -> float:
     return float(np.nanmedian(difference)) if np.isfinite(difference).any() else 0.0
 
 
-def _surface(profiles: Profiles, section: Section, side: Side, rotation: RotationAxis) -> Surface:
+def _surface(profiles: Profiles, section: MeasuredSection, side: Side, rotation: RotationAxis) -> Surface:
     """Return one carriageway's surface along the alignment."""
     own = section.sides[side]
     count = len(own.usual)
@@ -248,7 +248,7 @@ def _smooth_fall(measured: Surface) -> Float:
     return smooth(measured.fall, known.astype(np.float64), STRETCH * SPACING, 15.0, order=2, usual=0.002).values
 
 
-def _notes(cloud: RoadCloud, section: Section, measured: Measured) -> list[str]:
+def _notes(cloud: RoadCloud, section: MeasuredSection, measured: Measured) -> list[str]:
     """Return what a reader of the parameter set must know."""
     notes = []
     if cloud.epsg is None:

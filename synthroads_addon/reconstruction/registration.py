@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from .path import SPACING, Path
+from .path import SPACING, CloudPath
 from .profiles import ACROSS, Grid, Profiles
 from .smoothing import smooth
 
@@ -32,7 +32,7 @@ class _Fit:
     score: float
 
 
-def registered(path: Path, profiles: Profiles) -> Path:
+def registered(path: CloudPath, profiles: Profiles) -> CloudPath:
     """Return a path parallel to what its profiles show: its offset from any line of the road changes slowly at most.
 
     Stretches of 20 m are sheared and shifted against the mean of those before them, beginning with the most usual one.

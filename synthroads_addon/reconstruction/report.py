@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from ..checking.checker import check
 from ..road.geometry import RoadGeometry
 from ..road.parameters import LineMarking
-from .cloud import Kind, RoadCloud
+from .cloud import PointKind, RoadCloud
 from .reconstruct import Reconstruction
-from .section import Section, SideSection, standard_section
+from .section import MeasuredSection, SideSection, standard_section
 
 Float = NDArray[np.float64]
 
@@ -80,7 +80,7 @@ def _centreline(found: Reconstruction) -> dict[str, Any]:
     }
 
 
-def section_report(section: Section) -> dict[str, Any]:
+def section_report(section: MeasuredSection) -> dict[str, Any]:
     """Return the cross-section's widths with their standard deviations."""
     median = section.median
     return {
@@ -106,7 +106,7 @@ def _side(side: SideSection) -> dict[str, Any]:
 
 def _surface(found: Reconstruction, cloud: RoadCloud, geometry: RoadGeometry) -> dict[str, Any]:
     """Return how far the pavement's points are above the reconstructed surface, by side."""
-    chosen = np.flatnonzero(cloud.of(Kind.PAVEMENT, Kind.MARKING)) if cloud.labelled else cloud.surface
+    chosen = np.flatnonzero(cloud.of(PointKind.PAVEMENT, PointKind.MARKING)) if cloud.labelled else cloud.surface
     chosen = chosen[:: max(1, len(chosen) // _MOST_POINTS)]
     station, offset = geometry.alignment.project(cloud.xyz[chosen, :2])
     result: dict[str, Any] = {}

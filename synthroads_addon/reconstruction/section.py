@@ -11,7 +11,7 @@ from scipy import ndimage
 
 from ..road.guidelines import STANDARD_CROSS_SECTIONS, StandardCrossSection
 from .edges import Edge, paved_edge, stretch_count
-from .layout import Band, Layout, RoadKind
+from .layout import Band, RoadKind, RoadLayout
 from .lines import Line
 from .profiles import Profiles
 from .smoothing import mean_with_std
@@ -108,7 +108,7 @@ class SideSection:
 
 
 @dataclass(frozen=True)
-class Section:
+class MeasuredSection:
     """The road's cross-section.
 
     Attributes:
@@ -136,7 +136,7 @@ class Section:
         return Estimate(left.value + right.value, float(np.hypot(left.std, right.std)))
 
 
-def measure_section(profiles: Profiles, layout: Layout, marked: bool) -> Section:
+def measure_section(profiles: Profiles, layout: RoadLayout, marked: bool) -> MeasuredSection:
     """Return the cross-section of profiles along the alignment.
 
     Args:
@@ -148,11 +148,11 @@ def measure_section(profiles: Profiles, layout: Layout, marked: bool) -> Section
     if layout.kind == "single":
         (band,) = layout.bands
         sides = {name: _half(profiles, layout, band, name, marked) for name in names}
-        return Section("single", sides, band.middle, None, "", np.inf)
+        return MeasuredSection("single", sides, band.middle, None, "", np.inf)
     sides = {name: _side(profiles, layout, band, name, marked) for name, band in zip(names, layout.bands, strict=True)}
     nearest, distance = nearest_standard(sides)
     standard = nearest if distance <= STANDARD_TOLERANCE else None
-    return Section(layout.kind, sides, None, standard, nearest, distance)
+    return MeasuredSection(layout.kind, sides, None, standard, nearest, distance)
 
 
 def line_width(line: Line | None, kind: Literal["edge", "lane", "inner"], road: RoadKind, marked: bool) -> float:
@@ -169,7 +169,7 @@ def line_width(line: Line | None, kind: Literal["edge", "lane", "inner"], road: 
     return near if abs(near - line.width) <= _LINE_TOLERANCE else float(np.clip(round(line.width, 2), 0.05, 1.0))
 
 
-def _side(profiles: Profiles, layout: Layout, band: Band, name: Side, marked: bool) -> SideSection:
+def _side(profiles: Profiles, layout: RoadLayout, band: Band, name: Side, marked: bool) -> SideSection:
     """Return one carriageway of a dual one."""
     sign = 1 if name == "left" else -1
     if len(band.lines) < 2:
@@ -184,7 +184,7 @@ def _side(profiles: Profiles, layout: Layout, band: Band, name: Side, marked: bo
     return _summarised(name, lines, (distances, apart), inner, outer)
 
 
-def _half(profiles: Profiles, layout: Layout, band: Band, name: Side, marked: bool) -> SideSection:
+def _half(profiles: Profiles, layout: RoadLayout, band: Band, name: Side, marked: bool) -> SideSection:
     """Return one direction of a single carriageway, from the axis outwards."""
     sign = 1 if name == "left" else -1
     count = stretch_count(profiles)
@@ -226,7 +226,7 @@ def _beside(band: Band, sign: int, marked: bool) -> list[Line]:
     return [max(near, key=lambda line: line.length * line.width)] if near else []
 
 
-def _by_width(profiles: Profiles, layout: Layout, band: Band, name: Side) -> SideSection:
+def _by_width(profiles: Profiles, layout: RoadLayout, band: Band, name: Side) -> SideSection:
     """Return a carriageway whose lines aren't seen: with the lanes of the standard cross-section of about its width."""
     sign = 1 if name == "left" else -1
     middle = np.full(stretch_count(profiles), 0.5 * (band.low + band.high))
@@ -386,7 +386,7 @@ def _distance(side: SideSection, row: StandardCrossSection) -> float:
     return max(apart)
 
 
-def snapped(section: Section) -> Section:
+def snapped(section: MeasuredSection) -> MeasuredSection:
     """Return a cross-section with the widths of the standard one that it passes for, else as it is."""
     if section.standard is None:
         return section
@@ -410,7 +410,7 @@ def snapped(section: Section) -> Section:
     return replace(section, sides=sides)
 
 
-def standard_section(section: Section) -> dict[str, Any] | None:
+def standard_section(section: MeasuredSection) -> dict[str, Any] | None:
     """Return what the report says of the nearest standard cross-section; None for a single carriageway."""
     if section.kind == "single":
         return None

@@ -8,12 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from .assemble import Ground
-from .cloud import STANDING, Kind, RoadCloud
-from .objects import FoundBarrier, Standing, facing
-from .path import SPACING, Path
+from .assemble import GroundShape
+from .cloud import STANDING, PointKind, RoadCloud
+from .objects import FoundBarrier, StandingObject, facing
+from .path import SPACING, CloudPath
 from .profiles import ACROSS, STRETCH, Profiles
-from .section import Section
+from .section import MeasuredSection
 
 Float = NDArray[np.float64]
 
@@ -25,7 +25,7 @@ _COARSE = 5  # bins of which a median makes the ground
 _BEYOND = 4.0  # m outside of the verge, where the ground no longer is the road's
 
 
-def standing_points(cloud: RoadCloud, path: Path, profiles: Profiles, section: Section) -> Standing:
+def standing_points(cloud: RoadCloud, path: CloudPath, profiles: Profiles, section: MeasuredSection) -> StandingObject:
     """Return what stands within reach of the road, with heights above the surface below."""
     chosen = cloud.of(*STANDING)
     xyz, kind = cloud.xyz[chosen], cloud.kind[chosen]
@@ -34,9 +34,9 @@ def standing_points(cloud: RoadCloud, path: Path, profiles: Profiles, section: S
     near = (station > -5.0) & (station < path.length + 5.0) & (np.abs(offset) < reach)
     station, offset, kind, height = station[near], offset[near], kind[near], xyz[near, 2]
     outside = np.where(offset > 0.0, offset - _outer(section, 1), -offset - _outer(section, -1))
-    kept = (outside < _FARTHEST_UNKNOWN) | (kind != Kind.FURNITURE)
+    kept = (outside < _FARTHEST_UNKNOWN) | (kind != PointKind.FURNITURE)
     station, offset, kind, height = station[kept], offset[kept], kind[kept], height[kept]
-    return Standing(station, offset, height - ground_below(profiles, station, offset), kind)
+    return StandingObject(station, offset, height - ground_below(profiles, station, offset), kind)
 
 
 def ground_below(profiles: Profiles, station: Float, offset: Float) -> Float:
@@ -56,12 +56,12 @@ def ground_below(profiles: Profiles, station: Float, offset: Float) -> Float:
     return np.asarray(ndimage.map_coordinates(filled, np.stack([row, column]), order=1, mode="nearest"))
 
 
-def faced(barriers: list[FoundBarrier], section: Section) -> list[FoundBarrier]:
+def faced(barriers: list[FoundBarrier], section: MeasuredSection) -> list[FoundBarrier]:
     """Return barriers with guardrails' beams on the side of the traffic that they protect from."""
     return [facing(barrier, _face(barrier.offset, section)) for barrier in barriers]
 
 
-def _face(offset: float, section: Section) -> Literal["left", "right", "both"]:
+def _face(offset: float, section: MeasuredSection) -> Literal["left", "right", "both"]:
     side = section.sides["left" if offset > 0.0 else "right"]
     if abs(offset) <= side.inner_offset.value:
         if abs(offset) < _IN_THE_MIDDLE:
@@ -70,7 +70,7 @@ def _face(offset: float, section: Section) -> Literal["left", "right", "both"]:
     return "right" if offset > 0.0 else "left"
 
 
-def measure_ground(cloud: RoadCloud, path: Path, section: Section, axis_height: Float) -> Ground:
+def measure_ground(cloud: RoadCloud, path: CloudPath, section: MeasuredSection, axis_height: Float) -> GroundShape:
     """Return what the ground beside the road is like.
 
     Args:
@@ -79,27 +79,27 @@ def measure_ground(cloud: RoadCloud, path: Path, section: Section, axis_height: 
         section: of the road.
         axis_height: (M,) height of the axis at each point of the path, m.
     """
-    chosen = np.flatnonzero(cloud.of(Kind.GROUND, Kind.VERGE))
+    chosen = np.flatnonzero(cloud.of(PointKind.GROUND, PointKind.VERGE))
     chosen = chosen[:: max(1, len(chosen) // 300_000)]
     station, offset = path.project(cloud.xyz[chosen, :2])
     inside = (station > 0.0) & (station < path.length)
     chosen, station, offset = chosen[inside], station[inside], offset[inside]
     beyond = np.where(offset > 0.0, offset - _outer(section, 1), -offset - _outer(section, -1))
     beside = _usual(section, station, offset)
-    verge = beyond[(cloud.kind[chosen] == Kind.VERGE) & (beyond > 0.1) & beside]
+    verge = beyond[(cloud.kind[chosen] == PointKind.VERGE) & (beyond > 0.1) & beside]
     seen = len(verge) > 200
     width = float(np.clip(np.percentile(verge, 97), 0.5, 5.0)) if seen else USUAL_VERGE
     far = beyond > width + _BEYOND
     outermost = max(_outer(section, 1), _outer(section, -1)) + width
     if far.sum() < 200:
-        return Ground(outermost + 10.0, 0.0, 0.05, width, seen)
+        return GroundShape(outermost + 10.0, 0.0, 0.05, width, seen)
     below = axis_height[np.clip(station[far].astype(np.int64), 0, len(axis_height) - 1)] - cloud.xyz[chosen[far], 2]
     reach = float(np.percentile(np.abs(offset[far]), 99))
     spread = float(np.clip(0.5 * (np.percentile(below, 84) - np.percentile(below, 16)), 0.05, 2.0))
-    return Ground(max(reach, outermost + 5.0), float(np.median(below)), spread, width, seen)
+    return GroundShape(max(reach, outermost + 5.0), float(np.median(below)), spread, width, seen)
 
 
-def _usual(section: Section, station: Float, offset: Float) -> NDArray[np.bool_]:
+def _usual(section: MeasuredSection, station: Float, offset: Float) -> NDArray[np.bool_]:
     """Return which places (N,) lie where the pavement's edge on their side is the road's own."""
     result = np.zeros(len(station), dtype=bool)
     for side in section.sides.values():
@@ -108,7 +108,7 @@ def _usual(section: Section, station: Float, offset: Float) -> NDArray[np.bool_]
     return result
 
 
-def _outer(section: Section, sign: int) -> float:
+def _outer(section: MeasuredSection, sign: int) -> float:
     """Return the distance of one side's outer paved edge from the axis, m."""
     side = section.sides["left" if sign > 0 else "right"]
     return side.inner_offset.value + side.paved_width.value

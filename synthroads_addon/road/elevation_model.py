@@ -51,7 +51,7 @@ _STILL, _MOST_ROUNDS = 1e-7, 2000  # of the membrane over a hole: m, rounds
 
 
 @dataclass(frozen=True)
-class Grid:
+class HeightGrid:
     """Where the cells of a raster lie.
 
     Attributes:
@@ -139,7 +139,7 @@ class ElevationModel:
         grid: where its cells lie.
     """
 
-    def __init__(self, path: str, grid: Grid) -> None:
+    def __init__(self, path: str, grid: HeightGrid) -> None:
         self.path = path
         self.grid = grid
         # Tile 0 has no heights: it stands for all that isn't loaded.
@@ -314,7 +314,7 @@ def _horizontal(system: CRS) -> tuple[CRS, str]:
     return type(system).from_dict(parts[0]), unit if isinstance(unit, str) else unit["name"]
 
 
-def _grid(name: str, dataset: DatasetReader) -> Grid:
+def _grid(name: str, dataset: DatasetReader) -> HeightGrid:
     transform = dataset.transform
     if transform.is_identity:
         raise InputError(f"{name}: georeference", None, "the file has none: it doesn't say where its cells lie")
@@ -335,7 +335,7 @@ def _grid(name: str, dataset: DatasetReader) -> Grid:
     east, north = transform.c + transform.a / 2.0, transform.f + transform.e / 2.0
     if not max(abs(east), abs(north)) <= _FARTHEST:
         raise InputError(f"{name}: place", (east, north), f"must lie within {_FARTHEST:g} m of the map's origin")
-    return Grid(east, north, transform.a, transform.e, dataset.width, dataset.height)
+    return HeightGrid(east, north, transform.a, transform.e, dataset.width, dataset.height)
 
 
 def _cells_needed(model: ElevationModel, corridor: Corridor) -> Cells:

@@ -24,7 +24,7 @@ Float = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class Strip:
+class SurfaceStrip:
     """A lengthwise strip of the road between two neighbouring boundaries.
 
     Attributes:
@@ -69,15 +69,15 @@ class RoadGeometry:
         self.profile = Profile([IntersectionPoint(p.station, p.elevation, p.radius) for p in axis.vertical])
         self.sections = sections_of(parameters)
         left, right = self.sections.get("left"), self.sections.get("right")
-        strips: list[Strip] = []
+        strips: list[SurfaceStrip] = []
         if left:
             strips += _strips(left)[::-1]
         if left and right:
             median = next(iter(parameters.of_type(Median).values()), left.carriageway)
-            strips.append(Strip("median", *_SURFACES["median"], median.instance, None))
+            strips.append(SurfaceStrip("median", *_SURFACES["median"], median.instance, None))
         if right:
             strips += _strips(right)
-        self.strips: tuple[Strip, ...] = tuple(strips)
+        self.strips: tuple[SurfaceStrip, ...] = tuple(strips)
 
     @property
     def length(self) -> float:
@@ -137,7 +137,7 @@ class RoadGeometry:
         index = np.where(at_end, widest_last, index)
         return np.where((index < 0) | (index > last), -1, index)
 
-    def instances(self, strip: Strip, station: ArrayLike) -> NDArray[np.int64]:
+    def instances(self, strip: SurfaceStrip, station: ArrayLike) -> NDArray[np.int64]:
         """Return the instance numbers (N,) that a strip's surface has at stations (N,)."""
         station = np.atleast_1d(np.asarray(station, dtype=np.float64))
         result = np.full(station.shape, strip.instance, dtype=np.int64)
@@ -202,11 +202,11 @@ def sections_of(parameters: RoadParameters) -> dict[Side, CarriagewaySection]:
     }
 
 
-def _strips(section: CarriagewaySection) -> list[Strip]:
+def _strips(section: CarriagewaySection) -> list[SurfaceStrip]:
     """Return one carriageway's strips, innermost first."""
     paved = ("road", section.carriageway.pavement.kind)
     instance, side = section.carriageway.instance, section.carriageway.side
-    return [Strip(kind, *_SURFACES.get(kind, paved), instance, side) for kind in section.kinds]
+    return [SurfaceStrip(kind, *_SURFACES.get(kind, paved), instance, side) for kind in section.kinds]
 
 
 def _pairs(station: ArrayLike, offset: ArrayLike) -> tuple[Float, Float]:

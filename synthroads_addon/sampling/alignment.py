@@ -48,7 +48,7 @@ def _widest(room: float) -> float:
 
 
 @dataclass
-class _Part:
+class _AlignmentPart:
     """An element in the making; straights and arcs can still grow."""
 
     length: float
@@ -69,14 +69,14 @@ class HorizontalSampler:
         self.radii = radius_limits(scenario)
         self.half_width = cross_section_of(scenario).paved_width / 2.0
         self.shortest_arc = 2.0 * self.limits.speed / 3.6
-        self.parts: list[_Part] = []
+        self.parts: list[_AlignmentPart] = []
         self.room = 0.0
         self.turned = 0.0
 
     def draw(self) -> tuple[HorizontalElement, ...]:
         """Return elements whose lengths add up to the scenario's length."""
         first = 0.0 if self._may_begin_straight() and self.rng.random() < 0.35 else self._sign() / self._radius(None)
-        self.parts = [_Part(min(_SHORTEST_END, self.length), first, first)]
+        self.parts = [_AlignmentPart(min(_SHORTEST_END, self.length), first, first)]
         self.room = self.length - self.parts[0].length
         while joint := self._joint():
             self.parts += joint
@@ -89,7 +89,7 @@ class HorizontalSampler:
         """Return whether a straight can be all of the road, or else a curve can follow it."""
         return self.length <= LONGEST_STRAIGHT or _widest(self.length - 3.0 * _SHORTEST_END) > self.radii[0]
 
-    def _joint(self) -> list[_Part]:
+    def _joint(self) -> list[_AlignmentPart]:
         """Return what follows: clothoids and the next straight or arc, the last at an end's least length.
 
         What was the end has a neighbour then: it gets what it lacks to its full least length. Nothing follows where the
@@ -99,7 +99,7 @@ class HorizontalSampler:
         if last.start == 0.0:
             return self._arc_after_straight(last)
         lacking = max(0.0, self.shortest_arc - last.length) if len(self.parts) > 1 else 0.0
-        grown = _Part(lacking, last.start, last.start)
+        grown = _AlignmentPart(lacking, last.start, last.start)
         room = self.room - lacking - _SHORTEST_END
         chance = self.rng.random()
         drawn = "straight" if chance < 0.25 else "egg" if chance < 0.5 else "s"
@@ -110,10 +110,10 @@ class HorizontalSampler:
                 joint = self._arc_after_arc(kind, last.start, room)
             if joint:
                 end = joint[-1].end
-                return [grown, *joint, _Part(_SHORTEST_END, end, end)]
+                return [grown, *joint, _AlignmentPart(_SHORTEST_END, end, end)]
         return []
 
-    def _arc_after_straight(self, last: _Part) -> list[_Part]:
+    def _arc_after_straight(self, last: _AlignmentPart) -> list[_AlignmentPart]:
         before = next((part.start for part in reversed(self.parts[:-1]) if part.start), 0.0)
         sign = self._sign()
         least = (STRAIGHT_SAME_DIRECTION if before * sign > 0.0 else _SHORTEST_STRAIGHT) if before else 0.0
@@ -123,9 +123,13 @@ class HorizontalSampler:
             return []
         curvature = sign / radius
         joint = self._clothoids([(0.0, curvature)], self._transition(0.0, curvature), room)
-        return [_Part(lacking, 0.0, 0.0), *joint, _Part(_SHORTEST_END, curvature, curvature)] if joint else []
+        return (
+            [_AlignmentPart(lacking, 0.0, 0.0), *joint, _AlignmentPart(_SHORTEST_END, curvature, curvature)]
+            if joint
+            else []
+        )
 
-    def _arc_after_arc(self, kind: str, start: float, room: float) -> list[_Part]:
+    def _arc_after_arc(self, kind: str, start: float, room: float) -> list[_AlignmentPart]:
         """Return the clothoids of an S-curve ("s") or an egg curve ("egg")."""
         least = self._least(start, 0.0) if kind == "s" else 0.0
         if not (radius := self._radius(1.0 / abs(start), room - least)):
@@ -137,7 +141,7 @@ class HorizontalSampler:
         alike = max(start / end, end / start) < _EGG_RATIO
         return [] if alike else self._clothoids([(start, end)], self._egg(start, end), room)
 
-    def _clothoids(self, curvatures: list[_Pair], lengths: Lengths, room: float) -> list[_Part]:
+    def _clothoids(self, curvatures: list[_Pair], lengths: Lengths, room: float) -> list[_AlignmentPart]:
         """Return clothoids with lengths between the least and the drawn ones, so long as there is room; else none.
 
         Every rule for lengths is linear in them, so that what lies between two sets that keep it keeps it as well.
@@ -148,7 +152,7 @@ class HorizontalSampler:
             return []
         share = min(1.0, spare / asked) if asked > 0.0 else 0.0
         fitting = [a + (b - a) * share for a, b in zip(least, drawn, strict=True)]
-        return [_Part(length, *pair) for length, pair in zip(fitting, curvatures, strict=True)]
+        return [_AlignmentPart(length, *pair) for length, pair in zip(fitting, curvatures, strict=True)]
 
     def _sign(self) -> float:
         """Return a direction to turn to; the farther the road has turned, the likelier back again."""
@@ -232,7 +236,7 @@ class HorizontalSampler:
         for part, extra in zip(growing, given, strict=True):
             part.length += float(extra)
 
-    def _room(self, part: _Part) -> float:
+    def _room(self, part: _AlignmentPart) -> float:
         longest = LONGEST_STRAIGHT if part.start == 0.0 else max(_LONGEST_TURN / abs(part.start), self.shortest_arc)
         return max(0.0, longest - part.length)
 
@@ -252,9 +256,9 @@ def radius_limits(scenario: RoadScenario) -> tuple[float, float]:
     return scenario.radius.minimum, scenario.radius.maximum
 
 
-def _merged(parts: list[_Part]) -> list[_Part]:
+def _merged(parts: list[_AlignmentPart]) -> list[_AlignmentPart]:
     """Return parts with neighbours of one constant curvature joined."""
-    result: list[_Part] = []
+    result: list[_AlignmentPart] = []
     for part in parts:
         if result and part.grows and result[-1].grows and result[-1].start == part.start:
             result[-1].length += part.length

@@ -13,7 +13,7 @@ from ..road.objects import AnyWidth
 from ..road.section import Arrow, Carriageway, Hatching, LineMarking, Turnout
 from ..road.things.furniture import Side
 from ..road.turnout_geometry import TurnoutShape
-from .placing.site import Site
+from .placing.site import PlacementSite
 
 NARROW, BROAD = 0.15, 0.30
 LANE_DASH, LANE_GAP = 6.0, 12.0
@@ -29,7 +29,7 @@ _FIRST_MERGE_ARROW = 20.0  # from the beginning of the taper, m
 _Span = tuple[float, float]
 
 
-def place_markings(site: Site) -> Iterator[tuple[str, LineMarking | Hatching | Arrow]]:
+def place_markings(site: PlacementSite) -> Iterator[tuple[str, LineMarking | Hatching | Arrow]]:
     """Yield (id, marking) of everything painted on a road, with instance 1. All has films of one thickness."""
     limits = site.scenario.markings.film_thickness
     film = rounded(site.stream("film").uniform(limits.minimum, limits.maximum))
@@ -45,7 +45,7 @@ def place_markings(site: Site) -> Iterator[tuple[str, LineMarking | Hatching | A
 class _Painter:
     """Makes the markings of one carriageway."""
 
-    def __init__(self, site: Site, side: Side, carriageway: Carriageway, film: float) -> None:
+    def __init__(self, site: PlacementSite, side: Side, carriageway: Carriageway, film: float) -> None:
         self.site, self.carriageway, self.film = site, carriageway, film
         self.name = f"carriageway-{side}"
         self.section = site.sections[side]

@@ -30,7 +30,7 @@ from .conflicts import check_conflicts
 from .markings import place_markings
 from .placing.assets import sample_assets
 from .placing.furniture import place_furniture
-from .placing.site import Site
+from .placing.site import PlacementSite
 from .section import SIDES, CarriagewaySampler
 from .surroundings import (
     origin_on_ground,
@@ -129,7 +129,7 @@ def _position(elements: tuple[HorizontalElement, ...], heading: float, station: 
     return float(reached @ (np.cos(angle) @ _WEIGHTS)), float(reached @ (np.sin(angle) @ _WEIGHTS))
 
 
-def _sample_site(scenario: RoadScenario, seed: int, axis: AlignmentObject) -> Site:
+def _sample_site(scenario: RoadScenario, seed: int, axis: AlignmentObject) -> PlacementSite:
     """Return the road without what stands on and beside it."""
     sampler = CarriagewaySampler(scenario, seed, axis)
     carriageways: dict[Side, Carriageway] = {}
@@ -137,10 +137,10 @@ def _sample_site(scenario: RoadScenario, seed: int, axis: AlignmentObject) -> Si
     for side in SIDES:
         carriageways[side], own = sampler.draw(side)
         turnouts |= own
-    return Site(scenario, seed, axis, carriageways, turnouts, sample_terrain(scenario, seed))
+    return PlacementSite(scenario, seed, axis, carriageways, turnouts, sample_terrain(scenario, seed))
 
 
-def _structure(site: Site) -> Iterator[tuple[str, RoadObject]]:
+def _structure(site: PlacementSite) -> Iterator[tuple[str, RoadObject]]:
     """Yield (id, object) of the median, the carriageways and the turnouts."""
     yield "median", Median(instance=1)
     for side, carriageway in site.carriageways.items():

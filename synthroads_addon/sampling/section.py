@@ -18,8 +18,8 @@ from ..scenario.road import FreeCrossSection, RoadScenario
 from .turnouts import (
     BESIDE_LANE_CHANGE,
     Direction,
-    Place,
     RampLimits,
+    TurnoutPlace,
     arrange,
     bounds,
     draw,
@@ -90,7 +90,7 @@ class CarriagewaySampler:
         return self._carriageway(side, lanes, rng), turnouts
 
     def _changed(
-        self, lanes: tuple[Lane, ...], place: Place, direction: Direction, rng: np.random.Generator
+        self, lanes: tuple[Lane, ...], place: TurnoutPlace, direction: Direction, rng: np.random.Generator
     ) -> tuple[Lane, ...]:
         """Return the lanes with the outermost or innermost one ending, or beginning, over the taper of a place."""
         index = 0 if rng.random() < 0.5 else len(lanes) - 1

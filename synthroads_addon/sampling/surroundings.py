@@ -36,7 +36,7 @@ from ..road.things.vehicles import (
     VEHICLE_TYPES,
 )
 from ..scenario.road import Interval, MaterialLimits, RoadScenario
-from .placing.site import Site
+from .placing.site import PlacementSite
 
 Float = NDArray[np.float64]
 Kind = Literal["grass", "shrub", "tree"]
@@ -114,7 +114,7 @@ def sample_materials(scenario: RoadScenario, seed: int) -> MaterialVariation:
 # --- plants ----------------------------------------------------------------------------------------------------------
 
 
-def sample_vegetation(site: Site) -> Iterator[tuple[str, Vegetation]]:
+def sample_vegetation(site: PlacementSite) -> Iterator[tuple[str, Vegetation]]:
     """Yield the plants by id, species by species; their instance numbers are 1.
 
     Grass grows everywhere beside the road. Shrubs follow behind the verge, one species after the other. Trees mix, and
@@ -130,7 +130,7 @@ def sample_vegetation(site: Site) -> Iterator[tuple[str, Vegetation]]:
         yield from _mixed(site, "tree", limits.trees, density, limits.tree_height, first_tree)
 
 
-def _room_beside(site: Site) -> float:
+def _room_beside(site: PlacementSite) -> float:
     """Return the width (m) of the ground between the verge and the end of the terrain, where the road has all lanes."""
     edges = []
     for road in site.carriageways.values():
@@ -140,7 +140,7 @@ def _room_beside(site: Site) -> float:
     return site.terrain.half_width - min(edges)
 
 
-def _first_tree(site: Site) -> float:
+def _first_tree(site: PlacementSite) -> float:
     """Return the distance (m) behind the verge from which trees may stand beside either carriageway."""
     verges = [road.verge_width for road in site.carriageways.values()]
     narrowest = min(min(p.width for p in verge) if isinstance(verge, tuple) else verge for verge in verges)
@@ -157,7 +157,7 @@ def _species(rng: np.random.Generator, kind: Kind, names: tuple[str, ...]) -> li
 
 
 def _mixed(
-    site: Site, kind: Kind, names: tuple[str, ...], density: float, heights: Interval, band_start: float
+    site: PlacementSite, kind: Kind, names: tuple[str, ...], density: float, heights: Interval, band_start: float
 ) -> Iterator[tuple[str, Vegetation]]:
     """Yield species that share a density (1/m2) between them, the first most of it, all from a distance (m) on."""
     if density <= 0.0:
@@ -170,7 +170,7 @@ def _mixed(
         yield _plants(rng, kind, name, rounded(density * part / math.fsum(shares)), band, heights)
 
 
-def _belts(site: Site, room: float) -> Iterator[tuple[str, Vegetation]]:
+def _belts(site: PlacementSite, room: float) -> Iterator[tuple[str, Vegetation]]:
     """Yield the shrubs, each species in a belt of its own behind that of the one before."""
     limits, density = site.scenario.vegetation, rounded(site.scenario.shrubs_per_hectare / 10_000.0)
     if density <= 0.0 or room <= SHRUB_DISTANCE:
@@ -204,7 +204,7 @@ def _plants(
 # --- traffic ---------------------------------------------------------------------------------------------------------
 
 
-def sample_vehicles(site: Site, objects: Mapping[str, RoadObject]) -> Iterator[tuple[str, Vehicle]]:
+def sample_vehicles(site: PlacementSite, objects: Mapping[str, RoadObject]) -> Iterator[tuple[str, Vehicle]]:
     """Yield the vehicles by id; their instance numbers are 1.
 
     They are `VEHICLE_GAP` apart at the time 0 and remain so: in each lane the faster drive ahead of the slower.

@@ -73,7 +73,7 @@ class Feature:
 
 
 @dataclass(frozen=True)
-class Place:
+class TurnoutPlace:
     """A feature on its stretch.
 
     Attributes:
@@ -160,7 +160,7 @@ def may_change_lanes(scenario: RoadScenario, section: StandardCrossSection) -> b
     return len(section.lanes) >= (2 if by_hand else 3)
 
 
-def arrange(features: tuple[Feature, ...], length: float, rng: np.random.Generator) -> list[Place]:
+def arrange(features: tuple[Feature, ...], length: float, rng: np.random.Generator) -> list[TurnoutPlace]:
     """Draw which features a carriageway of a length (m) has, and their places in the order of traffic.
 
     Where they don't all fit, the certain ones (of share 1) come first.
@@ -188,7 +188,7 @@ def arrange(features: tuple[Feature, ...], length: float, rng: np.random.Generat
     spare = max(0.0, length - begins.pop())
     shifts = sorted(spare * rng.random() for _ in chosen)
     return [
-        Place(feature.kind, begin + shift, own)
+        TurnoutPlace(feature.kind, begin + shift, own)
         for feature, begin, shift, own in zip(chosen, begins, shifts, lengths, strict=True)
     ]
 
@@ -221,7 +221,7 @@ class Direction:
 
 
 def sample_turnout(
-    scenario: RoadScenario, ramps: RampLimits, place: Place, direction: Direction, rng: np.random.Generator
+    scenario: RoadScenario, ramps: RampLimits, place: TurnoutPlace, direction: Direction, rng: np.random.Generator
 ) -> Turnout:
     """Return the turnout at a place, with instance 1."""
     limits = scenario.turnouts

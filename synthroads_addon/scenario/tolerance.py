@@ -19,7 +19,7 @@ _NUMBER = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*([^\s\d]
 
 
 @dataclass(frozen=True)
-class Kind:
+class ErrorKind:
     """A kind of error.
 
     Attributes:
@@ -35,15 +35,15 @@ class Kind:
     suffix: str = ""
 
 
-KINDS: dict[str, Kind] = {
-    "height": Kind("height_mm", LENGTHS, 1e-3, " mm"),
-    "position": Kind("position_mm", LENGTHS, 1e-3, " mm"),
-    "relief": Kind("relief_mm", LENGTHS, 1e-3, " mm"),
-    "intensity": Kind("intensity_percent", SHARES, 0.01, " %"),
-    "colour": Kind("colour_95", PLAIN),
-    "layers": Kind("layers_rmse", PLAIN),
-    "labels": Kind("labels_percent", SHARES, 0.01, " %"),
-    "density": Kind("density_percent", SHARES, 0.01, " %"),
+KINDS: dict[str, ErrorKind] = {
+    "height": ErrorKind("height_mm", LENGTHS, 1e-3, " mm"),
+    "position": ErrorKind("position_mm", LENGTHS, 1e-3, " mm"),
+    "relief": ErrorKind("relief_mm", LENGTHS, 1e-3, " mm"),
+    "intensity": ErrorKind("intensity_percent", SHARES, 0.01, " %"),
+    "colour": ErrorKind("colour_95", PLAIN),
+    "layers": ErrorKind("layers_rmse", PLAIN),
+    "labels": ErrorKind("labels_percent", SHARES, 0.01, " %"),
+    "density": ErrorKind("density_percent", SHARES, 0.01, " %"),
 }
 """Kinds of errors by the names of `Tolerance`'s fields."""
 

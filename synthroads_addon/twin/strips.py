@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..road.damage import damage_columns, damage_depth, damaged_strips, spaced
-from ..road.geometry import RoadGeometry, Strip
+from ..road.geometry import RoadGeometry, SurfaceStrip
 from ..road.parameters import Pavement, Pothole, Rut
 from ..road.section_geometry import CarriagewaySection
 from .faces import Faces, Float, compact, grid_corners, joined, polygons, quads
@@ -29,7 +29,7 @@ class StripSurface:
         faces: its polygons.
     """
 
-    strip: Strip
+    strip: SurfaceStrip
     lane: int | None
     instance: int
     faces: Faces

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from synthroads_addon.base.errors import InputError, MissingFileError
-from synthroads_addon.fitting.chain import FREE, ZERO, Chain, Fit, Heights, Plan
+from synthroads_addon.fitting.chain import FREE, ZERO, Chain, ChainFit, Heights, Plan
 from synthroads_addon.fitting.fit import AxisFit, _exactly, _trimmed, fit_axis, read_axis
 from synthroads_addon.road.alignment import Alignment, Element
 from synthroads_addon.road.profile import IntersectionPoint, Profile
@@ -234,7 +234,7 @@ def test_what_counts_as_exact() -> None:
     chain = Chain(np.zeros(3), np.array([0.0, 1.0]), np.zeros(2), np.array([ZERO]))
     smooth, random = np.sin(np.linspace(0.0, 20.0, 900)), np.random.default_rng(1).uniform(-0.5e-3, 0.5e-3, 900)
     for residuals, exact in ((1e-7 * smooth, True), (random, True), (2e-4 * smooth, False), (10 * random, False)):
-        assert _exactly(Fit(chain, np.zeros(900), residuals)) is exact
+        assert _exactly(ChainFit(chain, np.zeros(900), residuals)) is exact
 
 
 def test_a_corner_is_rounded_and_its_straights_stay_straight() -> None:

@@ -18,7 +18,7 @@ from headless.list import KINDS
 from ml.configuration import SHIPPED
 from synthroads_addon.base.classes import class_scheme
 from synthroads_addon.base.errors import InputError
-from synthroads_addon.base.field_list import Field, fields_of
+from synthroads_addon.base.field_list import FieldEntry, fields_of
 from synthroads_addon.base.typed_text import alternatives
 from synthroads_addon.dataset.recipe import load_recipe, recipe_names, scene_jobs
 from synthroads_addon.scanning.devices.device import DEVICES, device_names, load_device
@@ -136,7 +136,7 @@ def paths(kind: Any, above: str = "") -> Iterator[str]:
                 yield from paths(inner, f"{above}{name}.")
 
 
-def fault_of(field: Field) -> str:
+def fault_of(field: FieldEntry) -> str:
     """Return why a scenario with nothing but this field's default is refused: a part of an object alone, say."""
     data = apply_values({"road": {"cross_section": {"lanes": [3.5, 3.5]}}}, {field.path: field.default})
     try:

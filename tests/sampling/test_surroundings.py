@@ -30,7 +30,7 @@ from synthroads_addon.road.parameters import (
 )
 from synthroads_addon.road.surroundings import SPECIES, Vegetation, Vehicle
 from synthroads_addon.road.things.vehicles import COLORS, VEHICLE_TYPES
-from synthroads_addon.sampling.placing.site import Site
+from synthroads_addon.sampling.placing.site import PlacementSite
 from synthroads_addon.sampling.surroundings import (
     WEATHER,
     sample_environment,
@@ -68,7 +68,7 @@ def carriageway(side: str, lanes: Iterable = (3.75, 3.5, 3.5), verge=1.5) -> Car
     )
 
 
-def site(scenario: RoadScenario, seed: int, lanes: Iterable = (3.75, 3.5, 3.5), verge=1.5) -> Site:
+def site(scenario: RoadScenario, seed: int, lanes: Iterable = (3.75, 3.5, 3.5), verge=1.5) -> PlacementSite:
     """Return a straight road of the scenario's length without turnouts."""
     axis = AlignmentObject(
         instance=1,
@@ -79,7 +79,7 @@ def site(scenario: RoadScenario, seed: int, lanes: Iterable = (3.75, 3.5, 3.5), 
         vertical=(VerticalPoint(station=0.0, elevation=0.0),),
     )
     sides = {side: carriageway(side, lanes, verge) for side in ("right", "left")}
-    return Site(scenario, seed, axis, sides, {}, sample_terrain(scenario, seed))
+    return PlacementSite(scenario, seed, axis, sides, {}, sample_terrain(scenario, seed))
 
 
 def assert_covers(values: Iterable[float], limits: Interval, share: float = 0.9) -> None:

@@ -23,7 +23,7 @@ from synthroads_addon.road.parameters import (
 )
 from synthroads_addon.road.things.furniture import Asset
 from synthroads_addon.sampling.placing.assets import sample_assets
-from synthroads_addon.sampling.placing.site import Site
+from synthroads_addon.sampling.placing.site import PlacementSite
 from synthroads_addon.scenario.assets import AssetLibrary, read_asset_library
 from synthroads_addon.scenario.road import RoadScenario
 
@@ -54,7 +54,9 @@ def library(folder: Path, changes: dict[str, Any] | None = None, **assets: dict[
     return path
 
 
-def site(*libraries: Path, seed: int = 1, length: float = 600.0, half_width: float = 78.0, turnouts=()) -> Site:
+def site(
+    *libraries: Path, seed: int = 1, length: float = 600.0, half_width: float = 78.0, turnouts=()
+) -> PlacementSite:
     """Return a straight road of one lane per direction."""
     scenario = RoadScenario(length=length, half_width=half_width, assets=tuple(str(path) for path in libraries))
     axis = AlignmentObject(
@@ -85,7 +87,7 @@ def site(*libraries: Path, seed: int = 1, length: float = 600.0, half_width: flo
         batter_slope=2.0,
         seed=1,
     )
-    return Site(scenario, seed, axis, sides, {f"turnout-{i}": item for i, item in enumerate(turnouts)}, ground)
+    return PlacementSite(scenario, seed, axis, sides, {f"turnout-{i}": item for i, item in enumerate(turnouts)}, ground)
 
 
 def placed(path: Path, **options: Any) -> list[Asset]:

@@ -1,4 +1,4 @@
-"""`Axis`: a line along a road by running length, with the gaps that a measured one has."""
+"""`MeasuredAxis`: a line along a road by running length, with the gaps that a measured one has."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ _PAIRS = 4_000_000
 """Pairs of frame and segment that are tried at once."""
 
 
-class Axis:
+class MeasuredAxis:
     """A polyline in 3D. Stations are the running length in plan, across gaps as well.
 
     Attributes:
@@ -52,7 +52,7 @@ class Axis:
             raise InputError("axis", len(self.points), "must have at least two distinct points")
 
     @classmethod
-    def read(cls, path: Path, gap: float | None = None) -> Axis:
+    def read(cls, path: Path, gap: float | None = None) -> MeasuredAxis:
         """Read an axis from CSV (a header that names x, y and perhaps z; one point about every metre) or GeoJSON.
 
         Args:
@@ -68,7 +68,7 @@ class Axis:
         return cls(points, np.hypot(*np.diff(points[:, :2], axis=0).T) <= gap)
 
     @classmethod
-    def of_road(cls, geometry: RoadGeometry, step: float = 0.5) -> Axis:
+    def of_road(cls, geometry: RoadGeometry, step: float = 0.5) -> MeasuredAxis:
         """Return a road's centreline in the road's local coordinates.
 
         Vertices lie ``step`` apart at most; chords of 0.5 m are 0.1 mm off a radius of 280 m.
@@ -81,9 +81,9 @@ class Axis:
         """Return the running length of the last vertex, gaps included, m."""
         return float(self.station[-1])
 
-    def moved(self, by: ArrayLike) -> Axis:
+    def moved(self, by: ArrayLike) -> MeasuredAxis:
         """Return the line moved by a vector (3,), m."""
-        return Axis(self.points + np.asarray(by, dtype=np.float64), self.joined)
+        return MeasuredAxis(self.points + np.asarray(by, dtype=np.float64), self.joined)
 
     @cached_property
     def parts(self) -> Float:

@@ -16,11 +16,11 @@ from synthroads_addon.base.random_streams import stream
 from synthroads_addon.base.schema import quantity
 
 from ...configuration import Part
-from .axis import Axis
+from .axis import MeasuredAxis
 from .corridor import Truth, TruthKind
-from .effects import Crop, Effects
+from .effects import SequenceCrop, SequenceEffects
 from .mirroring import mirrored
-from .roads import Road, read_measured, read_scene, scene_folders
+from .roads import LearningRoad, read_measured, read_scene, scene_folders
 from .slices import Batch, Sample, SliceDataset, SliceSettings, collate
 
 
@@ -82,10 +82,10 @@ class BatchOptions(Part):
 class Roads:
     """Roads to learn from and roads to validate with; of both the synthetic and the real ones apart."""
 
-    train: list[Road]
-    measured: list[Road]
-    validation: list[Road]
-    measured_validation: list[Road]
+    train: list[LearningRoad]
+    measured: list[LearningRoad]
+    validation: list[LearningRoad]
+    measured_validation: list[LearningRoad]
 
 
 def read_roads(data: DataOptions, truth: TruthKind, progress: Progress = silent) -> Roads:
@@ -122,7 +122,7 @@ class Batches:
         self,
         roads: Roads,
         settings: SliceSettings,
-        effects: Effects,
+        effects: SequenceEffects,
         options: BatchOptions,
         seed: int,
         measured_share: float,
@@ -161,7 +161,7 @@ class Batches:
 
 
 def fixed_batches(
-    roads: Sequence[Road], settings: SliceSettings, effects: Effects | None, count: int, seed: int
+    roads: Sequence[LearningRoad], settings: SliceSettings, effects: SequenceEffects | None, count: int, seed: int
 ) -> list[Batch]:
     """Return batches that are the same every time.
 
@@ -177,24 +177,24 @@ def fixed_batches(
     return [collate(samples[first : first + 32]) for first in range(0, len(samples), 32)]
 
 
-def quiet(crop: Crop) -> Effects:
+def quiet(crop: SequenceCrop) -> SequenceEffects:
     """Return effects that do nothing but cut off sides."""
-    strengths = [name for name, field in Effects.model_fields.items() if field.annotation is float]
-    return Effects(crop=crop, gamma=(1.0, 1.0), **dict.fromkeys(strengths, 0.0))
+    strengths = [name for name, field in SequenceEffects.model_fields.items() if field.annotation is float]
+    return SequenceEffects(crop=crop, gamma=(1.0, 1.0), **dict.fromkeys(strengths, 0.0))
 
 
 def _scenes(
     data_sets: Sequence[str], split: str, truth: TruthKind, cache: Path | None, progress: Progress
-) -> list[Road]:
+) -> list[LearningRoad]:
     folders = [folder for data_set in data_sets for folder in scene_folders(Path(data_set), split)]
-    roads: list[Road] = []
+    roads: list[LearningRoad] = []
     for number, folder in enumerate(folders):
         progress(f"reading {split} roads", number / len(folders))
         roads += read_scene(folder, truth, cache)
     return roads
 
 
-def _measured(road: MeasuredRoad, truth: TruthKind) -> Road:
+def _measured(road: MeasuredRoad, truth: TruthKind) -> LearningRoad:
     """Read a real road whose axis is only known between two stations."""
     whole = read_measured(Path(road.cloud), Path(road.axis), truth)
     assert whole.truth is not None
@@ -202,5 +202,5 @@ def _measured(road: MeasuredRoad, truth: TruthKind) -> Road:
     inside = (axis.station >= road.first) & (axis.station <= road.last)
     if np.count_nonzero(inside) < 2:
         raise InputError(f"{road.axis}: first", road.first, f"leaves nothing of an axis of {axis.length:.0f} m")
-    part = Axis(axis.points[inside], axis.joined[inside[:-1] & inside[1:]])
+    part = MeasuredAxis(axis.points[inside], axis.joined[inside[:-1] & inside[1:]])
     return replace(whole, truth=Truth.measured(part, truth))

@@ -14,7 +14,7 @@ from synthroads_addon.road.parameters import RoadParameters
 from synthroads_addon.road.section_geometry import CarriagewaySection
 from synthroads_addon.road.turnout_geometry import TURNOUT_STRIPS
 
-from .axis import Axis
+from .axis import MeasuredAxis
 
 Float = NDArray[np.float64]
 TruthKind = Literal["road", "carriageway"]
@@ -48,9 +48,9 @@ class Truth:
     """
 
     kind: TruthKind
-    axis: Axis
-    left: Axis | None
-    right: Axis | None
+    axis: MeasuredAxis
+    left: MeasuredAxis | None
+    right: MeasuredAxis | None
     lanes: Float
     lane_width: Float
     lines: Float
@@ -58,7 +58,7 @@ class Truth:
     has_height: bool = True
 
     @classmethod
-    def measured(cls, axis: Axis, kind: TruthKind) -> Truth:
+    def measured(cls, axis: MeasuredAxis, kind: TruthKind) -> Truth:
         """Return a measured centreline of which nothing else is known."""
         unknown = np.full(len(axis.points), np.nan)
         return cls(
@@ -172,7 +172,7 @@ def truths(parameters: RoadParameters, kind: TruthKind, origin: ArrayLike = (0.0
 
 
 def _whole_road(geometry: RoadGeometry) -> Truth:
-    axis = Axis.of_road(geometry, STEP)
+    axis = MeasuredAxis.of_road(geometry, STEP)
     station = _vertices(geometry)
     count, total = np.zeros(len(station)), np.zeros(len(station))
     edges: dict[str, Float] = {}
@@ -216,7 +216,7 @@ def _carriageway(geometry: RoadGeometry, section: CarriagewaySection) -> Truth |
     left, right = (outer_edge, inner_edge) if sign > 0 else (inner_edge, outer_edge)
     return Truth(
         kind="carriageway",
-        axis=Axis(center, np.diff(np.flatnonzero(known)) == 1),
+        axis=MeasuredAxis(center, np.diff(np.flatnonzero(known)) == 1),
         left=_offset_line(geometry, station, sign * left),
         right=_offset_line(geometry, station, sign * right),
         lanes=number[known],
@@ -258,8 +258,8 @@ def _points(geometry: RoadGeometry, station: Float, offset: Float) -> Float:
     return np.column_stack([plan, np.where(np.isnan(height), geometry.profile.elevation(station), height)])
 
 
-def _offset_line(geometry: RoadGeometry, station: Float, offset: Float) -> Axis | None:
+def _offset_line(geometry: RoadGeometry, station: Float, offset: Float) -> MeasuredAxis | None:
     known = np.flatnonzero(~np.isnan(offset))
     if len(known) < 2:
         return None
-    return Axis(_points(geometry, station, offset)[known], np.diff(known) == 1)
+    return MeasuredAxis(_points(geometry, station, offset)[known], np.diff(known) == 1)

@@ -24,7 +24,7 @@ _RIM = 0.7
 """Width of the pavement's edge whose height is taken, m."""
 
 
-class Crop(Part):
+class SequenceCrop(Part):
     """Both sides of every slice cut off, so that the middle of what is left isn't the centre.
 
     A strip reaches to a distance R from the true centre to either side, two numbers drawn for the whole sequence: a
@@ -41,7 +41,7 @@ class Crop(Part):
     steady: float = quantity(0.25, ge=0, le=1, unit="1", description="Probability of cuts that all slices share.")
 
     @model_validator(mode="after")
-    def _in_order(self) -> Crop:
+    def _in_order(self) -> SequenceCrop:
         for name, least in (("reach", 0.5), ("beyond", 0.0)):
             low, high = getattr(self, name)
             if not least <= low <= high <= 1000.0:
@@ -49,12 +49,12 @@ class Crop(Part):
         return self
 
 
-class Effects(Part):
+class SequenceEffects(Part):
     """Effects on a sequence while training. Strengths are the largest; each sample draws its own below them."""
 
     mirror: float = quantity(0.5, ge=0, le=1, unit="1", description="Probability of left and right being swapped.")
     turn_round: float = quantity(0.5, ge=0, le=1, unit="1", description="Probability of running against the path.")
-    crop: Crop = Field(default=Crop(), description="Sides cut off.")
+    crop: SequenceCrop = Field(default=SequenceCrop(), description="Sides cut off.")
     alone: float = quantity(
         0.5,
         ge=0,
@@ -93,14 +93,14 @@ class Effects(Part):
     tint: float = quantity(0.2, ge=0, le=1, unit="1", description="Log of the factor on each colour channel.")
 
     @model_validator(mode="after")
-    def _powers(self) -> Effects:
+    def _powers(self) -> SequenceEffects:
         if not 0.01 <= self.gamma[0] <= self.gamma[1] <= 10.0:
             low, high = self.gamma
             raise ValueError(f"gamma is {low:g}, {high:g}: must be two ascending numbers from 0.01 to 10")
         return self
 
 
-def leave_out(stretch: Stretch, effects: Effects, rng: Generator) -> None:
+def leave_out(stretch: Stretch, effects: SequenceEffects, rng: Generator) -> None:
     """Draw the effects that leave points out, or put others in their place.
 
     Args:
@@ -114,7 +114,7 @@ def leave_out(stretch: Stretch, effects: Effects, rng: Generator) -> None:
     drop(stretch, effects, rng)
 
 
-def transform(stretch: Stretch, effects: Effects, rng: Generator) -> None:
+def transform(stretch: Stretch, effects: SequenceEffects, rng: Generator) -> None:
     """Draw the effects that change points. They cost the less the fewer points are left."""
     for happens, turned in ((effects.mirror, mirror), (effects.turn_round, turn_round)):
         if rng.random() < happens:
@@ -153,7 +153,7 @@ def stand_alone(stretch: Stretch) -> None:
     stretch.room = np.full_like(stretch.room, np.inf)
 
 
-def crop_sides(stretch: Stretch, crop: Crop, rng: Generator) -> None:
+def crop_sides(stretch: Stretch, crop: SequenceCrop, rng: Generator) -> None:
     """Cut off both sides of every slice; slices without a known centre are cut as if it lay at the frame's origin."""
     count = len(stretch.center)
     center = np.nan_to_num(stretch.center)
@@ -172,7 +172,7 @@ def crop_sides(stretch: Stretch, crop: Crop, rng: Generator) -> None:
     stretch.keep((y <= reach[stretch.number, 0]) & (-y <= reach[stretch.number, 1]))
 
 
-def drop(stretch: Stretch, effects: Effects, rng: Generator) -> None:
+def drop(stretch: Stretch, effects: SequenceEffects, rng: Generator) -> None:
     """Leave out single points, whole slices, and a hole of some metres."""
     slices, points = len(stretch.center), len(stretch.number)
     keep = rng.random(points) >= rng.uniform(0.0, effects.dropout)
@@ -212,7 +212,7 @@ def turn_round(stretch: Stretch) -> None:
     stretch.frames = stretch.frames.turned_round()
 
 
-def move(stretch: Stretch, effects: Effects, rng: Generator) -> None:
+def move(stretch: Stretch, effects: SequenceEffects, rng: Generator) -> None:
     """Tilt the ground and add noise to the points. Their slices stay what they are."""
     grade, cross = rng.uniform(-effects.tilt, effects.tilt, 2)
     along = stretch.along()

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from synthroads_addon.base.errors import InputError
 
-from .axis import Axis
+from .axis import MeasuredAxis
 
 Float = NDArray[np.float64]
 
@@ -62,7 +62,7 @@ class Frames:
         return Frames(self.position[::-1], self.direction[::-1] + np.pi, self.station[::-1])
 
 
-def along(path: Axis, spacing: float = SPACING, reach: float = 5.0) -> Frames:
+def along(path: MeasuredAxis, spacing: float = SPACING, reach: float = 5.0) -> Frames:
     """Return frames every ``spacing`` along a path, none in its gaps.
 
     Args:
@@ -149,7 +149,7 @@ def _own_spacing(frames: Frames, most: float) -> float:
     return min(float(np.median(np.abs(np.diff(frames.station)))), most) if len(frames) > 1 else most
 
 
-def read_path(file: Path, origin: ArrayLike = (0.0, 0.0, 0.0), tolerance: float = 0.3) -> Axis:
+def read_path(file: Path, origin: ArrayLike = (0.0, 0.0, 0.0), tolerance: float = 0.3) -> MeasuredAxis:
     """Read a path along the road: a drawn line, or the trajectory of the scanner's platform.
 
     Args:
@@ -161,7 +161,7 @@ def read_path(file: Path, origin: ArrayLike = (0.0, 0.0, 0.0), tolerance: float 
     Raises:
         MissingFileError, InputError: see `read_axis`.
     """
-    whole = Axis.read(file, gap=np.inf).moved(-np.asarray(origin, dtype=np.float64))
+    whole = MeasuredAxis.read(file, gap=np.inf).moved(-np.asarray(origin, dtype=np.float64))
     keep, last = [0], 0.0
     for index, station in enumerate(whole.station[1:], 1):
         if station - last >= tolerance:
@@ -169,10 +169,10 @@ def read_path(file: Path, origin: ArrayLike = (0.0, 0.0, 0.0), tolerance: float 
             last = station
     if len(keep) < 2:
         raise InputError(str(file), whole.length, f"must be a path of at least {tolerance:g} m")
-    return Axis(whole.points[keep])
+    return MeasuredAxis(whole.points[keep])
 
 
-def estimated_path(xyz: Float, cell: float = 4.0, window: float = 60.0, half_width: float = 40.0) -> Axis:
+def estimated_path(xyz: Float, cell: float = 4.0, window: float = 60.0, half_width: float = 40.0) -> MeasuredAxis:
     """Find the line along the middle of a strip of points, whatever way the strip bends.
 
     The two ends of the strip are the cells of a grid that lie farthest apart along it. The shortest way between them is
@@ -189,7 +189,7 @@ def estimated_path(xyz: Float, cell: float = 4.0, window: float = 60.0, half_wid
     """
     plan = np.asarray(xyz, dtype=np.float64)[:, :2]
     cells = _cells(plan, cell)
-    rough = Axis(cells[_way_through(cells, cell)])
+    rough = MeasuredAxis(cells[_way_through(cells, cell)])
     path = _smoothed(rough.position(rough.stations(SPACING)), window) if rough.length > 4 * SPACING else rough
     for _ in range(3):
         path = _centred(path, plan, window, half_width)
@@ -245,7 +245,7 @@ def _graph(count: int, pairs: NDArray[np.intp], weights: Float) -> Any:
     return coo_array((weights, (pairs[:, 0], pairs[:, 1])), shape=(count, count)).tocsr()
 
 
-def _centred(path: Axis, plan: Float, window: float, half_width: float) -> Axis:
+def _centred(path: MeasuredAxis, plan: Float, window: float, half_width: float) -> MeasuredAxis:
     """Return a path drawn to the middle of the points' extent across it and smoothed."""
     station, offset = path.project(plan)
     near = np.abs(offset) <= half_width
@@ -264,7 +264,7 @@ def _centred(path: Axis, plan: Float, window: float, half_width: float) -> Axis:
     return _smoothed(_on_path(path, every).at(np.interp(every, middle, 0.5 * (low + high))), window)
 
 
-def _on_path(path: Axis, station: Float) -> Frames:
+def _on_path(path: MeasuredAxis, station: Float) -> Frames:
     """Return frames at stations of a path without gaps, which goes on straight beyond its ends."""
     inside = np.clip(station, 0.0, path.length)
     direction = path.direction(inside, reach=8.0)
@@ -272,9 +272,9 @@ def _on_path(path: Axis, station: Float) -> Frames:
     return Frames(path.position(inside) + beyond, direction, station)
 
 
-def _smoothed(points: Float, window: float) -> Axis:
+def _smoothed(points: Float, window: float) -> MeasuredAxis:
     """Return the line through points (N, 2), `SPACING` apart, each moved on the parabola through those around it."""
     from scipy.signal import savgol_filter
 
     size = min(int(window / SPACING), len(points) - 1) // 2 * 2 + 1
-    return Axis(savgol_filter(points, size, polyorder=min(2, size - 1), axis=0, mode="interp"))
+    return MeasuredAxis(savgol_filter(points, size, polyorder=min(2, size - 1), axis=0, mode="interp"))

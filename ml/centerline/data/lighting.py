@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from .stretch import Stretch
 
 if TYPE_CHECKING:
-    from .effects import Effects
+    from .effects import SequenceEffects
 
 Float = NDArray[np.float64]
 Generator = np.random.Generator
@@ -30,7 +30,7 @@ _SCANNER_ASIDE = 15.0
 """Of the scanners from whose range intensities fall off: lowest and highest, and farthest from the path, m."""
 
 
-def relight(stretch: Stretch, effects: Effects, rng: Generator) -> None:
+def relight(stretch: Stretch, effects: SequenceEffects, rng: Generator) -> None:
     """Change intensities and colours as another scanner, other materials and another camera would have."""
     if rng.random() >= effects.plain and stretch.intensity.any():
         _relight_intensities(stretch, effects, rng)
@@ -41,7 +41,7 @@ def relight(stretch: Stretch, effects: Effects, rng: Generator) -> None:
         stretch.rgb = np.clip(stretch.rgb * factors, 0.0, 1.0)
 
 
-def _relight_intensities(stretch: Stretch, effects: Effects, rng: Generator) -> None:
+def _relight_intensities(stretch: Stretch, effects: SequenceEffects, rng: Generator) -> None:
     share = rng.random(7)
     value, marked = _repainted(np.maximum(stretch.intensity, 0.0), stretch, effects.repaint, rng)
     value = _worn(value, stretch.paved, marked, effects.paint * share[0])

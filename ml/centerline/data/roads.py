@@ -1,4 +1,4 @@
-"""`Road`: one cloud's ground points in the order in which they lie along the road, with what is known of the truth."""
+"""`LearningRoad`: one cloud's ground points in the order in which they lie along the road, with the known truth."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from synthroads_addon.dataset.manifest import checksum, read_manifest
 from synthroads_addon.road.parameters import read_parameters
 
 from ...points import GROUND_CLASSES, Points, read_ground, read_points
-from .axis import Axis
+from .axis import MeasuredAxis
 from .corridor import Truth, TruthKind, truths
 from .frames import Frames
 
@@ -40,12 +40,12 @@ _CACHED = {
     "class_id": ("u1", ()),
     "station": ("f4", ()),
 }
-"""Arrays of a `Road`, with the type and the shape of a point's entry."""
+"""Arrays of a `LearningRoad`, with the type and the shape of a point's entry."""
 _CACHE_VERSION = 1
 
 
 @dataclass(frozen=True)
-class Road:
+class LearningRoad:
     """N points of the road and the ground beside it. Arrays may be mapped from files.
 
     Attributes:
@@ -71,7 +71,7 @@ class Road:
     class_names: dict[int, str]
     has_color: bool
     station: NDArray[np.float32]
-    reference: Axis
+    reference: MeasuredAxis
     truth: Truth | None = None
 
     def __len__(self) -> int:
@@ -79,8 +79,8 @@ class Road:
 
     @classmethod
     def of_points(
-        cls, name: str, points: Points, reference: Axis, truth: Truth | None = None, reach: float = REACH
-    ) -> Road:
+        cls, name: str, points: Points, reference: MeasuredAxis, truth: Truth | None = None, reach: float = REACH
+    ) -> LearningRoad:
         """Sort points along a line. Points farther than ``reach`` (m) from it are left out."""
         station, offset = reference.project(points.xyz)
         near = np.flatnonzero(np.abs(offset) <= reach)
@@ -99,7 +99,7 @@ class Road:
             truth=truth,
         )
 
-    def select(self, keep: NDArray[np.bool_]) -> Road:
+    def select(self, keep: NDArray[np.bool_]) -> LearningRoad:
         """Return the road with the points (N,) of a mask only."""
         return replace(self, **{name: getattr(self, name)[keep] for name in _CACHED})
 
@@ -176,12 +176,12 @@ def scene_folders(data_set: Path, split: str) -> list[Path]:
     return found
 
 
-def read_scene(folder: Path, kind: TruthKind, cache: Path | None = None) -> list[Road]:
+def read_scene(folder: Path, kind: TruthKind, cache: Path | None = None) -> list[LearningRoad]:
     """Read a scene of a data set: its ground points and their truth from its parameters.
 
     Args:
         folder: with ``cloud.laz`` and ``parameters.json``.
-        kind: of the truth. A road with carriageways of two lanes gives a `Road` for each of them with the kind
+        kind: of the truth. A road with carriageways of two lanes gives a `LearningRoad` for each of them with the kind
             ``carriageway``, perhaps none; names of several end with their number.
         cache: folder in which the sorted points are kept, to be mapped into memory the next time; None: nowhere.
 
@@ -196,7 +196,7 @@ def read_scene(folder: Path, kind: TruthKind, cache: Path | None = None) -> list
     if whole is None:
         points = read_points(folder / CLOUD, GROUND_CLASSES)
         reference = truths(parameters, "road", points.origin)[0].axis
-        whole = Road.of_points(folder.name, points, reference)
+        whole = LearningRoad.of_points(folder.name, points, reference)
         if cache:
             _keep(whole, folder, cache)
     found = truths(parameters, kind, whole.origin)
@@ -204,7 +204,7 @@ def read_scene(folder: Path, kind: TruthKind, cache: Path | None = None) -> list
     return [replace(whole, name=name, truth=truth) for name, truth in zip(names, found, strict=True)]
 
 
-def read_measured(cloud: Path, axis: Path, kind: TruthKind, gap: float | None = None) -> Road:
+def read_measured(cloud: Path, axis: Path, kind: TruthKind, gap: float | None = None) -> LearningRoad:
     """Read the ground of a real cloud and a measured axis, in the same map coordinates.
 
     Args:
@@ -217,11 +217,11 @@ def read_measured(cloud: Path, axis: Path, kind: TruthKind, gap: float | None = 
         MissingFileError, InputError: a file is missing or damaged.
     """
     points = read_ground(cloud)
-    line = Axis.read(axis, gap).moved(-points.origin)
-    return Road.of_points(cloud.stem, points, line, Truth.measured(line, kind))
+    line = MeasuredAxis.read(axis, gap).moved(-points.origin)
+    return LearningRoad.of_points(cloud.stem, points, line, Truth.measured(line, kind))
 
 
-def cropped(road: Road, share: float, seed: int, length: float = 1.0) -> Road:
+def cropped(road: LearningRoad, share: float, seed: int, length: float = 1.0) -> LearningRoad:
     """Cut off both sides of every slice of a road with a truth, each at random and by itself.
 
     Slices are each metre (``length``) of the station along the truth's axis. On either side of the axis a slice reaches
@@ -251,7 +251,7 @@ def cropped(road: Road, share: float, seed: int, length: float = 1.0) -> Road:
     return road.select(keep)
 
 
-def cut_beside_median(road: Road, error: float, rng: np.random.Generator) -> Road:
+def cut_beside_median(road: LearningRoad, error: float, rng: np.random.Generator) -> LearningRoad:
     """Return a road of which the other carriageway is cut off somewhere beside the middle of the median.
 
     The cut is as far from it everywhere, and nobody knows how far: so it doesn't tell where the carriageway lies.
@@ -275,7 +275,7 @@ def _cache_folder(folder: Path, cache: Path) -> Path:
     return cache / f"{folder.name}-{hashlib.sha256(made_from.encode()).hexdigest()[:16]}"
 
 
-def _keep(road: Road, folder: Path, cache: Path) -> None:
+def _keep(road: LearningRoad, folder: Path, cache: Path) -> None:
     """Write a road's arrays, in place of damaged ones; they appear when all of them are whole.
 
     Raises:
@@ -299,7 +299,7 @@ def _keep(road: Road, folder: Path, cache: Path) -> None:
         raise OutputError("data.cache", str(cache), f"cannot be written ({error.strerror})") from None
 
 
-def _cached(folder: Path, cache: Path) -> Road | None:
+def _cached(folder: Path, cache: Path) -> LearningRoad | None:
     """Return a road as it was kept; None if it wasn't, or is damaged."""
     place = _cache_folder(folder, cache)
     try:
@@ -308,12 +308,12 @@ def _cached(folder: Path, cache: Path) -> Road | None:
         count = len(arrays["xyz"])
         if any(arrays[name].dtype != of[0] or arrays[name].shape != (count, *of[1]) for name, of in _CACHED.items()):
             return None
-        return Road(
+        return LearningRoad(
             name=folder.name,
             origin=np.array(notes["origin"], dtype=np.float64).reshape(3),
             class_names={int(number): str(name) for number, name in notes["classes"].items()},
             has_color=bool(notes["has_color"]),
-            reference=Axis(np.load(place / "reference.npy")),
+            reference=MeasuredAxis(np.load(place / "reference.npy")),
             **arrays,
         )
     except (*ARCHIVE_FAULTS, TypeError, AttributeError, InputError):

@@ -32,9 +32,9 @@ from ...configuration import Part
 from ...points import ROAD_CLASSES
 from . import intensity
 from .corridor import CORRIDOR, TruthKind
-from .effects import Effects, leave_out, transform
+from .effects import SequenceEffects, leave_out, transform
 from .frames import SPACING, Frames, displaced, sequences
-from .roads import Road, cut_beside_median
+from .roads import LearningRoad, cut_beside_median
 from .stretch import HEIGHT, Stretch
 
 Float = NDArray[np.float64]
@@ -97,11 +97,11 @@ class SliceDataset(Dataset[Sample]):
 
     def __init__(
         self,
-        roads: Sequence[Road],
+        roads: Sequence[LearningRoad],
         settings: SliceSettings,
         samples: int,
         seed: int,
-        effects: Effects | None = None,
+        effects: SequenceEffects | None = None,
         purpose: str = "slices",
     ) -> None:
         self.roads = list(roads)
@@ -178,7 +178,7 @@ class FrameSlices(Dataset[Sample]):
         step: slices from one sequence's start to the next one's; so many as a sequence has if not given.
     """
 
-    def __init__(self, road: Road, frames: Frames, settings: SliceSettings, step: int | None = None) -> None:
+    def __init__(self, road: LearningRoad, frames: Frames, settings: SliceSettings, step: int | None = None) -> None:
         self.road = road
         self.frames = frames
         self.settings = settings
@@ -195,7 +195,7 @@ class FrameSlices(Dataset[Sample]):
         return sample(cut, self.settings, stream(0, "frames", place), 0, run)
 
 
-def stretch(road: Road, frames: Frames, settings: SliceSettings) -> Stretch:
+def stretch(road: LearningRoad, frames: Frames, settings: SliceSettings) -> Stretch:
     """Return the points and the truth in the slices of some frames.
 
     Where the truth is a carriageway's, points beyond the middle of the median are left out, see `Truth.room`.
@@ -279,7 +279,7 @@ def collate(samples: Sequence[Mapping[str, Tensor]]) -> Batch:
     return batch
 
 
-def _starts(road: Road, number: int, settings: SliceSettings) -> list[_Start]:
+def _starts(road: LearningRoad, number: int, settings: SliceSettings) -> list[_Start]:
     if road.truth is None:
         return []
     length = settings.spacing * (settings.slices - 1)
@@ -324,7 +324,7 @@ __all__ = [
     "Batch",
     "FrameSlices",
     "IterableSlices",
-    "Road",
+    "LearningRoad",
     "Sample",
     "SliceDataset",
     "SliceSettings",

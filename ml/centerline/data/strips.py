@@ -17,9 +17,9 @@ from synthroads_addon.cloud.formats.registry import open_cloud
 from synthroads_addon.cloud.points import PointBlock
 
 from ...points import GROUND_CLASSES, SIXTEEN_BITS, UNSORTED_CLASSES, Points, full_color
-from .axis import Axis
+from .axis import MeasuredAxis
 from .frames import Frames, estimated_path
-from .roads import REACH, Road
+from .roads import REACH, LearningRoad
 
 Float = NDArray[np.float64]
 
@@ -33,7 +33,7 @@ _STORED = np.dtype([("xyz", "<f8", 3), ("intensity", "<f4"), ("rgb", "<u2", 3), 
 
 
 @dataclass(frozen=True)
-class Ground:
+class GroundReading:
     """Findings of a first reading of a cloud.
 
     Attributes:
@@ -49,7 +49,7 @@ class Ground:
     cells: Float
 
 
-def find_ground(cloud: Path, progress: Progress = silent) -> Ground:
+def find_ground(cloud: Path, progress: Progress = silent) -> GroundReading:
     """Read a cloud once and say where its ground is: as `points.read_ground` chooses it, in bounded memory.
 
     Raises:
@@ -76,18 +76,18 @@ def find_ground(cloud: Path, progress: Progress = silent) -> Ground:
         chosen, found = np.ones(256, dtype=bool), cells[False]
     else:
         raise InputError(str(cloud), None, f"holds no point of the classes {', '.join(GROUND_CLASSES)}")
-    return Ground(header, chosen, largest, _CELL * (np.array(list(found), dtype=np.float64) + 0.5))
+    return GroundReading(header, chosen, largest, _CELL * (np.array(list(found), dtype=np.float64) + 0.5))
 
 
-def path_through(ground: Ground) -> Axis:
+def path_through(ground: GroundReading) -> MeasuredAxis:
     """Return the path along a cloud's ground, in map coordinates."""
     origin = np.floor(ground.cells.min(axis=0))
     return estimated_path(ground.cells - origin).moved((*origin, 0.0))
 
 
 def strips(
-    cloud: Path, ground: Ground, path: Axis, frames: Frames, progress: Progress = silent
-) -> Iterator[tuple[Road, Frames, NDArray[np.bool_]]]:
+    cloud: Path, ground: GroundReading, path: MeasuredAxis, frames: Frames, progress: Progress = silent
+) -> Iterator[tuple[LearningRoad, Frames, NDArray[np.bool_]]]:
     """Yield a road strip by strip, from first to last.
 
     The points lie in a temporary folder meanwhile, and in memory only those of one strip.
@@ -114,10 +114,12 @@ def strips(
                 points = _points(stored, ground)
                 line = _part(path, first - REACH, last + REACH).moved(-points.origin)
                 local = Frames(frames.position - points.origin[:2], frames.direction, frames.station).select(seen)
-                yield Road.of_points(cloud.stem, points, line), local, own[seen] == number
+                yield LearningRoad.of_points(cloud.stem, points, line), local, own[seen] == number
 
 
-def _sorted_to(folder: Path, cloud: Path, ground: Ground, path: Axis, progress: Progress) -> dict[int, Path]:
+def _sorted_to(
+    folder: Path, cloud: Path, ground: GroundReading, path: MeasuredAxis, progress: Progress
+) -> dict[int, Path]:
     """Write the points near the path to a file per strip, margins included."""
     files: dict[int, Path] = {}
     done = 0
@@ -152,7 +154,7 @@ def _rows(block: PointBlock, header: CloudHeader) -> NDArray[np.void]:
     return rows
 
 
-def _points(rows: NDArray[np.void], ground: Ground) -> Points:
+def _points(rows: NDArray[np.void], ground: GroundReading) -> Points:
     origin = np.floor(rows["xyz"].min(axis=0))
     return Points(
         origin=origin,
@@ -166,9 +168,9 @@ def _points(rows: NDArray[np.void], ground: Ground) -> Points:
     )
 
 
-def _part(path: Axis, first: float, last: float) -> Axis:
+def _part(path: MeasuredAxis, first: float, last: float) -> MeasuredAxis:
     """Return the part of a path around some stations: its vertices there, and one beyond on either side."""
     low = max(0, int(np.searchsorted(path.station, first, "right")) - 1)
     high = min(len(path.points), int(np.searchsorted(path.station, last, "left")) + 1)
     low = min(low, high - 2) if high >= 2 else 0
-    return Axis(path.points[low : max(high, 2)], path.joined[low : max(high, 2) - 1])
+    return MeasuredAxis(path.points[low : max(high, 2)], path.joined[low : max(high, 2) - 1])

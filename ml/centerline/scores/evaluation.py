@@ -32,13 +32,13 @@ from synthroads_addon.base.random_streams import stream
 from ...points import ROAD_CLASSES
 from ..data.corridor import CORRIDOR, Truth
 from ..data.frames import Frames, along, displaced, estimated_path, stretches
-from ..data.roads import Road, Slices, cropped, cut_beside_median
+from ..data.roads import LearningRoad, Slices, cropped, cut_beside_median
 from ..data.slices import SliceSettings
 from . import skeleton, trivial
 from .metrics import Spread, figures, over_roads, over_seeds
 
 Float = NDArray[np.float64]
-Predictor = Callable[[Road, Frames], Float]
+Predictor = Callable[[LearningRoad, Frames], Float]
 
 CORRIDOR_COLUMNS = ("center", "center_std", *CORRIDOR, *(f"{name}_std" for name in CORRIDOR), "center_68", "center_95")
 """Columns of a prediction; only the first is needed. Those of the corridor are for pictures. The last two are the
@@ -65,12 +65,12 @@ class Cropping:
 class Case:
     """A road as one seed shows it: its points, cropped perhaps, and the frames in which it is looked at."""
 
-    road: Road
+    road: LearningRoad
     frames: Frames
 
 
 def case(
-    road: Road, seed: int, *, cropping: Cropping | None, estimated: bool, settings: SliceSettings | None = None
+    road: LearningRoad, seed: int, *, cropping: Cropping | None, estimated: bool, settings: SliceSettings | None = None
 ) -> Case:
     """Return a road as a seed shows it.
 
@@ -93,7 +93,7 @@ def case(
     return Case(seen, strayed)
 
 
-def truth_of(road: Road) -> Truth:
+def truth_of(road: LearningRoad) -> Truth:
     """Return a road's truth.
 
     Raises:
@@ -151,7 +151,7 @@ def trivial_predictor(name: str, cut: Cut | None = None) -> Predictor:
     rule, length = trivial.RULES[name]
     cut = cut or Cut()
 
-    def predict(road: Road, frames: Frames) -> Float:
+    def predict(road: LearningRoad, frames: Frames) -> Float:
         found = cut(road, frames, length)
         own = road.belonging[found.index]
         y, intensity = found.xy[own, 1], road.intensity[found.index[own]].astype(np.float64)
@@ -169,10 +169,10 @@ class Cut:
 
     def __init__(self, half_width: float = HALF_WIDTH) -> None:
         self.half_width = half_width
-        self._last: tuple[Road, Frames] | None = None
+        self._last: tuple[LearningRoad, Frames] | None = None
         self._slices: dict[float, Slices] = {}
 
-    def __call__(self, road: Road, frames: Frames, thickness: float) -> Slices:
+    def __call__(self, road: LearningRoad, frames: Frames, thickness: float) -> Slices:
         """Return the points in each slice of so many metres."""
         if self._last is None or self._last[0] is not road or self._last[1] is not frames:
             self._last, self._slices = (road, frames), {}
@@ -184,21 +184,21 @@ class Cut:
 def skeleton_predictor(settings: skeleton.SkeletonSettings) -> Predictor:
     """Return the skeleton baseline; the mask ``classes`` takes the points of the road's classes where there are any."""
 
-    def predict(road: Road, frames: Frames) -> Float:
+    def predict(road: LearningRoad, frames: Frames) -> Float:
         xy, intensity = _mask_points(road, settings.mask)
         return skeleton.centers(xy, intensity, frames.position, frames.direction, settings)[:, None]
 
     return predict
 
 
-def _mask_points(road: Road, mask: str) -> tuple[Float, Float]:
+def _mask_points(road: LearningRoad, mask: str) -> tuple[Float, Float]:
     """Return places (N, 2) and intensities (N,) of the points that the skeleton's mask is made of."""
     paved = np.isin(road.class_id, road.ids_of(ROAD_CLASSES))
     own = road.belonging & paved if mask == "classes" and paved.any() else road.belonging
     return road.xyz[own, :2].astype(np.float64), road.intensity[own].astype(np.float64)
 
 
-def path_itself(road: Road, frames: Frames) -> Float:
+def path_itself(road: LearningRoad, frames: Frames) -> Float:
     """Predict the frames' own origins: what the displaced path alone would be worth."""
     return np.zeros((len(frames), 1))
 
@@ -217,7 +217,7 @@ def trivial_predictors(half_width: float = HALF_WIDTH) -> dict[str, list[Predict
 def along_parabolas(predictor: Predictor, length: float) -> Predictor:
     """Return what predicts, of each frame, the parabola through a predictor's centres that far along the path, m."""
 
-    def predict(road: Road, frames: Frames) -> Float:
+    def predict(road: LearningRoad, frames: Frames) -> Float:
         y = predictor(road, frames)[:, 0]
         place, result = frames.at(y), np.full(len(y), np.nan)
         for part in stretches(frames):
@@ -272,5 +272,5 @@ def grid_search(shown: Sequence[Case], masks: Sequence[str]) -> GridSearch:
     return GridSearch(best[0], rows)
 
 
-def _told(y: Float, road: Road, frames: Frames) -> Float:
+def _told(y: Float, road: LearningRoad, frames: Frames) -> Float:
     return y[:, None]

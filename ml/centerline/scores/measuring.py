@@ -17,7 +17,7 @@ from synthroads_addon.dataset.manifest import MANIFEST
 
 from ...tasks import Evaluation
 from ..data.corridor import TruthKind
-from ..data.roads import Road, read_measured, read_scene, scene_folders
+from ..data.roads import LearningRoad, read_measured, read_scene, scene_folders
 from ..networks.models import TARGETS
 from ..use.calibration import LEVELS
 from ..use.predictor import CenterlinePredictor, errors
@@ -32,7 +32,7 @@ from .evaluation import (
     truth_of,
 )
 from .metrics import coverage
-from .pictures import View, corridor_picture, lines_picture
+from .pictures import PictureView, corridor_picture, lines_picture
 from .skeleton import SkeletonSettings
 from .tables import as_data, write_tables
 
@@ -138,7 +138,7 @@ def _figures(error: Float, std: Float, wide: Float) -> dict[str, dict[str, float
     return rows
 
 
-def _measured(cloud: Path, truth: TruthKind) -> Road:
+def _measured(cloud: Path, truth: TruthKind) -> LearningRoad:
     found = [cloud.with_name(cloud.stem + ending) for ending in AXIS_ENDINGS]
     there = [path for path in found if path.is_file()]
     if not cloud.exists():
@@ -152,7 +152,7 @@ def _measured(cloud: Path, truth: TruthKind) -> Road:
 def _draw(folder: Path, one: Case, predictor: CenterlinePredictor, name: str) -> list[str]:
     """Draw a road; return the names of the pictures."""
     length = truth_of(one.road).axis.length
-    view = View(max(0.0, 0.5 * (length - _VIEW)), min(length, 0.5 * (length + _VIEW)))
+    view = PictureView(max(0.0, 0.5 * (length - _VIEW)), min(length, 0.5 * (length + _VIEW)))
     prediction = predictor(one.road, one.frames)
     lines: Mapping[str, Float] = {
         name: prediction[:, 0],

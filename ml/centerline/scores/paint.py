@@ -14,10 +14,10 @@ from numpy.typing import NDArray
 
 from synthroads_addon.base.errors import InputError
 
-from ..data.axis import Axis
+from ..data.axis import MeasuredAxis
 from ..data.corridor import Truth
 from ..data.intensity import logarithms
-from ..data.roads import Road
+from ..data.roads import LearningRoad
 from .evaluation import truth_of
 
 Float = NDArray[np.float64]
@@ -38,7 +38,7 @@ FEWEST = 100
 """Points of which a place is taken."""
 
 
-def with_painted_line(road: Road) -> Road:
+def with_painted_line(road: LearningRoad) -> LearningRoad:
     """Return a road whose truth is the painted line next to its measured axis, with gaps where none is found.
 
     Raises:
@@ -61,7 +61,7 @@ def with_painted_line(road: Road) -> Road:
     direction = axis.direction(places[there])
     left = np.column_stack([-np.sin(direction), np.cos(direction)])
     points = axis.position(places[there]) + aside[there, None] * left
-    line = Axis(np.column_stack([points, axis.elevation(places[there])]), np.diff(places[there]) < 1.5 * STEP)
+    line = MeasuredAxis(np.column_stack([points, axis.elevation(places[there])]), np.diff(places[there]) < 1.5 * STEP)
     return replace(road, truth=Truth.measured(line, truth.kind))
 
 

@@ -35,14 +35,16 @@ _APART = 4.0
 
 
 @dataclass(frozen=True)
-class View:
+class PictureView:
     """The part of a road that is drawn: stations along its true axis, m."""
 
     first: float
     last: float
 
 
-def lines_picture(shown: Case, lines: Mapping[str, Float], view: View, title: str, height: float = 12.0) -> bytes:
+def lines_picture(
+    shown: Case, lines: Mapping[str, Float], view: PictureView, title: str, height: float = 12.0
+) -> bytes:
     """Return a PNG: centrelines over the cloud, and how far each is from the true axis.
 
     Args:
@@ -71,7 +73,7 @@ def lines_picture(shown: Case, lines: Mapping[str, Float], view: View, title: st
     return _png(figure)
 
 
-def corridor_picture(shown: Case, prediction: Float, view: View, title: str, height: float = 16.0) -> bytes:
+def corridor_picture(shown: Case, prediction: Float, view: PictureView, title: str, height: float = 16.0) -> bytes:
     """Return a PNG: centre and edges with their 95 % bands over the cloud, the centre's error, the lanes.
 
     Args:
@@ -96,7 +98,7 @@ def corridor_picture(shown: Case, prediction: Float, view: View, title: str, hei
     return _png(figure)
 
 
-def _panels(title: str, heights: Sequence[float], view: View, height: float) -> tuple[Any, Sequence[Any]]:
+def _panels(title: str, heights: Sequence[float], view: PictureView, height: float) -> tuple[Any, Sequence[Any]]:
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(13.0, 1.6 + 2.0 * sum(heights)), layout="constrained")
@@ -109,7 +111,7 @@ def _panels(title: str, heights: Sequence[float], view: View, height: float) -> 
     return figure, panels
 
 
-def _cloud(axes: Axes, shown: Case, view: View, height: float) -> None:
+def _cloud(axes: Axes, shown: Case, view: PictureView, height: float) -> None:
     """Draw the points by intensity, straightened along the true axis.
 
     Where only an axis is known, as of real scans that may not be passed on, means of cells are drawn and no points.
@@ -134,7 +136,7 @@ def _cloud(axes: Axes, shown: Case, view: View, height: float) -> None:
     axes.scatter(station[near][some], offset[near][some], c=intensity[some], s=size, lw=0, **look)
 
 
-def _true(axes: Axes, shown: Case, view: View, edges: bool = False) -> None:
+def _true(axes: Axes, shown: Case, view: PictureView, edges: bool = False) -> None:
     truth = truth_of(shown.road)
     station = np.arange(view.first, view.last, 0.5)
     axes.plot(station, np.where(truth.axis.inside(station), 0.0, np.nan), color=TRUE, lw=2.5, label="true axis")
@@ -146,7 +148,7 @@ def _true(axes: Axes, shown: Case, view: View, edges: bool = False) -> None:
             axes.plot(along[order], aside[order], color=TRUE, lw=2.0, ls="--", label=label)
 
 
-def _beside(shown: Case, points: Float, view: View) -> tuple[Float, Float]:
+def _beside(shown: Case, points: Float, view: PictureView) -> tuple[Float, Float]:
     """Return station and offset of those points (M, 2) that lie in the view, by station; NaN between stretches."""
     truth = truth_of(shown.road)
     there = np.isfinite(points).all(axis=1)
@@ -168,7 +170,7 @@ def _half_width(column: Mapping[str, Float], name: str, level: int) -> Float:
     return np.nan_to_num(width)
 
 
-def _band(axes: Axes, shown: Case, view: View, y: Float, width: Float, color: str, label: str | None) -> None:
+def _band(axes: Axes, shown: Case, view: PictureView, y: Float, width: Float, color: str, label: str | None) -> None:
     """Draw a line with an interval of 95 %."""
     station, offset = _beside(shown, shown.frames.at(y), view)
     _, low = _across(shown, shown.frames, y - width, view)
@@ -177,7 +179,7 @@ def _band(axes: Axes, shown: Case, view: View, y: Float, width: Float, color: st
     axes.plot(station, offset, color=color, lw=1.3, label=label)
 
 
-def _across(shown: Case, frames: Frames, y: Float, view: View) -> tuple[Float, Float]:
+def _across(shown: Case, frames: Frames, y: Float, view: PictureView) -> tuple[Float, Float]:
     """Return the frames' stations on the true axis (K,) and the offsets of their points, in the frames' order."""
     truth = truth_of(shown.road)
     _, station = truth.axis.crossing(frames.position, frames.direction)
@@ -189,7 +191,7 @@ def _across(shown: Case, frames: Frames, y: Float, view: View) -> tuple[Float, F
     return np.insert(station, breaks, np.nan), np.insert(offset, breaks, np.nan)
 
 
-def _center_error(axes: Axes, shown: Case, view: View, column: Mapping[str, Float]) -> None:
+def _center_error(axes: Axes, shown: Case, view: PictureView, column: Mapping[str, Float]) -> None:
     y = column["center"]
     station, offset = _across(shown, shown.frames, y, view)
     for level, alpha in ((95, 0.2), (68, 0.35)):
@@ -204,7 +206,7 @@ def _center_error(axes: Axes, shown: Case, view: View, column: Mapping[str, Floa
     axes.legend(loc="upper right", ncols=3, fontsize=8)
 
 
-def _lanes(axes: Axes, shown: Case, view: View, column: Mapping[str, Float]) -> None:
+def _lanes(axes: Axes, shown: Case, view: PictureView, column: Mapping[str, Float]) -> None:
     there = truth_of(shown.road).at(shown.frames.position, shown.frames.direction, np.zeros(len(shown.frames)))
     inside = np.flatnonzero((there.station >= view.first) & (there.station <= view.last))
     inside = inside[np.argsort(there.station[inside])]

@@ -27,7 +27,7 @@ from skimage.morphology import skeletonize
 
 from synthroads_addon.base.thresholds import otsu
 
-from ..data.axis import Axis
+from ..data.axis import MeasuredAxis
 
 Float = NDArray[np.float64]
 Index = NDArray[np.intp]
@@ -201,4 +201,4 @@ def crossings(chain: Float, origin: Float, direction: Float, reach: float = REAC
     apart = np.hypot(*np.diff(chain, axis=0).T)
     if not (apart > 0.0).any():
         return np.full(len(origin), np.nan)
-    return Axis(chain, apart <= reach).crossing(origin, direction)[0]
+    return MeasuredAxis(chain, apart <= reach).crossing(origin, direction)[0]

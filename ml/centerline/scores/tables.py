@@ -19,7 +19,7 @@ Measured = Mapping[str, Mapping[str, Mapping[str, Spread]]]
 
 
 @dataclass(frozen=True)
-class Column:
+class TableColumn:
     """A figure in a table: its name in the data, the column's title, factor and decimals."""
 
     figure: str
@@ -29,17 +29,17 @@ class Column:
 
 
 COLUMNS = (
-    Column("mae", "MAE (m)"),
-    Column("distance_95", "95 % (m)", decimals=2),
-    Column("lateral", "lateral (m)"),
-    Column("bias", "bias (m)"),
-    Column("chamfer_full", "Chamfer, full (m)"),
-    Column("chamfer_common", "Chamfer, common (m)"),
-    Column("coverage_68", "in 68 % (%)", 100.0, 1),
-    Column("coverage_95", "in 95 % (%)", 100.0, 1),
-    Column("found", "found (%)", 100.0, 1),
+    TableColumn("mae", "MAE (m)"),
+    TableColumn("distance_95", "95 % (m)", decimals=2),
+    TableColumn("lateral", "lateral (m)"),
+    TableColumn("bias", "bias (m)"),
+    TableColumn("chamfer_full", "Chamfer, full (m)"),
+    TableColumn("chamfer_common", "Chamfer, common (m)"),
+    TableColumn("coverage_68", "in 68 % (%)", 100.0, 1),
+    TableColumn("coverage_95", "in 95 % (%)", 100.0, 1),
+    TableColumn("found", "found (%)", 100.0, 1),
 )
-ROAD_COLUMNS = (Column("mae", "MAE (m)"), Column("chamfer_full", "Chamfer (m)"))
+ROAD_COLUMNS = (TableColumn("mae", "MAE (m)"), TableColumn("chamfer_full", "Chamfer (m)"))
 """Columns of each road in a table that has several side by side."""
 TARGETS_SHOWN = {
     "center": ("centre (m)", 1.0),
@@ -52,15 +52,15 @@ TARGETS_SHOWN = {
 }
 """Targets of the corridor: title and factor."""
 CORRIDOR_COLUMNS = (
-    Column("mae", "mean error"),
-    Column("right", "right when rounded (%)", 100.0, 1),
-    Column("interval_68", "in 68 % (%)", 100.0, 1),
-    Column("interval_95", "in 95 % (%)", 100.0, 1),
+    TableColumn("mae", "mean error"),
+    TableColumn("right", "right when rounded (%)", 100.0, 1),
+    TableColumn("interval_68", "in 68 % (%)", 100.0, 1),
+    TableColumn("interval_95", "in 95 % (%)", 100.0, 1),
 )
 COVERAGE_COLUMNS = tuple(column for column in COLUMNS if column.figure in ("coverage_68", "coverage_95"))
 
 
-def table(measured: Measured, road: str = "all", columns: Sequence[Column] = COLUMNS) -> str:
+def table(measured: Measured, road: str = "all", columns: Sequence[TableColumn] = COLUMNS) -> str:
     """Return a Markdown table of all predictors on one road, or on all; columns that nobody fills are left out."""
     return _markdown(*_cells({name: rows.get(road, {}) for name, rows in measured.items()}, columns))
 
@@ -82,14 +82,16 @@ def report(result: Mapping[str, Any]) -> str:
     return "\n".join([*parts, "", f"{model}, the corridor:", *text_table(*_cells(corridor, CORRIDOR_COLUMNS))])
 
 
-def _cells(rows: Mapping[str, Mapping[str, Spread]], columns: Sequence[Column]) -> tuple[list[str], list[list[str]]]:
+def _cells(
+    rows: Mapping[str, Mapping[str, Spread]], columns: Sequence[TableColumn]
+) -> tuple[list[str], list[list[str]]]:
     """Return head and body of a table with a row of figures for each name; columns that nobody fills are left out."""
     used = [column for column in columns if any(column.figure in row for row in rows.values())]
     body = [[name, *(cell(row.get(column.figure), column) for column in used)] for name, row in rows.items()]
     return ["", *(column.title for column in used)], body
 
 
-def road_table(measured: Measured, roads: Mapping[str, str], columns: Sequence[Column] = ROAD_COLUMNS) -> str:
+def road_table(measured: Measured, roads: Mapping[str, str], columns: Sequence[TableColumn] = ROAD_COLUMNS) -> str:
     """Return a Markdown table of all predictors with some columns per road.
 
     Args:
@@ -105,7 +107,7 @@ def road_table(measured: Measured, roads: Mapping[str, str], columns: Sequence[C
     return _markdown(head, body)
 
 
-def cell(spread: Spread | None, column: Column) -> str:
+def cell(spread: Spread | None, column: TableColumn) -> str:
     """Return ``mean (std)``; the mean alone where there is one seed or nothing differs, a dash where there is none."""
     if spread is None or math.isnan(spread.mean):
         return "–"

@@ -26,7 +26,7 @@ TOLERANCES = (0.05, 0.03)
 
 
 @dataclass(frozen=True)
-class Calibration:
+class IntervalCalibration:
     """How the deviations of one target are corrected.
 
     Attributes:
@@ -52,13 +52,13 @@ class Calibration:
         return asdict(self) | {"holds": self.holds}
 
     @classmethod
-    def from_dict(cls, data: Mapping[str, Any]) -> Calibration:
+    def from_dict(cls, data: Mapping[str, Any]) -> IntervalCalibration:
         """Return what `to_dict` gave."""
         widths, before, after = (_pair(data[name]) for name in ("widths", "before", "after"))
         return cls(float(data["factor"]), widths, before, after, int(data["count"]))
 
 
-def calibrated(error: Float, std: Float) -> Calibration:
+def calibrated(error: Float, std: Float) -> IntervalCalibration:
     """Return the calibration of one target.
 
     Args:
@@ -68,16 +68,18 @@ def calibrated(error: Float, std: Float) -> Calibration:
     known = np.isfinite(error) & np.isfinite(std)
     ratio = np.sort(np.abs(error[known]) / std[known])
     if not len(ratio):
-        return Calibration()
+        return IntervalCalibration()
     widths = tuple(_conformal(ratio, level) for level in LEVELS)
     # The share that is covered changes only where the interval's end passes an error.
     tried = np.unique(np.concatenate([ratio / deviation for deviation in DEVIATIONS]))
     tried = tried[tried > 0.0]
     factor = float(tried[np.argmin(_missed(ratio, tried))]) if len(tried) else 1.0
-    return Calibration(factor, (widths[0], widths[1]), _covered(ratio, 1.0), _covered(ratio, factor), len(ratio))
+    return IntervalCalibration(
+        factor, (widths[0], widths[1]), _covered(ratio, 1.0), _covered(ratio, factor), len(ratio)
+    )
 
 
-def all_calibrated(names: Sequence[str], error: Float, std: Float) -> dict[str, Calibration]:
+def all_calibrated(names: Sequence[str], error: Float, std: Float) -> dict[str, IntervalCalibration]:
     """Return the calibration of several targets by name, from errors and deviations (N, T)."""
     return {name: calibrated(error[:, column], std[:, column]) for column, name in enumerate(names)}
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from synthroads_addon.base.errors import InputError
 from synthroads_addon.base.schema import read_json
 from synthroads_addon.reconstruction.cloud import RoadCloud
-from synthroads_addon.reconstruction.path import Path
+from synthroads_addon.reconstruction.path import CloudPath
 from synthroads_addon.reconstruction.reconstruct import Predictor
 
 from ...runs import Run
@@ -39,7 +39,7 @@ def learned_axis(folder: FilePath, cloud_file: FilePath, scratch: FilePath) -> P
     if name != "centerline":
         raise InputError("--run", str(folder), f"is a model for {name}, a centreline model is needed")
 
-    def predict(cloud: RoadCloud, path: Path) -> tuple[Float, Float]:
+    def predict(cloud: RoadCloud, path: CloudPath) -> tuple[Float, Float]:
         with TemporaryDirectory(dir=scratch) as place:
             course, lines = FilePath(place) / "path.csv", FilePath(place) / "axis.geojson"
             points = path.points[::5] + cloud.origin[:2]
@@ -50,7 +50,7 @@ def learned_axis(folder: FilePath, cloud_file: FilePath, scratch: FilePath) -> P
     return predict
 
 
-def axis_beside(document: object, origin: Float, path: Path) -> tuple[Float, Float]:
+def axis_beside(document: object, origin: Float, path: CloudPath) -> tuple[Float, Float]:
     """Return offset and standard deviation (M,) of predicted centrelines at each point of a path; NaN beside none.
 
     Args:

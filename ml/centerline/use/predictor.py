@@ -19,10 +19,10 @@ from synthroads_addon.base.schema import quantity
 from ...configuration import Part
 from ..data.corridor import CORRIDOR, Truth
 from ..data.frames import Frames, interleaved, stretches
-from ..data.roads import Road
+from ..data.roads import LearningRoad
 from ..data.slices import FrameSlices, SliceSettings, collate
 from ..networks.models import LINES, TARGETS, CenterlineModel, both_ways
-from .calibration import Calibration, all_calibrated
+from .calibration import IntervalCalibration, all_calibrated
 
 Float = NDArray[np.float64]
 
@@ -77,13 +77,13 @@ class CenterlinePredictor:
         model: CenterlineModel,
         settings: SliceSettings,
         use: UseOptions,
-        calibration: Mapping[str, Calibration] | None = None,
+        calibration: Mapping[str, IntervalCalibration] | None = None,
     ) -> None:
         self.model = model
         self.settings = settings
         self.use = use
         found = calibration or {}
-        self.calibration = {name: found.get(name, Calibration()) for name in TARGETS}
+        self.calibration = {name: found.get(name, IntervalCalibration()) for name in TARGETS}
         self._memory: dict[str, tuple[Float, Float]] | None = None
 
     def remembering(self) -> CenterlinePredictor:
@@ -95,13 +95,13 @@ class CenterlinePredictor:
         other._memory = {}
         return other
 
-    def __call__(self, road: Road, frames: Frames) -> Float:
+    def __call__(self, road: LearningRoad, frames: Frames) -> Float:
         """Return (M, 4 + 2 K), `evaluation.CORRIDOR_COLUMNS`; the height is an elevation."""
         found = self.regress(road, frames)
         center, corridor = (found.value[:, :1], found.std[:, :1]), (found.value[:, 1:], found.std[:, 1:])
         return np.column_stack([*center, *corridor, self.widths(found)[:, 0]])
 
-    def regress(self, road: Road, frames: Frames) -> Regression:
+    def regress(self, road: LearningRoad, frames: Frames) -> Regression:
         """Return what the model finds.
 
         A frame in several sequences has the mean of what they say, weighted by the inverse variances. Its variance is
@@ -112,7 +112,7 @@ class CenterlinePredictor:
         factors = np.array([self.calibration[name].factor for name in TARGETS])
         return Regression(frames, mean, raw, raw * factors)
 
-    def _found(self, road: Road, frames: Frames) -> tuple[Float, Float]:
+    def _found(self, road: LearningRoad, frames: Frames) -> tuple[Float, Float]:
         """Return values and the model's own deviations (M, T), from memory if there is one that has them."""
         if self._memory is None:
             return self._regress(road, frames)
@@ -122,7 +122,7 @@ class CenterlinePredictor:
             self._memory[key] = self._regress(road, frames)
         return self._memory[key]
 
-    def _regress(self, road: Road, frames: Frames) -> tuple[Float, Float]:
+    def _regress(self, road: LearningRoad, frames: Frames) -> tuple[Float, Float]:
         shape = (len(frames), len(TARGETS))
         weight, value, spread = np.zeros(shape), np.zeros(shape), np.zeros(shape)
         seen = np.zeros(len(frames), dtype=bool)
@@ -144,7 +144,7 @@ class CenterlinePredictor:
             mean[:, column] = joined(frames, mean[:, column], raw[:, column], reach)
         return mean, raw
 
-    def calibrated_on(self, shown: Iterable[tuple[Road, Frames]]) -> tuple[CenterlinePredictor, Float]:
+    def calibrated_on(self, shown: Iterable[tuple[LearningRoad, Frames]]) -> tuple[CenterlinePredictor, Float]:
         """Return the model with the deviations that are right on some roads, and its errors there (N, T).
 
         Found on a few roads of another scanner, one factor per target makes its deviations right there (see
@@ -174,7 +174,7 @@ class CenterlinePredictor:
         return found.raw_std[:, :, None] * factors
 
     def _sequences(
-        self, road: Road, frames: Frames
+        self, road: LearningRoad, frames: Frames
     ) -> Iterator[tuple[NDArray[np.intp], Float, NDArray[np.bool_], Float, Float]]:
         """Yield of all slices of some sequences: frame, z origin, whether there are points, values and deviations."""
         data = FrameSlices(road, frames, self.settings, self.use.step)

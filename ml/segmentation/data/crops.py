@@ -22,7 +22,7 @@ from synthroads_addon.base.errors import InputError
 from synthroads_addon.base.random_streams import stream
 
 from .effects import MISSING_SIGMA, NO_EFFECTS, Crop, Effects, FloatArray, crop_of
-from .tiles import Scaling, Tile
+from .tiles import CloudTile, Scaling
 
 Feature = Literal["x", "y", "z", "red", "green", "blue", "intensity"]
 FEATURES: tuple[Feature, ...] = get_args(Feature)
@@ -63,7 +63,7 @@ class Seeds:
         balanced: draw the class first, then the tile by its number of points of that class, then one of these.
     """
 
-    def __init__(self, tiles: Sequence[Tile], classes: int, balanced: bool) -> None:
+    def __init__(self, tiles: Sequence[CloudTile], classes: int, balanced: bool) -> None:
         self._tiles = tiles
         self._balanced = balanced
         self._counts = np.array([tile.class_counts(classes) for tile in tiles]) if balanced else None
@@ -95,7 +95,7 @@ class CropDataset(Dataset[Item]):
 
     def __init__(
         self,
-        tiles: Sequence[Tile],
+        tiles: Sequence[CloudTile],
         scalings: dict[str, Scaling],
         settings: CropSettings,
         plan: Sequence[Draw],
@@ -126,7 +126,7 @@ class CropStream(IterableDataset[Item]):
 
     def __init__(
         self,
-        tiles: Sequence[Tile],
+        tiles: Sequence[CloudTile],
         scalings: dict[str, Scaling],
         settings: CropSettings,
         seeds: Seeds,
@@ -143,7 +143,7 @@ class CropStream(IterableDataset[Item]):
             yield _drawn(self, int(random.integers(len(self.tiles))), random)
 
 
-def cut(tile: Tile, middle: NDArray[np.float32], points: int, scaling: Scaling) -> Crop:
+def cut(tile: CloudTile, middle: NDArray[np.float32], points: int, scaling: Scaling) -> Crop:
     """Return the points of a tile nearest a place (3,) by horizontal distance, at most as many as given.
 
     Columns rather than balls: a gantry stays with its posts and a crown with its trunk.

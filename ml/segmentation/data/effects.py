@@ -11,7 +11,7 @@ from pydantic import Field, model_validator
 from synthroads_addon.base.schema import quantity
 
 from ...configuration import Part
-from .tiles import Tile
+from .tiles import CloudTile
 
 FloatArray = NDArray[np.float32]
 
@@ -108,7 +108,7 @@ NO_EFFECTS = Effects(
 """For validation and prediction."""
 
 
-def crop_of(tile: Tile, strength: FloatArray | None) -> Crop:
+def crop_of(tile: CloudTile, strength: FloatArray | None) -> Crop:
     """Return a whole tile as a crop; ``strength`` (N,) is its scaled intensity."""
     color = None if tile.color is None else (tile.color / np.float32(255.0)).astype(np.float32)
     return Crop(tile.coord, color, strength, tile.segment)

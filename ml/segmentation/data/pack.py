@@ -23,7 +23,7 @@ from synthroads_addon.dataset.manifest import MANIFEST, SceneEntry, read_manifes
 
 from .packed_file import Packed, pack_tile
 from .sources import Source, labelled_blocks, read_tiles, tile_of
-from .tiles import Tile
+from .tiles import CloudTile
 
 CROP = 24_000
 """Points of a crop, in which the size of a packed set is told."""
@@ -33,7 +33,7 @@ _SMALLEST = 2_000
 
 def corridor_tiles(
     folder: Path, scene: str, scheme: ClassScheme, voxel: float, corridor: float, length: float = 60.0
-) -> Iterator[Tile]:
+) -> Iterator[CloudTile]:
     """Yield the corridor of one scene of a data set, a tile per ``length`` of its road.
 
     The thinned corridor of one scene is held in memory: about 100 MB per km.

@@ -26,7 +26,7 @@ from synthroads_addon.cloud.formats.npz import ARCHIVE_FAULTS
 
 from ...cells import cell_keys
 from .classes import IGNORED
-from .tiles import Tile
+from .tiles import CloudTile
 
 STEP = 0.01
 """Size of a coordinate's step, m."""
@@ -50,7 +50,7 @@ class Packed:
     content: bytes
 
 
-def words_of(tile: Tile) -> tuple[NDArray[np.uint64], NDArray[np.int32], NDArray[np.int64]]:
+def words_of(tile: CloudTile) -> tuple[NDArray[np.uint64], NDArray[np.int32], NDArray[np.int64]]:
     """Return a tile's points as words (N,), the cubes' places (B, 3) and how many points each cube has (B,).
 
     Raises:
@@ -71,7 +71,7 @@ def words_of(tile: Tile) -> tuple[NDArray[np.uint64], NDArray[np.int32], NDArray
     return word[order], cubes[order[starts]].astype(np.int32), counts
 
 
-def _fields(tile: Tile, inside: NDArray[np.int64]) -> Iterator[tuple[NDArray[Any], int]]:
+def _fields(tile: CloudTile, inside: NDArray[np.int64]) -> Iterator[tuple[NDArray[Any], int]]:
     for axis in range(3):
         yield inside[:, axis], 10 * axis
     if tile.color is not None:
@@ -84,7 +84,7 @@ def _fields(tile: Tile, inside: NDArray[np.int64]) -> Iterator[tuple[NDArray[Any
     yield np.where(tile.segment == IGNORED, _NO_CLASS, tile.segment), 59
 
 
-def pack_tile(tile: Tile) -> Packed:
+def pack_tile(tile: CloudTile) -> Packed:
     """Return a tile as it is stored; it must hold points."""
     word, cubes, counts = words_of(tile)
     planes = np.ascontiguousarray(word.astype("<u8").view(np.uint8).reshape(-1, 8).T)
@@ -100,7 +100,7 @@ def pack_tile(tile: Tile) -> Packed:
     return Packed(notes, zlib.compress(content, 9))
 
 
-def unpack_tile(packed: Packed) -> Tile:
+def unpack_tile(packed: Packed) -> CloudTile:
     """Return the tile; coordinates within half a step of those packed, colours and intensities to their bits."""
     notes = packed.notes
     points, cubes = int(notes["points"]), int(notes["cubes"])
@@ -118,7 +118,7 @@ def unpack_tile(packed: Packed) -> Tile:
     steps = np.stack([bits(10 * axis, 10) for axis in range(3)], axis=1) + np.repeat(places * CUBE, counts, axis=0)
     color = np.stack([bits(30, 5) * 255 / 31, bits(35, 6) * 255 / 63, bits(41, 5) * 255 / 31], axis=1)
     segment = bits(59, 5)
-    return Tile(
+    return CloudTile(
         str(notes["scene"]),
         np.array(notes["origin"], dtype=np.float64),
         (steps * STEP).astype(np.float32),
@@ -181,7 +181,7 @@ class PackReader:
     def __len__(self) -> int:
         return len(self.notes)
 
-    def tile(self, place: int) -> Tile:
+    def tile(self, place: int) -> CloudTile:
         """Return one tile; raise `InputError` if the file is damaged there."""
         try:
             return unpack_tile(Packed(self.notes[place], self._archive.read(f"{place:06d}")))

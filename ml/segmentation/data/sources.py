@@ -28,7 +28,7 @@ from ...cells import thin
 from ...configuration import Part
 from .classes import IGNORED, LabelMapping, class_names, load_mapping, table_between
 from .packed_file import PackReader
-from .tiles import Tile, eight_bits
+from .tiles import CloudTile, eight_bits
 
 FULL = 65535.0
 """Largest 16-bit intensity."""
@@ -52,7 +52,7 @@ class Source(Part):
         return mapping.targets(names) if mapping else names
 
 
-def read_tiles(source: Source, scheme: ClassScheme, voxel: float | None) -> Iterator[Tile]:
+def read_tiles(source: Source, scheme: ClassScheme, voxel: float | None) -> Iterator[CloudTile]:
     """Yield the tiles of a source, ordered by name.
 
     Args:
@@ -91,7 +91,7 @@ def _is_pack(path: Path) -> bool:
         return False
 
 
-def _packed_tiles(path: Path, scheme: ClassScheme, voxel: float | None) -> Iterator[Tile]:
+def _packed_tiles(path: Path, scheme: ClassScheme, voxel: float | None) -> Iterator[CloudTile]:
     pack = PackReader(path)
     if voxel is not None and pack.voxel > voxel * (1.0 + 1e-9):
         raise InputError("voxel", voxel, f"must be at least {pack.voxel:g} m, as the points of {path} were thinned")
@@ -100,12 +100,12 @@ def _packed_tiles(path: Path, scheme: ClassScheme, voxel: float | None) -> Itera
         yield _relabelled(pack.tile(place), table)
 
 
-def _relabelled(tile: Tile, table: NDArray[np.int16]) -> Tile:
+def _relabelled(tile: CloudTile, table: NDArray[np.int16]) -> CloudTile:
     known = tile.segment != IGNORED
     return replace(tile, segment=np.where(known, table[np.where(known, tile.segment, 0)], IGNORED).astype(np.int16))
 
 
-def _folder_tiles(path: Path, scheme: ClassScheme, source: Source) -> Iterator[Tile]:
+def _folder_tiles(path: Path, scheme: ClassScheme, source: Source) -> Iterator[CloudTile]:
     root = pointcept_root(path)
     if root is not None:
         yield from pointcept_tiles(root, scheme, source.split)
@@ -129,7 +129,7 @@ def pointcept_root(path: Path) -> Path | None:
     return roots[0] if roots else None
 
 
-def pointcept_tiles(root: Path, scheme: ClassScheme, split: str | None) -> Iterator[Tile]:
+def pointcept_tiles(root: Path, scheme: ClassScheme, split: str | None) -> Iterator[CloudTile]:
     """Yield the tiles of a folder in Pointcept's layout: ``SPLIT/TILE/coord.npy`` and so on.
 
     Raises:
@@ -159,7 +159,7 @@ def pointcept_folders(root: Path, split: str | None) -> list[Path]:
     return folders
 
 
-def _pointcept_tile(folder: Path, table: NDArray[np.int16]) -> Tile:
+def _pointcept_tile(folder: Path, table: NDArray[np.int16]) -> CloudTile:
     coord, segment = _array(folder, "coord", (3,), "f4"), _array(folder, "segment", (), "i8")
     color = _array(folder, "color", (3,), "u1") if (folder / "color.npy").exists() else None
     strength = _array(folder, "strength", (), "f4") if (folder / "strength.npy").exists() else None
@@ -174,7 +174,7 @@ def _pointcept_tile(folder: Path, table: NDArray[np.int16]) -> Tile:
     except (AttributeError, TypeError, ValueError):
         raise InputError(str(folder / "tile.json"), None, "must be an object whose origin is three numbers") from None
     known = (segment >= 0) & (segment < UNLABELLED)
-    return Tile(
+    return CloudTile(
         str(notes.get("scene", folder.name)),
         origin,
         coord,
@@ -197,7 +197,7 @@ def _array(folder: Path, name: str, entry: tuple[int, ...], kind: str) -> NDArra
     return np.asarray(array)
 
 
-def cloud_tiles(path: Path, scheme: ClassScheme, source: Source, scene: str | None = None) -> Iterator[Tile]:
+def cloud_tiles(path: Path, scheme: ClassScheme, source: Source, scene: str | None = None) -> Iterator[CloudTile]:
     """Yield the square tiles of one cloud; memory holds one of them.
 
     The classes are those of the project's own clouds, or of another's attribute by the source's mapping.
@@ -223,7 +223,7 @@ def cloud_tiles(path: Path, scheme: ClassScheme, source: Source, scene: str | No
                 yield tile_of(part.points, scene or path.stem, part.corner, scale)
 
 
-def tile_of(points: PointBlock, scene: str, origin: NDArray[np.float64], scale: float) -> Tile:
+def tile_of(points: PointBlock, scene: str, origin: NDArray[np.float64], scale: float) -> CloudTile:
     """Return points whose ``class_id`` is the place in the scheme (255: ignored) as a tile.
 
     Args:
@@ -233,7 +233,7 @@ def tile_of(points: PointBlock, scene: str, origin: NDArray[np.float64], scale: 
         scale: 16-bit steps per unit of intensity.
     """
     strength = (levels(points.intensity, scale) / FULL).astype(np.float32)
-    return Tile(
+    return CloudTile(
         scene,
         origin,
         (points.xyz - origin).astype(np.float32),

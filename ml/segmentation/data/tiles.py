@@ -1,4 +1,4 @@
-"""`Tile`: the labelled points of a piece of a scene, as training and scoring hold them in memory."""
+"""`CloudTile`: the labelled points of a piece of a scene, as training and scoring hold them in memory."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from .classes import IGNORED
 
 
 @dataclass(frozen=True)
-class Tile:
+class CloudTile:
     """N points of one scene.
 
     Attributes:
@@ -37,7 +37,7 @@ class Tile:
     def __len__(self) -> int:
         return len(self.coord)
 
-    def select(self, keep: NDArray[Any]) -> Tile:
+    def select(self, keep: NDArray[Any]) -> CloudTile:
         """Return the points chosen by a mask or indices."""
         return replace(
             self,
@@ -88,7 +88,7 @@ def robust_scaling(strengths: Sequence[NDArray[np.float32]]) -> Scaling:
     return Scaling(float(middle), float(high - low) if high > low else 1.0)
 
 
-def scalings(tiles: Sequence[Tile], kind: str, voxel: float | None = None) -> dict[str, Scaling]:
+def scalings(tiles: Sequence[CloudTile], kind: str, voxel: float | None = None) -> dict[str, Scaling]:
     """Return the scaling of each scene by name.
 
     Args:

@@ -18,7 +18,7 @@ from ...runs import Run
 from ..data.classes import IGNORED, class_names
 from ..data.crops import Item
 from ..data.sources import Source, read_tiles
-from ..data.tiles import Tile, scalings
+from ..data.tiles import CloudTile, scalings
 from ..loading import adaptation_batches, thinned, watched_workers
 from ..network import adapted, build, on_device, plan_of, prepared, scores_of
 from ..recipes import SegmentationConfiguration
@@ -88,7 +88,7 @@ def score(
     sources: Sequence[Source],
     device: torch.device,
     progress: Progress = silent,
-) -> tuple[Confusion, tuple[Tile, Any] | None]:
+) -> tuple[Confusion, tuple[CloudTile, Any] | None]:
     """Return the confusion over all points of some sources, and the largest tile with its classes, to be drawn.
 
     Raises:
@@ -131,9 +131,9 @@ def _groups(source: Source, scheme: ClassScheme) -> NDArray[np.int16]:
     return groups
 
 
-def _scenes(tiles: Iterator[Tile]) -> Iterator[list[Tile]]:
+def _scenes(tiles: Iterator[CloudTile]) -> Iterator[list[CloudTile]]:
     """Yield the tiles of one scene after another, which stand together."""
-    scene: list[Tile] = []
+    scene: list[CloudTile] = []
     for tile in tiles:
         if scene and scene[0].scene != tile.scene:
             yield scene

@@ -13,7 +13,7 @@ from PIL import Image
 from synthroads_addon.base.classes import class_scheme
 
 from ..data.classes import IGNORED
-from ..data.tiles import Tile
+from ..data.tiles import CloudTile
 
 _PIXELS = 490
 """Of a view's longer side: as many as it has in the picture, so that none is lost."""
@@ -24,7 +24,7 @@ _UNKNOWN = (0.07, 0.07, 0.09)
 _WRONG = np.array([[0.75, 0.75, 0.75], [0.9, 0.1, 0.1]])
 
 
-def comparison(tile: Tile, predicted: NDArray[np.int16], names: Sequence[str]) -> bytes:
+def comparison(tile: CloudTile, predicted: NDArray[np.int16], names: Sequence[str]) -> bytes:
     """Return a PNG: a tile from above by its truth, by the classes predicted, and where the two differ.
 
     Args:

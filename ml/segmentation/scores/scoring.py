@@ -17,7 +17,7 @@ from ...cells import thin
 from ..data.classes import IGNORED
 from ..data.crops import CropSettings, Item, item
 from ..data.effects import crop_of
-from ..data.tiles import Scaling, Tile
+from ..data.tiles import CloudTile, Scaling
 from .metrics import Confusion
 
 EDGE = 24.0
@@ -83,7 +83,7 @@ def _cut(
 
 
 def label_tile(
-    tile: Tile,
+    tile: CloudTile,
     scaling: Scaling,
     classifier: Classifier,
     settings: CropSettings,
@@ -137,7 +137,7 @@ def carry(known: NDArray[np.float32], labels: NDArray[np.int16], points: NDArray
     return labels[nearest]
 
 
-def score_tile(confusion: Confusion, tile: Tile, labels: NDArray[np.int16], group_of: NDArray[np.int16]) -> None:
+def score_tile(confusion: Confusion, tile: CloudTile, labels: NDArray[np.int16], group_of: NDArray[np.int16]) -> None:
     """Count a tile's points in a confusion matrix.
 
     Args:

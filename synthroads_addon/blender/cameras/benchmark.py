@@ -18,7 +18,7 @@ from ..model.build import RoadModel
 from . import image_views, layer_source
 from .images import aim
 from .light import daylight
-from .stage import Passes, Stage, stage
+from .stage import Passes, RenderStage, stage
 
 _EDITS = 3
 """Changes there and back whose times are measured."""
@@ -72,7 +72,7 @@ def _bare_seconds(request: LayerRequest, views: list[View]) -> float:
     return seconds
 
 
-def _rendered(bare: Stage, view: View) -> None:
+def _rendered(bare: RenderStage, view: View) -> None:
     render = bare.scene.render
     render.resolution_x, render.resolution_y, render.resolution_percentage = *view.size, 100
     bpy.ops.render.render(scene=bare.scene.name)

@@ -14,7 +14,7 @@ from mathutils import Matrix
 from ...scanning.colour.colour import MaterialLayers
 from ...scanning.colour.images import ImageLayers
 from ...scanning.colour.views import RenderedImage, View
-from .stage import Rendered, Stage
+from .stage import Rendered, RenderStage
 
 _LARGEST_HALF = 65504.0
 _SENSOR = 36.0
@@ -27,7 +27,7 @@ class RenderedLayers(ImageLayers):
         report: images, pixels, layers and bytes, as JSON data.
     """
 
-    def __init__(self, stage: Stage, views: Sequence[View], fallback: MaterialLayers, exposure: float) -> None:
+    def __init__(self, stage: RenderStage, views: Sequence[View], fallback: MaterialLayers, exposure: float) -> None:
         """Begin without an image; `render` makes them."""
         super().__init__((), stage.passes.channels, fallback)
         self._stage, self._views, self._exposure = stage, views, exposure

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ...scanning.colour.colour import FROM_MATERIAL, FROM_RETURN, LayerValues, MaterialLayers, Targets
 from .exr import write_image
-from .stage import SKY_GROUP, SUN_GROUP, Stage
+from .stage import SKY_GROUP, SUN_GROUP, RenderStage
 
 Float = NDArray[np.float64]
 
@@ -59,7 +59,7 @@ class ReturnCamera:
 
     main_thread_only = True
 
-    def __init__(self, stage: Stage, fallback: MaterialLayers, exposure: float) -> None:
+    def __init__(self, stage: RenderStage, fallback: MaterialLayers, exposure: float) -> None:
         self._stage, self.material, self._exposure = stage, fallback, exposure
         self._blocks = 0
         self.worst = 0.0

@@ -73,7 +73,7 @@ class Rendered:
     position: NDArray[np.float32] | None
 
 
-class Stage:
+class RenderStage:
     """Renders the visible objects of a scene, under lights of its own.
 
     Attributes:
@@ -130,7 +130,7 @@ def stage(
     lights: Sequence[bpy.types.Object],
     world: bpy.types.World | None,
     engine: str = "cycles",
-) -> Iterator[Stage]:
+) -> Iterator[RenderStage]:
     """Yield a stage with the objects that are visible in a scene; afterwards nothing of it is left.
 
     Args:
@@ -159,7 +159,7 @@ def stage(
         _set_engine(scene, engine, passes)
         _set_passes(scene, passes, lights, world)
         multilayer_exr(scene.render.image_settings)
-        yield Stage(scene, camera, passes, folder)
+        yield RenderStage(scene, camera, passes, folder)
 
 
 def _strike(scene: bpy.types.Scene) -> None:

@@ -28,7 +28,7 @@ from ..labels import Label, Labels, velocity_of
 from ..model.build import ORIGIN
 from ..things.model_builder import ROLE, SUPPORT
 from .changes import Changes
-from .reading import Copied, Part, Places, Whole, copy_mesh, placed, slot_names
+from .reading import Copied, MeshPart, Places, Whole, copy_mesh, placed, slot_names
 
 Float = NDArray[np.float64]
 Source: TypeAlias = bpy.types.Depsgraph | bpy.types.Scene | None
@@ -239,7 +239,7 @@ class _Reading:
         self._materials: dict[str, int] = {}
         self._waiting: dict[tuple[Hashable, ...], _Waiting] = {}
         self._copied: dict[tuple[Hashable, ...], Copied] = {}
-        self._parts: dict[tuple[Hashable, ...], Part] = {}
+        self._parts: dict[tuple[Hashable, ...], MeshPart] = {}
         self._labels: list[Label] = []
         self._nameless: dict[int, tuple[str, tuple[Hashable, ...]]] = {}
         self._uses: dict[Hashable, dict[tuple[Hashable, ...], Places]] = {}
@@ -280,14 +280,14 @@ class _Reading:
     def _copy(self, key: tuple[Hashable, ...], name: str, mesh: bpy.types.Mesh, slots: list[str]) -> None:
         self._copied[key] = copy_mesh(name, mesh, slots, self._materials, self.labels.by_name)
 
-    def pairs(self, carrier: Hashable) -> list[tuple[Part, Places]]:
+    def pairs(self, carrier: Hashable) -> list[tuple[MeshPart, Places]]:
         """Return the parts that a carrier moves (that stand, for None) and their places; only once for each."""
         pairs = [(self._part(key), places) for key, places in self._uses.pop(carrier, {}).items()]
         if not self._uses:
             self._parts.clear()  # what is placed needn't be held twice
         return pairs
 
-    def _part(self, key: tuple[Hashable, ...]) -> Part:
+    def _part(self, key: tuple[Hashable, ...]) -> MeshPart:
         if key in self._copied:
             self._parts[key] = self._copied.pop(key).part()
         return self._parts[key]

@@ -29,7 +29,7 @@ _IDENTITY = array("d", np.eye(4).ravel().tolist())
 
 
 @dataclass
-class Part:
+class MeshPart:
     """Triangles of one mesh in its own frame.
 
     Attributes:
@@ -93,7 +93,7 @@ class Copied:
         face: (T,) int32 face of each triangle; None if all faces are triangles.
         slot, class_id, instance_id: (F,) int32 values of the faces, or None if the mesh has none.
         materials: (S,) uint16 indices of the slots' materials into the scene's.
-        material_class: see `Part`.
+        material_class: see `MeshPart`.
     """
 
     name: str
@@ -107,7 +107,7 @@ class Copied:
     materials: NDArray[np.uint16]
     material_class: NDArray[np.int16] | None
 
-    def part(self) -> Part:
+    def part(self) -> MeshPart:
         """Return the mesh's triangles; raise `InputError` if its vertices aren't finite."""
         if not np.isfinite(self.vertices).all():
             raise InputError(f"{self.name}: vertices", None, "must be finite numbers")
@@ -121,7 +121,7 @@ class Copied:
             labels = _by_triangle(labels, face)
         numbers = None if number is None else _by_triangle(number.view(np.uint32), face)
         triangles = corners.reshape(-1, 3) if self.triangles is None else corners[self.triangles]
-        return Part(self.vertices, triangles, material, labels, numbers, self.material_class)
+        return MeshPart(self.vertices, triangles, material, labels, numbers, self.material_class)
 
 
 def copy_mesh(
@@ -207,7 +207,7 @@ def _face_values(mesh: bpy.types.Mesh, name: str) -> NDArray[Any] | None:
     return values
 
 
-def placed(pairs: list[tuple[Part, Places]], whole: Whole, frame: Float | None = None) -> SceneMesh:
+def placed(pairs: list[tuple[MeshPart, Places]], whole: Whole, frame: Float | None = None) -> SceneMesh:
     """Return parts at their places as one mesh, without triangles that have no area.
 
     Args:
@@ -250,7 +250,7 @@ def placed(pairs: list[tuple[Part, Places]], whole: Whole, frame: Float | None =
     return SceneMesh(**arrays, materials=whole.materials, origin=origin)
 
 
-def _blocks(part: Part, places: Places) -> Iterator[tuple[Float, array[int]]]:
+def _blocks(part: MeshPart, places: Places) -> Iterator[tuple[Float, array[int]]]:
     """Yield matrices (N, 4, 4) and labels of so many places at a time that their arrays stay small."""
     matrices = np.frombuffer(places.matrices).reshape(-1, 4, 4)
     size = max(1, _BLOCK // max(len(part.vertices), len(part.triangles), 1))
@@ -259,7 +259,7 @@ def _blocks(part: Part, places: Places) -> Iterator[tuple[Float, array[int]]]:
 
 
 def _place(
-    part: Part, matrices: Float, vertices: NDArray[np.float32], triangles: NDArray[np.int32], first: int
+    part: MeshPart, matrices: Float, vertices: NDArray[np.float32], triangles: NDArray[np.int32], first: int
 ) -> None:
     """Fill in the vertices and triangles of a part at N places, as (N, 4, 4) matrices."""
     count, size = len(matrices), len(part.vertices)
@@ -275,7 +275,7 @@ def _place(
     numbers += (first + size * np.arange(count, dtype=np.int64)).astype(np.int32)[:, None, None]
 
 
-def _label(part: Part, labels: list[Label], into: dict[str, NDArray[Any]]) -> None:
+def _label(part: MeshPart, labels: list[Label], into: dict[str, NDArray[Any]]) -> None:
     """Fill in class, instance and material (N * T,) of a part at N places."""
     count = len(labels)
     into["material"].reshape(count, -1)[...] = part.material

@@ -28,7 +28,7 @@ def temporary_barrier_group() -> bpy.types.NodeTree:
 
 
 @dataclass(frozen=True)
-class _Barrier:
+class _TemporaryBarrier:
     first: Value
     last: Value
     offset: Value
@@ -39,11 +39,11 @@ class _Barrier:
     plastic: Value
 
 
-def _declare(tree: Tree) -> _Barrier:
+def _declare(tree: Tree) -> _TemporaryBarrier:
     def metres(name: str, default: float, limits: tuple[float, float], description: str) -> Value:
         return tree.number(name, default, limits, unit="m", description=description)
 
-    return _Barrier(
+    return _TemporaryBarrier(
         first=metres("Start Station", 0.0, (0.0, 1e6), "Beginning of the first element"),
         last=metres("End Station", 100.0, (0.0, 1e6), "End of the last element"),
         offset=metres("Offset", 0.0, (-100.0, 100.0), "Offset of its axis at the beginning"),
@@ -92,7 +92,7 @@ def _build(tree: Tree) -> None:
     tree.output("Mesh", mesh, description="Elements")
 
 
-def _elements(tree: Tree, barrier: _Barrier, begin: Value, end: Value) -> Value:
+def _elements(tree: Tree, barrier: _TemporaryBarrier, begin: Value, end: Value) -> Value:
     """Return one point per element with its number and the stations that it lies between."""
     whole = (barrier.last - barrier.first) / barrier.length - SHORTEST_ELEMENT
     count = op.rounded_up(op.maximum(whole, 1.0))
@@ -104,13 +104,13 @@ def _elements(tree: Tree, barrier: _Barrier, begin: Value, end: Value) -> Value:
     return op.delete_points(points, op.named(tree, "to") - op.named(tree, "from") < 0.05)
 
 
-def _offset(barrier: _Barrier, station: Value) -> Value:
+def _offset(barrier: _TemporaryBarrier, station: Value) -> Value:
     """Return the offset at a station."""
     share = (station - barrier.first) / op.maximum(barrier.last - barrier.first, 1e-3)
     return barrier.offset + (barrier.end_offset - barrier.offset) * share
 
 
-def _body(tree: Tree, barrier: _Barrier) -> Value:
+def _body(tree: Tree, barrier: _TemporaryBarrier) -> Value:
     """Return an element from x = 0 to 1."""
     outlines = [
         [(0.0, x, z) for x, z in flank] + [(0.0, -x, z) for x, z in reversed(flank)] for flank in (_STEEL, _PLASTIC)
@@ -127,7 +127,7 @@ def _body(tree: Tree, barrier: _Barrier) -> Value:
     return loft(tree, outline, len(outlines[0]), 2, place)
 
 
-def _reflectors(tree: Tree, barrier: _Barrier) -> Value:
+def _reflectors(tree: Tree, barrier: _TemporaryBarrier) -> Value:
     """Return a reflector on either flank, around x = 0."""
     beside = barrier.width * (0.5 * _STEEL[5][0]) + _REFLECTOR[1] * 0.25
     up = barrier.height * 0.82

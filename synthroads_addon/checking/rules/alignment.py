@@ -8,7 +8,7 @@ from itertools import pairwise
 import numpy as np
 
 from ...road.guidelines import LONGEST_STRAIGHT
-from .rule import STRAIGHT, Finding, Road, Rule, Run, above, below, out_of_order, same_curvature
+from .rule import STRAIGHT, CurvatureRun, Finding, Road, Rule, above, below, out_of_order, same_curvature
 
 #: Shortest straight between two curves of the same direction, m (RAA, after a textbook).
 SHORTEST_STRAIGHT_SAME_DIRECTION = 400.0
@@ -149,14 +149,14 @@ def _direction(near: float, far: float) -> float:
     return float(np.sign(near if abs(near) > STRAIGHT else far))
 
 
-def _arcs(road: Road) -> list[Run]:
+def _arcs(road: Road) -> list[CurvatureRun]:
     """Return the arcs in order; where two clothoids meet at their sharper ends is an arc without length."""
     arcs = [run for run in road.runs if not run.straight]
     k0, k1 = road.k0, road.k1
     for i, (a, b) in enumerate(pairwise(~road.constant)):
         if a and b and abs(k0[i]) < abs(k1[i]) and abs(k1[i + 1]) < abs(k0[i + 1]) and k1[i] * k0[i + 1] > 0.0:
             at = float(road.starts[i + 1])
-            arcs.append(Run(at, at, float(k1[i]), i, i + 1))
+            arcs.append(CurvatureRun(at, at, float(k1[i]), i, i + 1))
     return sorted(arcs, key=lambda arc: (arc.start, arc.end))
 
 

@@ -93,7 +93,7 @@ class Rule:
 
 
 @dataclass(frozen=True)
-class Run:
+class CurvatureRun:
     """A stretch of constant curvature: neighbouring lines or arcs of the same curvature count as one.
 
     Attributes:
@@ -209,18 +209,18 @@ class Road:
         """Which of the barriers protect the traffic of each carriageway, by the carriageway's id."""
         return {name: Beside(self.barriers, name, edges) for name, edges in self.sides.items()}
 
-    def _runs(self) -> list[Run]:
-        runs: list[Run] = []
+    def _runs(self) -> list[CurvatureRun]:
+        runs: list[CurvatureRun] = []
         for i in np.flatnonzero(self.constant).tolist():
             curvature = float(0.5 * (self.k0[i] + self.k1[i]))
             first = i
             if runs and runs[-1].last == i - 1 and bool(same_curvature(self.k1[i - 1], self.k0[i])):
                 previous = runs.pop()
                 first, curvature = previous.first, previous.curvature
-            runs.append(Run(float(self.starts[first]), float(self.starts[i + 1]), curvature, first, i))
+            runs.append(CurvatureRun(float(self.starts[first]), float(self.starts[i + 1]), curvature, first, i))
         return runs
 
-    def cut(self, run: Run) -> bool:
+    def cut(self, run: CurvatureRun) -> bool:
         """Return whether the road's begin or end cuts a run, so that its true length is unknown."""
         return run.first == 0 or run.last == len(self.lengths) - 1
 

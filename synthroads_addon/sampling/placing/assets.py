@@ -13,12 +13,12 @@ from ...road.section_geometry import CarriagewaySection
 from ...road.things.furniture import Asset
 from ...scenario.assets import FARTHEST, AssetPlacement, read_asset_library
 from ...scenario.road import Interval
-from .site import Site
+from .site import PlacementSite
 
 Float = NDArray[np.float64]
 
 
-def sample_assets(site: Site) -> Iterator[tuple[str, Asset]]:
+def sample_assets(site: PlacementSite) -> Iterator[tuple[str, Asset]]:
     """Yield the assets of the scenario's libraries by id, placed by their rules; their instance numbers are 1.
 
     Where the road leaves no room for one, there is none.
@@ -46,7 +46,7 @@ def sample_assets(site: Site) -> Iterator[tuple[str, Asset]]:
 
 
 def _places(
-    site: Site, placement: AssetPlacement, field: str, purpose: tuple[str | int, ...]
+    site: PlacementSite, placement: AssetPlacement, field: str, purpose: tuple[str | int, ...]
 ) -> Iterator[tuple[float, float, float]]:
     """Yield station (m), offset (m) and rotation (deg) of an asset's copies. In the median each takes either half."""
     in_median = placement.side == "median"
@@ -89,7 +89,7 @@ def _stations(rng: np.random.Generator, placement: AssetPlacement, length: float
 
 
 def _room(
-    site: Site, section: CarriagewaySection, in_median: bool, stations: Float, field: str, needed: float
+    site: PlacementSite, section: CarriagewaySection, in_median: bool, stations: Float, field: str, needed: float
 ) -> tuple[Float, Float]:
     """Return the distance (N,) of the edge that an asset's distance counts from, and the room beyond it there, m."""
 

@@ -18,7 +18,7 @@ from ...road.things.furniture import ConstructionBeacon, Side, TemporaryBarrier
 from .draw import draw, pick
 from .layout import Layout, Roadside
 from .ranges import Range, Taken, draw_start, free_ranges
-from .site import Site
+from .site import PlacementSite
 
 TAPERS_IN, TAPER_OUT = (60.0, 70.0, 80.0), 20.0
 """Lengths over which the lane is closed and opened again, m."""
@@ -72,7 +72,7 @@ def construction_zones(layout: Layout, rng: np.random.Generator) -> tuple[dict[S
     return zones, objects
 
 
-def closed_lanes(objects: Iterable[RoadObject], site: Site) -> dict[Side, tuple[int, float, float]]:
+def closed_lanes(objects: Iterable[RoadObject], site: PlacementSite) -> dict[Side, tuple[int, float, float]]:
     """Return the lane that a construction zone closes, and from where to where (m), by side."""
     beacons = [item for item in objects if isinstance(item, ConstructionBeacon)]
     found: dict[Side, tuple[int, float, float]] = {}

@@ -48,7 +48,7 @@ def delineator_stations(elements: tuple[HorizontalElement, ...]) -> NDArray[np.f
         length = math.fsum(e.length for e in elements)
         first = min(widest, length) / 2.0
         return first + widest * np.arange(int((length - first) / widest) + 1)
-    spacing = _Spacing(elements, widest)
+    spacing = _PostSpacing(elements, widest)
     found, station = [], min(spacing.at(0.0), spacing.length) / 2.0
     while station <= spacing.length:
         found.append(station)
@@ -56,7 +56,7 @@ def delineator_stations(elements: tuple[HorizontalElement, ...]) -> NDArray[np.f
     return np.array(found)
 
 
-class _Spacing:
+class _PostSpacing:
     """Spacing of delineators by station.
 
     Attributes:

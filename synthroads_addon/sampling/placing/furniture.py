@@ -28,12 +28,12 @@ from .layout import Layout
 from .overpass import OverpassPlan, overpass, plan_overpass
 from .random import plan_random_equipment, plan_random_signs, random_front, random_median_barrier
 from .signs import median_signs, plan_exit_signs, plan_gore_signs, plan_other_signs
-from .site import Site
+from .site import PlacementSite
 
 __all__ = ["closed_lanes", "place_furniture"]
 
 
-def place_furniture(site: Site) -> Iterator[tuple[str, RoadObject]]:
+def place_furniture(site: PlacementSite) -> Iterator[tuple[str, RoadObject]]:
     """Yield (id, object) of all furniture; every object has the instance number 1."""
     layout, streams = Layout(site), _Streams(site)
     by_rules = site.scenario.placement == "rules"
@@ -66,7 +66,7 @@ def place_furniture(site: Site) -> Iterator[tuple[str, RoadObject]]:
 class _Streams:
     """The random numbers of each family of furniture."""
 
-    site: Site
+    site: PlacementSite
 
     @cached_property
     def signs(self) -> np.random.Generator:

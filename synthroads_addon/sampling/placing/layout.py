@@ -19,7 +19,7 @@ from ...road.objects import AnyWidth, PointObject
 from ...road.things.furniture import Side, TrafficSign
 from .edge import EdgeProfile
 from .ranges import Range, Taken
-from .site import Site
+from .site import PlacementSite
 
 BARRIER_AXIS = 0.70
 """From the paved edge to the axis of a guardrail's posts: its face then stands 0.5 m from the pavement, m."""
@@ -97,7 +97,7 @@ class Roadside:
         pieces: the barriers that stand, in order.
     """
 
-    def __init__(self, site: Site, side: Side) -> None:
+    def __init__(self, site: PlacementSite, side: Side) -> None:
         carriageway, section = site.carriageways[side], site.sections[side]
         self.side, self.sign, self.traffic = side, carriageway.sign, carriageway.traffic
         self.length = site.length
@@ -222,7 +222,7 @@ class Layout:
         median: its median.
     """
 
-    def __init__(self, site: Site) -> None:
+    def __init__(self, site: PlacementSite) -> None:
         self.site = site
         self.length = site.length
         self.sides: dict[Side, Roadside] = {side: Roadside(site, side) for side in site.carriageways}

@@ -22,7 +22,7 @@ Float = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class Site:
+class PlacementSite:
     """A road without its furniture.
 
     Attributes:

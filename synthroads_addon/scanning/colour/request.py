@@ -10,7 +10,7 @@ from ..scene.mesh import SceneMesh
 from .colour import MaterialLayers, Shading, SurfaceConstants
 from .light import CloudShadows, SunAndSky
 from .settings import ColourSettings
-from .views import Poses, View
+from .views import CameraPath, View
 
 
 @dataclass(frozen=True)
@@ -33,7 +33,7 @@ class LayerRequest:
     wanted: frozenset[str]
     mesh: SceneMesh
     environment: Environment
-    path: Poses
+    path: CameraPath
     field_of_view: float
     seed: int = 0
     frame: tuple[float, float, float] = (0.0, 0.0, 0.0)

@@ -43,7 +43,7 @@ class PulseTiming:
 
 
 @dataclass(frozen=True)
-class Rays:
+class PulseRays:
     """Directions of P pulses of a head.
 
     Attributes:
@@ -99,7 +99,7 @@ class Pattern(Model):
         """Return why the pattern can't have a field of view (deg) and a pulse rate (1/s), or an empty string."""
         return ""
 
-    def rays(self, timing: PulseTiming, pulse: Numbers, with_frame: bool) -> Rays:
+    def rays(self, timing: PulseTiming, pulse: Numbers, with_frame: bool) -> PulseRays:
         """Return pulses (P,) of a head by their numbers from 0.
 
         Args:

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from ...base.schema import quantity
-from .base import Float, Numbers, Pattern, PulseTiming, Rays
+from .base import Float, Numbers, Pattern, PulseRays, PulseTiming
 
 
 class LinePattern(Pattern):
@@ -26,7 +26,7 @@ class LinePattern(Pattern):
         largest = abs(self.centre_from_nadir_deg) + field_of_view_deg / 2.0
         return f"reaches {largest:g} deg from the nadir, beyond 180" if largest > 180.0 + 1e-9 else ""
 
-    def rays(self, timing: PulseTiming, pulse: Numbers, with_frame: bool) -> Rays:
+    def rays(self, timing: PulseTiming, pulse: Numbers, with_frame: bool) -> PulseRays:
         """Return pulses of lines across the forward direction.
 
         Line k begins at k / lines per second, and its N pulses follow at the pulse rate. Pulse j is j - (N - 1) / 2
@@ -53,7 +53,7 @@ class LinePattern(Pattern):
         return None
 
 
-def make_rays(time: Float, angle: Float, forward: Float | None, with_frame: bool) -> Rays:
+def make_rays(time: Float, angle: Float, forward: Float | None, with_frame: bool) -> PulseRays:
     """Return rays at angles (P,) from the nadir, in planes that are tilted forward by angles (P,), None for 0.
 
     direction = cos(angle) down + sin(angle) right, where down = (sin(forward), 0, -cos(forward)).
@@ -65,10 +65,10 @@ def make_rays(time: Float, angle: Float, forward: Float | None, with_frame: bool
     np.negative(sine, out=direction[1])
     np.multiply(cosine, -nodding[1], out=direction[2])
     if not with_frame:
-        return Rays(time, angle, direction)
+        return PulseRays(time, angle, direction)
     in_plane, across = np.empty_like(direction), np.zeros_like(direction)
     np.multiply(sine, -nodding[0], out=in_plane[0])
     np.negative(cosine, out=in_plane[1])
     np.multiply(sine, nodding[1], out=in_plane[2])
     across[0], across[2] = nodding[1], nodding[0]
-    return Rays(time, angle, direction, in_plane, across)
+    return PulseRays(time, angle, direction, in_plane, across)

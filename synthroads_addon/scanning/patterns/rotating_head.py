@@ -7,7 +7,7 @@ from typing import Annotated, ClassVar, Literal
 import numpy as np
 from pydantic import Field, model_validator
 
-from .base import FULL_TURN, Numbers, Pattern, PulseTiming, Rays
+from .base import FULL_TURN, Numbers, Pattern, PulseRays, PulseTiming
 
 _Elevation = Annotated[float, Field(strict=True, gt=-90, lt=90)]
 _Microseconds = Annotated[float, Field(strict=True, ge=0, le=1e6)]
@@ -59,7 +59,7 @@ class RotatingHead(Pattern):
             return f"goes with a firing sequence of {sequence:.4g} us: a beam fires after its end"
         return ""
 
-    def rays(self, timing: PulseTiming, pulse: Numbers, with_frame: bool) -> Rays:
+    def rays(self, timing: PulseTiming, pulse: Numbers, with_frame: bool) -> PulseRays:
         """Return pulses of a rotating head.
 
         Turn k begins at k / lines per second. Its S firing sequences begin a step apart, from S / 2 steps left of the
@@ -82,7 +82,7 @@ class RotatingHead(Pattern):
         time = turn / timing.lines_per_second + since
         direction = np.stack([out * cosine, -out * sine, up])
         if not with_frame:
-            return Rays(time, azimuth, direction, beam=beam)
+            return PulseRays(time, azimuth, direction, beam=beam)
         in_plane = np.stack([-sine, -cosine, np.zeros_like(sine)])
         across = np.stack([-up * cosine, up * sine, out])
-        return Rays(time, azimuth, direction, in_plane, across, beam)
+        return PulseRays(time, azimuth, direction, in_plane, across, beam)

@@ -9,7 +9,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from ...base.schema import Model, quantity
-from .base import FULL_TURN, Float, Numbers, Pattern, PulseTiming, Rays
+from .base import FULL_TURN, Float, Numbers, Pattern, PulseRays, PulseTiming
 
 
 class Wedge(Model):
@@ -72,7 +72,7 @@ class WedgePrism(Pattern):
             return f"isn't that of the wedges, {view:.2f} deg"
         return ""
 
-    def rays(self, timing: PulseTiming, pulse: Numbers, with_frame: bool) -> Rays:
+    def rays(self, timing: PulseTiming, pulse: Numbers, with_frame: bool) -> PulseRays:
         """Return pulses of one or two rotating wedges.
 
         Pulse p is fired at p / pulse rate. Wedge i has then turned by p x lines/s x turns_i / (turns_1 x pulse rate)
@@ -89,8 +89,8 @@ class WedgePrism(Pattern):
         time, angle = pulse / timing.pulse_rate, np.arctan2(right, down)
         direction = np.stack([forward, -right, -down])
         if not with_frame:
-            return Rays(time, angle, direction)
-        return Rays(time, angle, direction, *_carry_axes(forward, right, down))
+            return PulseRays(time, angle, direction)
+        return PulseRays(time, angle, direction, *_carry_axes(forward, right, down))
 
 
 def _refract(forward: Float, right: Float, phase: Float, apex: float, index: float) -> tuple[Float, Float]:

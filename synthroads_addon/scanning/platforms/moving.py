@@ -11,7 +11,7 @@ from ...base.rotations import rotation_matrix
 from .base import KNOT_RANGE, USUAL, Strip, knots_for, mounting, strips_of
 from .guides import Float, Guide, SmoothedGuide
 from .platform import Platform
-from .strip_line import Eased, Sway, Track
+from .strip_line import Eased, StripTrack, Sway
 
 AXLES = 3.0
 """Distance between a vehicle's axles, m: its pitch is that of the line through both."""
@@ -80,11 +80,11 @@ class MovingPath:
             return self._offsets[index] <= 0.0  # traffic keeps to the right
         return index % 2 == 0 or not platform.there_and_back
 
-    def _make_track(self, index: int) -> Track:
+    def _make_track(self, index: int) -> StripTrack:
         field = f"scan.platform.lateral_offsets[{index}]" if self._named else "scan.platform.lateral_offsets"
-        return Track(self._guide, self._offsets[index], self._sway, self._forward[index], field)
+        return StripTrack(self._guide, self._offsets[index], self._sway, self._forward[index], field)
 
-    def _eased(self, track: Track) -> tuple[Eased, Eased]:
+    def _eased(self, track: StripTrack) -> tuple[Eased, Eased]:
         """Return height (K, 1) and heading, pitch, roll (K, 3) as functions of the distance travelled."""
         step = min(_ATTITUDE_STEP, self._sway.wavelength / 40.0) if self._sway else _ATTITUDE_STEP
         return (
@@ -92,12 +92,12 @@ class MovingPath:
             Eased(lambda distance: self._attitudes(track, distance), track.length, step, True),
         )
 
-    def _heights(self, track: Track, distance: Float) -> Float:
+    def _heights(self, track: StripTrack, distance: Float) -> Float:
         if self._vehicle:
             return self._height + self._surface(track, distance, 0.0)
         return self._height + self._guide.elevation(track.stations(distance))
 
-    def _attitudes(self, track: Track, distance: Float) -> Float:
+    def _attitudes(self, track: StripTrack, distance: Float) -> Float:
         course = track.place(distance)[1]
         if not self._vehicle:
             return np.column_stack([course, np.zeros((len(course), 2))])
@@ -110,7 +110,7 @@ class MovingPath:
         # Left of the body is a tangent of the surface: tan(roll) is the slope across times cos(pitch).
         return np.column_stack([course, pitch, np.arctan(across / WHEELS * np.cos(pitch))])
 
-    def _surface(self, track: Track, distance: Float, left: float) -> Float:
+    def _surface(self, track: StripTrack, distance: Float, left: float) -> Float:
         """Return the surface's elevation (K,) on the track or beside it, by the direction of travel."""
         station = track.stations(distance)
         offset = track.offsets(station)[0] + (left if track.forward else -left)

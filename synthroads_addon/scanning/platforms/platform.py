@@ -12,7 +12,7 @@ PlatformKind = Literal["uav", "vehicle", "tripod", "airborne", "trajectory"]
 
 
 class Platform(ClosedModel):
-    """Carrier of the scanner and its place. What isn't given is usual for its kind (`scanning.platforms.base.USUAL`)."""
+    """Carrier of the scanner and its place. What is left out is usual for the kind (`platforms.base.USUAL`)."""
 
     kind: PlatformKind = Field("uav", description="Platform.")
     height: float | None = quantity(

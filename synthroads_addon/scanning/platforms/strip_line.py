@@ -72,7 +72,7 @@ class _Table:
     course: Float
 
 
-class Track:
+class StripTrack:
     """A line beside a guide, by the distance travelled along it.
 
     Every place lies exactly beside the guide. The station at a distance is interpolated by cubics in a table whose

@@ -16,7 +16,7 @@ from ...road.parameters import Vehicle
 from ...road.things.chassis import CHASSIS, wheel_base
 from ...road.things.vehicles import VEHICLE_TYPES
 from .mesh import SceneMesh
-from .passes import Passes, passes
+from .passes import VehiclePasses, passes
 
 Float = NDArray[np.float64]
 Pose = tuple[Float, Float, NDArray[np.bool_]]
@@ -109,7 +109,7 @@ class LaneMotion:
         *,
         origin: ArrayLike = (0.0, 0.0, 0.0),
         line: LaneLine | None = None,
-        way: Passes | None = None,
+        way: VehiclePasses | None = None,
     ) -> None:
         self.vehicle = vehicle
         self.line = line or lane_of(geometry, vehicle)
@@ -224,7 +224,7 @@ def checked_factor(speed_factor: float) -> float:
     return float(speed_factor)
 
 
-def _ways(vehicles: list[Vehicle], line: LaneLine) -> list[Passes]:
+def _ways(vehicles: list[Vehicle], line: LaneLine) -> list[VehiclePasses]:
     """Return the passes of vehicles on one open range of a lane."""
     low, high = line.distance(np.array(line.range_at(vehicles[0].station))).tolist()
     middle = line.distance(np.array([vehicle.station for vehicle in vehicles]))

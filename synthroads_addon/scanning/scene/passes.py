@@ -18,7 +18,7 @@ centreline by which it was placed."""
 
 
 @dataclass(frozen=True)
-class Passes:
+class VehiclePasses:
     """The way of one vehicle: once from where it is at the time 0, then from the lane's beginning again and again.
 
     Attributes:
@@ -53,13 +53,15 @@ class Passes:
         half = self.length / 2.0 - OVERHANG
         return distance, (distance >= half) & (distance <= self.whole - half)
 
-    def from_elsewhere(self, start: float) -> Passes:
+    def from_elsewhere(self, start: float) -> VehiclePasses:
         """Return the same for a vehicle that is elsewhere at the time 0; it comes in as much later as it leaves."""
         moved = replace(self, start=start)
         return replace(moved, entry=self.entry + max(0.0, moved.leave - self.leave))
 
 
-def passes(start: Sequence[float], speed: Sequence[float], length: Sequence[float], whole: float) -> list[Passes]:
+def passes(
+    start: Sequence[float], speed: Sequence[float], length: Sequence[float], whole: float
+) -> list[VehiclePasses]:
     """Return the passes of all vehicles of one lane, in their order.
 
     They come in again in the order in which they leave, each as soon as it may: not before it has left, and so far
@@ -89,4 +91,4 @@ def passes(start: Sequence[float], speed: Sequence[float], length: Sequence[floa
     once = behind(order[-1], came_in, order[0]) - entry[order[0]]
     period = max(once, *(whole / v for v in speed))
     rows = zip(start, speed, length, entry, strict=True)
-    return [Passes(x, v, whole, size, when, period) for x, v, size, when in rows]
+    return [VehiclePasses(x, v, whole, size, when, period) for x, v, size, when in rows]

@@ -27,7 +27,7 @@ _OF_NO_FACE = {"class_id": UNLABELLED, "instance_id": 0, "material": NO_MATERIAL
 
 
 @dataclass(frozen=True)
-class _Part:
+class _TargetPart:
     """A mesh of the target.
 
     Attributes:
@@ -195,7 +195,7 @@ def _joined(arrays: list[NDArray[Any]]) -> NDArray[Any]:
     return arrays[0] if len(arrays) == 1 else np.concatenate(arrays)
 
 
-def _part(mesh: SceneMesh, caster: Caster, first: int) -> _Part:
+def _part(mesh: SceneMesh, caster: Caster, first: int) -> _TargetPart:
     if len(mesh.vertices):
         low, high = mesh.vertices.min(axis=0).astype(np.float64), mesh.vertices.max(axis=0).astype(np.float64)
     else:
@@ -203,17 +203,17 @@ def _part(mesh: SceneMesh, caster: Caster, first: int) -> _Part:
     centre = (low + high) / 2.0
     half = (high - low) / 2.0
     radius = float(np.linalg.norm(half)) + 1e-3
-    return _Part(caster, FacePlanes(mesh), first, len(mesh.triangles), centre, half, radius)
+    return _TargetPart(caster, FacePlanes(mesh), first, len(mesh.triangles), centre, half, radius)
 
 
-def _out_of_the_way(track: Track, part: _Part, scanner: Float) -> Track:
+def _out_of_the_way(track: Track, part: _TargetPart, scanner: Float) -> Track:
     """Return a part's track on which it isn't there where the scanner's vehicle is; places (3, K) at its knots."""
     own = _inverse(track.rotation, scanner - track.position)
     away = (np.abs(own.T - part.centre) > part.half + CLEARANCE).any(axis=1)
     return replace(track, present=track.present & away)
 
 
-def _cast(part: _Part, origins: Float, directions: Float, maximum_range: float) -> Met:
+def _cast(part: _TargetPart, origins: Float, directions: Float, maximum_range: float) -> Met:
     """Cast rays at one part in its own frame; face numbers are those of all parts."""
     shape = directions.shape[1:]
     begin, towards = (np.broadcast_to(_rows(array), (*shape, 3)).reshape(-1, 3) for array in (origins, directions))
@@ -242,7 +242,7 @@ def _rows(vectors: Float) -> NDArray[np.float32]:
     return result
 
 
-def _cast_moving(part: _Part, track: Track, rays: Bundles, maximum_range: float, nearest: Met) -> None:
+def _cast_moving(part: _TargetPart, track: Track, rays: Bundles, maximum_range: float, nearest: Met) -> None:
     """Put a moving part's hits in place of farther ones; all arrays are flat."""
     near = rays.near(track, part.centre, part.radius)
     if not len(near):

@@ -27,7 +27,7 @@ from ...road.things.body_shapes import (
     TEMPORARY_GAP,
 )
 from .entities import Entity, Float
-from .scene import Place, Scene, grid_triangles
+from .scene import IfcPlace, Scene, grid_triangles
 
 _Mesh = tuple[Float, NDArray[np.intp]]
 
@@ -96,7 +96,7 @@ def _element(scene: Scene, entity: str, name: str, item: Any, meshes: list[_Mesh
     return made
 
 
-def _solid(scene: Scene, place: Place, mesh: _Mesh) -> Entity | None:
+def _solid(scene: Scene, place: IfcPlace, mesh: _Mesh) -> Entity | None:
     points, triangles = mesh
     return scene.ifc.mesh(place.inside(points), triangles, True)
 

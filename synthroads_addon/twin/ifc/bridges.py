@@ -16,7 +16,7 @@ from ...road.things.body_shapes import (
 )
 from .clearance import pavement_below
 from .entities import Entity
-from .scene import Place, Scene
+from .scene import IfcPlace, Scene
 from .solids import Point2, Solids
 
 _RAILING, _LOWEST_RAILING = 0.09, 0.5
@@ -34,7 +34,7 @@ class _Bridge:
 
     def __init__(self, scene: Scene, name: str, item: Overpass) -> None:
         self.scene, self.ifc, self.name, self.item = scene, scene.ifc, name, item
-        self.place: Place = scene.place_of(item)
+        self.place: IfcPlace = scene.place_of(item)
         self.shear = math.tan(math.radians(item.rotation_deg))
         self.left, self.right = item.left_abutment - item.offset, item.right_abutment - item.offset
         along, across = (-item.width / 2.0, item.width / 2.0), (self.left, self.right)

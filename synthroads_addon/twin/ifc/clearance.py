@@ -8,7 +8,7 @@ import numpy as np
 
 from ...road.geometry import RoadGeometry
 from ...road.surface import highest_pavement
-from .scene import Place
+from .scene import IfcPlace
 
 _ACROSS = 0.05
 """Distance (m) of the points across the road at which the pavement is looked at: 3.5 mm at 7 % crossfall."""
@@ -16,7 +16,7 @@ _ROWS = 7
 
 
 def pavement_below(
-    geometry: RoadGeometry, place: Place, along: tuple[float, float], across: tuple[float, float], shear: float = 0.0
+    geometry: RoadGeometry, place: IfcPlace, along: tuple[float, float], across: tuple[float, float], shear: float = 0.0
 ) -> float:
     """Return the local elevation (m) of the pavement's highest point below something; without any, the place's.
 

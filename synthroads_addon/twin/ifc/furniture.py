@@ -31,7 +31,7 @@ from ...road.things.body_shapes import (
     TRAFFIC_LIGHT_POST,
 )
 from .entities import Entity
-from .scene import Place, Scene
+from .scene import IfcPlace, Scene
 from .solids import Solids
 
 BURIED = 0.3
@@ -238,7 +238,7 @@ def _mount(item: Pole) -> float:
     return item.height - (0.0 if item.kind == "lighting" else 0.35)
 
 
-def part_of(scene: Scene, whole: Entity, place: Place, entity: str, name: str, **named: Any) -> Entity:
+def part_of(scene: Scene, whole: Entity, place: IfcPlace, entity: str, name: str, **named: Any) -> Entity:
     """Add an element that is part of another one, in its frame."""
     ifc = scene.ifc
     frame = ifc.add("IfcLocalPlacement", place.placement, ifc.flat_axes)

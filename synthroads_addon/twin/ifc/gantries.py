@@ -10,7 +10,7 @@ from ...road.things.furniture import GantrySign
 from .clearance import pavement_below
 from .entities import Entity
 from .furniture import part_of
-from .scene import Place, Scene
+from .scene import IfcPlace, Scene
 from .solids import Solids
 
 _BURIED = 0.6
@@ -20,15 +20,15 @@ _BURIED = 0.6
 def write_gantries(scene: Scene) -> None:
     """Add all gantries."""
     for name, item in scene.geometry.parameters.of_type(Gantry).items():
-        _Gantry(scene, name, item).write()
+        _IfcGantry(scene, name, item).write()
 
 
-class _Gantry:
+class _IfcGantry:
     """Writes one gantry. Its frame's y is to the left; it is turned about the middle of its beam."""
 
     def __init__(self, scene: Scene, name: str, item: Gantry) -> None:
         self.scene, self.ifc, self.name, self.item = scene, scene.ifc, name, item
-        self.place: Place = scene.place_of(item)
+        self.place: IfcPlace = scene.place_of(item)
         self.solids = Solids(scene.ifc, math.radians(item.rotation_deg))
         across = (item.left_offset - item.offset, item.right_offset - item.offset)
         along = (-self._reach(1.0), self._reach(-1.0))

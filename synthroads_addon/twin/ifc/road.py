@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...road.damage import damage_columns, damage_depth, damaged_strips
-from ...road.geometry import Strip
+from ...road.geometry import SurfaceStrip
 from ...road.guidelines import LIMITS
 from ...road.objects import AnyWidth
 from ...road.parameters import Carriageway, Median, Pothole, RoadParameters, Rut, Turnout
@@ -105,7 +105,7 @@ class _Piece:
     name: str
     index: int
     kind: str
-    strip: Strip
+    strip: SurfaceStrip
     whole: Entity
     instance: int
     start: float
@@ -181,7 +181,7 @@ class _Direction:
         self.scene.describe(part, turnout)
         return part
 
-    def _turnout_pieces(self, index: int, strip: Strip, wholes: dict[int, Entity]) -> Iterator[_Piece]:
+    def _turnout_pieces(self, index: int, strip: SurfaceStrip, wholes: dict[int, Entity]) -> Iterator[_Piece]:
         for shape in self.section.turnouts:
             instance = shape.turnout.instance
             low, high = _range(shape, self.scene.geometry.length)

@@ -44,7 +44,7 @@ CLASSES = {
 
 
 @dataclass(frozen=True)
-class Place:
+class IfcPlace:
     """An upright frame on the road: x along it, y to the left, z up.
 
     Attributes:
@@ -118,7 +118,7 @@ class Scene:
         extra = [station for station in more if start < station < end]
         return np.unique(np.concatenate([[start], inside, extra, [end]]))
 
-    def place(self, station: float, offset: float, above: float = 0.0) -> Place:
+    def place(self, station: float, offset: float, above: float = 0.0) -> IfcPlace:
         """Return a frame on the surface, or above it; beyond the road's ends it lies on its end."""
         height = self.at(station, offset)[0] + above
         station = min(max(station, 0.0), self.geometry.length)
@@ -127,9 +127,9 @@ class Scene:
         left = np.array([-math.sin(heading[0]), math.cos(heading[0])])
         origin = np.array([*(position[0] + offset * left), height])
         placement = linear_placement(self.ifc, self.geometry, self.axis, station, offset, height)
-        return Place(placement, origin, float(heading[0]))
+        return IfcPlace(placement, origin, float(heading[0]))
 
-    def place_of(self, item: PointObject) -> Place:
+    def place_of(self, item: PointObject) -> IfcPlace:
         """Return the frame at a point object's foot; its rotation isn't in it."""
         return self.place(item.station, item.offset, item.elevation)
 

@@ -8,7 +8,7 @@ from ...road.parameters import Lane
 from ...road.things.furniture import Side
 from .marks import RoadMarks
 from .pieces import Float, chords, cubics, runs
-from .sections import LanePlan, LaneStrip, Section
+from .sections import LanePlan, LaneSection, LaneStrip
 from .surface import LateralShape
 from .xml import Element, cubic, element, note
 
@@ -70,7 +70,7 @@ def _links(lane: Element, plan: LanePlan, number: int, side: Side, strip: LaneSt
                 element(link, tag, {"id": sign * other})
 
 
-def _widths(lane: Element, plan: LanePlan, section: Section, strip: LaneStrip) -> None:
+def _widths(lane: Element, plan: LanePlan, section: LaneSection, strip: LaneStrip) -> None:
     first, last = section.pieces
     borders = plan.widths.borders[first : last + 1]
     own = plan.widths.coefficients[first:last, strip.column]
@@ -78,7 +78,7 @@ def _widths(lane: Element, plan: LanePlan, section: Section, strip: LaneStrip) -
         cubic(lane, "width", {"sOffset": start - section.start}, coefficients)
 
 
-def _heights(lane: Element, plan: LanePlan, shape: LateralShape, section: Section, side: Side) -> None:
+def _heights(lane: Element, plan: LanePlan, shape: LateralShape, section: LaneSection, side: Side) -> None:
     """Add the heights of a verge: it falls away from the pavement's plane, from its inner edge on."""
     geometry = plan.geometry
 

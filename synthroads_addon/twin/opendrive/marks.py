@@ -8,7 +8,7 @@ from ...road.geometry import RoadGeometry
 from ...road.parameters import Carriageway, LineMarking
 from ...road.things.furniture import Side
 from .pieces import CLOSE
-from .sections import LanePlan, Section
+from .sections import LanePlan, LaneSection
 from .xml import Element, element, notes
 
 _OUTWARDS = {"outer_edge": 0.5, "block": 0.5, "turnout_edge": 0.5, "inner_edge": -0.5, "gore_edge": -0.5}
@@ -76,7 +76,7 @@ class RoadMarks:
 
     def _on_border(self, stretch: _Stretch, number: int, index: int) -> bool:
         """Put a stretch on the border outside of a strip; return whether it is free."""
-        section: Section = self._plan.sections[number]
+        section: LaneSection = self._plan.sections[number]
         sign = 1 if stretch.side == "left" else -1
         own = self._of.setdefault((number, sign * section.number(stretch.side, index)), [])
         if any(stretch.start < other.end - CLOSE and other.start < stretch.end - CLOSE for other in own):

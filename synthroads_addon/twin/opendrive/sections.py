@@ -54,7 +54,7 @@ class LaneStrip:
 
 
 @dataclass(frozen=True)
-class Section:
+class LaneSection:
     """A lane section.
 
     Attributes:
@@ -114,16 +114,16 @@ class LanePlan:
         """Return all widths (F,) at the beginning of a piece."""
         return np.asarray(self.widths.coefficients[piece, :, 0])
 
-    def _sections(self) -> list[Section]:
+    def _sections(self) -> list[LaneSection]:
         """Return the sections: a new one where a strip begins, ends, becomes something else or has no width."""
         borders = self.widths.borders
         rows = [self._lanes(piece) for piece in range(len(borders) - 1)]
-        found: list[Section] = []
+        found: list[LaneSection] = []
         first = 0
         for piece in range(1, len(rows) + 1):
             if piece < len(rows) and rows[piece] == rows[piece - 1] and not self._pinched(piece, rows[piece]):
                 continue
-            found.append(Section(float(borders[first]), float(borders[piece]), (first, piece), rows[first]))
+            found.append(LaneSection(float(borders[first]), float(borders[piece]), (first, piece), rows[first]))
             first = piece
         return found
 

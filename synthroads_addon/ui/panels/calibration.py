@@ -15,7 +15,7 @@ from ...calibration.job import Calibration, Compared, save_fitted
 from ..work import calibration_run
 from ..work.calibration_run import PICTURE, calibration_work, fitted_result, show_picture
 from ..work.common import Sidebar, column, is_free, large_button, refuse
-from ..work.job import Job
+from ..work.job import PanelJob
 from ..work.long_operator import LongOperator
 from . import calibration_settings
 from .calibration_settings import file_of
@@ -38,12 +38,12 @@ class _Calibrates(LongOperator):
             return False
         return True
 
-    def job(self, context: bpy.types.Context) -> Job[Calibration]:
+    def job(self, context: bpy.types.Context) -> PanelJob[Calibration]:
         """Return the calibration that the panel asks for."""
         wanted = context.window_manager.synthroads_calibration.job(self.fit)
-        return Job("Calibration", calibration_work(wanted))
+        return PanelJob("Calibration", calibration_work(wanted))
 
-    def succeed(self, context: bpy.types.Context, job: Job[Calibration]) -> str:
+    def succeed(self, context: bpy.types.Context, job: PanelJob[Calibration]) -> str:
         """Draw the diagrams; return the largest errors."""
         assert job.result is not None
         calibration_run.latest = job.result

@@ -18,7 +18,7 @@ from ...blender.views.cloud import CloudView, scene_origin
 from ...cloud.formats.registry import ENDINGS
 from ...cloud.tools.display import COLOURINGS, ColourBy, DisplayCloud, height_colors, read_display
 from ..work.common import Sidebar, column, is_free
-from ..work.job import Aside, Job, Report, Work
+from ..work.job import Aside, PanelJob, Report, Work
 from ..work.long_operator import LongOperator, draw_job
 from ..work.view import frame_points, redraw_views, view_of
 from .swatches import swatch
@@ -126,7 +126,7 @@ class SYNTHROADS_OT_show_cloud(LongOperator, bpy.types.Operator):
         """Nothing else at work."""
         return is_free(cls, context)
 
-    def job(self, context: bpy.types.Context) -> Job[DisplayCloud]:
+    def job(self, context: bpy.types.Context) -> PanelJob[DisplayCloud]:
         """Return the reading of the cloud in the scene's frame."""
         path, points = cloud_path(context, self.filepath), context.window_manager.synthroads_cloud_view.points
         origin = scene_origin(context.scene)
@@ -137,9 +137,9 @@ class SYNTHROADS_OT_show_cloud(LongOperator, bpy.types.Operator):
             )
             return cloud
 
-        return Job("Loading", work())
+        return PanelJob("Loading", work())
 
-    def succeed(self, context: bpy.types.Context, job: Job[DisplayCloud]) -> str:
+    def succeed(self, context: bpy.types.Context, job: PanelJob[DisplayCloud]) -> str:
         """Draw it; where there is no road to look at, look at it."""
         cloud, settings = job.result, context.window_manager.synthroads_cloud_view
         assert cloud

@@ -22,7 +22,7 @@ from ...twin.formats import TOLERANCE, TWIN_FORMATS, check_formats, missing_pack
 from ..fields.numbers import exact
 from ..work.common import Sidebar, column, is_free
 from ..work.file_operator import FileOperator
-from ..work.job import Aside, Job, Report, Work
+from ..work.job import Aside, PanelJob, Report, Work
 from ..work.long_operator import draw_job
 from .cloud_view import ENDINGS_GLOB, cloud_path, last_cloud
 from .rules import road_now, wrapped
@@ -124,13 +124,13 @@ class SYNTHROADS_OT_export_cloud(FileOperator, bpy.types.Operator):
         for name in ("format", "classes", "spacing"):
             layout.prop(self, name)
 
-    def job(self, context: bpy.types.Context) -> Job[dict[str, Any]]:
+    def job(self, context: bpy.types.Context) -> PanelJob[dict[str, Any]]:
         """Return the writing; the file browser has asked whether a file that is there may be replaced."""
         source, output = cloud_path(context, self.source), Path(bpy.path.abspath(self.filepath))
         classes, spacing = None if self.classes == "own" else self.classes, exact(self.spacing, None)
         return _aside("Export", lambda report: export_cloud(source, output, classes, spacing, report))
 
-    def succeed(self, context: bpy.types.Context, job: Job[dict[str, Any]]) -> str:
+    def succeed(self, context: bpy.types.Context, job: PanelJob[dict[str, Any]]) -> str:
         """Say what was written."""
         assert job.result
         return f"{job.result['points']:,} points written to {job.result['output']}"
@@ -187,7 +187,7 @@ class SYNTHROADS_OT_export_twin(FileOperator, bpy.types.Operator):
         layout.prop(self, "tolerance")
         layout.prop(self, "overwrite")
 
-    def job(self, context: bpy.types.Context) -> Job[tuple[str, ...]]:
+    def job(self, context: bpy.types.Context) -> PanelJob[tuple[str, ...]]:
         """Return the writing of the road as it is edited now."""
         parameters = road_now(context.scene)
         assert parameters  # poll() has seen the road
@@ -204,7 +204,7 @@ class SYNTHROADS_OT_export_twin(FileOperator, bpy.types.Operator):
         )
         return _aside("Export", lambda report: export_twin(parameters, folder, formats, tolerance, overwrite, report))
 
-    def succeed(self, context: bpy.types.Context, job: Job[tuple[str, ...]]) -> str:
+    def succeed(self, context: bpy.types.Context, job: PanelJob[tuple[str, ...]]) -> str:
         """Say what was written."""
         assert job.result
         return f"{', '.join(job.result)} written to {bpy.path.abspath(self.directory)}"
@@ -230,13 +230,13 @@ class SYNTHROADS_PT_export(Sidebar, bpy.types.Panel):
         layout.operator(SYNTHROADS_OT_export_twin.bl_idname, icon="EXPORT")
 
 
-def _aside(title: str, work: Callable[[Report], Any]) -> Job[Any]:
+def _aside(title: str, work: Callable[[Report], Any]) -> PanelJob[Any]:
     """Return a job that is done in a thread as a whole."""
 
     def steps() -> Work[Any]:
         return (yield Aside(work, title))
 
-    return Job(title, steps())
+    return PanelJob(title, steps())
 
 
 def _draw_formats(layout: bpy.types.UILayout, context: bpy.types.Context, operator: SYNTHROADS_OT_export_twin) -> None:

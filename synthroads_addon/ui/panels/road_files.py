@@ -19,7 +19,7 @@ from ...scenario.scenario import Scenario
 from ..work.build import road_work
 from ..work.common import is_free, refuse
 from ..work.file_operator import FileOperator
-from ..work.job import Aside, Job, Work
+from ..work.job import Aside, PanelJob, Work
 from ..work.view import look_along, view_of
 
 _FROM_FILE, _NAME = "file", "parameters.json"
@@ -47,13 +47,13 @@ class _Load(FileOperator):
         """Object mode, and nothing else at work."""
         return is_free(cls, context)
 
-    def job(self, context: bpy.types.Context) -> Job[str]:
+    def job(self, context: bpy.types.Context) -> PanelJob[str]:
         """Return the reading and the building."""
         self._first = find_road(context.scene) is None
         path, scenario = Path(bpy.path.abspath(self.filepath)), context.scene.synthroads.scenario()
-        return Job("Build", self._work(path, scenario))
+        return PanelJob("Build", self._work(path, scenario))
 
-    def succeed(self, context: bpy.types.Context, job: Job[str]) -> str:
+    def succeed(self, context: bpy.types.Context, job: PanelJob[str]) -> str:
         """Show the first road that is built."""
         road, space = find_road(context.scene), view_of(context)
         if self._first and not bpy.app.background and road and space:

@@ -10,7 +10,7 @@ from ...road.parameters import RoadParameters
 from ...sampling.road import sample_road
 from ...scenario.scenario import Scenario
 from .common import is_free
-from .job import Aside, Job, Step, Work
+from .job import Aside, PanelJob, Step, Work
 from .long_operator import LongOperator
 from .view import look_along
 
@@ -29,13 +29,13 @@ class SYNTHROADS_OT_build(LongOperator, bpy.types.Operator):
         """Object mode, and nothing else at work."""
         return is_free(cls, context)
 
-    def job(self, context: bpy.types.Context) -> Job[RoadModel]:
+    def job(self, context: bpy.types.Context) -> PanelJob[RoadModel]:
         """Return the building of the road that the panel asks for."""
         settings = context.scene.synthroads
         self._first = find_road(context.scene) is None
-        return Job("Build", build_work(settings.scenario(), settings.road_values()))
+        return PanelJob("Build", build_work(settings.scenario(), settings.road_values()))
 
-    def succeed(self, context: bpy.types.Context, job: Job[RoadModel]) -> str:
+    def succeed(self, context: bpy.types.Context, job: PanelJob[RoadModel]) -> str:
         """Show the first road that is built."""
         assert job.result
         parameters = recall(job.result.collection)[0]

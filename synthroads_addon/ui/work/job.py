@@ -59,7 +59,7 @@ Work: TypeAlias = Generator[float | Step | Aside | None, Any, T]
 """Work of a job. ``None`` means that there is nothing to do in the main thread just now."""
 
 
-class Job(Generic[T]):
+class PanelJob(Generic[T]):
     """Work that may take long. Across a part in a thread it holds on to no data of the file: an undo may take it away.
 
     Args:
@@ -228,10 +228,10 @@ class _Thread(Thread):
             self.error = error
 
 
-_running: Job[Any] | None = None
+_running: PanelJob[Any] | None = None
 
 
-def running_job() -> Job[Any] | None:
+def running_job() -> PanelJob[Any] | None:
     """Return the job that is at work in the window, if there is one."""
     return _running
 

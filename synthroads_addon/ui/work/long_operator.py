@@ -14,11 +14,11 @@ import bpy
 from ...base.errors import Cancelled, InputError
 from ...blender.model.stage import remove_staged
 from .common import redraw_sidebars, refuse
-from .job import TICK, Job, running_job, stop_job
+from .job import TICK, PanelJob, running_job, stop_job
 
 
 class LongOperator:
-    """Base of an operator whose work is a `Job`. Give it `bl_options` without REGISTER: Repeat Last would block."""
+    """Base of operators whose work is a `PanelJob`. Give it `bl_options` without REGISTER: Repeat Last would block."""
 
     nothing_done = "nothing was changed"
     """Message after the job was cancelled."""
@@ -28,14 +28,14 @@ class LongOperator:
         def report(self, kind: set[str], message: str, /) -> None:
             """Blender's own, of every operator."""
 
-    _job: Job[Any] | None = None
+    _job: PanelJob[Any] | None = None
     _timer: bpy.types.Timer | None = None
 
-    def job(self, context: bpy.types.Context) -> Job[Any]:
+    def job(self, context: bpy.types.Context) -> PanelJob[Any]:
         """Return the work; raise `InputError` if it can't be done."""
         raise NotImplementedError
 
-    def succeed(self, context: bpy.types.Context, job: Job[Any]) -> str:
+    def succeed(self, context: bpy.types.Context, job: PanelJob[Any]) -> str:
         """Return the message at the end; the job has its result."""
         raise NotImplementedError
 
@@ -86,7 +86,7 @@ class LongOperator:
             return refuse(self, error)
         return self._say(self.succeed(context, job))
 
-    def _end(self, context: bpy.types.Context, job: Job[Any]) -> set[str]:
+    def _end(self, context: bpy.types.Context, job: PanelJob[Any]) -> set[str]:
         if job.error is None:
             return self._say(self.succeed(context, job))
         if isinstance(job.error, Cancelled):

@@ -7,7 +7,7 @@ import bpy
 from ...blender.model.store import find_road, objects_of, recall
 from ..fields.preferences import with_preferences
 from .common import is_free
-from .job import Job
+from .job import PanelJob
 from .long_operator import LongOperator
 from .scan_job import RoadScan, Written, scan_work
 
@@ -30,11 +30,11 @@ class SYNTHROADS_OT_scan(LongOperator, bpy.types.Operator):
             return False
         return True
 
-    def job(self, context: bpy.types.Context) -> Job[Written]:
+    def job(self, context: bpy.types.Context) -> PanelJob[Written]:
         """Return the scan that the panel asks for: the road as it is edited now, the scanner as it is set now."""
-        return Job("Scan", scan_work(asked_for(context)))
+        return PanelJob("Scan", scan_work(asked_for(context)))
 
-    def succeed(self, context: bpy.types.Context, job: Job[Written]) -> str:
+    def succeed(self, context: bpy.types.Context, job: PanelJob[Written]) -> str:
         """Say what was written."""
         global _last
         assert job.result

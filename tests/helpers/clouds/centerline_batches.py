@@ -7,7 +7,7 @@ from typing import Any
 
 import torch
 
-from ml.centerline.data.effects import Effects
+from ml.centerline.data.effects import SequenceEffects
 from ml.centerline.data.slices import Batch, SliceDataset, SliceSettings, collate
 from ml.centerline.networks.models import CenterlineModel, ModelOptions, build
 from tests.helpers.roads import analytic_roads
@@ -19,11 +19,11 @@ MODELS = ("single", "sequence", "transformer")
 
 
 @cache
-def dataset(effects: Effects | None = None, seed: int = 7) -> SliceDataset:
+def dataset(effects: SequenceEffects | None = None, seed: int = 7) -> SliceDataset:
     return SliceDataset(analytic_roads.roads(), SETTINGS, 32, seed, effects)
 
 
-def batch(count: int = 4, effects: Effects | None = None) -> Batch:
+def batch(count: int = 4, effects: SequenceEffects | None = None) -> Batch:
     """Return the first sequences of the data set."""
     return collate([dataset(effects)[number] for number in range(count)])
 

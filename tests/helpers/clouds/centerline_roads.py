@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ml.centerline.data.axis import Axis
+from ml.centerline.data.axis import MeasuredAxis
 from ml.centerline.data.corridor import Truth
-from ml.centerline.data.roads import Road
+from ml.centerline.data.roads import LearningRoad
 from ml.points import Points
 from synthroads_addon.base.random_streams import stream
 
@@ -26,7 +26,7 @@ def arc_points(station: Float, offset: Float, radius: float) -> Float:
 
 def strip_road(
     name: str = "strip", left: float = 7.0, right: float = -7.0, length: float = 200.0, radius: float = 1500.0
-) -> Road:
+) -> LearningRoad:
     """Return a two-lane road: asphalt up to 3.5 m, edge lines at 3.2 m, a line in the middle, bright grass beyond."""
     random = stream(11, name)
     count = int(length * (left - right) * 15)
@@ -35,7 +35,7 @@ def strip_road(
     line = (np.abs(np.abs(offset) - 3.2) < 0.1) | (np.abs(offset) < 0.1)
     intensity = np.where(line, 0.6, np.where(paved, 0.25, 0.55)) + random.normal(0.0, 0.02, count)
     xyz = np.column_stack([arc_points(station, offset, radius), 0.01 * random.normal(size=count)])
-    axis = Axis(arc_points(np.arange(0.0, length + 0.5), np.zeros(int(length) + 1), radius))
+    axis = MeasuredAxis(arc_points(np.arange(0.0, length + 0.5), np.zeros(int(length) + 1), radius))
     points = Points(
         origin=np.zeros(3),
         xyz=xyz,
@@ -44,4 +44,4 @@ def strip_road(
         class_id=np.where(line, 2, np.where(paved, 1, 0)).astype(np.uint8),
         class_names=NAMES,
     )
-    return Road.of_points(name, points, axis, Truth.measured(axis, "road"))
+    return LearningRoad.of_points(name, points, axis, Truth.measured(axis, "road"))

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ml.segmentation.data.tiles import Tile
+from ml.segmentation.data.tiles import CloudTile
 from ml.segmentation.recipes import SegmentationConfiguration
 from synthroads_addon.base.classes import class_scheme
 from synthroads_addon.cloud.formats.registry import open_writer
@@ -35,14 +35,18 @@ def road_points(count: int, seed: int, length: float = 60.0) -> tuple[np.ndarray
     return xyz, color.astype(np.uint8), np.clip(bright, 0.01, 1.0), label
 
 
-def road_tile(count: int = 6000, seed: int = 1, scene: str = "road", gain: float = 1.0, length: float = 60.0) -> Tile:
+def road_tile(
+    count: int = 6000, seed: int = 1, scene: str = "road", gain: float = 1.0, length: float = 60.0
+) -> CloudTile:
     """Return the points as a tile; intensities times ``gain``."""
     xyz, rgb, intensity, label = road_points(count, seed, length)
     strength = np.clip(intensity * gain, 0.0, 1.0).astype(np.float32)
-    return Tile(scene, np.array([4e5, 5.6e6, 100.0]), xyz.astype(np.float32), rgb, strength, label.astype(np.int16))
+    return CloudTile(
+        scene, np.array([4e5, 5.6e6, 100.0]), xyz.astype(np.float32), rgb, strength, label.astype(np.int16)
+    )
 
 
-def write_pointcept(root: Path, split: str, tiles: list[Tile], scheme: str = "5") -> Path:
+def write_pointcept(root: Path, split: str, tiles: list[CloudTile], scheme: str = "5") -> Path:
     """Write tiles as a data set in Pointcept's layout; return its root."""
     folder = root / "pointcept" / f"classes-{scheme}"
     rows = class_scheme(scheme).rows

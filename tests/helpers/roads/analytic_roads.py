@@ -8,7 +8,7 @@ from functools import cache
 import numpy as np
 
 from ml.centerline.data.corridor import TruthKind, truths
-from ml.centerline.data.roads import Road
+from ml.centerline.data.roads import LearningRoad
 from ml.points import Points
 from synthroads_addon.base.classes import class_scheme
 from synthroads_addon.road.geometry import RoadGeometry
@@ -76,23 +76,25 @@ def points(section: str = "RQ31", design_class: str = "EKA1A", seed: int = SEED,
     )
 
 
-def roads(kind: TruthKind = "road", section: str = "RQ31", design_class: str = "EKA1A", seed: int = SEED) -> list[Road]:
+def roads(
+    kind: TruthKind = "road", section: str = "RQ31", design_class: str = "EKA1A", seed: int = SEED
+) -> list[LearningRoad]:
     """Return a road for each truth of a kind; tests share their arrays, which can't be written to."""
     return list(_roads(kind, section, design_class, seed))
 
 
 @cache
-def _roads(kind: TruthKind, section: str, design_class: str, seed: int) -> tuple[Road, ...]:
+def _roads(kind: TruthKind, section: str, design_class: str, seed: int) -> tuple[LearningRoad, ...]:
     known = parameters(section, design_class, seed)
     whole = _sorted(section, design_class, seed)
     return tuple(replace(whole, truth=truth) for truth in truths(known, kind, whole.origin))
 
 
 @cache
-def _sorted(section: str, design_class: str, seed: int) -> Road:
+def _sorted(section: str, design_class: str, seed: int) -> LearningRoad:
     cloud = points(section, design_class, seed)
     line = truths(parameters(section, design_class, seed), "road", cloud.origin)[0].axis
-    whole = Road.of_points(section, cloud, line)
+    whole = LearningRoad.of_points(section, cloud, line)
     for array in (whole.xyz, whole.intensity, whole.rgb, whole.class_id, whole.station):
         array.setflags(write=False)
     return whole

@@ -27,7 +27,7 @@ from synthroads_addon.road.parameters import (
 from synthroads_addon.road.section import CrossfallPoint, Lane, Ramp, Turnout
 from synthroads_addon.road.surroundings import Terrain
 from synthroads_addon.sampling.placing.furniture import place_furniture
-from synthroads_addon.sampling.placing.site import Site
+from synthroads_addon.sampling.placing.site import PlacementSite
 from synthroads_addon.scenario.road import RoadScenario
 
 NOTHING: dict[str, Any] = {
@@ -140,7 +140,7 @@ def make_site(
     section: StandardCrossSection | None = None,
     outer_lane: Any = None,
     **scenario: Any,
-) -> Site:
+) -> PlacementSite:
     """Return a road without furniture.
 
     Args:
@@ -177,7 +177,7 @@ def make_site(
         seed=1,
     )
     named = {f"turnout-{number}": turnout for number, turnout in enumerate(turnouts, start=1)}
-    return Site(limits, seed, axis, carriageways, named, terrain)
+    return PlacementSite(limits, seed, axis, carriageways, named, terrain)
 
 
 _SIDES: tuple[Any, ...] = ("right", "left")
@@ -198,7 +198,7 @@ def _carriageway(side: Any, section: StandardCrossSection, outer_lane: Any) -> C
     )
 
 
-def place(site: Site) -> dict[str, Any]:
+def place(site: PlacementSite) -> dict[str, Any]:
     """Return the furniture of a road by id."""
     found = list(place_furniture(site))
     assert len(dict(found)) == len(found)
@@ -216,7 +216,7 @@ def beside(furniture: dict[str, Any], side: str, *kinds: type[RoadObject]) -> li
     return sorted(found, key=lambda item: item.start_station if isinstance(item, LineObject) else item.station)
 
 
-def road_of(site: Site, furniture: dict[str, Any]) -> RoadParameters:
+def road_of(site: PlacementSite, furniture: dict[str, Any]) -> RoadParameters:
     """Return the whole road."""
     objects: dict[str, Any] = {"alignment": site.alignment, "median": Median(instance=1), "terrain": site.terrain}
     objects |= {f"carriageway-{side}": carriageway for side, carriageway in site.carriageways.items()}
@@ -235,6 +235,6 @@ def road_of(site: Site, furniture: dict[str, Any]) -> RoadParameters:
     )
 
 
-def faults(site: Site, furniture: dict[str, Any], rules: set[str] = RULES) -> list[Violation]:
+def faults(site: PlacementSite, furniture: dict[str, Any], rules: set[str] = RULES) -> list[Violation]:
     """Return the violations of rules that the checker finds."""
     return [found for found in check(road_of(site, furniture)) if found.rule in rules]

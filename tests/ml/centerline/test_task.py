@@ -14,7 +14,7 @@ import torch
 
 from ml.centerline import task
 from ml.centerline.data.batches import Batches, BatchOptions, MeasuredRoad, Roads, read_roads
-from ml.centerline.data.effects import Effects
+from ml.centerline.data.effects import SequenceEffects
 from ml.centerline.data.mirroring import mirrored
 from ml.configuration import from_data, load_configuration
 from ml.runs import CALIBRATION, METRICS, Run
@@ -190,7 +190,7 @@ def test_batches_hang_on_seed_and_epoch_alone():
     options = BatchOptions(size=3, steps=4, passes=2, validation=1)
 
     def drawn(seed: int, epoch: int) -> list[Any]:
-        return list(Batches(roads, SETTINGS, Effects(), options, seed, 0.5)(epoch))
+        return list(Batches(roads, SETTINGS, SequenceEffects(), options, seed, 0.5)(epoch))
 
     one, again, later, other = drawn(1, 4), drawn(1, 4), drawn(1, 5), drawn(2, 4)
     assert len(one) == 4
@@ -209,10 +209,10 @@ def test_synthetic_and_measured_roads_are_mixed():
     synthetic, real = analytic_roads.roads(), analytic_roads.roads(seed=6)
     options = BatchOptions(size=50, steps=1, passes=1, validation=1)
     for share, expected in ((0.0, 0), (0.3, 15), (1.0, 50)):
-        batches = Batches(Roads(synthetic, real, [], real), SETTINGS, Effects(), options, 1, share)
+        batches = Batches(Roads(synthetic, real, [], real), SETTINGS, SequenceEffects(), options, 1, share)
         kinds = batches.kinds(0)
         assert int((kinds == 1).sum()) == pytest.approx(expected, abs=7 if 0 < share < 1 else 0)
-    only = Batches(Roads([], real, [], real), SETTINGS, Effects(), options, 1, 0.3)
+    only = Batches(Roads([], real, [], real), SETTINGS, SequenceEffects(), options, 1, 0.3)
     assert (only.kinds(0) == 0).all()
 
 

@@ -24,7 +24,7 @@ from synthroads_addon.road.things.furniture import (
     TrafficLight,
     TrafficSign,
 )
-from synthroads_addon.sampling.placing.site import Site
+from synthroads_addon.sampling.placing.site import PlacementSite
 from tests.helpers.files.mutations import cases
 from tests.helpers.roads.sites import (
     BODIES,
@@ -100,7 +100,7 @@ SITES: dict[str, dict[str, Any]] = {
 }
 
 
-def site_of(name: str, seed: int, **changes: Any) -> Site:
+def site_of(name: str, seed: int, **changes: Any) -> PlacementSite:
     """Return one of `SITES` with all kinds of furniture switched on."""
     return make_site(**merged(SWITCHED_ON, SITES[name] | {"seed": seed} | changes))
 

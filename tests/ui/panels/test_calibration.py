@@ -16,7 +16,7 @@ from synthroads_addon.calibration.job import CalibrationJob, Wanted, calibrate, 
 from synthroads_addon.materials.table import materials
 from synthroads_addon.ui.panels import calibration
 from synthroads_addon.ui.work import calibration_run
-from synthroads_addon.ui.work.job import Job
+from synthroads_addon.ui.work.job import PanelJob
 from tests.helpers.clouds.calibration_cloud import labelled, striped
 
 
@@ -148,7 +148,7 @@ def test_a_texture_needs_an_image(settings: Any) -> None:
 
 def test_it_can_be_stopped(settings: Any, tmp_path: Path) -> None:
     labels(settings, labelled(tmp_path / "real.laz", 30.0, 40.0))
-    job = Job("Calibration", calibration_run.calibration_work(settings.job(True)))
+    job = PanelJob("Calibration", calibration_run.calibration_work(settings.job(True)))
     job.start()
     job.stop(wait=True)
     assert not job.running

@@ -19,7 +19,7 @@ from synthroads_addon.road.parameters import RoadParameters
 from synthroads_addon.sampling.road import sample_road
 from synthroads_addon.scenario.scenario import load_scenario
 from synthroads_addon.ui.work import build
-from synthroads_addon.ui.work.job import Job, running_job
+from synthroads_addon.ui.work.job import PanelJob, running_job
 from tests.helpers.scenes.kept_groups import KeptGroups
 from tests.helpers.scenes.panel_road import SAME, block_counts, cheap, choose, fingerprint, settings, users_own  # noqa: F401
 from tests.helpers.scenes.scene_hash import changes, digest, lines
@@ -202,7 +202,7 @@ def test_the_operator_cancelled_at_any_tick_leaves_the_file(cheap: Any) -> None:
     choose(cheap, **{"road.length": 60.0})
     expected, counts = lines(), block_counts()
     for ticks in (0, 1, 2, 5, 9):
-        job = Job("Build", build.build_work(cheap.scenario(), ""))
+        job = PanelJob("Build", build.build_work(cheap.scenario(), ""))
         job.start()
         for _ in range(ticks):
             job.tick(0.02)
@@ -232,7 +232,7 @@ def test_undo_in_the_midst_of_a_build_gives_it_up(cheap: Any, users_own: bpy.typ
     bpy.ops.ed.undo_push(message="before")
     users_own.location.x += 1.0
     bpy.ops.ed.undo_push(message="moved")
-    job = Job("Build", build.build_work(cheap.scenario(), ""))
+    job = PanelJob("Build", build.build_work(cheap.scenario(), ""))
     job.start()
     while len(bpy.data.objects) < 4:
         job.tick()
@@ -244,7 +244,7 @@ def test_undo_in_the_midst_of_a_build_gives_it_up(cheap: Any, users_own: bpy.typ
 
 def test_an_undo_step_of_a_half_built_road_holds_none_of_it(cheap: Any, users_own: bpy.types.Object) -> None:  # noqa: F811
     bpy.ops.ed.undo_push(message="before")
-    job = Job("Build", build.build_work(cheap.scenario(), ""))
+    job = PanelJob("Build", build.build_work(cheap.scenario(), ""))
     job.start()
     while len(bpy.data.objects) < 4:
         job.tick()

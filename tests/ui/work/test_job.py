@@ -13,7 +13,7 @@ import synthroads_addon
 from synthroads_addon.base.errors import Cancelled, InputError
 from synthroads_addon.ui.work import job as job_module
 from synthroads_addon.ui.work.common import is_free
-from synthroads_addon.ui.work.job import Aside, Job, Report, Step, Work, running_job, stop_job
+from synthroads_addon.ui.work.job import Aside, PanelJob, Report, Step, Work, running_job, stop_job
 
 
 @pytest.fixture(autouse=True)
@@ -45,14 +45,14 @@ def work(log: list[str], gate: threading.Event | None = None) -> Work[str]:
     return "done"
 
 
-def tick_to_the_end(job: Job[Any]) -> None:
+def tick_to_the_end(job: PanelJob[Any]) -> None:
     while job.tick(0.001):
         pass
 
 
 def test_run_does_it_all_here() -> None:
     log: list[str] = []
-    job = Job("Test", work(log))
+    job = PanelJob("Test", work(log))
     assert job.run() == "done"
     assert log == ["begin", "read", threading.current_thread().name, "clean"]
     assert (job.result, job.share, job.error, running_job()) == ("done", 1.0, None, None)
@@ -61,7 +61,7 @@ def test_run_does_it_all_here() -> None:
 def test_in_the_window_the_long_part_has_a_thread() -> None:
     log: list[str] = []
     gate = threading.Event()
-    job = Job("Test", work(log, gate))
+    job = PanelJob("Test", work(log, gate))
     job.start()
     assert running_job() is job
     assert job.running
@@ -87,7 +87,7 @@ def test_a_tick_keeps_to_its_budget() -> None:
             time.sleep(0.01)
             yield 0.5
 
-    job = Job("Test", steps())
+    job = PanelJob("Test", steps())
     job.start()
     begin = time.perf_counter()
     job.tick(0.05)
@@ -104,7 +104,7 @@ def test_with_nothing_to_do_a_tick_ends() -> None:
             count += 1
             yield None
 
-    job = Job("Test", steps())
+    job = PanelJob("Test", steps())
     job.start()
     job.tick(10.0)
     assert count == 2
@@ -116,7 +116,7 @@ def test_with_nothing_to_do_a_tick_ends() -> None:
 @pytest.mark.parametrize("wait", [False, True])
 def test_stopped_anywhere_it_cleans_up(ticks: int, wait: bool) -> None:
     log: list[str] = []
-    job = Job("Test", work(log))
+    job = PanelJob("Test", work(log))
     job.start()
     for _ in range(ticks):
         job.tick(0.0)
@@ -132,7 +132,7 @@ def test_stopped_anywhere_it_cleans_up(ticks: int, wait: bool) -> None:
 def test_while_it_computes_aside_it_is_stopped_by_its_report() -> None:
     log: list[str] = []
     gate = threading.Event()
-    job = Job("Test", work(log, gate))
+    job = PanelJob("Test", work(log, gate))
     job.start()
     while job.touches_scene:
         job.tick(0.001)
@@ -150,7 +150,7 @@ def test_what_is_wrong_at_the_begin_is_raised_at_once() -> None:
         raise InputError("Output", None, "choose a folder")
         yield 0.0
 
-    job = Job("Test", wrong())
+    job = PanelJob("Test", wrong())
     with pytest.raises(InputError, match="choose a folder"):
         job.start()
     assert running_job() is None
@@ -169,20 +169,20 @@ def test_what_goes_wrong_later_is_kept(where: str) -> None:
         finally:
             cleaned.append(True)
 
-    job = Job("Test", wrong())
+    job = PanelJob("Test", wrong())
     job.start()
     tick_to_the_end(job)
     assert isinstance(job.error, ZeroDivisionError)
     assert cleaned == [True]
     with pytest.raises(ZeroDivisionError):
-        Job("Test", wrong()).run()
+        PanelJob("Test", wrong()).run()
 
 
 def test_one_at_a_time() -> None:
-    job = Job("Test", work([]))
+    job = PanelJob("Test", work([]))
     job.start()
     with pytest.raises(AssertionError):
-        Job("Other", work([])).start()
+        PanelJob("Other", work([])).start()
     job.stop(wait=True)
     assert running_job() is None
 
@@ -197,7 +197,7 @@ def test_buttons_wait_for_a_job(monkeypatch: pytest.MonkeyPatch) -> None:
         poll_message_set = said.append
 
     assert is_free(Operator, bpy.context)
-    monkeypatch.setattr(job_module, "_running", Job("Scan", work([])))
+    monkeypatch.setattr(job_module, "_running", PanelJob("Scan", work([])))
     assert not is_free(Operator, bpy.context)
     assert said == ["Scan is still at work"]
     monkeypatch.setattr(job_module, "_running", None)

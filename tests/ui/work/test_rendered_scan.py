@@ -19,7 +19,7 @@ from synthroads_addon.jobs.generate import Job as PipelineJob
 from synthroads_addon.scenario.scenario import load_scenario
 from synthroads_addon.ui.fields.fields import own
 from synthroads_addon.ui.work import rendered_scan, scan
-from synthroads_addon.ui.work.job import Job
+from synthroads_addon.ui.work.job import PanelJob
 from synthroads_addon.ui.work.rendered_scan import MARK, SavedScene, _Told
 from synthroads_addon.ui.work.scan_job import Written, scan_work
 from tests.helpers.scenes.panel_road import SAME, block_counts, cheap, choose, road, road_file, settings  # noqa: F401
@@ -51,8 +51,8 @@ def content() -> list[str]:
     return [line for line in lines() if ".users = " not in line]
 
 
-def job_of_the_panel() -> Job[Written]:
-    return Job("Scan", scan_work(scan.asked_for(bpy.context)))
+def job_of_the_panel() -> PanelJob[Written]:
+    return PanelJob("Scan", scan_work(scan.asked_for(bpy.context)))
 
 
 @pytest.mark.slow

@@ -18,7 +18,7 @@ from synthroads_addon.jobs.generate import Job as PipelineJob
 from synthroads_addon.road.parameters import read_parameters
 from synthroads_addon.scenario.scenario import load_scenario
 from synthroads_addon.ui.work import scan, scan_job
-from synthroads_addon.ui.work.job import Job, running_job
+from synthroads_addon.ui.work.job import PanelJob, running_job
 from synthroads_addon.ui.work.scan_job import Written, scan_work
 from tests.helpers.scenes.panel_road import (  # noqa: F401
     SAME,
@@ -148,11 +148,11 @@ def test_output_beside_a_saved_file(road: Any, road_file: Path) -> None:  # noqa
     assert not road.needs_saved_file()
 
 
-def job_of_the_panel() -> Job[Written]:
-    return Job("Scan", scan_work(scan.asked_for(bpy.context)))
+def job_of_the_panel() -> PanelJob[Written]:
+    return PanelJob("Scan", scan_work(scan.asked_for(bpy.context)))
 
 
-def tick_to_the_end(job: Job[Any]) -> None:
+def tick_to_the_end(job: PanelJob[Any]) -> None:
     job.start()
     while job.tick(0.0):
         pass

@@ -29,7 +29,7 @@ def overpass_group() -> bpy.types.NodeTree:
 
 
 @dataclass(frozen=True)
-class _Bridge:
+class _Overpass:
     """The group's inputs; faces and lengths of the approaches by side: -1 left (-x), +1 right."""
 
     tree: Tree
@@ -45,7 +45,7 @@ class _Bridge:
     materials: dict[str, Value]
 
 
-def _declare(tree: Tree) -> _Bridge:
+def _declare(tree: Tree) -> _Overpass:
     def metres(name: str, default: float, limits: tuple[float, float], description: str) -> Value:
         return tree.number(name, default, limits, unit="m", description=description)
 
@@ -57,7 +57,7 @@ def _declare(tree: Tree) -> _Bridge:
     }
     names = {"Concrete": "deck, piers and walls", "Edge": "edge beams", "Steel": "railings and bearings"}
     names |= {"Pavement": "the crossing road", "Ground": "the embankments"}
-    return _Bridge(
+    return _Overpass(
         tree,
         faces={-1.0: -left, 1.0: -right},
         approaches=approaches,
@@ -112,7 +112,7 @@ def _build(tree: Tree) -> None:
     tree.output("Mesh", mesh, description="The bridge; its embankments' slopes are ground")
 
 
-def _lowest(bridge: _Bridge, surfaces: tuple[Value, Value], shear: Value, face: Value) -> Value:
+def _lowest(bridge: _Overpass, surfaces: tuple[Value, Value], shear: Value, face: Value) -> Value:
     """Return z of the lower end of the ground along an abutment's face."""
     ends = [
         height_on(*surfaces, op.vector(bridge.tree, face, bridge.width * half + face * shear)) for half in (0.5, -0.5)
@@ -120,13 +120,13 @@ def _lowest(bridge: _Bridge, surfaces: tuple[Value, Value], shear: Value, face: 
     return op.minimum(*ends)
 
 
-def _wing_length(bridge: _Bridge, low: Value, foot: Value) -> Value:
+def _wing_length(bridge: _Overpass, low: Value, foot: Value) -> Value:
     """Return the length of the wing walls, so that the embankment's cones reach the abutment's face."""
     wanted = (low + bridge.thickness - foot) * bridge.slope
     return op.minimum(op.maximum(wanted, _WINGS[0]), _WINGS[1])
 
 
-def _deck(bridge: _Bridge, low: Value, wings: dict[float, Value]) -> Value:
+def _deck(bridge: _Overpass, low: Value, wings: dict[float, Value]) -> Value:
     left, right = bridge.faces[-1.0], bridge.faces[1.0]
     deck = bridge.tree.call(
         bridge_deck_group(),
@@ -145,7 +145,7 @@ def _deck(bridge: _Bridge, low: Value, wings: dict[float, Value]) -> Value:
     return moved(deck, op.vector(bridge.tree, 0.0, 0.0, low))
 
 
-def _abutment(bridge: _Bridge, low: Value, feet: dict[float, Value], wings: dict[float, Value], side: float) -> Value:
+def _abutment(bridge: _Overpass, low: Value, feet: dict[float, Value], wings: dict[float, Value], side: float) -> Value:
     tree = bridge.tree
     made = tree.call(
         bridge_abutment_group(),
@@ -161,7 +161,7 @@ def _abutment(bridge: _Bridge, low: Value, feet: dict[float, Value], wings: dict
     return moved(made, op.vector(tree, bridge.faces[side], 0.0, low))
 
 
-def _piers(bridge: _Bridge, points: Value, surfaces: tuple[Value, Value], shear: Value, low: Value) -> Value:
+def _piers(bridge: _Overpass, points: Value, surfaces: tuple[Value, Value], shear: Value, low: Value) -> Value:
     tree = bridge.tree
     pier = tree.call(
         bridge_pier_group(),
@@ -179,7 +179,7 @@ def _piers(bridge: _Bridge, points: Value, surfaces: tuple[Value, Value], shear:
     return op.realize(op.join(bodies, put(points, pier["Bearings"], plan + op.vector(tree, 0.0, 0.0, low))))
 
 
-def _embankment(bridge: _Bridge, ground: Value, low: Value, wing: Value, shear: Value, side: float) -> Value:
+def _embankment(bridge: _Overpass, ground: Value, low: Value, wing: Value, shear: Value, side: float) -> Value:
     return bridge.tree.call(
         bridge_embankment_group(),
         ground=ground,

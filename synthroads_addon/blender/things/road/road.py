@@ -18,7 +18,7 @@ from .side import declare_instance, declare_side, side_group, strips_of
 
 
 @dataclass
-class _Side:
+class _SideInputs:
     """One side's inputs by name, and the node of its surface."""
 
     layout: SideLayout
@@ -75,11 +75,11 @@ def _build(tree: Tree, layout: tuple[SideLayout, ...]) -> None:
     tree.output("Mesh", mesh, description="The road; every face has class_id and instance_id")
 
 
-def _declare(tree: Tree, layout: tuple[SideLayout, ...]) -> tuple[list[_Side], Value | None]:
+def _declare(tree: Tree, layout: tuple[SideLayout, ...]) -> tuple[list[_SideInputs], Value | None]:
     sides = []
     for side_layout in layout:
         with tree.panel(f"{side_layout.side} Carriageway"):
-            sides.append(_Side(side_layout, declare_side(tree, side_layout), {}))
+            sides.append(_SideInputs(side_layout, declare_side(tree, side_layout), {}))
     median = None
     if len(sides) == 2:
         with tree.panel("Median"):
@@ -91,7 +91,7 @@ def _declare(tree: Tree, layout: tuple[SideLayout, ...]) -> tuple[list[_Side], V
     return sides, median
 
 
-def _markings(tree: Tree, backbone: Value, side: _Side, materials: dict[str, Value]) -> Value:
+def _markings(tree: Tree, backbone: Value, side: _SideInputs, materials: dict[str, Value]) -> Value:
     assert side.surface is not None
     across = [f"Distance {i}" for i in range(len(strips_of(side.layout)) + 1)]
     values = {name: side.surface[name] for name in (*across, "Plane Edge", "Pivot")}
@@ -100,7 +100,7 @@ def _markings(tree: Tree, backbone: Value, side: _Side, materials: dict[str, Val
     return tree.call(markings_group(side.layout), **_snake(values | side.markings)).value
 
 
-def _median(tree: Tree, backbone: Value, sides: list[_Side], instance: Value, material: Value) -> Value:
+def _median(tree: Tree, backbone: Value, sides: list[_SideInputs], instance: Value, material: Value) -> Value:
     (left_offset, left_height), (right_offset, right_height) = (side.edge(outer=False) for side in sides)
     return tree.call(
         strip_group(),
@@ -115,7 +115,7 @@ def _median(tree: Tree, backbone: Value, sides: list[_Side], instance: Value, ma
     ).value
 
 
-def _edges(tree: Tree, backbone: Value, sides: list[_Side]) -> Iterator[Value]:
+def _edges(tree: Tree, backbone: Value, sides: list[_SideInputs]) -> Iterator[Value]:
     """Return the left-most and the right-most edge as points with the attribute ``edge`` = +1 and -1."""
     for sign in (1.0, -1.0):
         side = sides[0] if sign > 0 else sides[-1]

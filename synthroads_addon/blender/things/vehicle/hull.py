@@ -15,7 +15,7 @@ from ...nodes.solids import painted
 Float = NDArray[np.float64]
 
 
-class Section(NamedTuple):
+class HullSection(NamedTuple):
     """A cross-section, symmetric about x = 0.
 
     Attributes:
@@ -63,7 +63,7 @@ class Hull(NamedTuple):
         patches: in order; what no patch has is painted.
     """
 
-    sections: tuple[Section, ...]
+    sections: tuple[HullSection, ...]
     axles: tuple[float, ...]
     wheel: float
     arch: float

@@ -1,4 +1,4 @@
-"""`Axis`: stations, gaps, projection and crossing against circles and straight lines; the frames along it."""
+"""`MeasuredAxis`: stations, gaps, projection and crossing against circles and straight lines; the frames along it."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ml.centerline.data.axis import Axis
+from ml.centerline.data.axis import MeasuredAxis
 from ml.centerline.data.frames import Frames, along, displaced, estimated_path, read_path, sequences, wander
 from synthroads_addon.base.errors import InputError
 
@@ -16,15 +16,17 @@ RADIUS = 300.0
 REAL = Path(__file__).resolve().parents[4].parent / "shared" / "real"
 
 
-def arc(length: float = 200.0, step: float = 0.5, radius: float = RADIUS) -> Axis:
+def arc(length: float = 200.0, step: float = 0.5, radius: float = RADIUS) -> MeasuredAxis:
     """Return an arc to the left that begins at the origin towards x, its centre at (0, radius)."""
     angle = np.arange(0.0, length / radius + 1e-9, step / radius)
-    return Axis(np.column_stack([radius * np.sin(angle), radius * (1.0 - np.cos(angle)), 5.0 + 0.02 * radius * angle]))
+    return MeasuredAxis(
+        np.column_stack([radius * np.sin(angle), radius * (1.0 - np.cos(angle)), 5.0 + 0.02 * radius * angle])
+    )
 
 
-def with_gap() -> Axis:
+def with_gap() -> MeasuredAxis:
     x = np.concatenate([np.arange(0.0, 21.0), np.arange(50.0, 81.0)])
-    return Axis(np.column_stack([x, 0.0 * x]), np.diff(x) < 2.0)
+    return MeasuredAxis(np.column_stack([x, 0.0 * x]), np.diff(x) < 2.0)
 
 
 def test_station_position_and_direction_of_an_arc() -> None:
@@ -52,7 +54,7 @@ def test_projection_onto_an_arc() -> None:
 def test_projection_finds_the_nearest_place_of_a_rough_line() -> None:
     rng = np.random.default_rng(2)
     x = np.cumsum(rng.uniform(0.4, 1.7, 80))
-    axis = Axis(np.column_stack([x, np.cumsum(rng.uniform(-0.6, 0.6, 80))]))
+    axis = MeasuredAxis(np.column_stack([x, np.cumsum(rng.uniform(-0.6, 0.6, 80))]))
     points = np.column_stack([rng.uniform(3.0, x[-1] - 3.0, 400), rng.uniform(-6.0, 6.0, 400)])
     station, offset = axis.project(points)
     dense = np.linspace(0.0, axis.length, 60_000)
@@ -80,7 +82,7 @@ def test_crossing_of_an_arc() -> None:
 
 def test_crossing_takes_the_nearest_branch_and_leaves_far_ones() -> None:
     # A hairpin: out along y = 0 and back along y = 40.
-    axis = Axis([[0.0, 0.0], [100.0, 0.0], [100.0, 40.0], [0.0, 40.0]])
+    axis = MeasuredAxis([[0.0, 0.0], [100.0, 0.0], [100.0, 40.0], [0.0, 40.0]])
     y, station = axis.crossing([[50.0, 15.0], [50.0, 30.0], [50.0, -70.0]], [0.0, 0.0, 0.0])
     np.testing.assert_allclose(y[:2], [-15.0, 10.0])
     np.testing.assert_allclose(station[:2], [50.0, 190.0])
@@ -105,23 +107,23 @@ def test_gaps() -> None:
 def test_direction_does_not_follow_jumps_of_single_points() -> None:
     x = np.arange(0.0, 100.0)
     y = np.where(x > 50.0, 0.05, 0.0)
-    assert np.abs(Axis(np.column_stack([x, y])).direction(x, reach=5.0)).max() < 0.0051
+    assert np.abs(MeasuredAxis(np.column_stack([x, y])).direction(x, reach=5.0)).max() < 0.0051
 
 
 def test_bad_axes_are_refused() -> None:
     for wrong in ([[0.0, 0.0]], [[0.0, 0.0], [0.0, 0.0]], [[0.0, np.nan], [1.0, 1.0]], [1.0, 2.0]):
         with pytest.raises(InputError, match="axis"):
-            Axis(wrong)
+            MeasuredAxis(wrong)
 
 
 def test_reading_csv_with_gaps_and_geojson(tmp_path: Path) -> None:
     rows = "".join(f"{s},{x},{2.0 * s},5,0\n" for s, x in ((0, 10), (1, 11), (2, 12), (30, 40), (31, 41)))
     (tmp_path / "axis.csv").write_text("s,x,y,z,tile\n" + rows)
-    axis = Axis.read(tmp_path / "axis.csv")
+    axis = MeasuredAxis.read(tmp_path / "axis.csv")
     assert axis.joined.tolist() == [True, True, False, True]
     line = {"type": "LineString", "coordinates": [[10.0, 0.0, 1.0], [60.0, 0.0, 1.0], [900.0, 0.0, 1.0]]}
     (tmp_path / "axis.geojson").write_text(json.dumps(line))
-    assert Axis.read(tmp_path / "axis.geojson").joined.all()
+    assert MeasuredAxis.read(tmp_path / "axis.geojson").joined.all()
 
 
 def test_wander_is_smooth_and_uniform() -> None:
@@ -222,7 +224,7 @@ def test_reading_a_trajectory(tmp_path: Path) -> None:
 @pytest.mark.skipif(not REAL.is_dir(), reason="no real scans here")
 @pytest.mark.parametrize("file", sorted(REAL.glob("als_*_axis.csv")), ids=lambda file: file.stem)
 def test_real_axes(file: Path) -> None:
-    axis = Axis.read(file)
+    axis = MeasuredAxis.read(file)
     given = np.genfromtxt(file, delimiter=",", names=True)["s"]
     np.testing.assert_allclose(axis.station, given - given[0], atol=0.1)
     lengths = np.diff(axis.station)

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from ml.centerline.data.axis import Axis
+from ml.centerline.data.axis import MeasuredAxis
 from ml.centerline.data.corridor import CORRIDOR, Truth, truths
 from ml.centerline.data.frames import Frames, along, displaced
 from synthroads_addon.base.errors import InputError
@@ -167,7 +167,7 @@ def test_ramps_leave_the_edge_unknown() -> None:
 
 def test_a_gap_in_the_axis_leaves_everything_unknown() -> None:
     x = np.concatenate([np.arange(0.0, 31.0), np.arange(60.0, 91.0)])
-    axis = Axis(np.column_stack([x, 0.0 * x, 70.0 + 0.01 * x]), np.diff(x) < 2.0)
+    axis = MeasuredAxis(np.column_stack([x, 0.0 * x, 70.0 + 0.01 * x]), np.diff(x) < 2.0)
     truth = Truth.measured(axis, "carriageway")
     frames = Frames(np.array([[10.0, 1.0], [45.0, 1.0]]), np.zeros(2), np.array([10.0, 45.0]))
     there = truth.at(frames.position, frames.direction, np.array([70.0, 70.0]))
@@ -176,9 +176,9 @@ def test_a_gap_in_the_axis_leaves_everything_unknown() -> None:
     assert np.isnan(there.corridor[0, :4]).all()
     np.testing.assert_allclose(there.corridor[0, 4:], [0.0, 0.1], atol=1e-9)
     assert np.isinf(there.room[0]).all()
-    flat = Truth.measured(Axis(axis.points[:, :2]), "road")
+    flat = Truth.measured(MeasuredAxis(axis.points[:, :2]), "road")
     assert np.isnan(flat.at(frames.position, frames.direction, zeros(frames)).corridor[0, COLUMN["height"]])
-    edged = replace(truth, left=Axis(axis.points + [0.0, 4.0, 0.0]))
+    edged = replace(truth, left=MeasuredAxis(axis.points + [0.0, 4.0, 0.0]))
     np.testing.assert_allclose(edged.at(frames.position, frames.direction, zeros(frames)).corridor[:, 0], [3.0, np.nan])
     moved = replace(truth, left=axis).moved([0.0, 5.0, 0.0])
     assert moved.left is not None

@@ -13,8 +13,8 @@ from ml.centerline.data.corridor import CORRIDOR
 from ml.centerline.data.effects import (
     LEFT,
     RIGHT,
-    Crop,
-    Effects,
+    SequenceCrop,
+    SequenceEffects,
     Stretch,
     crop_sides,
     drop,
@@ -32,10 +32,10 @@ from ml.centerline.data.slices import SliceSettings, stretch
 from synthroads_addon.base.errors import InputError
 from tests.helpers.roads.analytic_roads import roads
 
-NONE = Effects(
+NONE = SequenceEffects(
     mirror=0.0,
     turn_round=0.0,
-    crop=Crop(probability=0.0),
+    crop=SequenceCrop(probability=0.0),
     **dict.fromkeys(("alone", "dropout", "hidden", "empty", "jitter", "tilt"), 0.0),
     **dict.fromkeys(("plain", "contrast", "verge", "paint", "repaint"), 0.0),
     gamma=(1.0, 1.0),
@@ -122,7 +122,7 @@ def extents(one: Stretch) -> tuple[np.ndarray, np.ndarray]:
 
 
 def test_cropped_sides_lie_in_their_limits_about_the_truth() -> None:
-    crop = Crop(probability=1.0, reach=(6.0, 10.0), share=0.5, steady=0.0)
+    crop = SequenceCrop(probability=1.0, reach=(6.0, 10.0), share=0.5, steady=0.0)
     lefts, rights = [], []
     for seed in range(60):
         one = cut()
@@ -141,7 +141,7 @@ def test_cropped_sides_lie_in_their_limits_about_the_truth() -> None:
 
 def test_steady_cuts_are_the_same_in_all_slices() -> None:
     one = cut()
-    crop_sides(one, Crop(probability=1.0, reach=(6.0, 10.0), share=0.5, steady=1.0), rng(1))
+    crop_sides(one, SequenceCrop(probability=1.0, reach=(6.0, 10.0), share=0.5, steady=1.0), rng(1))
     left, right = extents(one)
     assert np.ptp(left) < 0.8
     assert np.ptp(right) < 0.8
@@ -151,16 +151,16 @@ def test_a_carriageway_is_cut_outside_its_edge_lines() -> None:
     for share, least in ((0.0, 3.4), (0.75, 0.5)):
         one = cut("carriageway")
         assert np.isfinite(one.lines).all()
-        crop_sides(one, Crop(probability=1.0, beyond=(0.0, 3.0), share=share), rng(2))
+        crop_sides(one, SequenceCrop(probability=1.0, beyond=(0.0, 3.0), share=share), rng(2))
         for side, reach in enumerate(extents(one)):
             assert reach.max() <= min(one.lines[0, side] + 3.0, one.room[:, side].max()) + 1e-9
             assert reach.min() > least
     narrow = cut("carriageway")
     narrow.room[:] = 1.5
-    crop_sides(narrow, Crop(probability=1.0), rng(2))
+    crop_sides(narrow, SequenceCrop(probability=1.0), rng(2))
     assert max(reach.max() for reach in extents(narrow)) <= 1.5
     untouched = cut("carriageway")
-    crop_sides(untouched, Crop(probability=0.0), rng(2))
+    crop_sides(untouched, SequenceCrop(probability=0.0), rng(2))
     assert len(untouched.number) == len(cut("carriageway").number)
 
 
@@ -205,7 +205,7 @@ def test_where_the_inner_edge_is_unknown_no_points_are_put_nowhere() -> None:
 def test_a_slice_without_truth_is_cropped_all_the_same() -> None:
     one = cut()
     one.center[3] = np.nan
-    crop_sides(one, Crop(probability=1.0, reach=(5.0, 5.0), share=0.0), rng())
+    crop_sides(one, SequenceCrop(probability=1.0, reach=(5.0, 5.0), share=0.0), rng())
     assert np.abs(one.xyz[one.number == 3, 1]).max() <= 5.0
     assert (one.number == 3).sum() > 20
 
@@ -464,7 +464,7 @@ def test_some_intensities_stay_as_they_are() -> None:
     same_as_before = 0
     for seed in range(40):
         one = cut()
-        relight(one, Effects(plain=0.5), rng(seed))
+        relight(one, SequenceEffects(plain=0.5), rng(seed))
         same_as_before += int(np.array_equal(one.intensity, plain))
     assert 10 < same_as_before < 30
 
@@ -472,7 +472,7 @@ def test_some_intensities_stay_as_they_are() -> None:
 def test_points_without_intensity_stay_without() -> None:
     one = cut()
     one.intensity[:] = 0.0
-    relight(one, Effects(), rng())
+    relight(one, SequenceEffects(), rng())
     assert (one.intensity == 0.0).all()
 
 
@@ -481,17 +481,17 @@ def test_a_sequence_without_points_passes_through() -> None:
     one.keep(np.zeros(len(one.number), dtype=bool))
     for seed in range(5):
         copy = replace(one)
-        leave_out(copy, Effects(hidden=1.0), rng(seed))
-        transform(copy, Effects(), rng(seed))
+        leave_out(copy, SequenceEffects(hidden=1.0), rng(seed))
+        transform(copy, SequenceEffects(), rng(seed))
         assert len(copy.xyz) == 0
 
 
 def test_wrong_limits_are_refused() -> None:
     with pytest.raises(InputError, match=r"reach is .*: must be two ascending numbers"):
-        Effects.from_dict({"crop": {"reach": [9.0, 4.0]}}, "effects")
+        SequenceEffects.from_dict({"crop": {"reach": [9.0, 4.0]}}, "effects")
     with pytest.raises(InputError, match=r"gamma is .*: must be two ascending"):
-        Effects.from_dict({"gamma": [1.0, 0.0]}, "effects")
+        SequenceEffects.from_dict({"gamma": [1.0, 0.0]}, "effects")
     with pytest.raises(InputError, match="dropout"):
-        Effects.from_dict({"dropout": 1.0}, "effects")
+        SequenceEffects.from_dict({"dropout": 1.0}, "effects")
     with pytest.raises(InputError, match="mirrored"):
-        Effects.from_dict({"mirrored": 1.0}, "effects")
+        SequenceEffects.from_dict({"mirrored": 1.0}, "effects")

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import torch
 
-from ml.centerline.data.effects import Effects
+from ml.centerline.data.effects import SequenceEffects
 from ml.centerline.data.roads import cropped, read_measured, read_scene, scene_folders
 from ml.centerline.data.slices import SliceDataset, SliceSettings, collate
 from ml.points import Points
@@ -119,7 +119,7 @@ def test_a_real_road() -> None:
     cloud = REAL / "als_rural2lane_t211-278.laz"
     road = read_measured(cloud, cloud.with_name("als_rural2lane_t211-278_axis.csv"), "carriageway")
     assert road.has_color
-    data = SliceDataset([road], SliceSettings(truth="carriageway"), 8, 1, Effects())
+    data = SliceDataset([road], SliceSettings(truth="carriageway"), 8, 1, SequenceEffects())
     batch = collate([data[number] for number in range(8)])
     assert torch.isfinite(batch["center"]).all()
     assert torch.isnan(batch["corridor"][..., 0]).all()

@@ -11,11 +11,11 @@ import pytest
 import torch
 from torch.utils.data import DataLoader
 
-from ml.centerline.data.axis import Axis
+from ml.centerline.data.axis import MeasuredAxis
 from ml.centerline.data.corridor import CORRIDOR, Truth
-from ml.centerline.data.effects import Effects, Stretch, mirror, turn_round
+from ml.centerline.data.effects import SequenceEffects, Stretch, mirror, turn_round
 from ml.centerline.data.frames import Frames, along, displaced
-from ml.centerline.data.roads import Road
+from ml.centerline.data.roads import LearningRoad
 from ml.centerline.data.slices import (
     FEATURE_LIMIT,
     FEATURES,
@@ -36,7 +36,7 @@ REAL = Path(__file__).resolve().parents[4].parent / "shared" / "real"
 ALL_POINTS = SliceSettings(points_per_slice=100_000, half_width=18.0)
 
 
-def path_of(road: Road, seed: int = 4) -> Frames:
+def path_of(road: LearningRoad, seed: int = 4) -> Frames:
     assert road.truth is not None
     exact = along(road.truth.axis)
     return displaced(exact, np.random.default_rng(seed), 12.0, 2.0, 100.0)
@@ -128,11 +128,11 @@ def same(one: Sample, other: Sample, atol: float) -> None:
         np.testing.assert_allclose(one[name], other[name], atol=atol, err_msg=name)
 
 
-def line_mapped(axis: Axis | None, turn: np.ndarray, by: np.ndarray) -> Axis | None:
-    return None if axis is None else Axis(axis.points @ turn.T + by, axis.joined)
+def line_mapped(axis: MeasuredAxis | None, turn: np.ndarray, by: np.ndarray) -> MeasuredAxis | None:
+    return None if axis is None else MeasuredAxis(axis.points @ turn.T + by, axis.joined)
 
 
-def mapped(road: Road, turn: np.ndarray, by: np.ndarray) -> Road:
+def mapped(road: LearningRoad, turn: np.ndarray, by: np.ndarray) -> LearningRoad:
     """Return a road whose points and truth are turned (or mirrored) and shifted, sorted anew."""
     truth = road.truth
     assert truth is not None
@@ -159,7 +159,7 @@ def mapped(road: Road, turn: np.ndarray, by: np.ndarray) -> Road:
     )
     reference = line_mapped(road.reference, turn, by)
     assert reference is not None
-    return Road.of_points(road.name, cloud, reference, moved)
+    return LearningRoad.of_points(road.name, cloud, reference, moved)
 
 
 @pytest.mark.parametrize("kind", ["road", "carriageway"])
@@ -227,7 +227,9 @@ def test_a_carriageway_shows_nothing_beyond_the_middle_of_the_median() -> None:
 
 def dataset(seed: int = 3, samples: int = 20, **changes: object) -> SliceDataset:
     settings = SliceSettings(points_per_slice=64, half_width=15.0).model_copy(update=changes)
-    return SliceDataset([*roads(), *roads(section="RQ25", design_class="EKA3")], settings, samples, seed, Effects())
+    return SliceDataset(
+        [*roads(), *roads(section="RQ25", design_class="EKA3")], settings, samples, seed, SequenceEffects()
+    )
 
 
 def equal(one: dict[str, torch.Tensor], other: dict[str, torch.Tensor]) -> bool:
@@ -331,7 +333,7 @@ def test_sequences_never_begin_where_the_truth_ends_in_them() -> None:
     assert road.truth is not None
     joined = road.truth.axis.joined.copy()
     joined[100:140] = False
-    gap = Truth.measured(Axis(road.truth.axis.points, joined), "road")
+    gap = Truth.measured(MeasuredAxis(road.truth.axis.points, joined), "road")
     data = SliceDataset([replace(road, truth=gap)], SliceSettings(points_per_slice=8), 60, 2)
     for number in range(60):
         station = data[number]["station"]

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import torch
 
-from ml.centerline.data.axis import Axis
+from ml.centerline.data.axis import MeasuredAxis
 from ml.centerline.data.corridor import CORRIDOR
 from ml.centerline.data.frames import along, displaced
 from ml.centerline.data.mirroring import mirrored
@@ -152,7 +152,7 @@ def test_weights_and_gradients_are_the_same_twice():
 @pytest.mark.parametrize("towards", [0.0, np.pi - 0.05])
 def test_parabola_finds_the_direction_in_frames_that_wander(towards: float):
     turn = towards + np.linspace(0.0, 0.1, 200)
-    axis = Axis(300.0 * np.column_stack([np.sin(turn), 1.0 - np.cos(turn)]))
+    axis = MeasuredAxis(300.0 * np.column_stack([np.sin(turn), 1.0 - np.cos(turn)]))
     exact = along(axis).select(slice(8, 18))
     frames = displaced(exact, np.random.default_rng(2), window=12.0, direction_deg=3.0, length=100.0)
     y, station = axis.crossing(frames.position, frames.direction)

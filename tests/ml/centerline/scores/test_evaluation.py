@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from ml.centerline.data.axis import Axis
+from ml.centerline.data.axis import MeasuredAxis
 from ml.centerline.data.frames import Frames
-from ml.centerline.data.roads import Road, read_measured
+from ml.centerline.data.roads import LearningRoad, read_measured
 from ml.centerline.scores import trivial
 from ml.centerline.scores.evaluation import (
     CORRIDOR_COLUMNS,
@@ -30,7 +30,7 @@ from ml.centerline.scores.evaluation import (
     truth_of,
 )
 from ml.centerline.scores.metrics import Spread
-from ml.centerline.scores.pictures import View, corridor_picture, lines_picture
+from ml.centerline.scores.pictures import PictureView, corridor_picture, lines_picture
 from ml.centerline.scores.skeleton import SkeletonSettings
 from ml.centerline.scores.tables import COLUMNS, as_data, cell, report, road_table, table, write_tables
 from synthroads_addon.base.errors import InputError
@@ -44,7 +44,7 @@ MIDDLE, MIDDLE_10 = "middle of the extent", "middle of the extent, 10 m"
 def told(offset: float, std: float = 0.1):
     """Return a predictor that looks the truth up and strays from it by an offset."""
 
-    def predict(road: Road, frames: Frames) -> Float:
+    def predict(road: LearningRoad, frames: Frames) -> Float:
         y, _ = truth_of(road).axis.crossing(frames.position, frames.direction)
         return np.column_stack([y + offset, np.full(len(y), std)])
 
@@ -52,11 +52,11 @@ def told(offset: float, std: float = 0.1):
 
 
 @pytest.fixture(scope="module")
-def road() -> Road:
+def road() -> LearningRoad:
     return strip_road()
 
 
-def test_a_known_error_is_what_is_measured(road: Road) -> None:
+def test_a_known_error_is_what_is_measured(road: LearningRoad) -> None:
     shown = case(road, 1, cropping=None, estimated=False)
     right, wrong = evaluate(told(0.0), shown), evaluate(told(0.15), shown)
     assert right["mae"] < 1e-9
@@ -69,7 +69,7 @@ def test_a_known_error_is_what_is_measured(road: Road) -> None:
     assert (wrong["coverage_68"], wrong["coverage_95"]) == (0.0, 1.0)
 
 
-def test_frames_stray_from_the_axis_by_the_seed(road: Road) -> None:
+def test_frames_stray_from_the_axis_by_the_seed(road: LearningRoad) -> None:
     first, second, again = (case(road, seed, cropping=None, estimated=False).frames for seed in (1, 2, 1))
     assert np.array_equal(first.position, again.position)
     assert not np.allclose(first.position, second.position)
@@ -78,14 +78,14 @@ def test_frames_stray_from_the_axis_by_the_seed(road: Road) -> None:
     assert np.abs(first.direction - truth_of(road).axis.direction(first.station)).max() > 0.01
 
 
-def test_the_estimated_path_does_not_know_the_axis(road: Road) -> None:
+def test_the_estimated_path_does_not_know_the_axis(road: LearningRoad) -> None:
     """The truth may be anything: frames in use come from the points alone."""
     other = replace(road, truth=replace(truth_of(road), axis=truth_of(road).axis.moved((3.0, 4.0, 0.0))))
     frames = [case(one, 1, cropping=None, estimated=True).frames for one in (road, other)]
     assert np.array_equal(frames[0].position, frames[1].position)
 
 
-def test_without_cropping_the_extent_gives_the_answer_away(road: Road) -> None:
+def test_without_cropping_the_extent_gives_the_answer_away(road: LearningRoad) -> None:
     whole = evaluate(trivial_predictor(MIDDLE), case(road, 1, cropping=None, estimated=True))
     shown = case(road, 1, cropping=Cropping(), estimated=True)
     cut = evaluate(trivial_predictor(MIDDLE), shown)
@@ -94,7 +94,7 @@ def test_without_cropping_the_extent_gives_the_answer_away(road: Road) -> None:
     assert 0.6 < len(shown.road) / len(road) < 0.9
 
 
-def test_cuts_of_single_slices_average_out_and_longer_ones_do_not(road: Road) -> None:
+def test_cuts_of_single_slices_average_out_and_longer_ones_do_not(road: LearningRoad) -> None:
     errors = {
         length: np.mean(
             [
@@ -109,11 +109,11 @@ def test_cuts_of_single_slices_average_out_and_longer_ones_do_not(road: Road) ->
     assert errors[1.0] < 0.3 < errors[50.0]
 
 
-def test_gaps_of_the_axis_are_left_out(road: Road) -> None:
+def test_gaps_of_the_axis_are_left_out(road: LearningRoad) -> None:
     axis = truth_of(road).axis
     joined = axis.joined.copy()
     joined[80:120] = False
-    gap = replace(road, truth=replace(truth_of(road), axis=Axis(axis.points, joined)))
+    gap = replace(road, truth=replace(truth_of(road), axis=MeasuredAxis(axis.points, joined)))
     whole, holed = (evaluate(told(0.0), case(one, 1, cropping=None, estimated=True)) for one in (road, gap))
     assert whole["slices"] - holed["slices"] == pytest.approx(40, abs=2)
 
@@ -134,7 +134,7 @@ def test_without_classes_the_skeleton_takes_the_ground() -> None:
     assert classes == ground
 
 
-def test_only_one_carriageways_points_belong_to_it(road: Road) -> None:
+def test_only_one_carriageways_points_belong_to_it(road: LearningRoad) -> None:
     assert road.belonging.all()
     room = np.column_stack(
         [np.full(len(truth_of(road).axis.points), np.inf), np.full(len(truth_of(road).axis.points), 2.0)]
@@ -149,7 +149,7 @@ def test_only_one_carriageways_points_belong_to_it(road: Road) -> None:
     )
 
 
-def test_a_road_without_truth_is_refused(road: Road) -> None:
+def test_a_road_without_truth_is_refused(road: LearningRoad) -> None:
     with pytest.raises(InputError, match=r"strip.*known centreline"):
         case(replace(road, truth=None), 1, cropping=None, estimated=False)
 
@@ -166,7 +166,7 @@ def test_the_grid_search_takes_the_best_that_finds_enough() -> None:
     assert figures[search.best]["found"] >= 0.8
 
 
-def test_seeds_and_trained_versions_are_averaged(road: Road) -> None:
+def test_seeds_and_trained_versions_are_averaged(road: LearningRoad) -> None:
     predictors = {"two runs": [told(0.1), told(0.3)], "one for all": [told(0.2)]}
     result = measure(predictors, lambda seed: [case(road, seed, cropping=None, estimated=False)], [1, 2])
     spread = result["two runs"]["all"]["mae"]
@@ -223,21 +223,21 @@ def test_a_report_shows_every_road_and_the_corridor() -> None:
     assert text.splitlines()[-1].split()[2:] == ["4.000", "–", "–"]
 
 
-def test_pictures_are_drawn_with_and_without_uncertainty(road: Road) -> None:
+def test_pictures_are_drawn_with_and_without_uncertainty(road: LearningRoad) -> None:
     shown = case(road, 1, cropping=Cropping(), estimated=True)
     lines = {MIDDLE: trivial_predictor(MIDDLE)(road, shown.frames)[:, 0], "none": np.full(len(shown.frames), np.nan)}
     count = len(shown.frames)
     center = told(0.1)(road, shown.frames)
     corridor = np.column_stack([center, np.tile([3.5, -3.5, 2.0, 3.3, 0.0, 0.0], (count, 1)), np.full((count, 6), 0.1)])
     pictures = [
-        lines_picture(shown, lines, View(20.0, 50.0), "lines"),
-        corridor_picture(shown, center[:, :1], View(20.0, 50.0), "centre alone"),
-        corridor_picture(shown, center, View(20.0, 50.0), "with its deviation"),
-        corridor_picture(shown, corridor, View(20.0, 50.0), "corridor"),
+        lines_picture(shown, lines, PictureView(20.0, 50.0), "lines"),
+        corridor_picture(shown, center[:, :1], PictureView(20.0, 50.0), "centre alone"),
+        corridor_picture(shown, center, PictureView(20.0, 50.0), "with its deviation"),
+        corridor_picture(shown, corridor, PictureView(20.0, 50.0), "corridor"),
     ]
     assert all(picture.startswith(b"\x89PNG") for picture in pictures)
     assert len({len(picture) for picture in pictures}) == 4
-    assert pictures[0] == lines_picture(shown, lines, View(20.0, 50.0), "lines"), "the same bytes again"
+    assert pictures[0] == lines_picture(shown, lines, PictureView(20.0, 50.0), "lines"), "the same bytes again"
 
 
 @pytest.mark.skipif(not REAL.is_dir(), reason="no real scans beside the repository")
@@ -272,10 +272,10 @@ def test_parabolas_average_cuts_out_and_follow_a_bend() -> None:
     assert np.isfinite(found[shown.frames.station > 100.0]).all()
 
 
-def test_intervals_count_where_they_are_given(road: Road) -> None:
+def test_intervals_count_where_they_are_given(road: LearningRoad) -> None:
     shown = case(road, 1, cropping=None, estimated=False)
 
-    def predict(road: Road, frames: Frames) -> Float:
+    def predict(road: LearningRoad, frames: Frames) -> Float:
         found = np.zeros((len(frames), len(CORRIDOR_COLUMNS)))
         found[:, :2] = told(0.1)(road, frames)
         found[:, -2:] = [0.05, 0.2]
@@ -286,7 +286,7 @@ def test_intervals_count_where_they_are_given(road: Road) -> None:
     assert evaluate(told(0.1, std=1.0), shown)["coverage_68"] == 1.0
 
 
-def test_roads_of_one_name_are_refused(road: Road) -> None:
+def test_roads_of_one_name_are_refused(road: LearningRoad) -> None:
     """Their figures would be taken for each other's."""
     shown = case(road, 1, cropping=None, estimated=False)
     with pytest.raises(InputError, match=f"road is '{road.name}': is the name of several roads"):

@@ -7,16 +7,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from ml.centerline.data.axis import Axis
+from ml.centerline.data.axis import MeasuredAxis
 from ml.centerline.data.corridor import Truth
-from ml.centerline.data.roads import Road
+from ml.centerline.data.roads import LearningRoad
 from ml.centerline.scores.evaluation import truth_of
 from ml.centerline.scores.paint import REACH, with_painted_line
 from ml.points import Points
 from synthroads_addon.base.errors import InputError
 
 
-def swaying_road(paint: float = 1.5, sway: float = 0.4, bare: tuple[float, float] = (0.0, 0.0)) -> Road:
+def swaying_road(paint: float = 1.5, sway: float = 0.4, bare: tuple[float, float] = (0.0, 0.0)) -> LearningRoad:
     """Return a straight road with a painted line at y = 0 and an axis that sways about it, m."""
     rng = np.random.default_rng(1)
     xyz = np.column_stack([rng.uniform(0.0, 200.0, 40_000), rng.uniform(-4.0, 4.0, 40_000), np.zeros(40_000)])
@@ -33,8 +33,8 @@ def swaying_road(paint: float = 1.5, sway: float = 0.4, bare: tuple[float, float
         has_color=False,
     )
     x = np.arange(0.0, 200.5, 1.0)
-    axis = Axis(np.column_stack([x, sway * np.sin(x / 15.0)]))
-    return Road.of_points("swaying", points, axis, Truth.measured(axis, "carriageway"))
+    axis = MeasuredAxis(np.column_stack([x, sway * np.sin(x / 15.0)]))
+    return LearningRoad.of_points("swaying", points, axis, Truth.measured(axis, "carriageway"))
 
 
 def test_the_line_is_found_where_the_axis_is_not() -> None:
@@ -56,7 +56,7 @@ def test_no_line_is_found_where_none_is_painted() -> None:
 
 def test_what_is_bright_farther_away_is_no_line_of_the_axis() -> None:
     far = swaying_road(sway=0.0)
-    axis = Axis(far.reference.points + np.array([0.0, REACH + 0.1, 0.0]))
+    axis = MeasuredAxis(far.reference.points + np.array([0.0, REACH + 0.1, 0.0]))
     with pytest.raises(InputError, match="painted line"):
         with_painted_line(replace(far, truth=Truth.measured(axis, "carriageway")))
 

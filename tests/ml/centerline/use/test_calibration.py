@@ -7,7 +7,7 @@ import json
 import numpy as np
 import pytest
 
-from ml.centerline.use.calibration import DEVIATIONS, LEVELS, Calibration, calibrated
+from ml.centerline.use.calibration import DEVIATIONS, LEVELS, IntervalCalibration, calibrated
 from synthroads_addon.base.random_streams import stream
 
 
@@ -60,9 +60,9 @@ def test_errors_of_zero():
 
 
 def test_survives_json():
-    for found in (calibrated(*_errors("heavy", 100, 1)), Calibration()):
+    for found in (calibrated(*_errors("heavy", 100, 1)), IntervalCalibration()):
         data = found.to_dict() | {"after": [None if np.isnan(x) else x for x in found.after]}
         data["before"] = [None if np.isnan(x) else x for x in found.before]
-        again = Calibration.from_dict(json.loads(json.dumps(data)))
+        again = IntervalCalibration.from_dict(json.loads(json.dumps(data)))
         assert (again.factor, again.widths, again.count) == (found.factor, found.widths, found.count)
         assert again.after == pytest.approx(found.after, nan_ok=True)

@@ -14,10 +14,10 @@ from ml.centerline.use import learned_axis
 from ml.centerline.use.learned_axis import axis_beside
 from ml.tasks import Prediction
 from synthroads_addon.base.errors import InputError, MissingFileError
-from synthroads_addon.reconstruction.path import Path
+from synthroads_addon.reconstruction.path import CloudPath
 
 ORIGIN = np.array([294_000.0, 5_628_000.0, 180.0])
-PATH = Path(np.column_stack([np.arange(101.0), np.zeros(101)]), np.zeros(101))
+PATH = CloudPath(np.column_stack([np.arange(101.0), np.zeros(101)]), np.zeros(101))
 """100 m to the east."""
 
 

@@ -11,12 +11,12 @@ import numpy as np
 import pytest
 
 from ml.centerline.data import strips
-from ml.centerline.data.axis import Axis
+from ml.centerline.data.axis import MeasuredAxis
 from ml.centerline.data.corridor import CORRIDOR
 from ml.centerline.data.frames import Frames, along, displaced
-from ml.centerline.data.roads import Road
+from ml.centerline.data.roads import LearningRoad
 from ml.centerline.networks.models import TARGETS
-from ml.centerline.use.calibration import Calibration
+from ml.centerline.use.calibration import IntervalCalibration
 from ml.centerline.use.find_road import find_road
 from ml.centerline.use.predictor import CenterlinePredictor, Regression, UseOptions, errors, joined
 from ml.centerline.use.writing import Found, corridor_json, geojson
@@ -34,7 +34,7 @@ def predictor(name: str = "transformer", **use: object) -> CenterlinePredictor:
 
 
 @cache
-def road() -> Road:
+def road() -> LearningRoad:
     return analytic_roads.roads()[0]
 
 
@@ -111,7 +111,7 @@ def test_rotating_and_shifting_a_cloud_carries_over():
     xyz[:, :2] = road().xyz[:, :2] @ turn.T + by
     line = road().reference.points.copy()
     line[:, :2] = line[:, :2] @ turn.T + by
-    turned = replace(road(), xyz=xyz, reference=Axis(line))
+    turned = replace(road(), xyz=xyz, reference=MeasuredAxis(line))
     places = frames()
     elsewhere = Frames(places.position @ turn.T + by, places.direction + angle, places.station)
     for name in ("single", "sequence", "transformer"):
@@ -123,7 +123,7 @@ def test_rotating_and_shifting_a_cloud_carries_over():
 
 
 def test_calibration_scales_deviations_and_widths():
-    table = {"center": Calibration(factor=3.0, widths=(4.0, 5.0))}
+    table = {"center": IntervalCalibration(factor=3.0, widths=(4.0, 5.0))}
     model = small("single").eval()
     plain = CenterlinePredictor(model, WHOLE, UseOptions()).regress(road(), frames())
     ready = CenterlinePredictor(model, WHOLE, UseOptions(), table)
@@ -229,7 +229,7 @@ def test_geojson_is_read_back_as_an_axis(tmp_path: Path):
     data = geojson(_found(gap=False), "cloud", 1.0)
     data["features"] = data["features"][:1]
     (tmp_path / "line.geojson").write_text(json.dumps(data))
-    np.testing.assert_allclose(Axis.read(tmp_path / "line.geojson").points[:, 1], 1.0)
+    np.testing.assert_allclose(MeasuredAxis.read(tmp_path / "line.geojson").points[:, 1], 1.0)
 
 
 def test_corridor_is_json_with_all_columns():
@@ -251,7 +251,9 @@ def test_lines_of_interleaved_sequences_are_joined():
     turn, away = rng.uniform(-0.03, 0.03, len(station)), np.sin(station / 9.0)
     out = np.column_stack([np.sin(angle), -np.cos(angle)])
     places = Frames((280.0 - away)[:, None] * out, angle + turn, station)
-    known = Axis(280.0 * np.column_stack([np.sin(np.linspace(-0.1, 0.6, 2000)), -np.cos(np.linspace(-0.1, 0.6, 2000))]))
+    known = MeasuredAxis(
+        280.0 * np.column_stack([np.sin(np.linspace(-0.1, 0.6, 2000)), -np.cos(np.linspace(-0.1, 0.6, 2000))])
+    )
     true, _ = known.crossing(places.position, places.direction)
     std = np.full(len(station), 0.1)
     np.testing.assert_allclose(joined(places, true, std, 1), true, atol=1e-12)
@@ -276,7 +278,7 @@ def test_what_was_found_is_remembered_by_points_and_frames(monkeypatch: pytest.M
     seen: list[int] = []
     sequences = CenterlinePredictor._sequences
 
-    def counted(self: CenterlinePredictor, road: Road, frames: Frames):
+    def counted(self: CenterlinePredictor, road: LearningRoad, frames: Frames):
         seen.append(len(frames))
         return sequences(self, road, frames)
 

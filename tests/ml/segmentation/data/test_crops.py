@@ -22,7 +22,7 @@ from ml.segmentation.data.crops import (
     cut,
 )
 from ml.segmentation.data.effects import MISSING_SIGMA, NO_EFFECTS, Crop, Effects, crop_of
-from ml.segmentation.data.tiles import Scaling, Tile, scalings
+from ml.segmentation.data.tiles import CloudTile, Scaling, scalings
 from ml.segmentation.recipes import (
     SegmentationConfiguration,
     class_shares,
@@ -36,7 +36,7 @@ from tests.helpers.clouds.segmentation_data import road_tile
 SETTINGS = CropSettings(points=900)
 
 
-def dataset(tiles: list[Tile], effects: Effects = NO_EFFECTS, seed: int = 1, epoch: int = 0) -> CropDataset:
+def dataset(tiles: list[CloudTile], effects: Effects = NO_EFFECTS, seed: int = 1, epoch: int = 0) -> CropDataset:
     """Return two crops of each tile."""
     draws = [Draw(tile, number) for tile in range(len(tiles)) for number in range(2)]
     seeds = Seeds(tiles, 5, balanced=False)

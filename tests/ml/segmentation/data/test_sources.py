@@ -13,7 +13,7 @@ import pytest
 from ml.cells import thin
 from ml.segmentation.data.classes import IGNORED, LabelMapping, load_mapping, table_between
 from ml.segmentation.data.sources import Source, read_tiles
-from ml.segmentation.data.tiles import Tile, robust_scaling, scalings
+from ml.segmentation.data.tiles import CloudTile, robust_scaling, scalings
 from synthroads_addon.base.classes import class_scheme
 from synthroads_addon.base.errors import InputError, MissingFileError
 from tests.helpers.clouds.segmentation_data import (
@@ -150,6 +150,6 @@ def test_robust_scaling_takes_gain_and_shift_out() -> None:
     one, other = (robust_scaling([s]).apply(s) for s in (strength, strength * np.float32(0.2) + np.float32(0.1)))
     np.testing.assert_allclose(one, other, atol=1e-5)
     assert np.median(one) == pytest.approx(0.0, abs=1e-6)
-    tiles: list[Tile] = [road_tile(500, 1, "a"), replace(road_tile(500, 2, "b"), strength=None)]
+    tiles: list[CloudTile] = [road_tile(500, 1, "a"), replace(road_tile(500, 2, "b"), strength=None)]
     assert scalings(tiles, "share")["a"].apply(strength) == pytest.approx(strength)
     assert scalings(tiles, "robust")["b"].span == 1.0

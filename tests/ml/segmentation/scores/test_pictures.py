@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from ml.segmentation.data.classes import IGNORED
-from ml.segmentation.data.tiles import Tile
+from ml.segmentation.data.tiles import CloudTile
 from ml.segmentation.scores.pictures import class_colors, comparison
 
 Floats = NDArray[np.float32]
@@ -18,7 +18,7 @@ Classes = NDArray[np.int16]
 
 def brown(coord: Floats, segment: Classes) -> float:
     """Return the share of the picture that has the ground's colour."""
-    tile = Tile("a", np.zeros(3), coord, None, None, segment)
+    tile = CloudTile("a", np.zeros(3), coord, None, None, segment)
     content = comparison(tile, np.zeros(len(coord), dtype=np.int16), ["ground", "road"])
     image = np.asarray(Image.open(io.BytesIO(content)).convert("RGB")).astype(int)
     ground = (255 * class_colors(["ground"])[0]).round()
