@@ -16,7 +16,7 @@ from typing import Any
 if __name__ == "__main__":
     sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from headless.benchmark_table import DEMO, QUICK, TABLE, judged, markdown
+from headless.benchmark_table import DEMO, QUICK, TABLE, judge_lines, markdown
 from headless.commands import Outcome, add_changes_argument, add_common_arguments, entry
 from headless.marked_documents import fill
 from headless.messages import progress_bar
@@ -56,7 +56,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> Outcome:
     """Run `synthroads benchmark`; each part is measured in a process of its own, so that its memory is its own."""
     if arguments.part:
-        result = _measured(json.loads(arguments.part))
+        result = _measure_part(json.loads(arguments.part))
         return 0, result, canonical_json(result)
     _scenario(arguments.scenario, arguments.changes, arguments.quick)
     for cores in arguments.cores:
@@ -119,7 +119,7 @@ def _in_own_process(part: dict[str, Any], cores: int) -> dict[str, Any]:
     return result
 
 
-def _measured(part: dict[str, Any]) -> dict[str, Any]:
+def _measure_part(part: dict[str, Any]) -> dict[str, Any]:
     """Measure a part in this process."""
     if part["part"] == "demo":
         from synthroads_addon.jobs.measure.benchmark import measure_demo
@@ -160,7 +160,7 @@ def _scenario(name: str, changes: list[str], quick: bool) -> Scenario:
 def _verdict(result: dict[str, Any]) -> str:
     if result["quick"]:
         return ""
-    missed = [name for name, _, kept in judged(result) if not kept]
+    missed = [name for name, _, kept in judge_lines(result) if not kept]
     return f"\nmissed: {', '.join(missed)}" if missed else "\nall limits that were measured are kept"
 
 

@@ -74,7 +74,7 @@ def markdown(result: dict[str, Any]) -> str:
     return "\n".join([*lines, *_limits(result), "", *_stages(result), "", *_floors(result)]) + "\n"
 
 
-def judged(result: dict[str, Any]) -> Iterator[tuple[str, float, bool]]:
+def judge_lines(result: dict[str, Any]) -> Iterator[tuple[str, float, bool]]:
     """Yield (name, value, kept) of every line that was measured on as many cores as the limits are for."""
     run = next((run for run in result["runs"] if run["cores"] == CORES), None)
     for name, limit in LIMITS.items():
@@ -87,7 +87,7 @@ def _limits(result: dict[str, Any]) -> Iterator[str]:
     runs = result["runs"]
     titles = ["", *(f"{run['cores']} core{'s' * (run['cores'] > 1)}" for run in runs), "limit", f"on {CORES} cores"]
     yield from _head(titles)
-    kept = {} if result["quick"] else {name: good for name, _, good in judged(result)}
+    kept = {} if result["quick"] else {name: good for name, _, good in judge_lines(result)}
     for name, limit in LIMITS.items():
         values = [_number(run["lines"].get(name), limit.digits) for run in runs]
         bound = f"{'at most' if limit.most else 'at least'} {limit.limit:g} {limit.unit}"

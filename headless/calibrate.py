@@ -96,7 +96,7 @@ def run(arguments: argparse.Namespace) -> Outcome:
         check_target(field, path, ending, arguments.overwrite)
     if arguments.save and (job.real is None or not job.fit):
         raise InputError("--save", str(arguments.save), "needs a cloud that materials are fitted to")
-    result = followed(job, progress_bar(arguments))
+    result = follow_job(job, progress_bar(arguments))
     if arguments.save:
         save_fitted(result, arguments.save, arguments.overwrite)
     if arguments.plot:
@@ -117,7 +117,7 @@ def check_target(field: str, path: Path | None, ending: str, overwrite: bool) ->
         raise InputError(field, str(path), "is there already; --overwrite replaces it")
 
 
-def followed(job: CalibrationJob, progress: Progress = silent) -> Calibration:
+def follow_job(job: CalibrationJob, progress: Progress = silent) -> Calibration:
     """Run a job and show its progress."""
     run = steps(job)
     while True:
@@ -131,7 +131,7 @@ def followed(job: CalibrationJob, progress: Progress = silent) -> Calibration:
 def job_of(arguments: argparse.Namespace) -> CalibrationJob:
     """Return the job that the arguments stand for."""
     textures = dict(_texture(text) for text in arguments.texture)
-    wanted = [_wanted(text, textures) for text in arguments.material]
+    wanted = [_parse_target(text, textures) for text in arguments.material]
     unknown = set(textures) - {one.material for one in wanted}
     if unknown:
         raise InputError("--texture", sorted(unknown)[0], "must be one of the materials asked for")
@@ -202,7 +202,7 @@ def _parts(text: str) -> list[Any]:
     return parts
 
 
-def _wanted(text: str, textures: dict[str, tuple[Path, float]]) -> Wanted:
+def _parse_target(text: str, textures: dict[str, tuple[Path, float]]) -> Wanted:
     name, _, told = text.partition("=")
     image, width = textures.get(name, (None, 1.0))
     return Wanted(name, told or None, image, width)

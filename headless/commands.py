@@ -36,7 +36,7 @@ def _missing(error: ModuleNotFoundError) -> str:
 try:
     from synthroads_addon.base.schema import canonical_json
     from synthroads_addon.scenario.scenario import apply_change
-    from synthroads_addon.scenario.tolerance import KINDS, TIMES, parse_tolerance, shown, with_unit
+    from synthroads_addon.scenario.tolerance import KINDS, TIMES, parse_tolerance, with_unit, written_error
     from synthroads_addon.twin.formats import TWIN_FORMATS
 except ModuleNotFoundError as error:  # Blender itself has none of the packages that the extension brings
     print(_missing(error), file=sys.stderr)
@@ -179,8 +179,8 @@ def choice_summary(report: dict[str, Any]) -> list[str]:
         return []
     choice = report["choice"]
     chosen = ", ".join(f"{path}={value}" for path, value in choice["chosen"].items())
-    errors = ", ".join(f"{name} {shown(name, value)}" for name, value in choice["expected"]["errors"].items())
-    at_most = ", ".join(f"{name} {shown(name, value)}" for name, value in choice["expected"]["at_most"].items())
+    errors = ", ".join(f"{name} {written_error(name, value)}" for name, value in choice["expected"]["errors"].items())
+    at_most = ", ".join(f"{name} {written_error(name, value)}" for name, value in choice["expected"]["at_most"].items())
     lines = [f"chosen: {chosen or 'nothing, as all is given'} ({choice['by']})", f"  expected errors: {errors}"]
     lines += [f"  at most, with a confidence of 95 %: {at_most}"] if at_most else []
     seconds = choice["expected"]["seconds"]
@@ -200,10 +200,10 @@ def add_renamed_argument(parser: argparse.ArgumentParser, former: str, name: str
 def add_twin_argument(parser: argparse.ArgumentParser, default: Sequence[str] = ()) -> None:
     """Add ``--twin FORMATS``, a list of names of formats in ``twin``."""
     text = f"geometric-semantic models, with commas: {', '.join(TWIN_FORMATS)} ({','.join(default) or 'none'})"
-    parser.add_argument("--twin", type=_listed, default=list(default), metavar="FORMATS", help=text)
+    parser.add_argument("--twin", type=_split_names, default=list(default), metavar="FORMATS", help=text)
 
 
-def _listed(text: str) -> list[str]:
+def _split_names(text: str) -> list[str]:
     """Return the names in a list with commas, each once."""
     return list(dict.fromkeys(text.split(",")))
 
@@ -240,7 +240,7 @@ def run(action: Callable[[argparse.Namespace], Outcome], arguments: argparse.Nam
         return 2
     except ModuleNotFoundError as error:
         if was_stopped():
-            return interrupted()
+            return report_interrupt()
         print(_missing(error), file=sys.stderr)
         return 2
     except BrokenPipeError:
@@ -248,10 +248,10 @@ def run(action: Callable[[argparse.Namespace], Outcome], arguments: argparse.Nam
         os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
         return 130
     except KeyboardInterrupt:
-        return interrupted()
+        return report_interrupt()
 
 
-def interrupted() -> int:
+def report_interrupt() -> int:
     """Say that the user stopped the work; return the exit code."""
     print("interrupted; nothing was left half-written", file=sys.stderr)
     return 130
@@ -276,12 +276,12 @@ def leave(action: Callable[[], int]) -> None:
     try:
         code = action()
     except KeyboardInterrupt:  # before the command's own work began, or at its very end
-        code = interrupted()
+        code = report_interrupt()
     except SystemExit as error:
         code = error.code if isinstance(error.code, int) else 0 if error.code is None else 1
     except BaseException:
         if was_stopped():
-            code = interrupted()
+            code = report_interrupt()
         else:
             import traceback
 

@@ -47,7 +47,7 @@ def run(arguments: argparse.Namespace) -> Outcome:
         return _verify(arguments.output)
     if arguments.jobs is not None and not 1 <= arguments.jobs <= 1024:
         raise InputError("--jobs", arguments.jobs, "must be 1 to 1024")
-    recipe = _changed(load_recipe(arguments.recipe), arguments.changes)
+    recipe = _change_recipe(load_recipe(arguments.recipe), arguments.changes)
     detail("recipe", recipe.to_dict())
     from headless.dataset_run import DatasetRun, dask_workers, local_processes
 
@@ -60,7 +60,7 @@ def run(arguments: argparse.Namespace) -> Outcome:
     return 3 if failed else 0, manifest.to_dict(), summary(manifest, arguments.output)
 
 
-def _changed(recipe: Recipe, changes: list[str]) -> Recipe:
+def _change_recipe(recipe: Recipe, changes: list[str]) -> Recipe:
     """Return a recipe whose scenarios are changed as well; the changes become a part of it."""
     if not changes:
         return recipe

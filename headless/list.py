@@ -27,7 +27,7 @@ KINDS: dict[str, Kind] = {**catalogue.KINDS, **ml.catalogue.KINDS}
 """Kinds of things that are listed."""
 
 
-def _learned(name: str) -> Callable[[], Any]:
+def _learning_class(name: str) -> Callable[[], Any]:
     def kind() -> Any:
         from ml.tasks import task
 
@@ -38,8 +38,8 @@ def _learned(name: str) -> Callable[[], Any]:
 
 _OWNERS: dict[str, Callable[[], Any]] = {
     "scenario": lambda: Scenario,
-    "segmentation": _learned("segmentation"),
-    "centerline": _learned("centerline"),
+    "segmentation": _learning_class("segmentation"),
+    "centerline": _learning_class("centerline"),
 }
 """Things that have fields which ``--set`` takes, with their classes: of `train` and `experiment` the task's."""
 

@@ -15,7 +15,7 @@ FIELD = "--document"
 """Option by which the commands name the document."""
 
 
-def replaced(document: str, tables: Mapping[str, str]) -> str:
+def replace_tables(document: str, tables: Mapping[str, str]) -> str:
     """Return a document with new text between the markers of the named tables; all else stays.
 
     Raises:
@@ -39,18 +39,18 @@ def fill(document: Path | None, names: Iterable[str], make: Callable[[], Mapping
         make: returns their texts by name.
 
     Raises:
-        InputError: the document can't be read, or see `replaced`.
+        InputError: the document can't be read, or see `replace_tables`.
         OutputError: the document can't be written.
     """
     if document is None:
         return make()
-    replaced(_read(document), dict.fromkeys(names, ""))
+    replace_tables(_read_document(document), dict.fromkeys(names, ""))
     tables = make()
-    write_file(document, replaced(_read(document), tables).encode(), FIELD, overwrite=True)
+    write_file(document, replace_tables(_read_document(document), tables).encode(), FIELD, overwrite=True)
     return tables
 
 
-def _read(document: Path) -> str:
+def _read_document(document: Path) -> str:
     try:
         return document.read_text(encoding="utf-8")
     except OSError as error:

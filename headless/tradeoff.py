@@ -65,7 +65,7 @@ def run(arguments: argparse.Namespace) -> Outcome:
         result = measure_row(row["scenario"], row["knob"], row["value"])
         return 0, result, json.dumps(result)
     scenes = list(dict.fromkeys(arguments.scenario or SCENES))
-    titles = _checked(arguments, scenes)
+    titles = _check_request(arguments, scenes)
     progress = progress_bar(arguments)
     results = {}
 
@@ -81,7 +81,7 @@ def run(arguments: argparse.Namespace) -> Outcome:
     return 0, {"scenes": results}, "\n".join([*tables.values(), f"written to {arguments.output}"])
 
 
-def _checked(arguments: argparse.Namespace, scenes: Sequence[str]) -> dict[str, str]:
+def _check_request(arguments: argparse.Namespace, scenes: Sequence[str]) -> dict[str, str]:
     """Refuse what can't be done before hours of work; return what the files of each scene are called."""
     titles = {scene: Path(scene).stem for scene in scenes}
     for scene in scenes:
@@ -116,9 +116,9 @@ def _measure_all(arguments: argparse.Namespace, scene: str, title: str, progress
         progress(f"{title} {knob} {value}", number / len(list(rows(KNOBS))))
         path = arguments.output / _ROWS / title / f"{knob}-{_file_name(value)}.json"
         job = _fingerprint(scene, knob, value)
-        result = _kept(path, job) if arguments.resume else None
+        result = _read_kept_row(path, job) if arguments.resume else None
         if result is None and (knob, value) in wanted:
-            result = _measured(scene, knob, value)
+            result = _measure_row(scene, knob, value)
             write_file(path, canonical_json({"job": job, "row": result}).encode(), overwrite=True)
         if result is not None:
             results.append(result)
@@ -135,7 +135,7 @@ def _fingerprint(scene: str, knob: str, value: Any) -> str:
     return hashlib.sha256(f"{generator()} {changed}".encode()).hexdigest()
 
 
-def _kept(path: Path, job: str) -> dict[str, Any] | None:
+def _read_kept_row(path: Path, job: str) -> dict[str, Any] | None:
     """Return the row of this job that was measured before, if there is one; another Blender may have what it lacked."""
     if not path.exists():
         return None
@@ -146,7 +146,7 @@ def _kept(path: Path, job: str) -> dict[str, Any] | None:
     return row
 
 
-def _measured(scene: str, knob: str, value: Any) -> dict[str, Any]:
+def _measure_row(scene: str, knob: str, value: Any) -> dict[str, Any]:
     """Measure a row, those of some knobs several times: the fastest is returned, with the times of all."""
     several = [_measured_once(scene, knob, value) for _ in range(REPEATED.get(knob, 1))]
     if len(several) == 1 or "left_out" in several[0]:

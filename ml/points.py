@@ -116,22 +116,22 @@ def full_color(largest: int) -> float:
 
 
 def _points(header: CloudHeader, blocks: list[PointBlock], names: Mapping[int, str]) -> Points:
-    xyz = _joined([block.xyz for block in blocks])
+    xyz = _join_arrays([block.xyz for block in blocks])
     origin = np.floor(xyz.min(axis=0))
-    rgb = _joined([block.rgb for block in blocks])
+    rgb = _join_arrays([block.rgb for block in blocks])
     largest = int(rgb.max())
     scale = (header.intensity_scale or 1.0) / SIXTEEN_BITS
     return Points(
         origin=origin,
         xyz=xyz - origin,
-        intensity=_joined([(block.intensity * scale).astype(np.float32) for block in blocks]),
+        intensity=_join_arrays([(block.intensity * scale).astype(np.float32) for block in blocks]),
         rgb=(rgb / full_color(largest)).astype(np.float32),
-        class_id=_joined([block.class_id for block in blocks]),
+        class_id=_join_arrays([block.class_id for block in blocks]),
         class_names=dict(names),
         has_color=header.has_color and largest > 0,
         epsg=header.epsg,
     )
 
 
-def _joined(parts: list[NDArray[Any]]) -> NDArray[Any]:
+def _join_arrays(parts: list[NDArray[Any]]) -> NDArray[Any]:
     return parts[0] if len(parts) == 1 else np.concatenate(parts)

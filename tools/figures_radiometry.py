@@ -20,7 +20,7 @@ sys.path.insert(0, str(ROOT))
 
 from synthroads_addon.materials.reflectance import facet_terms, returned_share  # noqa: E402
 from synthroads_addon.materials.table import Material, materials  # noqa: E402
-from synthroads_addon.materials.variation import varied  # noqa: E402
+from synthroads_addon.materials.variation import vary_material  # noqa: E402
 from synthroads_addon.road.surroundings import Environment, MaterialVariation  # noqa: E402
 from synthroads_addon.scanning.beam import RINGS, beam_pattern, conical, cylindrical_offsets  # noqa: E402
 from synthroads_addon.scanning.weather.base import Weather  # noqa: E402
@@ -185,8 +185,8 @@ def reflection_models() -> Any:
 
 def _shown_materials() -> list[tuple[str, Material, str, str]]:
     table = materials()
-    wet = varied("paint_white", MaterialVariation(), Environment(wetness=1.0))
-    worn = varied("paint_white", MaterialVariation(paint_wear=0.8), Environment())
+    wet = vary_material("paint_white", MaterialVariation(), Environment(wetness=1.0))
+    worn = vary_material("paint_white", MaterialVariation(paint_wear=0.8), Environment())
     return [
         ("reflector", table["reflector"], RED, "-"),
         ("white sheeting", table["sheeting_white"], ORANGE, "-"),

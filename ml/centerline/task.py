@@ -73,7 +73,7 @@ def train(run: Run[CenterlineConfiguration], progress: Progress = silent) -> dic
         run,
         batches,
         configuration.batches.steps,
-        lambda net, batch: on_device(net, _moved(batch, device)),
+        lambda net, batch: on_device(net, _move_to_device(batch, device)),
         validate=_validation(configuration, roads, device),
         progress=progress,
     )
@@ -176,7 +176,7 @@ def _first_model(configuration: CenterlineConfiguration) -> CenterlineModel:
     return model
 
 
-def _moved(batch: Batch, device: torch.device) -> Batch:
+def _move_to_device(batch: Batch, device: torch.device) -> Batch:
     return {name: values.to(device) for name, values in batch.items()}
 
 
@@ -238,7 +238,7 @@ def _residuals(model: nn.Module, batches: Sequence[Batch], device: torch.device)
 
 def _pairs(model: nn.Module, batches: Sequence[Batch], device: torch.device) -> Iterator[tuple[Any, Any]]:
     for batch in batches:
-        moved = _moved(batch, device)
+        moved = _move_to_device(batch, device)
         with torch.no_grad():
             output = model(moved)
         value = torch.cat([output["center"][..., None], output["corridor"]], dim=-1)

@@ -196,11 +196,11 @@ def geometric_order(points: NDArray[np.floating]) -> Indices:
     bits = np.ascontiguousarray(points.astype(np.float64) + 0.0).view(np.uint64)  # + 0.0: one zero, not two
     key = np.zeros(len(points), dtype=np.uint64)
     for axis in range(3):
-        key = _mixed(key ^ bits[:, axis])
+        key = _mix_bits(key ^ bits[:, axis])
     return np.argsort(key, kind="stable")
 
 
-def _mixed(key: NDArray[np.uint64]) -> NDArray[np.uint64]:
+def _mix_bits(key: NDArray[np.uint64]) -> NDArray[np.uint64]:
     """Return 64-bit numbers stirred (the finaliser of SplitMix64; Steele, Lea and Flood, 2014)."""
     key = key + np.uint64(0x9E3779B97F4A7C15)
     key = (key ^ (key >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)

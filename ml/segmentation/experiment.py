@@ -88,7 +88,7 @@ def configurations(
     """
     kinds = {"segmentation": SegmentationConfiguration}
     base = load_configuration(experiment.configuration, kinds).to_dict()
-    base |= {"data": _filled(experiment.data, folders).to_dict(), "seed": experiment.seeds[0]}
+    base |= {"data": _fill_sources(experiment.data, folders).to_dict(), "seed": experiment.seeds[0]}
     result = {}
     for name, variant in experiment.variants.items():
         data = base
@@ -100,7 +100,7 @@ def configurations(
     return result
 
 
-def _filled(data: Data, folders: Mapping[str, str]) -> Data:
+def _fill_sources(data: Data, folders: Mapping[str, str]) -> Data:
     """Return sources with their folders in place of names."""
 
     def filled(source: Source) -> Source:
@@ -140,16 +140,16 @@ def run_experiment(
             configuration = configured[name].model_copy(update={"seed": seed})
             folder = output / (variant.of or name) / f"seed-{seed}"
             if variant.of is None:
-                tests = _trained(configuration, folder, output, progress)
+                tests = _train_variant(configuration, folder, output, progress)
             else:
-                tests = _tested(configuration, folder, output / name / f"seed-{seed}.json", progress)
+                tests = _test_variant(configuration, folder, output / name / f"seed-{seed}.json", progress)
             results[name][str(seed)] = tests
             write_file(output / RESULTS, canonical_json(results).encode(), overwrite=True)
             write_file(output / TABLE, table(experiment.title, results).encode(), overwrite=True)
     return results
 
 
-def _trained(
+def _train_variant(
     configuration: SegmentationConfiguration, folder: Path, output: Path, progress: Progress
 ) -> dict[str, Any]:
     """Return the scores of a run, trained unless it is already."""
@@ -176,7 +176,9 @@ def _reuse_pretraining(configuration: SegmentationConfiguration, target: Path, o
             return
 
 
-def _tested(configuration: SegmentationConfiguration, folder: Path, file: Path, progress: Progress) -> dict[str, Any]:
+def _test_variant(
+    configuration: SegmentationConfiguration, folder: Path, file: Path, progress: Progress
+) -> dict[str, Any]:
     """Return the scores of a trained run under another configuration, tested unless just that was tested already."""
     made_from = {"configuration": lasting(configuration.to_dict()), "checkpoint_sha256": checksum(folder / CHECKPOINT)}
     tests: dict[str, Any]

@@ -23,7 +23,7 @@ from .data.classes import class_names
 from .data.crops import Item, Seeds
 from .data.sources import Source, pointcept_folders, pointcept_root
 from .data.tiles import CloudTile, scalings
-from .loading import epoch_batches, thinned
+from .loading import epoch_batches, thin_tiles
 from .network import build
 from .recipes import SegmentationConfiguration
 from .training import objective
@@ -71,13 +71,13 @@ def tile_count(source: Source, configuration: SegmentationConfiguration) -> int:
     root = pointcept_root(path) if path.is_dir() else None
     if root is not None:
         return len(pointcept_folders(root, source.split))
-    return sum(1 for _ in thinned([source], configuration, "counted"))
+    return sum(1 for _ in thin_tiles([source], configuration, "counted"))
 
 
 def _first_tiles(sources: list[Source], configuration: SegmentationConfiguration) -> list[CloudTile]:
     """Return the first tiles with as many points as a crop has."""
     found: list[CloudTile] = []
-    for tile in thinned(sources, configuration, "first"):
+    for tile in thin_tiles(sources, configuration, "first"):
         if len(tile) >= configuration.crop_points:
             found.append(tile)
         if len(found) == _TILES:

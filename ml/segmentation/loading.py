@@ -21,7 +21,7 @@ from .adaptation import laid_over
 from .data.crops import CropDataset, Draw, Item, Seeds, collate
 from .data.sources import Source, read_tiles
 from .data.tiles import CloudTile, Scaling, scalings
-from .network import on_device, plan_of, prepared
+from .network import on_device, plan_of, prepare_batch
 from .recipes import SegmentationConfiguration, mapped_intensities, plan
 
 SMALLEST_SHARE = 0.25
@@ -39,7 +39,7 @@ def read_domains(configuration: SegmentationConfiguration) -> dict[str, list[Clo
     """
     domains: dict[str, list[CloudTile]] = {}
     for domain, sources in configuration.needed().items():
-        tiles = list(thinned(sources, configuration, domain))
+        tiles = list(thin_tiles(sources, configuration, domain))
         least = SMALLEST_SHARE * configuration.crop_points
         enough = [tile for tile in tiles if len(tile) >= least]
         domains[domain] = enough or [tile for tile in tiles if len(tile)]
@@ -48,7 +48,7 @@ def read_domains(configuration: SegmentationConfiguration) -> dict[str, list[Clo
     return domains
 
 
-def thinned(sources: Sequence[Source], configuration: SegmentationConfiguration, title: str) -> Iterator[CloudTile]:
+def thin_tiles(sources: Sequence[Source], configuration: SegmentationConfiguration, title: str) -> Iterator[CloudTile]:
     """Yield the tiles of sources with one point per training voxel.
 
     Scenes of two sources may have one name: here they have others, so that their intensities are scaled apart.
@@ -79,7 +79,7 @@ def epoch_batches(
         seed=configuration.seed,
         epoch=epoch,
     )
-    yield from _loaded(dataset, configuration, device, epoch, configuration.adaptation.mix3d)
+    yield from _load_crops(dataset, configuration, device, epoch, configuration.adaptation.mix3d)
 
 
 @contextmanager
@@ -99,7 +99,7 @@ def watched_workers(configuration: SegmentationConfiguration) -> Iterator[None]:
         raise InputError("workers", configuration.workers, allowed) from None
 
 
-def _loaded(
+def _load_crops(
     dataset: CropDataset, configuration: SegmentationConfiguration, device: torch.device, epoch: int, mix3d: float
 ) -> Iterator[Item]:
     loader: DataLoader[Item] = DataLoader(
@@ -110,7 +110,7 @@ def _loaded(
         pin_memory=device.type == "cuda",
         worker_init_fn=leave_quietly,
     )
-    with uninterrupted():
+    with defer_interrupt():
         batches = iter(loader)
     for batch in batches:
         yield on_device(batch, device)
@@ -128,7 +128,7 @@ def leave_quietly(_worker: int) -> None:
 
 
 @contextmanager
-def uninterrupted() -> Iterator[None]:
+def defer_interrupt() -> Iterator[None]:
     """Put Ctrl-C off while processes are started: Python drops one that comes between a fork and what runs after it.
 
     The processes go on putting it off; they end when the one that started them does.
@@ -156,7 +156,7 @@ class Collate:
         batch = collate(items)
         if self.mix3d and self._chance(items[0]) < self.mix3d:
             batch = laid_over(batch)
-        return prepared(batch, plan_of(self.configuration).neighbourhood)
+        return prepare_batch(batch, plan_of(self.configuration).neighbourhood)
 
     def _chance(self, first: Item) -> float:
         """Return a number from 0 to 1 that follows from the batch itself: workers don't know how many came before."""
@@ -180,4 +180,4 @@ def adaptation_batches(tiles: list[CloudTile], configuration: SegmentationConfig
         Seeds(tiles, 0, balanced=False),
         seed=configuration.seed,
     )
-    yield from _loaded(dataset, configuration, torch.device("cpu"), 0, 0.0)
+    yield from _load_crops(dataset, configuration, torch.device("cpu"), 0, 0.0)

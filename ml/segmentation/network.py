@@ -36,7 +36,7 @@ def build(configuration: SegmentationConfiguration) -> PointNeXt:
     return PointNeXt(plan_of(configuration))
 
 
-def prepared(batch: Item, neighbourhood: Neighbourhood) -> Item:
+def prepare_batch(batch: Item, neighbourhood: Neighbourhood) -> Item:
     """Return a batch with the indices of all stages' points and neighbours; runs on the CPU, in workers."""
     return batch | build_neighbours(batch["coord"], batch["offset"], neighbourhood)
 
@@ -52,7 +52,7 @@ def on_device(batch: Item, device: torch.device) -> Item:
     return {name: value.to(device, non_blocking=True) for name, value in batch.items()}
 
 
-def adapted(model: nn.Module, batches: Iterable[Item], device: torch.device) -> nn.Module:
+def adapt_network(model: nn.Module, batches: Iterable[Item], device: torch.device) -> nn.Module:
     """Return a copy of a network whose norms have the statistics of other points (AdaBN).
 
     Raises:

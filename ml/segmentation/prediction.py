@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from synthroads_addon.base.classes import ClassScheme
 from synthroads_addon.base.errors import InputError, OutputError
 from synthroads_addon.base.progress import Progress, silent
-from synthroads_addon.cloud.formats.base import damaged
+from synthroads_addon.cloud.formats.base import damage_error
 from synthroads_addon.cloud.formats.las import open_to_copy
 from synthroads_addon.cloud.formats.registry import open_cloud
 from synthroads_addon.cloud.tools.quantile_mapping import LEVELS
@@ -266,7 +266,7 @@ def write_copy(
                     done += len(old)
                     progress("writing", done / reader.header.point_count)
                 if done != len(labels):
-                    raise damaged(source, done, len(labels))
+                    raise damage_error(source, done, len(labels))
                 if kept := [record for record in reader.evlrs or () if record.user_id != _COPC]:
                     writer.write_evlrs(type(reader.evlrs)(kept))
         copy_header_texts(source, temporary)

@@ -22,7 +22,7 @@ from .recipes import SegmentationConfiguration
 from .scores.evaluation import check_tests, classifier, score, score_all, trained_model
 from .scores.metrics import score_table
 from .scores.pictures import comparison
-from .training import trained
+from .training import train_network
 
 _ONE_TILE = 5_000_000
 """Points of a cloud up to which it is scored as one tile."""
@@ -42,7 +42,7 @@ def train(run: SegmentationRun, progress: Progress = silent) -> dict[str, Any]:
     """
     configuration = run.configuration
     check_tests(configuration)
-    model, domains = trained(run, progress)
+    model, domains = train_network(run, progress)
     device = next(model.parameters()).device
     tests = score_all(model, configuration, device, progress)
     metrics = {

@@ -19,7 +19,7 @@ from ..training_loop import Figures, chosen_device, fit
 from .data.classes import IGNORED, class_names
 from .data.crops import Item, Seeds
 from .data.tiles import CloudTile, scalings
-from .loading import epoch_batches, read_domains, thinned, watched_workers
+from .loading import epoch_batches, read_domains, thin_tiles, watched_workers
 from .network import build, scores_of
 from .recipes import SegmentationConfiguration, class_shares, class_weights
 from .scores.evaluation import classifier
@@ -29,7 +29,7 @@ from .scores.scoring import label_tile
 Domains = dict[str, list[CloudTile]]
 
 
-def trained(run: Run[SegmentationConfiguration], progress: Progress = silent) -> tuple[nn.Module, Domains]:
+def train_network(run: Run[SegmentationConfiguration], progress: Progress = silent) -> tuple[nn.Module, Domains]:
     """Train a run; return the network with its last weights, and what it was trained on.
 
     Raises:
@@ -38,7 +38,7 @@ def trained(run: Run[SegmentationConfiguration], progress: Progress = silent) ->
     configuration = run.configuration
     device = chosen_device(configuration)
     domains = read_domains(configuration)
-    validation = list(thinned(configuration.data.validation, configuration, "validation"))
+    validation = list(thin_tiles(configuration.data.validation, configuration, "validation"))
     torch.manual_seed(configuration.seed)
     model = build(configuration).to(device)
     if configuration.set_up == "fine_tuned":

@@ -98,11 +98,11 @@ def entries(kind: Kind, wanted: Sequence[str] = ()) -> list[Entry]:
     """
     if not wanted:
         return [kind.read(name) for name in kind.names()]
-    found = (name for text in wanted for name in _named(kind, text))
+    found = (name for text in wanted for name in _find_names(kind, text))
     return [kind.read(name) for name in dict.fromkeys(found)]
 
 
-def _named(kind: Kind, text: str) -> list[str]:
+def _find_names(kind: Kind, text: str) -> list[str]:
     """Return the names that begin with a text, the file that it is, or the files in the folder that it is."""
     names = [name for name in kind.names() if name.startswith(text)]
     path = Path(text)

@@ -66,14 +66,14 @@ def field(position: Float, wavelength: float | Float, seed: int, octaves: int = 
         point = [position[part, axis] * cells[part] for axis in range(3)]
         total = np.zeros(len(point[0]), dtype=np.float32)
         for key, gain in zip(keys, gains, strict=False):
-            point = _turned(point)
+            point = _turn_coordinates(point)
             total += gain * _octave(point, key)
             point = [coordinate * 2.0 for coordinate in point]
         result[part] = total
     return result
 
 
-def _turned(point: list[Float]) -> list[Float]:
+def _turn_coordinates(point: list[Float]) -> list[Float]:
     """Return coordinates turned by `_TURN`."""
     x, y, z = point
     return [(a * x + b * y + c * z) / 19.0 for a, b, c in _TURN]
@@ -94,10 +94,10 @@ def _octave(point: list[Float], key: np.uint32) -> NDArray[np.float32]:
 
     def along_y(node: _Hash) -> NDArray[np.float32]:
         low = node + nodes[1]
-        return along_z(_mixed(low)) * weights[1][0] + along_z(_mixed(low + _AXES[1])) * weights[1][1]
+        return along_z(_mix_bits(low)) * weights[1][0] + along_z(_mix_bits(low + _AXES[1])) * weights[1][1]
 
     low = nodes[0] + key
-    return along_y(_mixed(low)) * weights[0][0] + along_y(_mixed(low + _AXES[0])) * weights[0][1]
+    return along_y(_mix_bits(low)) * weights[0][0] + along_y(_mix_bits(low + _AXES[0])) * weights[0][1]
 
 
 def _weights(t: NDArray[np.float32]) -> _Weights:
@@ -108,7 +108,7 @@ def _weights(t: NDArray[np.float32]) -> _Weights:
     return below * scale, above * scale
 
 
-def _mixed(node: _Hash) -> _Hash:
+def _mix_bits(node: _Hash) -> _Hash:
     node = node ^ (node >> _FIRST)
     node *= _FACTORS[0]
     node ^= node >> _SECOND
@@ -117,6 +117,6 @@ def _mixed(node: _Hash) -> _Hash:
 
 def _value(node: _Hash) -> NDArray[np.float32]:
     """Return numbers uniform in -sqrt(3) to sqrt(3) from hashes; their upper bits, which count, are the best mixed."""
-    node = _mixed(node)
+    node = _mix_bits(node)
     node *= _FACTORS[1]
     return node.view(np.int32).astype(np.float32) * _UNIT

@@ -27,7 +27,7 @@ def rotation_matrix(heading: ArrayLike, pitch: ArrayLike = 0.0, roll: ArrayLike 
     return matrix
 
 
-def wrapped(angle: ArrayLike) -> Float:
+def wrap_angle(angle: ArrayLike) -> Float:
     """Return angles (...), rad, brought to within half a turn of 0."""
     value = np.asarray(angle, dtype=np.float64)
     return np.asarray(value - 2.0 * np.pi * np.round(value / (2.0 * np.pi)))

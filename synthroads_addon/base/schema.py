@@ -162,7 +162,7 @@ def canonical_json(data: object) -> str:
     return json.dumps(data, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
 
 
-def rounded(value: float, digits: int = 9) -> float:
+def round_value(value: float, digits: int = 9) -> float:
     """Round a sampled value so that its text is short and the same on every machine (-0.0 becomes 0.0)."""
     return round(float(value), digits) + 0.0
 

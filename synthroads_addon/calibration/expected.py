@@ -2,9 +2,9 @@
 
 Everything that a scan does to a point's intensity is done here by the scanner's own functions: the surface
 (`materials.surfaces.brightness_of`), its variation (`materials.texture_spread`), the footprint's rays
-(`scanning.beam`), distance and air (`scanning.radiometry.received`). Only the casting is left out: what is seen is a
-plane of the material, or a strip of it on another one. Linear intensities are as in `PointBlock`: a white target
-struck at a right angle at 1 m gives 1; `Receiver` says what a device writes into its files for that.
+(`scanning.beam`), distance and air (`scanning.radiometry.received_intensity`). Only the casting is left out: what is
+seen is a plane of the material, or a strip of it on another one. Linear intensities are as in `PointBlock`: a white
+target struck at a right angle at 1 m gives 1; `Receiver` says what a device writes into its files for that.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from ..materials.surfaces import Reflection, brightness_of, surfaces_of
 from ..materials.table import Material
 from ..materials.texture_spread import spread_factors
 from ..scanning.beam import RINGS, beam_pattern, beam_radii
-from ..scanning.radiometry import received
+from ..scanning.radiometry import received_intensity
 from .texture import Texture
 
 Float = NDArray[np.float64]
@@ -67,7 +67,7 @@ class Receiver:
         """Return linear intensities (N,) of surfaces' brightness at ranges (N,), m."""
         if self.range_corrected:
             return brightness
-        return received(brightness, distance, self.attenuation)
+        return received_intensity(brightness, distance, self.attenuation)
 
     def stored(self, linear: Float) -> Float:
         """Return what the device writes, without rounding, for linear intensities times its gain; -inf dB for 0."""

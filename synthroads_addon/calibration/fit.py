@@ -55,7 +55,7 @@ def interquartile(quantiles: Float) -> float:
     return max(float(quantiles[2] - quantiles[0]), 1e-6 * abs(float(quantiles[1])), 1e-300)
 
 
-def fitted(
+def fit_level_and_spreads(
     expectation: Expectation,
     material: Material,
     wanted: Float,
@@ -78,7 +78,7 @@ def fitted(
     width = interquartile(wanted)
 
     def miss(x: Float) -> Float:
-        got = np.quantile(receiver.stored(levelled(expectation, material, _fit(x, material), beside)), FITTED)
+        got = np.quantile(receiver.stored(apply_gain(expectation, material, _fit(x, material), beside)), FITTED)
         return np.asarray((got - wanted) / width)
 
     start = float(np.median(expectation.linear(material, beside[0] if beside else None)))
@@ -92,14 +92,14 @@ def fitted(
     return _fit(_levenberg_marquardt(miss, np.array([level, *np.log(first)])), material)
 
 
-def levelled(
+def apply_gain(
     expectation: Expectation, material: Material, fit: Fit, beside: tuple[Material, float] | None
 ) -> Float:
     """Return linear intensities with a fit's spreads and level; what lies beside a strip keeps its own level."""
     uneven = material.model_copy(update={"spread_below": fit.below, "spread_above": fit.above})
     if beside is None:
         return fit.level * expectation.linear(uneven)
-    return fit.level * expectation.linear(uneven, brightened(beside[0], beside[1] / fit.level, limited=False))
+    return fit.level * expectation.linear(uneven, brighten_material(beside[0], beside[1] / fit.level, limited=False))
 
 
 def _fit(x: Float, material: Material) -> Fit:
@@ -150,7 +150,7 @@ def gain_of(
     return wanted
 
 
-def brightened(material: Material, change: float, limited: bool = True) -> Material:
+def brighten_material(material: Material, change: float, limited: bool = True) -> Material:
     """Return a material that gives back ``change`` times as much: reflectivity and retro-reflection alike.
 
     The base colour is what the camera sees: it stays as long as a specular share of 0 to 1 can make the reflectivity.

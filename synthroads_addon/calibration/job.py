@@ -23,13 +23,13 @@ from .fit import (
     FITTED,
     SHOWN,
     Fit,
-    brightened,
-    fitted,
+    apply_gain,
+    brighten_material,
+    fit_level_and_spreads,
     fitted_slope,
     fitted_wavelength,
     gain_of,
     interquartile,
-    levelled,
 )
 from .pavement import RoadClasses, road_classes
 from .texture import Texture, read_texture
@@ -337,13 +337,13 @@ def _start(job: CalibrationJob, wanted: Wanted, before: Material, real: RealClas
         material = before.model_copy(update={"base_color": texture.mean_color})
     views = _views(job, real)
     if job.fit and real is not None:
-        material = _shaped(job, material, real, views)
+        material = _with_facets(job, material, real, views)
     strip = job.road.line_width if job.road is not None and wanted.told == "line" else None
     expectation = Expectation(views, receiver, job.reflection, texture, strip)
     return _Started(wanted, before, material, expectation, real, strip is not None)
 
 
-def _shaped(job: CalibrationJob, material: Material, real: RealClass, views: Views) -> Material:
+def _with_facets(job: CalibrationJob, material: Material, real: RealClass, views: Views) -> Material:
     """Return a material with the facet slope and the wavelength of the real class."""
     update: dict[str, Any] = {}
     if "wavelength" in job.parts:
@@ -383,7 +383,7 @@ def _level(job: CalibrationJob, item: _Started, beside: tuple[Material, float] |
         return Fit(1.0, item.material.spread_below, item.material.spread_above)
     wanted = np.quantile(item.real.intensity, FITTED)
     spread = job.fit and "spread" in job.parts
-    return fitted(item.expectation, item.material, wanted, job.receiver, beside, spread)
+    return fit_level_and_spreads(item.expectation, item.material, wanted, job.receiver, beside, spread)
 
 
 def _result(
@@ -399,30 +399,32 @@ def _result(
         gain = gain_of(rows, levels, hold, job.gain) if fitting else job.gain or _mean(levels)
     if fitting:
         rows = [
-            brightened(row, fit.level / gain).model_copy(
+            brighten_material(row, fit.level / gain).model_copy(
                 update={"spread_below": round(fit.below, 4), "spread_above": round(fit.above, 4)}
             )
             for row, fit in zip(rows, fits, strict=True)
         ]
-        rows = [_rounded(row) for row in rows]
-    compared = tuple(_compared(job, item, row, gain, rows, started) for item, row in zip(started, rows, strict=True))
+        rows = [_round_material(row) for row in rows]
+    compared = tuple(
+        _compare_class(job, item, row, gain, rows, started) for item, row in zip(started, rows, strict=True)
+    )
     return Calibration(job, gain, compared, {**table, **dict(zip(names, rows, strict=True))} if fitting else table)
 
 
-def _compared(
+def _compare_class(
     job: CalibrationJob, item: _Started, row: Material, gain: float, rows: list[Material], started: list[_Started]
 ) -> Compared:
     """Return a class with the intensities that its final material gives."""
     beside = next((own for own, other in zip(rows, started, strict=True) if other.wanted.told == "paved"), None)
     fit = Fit(gain, row.spread_below, row.spread_above)
     seen = item.expectation
-    linear = levelled(seen, row, fit, (beside, gain) if item.strip and beside is not None else None)
+    linear = apply_gain(seen, row, fit, (beside, gain) if item.strip and beside is not None else None)
     return Compared(
         item.wanted, item.before, row, job.receiver.stored(linear), seen.incidence, seen.distance, item.real
     )
 
 
-def _rounded(row: Material) -> Material:
+def _round_material(row: Material) -> Material:
     """Return a material with as many digits as a table holds; refused if a limit of the table is broken."""
     data = row.to_dict()
     for name in ("specular", "retroreflection", "facet_slope"):

@@ -169,7 +169,7 @@ def write_layouts(cloud: Path, folder: Path, recipe: Recipe, job: SceneJob, orig
     if not recipe.layouts:
         return
     with open_cloud(cloud) as source, TileSorter(recipe.tile, origin, folder) as sorter:
-        sorter.add(_thinned(source.blocks(), recipe.point_spacing, folder))
+        sorter.add(_thin_out(source.blocks(), recipe.point_spacing, folder))
         header = source.header
         writers = [WRITERS[name](folder, job, header.scheme, header.intensity_scale or 1.0) for name in recipe.layouts]
         for tile in sorter.tiles():
@@ -180,7 +180,7 @@ def write_layouts(cloud: Path, folder: Path, recipe: Recipe, job: SceneJob, orig
             writer.close()
 
 
-def _thinned(blocks: Iterator[PointBlock], spacing: float | None, folder: Path) -> Iterator[PointBlock]:
+def _thin_out(blocks: Iterator[PointBlock], spacing: float | None, folder: Path) -> Iterator[PointBlock]:
     if spacing is None:
         yield from blocks
         return

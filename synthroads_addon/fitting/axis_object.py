@@ -9,7 +9,7 @@ import numpy as np
 from pydantic import ValidationError
 
 from ..base.errors import InputError
-from ..base.schema import rounded
+from ..base.schema import round_value
 from ..road.parameters import AlignmentObject, HorizontalElement, VerticalPoint
 from ..scenario.road import RoadScenario
 from .fit import AxisFit, fit_axis, read_axis
@@ -37,21 +37,23 @@ def _alignment_object(fit: AxisFit) -> AlignmentObject:
     start, heading, _ = fit.alignment.frame(0.0)
     return AlignmentObject(
         instance=1,
-        start_x=rounded(float(start[0])),
-        start_y=rounded(float(start[1])),
-        start_heading_deg=rounded(float(np.rad2deg(np.angle(np.exp(1j * heading)))), 12),
+        start_x=round_value(float(start[0])),
+        start_y=round_value(float(start[1])),
+        start_heading_deg=round_value(float(np.rad2deg(np.angle(np.exp(1j * heading)))), 12),
         horizontal=tuple(
-            HorizontalElement.between(rounded(e.length), e.curvature_start, e.curvature_end)
+            HorizontalElement.between(round_value(e.length), e.curvature_start, e.curvature_end)
             for e in fit.alignment.elements
         ),
         vertical=tuple(
-            VerticalPoint(station=rounded(p.station), elevation=rounded(p.elevation), radius=_written(p.radius))
+            VerticalPoint(
+                station=round_value(p.station), elevation=round_value(p.elevation), radius=_written_radius(p.radius)
+            )
             for p in fit.profile.points
         ),
     )
 
 
-def _written(radius: float) -> float:
+def _written_radius(radius: float) -> float:
     """Return the radius of a rounding as it is written."""
     return radius * (1.0 - _PLAY) if radius < _FLATTEST else 0.0
 

@@ -288,7 +288,7 @@ def room(chain: Chain, least: float) -> FloatArray:
     return 0.5 * np.minimum(spare[:-1], spare[1:])
 
 
-def stepped(data: AxisData, chain: Chain, step: FloatArray) -> Chain:
+def apply_step(data: AxisData, chain: Chain, step: FloatArray) -> Chain:
     """Return the chain after a step (F,) of all parameters, its knots kept apart."""
     values = np.clip(chain.values + step[chain.value_columns], -data.limit, data.limit)
     spare = _SHARE * np.maximum(np.diff(chain.knots) - data.least, 0.0)
@@ -327,7 +327,7 @@ def refine(data: AxisData, chain: Chain, stations: FloatArray, free_knots: bool,
         weight = np.sqrt(damping * (fit.square + 1e-12 * len(fit.residuals)))
         rows = np.vstack((r, weight * held, np.sqrt(1e-7 * damping) * np.eye(r.shape[1])))
         step = least_squares(rows, np.concatenate((wanted, np.zeros(len(rows) - len(wanted))))) / scale
-        trial_chain = stepped(data, fit.chain, basis @ step)
+        trial_chain = apply_step(data, fit.chain, basis @ step)
         trial = ChainFit(trial_chain, *data.measure(trial_chain, fit.stations))
         if trial.square < fit.square:
             gain = 1.0 - trial.square / fit.square

@@ -19,7 +19,7 @@ from ..road.alignment import Alignment, Element, FloatArray, IntArray, finite_ar
 from ..road.centerline import read_axis
 from ..road.profile import IntersectionPoint, Profile
 from .chain import FREE, AxisData, Chain, ChainFit, Heights, Plan, elevations, refine
-from .search import Goal, descent, improved, independent
+from .search import Goal, descent, improve_fit, independent
 from .start import Start, start_heights, start_plan
 
 __all__ = ["AxisFit", "fit_axis", "read_axis"]
@@ -79,11 +79,11 @@ def fit_axis(points: ArrayLike, tolerance: float = 0.05) -> AxisFit:
     Raises:
         InputError: wrong shape, a value that isn't finite, fewer than two distinct points, a tolerance not above 0.
     """
-    given = _checked(points)
+    given = _check_points(points)
     if not (np.isfinite(tolerance) and tolerance > 0):
         raise InputError("tolerance", tolerance, "a finite length above 0 m is needed")
     origin = np.append(np.round(given[:, :2].mean(axis=0)), 0.0)
-    local, weights = _bridged(given - origin)
+    local, weights = _bridge_gaps(given - origin)
     alignment, near = _fit_plan(local[:, :2], weights, _MARGIN * tolerance)
     reach = max(_NEAR, 5.0 * float(np.median(np.diff(near))))
     station, _ = alignment.project_near(local[:, :2], near, reach)
@@ -96,7 +96,7 @@ def fit_axis(points: ArrayLike, tolerance: float = 0.05) -> AxisFit:
     return AxisFit(placed, profile, *_figures(station, across[real]), *_figures(station, above), points=len(given))
 
 
-def _checked(points: ArrayLike) -> FloatArray:
+def _check_points(points: ArrayLike) -> FloatArray:
     """Return (N, 3) finite points without consecutive duplicates in plan, N >= 2."""
     array = finite_array("points", points)
     if array.ndim != 2 or array.shape[1] not in (2, 3):
@@ -111,7 +111,7 @@ def _checked(points: ArrayLike) -> FloatArray:
     return array
 
 
-def _bridged(points: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _bridge_gaps(points: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return points (M, 3) with some added on the chord of every long gap, and weights (M,).
 
     A polyline with dense points on its curves only would leave the fit without a hold on the straights between. The
@@ -191,7 +191,7 @@ def _fit_plan(points: FloatArray, weights: FloatArray, tolerance: float) -> tupl
     """Return the alignment from the first point's foot to the last one's, and all points' stations, roughly."""
     run = np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))))
     chain, station = _walk(_PlanPart(points, weights), run, tolerance)
-    return _trimmed(chain, float(station[0]), float(station[-1])), station - station[0]
+    return _trim_ends(chain, float(station[0]), float(station[-1])), station - station[0]
 
 
 def _fit_heights(
@@ -222,8 +222,8 @@ def _walk(part: _Part, run: FloatArray, tolerance: float) -> tuple[Chain, FloatA
         fit = _solve(part, chosen, start, origin, float(run[end - 1] - run[first]), tolerance)
         station[first:end] = origin + np.interp(np.arange(first, end), chosen, fit.stations)
         if end == len(run):
-            return _joined([*pieces, fit.chain]), station
-        cut = _cut(fit.chain, tail)
+            return _join_pieces([*pieces, fit.chain]), station
+        cut = _window_end(fit.chain, tail)
         start = part.leave(fit.chain, cut)
         pieces.append(_head(fit.chain, cut))
         first, origin = int(chosen[np.argmax(fit.stations >= cut)]), origin + cut
@@ -252,7 +252,7 @@ def _solve(
         data, rich = finer_data, finer
     if not goal.met(rich):
         goal = replace(goal, rms=max(goal.rms, _RELAXED * rich.rms), p95=max(goal.p95, _RELAXED * rich.p95))
-    return improved(data, min(descent(data, rich, goal), key=goal.rank), goal)
+    return improve_fit(data, min(descent(data, rich, goal), key=goal.rank), goal)
 
 
 def _exactly(fit: ChainFit) -> bool:
@@ -261,7 +261,7 @@ def _exactly(fit: ChainFit) -> bool:
     return fit.rms < _EXACT or (fit.rms < _ROUNDED and float(r[1:] @ r[:-1]) < _RANDOM * fit.square)
 
 
-def _cut(chain: Chain, tail: float) -> float:
+def _window_end(chain: Chain, tail: float) -> float:
     """Return where to leave a window: at its last knot before the tail, or within a long element."""
     latest = max(chain.knots[-1] - tail, 0.5 * chain.knots[-1])  # points that turn back make a short chain
     good = chain.knots[(chain.knots <= latest) & (chain.knots >= 0.4 * latest)]
@@ -276,7 +276,7 @@ def _head(chain: Chain, cut: float) -> Chain:
     return replace(chain, knots=knots, values=values, kinds=chain.kinds[:count])
 
 
-def _joined(pieces: list[Chain]) -> Chain:
+def _join_pieces(pieces: list[Chain]) -> Chain:
     """Return the pieces as one chain; lines, arcs and constant grades that a cut went through become one again."""
     knots, values = [0.0], [float(pieces[0].values[0])]
     kinds: list[int] = []
@@ -294,7 +294,7 @@ def _joined(pieces: list[Chain]) -> Chain:
     return Chain(pieces[0].pose, np.array(knots), np.array(values), np.array(kinds))
 
 
-def _trimmed(chain: Chain, first: float, last: float) -> Alignment:
+def _trim_ends(chain: Chain, first: float, last: float) -> Alignment:
     """Return the alignment from the first point's foot to the last one's, the outer elements cut or prolonged."""
     knots, values = chain.knots.copy(), chain.values.copy()
     heading, (x, y) = float(chain.pose[2]), chain.pose[:2]

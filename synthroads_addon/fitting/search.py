@@ -27,11 +27,11 @@ from .chain import (
     AxisData,
     Chain,
     ChainFit,
+    apply_step,
     column_scale,
     knot_penalty,
     least_squares,
     refine,
-    stepped,
 )
 
 _CORRELATED = 20.0  # m
@@ -96,7 +96,7 @@ def independent(length: float, points: int) -> float:
     return max(4.0, min(float(points), max(10.0, length / _CORRELATED)))
 
 
-def edited(chain: Chain, edits: Sequence[Edit]) -> tuple[Chain, list[int]]:
+def apply_edits(chain: Chain, edits: Sequence[Edit]) -> tuple[Chain, list[int]]:
     """Return the chain's structure after edits, with its values as they are, and the knots that stay.
 
     Constant elements that come to lie side by side are one.
@@ -150,7 +150,7 @@ def _lift(chain: Chain, new: Chain, keep: list[int]) -> FloatArray:
 
 def foresee(data: AxisData, fit: ChainFit, edits: Sequence[Edit], free_knots: bool, goal: Goal) -> tuple[Chain, float]:
     """Return the edited chain at the optimum of the linearised problem, and the sum of squares expected there."""
-    new, keep = edited(fit.chain, edits)
+    new, keep = apply_edits(fit.chain, edits)
     new = new.tied()
     basis, lift = new.basis(free_knots), _lift(fit.chain, new, keep)
     start = np.zeros(len(lift))  # the jump to the new chain's values
@@ -165,7 +165,7 @@ def foresee(data: AxisData, fit: ChainFit, edits: Sequence[Edit], free_knots: bo
     rest = rows @ scaled
     rest[: len(wanted)] -= wanted
     square = float(rest @ rest) - float(projected @ projected) + fit.square
-    return stepped(data, new, basis @ (scaled / scale)), square
+    return apply_step(data, new, basis @ (scaled / scale)), square
 
 
 def _allowance(fit: ChainFit, goal: Goal) -> float:
@@ -202,7 +202,7 @@ def options(data: AxisData, fit: ChainFit, free_knots: bool, goal: Goal) -> list
         square[np.diag_indices(len(square))] *= 1.0 + 1e-9
         if (np.diag(square) > 0).all():
             cost = float(violation @ np.linalg.solve(square, violation))
-            score = goal.expected(fit.square + cost, edited(chain, [edit])[0], len(fit.residuals))
+            score = goal.expected(fit.square + cost, apply_edits(chain, [edit])[0], len(fit.residuals))
             result.append((score - present, edit))
     return sorted(result, key=lambda pair: pair[0])
 
@@ -254,18 +254,18 @@ def _several(options_: list[tuple[float, Edit]], most: int, gain: float) -> list
     return chosen
 
 
-def _refined(data: AxisData, fit: ChainFit, chain: Chain, free_knots: bool) -> ChainFit:
+def _refine_again(data: AxisData, fit: ChainFit, chain: Chain, free_knots: bool) -> ChainFit:
     return refine(data, chain, fit.stations, free_knots, 12)
 
 
-def simplified(data: AxisData, fit: ChainFit, free_knots: bool, goal: Goal) -> ChainFit | None:
+def simplify_fit(data: AxisData, fit: ChainFit, free_knots: bool, goal: Goal) -> ChainFit | None:
     """Return the fit after the edit, or the edits at once, that cost least; None if there is nothing to take away."""
     ways = options(data, fit, free_knots, goal)
     batch = _several(ways, max(1, fit.chain.size // 3), 0.5 * np.log(goal.count))
     present = goal.score(fit)
     while len(batch) > 1:
         chain, _ = foresee(data, fit, [edit for _, edit in batch], free_knots, goal)
-        trial = _refined(data, fit, chain, free_knots)
+        trial = _refine_again(data, fit, chain, free_knots)
         if goal.score(trial) - present <= 0.5 * math.fsum(change for change, _ in batch):
             return trial
         batch = batch[: len(batch) // 2]
@@ -282,7 +282,7 @@ def _trials(data: AxisData, fit: ChainFit, edits: list[Edit], free_knots: bool, 
     foreseen = [foresee(data, fit, [edit], free_knots, goal) for edit in edits]
     scores = [goal.expected(square, chain, len(fit.residuals)) for chain, square in foreseen]
     for i in np.argsort(scores, kind="stable")[:_TRIALS]:
-        yield _refined(data, fit, foreseen[i][0], free_knots)
+        yield _refine_again(data, fit, foreseen[i][0], free_knots)
 
 
 def descent(data: AxisData, fit: ChainFit, goal: Goal) -> list[ChainFit]:
@@ -292,7 +292,7 @@ def descent(data: AxisData, fit: ChainFit, goal: Goal) -> list[ChainFit]:
     """
     path, free_knots = [fit], False
     while fit.rms < _HOPELESS * max(goal.rms, path[0].rms):
-        trial = simplified(data, fit, free_knots, goal)
+        trial = simplify_fit(data, fit, free_knots, goal)
         if not free_knots and (trial is None or goal.score(trial) > goal.score(fit)):
             free_knots = True
             trial = refine(data, fit.chain, fit.stations, True, 20)
@@ -325,11 +325,11 @@ def splits(data: AxisData, fit: ChainFit) -> list[Chain]:
         for knot in fine[e * _PARTS + 1 : (e + 1) * _PARTS]:
             if min(knot - chain.knots[e], chain.knots[e + 1] - knot) >= data.least:
                 hat = hats @ np.interp(fine, [chain.knots[e], knot, chain.knots[e + 1]], [0.0, 1.0, 0.0])
-                ways.append((_gain([hat, *ends], q, rest), _split(chain, freed, e, knot)))
+                ways.append((_gain([hat, *ends], q, rest), _split_element(chain, freed, e, knot)))
     return [new for _, new in sorted(ways, key=lambda way: -way[0])]
 
 
-def _split(chain: Chain, freed: IntArray, e: int, knot: float) -> Chain:
+def _split_element(chain: Chain, freed: IntArray, e: int, knot: float) -> Chain:
     """Return the chain with a knot in element e, both parts of which are free."""
     values = np.insert(chain.values, e + 1, np.interp(knot, chain.knots, chain.values))
     return replace(chain, knots=np.insert(chain.knots, e + 1, knot), values=values, kinds=np.insert(freed, e, FREE))
@@ -344,7 +344,7 @@ def _gain(columns: list[FloatArray], q: FloatArray, rest: FloatArray) -> float:
     return float(rest @ (new @ solution))
 
 
-def improved(data: AxisData, fit: ChainFit, goal: Goal, steps: int = 60) -> ChainFit:
+def improve_fit(data: AxisData, fit: ChainFit, goal: Goal, steps: int = 60) -> ChainFit:
     """Return a fit that no single edit improves: grown until the bounds are met, then changed while the rank falls."""
     for _ in range(steps):
         while goal.met(fit):
@@ -353,7 +353,7 @@ def improved(data: AxisData, fit: ChainFit, goal: Goal, steps: int = 60) -> Chai
             if best is None or not _better(best, fit, goal):
                 break
             fit = best
-        grown = [_refined(data, fit, chain, True) for chain in splits(data, fit)[:_TRIALS]]
+        grown = [_refine_again(data, fit, chain, True) for chain in splits(data, fit)[:_TRIALS]]
         best = min(grown, key=goal.score, default=None)
         if best is None:
             return fit

@@ -20,7 +20,7 @@ def start_plan(points: FloatArray, spacing: float, start: Start | None) -> tuple
     through = points if start is None else np.vstack((start[0][:2], points))
     run = np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(through, axis=0).T))))
     at = np.linspace(0.0, run[-1], int(run[-1] / min(1.0, 0.1 * spacing)) + 20)
-    curve = smoothed(run, through, 0.5 * spacing, at)
+    curve = smooth_values(run, through, 0.5 * spacing, at)
     move = np.diff(curve, axis=0)
     station = np.concatenate(([0.0], np.cumsum(np.hypot(*move.T))))
     heading = np.unwrap(np.arctan2(move[:, 1], move[:, 0]))
@@ -43,7 +43,7 @@ def start_heights(station: FloatArray, heights: FloatArray, spacing: float, star
     if start is not None:
         station, heights = np.append(0.0, station), np.append(start[0][0], heights)
     knots = even_knots(station[-1], spacing)
-    curve = smoothed(station, heights[:, None], 0.5 * spacing, knots)[:, 0]
+    curve = smooth_values(station, heights[:, None], 0.5 * spacing, knots)[:, 0]
     grade = np.diff(curve) / np.diff(knots)
     values = np.concatenate((grade[:1], 0.5 * (grade[1:] + grade[:-1]), grade[-1:]))
     if start is None:
@@ -61,7 +61,7 @@ def _free(knots: FloatArray) -> IntArray:
     return np.full(len(knots) - 1, FREE)
 
 
-def smoothed(run: FloatArray, values: FloatArray, spacing: float, at: FloatArray) -> FloatArray:
+def smooth_values(run: FloatArray, values: FloatArray, spacing: float, at: FloatArray) -> FloatArray:
     """Return (M, D): at `at` (M), a cubic spline of even knots through values (N, D) at `run` (N).
 
     Its third differences are penalised, so that it goes on smoothly through gaps in the data.

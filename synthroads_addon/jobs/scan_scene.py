@@ -106,7 +106,7 @@ def scan_scene(job: SceneScan, progress: Progress = silent) -> dict[str, Any]:
             if job.scene is not None:
                 open_scene(job.scene, job.up)
         with timer.stage("scene mesh"):
-            read = _read(job, mapping)
+            read = _read_scene(job, mapping)
         mesh, road = read.scene.static, RoadGeometry(read.road) if read.road else None
         path, conditions = scene_path(job, mesh, road), ScanConditions.of(read.road)
         if scenario.chooses:
@@ -156,7 +156,7 @@ def check_scene_scan(job: SceneScan) -> ClassMapping | None:
     return ClassMapping.from_dict(read_json(job.classes), source=str(job.classes))
 
 
-def _read(job: SceneScan, mapping: ClassMapping | None) -> _Read:
+def _read_scene(job: SceneScan, mapping: ClassMapping | None) -> _Read:
     """Return the open scene's triangles and road; refuse a scene in which there is nothing to scan."""
     from ..blender.model.store import open_road  # see `scan_scene`
     from ..blender.scene.evaluated import scanned_scene

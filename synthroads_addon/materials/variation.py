@@ -28,7 +28,7 @@ _POROUS = ("asphalt", "concrete", "soil", "verge", *_PAINTS)
 _DEFAULT = MaterialVariation()
 
 
-def varied(
+def vary_material(
     name: str, variation: MaterialVariation, environment: Environment, own: Mapping[str, Material] | None = None
 ) -> Material:
     """Return a material of the table as a road with this variation and weather has it; KeyError for other names.
@@ -38,7 +38,7 @@ def varied(
         variation, environment: the road's.
         own: materials that take the place of the shipped table's, or stand beside them.
     """
-    result = _aged(name, {**materials(), **(own or {})}, variation)
+    result = _age_material(name, {**materials(), **(own or {})}, variation)
     if environment.wetness > 0.0 and name in _POROUS:
         result = _wet(result, environment.wetness)
     return result
@@ -47,7 +47,7 @@ def varied(
 def _wet(dry: Material, wet: float) -> Material:
     """Return a porous material under a film of water; its facets get flatter as the roughness's would."""
     smoother = 1.0 - WET_ROUGHNESS * wet
-    result = _scaled(dry, 1.0 - WET_BASE * wet, 1.0 - WET_SPECULAR * wet)
+    result = _scale_color(dry, 1.0 - WET_BASE * wet, 1.0 - WET_SPECULAR * wet)
     return result.model_copy(
         update={
             "roughness": dry.roughness * smoother,
@@ -57,20 +57,20 @@ def _wet(dry: Material, wet: float) -> Material:
     )
 
 
-def _aged(name: str, table: Mapping[str, Material], variation: MaterialVariation) -> Material:
+def _age_material(name: str, table: Mapping[str, Material], variation: MaterialVariation) -> Material:
     mean = table[name]
     if name == "asphalt":
-        return _scaled(mean, variation.asphalt_brightness * _of_age(variation) / _of_age(_DEFAULT))
+        return _scale_color(mean, variation.asphalt_brightness * _of_age(variation) / _of_age(_DEFAULT))
     if name == "concrete":
-        return _scaled(mean, variation.concrete_brightness)
+        return _scale_color(mean, variation.concrete_brightness)
     if name == "soil":
-        return _scaled(mean, variation.soil_brightness)
+        return _scale_color(mean, variation.soil_brightness)
     if name in _PAINTS:
         worn = (variation.paint_wear - _DEFAULT.paint_wear) / (1.0 - _DEFAULT.paint_wear)
-        return _mixed(mean, table["asphalt"], worn)
+        return _mix_materials(mean, table["asphalt"], worn)
     if name in _GRASSES:
         dry = (variation.grass_dryness - _DEFAULT.grass_dryness) / (1.0 - _DEFAULT.grass_dryness)
-        return _mixed(mean, mean.model_copy(update={"base_color": DRY_GRASS}), dry)
+        return _mix_materials(mean, mean.model_copy(update={"base_color": DRY_GRASS}), dry)
     return mean
 
 
@@ -79,13 +79,13 @@ def _of_age(variation: MaterialVariation) -> float:
     return new + (old - new) * variation.asphalt_age
 
 
-def _scaled(mean: Material, factor: float, specular: float | None = None) -> Material:
+def _scale_color(mean: Material, factor: float, specular: float | None = None) -> Material:
     color = np.clip(np.array(mean.base_color) * factor, 0.0, 1.0)
     reflected = float(np.clip(mean.specular * (factor if specular is None else specular), 0.0, 1.0))
     return mean.model_copy(update={"base_color": tuple(color.tolist()), "specular": reflected})
 
 
-def _mixed(mean: Material, other: Material, share: float) -> Material:
+def _mix_materials(mean: Material, other: Material, share: float) -> Material:
     """Return a material between two; a negative share goes beyond the first, away from the other.
 
     Roughness, transmission, spread and the lobe of the retro-reflection stay the first's.

@@ -9,7 +9,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from ..base.schema import rounded
+from ..base.schema import round_value
 from ..base.version import generator
 from ..fitting.axis_object import alignment_object
 from ..fitting.fit import AxisFit
@@ -88,7 +88,7 @@ class Measured:
     title: str
 
 
-def assembled(measured: Measured) -> RoadParameters:
+def assemble_parameters(measured: Measured) -> RoadParameters:
     """Return the parameter set of what was measured; the schema checks it.
 
     Raises:
@@ -179,7 +179,7 @@ def _corners(station: Float, value: Float, tolerance: float) -> list[int]:
 
 def _markings(measured: Measured) -> Iterator[tuple[str, LineMarking]]:
     section = measured.section
-    length = rounded(measured.fit.alignment.length)
+    length = round_value(measured.fit.alignment.length)
     for side in _SIDES:
         own = section.sides[side]
         last = len(own.lines) - 1
@@ -250,7 +250,7 @@ def _line(
 
 
 def _furniture(measured: Measured) -> Iterator[tuple[str, RoadObject]]:
-    length = rounded(measured.fit.alignment.length)
+    length = round_value(measured.fit.alignment.length)
     for number, barrier in enumerate(measured.barriers, 1):
         start = 0.0 if barrier.start < _END else _length(barrier.start)
         end = length if barrier.end > length - _END else _length(barrier.end)

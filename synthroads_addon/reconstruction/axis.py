@@ -52,12 +52,12 @@ def centre_of(layout: RoadLayout) -> Centre:
     raw, start = given, given
     if not np.isfinite(given).any():
         start = np.nanmean(np.array([line.measured for line in lines]), axis=0)
-    axis = _filled(start)
+    axis = _fill_gaps(start)
     for _ in range(_ROUNDS):
-        raw = _voted(lines, axis)
+        raw = _vote_axis(lines, axis)
         # The votes fix the movement; where the axis lies, its own lines say.
         raw = raw + _level(given - raw)
-        axis = _filled(raw)
+        axis = _fill_gaps(raw)
     smoothed = smooth(raw, np.where(np.isfinite(raw), 1.0, 0.0), STRETCH * SPACING, WAVELENGTH, usual=USUAL)
     level_std = mean_with_std(given - raw)[1]
     level_std = float(np.hypot(level_std if np.isfinite(level_std) else 0.0, _shared_error(guides, smoothed.scatter)))
@@ -75,13 +75,13 @@ def axis_guides(layout: RoadLayout) -> tuple[Line, ...]:
     return (band.middle,) if band.middle is not None else (band.guide(-1), band.guide(1))
 
 
-def _voted(lines: list[Line], axis: Float) -> Float:
+def _vote_axis(lines: list[Line], axis: Float) -> Float:
     """Return the axis (K,) by the votes of all lines, each relative to its mean distance from a first axis."""
     offsets = np.array([line.measured for line in lines])
     std = np.array([line.std for line in lines])
     apart = offsets - axis
     middle = np.array([mean_with_std(row)[0] for row in apart])
-    spread = np.array([_spread(row - value) for row, value in zip(apart, middle, strict=True)])
+    spread = np.array([_robust_spread(row - value) for row, value in zip(apart, middle, strict=True)])
     seen = np.isfinite(offsets) & np.isfinite(std)
     weight = np.where(seen, 1.0 / (spread[:, None] ** 2 + np.where(seen, std, 1.0) ** 2 + 1e-6), 0.0)
     votes = np.where(seen, offsets - middle[:, None], 0.0)
@@ -95,7 +95,7 @@ def _shared_error(guides: tuple[Line, ...], scatter: float) -> float:
     return float(np.sqrt(sum(unseen(line.apart, scatter) ** 2 for line in guides))) / len(guides)
 
 
-def _spread(values: Float) -> float:
+def _robust_spread(values: Float) -> float:
     known = values[np.isfinite(values)]
     return max(1.4826 * float(np.median(np.abs(known))), 0.003) if len(known) else np.inf
 
@@ -105,7 +105,7 @@ def _level(difference: Float) -> float:
     return value if np.isfinite(value) else 0.0
 
 
-def _filled(values: Float) -> Float:
+def _fill_gaps(values: Float) -> Float:
     rows = np.arange(len(values))
     known = np.isfinite(values)
     return np.interp(rows, rows[known], values[known])

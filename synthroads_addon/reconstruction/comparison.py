@@ -135,8 +135,8 @@ def _barriers(there: RoadGeometry, here: RoadGeometry, apart: Float) -> dict[str
     """Return length, recall and precision of all barriers: shares of their metres with one of the other set near."""
     true = [item for item in there.parameters.objects.values() if isinstance(item, _BARRIERS)]
     mine = [item for item in here.parameters.objects.values() if isinstance(item, _BARRIERS)]
-    recalled, error = _matched(there, true, here, mine, apart)
-    precise, _ = _matched(here, mine, there, true, -apart)
+    recalled, error = _match_barriers(there, true, here, mine, apart)
+    precise, _ = _match_barriers(here, mine, there, true, -apart)
     return {
         "true_length": round(float(len(recalled)), 1),
         "found_length": round(float(len(precise)), 1),
@@ -146,7 +146,7 @@ def _barriers(there: RoadGeometry, here: RoadGeometry, apart: Float) -> dict[str
     }
 
 
-def _matched(
+def _match_barriers(
     one: RoadGeometry, items: list[Any], other: RoadGeometry, others: list[Any], apart: Float
 ) -> tuple[NDArray[np.bool_], Float]:
     """Return of each metre of some barriers whether one of the others stands there, and how far beside (m)."""

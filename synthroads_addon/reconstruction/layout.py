@@ -101,7 +101,7 @@ def find_layout(profiles: Profiles, lines: list[Line], wanted: RoadKind | None =
         InputError: no carriageway can be made out.
     """
     paved = profiles.paved if profiles.paved is not None else paved_by_brightness(profiles, lines)
-    seen = covered(profiles)
+    seen = covered_length(profiles)
     main = [line for line in lines if line.length >= _SEEN * seen]
     notes = []
     spans = paved_bands(profiles, paved)
@@ -121,7 +121,7 @@ def find_layout(profiles: Profiles, lines: list[Line], wanted: RoadKind | None =
     return RoadLayout("dual" if pair else "single", chosen, paved, tuple(notes))
 
 
-def covered(profiles: Profiles) -> float:
+def covered_length(profiles: Profiles) -> float:
     """Return the length (m) on which the profiles have points."""
     return float((profiles.count.sum(axis=1) > 0).sum())
 
@@ -131,7 +131,7 @@ def paved_bands(profiles: Profiles, paved: Grid) -> list[tuple[float, float]]:
     known = np.isfinite(paved)
     rows = known.sum(axis=0)
     share = np.where(known, paved, 0.0).sum(axis=0) / np.maximum(rows, 1)
-    on = (share > 0.5) & (rows > 0.3 * covered(profiles))
+    on = (share > 0.5) & (rows > 0.3 * covered_length(profiles))
     on = ndimage.binary_closing(on, iterations=round(0.3 / ACROSS))
     label, count = ndimage.label(on)
     spans = []
@@ -150,7 +150,7 @@ def paved_by_brightness(profiles: Profiles, lines: list[Line]) -> Grid:
     grass, soil and gravel are mostly brighter. Otsu's threshold parts the differences from that brightness, if there
     are two kinds of them; if not, all is pavement.
     """
-    brightness = _blurred(profiles.brightness)
+    brightness = _blur(profiles.brightness)
     known = np.isfinite(brightness)
     sure = np.zeros(brightness.shape, dtype=bool)
     rows = np.arange(len(profiles.stations))
@@ -185,7 +185,7 @@ def _lane_lines(lines: list[Line]) -> list[Line]:
     return [line for line in dashed if line.length > 0.5 * longest] or sorted(lines, key=lambda item: -item.length)[:1]
 
 
-def _blurred(values: Grid) -> Grid:
+def _blur(values: Grid) -> Grid:
     known = np.isfinite(values)
     weight = ndimage.gaussian_filter(known.astype(np.float32), _BLUR)
     mean = ndimage.gaussian_filter(np.where(known, values, 0.0).astype(np.float32), _BLUR)

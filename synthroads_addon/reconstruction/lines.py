@@ -86,7 +86,7 @@ class Line:
 
 def find_lines(profiles: Profiles) -> list[Line]:
     """Return the lines of profiles from right to left."""
-    lines = [_measured(profiles, *track) for track in _tracks(profiles)]
+    lines = [_measure_line(profiles, *track) for track in _tracks(profiles)]
     return sorted((line for line in lines if line is not None), key=lambda line: line.offset)
 
 
@@ -98,7 +98,7 @@ def _tracks(profiles: Profiles) -> list[tuple[Float, Float]]:
     for row in range(0, max(1, rows - _WINDOW // 2), _STEP):
         station = float(profiles.stations[row : row + _WINDOW].mean())
         peaks = _peaks(profiles, profiles.paint[row : row + _WINDOW])
-        running, ended = _linked(running, peaks, station)
+        running, ended = _link_peaks(running, peaks, station)
         closed += ended
     found = [np.array(track) for track in closed + running if len(track) >= 2]
     return [(track[:, 0], track[:, 1]) for track in found]
@@ -123,12 +123,14 @@ def _vertex(values: Float, at: int, places: Float) -> float:
     return float(places[at] + (0.5 * ACROSS * (before - after) / bend if bend < 0.0 else 0.0))
 
 
-def _linked(
+def _link_peaks(
     running: list[list[tuple[float, float]]], peaks: list[float], station: float
 ) -> tuple[list[list[tuple[float, float]]], list[list[tuple[float, float]]]]:
     """Return the tracks that go on, with the peaks that continue them or begin new ones, and those that ended."""
     pairs = sorted(
-        (abs(peak - _expected(track, station)), i, j) for i, track in enumerate(running) for j, peak in enumerate(peaks)
+        (abs(peak - _expected_place(track, station)), i, j)
+        for i, track in enumerate(running)
+        for j, peak in enumerate(peaks)
     )
     taken: set[int] = set()
     continued: set[int] = set()
@@ -143,7 +145,7 @@ def _linked(
     return going, ended
 
 
-def _expected(track: list[tuple[float, float]], station: float) -> float:
+def _expected_place(track: list[tuple[float, float]], station: float) -> float:
     """Return where a track should be at a station: straight on from its last 40 m."""
     if len(track) < 3:
         return track[-1][1]
@@ -152,7 +154,7 @@ def _expected(track: list[tuple[float, float]], station: float) -> float:
     return u1 + slope * min(station - s1, 20.0)
 
 
-def _measured(profiles: Profiles, stations: Float, offsets: Float) -> Line | None:
+def _measure_line(profiles: Profiles, stations: Float, offsets: Float) -> Line | None:
     """Return the line along a track; None where too little paint lies there."""
     half = _WINDOW / 2.0
     start = max(profiles.stations[0], stations[0] - half)

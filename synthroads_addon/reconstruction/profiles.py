@@ -105,7 +105,7 @@ def make_profiles(cloud: RoadCloud, path: CloudPath, half_width: float, exact: b
         brightness = total(cloud.intensity[surface][inside]) / count
         paved = total(np.isin(kind, (PointKind.PAVEMENT, PointKind.MARKING))) / count if cloud.labelled else None
         marked = total(kind == PointKind.MARKING) / count if cloud.marked else None
-    paint = painted(brightness, paved) if marked is None else marked
+    paint = paint_share(brightness, paved) if marked is None else marked
     stations = path.start + SPACING * (np.arange(rows) + 0.5)
     offsets = ACROSS * (np.arange(columns) - columns // 2 + 0.5)
     points = None
@@ -129,7 +129,7 @@ def _by_stretch(
     )
 
 
-def painted(brightness: Grid, paved: Grid | None) -> Grid:
+def paint_share(brightness: Grid, paved: Grid | None) -> Grid:
     """Return how far towards paint (1) from the pavement around it (0) each bin (S, U) is, by its intensity.
 
     The pavement around is the median of 11 m by 2.5 m: lines are narrower than that, and verges wider. Where classes
@@ -140,14 +140,14 @@ def painted(brightness: Grid, paved: Grid | None) -> Grid:
         known &= np.nan_to_num(paved) > 0.5
     if not known.any():
         return np.full(brightness.shape, np.nan, dtype=np.float32)
-    filled = _filled(brightness, known)
+    filled = _fill_bins(brightness, known)
     above = np.where(known, filled - ndimage.median_filter(filled, size=_BACKGROUND), 0.0)
     spread = 1.4826 * float(np.median(np.abs(above[known] - np.median(above[known]))))
     full = max(float(np.percentile(above[known], _PAINT_PERCENTILE)), 4.0 * spread, 1e-12)
     return np.where(known, np.clip(above / full, -0.5, 1.5), np.nan).astype(np.float32)
 
 
-def _filled(values: Grid, known: NDArray[np.bool_]) -> Grid:
+def _fill_bins(values: Grid, known: NDArray[np.bool_]) -> Grid:
     """Return values (S, U) whose unknown bins hold the mean of what is known around, farther away the less is."""
     result = np.where(known, values, 0.0).astype(np.float32)
     done = known.copy()

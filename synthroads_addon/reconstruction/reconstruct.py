@@ -12,7 +12,7 @@ from ..base.errors import InputError
 from ..base.progress import Progress, silent
 from ..fitting.fit import AxisFit, fit_axis
 from ..road.parameters import RoadParameters
-from .assemble import Measured, RotationAxis, assembled
+from .assemble import Measured, RotationAxis, assemble_parameters
 from .axis import Centre, centre_of
 from .cloud import PointKind, RoadCloud
 from .edges import Surface, paved_edge, stretch_middles, surface
@@ -21,10 +21,10 @@ from .lines import find_lines
 from .objects import find_barriers, find_posts
 from .path import SPACING, CloudPath, alignment_path, first_path, path_through
 from .profiles import STRETCH, Profiles, make_profiles
-from .registration import registered
-from .section import MeasuredSection, Side, SideSection, measure_section, snapped
+from .registration import register_path
+from .section import MeasuredSection, Side, SideSection, measure_section, snap_to_standard
 from .smoothing import smooth
-from .surroundings import faced, measure_ground, standing_points
+from .surroundings import face_guardrails, measure_ground, standing_points
 
 Float = NDArray[np.float64]
 Predictor = Callable[[RoadCloud, CloudPath], tuple[Float, Float]]
@@ -90,21 +90,21 @@ def reconstruct(cloud: RoadCloud, options: Options | None = None, progress: Prog
     """
     options = options or Options()
     progress("path", 0.0)
-    path, half = straightened(cloud, options)
+    path, half = straighten_path(cloud, options)
     whole, cloud = cloud, cloud.near(path, half + _AROUND)
     progress("lines", 0.3)
     profiles, layout, centre = _axis(cloud, path, half, options)
     path = path.moved(np.interp(path.stations, centre.stations, centre.offsets))
     profiles, layout, centre = _axis(cloud, path, half, options)  # a straight line is smoothed better than a bent one
     progress("alignment", 0.5)
-    fit, rotation = fitted(profiles, layout, centre, options.tolerance)
+    fit, rotation = fit_axis_and_profile(profiles, layout, centre, options.tolerance)
     progress("section", 0.6)
     along = alignment_path(fit.alignment)
     profiles = make_profiles(cloud, along, half, exact=True)
     layout = find_layout(profiles, find_lines(profiles), layout.kind)
     section = measure_section(profiles, layout, cloud.marked)
     if options.snap:
-        section = snapped(section)
+        section = snap_to_standard(section)
     surfaces = {side: _surface(profiles, section, side, rotation) for side in _SIDES}
     progress("objects", 0.8)
     ground = measure_ground(whole, along, section, fit.profile.elevation(along.stations))
@@ -118,18 +118,18 @@ def reconstruct(cloud: RoadCloud, options: Options | None = None, progress: Prog
         stations=stretch_middles(profiles),
         crossfall={side: _smooth_fall(surfaces[side]) for side in _SIDES},
         rotation=rotation,
-        barriers=faced(barriers, section),
+        barriers=face_guardrails(barriers, section),
         posts=find_posts(standing, used),
         ground=ground,
         marked=cloud.marked,
         title=options.title,
     )
-    parameters = assembled(measured)
+    parameters = assemble_parameters(measured)
     notes = [*layout.notes, *_notes(cloud, section, measured)]
     return Reconstruction(parameters, measured, centre, path, profiles, layout, surfaces, notes)
 
 
-def straightened(cloud: RoadCloud, options: Options) -> tuple[CloudPath, float]:
+def straighten_path(cloud: RoadCloud, options: Options) -> tuple[CloudPath, float]:
     """Return a path parallel to the road, and how far to either side of it there is something to see (m)."""
     xy = cloud.xyz[cloud.of(PointKind.PAVEMENT, PointKind.MARKING) if cloud.labelled else cloud.surface, :2]
     path = path_through(options.path) if options.path is not None else first_path(xy)
@@ -139,7 +139,7 @@ def straightened(cloud: RoadCloud, options: Options) -> tuple[CloudPath, float]:
         raise InputError("--path", None, "no point of the road lies within 45 m of it")
     half = float(np.clip(np.percentile(near, 99) + _MARGIN, *_HALF_WIDTHS))
     for _ in range(_REGISTRATIONS):
-        path = registered(path, make_profiles(cloud, path, half))
+        path = register_path(path, make_profiles(cloud, path, half))
     return path, half
 
 
@@ -169,7 +169,9 @@ def _centre(cloud: RoadCloud, profiles: Profiles, layout: RoadLayout, options: O
     return Centre(stations, smoothed.values, smoothed.std, np.where(inside, raw, np.nan))
 
 
-def fitted(profiles: Profiles, layout: RoadLayout, centre: Centre, tolerance: float) -> tuple[AxisFit, RotationAxis]:
+def fit_axis_and_profile(
+    profiles: Profiles, layout: RoadLayout, centre: Centre, tolerance: float
+) -> tuple[AxisFit, RotationAxis]:
     """Return alignment and profile through the axis, and the line about which the crossfall turns.
 
     The profile is the height of that line, the same for both carriageways: of the two lines that a parameter set can

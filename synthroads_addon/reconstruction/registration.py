@@ -32,7 +32,7 @@ class _Fit:
     score: float
 
 
-def registered(path: CloudPath, profiles: Profiles) -> CloudPath:
+def register_path(path: CloudPath, profiles: Profiles) -> CloudPath:
     """Return a path parallel to what its profiles show: its offset from any line of the road changes slowly at most.
 
     Stretches of 20 m are sheared and shifted against the mean of those before them, beginning with the most usual one.
@@ -40,7 +40,7 @@ def registered(path: CloudPath, profiles: Profiles) -> CloudPath:
     """
     signal = evidence(profiles)
     starts = np.arange(0, max(1, len(signal) - WINDOW + 1), STEP)
-    blocks = [_sheared(signal[row : row + WINDOW]) for row in starts]
+    blocks = [_shear_profiles(signal[row : row + WINDOW]) for row in starts]
     energy = np.array([float((block**2).sum(axis=1).max()) for block in blocks])
     if energy.max() <= 0.0:
         return path
@@ -72,7 +72,7 @@ def _most_usual(blocks: list[Float]) -> int:
     """Return the stretch that is most like its neighbours: no hatching, no arrows, no bridge above."""
     alike = np.zeros(len(blocks) + 1)
     for number in range(len(blocks) - 1):
-        fit = _best(blocks[number + 1], _laid(blocks[number], _own(blocks[number])), 0.0, 2.0 * _REACH)
+        fit = _best(blocks[number + 1], _shift_profile(blocks[number], _own(blocks[number])), 0.0, 2.0 * _REACH)
         alike[number + 1] = fit.score if fit is not None else 0.0
     return int(np.minimum(alike[:-1], alike[1:]).argmax())
 
@@ -87,7 +87,7 @@ def evidence(profiles: Profiles) -> Grid:
     return np.asarray(signal, dtype=np.float32)
 
 
-def _sheared(block: Grid) -> Float:
+def _shear_profiles(block: Grid) -> Float:
     """Return the mean profile (shears, U) of a stretch (rows, U) under each shear."""
     middle = 0.5 * (len(block) - 1)
     result = np.zeros((len(_SHEARS), block.shape[1]))
@@ -102,7 +102,7 @@ def _follow(blocks: list[Float], fits: list[_Fit], order: range, first: int) -> 
     if not len(order):
         return
     sign = order.step
-    template = _laid(blocks[first], fits[first])
+    template = _shift_profile(blocks[first], fits[first])
     last, loose = fits[first], _REACH
     distance = 0
     for index in order:
@@ -113,11 +113,11 @@ def _follow(blocks: list[Float], fits: list[_Fit], order: range, first: int) -> 
             loose = min(loose + _LOOSE, 3.0 * _REACH)
             continue
         fits[index] = fit
-        template = _MEMORY * template + (1.0 - _MEMORY) * _laid(blocks[index], fit)
+        template = _MEMORY * template + (1.0 - _MEMORY) * _shift_profile(blocks[index], fit)
         last, loose, distance = fit, _REACH, 0
 
 
-def _laid(block: Float, fit: _Fit) -> Float:
+def _shift_profile(block: Float, fit: _Fit) -> Float:
     number = int(np.abs(_SHEARS - fit.shear).argmin())
     return np.roll(block[number], -round(fit.shift / ACROSS))
 

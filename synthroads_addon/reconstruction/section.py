@@ -174,14 +174,14 @@ def _side(profiles: Profiles, layout: RoadLayout, band: Band, name: Side, marked
     sign = 1 if name == "left" else -1
     if len(band.lines) < 2:
         return _by_width(profiles, layout, band, name)
-    lines, distances, apart = _ordered(band, sign)
+    lines, distances, apart = _order_lines(band, sign)
     distances[:, 0] += 0.5 * line_width(lines[0], "inner", "dual", marked)
     outer = _outwards(paved_edge(profiles, layout.paved, sign * _everywhere(distances[:, -1]), sign), sign)
     if not _open(lines[-1], outer):
         distances[:, -1] -= 0.5 * line_width(lines[-1], "edge", "dual", marked)
     first = _everywhere(distances[:, 0])
     inner = _outwards(paved_edge(profiles, layout.paved, sign * first, -sign, first), sign)
-    return _summarised(name, lines, (distances, apart), inner, outer)
+    return _summarise_side(name, lines, (distances, apart), inner, outer)
 
 
 def _half(profiles: Profiles, layout: RoadLayout, band: Band, name: Side, marked: bool) -> SideSection:
@@ -207,7 +207,7 @@ def _half(profiles: Profiles, layout: RoadLayout, band: Band, name: Side, marked
         apart.append(outer.apart)
         lines.append(None)
     inner = Edge(np.zeros(count), np.zeros(count))
-    found = _summarised(name, lines, (np.column_stack(columns), np.column_stack(apart)), inner, outer)
+    found = _summarise_side(name, lines, (np.column_stack(columns), np.column_stack(apart)), inner, outer)
     nothing = Estimate(0.0, 0.0)
     return replace(found, inner_offset=nothing, inner_strip=nothing, mirrored=mirrored)
 
@@ -241,17 +241,17 @@ def _by_width(profiles: Profiles, layout: RoadLayout, band: Band, name: Side) ->
     columns = [first + sum(row.lanes[::-1][:i]) for i in range(len(row.lanes) + 1)]
     lines: list[Line | None] = [None] * len(columns)
     apart = np.tile(inner.apart[:, None], len(columns))
-    found = _summarised(name, lines, (np.column_stack(columns), apart), inner, outer)
+    found = _summarise_side(name, lines, (np.column_stack(columns), apart), inner, outer)
     lanes = [Estimate(lane, np.inf) for lane in reversed(row.lanes)]
     return replace(found, lanes=lanes, inner_strip=Estimate(row.inner_edge_strip, np.inf), assumed=name_of)
 
 
 def _open(line: Line | None, outer: Edge) -> bool:
     """Return whether the outermost line parts lanes, the outer one of which the cloud doesn't show."""
-    return line is not None and not line.solid and not _seen(outer)
+    return line is not None and not line.solid and not _is_visible(outer)
 
 
-def _seen(edge: Edge) -> bool:
+def _is_visible(edge: Edge) -> bool:
     return bool(np.isfinite(edge.offsets).mean() > _FEWEST_EDGES)
 
 
@@ -264,7 +264,7 @@ def _outwards(edge: Edge, sign: int) -> Edge:
     return Edge(sign * edge.offsets, edge.apart)
 
 
-def _summarised(
+def _summarise_side(
     name: Side, lines: list[Line | None], boundaries: tuple[Float, Float], inner: Edge, outer: Edge
 ) -> SideSection:
     """Return a side's widths from what was measured stretch by stretch."""
@@ -273,14 +273,14 @@ def _summarised(
         Estimate.of(distance[:, i + 1] - distance[:, i], np.hypot(apart[:, i], apart[:, i + 1]))
         for i in range(distance.shape[1] - 1)
     ]
-    edge_seen = _seen(outer)
+    edge_seen = _is_visible(outer)
     usual = _usual(outer.offsets - distance[:, -1], lines[-1])
     outside = Estimate(_USUAL_STRIP, np.inf)
     if edge_seen:
         width = np.where(usual, outer.offsets - distance[:, -1], np.nan)
         outside = Estimate.of(width, np.hypot(outer.apart, apart[:, -1]))
     outside = Estimate(float(np.clip(outside.value, 0.0, 2.0 + _WIDEST)), outside.std)
-    strip, shoulder = _shared(outside)
+    strip, shoulder = _share_pavement(outside)
     inner_offset, inner_strip = _inside(distance[:, 0], apart[:, 0], inner)
     return SideSection(
         side=name,
@@ -303,7 +303,7 @@ def _summarised(
 
 def _inside(first: Float, apart: Float, inner: Edge) -> tuple[Estimate, Estimate]:
     """Return the distance of the pavement's inner edge from the axis, and the width of the strip up to the lanes."""
-    if _seen(inner):
+    if _is_visible(inner):
         offset = Estimate.of(inner.offsets, inner.apart)
         strip = Estimate.of(first - inner.offsets, np.hypot(apart, inner.apart))
     else:
@@ -332,7 +332,7 @@ def _usual(outside: Float, line: Line | None) -> NDArray[np.bool_]:
     return usual & (np.abs(outside - edges[peak] - 0.05) < _MODE)
 
 
-def _ordered(band: Band, sign: int) -> tuple[list[Line | None], Float, Float]:
+def _order_lines(band: Band, sign: int) -> tuple[list[Line | None], Float, Float]:
     """Return the lines of one side from inside to outside, their distances (K, lines) from the axis, and how far apart
     the points are that these lie between."""
     seen: list[tuple[float, Line | None]] = [(sign * line.offset, line) for line in band.lines]
@@ -352,7 +352,7 @@ def _ordered(band: Band, sign: int) -> tuple[list[Line | None], Float, Float]:
     return lines, distances, apart
 
 
-def _shared(outside: Estimate) -> tuple[Estimate, Estimate]:
+def _share_pavement(outside: Estimate) -> tuple[Estimate, Estimate]:
     """Return the edge strip and hard shoulder that share the pavement outside of the lanes.
 
     Nothing on the road parts them: the strip is as wide as that of the standard cross-section which fits best.
@@ -386,7 +386,7 @@ def _distance(side: SideSection, row: StandardCrossSection) -> float:
     return max(apart)
 
 
-def snapped(section: MeasuredSection) -> MeasuredSection:
+def snap_to_standard(section: MeasuredSection) -> MeasuredSection:
     """Return a cross-section with the widths of the standard one that it passes for, else as it is."""
     if section.standard is None:
         return section

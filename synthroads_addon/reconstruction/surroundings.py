@@ -56,7 +56,7 @@ def ground_below(profiles: Profiles, station: Float, offset: Float) -> Float:
     return np.asarray(ndimage.map_coordinates(filled, np.stack([row, column]), order=1, mode="nearest"))
 
 
-def faced(barriers: list[FoundBarrier], section: MeasuredSection) -> list[FoundBarrier]:
+def face_guardrails(barriers: list[FoundBarrier], section: MeasuredSection) -> list[FoundBarrier]:
     """Return barriers with guardrails' beams on the side of the traffic that they protect from."""
     return [facing(barrier, _face(barrier.offset, section)) for barrier in barriers]
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from ..base.schema import rounded
+from ..base.schema import round_value
 from .guidelines import LEAST_CROSSFALL_PERCENT, LIMITS, curve_crossfall_percent
 from .parameters import CrossfallPoint, HorizontalElement
 
@@ -77,8 +77,8 @@ def crossfall_points(
         corners += _run_off(design_class, half_width, (from_station, from_percent), (station, percent))
     points: list[CrossfallPoint] = []
     for at, percent in corners:
-        if not points or rounded(at) > points[-1].station:
-            points.append(CrossfallPoint(station=rounded(at), crossfall_percent=rounded(percent)))
+        if not points or round_value(at) > points[-1].station:
+            points.append(CrossfallPoint(station=round_value(at), crossfall_percent=round_value(percent)))
     return tuple(points)
 
 

@@ -99,10 +99,10 @@ def damage_columns(
         shares.append(_shares(section, strip, pothole.station, np.linspace(low, high, cells + 1)))
     together = np.unique(np.concatenate(shares))
     inside = together[(together >= 0.0) & (together <= 1.0)]
-    return spaced(inside)
+    return space_shares(inside)
 
 
-def spaced(shares: Float) -> Float:
+def space_shares(shares: Float) -> Float:
     """Return sorted shares (K,) of a strip's width, both ends included, without those that only make slivers."""
     kept = [shares[0]]
     for share in shares[1:-1].tolist():

@@ -30,7 +30,7 @@ _TURN_HEAD = [(0.46, -0.20), (0.78, -0.30), (0.60, -0.02)]
 _MERGE_SHAFT = [(0.0, -0.03), (0.35, -0.03), (0.35, 0.03), (0.0, 0.03)]
 
 
-def _mirrored(shape: list[tuple[float, float]]) -> list[tuple[float, float]]:
+def _mirror_outline(shape: list[tuple[float, float]]) -> list[tuple[float, float]]:
     return [(x, -y) for x, y in reversed(shape)]
 
 
@@ -42,7 +42,7 @@ ARROWS: dict[str, list[list[tuple[float, float]]]] = {
     "merge_right": [_MERGE_SHAFT, _TURN_SHAFT, _TURN_HEAD],
 }
 ARROWS |= {
-    name.replace("right", "left"): [_mirrored(shape) for shape in shapes]
+    name.replace("right", "left"): [_mirror_outline(shape) for shape in shapes]
     for name, shapes in list(ARROWS.items())
     if "right" in name
 }
@@ -92,12 +92,12 @@ def arrow_outlines(arrow: Arrow) -> list[Float]:
 def pieces(outline: Float, cuts: Float) -> Iterator[Float]:
     """Yield a convex outline (K, 2) cut across the road into pieces between one station and the next (m)."""
     for first, last in pairwise(cuts):
-        piece = _clipped(_clipped(outline, first, 1.0), last, -1.0)
+        piece = _clip_outline(_clip_outline(outline, first, 1.0), last, -1.0)
         if len(piece) > 2:
             yield piece
 
 
-def _clipped(outline: Float, station: float, keep: float) -> Float:
+def _clip_outline(outline: Float, station: float, keep: float) -> Float:
     """Return the part of a convex outline beyond (``keep`` 1) or before (-1) a station."""
     inside = (outline[:, 0] - station) * keep >= 0.0
     corners = []

@@ -55,7 +55,7 @@ def frame_of(geometry: RoadGeometry, start: float, end: float) -> tuple[NDArray[
     return origin, int(max(0.0, FRAME * math.floor((start - _BEFORE) / FRAME)))
 
 
-def cut(parameters: RoadParameters, start: float, end: float) -> RoadParameters:
+def cut_stretch(parameters: RoadParameters, start: float, end: float) -> RoadParameters:
     """Return a set with only what stands between two stations (the end is the next stretch's, but for the last one).
 
     The road itself stays whole, and so do plants, which are cut with its surface, and what runs obliquely. What is
@@ -69,13 +69,13 @@ def cut(parameters: RoadParameters, start: float, end: float) -> RoadParameters:
                 objects[name] = item
         elif isinstance(item, LineObject | LineMarking):
             if item.end_station > start and item.start_station < end:
-                objects[name] = item if isinstance(item, TemporaryBarrier) else _cut(item, start, end)
+                objects[name] = item if isinstance(item, TemporaryBarrier) else _cut_line(item, start, end)
         else:
             objects[name] = item
     return parameters.model_copy(update={"objects": objects})
 
 
-def _cut(item: LineObject | LineMarking, start: float, end: float) -> RoadObject:
+def _cut_line(item: LineObject | LineMarking, start: float, end: float) -> RoadObject:
     """Return a line object that begins and ends near a stretch; its beginning moves by whole periods."""
     low, high = start - BEYOND, end + BEYOND
     update: dict[str, float] = {}

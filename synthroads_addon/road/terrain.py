@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from ..base.files import stamp
 from ..base.random_streams import stream
-from ..base.schema import rounded
+from ..base.schema import round_value
 from .alignment import Alignment, Element
 from .elevation_model import Corridor, ElevationModel, read_elevation_model
 from .geometry import RoadGeometry
@@ -82,11 +82,11 @@ def road_elevation_model(
         InputError: as `read_elevation_model`.
     """
     found = stamp(path, "an elevation model is needed here")
-    return _read(path, found, epsg, axis, origin, half_width + GROUND_MARGIN)
+    return _read_model(path, found, epsg, axis, origin, half_width + GROUND_MARGIN)
 
 
 @lru_cache(maxsize=2)
-def _read(
+def _read_model(
     path: str, _stamp: tuple[int, int], epsg: int, axis: AlignmentObject, origin: tuple[float, float], reach: float
 ) -> ElevationModel:
     return read_elevation_model(path, epsg, Corridor(_alignment(axis), *origin, reach))
@@ -109,7 +109,7 @@ def fit_to_ground(
     plan = alignment.position(station)
     profile = Profile([IntersectionPoint(p.station, p.elevation, p.radius) for p in axis.vertical])
     above = profile.elevation(station) - model.elevation(plan[:, 0] + east, plan[:, 1] + north)
-    return east, north, rounded(embankment_height - float(np.mean(above)))
+    return east, north, round_value(embankment_height - float(np.mean(above)))
 
 
 def _alignment(axis: AlignmentObject) -> Alignment:

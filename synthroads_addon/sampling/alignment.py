@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..base.schema import rounded
+from ..base.schema import round_value
 from ..road.crossfall import run_off_length
 from ..road.guidelines import LIMITS, LONGEST_STRAIGHT, DesignLimits
 from ..road.parameters import HorizontalElement, VerticalPoint
@@ -175,7 +175,7 @@ class HorizontalSampler:
             low, high = max(low, self.limits.clothoid**2 / max(room, 1.0)), min(high, _widest(room))
         if low > high:
             return 0.0
-        return rounded(math.exp(self.rng.uniform(math.log(low), math.log(high))), 6)
+        return round_value(math.exp(self.rng.uniform(math.log(low), math.log(high))), 6)
 
     def _least(self, start: float, end: float) -> float:
         """Return the least length A^2 / R of a clothoid between a straight and an arc: A >= R/3, and the run-off's."""
@@ -217,7 +217,7 @@ class HorizontalSampler:
 
     def _share_out(self) -> None:
         """Give the length that is left to straights and arcs, within the longest straight and turn."""
-        self.parts = _merged(self.parts)
+        self.parts = _merge_parts(self.parts)
         spare = self.length - math.fsum(part.length for part in self.parts)
         growing = [part for part in self.parts if part.grows]
         room = np.array([self._room(part) for part in growing])
@@ -243,9 +243,9 @@ class HorizontalSampler:
     def _elements(self) -> tuple[HorizontalElement, ...]:
         """Round lengths and curvatures; the last length takes what rounding leaves."""
         parts = [part for part in self.parts if part.length > 1e-6]
-        lengths = [rounded(part.length) for part in parts[:-1]]
-        lengths.append(rounded(self.length - math.fsum(lengths)))
-        curvatures = [(rounded(part.start, 12), rounded(part.end, 12)) for part in parts]
+        lengths = [round_value(part.length) for part in parts[:-1]]
+        lengths.append(round_value(self.length - math.fsum(lengths)))
+        curvatures = [(round_value(part.start, 12), round_value(part.end, 12)) for part in parts]
         return tuple(HorizontalElement.between(n, *k) for n, k in zip(lengths, curvatures, strict=True))
 
 
@@ -256,7 +256,7 @@ def radius_limits(scenario: RoadScenario) -> tuple[float, float]:
     return scenario.radius.minimum, scenario.radius.maximum
 
 
-def _merged(parts: list[_AlignmentPart]) -> list[_AlignmentPart]:
+def _merge_parts(parts: list[_AlignmentPart]) -> list[_AlignmentPart]:
     """Return parts with neighbours of one constant curvature joined."""
     result: list[_AlignmentPart] = []
     for part in parts:
@@ -276,7 +276,7 @@ def sample_profile(scenario: RoadScenario, rng: np.random.Generator) -> tuple[Ve
     limits = LIMITS[scenario.design_class]
     lowest, highest = grade_limits(scenario)
     stations = _intersections(scenario.length, rng)
-    grades = [rounded(rng.uniform(lowest, highest))]
+    grades = [round_value(rng.uniform(lowest, highest))]
     radii: list[float] = []
     climbed = 0.0
     for before, here, after in zip(stations[:-2], stations[1:-1], stations[2:], strict=True):
@@ -293,16 +293,16 @@ def sample_profile(scenario: RoadScenario, rng: np.random.Generator) -> tuple[Ve
             high = max(low, min(high, 0.0))
         elif climbed < -HIGHEST_CLIMB:
             low = min(high, max(low, 0.0))
-        grades.append(rounded(rng.uniform(low, high)))
+        grades.append(round_value(rng.uniform(low, high)))
         change = abs(grades[-1] - grades[-2]) / 100.0
         least = limits.crest if grades[-1] < grades[-2] else limits.sag
         largest = max(least, min(2.0 * tangent / max(change, 1e-9), 5.0 * least))
-        radii.append(rounded(rng.uniform(least, largest)) if change > 0 else 0.0)
+        radii.append(round_value(rng.uniform(least, largest)) if change > 0 else 0.0)
     elevations = np.concatenate([[0.0], np.cumsum(np.diff(stations) * np.array(grades) / 100.0)])
     elevations -= np.interp(scenario.length / 2.0, stations, elevations)
     radii = [0.0, *radii, 0.0]
     return tuple(
-        VerticalPoint(station=station, elevation=rounded(z), radius=radius)
+        VerticalPoint(station=station, elevation=round_value(z), radius=radius)
         for station, z, radius in zip(stations, elevations, radii, strict=True)
     )
 
@@ -320,4 +320,4 @@ def _intersections(length: float, rng: np.random.Generator) -> list[float]:
     spans = max(2, round(length / rng.uniform(300.0, 900.0)))
     shares = rng.uniform(0.7, 1.3, spans)
     stations = np.concatenate([[0.0], np.cumsum(shares) / shares.sum()]) * length
-    return [rounded(station) for station in stations[:-1]] + [rounded(length)]
+    return [round_value(station) for station in stations[:-1]] + [round_value(length)]

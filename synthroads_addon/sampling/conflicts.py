@@ -252,7 +252,7 @@ def _interval(scenario: ClosedModel, path: str) -> Interval:
     return value
 
 
-def _allowed(model: type[Model], name: str) -> tuple[float, float]:
+def _allowed_range(model: type[Model], name: str) -> tuple[float, float]:
     """Return the least and the largest value of a field."""
     low, high = -1e8, 1e8
     for limit in model.model_fields[name].metadata:
@@ -265,4 +265,4 @@ def _allowed(model: type[Model], name: str) -> tuple[float, float]:
     return low, high
 
 
-_ALLOWED = {path: _allowed(*field) for path, field in _FIELDS.items()} | _PLAIN
+_ALLOWED = {path: _allowed_range(*field) for path, field in _FIELDS.items()} | _PLAIN

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ..base.schema import rounded
+from ..base.schema import round_value
 from ..road.guidelines import LIMITS
 from ..road.objects import AnyWidth
 from ..road.section import Arrow, Carriageway, Hatching, LineMarking, Turnout
@@ -32,7 +32,7 @@ _Span = tuple[float, float]
 def place_markings(site: PlacementSite) -> Iterator[tuple[str, LineMarking | Hatching | Arrow]]:
     """Yield (id, marking) of everything painted on a road, with instance 1. All has films of one thickness."""
     limits = site.scenario.markings.film_thickness
-    film = rounded(site.stream("film").uniform(limits.minimum, limits.maximum))
+    film = round_value(site.stream("film").uniform(limits.minimum, limits.maximum))
     for side, carriageway in site.carriageways.items():
         sampler = _Painter(site, side, carriageway, film)
         yield from sampler.lines()
@@ -49,7 +49,7 @@ class _Painter:
         self.site, self.carriageway, self.film = site, carriageway, film
         self.name = f"carriageway-{side}"
         self.section = site.sections[side]
-        self.length = rounded(site.length)
+        self.length = round_value(site.length)
         self.arrow_length = 7.5 if LIMITS[site.design_class].speed > 80.0 else 5.0
 
     def lines(self) -> Iterator[tuple[str, LineMarking]]:
@@ -121,8 +121,8 @@ class _Painter:
                     instance=1,
                     carriageway=self.name,
                     kind=kind,
-                    station=rounded(station),
-                    offset=rounded(self.carriageway.sign * distance),
+                    station=round_value(station),
+                    offset=round_value(self.carriageway.sign * distance),
                     rotation_deg=0.0 if self.carriageway.traffic > 0 else 180.0,
                     length=self.arrow_length,
                     film_thickness=self.film,
@@ -133,7 +133,7 @@ class _Painter:
 def _stations(shape: TurnoutShape, begin: float, end: float) -> _Span:
     """Return the stations (m), the lower one first, of a stretch between two distances along a turnout."""
     low, high = sorted((shape.station(begin), shape.station(end)))
-    return max(0.0, rounded(low)), rounded(high)
+    return max(0.0, round_value(low)), round_value(high)
 
 
 def _block_span(shape: TurnoutShape) -> _Span:
@@ -160,8 +160,8 @@ def _there(width: AnyWidth, length: float) -> _Span:
         return 0.0, length
     widths, stations = [p.width for p in width], [p.station for p in width]
     if widths[0] < widths[-1]:
-        return rounded(float(np.interp(LANE_THERE, widths, stations))), length
-    return 0.0, rounded(float(np.interp(LANE_THERE, widths[::-1], stations[::-1])))
+        return round_value(float(np.interp(LANE_THERE, widths, stations))), length
+    return 0.0, round_value(float(np.interp(LANE_THERE, widths[::-1], stations[::-1])))
 
 
 def _overlap(first: _Span, second: _Span) -> _Span:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ..base.random_streams import stream
-from ..base.schema import rounded
+from ..base.schema import round_value
 from ..base.version import generator
 from ..road.parameters import (
     EPSG_URI,
@@ -60,7 +60,7 @@ def sample_road(
         InputError: limits contradict each other; the message names them all.
     """
     if axis:
-        scenario = scenario.model_copy(update={"length": rounded(axis.length)})
+        scenario = scenario.model_copy(update={"length": round_value(axis.length)})
     check_conflicts(scenario, with_axis=axis is not None)
     site = _sample_site(scenario, seed, axis or sample_alignment(scenario, seed))
     objects: dict[str, Any] = {"alignment": site.alignment}
@@ -98,13 +98,13 @@ def sample_road(
 def sample_alignment(scenario: RoadScenario, seed: int) -> AlignmentObject:
     """Return an alignment within the limits of its class, its middle at the local origin."""
     rng = stream(seed, "alignment")
-    heading = rounded(rng.uniform(-180.0, 180.0), 6)
+    heading = round_value(rng.uniform(-180.0, 180.0), 6)
     horizontal = HorizontalSampler(scenario, rng).draw()
     x, y = _position(horizontal, math.radians(heading), scenario.length / 2.0)
     return AlignmentObject(
         instance=1,
-        start_x=rounded(-x, 3),
-        start_y=rounded(-y, 3),
+        start_x=round_value(-x, 3),
+        start_y=round_value(-y, 3),
         start_heading_deg=heading,
         horizontal=horizontal,
         vertical=sample_profile(scenario, stream(seed, "profile")),

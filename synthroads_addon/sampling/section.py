@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..base.random_streams import stream
-from ..base.schema import rounded
+from ..base.schema import round_value
 from ..road.crossfall import crossfall_points
 from ..road.guidelines import STANDARD_CROSS_SECTIONS, StandardCrossSection
 from ..road.objects import WidthPoint, nominal_width, width_at
@@ -99,7 +99,7 @@ class CarriagewaySampler:
         start = direction.lowest_station(place.begin + BESIDE_LANE_CHANGE, taper)
         full = self.section.lanes[index]
         low, high = (full, 0.0) if drops == (direction.side == "right") else (0.0, full)
-        stations = (0.0, start, rounded(start + taper), rounded(self.length))
+        stations = (0.0, start, round_value(start + taper), round_value(self.length))
         points = zip(stations, (low, low, high, high), strict=True)
         changed = Lane(width=tuple(WidthPoint(station=station, width=width) for station, width in points))
         return tuple(changed if i == index else lane for i, lane in enumerate(lanes))
@@ -132,18 +132,18 @@ class CarriagewaySampler:
         if rng.random() >= limits.rutted:
             return ()
         length = self.length * draw(rng, (_SHORTEST_RUT, 1.0))
-        start = rounded((self.length - length) * rng.random())
+        start = round_value((self.length - length) * rng.random())
         lane = next(i for i, lane in enumerate(lanes) if isinstance(lane.width, float))
         width = draw(rng, bounds(limits.rut_width))
         return (
             Rut(
                 lane=lane,
                 start_station=start,
-                end_station=rounded(min(start + length, self.length)),
+                end_station=round_value(min(start + length, self.length)),
                 depth=draw(rng, bounds(limits.rut_depth)),
                 width=width,
-                track=rounded(min(_WHEEL_TRACK, self.section.lanes[lane] - width)),
-                ramp_length=rounded(min(_RUT_RAMP, length / 3.0)),
+                track=round_value(min(_WHEEL_TRACK, self.section.lanes[lane] - width)),
+                ramp_length=round_value(min(_RUT_RAMP, length / 3.0)),
             ),
         )
 

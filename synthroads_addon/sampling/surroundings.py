@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..base.random_streams import stream
-from ..base.schema import rounded
+from ..base.schema import round_value
 from ..road.guidelines import OBSTACLE_DISTANCE
 from ..road.objects import AnyWidth, nominal_width, width_at, width_kinks
 from ..road.parameters import (
@@ -65,7 +65,7 @@ _COLOR_SUMS = np.cumsum(list(COLORS.values()))
 def draw(rng: np.random.Generator, limits: Interval) -> float:
     """Draw a number within an interval."""
     low, high = limits.minimum, limits.maximum
-    return min(max(rounded(low + (high - low) * rng.random()), low), high)
+    return min(max(round_value(low + (high - low) * rng.random()), low), high)
 
 
 def _seed(rng: np.random.Generator) -> int:
@@ -122,12 +122,12 @@ def sample_vegetation(site: PlacementSite) -> Iterator[tuple[str, Vegetation]]:
     """
     scenario, limits = site.scenario, site.scenario.vegetation
     room = _room_beside(site)
-    yield from _mixed(site, "grass", limits.grasses, scenario.grass_density, limits.grass_height, 0.0)
+    yield from _mix_species(site, "grass", limits.grasses, scenario.grass_density, limits.grass_height, 0.0)
     yield from _belts(site, room)
     first_tree = _first_tree(site)
     if first_tree < room:
         density = scenario.trees_per_hectare / 10_000.0
-        yield from _mixed(site, "tree", limits.trees, density, limits.tree_height, first_tree)
+        yield from _mix_species(site, "tree", limits.trees, density, limits.tree_height, first_tree)
 
 
 def _room_beside(site: PlacementSite) -> float:
@@ -144,7 +144,7 @@ def _first_tree(site: PlacementSite) -> float:
     """Return the distance (m) behind the verge from which trees may stand beside either carriageway."""
     verges = [road.verge_width for road in site.carriageways.values()]
     narrowest = min(min(p.width for p in verge) if isinstance(verge, tuple) else verge for verge in verges)
-    return rounded(max(0.0, OBSTACLE_DISTANCE[site.design_class] - narrowest))
+    return round_value(max(0.0, OBSTACLE_DISTANCE[site.design_class] - narrowest))
 
 
 def _species(rng: np.random.Generator, kind: Kind, names: tuple[str, ...]) -> list[str]:
@@ -156,7 +156,7 @@ def _species(rng: np.random.Generator, kind: Kind, names: tuple[str, ...]) -> li
     return mixed[: rng.integers(1, min(len(mixed), MOST_SPECIES[kind]) + 1)]
 
 
-def _mixed(
+def _mix_species(
     site: PlacementSite, kind: Kind, names: tuple[str, ...], density: float, heights: Interval, band_start: float
 ) -> Iterator[tuple[str, Vegetation]]:
     """Yield species that share a density (1/m2) between them, the first most of it, all from a distance (m) on."""
@@ -167,18 +167,18 @@ def _mixed(
     shares = sorted(rng.uniform(0.5, 1.5, len(species)).tolist(), reverse=True)
     for name, part in zip(species, shares, strict=True):
         band = (band_start, site.terrain.half_width)
-        yield _plants(rng, kind, name, rounded(density * part / math.fsum(shares)), band, heights)
+        yield _plants(rng, kind, name, round_value(density * part / math.fsum(shares)), band, heights)
 
 
 def _belts(site: PlacementSite, room: float) -> Iterator[tuple[str, Vegetation]]:
     """Yield the shrubs, each species in a belt of its own behind that of the one before."""
-    limits, density = site.scenario.vegetation, rounded(site.scenario.shrubs_per_hectare / 10_000.0)
+    limits, density = site.scenario.vegetation, round_value(site.scenario.shrubs_per_hectare / 10_000.0)
     if density <= 0.0 or room <= SHRUB_DISTANCE:
         return
     rng = site.stream("shrub")
     species = _species(rng, "shrub", limits.shrubs)
     between = np.sort(rng.uniform(SHRUB_DISTANCE, room, len(species) - 1))
-    borders = [SHRUB_DISTANCE, *map(rounded, between), site.terrain.half_width]
+    borders = [SHRUB_DISTANCE, *map(round_value, between), site.terrain.half_width]
     for name, band in zip(species, pairwise(borders), strict=True):
         yield _plants(rng, "shrub", name, density, band, limits.shrub_height)
 
@@ -233,7 +233,7 @@ def sample_vehicles(site: PlacementSite, objects: Mapping[str, RoadObject]) -> I
                     model=model,
                     carriageway=f"carriageway-{side}",
                     lane=lane,
-                    station=rounded(station),
+                    station=round_value(station),
                     speed=speed,
                     color=_COLORS[next(colors)],
                 )
@@ -306,7 +306,7 @@ def _traffic(
     highest = np.where(heavy, min(HEAVY_SPEED, limits.maximum), limits.maximum)
     speeds = limits.minimum + (highest - limits.minimum) * rng.random(len(heavy))
     rows = zip(lanes.tolist(), speeds.tolist(), models.tolist(), highest.tolist(), strict=True)
-    return sorted((lane, min(rounded(speed), most), _MODELS[model]) for lane, speed, model, most in rows)
+    return sorted((lane, min(round_value(speed), most), _MODELS[model]) for lane, speed, model, most in rows)
 
 
 def _pick(rng: np.random.Generator, sums: Float, number: int) -> NDArray[np.intp]:

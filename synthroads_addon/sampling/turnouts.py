@@ -14,7 +14,7 @@ from typing import Literal
 
 import numpy as np
 
-from ..base.schema import rounded
+from ..base.schema import round_value
 from ..road.guidelines import (
     EMERGENCY_BAY_LENGTH,
     EMERGENCY_BAY_TAPER,
@@ -124,7 +124,7 @@ class RampLimits:
         """Return the parameter A (m) at a share (0 to 1) of those that a ramp of this length (m) may have."""
         low = max(self.clothoids.minimum, math.sqrt(length**3 / (6.0 * self.widest_wedge)))
         high = min(self.clothoids.maximum, math.sqrt((length - NOSE_BEFORE_END) ** 3 / (6.0 * self.nose_wedge)))
-        return rounded(low + max(0.0, high - low) * share)
+        return round_value(low + max(0.0, high - low) * share)
 
 
 def bounds(limits: Interval, least: float = -math.inf) -> tuple[float, float]:
@@ -181,7 +181,7 @@ def arrange(features: tuple[Feature, ...], length: float, rng: np.random.Generat
     extras = [[(high - low) * rng.random() for low, high in feature.lengths] for feature in chosen]
     granted = min(1.0, spare / max(math.fsum(map(math.fsum, extras)), 1e-9))
     lengths = [
-        tuple(rounded(low + extra * granted) for (low, _), extra in zip(feature.lengths, own, strict=True))
+        tuple(round_value(low + extra * granted) for (low, _), extra in zip(feature.lengths, own, strict=True))
         for feature, own in zip(chosen, extras, strict=True)
     ]
     begins = closest([(f, f.fixed + math.fsum(own)) for f, own in zip(chosen, lengths, strict=True)])
@@ -217,7 +217,7 @@ class Direction:
 
     def lowest_station(self, begin: float, length: float) -> float:
         """Return the lowest station (m) of a stretch that begins at a distance and has a length, both m."""
-        return max(0.0, rounded(begin if self.side == "right" else self.length - begin - length))
+        return max(0.0, round_value(begin if self.side == "right" else self.length - begin - length))
 
 
 def sample_turnout(
@@ -263,4 +263,4 @@ def sample_turnout(
 
 def draw(rng: np.random.Generator, limits: tuple[float, float]) -> float:
     """Draw a number between two limits."""
-    return rounded(limits[0] + (limits[1] - limits[0]) * rng.random())
+    return round_value(limits[0] + (limits[1] - limits[0]) * rng.random())

@@ -13,7 +13,7 @@ from .effects import EchoChanges, Float, PulseHits
 from .plan import ScanPlan
 from .platforms.path import Strip
 from .pulses import Pulses
-from .radiometry import received
+from .radiometry import received_intensity
 from .returns import UNCOUNTED, Marks
 from .trace import Hits, Traced
 
@@ -68,7 +68,7 @@ def _pulse_hits(scan: ScanPlan, pulses: Pulses, traced: Traced, marks: BothMarks
 
 def _brightness(marks: Marks, attenuation: float) -> Float:
     """Return what a surface sends back, from the intensity that is received of it; 0 where nothing is."""
-    white = received(1.0, marks.distance, attenuation)
+    white = received_intensity(1.0, marks.distance, attenuation)
     return np.divide(marks.intensity, white, out=np.zeros_like(white), where=white > 0.0)
 
 
@@ -105,13 +105,15 @@ def _add(scan: ScanPlan, traced: Traced, marks: BothMarks, changes: EchoChanges)
     none = np.zeros(len(here), dtype=np.intp)
     # In the air there is no face; it counts as one that lies across the beam.
     hits = Hits(none - 1, none, distance, none - 1.0, brightness)
-    added = Marks(distance, np.maximum(brightness, UNCOUNTED), received(brightness, distance, scan.attenuation))
+    added = Marks(
+        distance, np.maximum(brightness, UNCOUNTED), received_intensity(brightness, distance, scan.attenuation)
+    )
     first, behind = marks
     ray = changes.ray[here] * len(traced.rays.time) + changes.pulse[here]
-    traced = replace(traced, behind=Hits(*_joined(traced.behind, hits)), ray=np.concatenate([traced.ray, ray]))
-    return traced, (first, Marks(*_joined(behind, added)))
+    traced = replace(traced, behind=Hits(*_join_arrays(traced.behind, hits)), ray=np.concatenate([traced.ray, ray]))
+    return traced, (first, Marks(*_join_arrays(behind, added)))
 
 
-def _joined(one: Hits | Marks, other: Hits | Marks) -> list[NDArray[Any]]:
+def _join_arrays(one: Hits | Marks, other: Hits | Marks) -> list[NDArray[Any]]:
     """Return the arrays of two of a kind, one after the other."""
     return [np.concatenate([getattr(one, field.name), getattr(other, field.name)]) for field in fields(one)]

@@ -142,7 +142,7 @@ def conical(
     radius = beam_radii(divergence)
     x, y = pattern.across[:, 0] * radius[0], pattern.across[:, 1] * radius[1]
     length = 1.0 / np.sqrt(1.0 + x * x + y * y)
-    return _combined(((direction, length), (in_plane, x * length), (across, y * length)), rays)
+    return _sum_products(((direction, length), (in_plane, x * length), (across, y * length)), rays)
 
 
 def cylindrical_offsets(
@@ -166,10 +166,10 @@ def cylindrical_offsets(
     radius = beam_radii(divergence)
     reach = np.where((distance > 0.0) & (distance < np.inf), distance, 0.0)
     x, y = pattern.across[:, 0] * radius[0], pattern.across[:, 1] * radius[1]
-    return _combined(((in_plane * reach, x), (across * reach, y)), len(pattern))
+    return _sum_products(((in_plane * reach, x), (across * reach, y)), len(pattern))
 
 
-def _combined(terms: Sequence[tuple[Float, Float]], rays: int) -> Float:
+def _sum_products(terms: Sequence[tuple[Float, Float]], rays: int) -> Float:
     """Return the sum of outer products of (K,) factors and (3, P) vectors as (3, K, P).
 
     Products and sums of single numbers, not a matrix product: BLAS rounds as it splits the work, by position and cores.

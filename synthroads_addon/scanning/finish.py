@@ -15,8 +15,8 @@ from ..materials.surfaces import brightness_of
 from .colour.colour import LayerSource, LayerValues, Targets, sample_targets
 from .devices.device import ScannerSetting
 from .plan import ScanPlan
-from .radiometry import saturated
-from .relief import adjusted
+from .radiometry import saturate
+from .relief import shift_along_normals
 from .returns import number_returns
 from .scan import BlockResult
 
@@ -38,7 +38,7 @@ def finish(plan: ScanPlan, source: LayerSource, result: BlockResult) -> BlockRes
     points = result.points
     if result.seen is not None and plan.relief is not None and plan.relief_strength > 0.0:
         place = result.seen.position + plan.frame
-        points = adjusted(points, place, plan.relief, plan.relief_strength, plan.seed, plan.relief_octaves)
+        points = shift_along_normals(points, place, plan.relief, plan.relief_strength, plan.seed, plan.relief_octaves)
     changes: dict[str, NDArray[Any] | None] = dict.fromkeys(points.attributes().keys() & OPTIONAL - plan.kept)
     if plan.range_corrected:
         changes["intensity"] = points.intensity * points.range**2
@@ -55,7 +55,7 @@ def _with_layers(plan: ScanPlan, source: LayerSource, result: BlockResult, seen:
         changes["intensity"] = result.points.intensity * _relative_brightness(plan, result.points, seen, values)
     result = replace(result, points=result.points.with_arrays(changes))
     if plan.detects_later:
-        result = detected(result, plan.setting)
+        result = detect_echoes(result, plan.setting)
     assert result.points.color_source is not None
     return replace(result, sources=np.bincount(result.points.color_source, minlength=256))
 
@@ -85,7 +85,7 @@ def _relative_brightness(
     return factor
 
 
-def detected(result: BlockResult, setting: ScannerSetting) -> BlockResult:
+def detect_echoes(result: BlockResult, setting: ScannerSetting) -> BlockResult:
     """Return what the detector makes of echoes in a block, or several joined, that were kept for it until now.
 
     Weak echoes are lost, those beyond the device's largest number as well, and what is left is numbered anew and
@@ -99,7 +99,7 @@ def detected(result: BlockResult, setting: ScannerSetting) -> BlockResult:
     recorded, number, returns = number_returns(np.cumsum(begins), setting.device.maximum_returns)
     rows = strong[recorded]
     points = points.select(rows)
-    intensity, clipped = saturated(points.intensity, setting.saturation)
+    intensity, clipped = saturate(points.intensity, setting.saturation)
     return replace(
         result,
         points=replace(points, intensity=intensity, return_number=number, number_of_returns=returns),

@@ -158,9 +158,9 @@ def make_pulses(scan: ScanPlan, strip: Strip, poses: Poses, angle: Float | None,
     shot = shots(scan.setting, first, count, several or angle is not None)
     time = shot.time + strip.start_time
     rotation, origin, _ = poses.true.at(time)
-    direction = _turned(rotation, shot.direction)
+    direction = _turn_vectors(rotation, shot.direction)
     frame = (shot.in_plane, shot.across)
-    in_plane, across = (None if not several or axis is None else _turned(rotation, axis) for axis in frame)
+    in_plane, across = (None if not several or axis is None else _turn_vectors(rotation, axis) for axis in frame)
     measured_origin, measured_direction = origin, direction
     if poses.measured is not poses.true or angle is not None:
         believed = shot.direction
@@ -170,13 +170,13 @@ def make_pulses(scan: ScanPlan, strip: Strip, poses: Poses, angle: Float | None,
             believed = believed + angle[0] * frame[0] + angle[1] * frame[1]
             believed /= np.sqrt(np.einsum("ij,ij->j", believed, believed))
         rotation, measured_origin, _ = poses.measured.at(time)
-        measured_direction = _turned(rotation, believed)
+        measured_direction = _turn_vectors(rotation, believed)
     return Pulses(
         time, shot.scan_angle, origin, direction, in_plane, across, measured_origin, measured_direction
     )
 
 
-def _turned(rotation: Float, vectors: Float) -> Float:
+def _turn_vectors(rotation: Float, vectors: Float) -> Float:
     """Return vectors (3, N) turned by rotations (9, N)."""
     result = np.empty_like(vectors)
     product = np.empty(vectors.shape[1])

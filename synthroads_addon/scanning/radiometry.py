@@ -1,7 +1,8 @@
 """How bright an echo is: the laser equation and the detector.
 
 An echo's intensity is ``I0 * share / d^2 * exp(-a d)``; `returned_share` is what the surface does
-(`materials.reflectance`), `received` the rest. An ideal white target, struck at a right angle at 1 m, gives 1.
+(`materials.reflectance`), `received_intensity` the rest. An ideal white target, struck at a right angle at 1 m, gives
+1.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ NEAREST = 1e-3
 """Nearer than this, m, 1/d^2 doesn't grow on: the law holds far from the aperture only, and stays finite."""
 
 
-def received(share: ArrayLike, distance: ArrayLike, attenuation: float = 0.0, emitted: float = 1.0) -> Float:
+def received_intensity(share: ArrayLike, distance: ArrayLike, attenuation: float = 0.0, emitted: float = 1.0) -> Float:
     """Return the intensity I0 share / d^2 exp(-a d); 0 where the range isn't a finite number above 0.
 
     Args:
@@ -73,10 +74,10 @@ def oren_nayar_intensity(
     parts = (cosine, reflectance, *facet_terms(slope))
     shape = np.broadcast_shapes(*(np.shape(part) for part in parts))
     flat = (np.broadcast_to(np.asarray(part, dtype=np.float64), shape).ravel() for part in parts)
-    return received(returned_share(*flat).reshape(shape), distance, attenuation, emitted)
+    return received_intensity(returned_share(*flat).reshape(shape), distance, attenuation, emitted)
 
 
-def saturated(intensity: Float, limit: float) -> tuple[Float, int]:
+def saturate(intensity: Float, limit: float) -> tuple[Float, int]:
     """Return the intensities (N,) that a detector gives, and how many of them it clipped.
 
     Args:

@@ -123,7 +123,7 @@ def heights(position: Float, amplitude: Float, wavelength: Float, seed: int, oct
     return amplitude * field(position, wavelength, seed, octaves)
 
 
-def adjusted(
+def shift_along_normals(
     points: PointBlock, position: Float, relief: MicroRelief, strength: float, seed: int, octaves: int = 4
 ) -> PointBlock:
     """Return the points with `xyz` shifted along the normal, and `range` to match; all else is kept.

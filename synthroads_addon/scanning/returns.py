@@ -72,7 +72,7 @@ def group_returns(first: Marks, behind: Marks, pulse: Index, resolution: float) 
     chosen = np.flatnonzero(mixed)
     if not len(chosen):
         return one
-    return _merged(one, _split_pulses(chosen, first, behind, pulse, resolution))
+    return _merge_echoes(one, _split_pulses(chosen, first, behind, pulse, resolution))
 
 
 def _whole_pulses(pulse: Index, nearest: Float, first: Marks) -> Echoes:
@@ -142,7 +142,7 @@ def _strongest(energy: Float, group: Index, starts: Index) -> Index:
     return np.asarray(brightest[first])
 
 
-def _merged(one: Echoes, several: Echoes) -> Echoes:
+def _merge_echoes(one: Echoes, several: Echoes) -> Echoes:
     """Return both in the order of pulses; no pulse is in both."""
     pulse = np.concatenate([one.pulse, several.pulse])
     order = np.argsort(pulse, kind="stable")

@@ -52,7 +52,7 @@ class Stretches:
         return next(strip for strip in self.whole.strips if strip.index == stretch.index)
 
 
-def spread(path: Path, count: int, duration: float) -> Stretches:
+def spread_stretches(path: Path, count: int, duration: float) -> Stretches:
     """Return stretches of a duration (s) spread evenly over each strip, from its start to its end.
 
     A strip that is shorter than all its stretches together is taken whole.
@@ -78,7 +78,7 @@ def middle(path: Path, share: float) -> Stretches:
     )
 
 
-def scattered(path: Path, count: int, duration: float, phase: float = 0.5, most: float = 0.25) -> Stretches:
+def scatter_stretches(path: Path, count: int, duration: float, phase: float = 0.5, most: float = 0.25) -> Stretches:
     """Return stretches of a duration (s) scattered evenly over all strips together, however many there are.
 
     Args:

@@ -18,7 +18,7 @@ from .plan import ScanPlan
 from .platforms.path import Strip
 from .point_layers import MeasuredPoints, fill_layers, place_points
 from .pulses import Errors, Poses, Pulses, make_pulses, reaching_scene
-from .radiometry import received, saturated
+from .radiometry import received_intensity, saturate
 from .returns import UNCOUNTED, Echoes, Marks, chosen_echoes, group_returns, number_returns
 from .trace import Hits, Rays, Traced, trace
 
@@ -101,14 +101,14 @@ def scan_pulses(scan: ScanPlan, strip: Strip, first: int, count: int, key: int =
         traced, marks = apply_effects(scan, strip, key, pulses, traced, marks)
     echoes = group_returns(*marks, traced.pulse, scan.setting.range_resolution)
     if scan.surfaces.varying:
-        echoes = _uneven(scan, traced, echoes, poses.motions)
+        echoes = _vary_brightness(scan, traced, echoes, poses.motions)
     threshold = scan.setting.threshold * (LENIENT if scan.detects_later else 1.0)
     strong = np.flatnonzero(echoes.intensity >= threshold)
     weak = len(echoes.pulse) - len(strong)
     if weak:
         echoes = chosen_echoes(echoes, strong)
     if errors.lost is not None:
-        echoes = _kept(echoes, errors.lost[number])
+        echoes = _drop_lost_echoes(echoes, errors.lost[number])
     points, seen, clipped = _points(scan, strip, pulses, traced, echoes, errors, number, poses.motions)
     return BlockResult(points, seen, count, traced.first.face.size, weak, clipped)
 
@@ -143,10 +143,10 @@ def _marks(scan: ScanPlan, hits: Hits) -> Marks:
     brightness *= hits.share
     weight = np.maximum(np.take(surfaces.reflectivity, material), UNCOUNTED).reshape(hits.face.shape)
     weight *= hits.share
-    return Marks(hits.distance, weight, received(brightness, hits.distance, scan.attenuation))
+    return Marks(hits.distance, weight, received_intensity(brightness, hits.distance, scan.attenuation))
 
 
-def _uneven(scan: ScanPlan, traced: Traced, echoes: Echoes, motions: list[Track]) -> Echoes:
+def _vary_brightness(scan: ScanPlan, traced: Traced, echoes: Echoes, motions: list[Track]) -> Echoes:
     """Return the echoes as bright as the places are that gave most of them, see `materials.texture_spread`."""
     material = traced.pick("material", echoes.hit)
     own = np.flatnonzero(np.take(scan.surfaces.uneven, material, mode="clip"))
@@ -156,7 +156,7 @@ def _uneven(scan: ScanPlan, traced: Traced, echoes: Echoes, motions: list[Track]
         return echoes
     hit = echoes.hit[own]
     ray, reach, face = traced.ray_of(hit), traced.pick("distance", hit), traced.pick("face", hit)
-    position, _ = _where(traced.rays, ray, reach)
+    position, _ = _ray_ends(traced.rays, ray, reach)
     if scan.target.moving:
         (position,) = scan.target.at_start(face, position, traced.rays.time[ray % len(traced.rays.time)], motions)
     intensity = echoes.intensity.copy()
@@ -164,7 +164,7 @@ def _uneven(scan: ScanPlan, traced: Traced, echoes: Echoes, motions: list[Track]
     return replace(echoes, intensity=intensity)
 
 
-def _where(rays: Rays, ray: Index, reach: Float) -> tuple[Float, Float]:
+def _ray_ends(rays: Rays, ray: Index, reach: Float) -> tuple[Float, Float]:
     """Return where rays end after ``reach``, and where they began, (3, N) local, m."""
     scanner = np.take(
         rays.origin.reshape(3, -1), ray if rays.origin.shape[1] > 1 else ray % len(rays.time), axis=1
@@ -172,7 +172,7 @@ def _where(rays: Rays, ray: Index, reach: Float) -> tuple[Float, Float]:
     return scanner + reach * np.take(rays.direction.reshape(3, -1), ray, axis=1), scanner
 
 
-def _kept(echoes: Echoes, lost: NDArray[np.bool_]) -> Echoes:
+def _drop_lost_echoes(echoes: Echoes, lost: NDArray[np.bool_]) -> Echoes:
     """Return the echoes that are not lost at random, by their number within the pulse."""
     keep, number, _ = number_returns(echoes.pulse, lost.shape[1])
     chosen = np.flatnonzero(keep)
@@ -200,7 +200,7 @@ def _points(
     if errors.range is not None:
         own = errors.of_range(number_in_block[pulse], number, scan.most_returns)
         distance = distance + scan.setting.range_sigma * own
-    intensity, clipped = saturated(echoes.intensity, np.inf if scan.detects_later else scan.setting.saturation)
+    intensity, clipped = saturate(echoes.intensity, np.inf if scan.detects_later else scan.setting.saturation)
     normal = None
     if scan.targets or "normal" in scan.wanted:
         normal = target.normals(face, along, pulses.time[pulse], motions)
@@ -226,11 +226,11 @@ def _points(
     seen = None
     if scan.targets and normal is not None:
         ray, reach = traced.ray_of(hit), traced.pick("distance", hit)
-        seen = _seen(scan, traced.rays, ray, reach, face, normal, motions)
+        seen = _seen_targets(scan, traced.rays, ray, reach, face, normal, motions)
     return points, seen, clipped
 
 
-def _seen(
+def _seen_targets(
     scan: ScanPlan, rays: Rays, ray: Index, reach: Float, face: Index, normal: Float, motions: list[Track]
 ) -> Targets:
     """Return where the points were seen, in the scene as it stands at the time 0: as it is rendered.
@@ -238,7 +238,7 @@ def _seen(
     That is on the surface that gave most of the return: the mean of all its hits may lie in the air between them.
     """
     target, time = scan.target, rays.time[ray % len(rays.time)]
-    position, scanner = _where(rays, ray, reach)
+    position, scanner = _ray_ends(rays, ray, reach)
     if target.moving:
         begin, offset, normal = target.at_start(face, position, time, motions, (scanner - position, normal))
         position, scanner = begin, begin + offset

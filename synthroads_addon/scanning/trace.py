@@ -111,7 +111,7 @@ def trace(
     material = np.take(target.material, met.face, mode="clip").astype(np.intp)
     if not surfaces.permeable:
         first = Hits(met.face, material, _within(met.distance, nearest, np.inf), met.along, rays.share)
-        return _traced(rays, first, [], [])
+        return _gather_hits(rays, first, [], [])
     on = np.flatnonzero(np.take(surfaces.pervious, material, mode="clip"))
     on = on[np.take(met.distance, on) < farthest]
     through = surfaces.transmission[np.take(material, on)]
@@ -140,10 +140,10 @@ def trace(
         layers.append(Hits(face, own, _within(start, nearest, farthest), met.along[hit], left * (1.0 - through)))
         rays_on.append(on)
         left = left * through
-    return _traced(rays, first, layers, rays_on)
+    return _gather_hits(rays, first, layers, rays_on)
 
 
-def _traced(rays: Rays, first: Hits, layers: list[Hits], on: list[NDArray[np.intp]]) -> Traced:
+def _gather_hits(rays: Rays, first: Hits, layers: list[Hits], on: list[NDArray[np.intp]]) -> Traced:
     """Return everything; of what lies behind only what is within reach."""
     if not layers:
         nothing = Hits(*(np.empty(0, dtype=getattr(first, field.name).dtype) for field in fields(Hits)))

@@ -120,14 +120,14 @@ def read_asset_library(name_or_file: str | os.PathLike[str]) -> AssetLibrary:
         InputError: a field is unknown or wrong.
     """
     name = str(library_file(os.fspath(name_or_file)))
-    library = _read(name, stamp(name, "an asset library (JSON) is needed here"))
+    library = _read_library(name, stamp(name, "an asset library (JSON) is needed here"))
     for key, asset in library.assets.items():
         _check_file(Path(name).parent / asset.file, f"{name}: assets.{key}.file", asset.file)
     return library
 
 
 @lru_cache(maxsize=8)
-def _read(path: str, _stamp: tuple[int, int]) -> AssetLibrary:
+def _read_library(path: str, _stamp: tuple[int, int]) -> AssetLibrary:
     return AssetLibrary.from_dict(read_json(path), source=path)
 
 

@@ -34,7 +34,7 @@ class Faces:
         return len(self.sizes)
 
 
-def joined(parts: Sequence[Faces]) -> Faces:
+def join_polygons(parts: Sequence[Faces]) -> Faces:
     """Return all polygons of several parts as one; points stay apart."""
     if not parts:
         return Faces(np.empty((0, 3)), np.empty(0, np.int64), np.empty(0, np.int64))
@@ -109,10 +109,10 @@ def loft(sections: Float) -> Faces:
     caps = Faces(points, np.concatenate([here[::-1], last + here]), np.array([count, count]))
     body = quads(points, sides.reshape(-1, 4))
     closed = Faces(points, np.concatenate([body.corners, caps.corners]), np.concatenate([body.sizes, caps.sizes]))
-    return closed if volume(closed) >= 0.0 else turned(closed)
+    return closed if volume(closed) >= 0.0 else turn_polygons(closed)
 
 
-def turned(faces: Faces) -> Faces:
+def turn_polygons(faces: Faces) -> Faces:
     """Return polygons with their other side outwards."""
     return Faces(faces.points, faces.corners[::-1], faces.sizes[::-1])
 

@@ -9,11 +9,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..road.damage import damage_columns, damage_depth, damaged_strips, spaced
+from ..road.damage import damage_columns, damage_depth, damaged_strips, space_shares
 from ..road.geometry import RoadGeometry, SurfaceStrip
 from ..road.parameters import Pavement, Pothole, Rut
 from ..road.section_geometry import CarriagewaySection
-from .faces import Faces, Float, compact, grid_corners, joined, polygons, quads
+from .faces import Faces, Float, compact, grid_corners, join_polygons, polygons, quads
 
 Mask = NDArray[np.bool_]
 
@@ -159,7 +159,7 @@ def _row_masks(stations: Float, damages: list[_Damage]) -> Mask:
 def _shares(damages: list[_Damage], mask: Mask) -> Float:
     """Return where across (C,), from 0 at the left to 1 at the right edge, a row needs points."""
     wanted = [damage.shares for damage, there in zip(damages, mask.tolist(), strict=True) if there]
-    return spaced(np.unique(np.concatenate([[0.0, 1.0], *wanted])))
+    return space_shares(np.unique(np.concatenate([[0.0, 1.0], *wanted])))
 
 
 # --- polygons ---------------------------------------------------------------------------------------------------
@@ -172,7 +172,7 @@ def _faces(edges: _Edges, damages: list[_Damage], wanted: Mask) -> Faces:
     joined by triangles, so that all points are corners on both sides.
     """
     if not wanted.any():
-        return joined([])
+        return join_polygons([])
     masks = _row_masks(edges.stations, damages) if damages else np.zeros((len(edges.stations), 1), dtype=bool)
     even = np.all(masks[:-1] == masks[1:], axis=1)
     parts = []
@@ -183,8 +183,8 @@ def _faces(edges: _Edges, damages: list[_Damage], wanted: Mask) -> Faces:
             parts.append(quads(points.reshape(-1, 3), grid_corners(*points.shape[:2])))
         else:
             points = np.concatenate([edges.points(first, first, shares)[0], edges.points(last, last, others)[0]])
-            parts.append(polygons(points, _zipped(shares, others)))
-    return compact(joined(parts))
+            parts.append(polygons(points, _zip_rows(shares, others)))
+    return compact(join_polygons(parts))
 
 
 def _runs(even: Mask, wanted: Mask) -> Iterator[tuple[int, int]]:
@@ -197,7 +197,7 @@ def _runs(even: Mask, wanted: Mask) -> Iterator[tuple[int, int]]:
     yield from zip(starts.tolist(), ends.tolist(), strict=True)
 
 
-def _zipped(here: Float, there: Float) -> list[list[int]]:
+def _zip_rows(here: Float, there: Float) -> list[list[int]]:
     """Return triangles between a row of points at shares (C,) and the next one at shares (D,)."""
     rings, i, j, ahead = [], 0, 0, len(here)
     while i < len(here) - 1 or j < len(there) - 1:

@@ -11,7 +11,7 @@ from ..road.paint import arrow_outlines, hatching_outlines, pieces
 from ..road.parameters import Arrow, Hatching, LineMarking, Pothole, TemporaryBarrier
 from ..road.surface import known_elevation
 from ..road.tessellation import sample_stations
-from .faces import FLAT, Faces, Int, compact, grid_corners, joined, quads, twist
+from .faces import FLAT, Faces, Int, compact, grid_corners, join_polygons, quads, twist
 
 Float = NDArray[np.float64]
 
@@ -55,7 +55,7 @@ def dash_surfaces(geometry: RoadGeometry, line: LineMarking, stations: Float) ->
     """
     dashes, station, owner = dash_stations(geometry, line, stations)
     if not len(dashes):
-        return dashes, joined([]), owner
+        return dashes, join_polygons([]), owner
     left, right = geometry.marking_edges(line, station)
     points = on_ground(geometry, np.repeat(station, 2), np.stack([left, right], axis=1).ravel())
     points[:, 2] += line.film_thickness
@@ -72,15 +72,15 @@ def painted_surface(geometry: RoadGeometry, item: Hatching | Arrow, stations: Fl
     outlines = hatching_outlines(geometry, item) if isinstance(item, Hatching) else arrow_outlines(item)
     found = [piece for outline in outlines for piece in pieces(outline, _inside(stations, outline))]
     if not found:
-        return joined([])
+        return join_polygons([])
     places = np.concatenate(found)
     points = on_ground(geometry, places[:, 0], places[:, 1])
     points[:, 2] += item.film_thickness
     sizes = np.array([len(piece) for piece in found], dtype=np.int64)
-    return fanned(Faces(points, np.arange(len(points)), sizes))
+    return cut_into_triangles(Faces(points, np.arange(len(points)), sizes))
 
 
-def fanned(faces: Faces) -> Faces:
+def cut_into_triangles(faces: Faces) -> Faces:
     """Return polygons of which those that could be twisted (more than three corners) are flat or cut into triangles."""
     starts = np.cumsum(faces.sizes) - faces.sizes
     parts = []

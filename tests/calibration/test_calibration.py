@@ -17,7 +17,7 @@ from synthroads_addon.calibration.classes import RealClass, by_label, read_real,
 from synthroads_addon.calibration.expected import Expectation, Receiver, Views, chosen_views
 from synthroads_addon.calibration.fit import (
     BRIGHTEST,
-    brightened,
+    brighten_material,
     fitted_slope,
     fitted_wavelength,
     gain_of,
@@ -154,24 +154,24 @@ def test_the_gain_is_one_for_all_and_changes_materials_least() -> None:
 
 
 def test_the_specular_changes_and_the_colour_stays_as_long_as_it_can() -> None:
-    brighter = brightened(ASPHALT, 1.5)
+    brighter = brighten_material(ASPHALT, 1.5)
     assert brighter.reflectivity == pytest.approx(1.5 * ASPHALT.reflectivity)
     assert brighter.base_color == ASPHALT.base_color
-    dark = brightened(PAINT, 0.3)
+    dark = brighten_material(PAINT, 0.3)
     assert dark.reflectivity == pytest.approx(0.3 * PAINT.reflectivity)
     assert dark.retroreflection == pytest.approx(0.3 * PAINT.retroreflection)
     assert dark.base_color[0] == pytest.approx(0.3 * PAINT.base_color[0])
     steel = materials()["galvanised_steel"]
-    assert brightened(steel, 1.3).reflectivity == pytest.approx(1.3 * steel.reflectivity)
+    assert brighten_material(steel, 1.3).reflectivity == pytest.approx(1.3 * steel.reflectivity)
     with pytest.raises(InputError, match="reflectivity"):
-        brightened(PAINT, 2.0)
+        brighten_material(PAINT, 2.0)
 
 
 @given(st.sampled_from(sorted(materials())), st.floats(0.01, 3.0))
 def test_a_brightened_material_is_one_of_the_table_or_refused(name: str, change: float) -> None:
     before = materials()[name]
     try:
-        after = Material.from_dict(brightened(before, change).to_dict())
+        after = Material.from_dict(brighten_material(before, change).to_dict())
     except InputError:
         assert change > 1.0
         return

@@ -13,7 +13,7 @@ import pytest
 
 from synthroads_addon.base.errors import InputError, MissingFileError
 from synthroads_addon.fitting.chain import FREE, ZERO, Chain, ChainFit, Heights, Plan
-from synthroads_addon.fitting.fit import AxisFit, _exactly, _trimmed, fit_axis, read_axis
+from synthroads_addon.fitting.fit import AxisFit, _exactly, _trim_ends, fit_axis, read_axis
 from synthroads_addon.road.alignment import Alignment, Element
 from synthroads_addon.road.profile import IntersectionPoint, Profile
 
@@ -257,7 +257,7 @@ def test_ends_are_cut_and_prolonged_along_their_clothoids() -> None:
             whole.curvature(np.array([5.0, 120.0, 205.0])),
             np.full(2, FREE),
         )
-        cut = _trimmed(chain, first, last)
+        cut = _trim_ends(chain, first, last)
         s = np.linspace(0.0, cut.length, 50)
         assert cut.length == pytest.approx(last - first)
         np.testing.assert_allclose(cut.position(s), whole.position(s + 5.0 + first), atol=1e-6)

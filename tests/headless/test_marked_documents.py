@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from headless.marked_documents import BEGIN, END, fill, replaced
+from headless.marked_documents import BEGIN, END, fill, replace_tables
 from synthroads_addon.base.errors import InputError
 
 
@@ -14,11 +14,11 @@ def test_only_what_stands_between_markers_is_replaced() -> None:
     document = (
         "before\n<!-- table: a -->\nold\n<!-- end of table -->\nbetween\n<!-- table: b -->\n<!-- end of table -->\n"
     )
-    new = replaced(document, {"b": "| new |\n"})
+    new = replace_tables(document, {"b": "| new |\n"})
     assert new == document.replace("<!-- table: b -->\n", "<!-- table: b -->\n| new |\n")
-    assert replaced(new, {"b": "| new |\n"}) == new
+    assert replace_tables(new, {"b": "| new |\n"}) == new
     with pytest.raises(InputError, match="table: c"):
-        replaced(document, {"c": ""})
+        replace_tables(document, {"c": ""})
 
 
 def test_a_document_is_looked_at_before_the_work_and_filled_after_it(tmp_path: Path) -> None:

@@ -10,7 +10,7 @@ import pytest
 from headless.tradeoff_table import TABLES, better_row, markdown, time_noise
 from synthroads_addon.jobs.measure.tradeoff import KNOBS, row_scenario, rows
 from synthroads_addon.scanning.platforms.path import Strip
-from synthroads_addon.scanning.samples import middle, spread
+from synthroads_addon.scanning.samples import middle, spread_stretches
 from synthroads_addon.scenario.scenario import load_scenario
 from tests.helpers.scenes.scan_scenes import Standing
 
@@ -97,7 +97,7 @@ def test_images_from_afar_are_coarser() -> None:
 def test_stretches_are_spread_over_each_strip(count: int, duration: float) -> None:
     path = Standing(speed=2.0)
     path.strips = (Strip(0, 0.0, 75.0), Strip(1, 80.0, 50.0))
-    part = spread(path, count, duration)
+    part = spread_stretches(path, count, duration)
     short = count * duration > 75.0
     assert len(part.strips) == (2 if short else 2 * count)
     assert part.share == pytest.approx(1.0 if short else 2 * count * duration / 125.0)

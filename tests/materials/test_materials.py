@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from synthroads_addon.base.errors import InputError
 from synthroads_addon.materials.reflectance import facet_slope, facet_terms, returned_share
 from synthroads_addon.materials.table import Material, material_table_path, materials, read_material_table
-from synthroads_addon.materials.variation import varied
+from synthroads_addon.materials.variation import vary_material
 from synthroads_addon.road.surroundings import Environment, MaterialVariation
 
 DRY, WET = Environment(), Environment(wetness=1.0)
@@ -83,7 +83,7 @@ def test_beaded_paint_is_one_to_three_from_above_and_seen_by_headlamps() -> None
 
 
 def test_worn_paint_has_lost_its_beads() -> None:
-    by_wear = [varied("paint_white", MaterialVariation(paint_wear=wear), DRY) for wear in (0.0, 0.2, 0.6, 1.0)]
+    by_wear = [vary_material("paint_white", MaterialVariation(paint_wear=wear), DRY) for wear in (0.0, 0.2, 0.6, 1.0)]
     retro = [material.retroreflection for material in by_wear]
     assert retro == sorted(retro, reverse=True)
     assert retro[1] == pytest.approx(materials()["paint_white"].retroreflection)
@@ -94,17 +94,17 @@ def test_worn_paint_has_lost_its_beads() -> None:
 
 def test_water_drowns_beads_and_smooths_facets_but_leaves_sheeting() -> None:
     for name in PAINTS:
-        dry, wet = (varied(name, MEAN, environment) for environment in (DRY, WET))
+        dry, wet = (vary_material(name, MEAN, environment) for environment in (DRY, WET))
         assert 0.1 < wet.retroreflection / dry.retroreflection < 0.3
         assert wet.slope < dry.slope
         assert wet.reflectivity < dry.reflectivity
-    assert varied("soil", MEAN, WET).slope < varied("soil", MEAN, DRY).slope
-    assert varied("sheeting_white", MEAN, WET) == materials()["sheeting_white"]
+    assert vary_material("soil", MEAN, WET).slope < vary_material("soil", MEAN, DRY).slope
+    assert vary_material("sheeting_white", MEAN, WET) == materials()["sheeting_white"]
 
 
 def test_the_default_road_has_the_tables_means() -> None:
     for name, mean in materials().items():
-        same = varied(name, MEAN, DRY)
+        same = vary_material(name, MEAN, DRY)
         for field in type(mean).model_fields:
             assert getattr(same, field) == pytest.approx(getattr(mean, field)), (name, field)
 
@@ -123,7 +123,7 @@ def test_the_default_road_has_the_tables_means() -> None:
 )
 def test_every_roads_materials_can_be_written_and_read(variation, wetness) -> None:
     for name in materials():
-        got = varied(name, variation, Environment(wetness=wetness))
+        got = vary_material(name, variation, Environment(wetness=wetness))
         assert Material.from_dict(got.to_dict()) == got
         assert got.transmission == materials()[name].transmission
         assert np.isfinite(returned(got, 45.0))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from synthroads_addon.road.damage import damage_columns, damaged_strips, spaced
+from synthroads_addon.road.damage import damage_columns, damaged_strips, space_shares
 from synthroads_addon.road.parameters import Carriageway, CrossfallPoint, Lane, Pavement, Pothole
 from synthroads_addon.road.section_geometry import CarriagewaySection
 
@@ -33,7 +33,7 @@ def test_a_narrow_pothole_has_columns_as_close_as_its_slope_needs(tolerance: flo
 
 def test_columns_keep_their_ends_and_a_distance() -> None:
     shares = np.unique(np.concatenate([[0.0, 1.0], np.linspace(0.4, 0.41, 1001), [1e-5, 1.0 - 1e-5]]))
-    kept = spaced(shares)
+    kept = space_shares(shares)
     assert (kept[0], kept[-1]) == (0.0, 1.0)
     assert np.diff(kept).min() > 2e-4
     assert np.diff(kept[(kept >= 0.4) & (kept <= 0.41)]).max() < 2.2e-4

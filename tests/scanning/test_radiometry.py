@@ -8,7 +8,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from synthroads_addon.materials.reflectance import EDGE_ON, facet_slope, facet_terms, reflectivity, returned_share
-from synthroads_addon.scanning.radiometry import NEAREST, lambert_intensity, oren_nayar_intensity, received, saturated
+from synthroads_addon.scanning.radiometry import (
+    NEAREST,
+    lambert_intensity,
+    oren_nayar_intensity,
+    received_intensity,
+    saturate,
+)
 
 RANGES = np.array([1.0, 1.7, 5.0, 20.0, 60.0, 123.4, 250.0, 500.0])
 ANGLES = np.deg2rad(np.append(np.arange(0.0, 90.0, 2.5), [88.0, 89.0, 89.9, 89.999, 90.0]))
@@ -101,7 +107,7 @@ any_float = st.floats(allow_nan=True, allow_infinity=True)
 def test_nothing_is_infinite_or_undefined(cosine, distance, slope, attenuation, retro, inverse_lobe_squared) -> None:
     with np.errstate(divide="raise", invalid="raise"):
         share = returned_share(cosine, 1.5, *facet_terms(slope), retro, inverse_lobe_squared)
-        intensity = received(share, distance, attenuation)
+        intensity = received_intensity(share, distance, attenuation)
     for value in (share, intensity, lambert_intensity(1.5, cosine, distance, attenuation)):
         assert np.isfinite(value).all()
         assert (value >= 0.0).all()
@@ -113,15 +119,15 @@ def test_extremes_raise_no_floating_point_error() -> None:
     distance = np.array([0.0, 1e-300, 1e-9, 1.0, 1e3, 1e6, 1e300, np.inf])
     with np.errstate(all="raise"):
         got = lambert_intensity(1.0, 1.0, distance, attenuation=0.2)
-        assert received(np.array([1.0]), np.array([3600.0]), 0.2) < 1e-300
+        assert received_intensity(np.array([1.0]), np.array([3600.0]), 0.2) < 1e-300
     assert got[[0, 5, 6, 7]].tolist() == [0.0] * 4
     assert got[[1, 2]] == pytest.approx(NEAREST**-2, rel=1e-3)
     assert (np.diff(got[2:]) <= 0.0).all()
 
 
 def test_the_light_is_not_stronger_nearer_than_a_millimetre() -> None:
-    assert received(1.0, NEAREST / 1e6) == received(1.0, NEAREST)
-    assert received(1.0, NEAREST) == pytest.approx(1e6)
+    assert received_intensity(1.0, NEAREST / 1e6) == received_intensity(1.0, NEAREST)
+    assert received_intensity(1.0, NEAREST) == pytest.approx(1e6)
 
 
 def test_a_white_target_at_one_metre_is_1() -> None:
@@ -131,12 +137,12 @@ def test_a_white_target_at_one_metre_is_1() -> None:
 
 def test_the_detector_clips_and_counts() -> None:
     intensity = np.array([0.5, 2.0, 3.0, 2.0])
-    clipped, count = saturated(intensity, 2.0)
+    clipped, count = saturate(intensity, 2.0)
     assert clipped.tolist() == [0.5, 2.0, 2.0, 2.0]
     assert count == 1
     assert intensity[2] == 3.0
-    assert saturated(intensity, math.inf)[1] == 0
-    assert saturated(np.empty(0), 1.0)[1] == 0
+    assert saturate(intensity, math.inf)[1] == 0
+    assert saturate(np.empty(0), 1.0)[1] == 0
 
 
 def test_reflectivity_formula() -> None:

@@ -18,10 +18,10 @@ from synthroads_addon.scanning.relief import (
     MAX_STRENGTH,
     RELIEF,
     MicroRelief,
-    adjusted,
     heights,
     micro_relief,
     relief_of_roughness,
+    shift_along_normals,
 )
 from tests.helpers.clouds.random_points import make_points
 
@@ -39,7 +39,7 @@ def patch(name: str, count: int, size: float, strength: float, noise: float = 0.
     rng = np.random.default_rng(count)
     position = np.column_stack([rng.uniform(0, size, (count, 2)), np.zeros(count)])
     points = scanned(position, np.zeros(count, np.uint16), np.array([0.0, 0.0, 1.0]), rng)
-    result = adjusted(points, position, relief_of(name), strength, 1, octaves).xyz - ORIGIN
+    result = shift_along_normals(points, position, relief_of(name), strength, 1, octaves).xyz - ORIGIN
     result[:, 2] += rng.normal(0, noise, count)
     return result
 
@@ -76,19 +76,19 @@ def scene(count: int = 20_000, seed: int = 0) -> tuple[PointBlock, np.ndarray]:
 
 def test_strength_0_returns_the_very_same_points() -> None:
     points, position = scene()
-    assert adjusted(points, position, relief_of(*ROAD), 0.0, 1) is points
+    assert shift_along_normals(points, position, relief_of(*ROAD), 0.0, 1) is points
 
 
 def test_smooth_materials_return_the_very_same_points() -> None:
     points, position = scene()
     smooth = replace(points, material=np.full(len(points), 4, np.uint16))
-    assert adjusted(smooth, position, relief_of(*ROAD), 1.0, 1) is smooth
-    assert adjusted(points, position, relief_of(*["car_paint"] * 5), 1.0, 1) is points
+    assert shift_along_normals(smooth, position, relief_of(*ROAD), 1.0, 1) is smooth
+    assert shift_along_normals(points, position, relief_of(*["car_paint"] * 5), 1.0, 1) is points
 
 
 def test_points_move_along_the_normal_and_nothing_else_changes() -> None:
     points, position = scene()
-    result = adjusted(points, position, relief_of(*ROAD), 2.0, 1)
+    result = shift_along_normals(points, position, relief_of(*ROAD), 2.0, 1)
     shift = result.xyz - points.xyz
     height = np.einsum("ij,ij->i", shift, points.normal)
     # Normals are float32, and float64 has steps of 1e-9 at 5.6e6 m.
@@ -104,7 +104,7 @@ def test_points_move_along_the_normal_and_nothing_else_changes() -> None:
 
 def test_range_is_the_distance_to_the_shifted_point() -> None:
     points, position = scene()
-    result = adjusted(points, position, relief_of(*ROAD), 5.0, 1)
+    result = shift_along_normals(points, position, relief_of(*ROAD), 5.0, 1)
     assert np.abs(result.range - points.range).max() > 0.05
     assert result.range == pytest.approx(np.linalg.norm(result.xyz - points.scanner, axis=1), abs=1e-6)
     assert (result.range[points.material == 4] == points.range[points.material == 4]).all()
@@ -113,7 +113,7 @@ def test_range_is_the_distance_to_the_shifted_point() -> None:
 def test_the_given_points_are_not_written_to() -> None:
     points, position = scene(2000)
     before = {name: array.copy() for name, array in points.attributes().items()}
-    adjusted(points, position, relief_of(*ROAD), 1.0, 1)
+    shift_along_normals(points, position, relief_of(*ROAD), 1.0, 1)
     for name, array in points.attributes().items():
         np.testing.assert_array_equal(array, before[name])
 
@@ -122,10 +122,10 @@ def test_the_given_points_are_not_written_to() -> None:
 @given(cuts=st.lists(st.integers(0, 3000), max_size=4), seed=st.integers(0, 2**31), order=st.integers(0, 99))
 def test_blocks_and_order_do_not_matter(cuts: list[int], seed: int, order: int) -> None:
     points, position = scene(3000)
-    whole = adjusted(points, position, relief_of(*ROAD), 1.5, seed)
+    whole = shift_along_normals(points, position, relief_of(*ROAD), 1.5, seed)
     shuffle = np.random.default_rng(order).permutation(3000)
     parts = np.split(shuffle, sorted(cuts))
-    blocks = [adjusted(points.select(part), position[part], relief_of(*ROAD), 1.5, seed) for part in parts]
+    blocks = [shift_along_normals(points.select(part), position[part], relief_of(*ROAD), 1.5, seed) for part in parts]
     joined = concatenate(blocks)
     assert (joined.xyz == whole.xyz[shuffle]).all()
     assert (joined.range == whole.range[shuffle]).all()
@@ -136,7 +136,7 @@ def test_the_same_place_has_the_same_height_in_every_strip() -> None:
     material, normal = np.zeros(2000, np.uint16), np.array([-0.3, 0, 1])
     there, back = (scanned(position, material, normal, np.random.default_rng(seed)) for seed in (1, 2))
     assert (there.range != back.range).all()
-    moved = [adjusted(points, position, relief_of("asphalt"), 1.0, 3).xyz for points in (there, back)]
+    moved = [shift_along_normals(points, position, relief_of("asphalt"), 1.0, 3).xyz for points in (there, back)]
     assert (moved[0] == moved[1]).all()
 
 
@@ -239,20 +239,20 @@ def test_reaches_the_roughness_of_real_asphalt(file: Path) -> None:
 def test_strength_out_of_range(strength: float) -> None:
     points, position = scene(10)
     with pytest.raises(InputError, match="roughness strength"):
-        adjusted(points, position, relief_of(*ROAD), strength, 1)
+        shift_along_normals(points, position, relief_of(*ROAD), strength, 1)
 
 
 @pytest.mark.parametrize("missing", ["normal", "material"])
 def test_normals_and_materials_are_needed(missing: str) -> None:
     points, position = scene(10)
     with pytest.raises(ValueError, match="normals and materials"):
-        adjusted(replace(points, **{missing: None}), position, relief_of(*ROAD), 1.0, 1)
+        shift_along_normals(replace(points, **{missing: None}), position, relief_of(*ROAD), 1.0, 1)
 
 
 def test_no_points() -> None:
     points, position = scene(10)
     none = points.select(np.zeros(10, bool))
-    assert len(adjusted(none, position[:0], relief_of(*ROAD), 1.0, 1)) == 0
+    assert len(shift_along_normals(none, position[:0], relief_of(*ROAD), 1.0, 1)) == 0
 
 
 def test_every_material_of_the_table_has_a_stated_relief() -> None:
@@ -284,6 +284,6 @@ def test_a_million_points_in_a_second() -> None:
     spent = []
     for _ in range(3):
         begin = time.process_time()
-        adjusted(points, position, relief_of("asphalt"), 1.0, 1)
+        shift_along_normals(points, position, relief_of("asphalt"), 1.0, 1)
         spent.append(time.process_time() - begin)
     assert min(spent) < 0.1

@@ -19,7 +19,7 @@ from ...configuration import Part
 from .axis import MeasuredAxis
 from .corridor import Truth, TruthKind
 from .effects import SequenceCrop, SequenceEffects
-from .mirroring import mirrored
+from .mirroring import mirror_batch
 from .roads import LearningRoad, read_measured, read_scene, scene_folders
 from .slices import Batch, Sample, SliceDataset, SliceSettings, collate
 
@@ -97,8 +97,8 @@ def read_roads(data: DataOptions, truth: TruthKind, progress: Progress = silent)
     cache = Path(data.cache) if data.cache else None
     train = _scenes(data.data_sets, data.train_split, truth, cache, progress)
     validation = _scenes(data.data_sets, data.validation_split, truth, cache, progress)
-    measured = [_measured(road, truth) for road in data.measured]
-    measured_validation = [_measured(road, truth) for road in data.measured_validation]
+    measured = [_read_measured_road(road, truth) for road in data.measured]
+    measured_validation = [_read_measured_road(road, truth) for road in data.measured_validation]
     if not train and not measured:
         raise InputError("data", list(data.data_sets), f"holds no road with a {truth} to learn from")
     if not validation and not measured_validation:
@@ -157,7 +157,7 @@ class Batches:
                 else:
                     chosen = [kept[number] for number in order[first : first + self.options.size]]
                 batch = collate(chosen)
-                yield mirrored(batch) if turn % 2 else batch
+                yield mirror_batch(batch) if turn % 2 else batch
 
 
 def fixed_batches(
@@ -194,7 +194,7 @@ def _scenes(
     return roads
 
 
-def _measured(road: MeasuredRoad, truth: TruthKind) -> LearningRoad:
+def _read_measured_road(road: MeasuredRoad, truth: TruthKind) -> LearningRoad:
     """Read a real road whose axis is only known between two stations."""
     whole = read_measured(Path(road.cloud), Path(road.axis), truth)
     assert whole.truth is not None

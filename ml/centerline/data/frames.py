@@ -1,7 +1,7 @@
 """Frames of slices across a road: along a path that was driven, flown or drawn, or found in the cloud itself.
 
-The path is never the truth. For training it is the truth displaced at random (`displaced`); in use it comes from a file
-(`read_path`) or from the points (`estimated_path`).
+The path is never the truth. For training it is the truth displaced at random (`displace_frames`); in use it comes from
+a file (`read_path`) or from the points (`estimated_path`).
 """
 
 from __future__ import annotations
@@ -74,7 +74,9 @@ def along(path: MeasuredAxis, spacing: float = SPACING, reach: float = 5.0) -> F
     return Frames(path.position(station), path.direction(station, reach), station)
 
 
-def displaced(frames: Frames, rng: np.random.Generator, window: float, direction_deg: float, length: float) -> Frames:
+def displace_frames(
+    frames: Frames, rng: np.random.Generator, window: float, direction_deg: float, length: float
+) -> Frames:
     """Return frames moved sideways and turned by smooth random amounts.
 
     Args:
@@ -123,7 +125,7 @@ def sequences(frames: Frames, length: int, step: int | None = None, spacing: flo
         spacing: of a run's frames, m; to the nearest multiple of the frames' own.
     """
     step = step or length
-    every = interleaved(frames, spacing)
+    every = interleave_count(frames, spacing)
     runs = []
     for stretch in stretches(frames, spacing):
         for some in (stretch[first::every] for first in range(min(every, len(stretch)))):
@@ -134,7 +136,7 @@ def sequences(frames: Frames, length: int, step: int | None = None, spacing: flo
     return np.concatenate(runs) if runs else np.empty((0, length), dtype=np.intp)
 
 
-def interleaved(frames: Frames, spacing: float) -> int:
+def interleave_count(frames: Frames, spacing: float) -> int:
     """Return how many of the frames there are to each of a spacing, m."""
     return max(1, round(spacing / _own_spacing(frames, spacing)))
 
@@ -190,9 +192,9 @@ def estimated_path(xyz: Float, cell: float = 4.0, window: float = 60.0, half_wid
     plan = np.asarray(xyz, dtype=np.float64)[:, :2]
     cells = _cells(plan, cell)
     rough = MeasuredAxis(cells[_way_through(cells, cell)])
-    path = _smoothed(rough.position(rough.stations(SPACING)), window) if rough.length > 4 * SPACING else rough
+    path = _smooth_line(rough.position(rough.stations(SPACING)), window) if rough.length > 4 * SPACING else rough
     for _ in range(3):
-        path = _centred(path, plan, window, half_width)
+        path = _centre_path(path, plan, window, half_width)
     return path
 
 
@@ -211,7 +213,7 @@ def _way_through(cells: Float, cell: float) -> NDArray[np.intp]:
     from scipy.spatial import cKDTree
 
     pairs = cKDTree(cells).query_pairs(2.1 * cell, output_type="ndarray")
-    pairs = _bridged(cells, pairs)
+    pairs = _bridge_cells(cells, pairs)
     graph = _graph(len(cells), pairs, np.hypot(*(cells[pairs[:, 0]] - cells[pairs[:, 1]]).T))
     start = 0
     for _ in range(2):
@@ -224,7 +226,7 @@ def _way_through(cells: Float, cell: float) -> NDArray[np.intp]:
     return np.array(way if tuple(cells[way[0]]) < tuple(cells[way[-1]]) else way[::-1])
 
 
-def _bridged(cells: Float, pairs: NDArray[np.intp]) -> NDArray[np.intp]:
+def _bridge_cells(cells: Float, pairs: NDArray[np.intp]) -> NDArray[np.intp]:
     """Return the pairs of cells (P, 2) and those of the shortest ways that join what they leave apart."""
     from scipy.sparse.csgraph import connected_components
     from scipy.spatial import cKDTree
@@ -245,7 +247,7 @@ def _graph(count: int, pairs: NDArray[np.intp], weights: Float) -> Any:
     return coo_array((weights, (pairs[:, 0], pairs[:, 1])), shape=(count, count)).tocsr()
 
 
-def _centred(path: MeasuredAxis, plan: Float, window: float, half_width: float) -> MeasuredAxis:
+def _centre_path(path: MeasuredAxis, plan: Float, window: float, half_width: float) -> MeasuredAxis:
     """Return a path drawn to the middle of the points' extent across it and smoothed."""
     station, offset = path.project(plan)
     near = np.abs(offset) <= half_width
@@ -261,7 +263,7 @@ def _centred(path: MeasuredAxis, plan: Float, window: float, half_width: float) 
     whole = high - low >= _WHOLE * np.median(high - low)
     middle, low, high = station.min() + _BIN * (filled[whole] + 0.5), low[whole], high[whole]
     every = np.arange(station.min(), station.max() + 0.5 * SPACING, SPACING)
-    return _smoothed(_on_path(path, every).at(np.interp(every, middle, 0.5 * (low + high))), window)
+    return _smooth_line(_on_path(path, every).at(np.interp(every, middle, 0.5 * (low + high))), window)
 
 
 def _on_path(path: MeasuredAxis, station: Float) -> Frames:
@@ -272,7 +274,7 @@ def _on_path(path: MeasuredAxis, station: Float) -> Frames:
     return Frames(path.position(inside) + beyond, direction, station)
 
 
-def _smoothed(points: Float, window: float) -> MeasuredAxis:
+def _smooth_line(points: Float, window: float) -> MeasuredAxis:
     """Return the line through points (N, 2), `SPACING` apart, each moved on the parabola through those around it."""
     from scipy.signal import savgol_filter
 

@@ -37,10 +37,10 @@ def logarithms(intensity: Float) -> Float:
 
 def level(logs: Float) -> Float:
     """Return logarithms (K,) less their median, by the distance of their 10th and 90th percentiles."""
-    return (logs - float(np.median(logs))) / max(_spread(logs), _SMALLEST)
+    return (logs - float(np.median(logs))) / max(_decile_spread(logs), _SMALLEST)
 
 
-def _spread(logs: Float) -> float:
+def _decile_spread(logs: Float) -> float:
     low, high = np.percentile(logs, (10.0, 90.0))
     return float(high - low)
 
@@ -70,4 +70,4 @@ def contrast(logs: Float, y: Float) -> Float:
     usual = np.interp(y, _BIN * (first + np.flatnonzero(there) + 0.5), around)
     rest = logs - usual
     low, high = np.percentile(rest, (20.0, 80.0))
-    return rest / max(float(high - low) / _SPREAD_20_80, QUIETEST * max(_spread(logs), _SMALLEST))
+    return rest / max(float(high - low) / _SPREAD_20_80, QUIETEST * max(_decile_spread(logs), _SMALLEST))

@@ -43,11 +43,11 @@ def relight(stretch: Stretch, effects: SequenceEffects, rng: Generator) -> None:
 
 def _relight_intensities(stretch: Stretch, effects: SequenceEffects, rng: Generator) -> None:
     share = rng.random(7)
-    value, marked = _repainted(np.maximum(stretch.intensity, 0.0), stretch, effects.repaint, rng)
-    value = _worn(value, stretch.paved, marked, effects.paint * share[0])
+    value, marked = _repaint_lines(np.maximum(stretch.intensity, 0.0), stretch, effects.repaint, rng)
+    value = _wear_markings(value, stretch.paved, marked, effects.paint * share[0])
     value, like_pavement = _verges(value, stretch, marked, effects.verge, rng)
     value = np.where(like_pavement, value, value * np.exp(effects.contrast * rng.uniform(-1.0, 1.0)))
-    value = _blurred(value, stretch, effects.footprint * share[5])
+    value = _blur_footprint(value, stretch, effects.footprint * share[5])
     value *= _falloff(stretch.xyz[:, 1], effects.falloff * share[1], rng)
     low, high = np.log(effects.gamma)
     log = np.exp(low + share[4] * (high - low)) * np.log(np.maximum(value / np.max(value), _DARKEST))
@@ -58,7 +58,9 @@ def _relight_intensities(stretch: Stretch, effects: SequenceEffects, rng: Genera
     stretch.intensity = np.exp(log + spread * (noise + pattern))
 
 
-def _repainted(value: Float, stretch: Stretch, probability: float, rng: Generator) -> tuple[Float, NDArray[np.bool_]]:
+def _repaint_lines(
+    value: Float, stretch: Stretch, probability: float, rng: Generator
+) -> tuple[Float, NDArray[np.bool_]]:
     """Return intensities and what is marked (K,) where the lines of a carriageway without shoulders are others.
 
     Two lanes are parted by dashes on motorways; on rural roads as well by a solid or a double line, or by none; and
@@ -105,7 +107,7 @@ def _verges(
     return np.where(verge, value * (tone * float(np.median(value[bare])) / usual), value), stretch.paved | verge
 
 
-def _worn(value: Float, paved: NDArray[np.bool_], marked: NDArray[np.bool_], share: float) -> Float:
+def _wear_markings(value: Float, paved: NDArray[np.bool_], marked: NDArray[np.bool_], share: float) -> Float:
     """Return intensities whose markings have lost a share of what they are brighter than the pavement."""
     bare = paved & ~marked
     if not marked.any() or not bare.any():
@@ -114,7 +116,7 @@ def _worn(value: Float, paved: NDArray[np.bool_], marked: NDArray[np.bool_], sha
     return np.where(marked, value + share * np.minimum(pavement - value, 0.0), value)
 
 
-def _blurred(value: Float, stretch: Stretch, width: float) -> Float:
+def _blur_footprint(value: Float, stretch: Stretch, width: float) -> Float:
     """Return the means of intensities (K,) over a beam's footprint: over points of the slice within half a width in y.
 
     A line seen by a wide beam is wider and fainter than it is.

@@ -12,7 +12,7 @@ _TURNED = ("left_edge", "right_edge", "heading")
 """Columns of the corridor whose sign changes."""
 
 
-def mirrored(batch: Batch) -> Batch:
+def mirror_batch(batch: Batch) -> Batch:
     """Return a batch with left and right swapped, truth and frames included."""
     flip = batch["coord"].new_tensor([1.0, -1.0, 1.0])
     other = dict(batch, coord=batch["coord"] * flip)

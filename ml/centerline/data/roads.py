@@ -192,7 +192,7 @@ def read_scene(folder: Path, kind: TruthKind, cache: Path | None = None) -> list
         if not (folder / name).is_file():
             raise MissingFileError(str(folder / name), None, "no such file; a scene of a data set has one")
     parameters = read_parameters(folder / PARAMETERS)
-    whole = _cached(folder, cache) if cache else None
+    whole = _read_cached(folder, cache) if cache else None
     if whole is None:
         points = read_points(folder / CLOUD, GROUND_CLASSES)
         reference = truths(parameters, "road", points.origin)[0].axis
@@ -221,7 +221,7 @@ def read_measured(cloud: Path, axis: Path, kind: TruthKind, gap: float | None = 
     return LearningRoad.of_points(cloud.stem, points, line, Truth.measured(line, kind))
 
 
-def cropped(road: LearningRoad, share: float, seed: int, length: float = 1.0) -> LearningRoad:
+def crop_road(road: LearningRoad, share: float, seed: int, length: float = 1.0) -> LearningRoad:
     """Cut off both sides of every slice of a road with a truth, each at random and by itself.
 
     Slices are each metre (``length``) of the station along the truth's axis. On either side of the axis a slice reaches
@@ -299,7 +299,7 @@ def _keep(road: LearningRoad, folder: Path, cache: Path) -> None:
         raise OutputError("data.cache", str(cache), f"cannot be written ({error.strerror})") from None
 
 
-def _cached(folder: Path, cache: Path) -> LearningRoad | None:
+def _read_cached(folder: Path, cache: Path) -> LearningRoad | None:
     """Return a road as it was kept; None if it wasn't, or is damaged."""
     place = _cache_folder(folder, cache)
     try:

@@ -33,7 +33,7 @@ from ...points import ROAD_CLASSES
 from . import intensity
 from .corridor import CORRIDOR, TruthKind
 from .effects import SequenceEffects, leave_out, transform
-from .frames import SPACING, Frames, displaced, sequences
+from .frames import SPACING, Frames, displace_frames, sequences
 from .roads import LearningRoad, cut_beside_median
 from .stretch import HEIGHT, Stretch
 
@@ -140,7 +140,7 @@ class SliceDataset(Dataset[Sample]):
         station = rng.uniform(start.low, start.high) + settings.spacing * np.arange(settings.slices)
         axis = road.truth.axis
         exact = Frames(axis.position(station), axis.direction(station), station)
-        path = displaced(exact, rng, settings.window, settings.direction_deg, settings.wander_length)
+        path = displace_frames(exact, rng, settings.window, settings.direction_deg, settings.wander_length)
         cut = stretch(road, path, settings)
         if self.effects is not None:
             leave_out(cut, self.effects, rng)

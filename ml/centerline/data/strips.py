@@ -130,7 +130,7 @@ def _sorted_to(
             station, offset = path.project(some.xyz)
             near = np.abs(offset) <= REACH
             rows, station = _rows(some.select(near), ground.header), station[near]
-            for number in _touched(station):
+            for number in _touched_strips(station):
                 inside = (station >= number * LENGTH - MARGIN) & (station < (number + 1) * LENGTH + MARGIN)
                 files.setdefault(number, folder / f"{number}.bin")
                 with files[number].open("ab") as file:
@@ -139,7 +139,7 @@ def _sorted_to(
     return files
 
 
-def _touched(station: Float) -> list[int]:
+def _touched_strips(station: Float) -> list[int]:
     """Return the numbers of the strips that stations lie in or beside."""
     both = np.concatenate([np.floor((station + by) / LENGTH) for by in (-MARGIN, MARGIN)])
     return np.unique(both).astype(np.int64).tolist()

@@ -30,7 +30,7 @@ from synthroads_addon.base.schema import quantity
 
 from ...configuration import Part
 from ..data.corridor import CORRIDOR
-from ..data.mirroring import mirrored, mirrored_corridor, with_sides_swapped
+from ..data.mirroring import mirror_batch, mirrored_corridor, with_sides_swapped
 from ..data.slices import FEATURES, Batch
 from .layers import (
     AttentionPool,
@@ -144,7 +144,7 @@ class CenterlineModel(nn.Module):
         )
         found["rough"], found["center"] = found["center"], guess + step
         found["fine_places"] = guess[..., None] + self.again.places
-        found["log_std"] = _bounded(torch.cat([log_std[..., None], found["log_std"]], dim=-1))
+        found["log_std"] = _bound_values(torch.cat([log_std[..., None], found["log_std"]], dim=-1))
         _, heading = self.line(found["center"].detach(), found, context, batch["frame"])
         place = CORRIDOR.index("heading")
         found["corridor"] = torch.cat(
@@ -287,7 +287,7 @@ def both_ways(model: nn.Module, batch: Batch) -> Output:
     Mirroring the batch mirrors the result exactly. Variances are averaged; what the two disagree on is left out, as the
     calibration sees it.
     """
-    one, other = model(batch), model(mirrored(batch))
+    one, other = model(batch), model(mirror_batch(batch))
     back = mirrored_corridor(other["corridor"])
     variance = with_sides_swapped(other["corridor_std"]) ** 2
     return {
@@ -298,5 +298,5 @@ def both_ways(model: nn.Module, batch: Batch) -> Output:
     }
 
 
-def _bounded(logarithm: Tensor) -> Tensor:
+def _bound_values(logarithm: Tensor) -> Tensor:
     return _LARGEST_LOG * torch.tanh(logarithm / _LARGEST_LOG)

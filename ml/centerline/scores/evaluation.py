@@ -31,8 +31,8 @@ from synthroads_addon.base.random_streams import stream
 
 from ...points import ROAD_CLASSES
 from ..data.corridor import CORRIDOR, Truth
-from ..data.frames import Frames, along, displaced, estimated_path, stretches
-from ..data.roads import LearningRoad, Slices, cropped, cut_beside_median
+from ..data.frames import Frames, along, displace_frames, estimated_path, stretches
+from ..data.roads import LearningRoad, Slices, crop_road, cut_beside_median
 from ..data.slices import SliceSettings
 from . import skeleton, trivial
 from .metrics import Spread, figures, over_roads, over_seeds
@@ -85,11 +85,11 @@ def case(
         InputError: the road has no truth.
     """
     settings = settings or SliceSettings()
-    seen = road if cropping is None else cropped(road, cropping.share, seed, cropping.length)
+    seen = road if cropping is None else crop_road(road, cropping.share, seed, cropping.length)
     seen = cut_beside_median(seen, settings.median_error, stream(seed, "median", road.name))
     path = estimated_path(seen.xyz.astype(np.float64)) if estimated else truth_of(road).axis
     rng = stream(seed, "frames", road.name)
-    strayed = displaced(along(path), rng, settings.window, settings.direction_deg, settings.wander_length)
+    strayed = displace_frames(along(path), rng, settings.window, settings.direction_deg, settings.wander_length)
     return Case(seen, strayed)
 
 
@@ -265,12 +265,12 @@ def grid_search(shown: Sequence[Case], masks: Sequence[str]) -> GridSearch:
             lines = skeleton.skeletons(*_mask_points(one.road, mask), frames.position, tried[0])
             for settings, some in zip(tried, found, strict=True):
                 y = skeleton.centers_on(lines, frames.position, frames.direction, settings.bin)
-                some.append(evaluate(partial(_told, y), one))
+                some.append(evaluate(partial(_as_column, y), one))
         rows.extend((settings, over_roads(some)) for settings, some in zip(tried, found, strict=True))
     enough = [row for row in rows if row[1]["found"] >= FOUND] or rows
     best = min(enough, key=lambda row: row[1]["mae"] if np.isfinite(row[1]["mae"]) else np.inf)
     return GridSearch(best[0], rows)
 
 
-def _told(y: Float, road: LearningRoad, frames: Frames) -> Float:
+def _as_column(y: Float, road: LearningRoad, frames: Frames) -> Float:
     return y[:, None]

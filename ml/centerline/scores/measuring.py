@@ -101,7 +101,7 @@ def read_cases(
                 for road in read_scene(folder, settings.truth, cache):
                     shown.append(case(road, seed, cropping=None, estimated=False, settings=settings))
         else:
-            road = _measured(path, settings.truth)
+            road = _measure_case(path, settings.truth)
             shown.append(case(road, seed, cropping=Cropping(), estimated=True, settings=settings))
     if not shown:
         names = ", ".join(str(path) for path in evaluation.data)
@@ -138,7 +138,7 @@ def _figures(error: Float, std: Float, wide: Float) -> dict[str, dict[str, float
     return rows
 
 
-def _measured(cloud: Path, truth: TruthKind) -> LearningRoad:
+def _measure_case(cloud: Path, truth: TruthKind) -> LearningRoad:
     found = [cloud.with_name(cloud.stem + ending) for ending in AXIS_ENDINGS]
     there = [path for path in found if path.is_file()]
     if not cloud.exists():

@@ -210,14 +210,14 @@ def _window_chamfer(predicted: Float, true: Float) -> tuple[float, float] | None
     extents = [(points[:, 0].min(), points[:, 0].max()) for points in local]
     common = (max(low for low, _ in extents), min(high for _, high in extents))
     fits = [np.polynomial.Polynomial.fit(p[:, 0] / scale, p[:, 1] / scale, DEGREE) for p in local]
-    full = [_sampled(fit, scale, extent) for fit, extent in zip(fits, extents, strict=True)]
-    shared = [_sampled(fit, scale, common) for fit in fits]
+    full = [_sample_polynomial(fit, scale, extent) for fit, extent in zip(fits, extents, strict=True)]
+    shared = [_sample_polynomial(fit, scale, common) for fit in fits]
     if not all(len(points) for points in (*full, *shared)):
         return None
     return _both_ways(*full), _both_ways(*shared)
 
 
-def _sampled(fit: np.polynomial.Polynomial, scale: float, extent: tuple[float, float]) -> Float:
+def _sample_polynomial(fit: np.polynomial.Polynomial, scale: float, extent: tuple[float, float]) -> Float:
     """Return the polynomial's points (N, 2), m, at the whole metres within an extent."""
     along = np.arange(np.ceil(extent[0] - 1e-9), np.floor(extent[1] + 1e-9) + 1.0)
     return np.column_stack([along, scale * fit(along / scale)])

@@ -98,7 +98,7 @@ def centers_on(lines: Sequence[Float], origin: Float, direction: Float, width: f
     """Return `centers` of the windows' skeletons (K, 2), averaged in bins of a width, m."""
     result = np.full(len(origin), np.nan)
     parts = [slice(first, first + WINDOW) for first in range(0, len(origin), WINDOW)]
-    chains = [averaged(line, width, direction[part]) for line, part in zip(lines, parts, strict=True)]
+    chains = [average_along(line, width, direction[part]) for line, part in zip(lines, parts, strict=True)]
     for number, part in enumerate(parts):
         # With its neighbours, as the line goes on from window to window.
         chain = np.concatenate(chains[max(0, number - 1) : number + 2])
@@ -115,7 +115,7 @@ def skeleton_points(xy: Float, intensity: Float | None, settings: SkeletonSettin
     if settings.mask == "dark" and intensity is not None:
         cell = cell[_in_dark_pixels(cell, shape, intensity)]
     mask[cell[:, 0], cell[:, 1]] = True
-    pixels = np.argwhere(pruned(skeletonize(mask), settings.branch / settings.raster))
+    pixels = np.argwhere(prune_skeleton(skeletonize(mask), settings.branch / settings.raster))
     return (pixels + corner + 0.5) * settings.raster
 
 
@@ -127,7 +127,7 @@ def _in_dark_pixels(cell: Index, shape: tuple[int, ...], intensity: Float) -> Ma
     return (median <= otsu(median))[owner]
 
 
-def pruned(skeleton: Mask, shortest: float) -> Mask:
+def prune_skeleton(skeleton: Mask, shortest: float) -> Mask:
     """Return a skeleton without branches shorter than ``shortest`` pixels, thinned again after each round of cuts.
 
     Args:
@@ -172,7 +172,7 @@ def _lengths(number: NDArray[np.int32], chosen: list[int]) -> Iterator[tuple[int
         yield label, np.count_nonzero(own) + (2.0**0.5 - 1.0) * diagonal
 
 
-def averaged(points: Float, width: float, direction: Float) -> Float:
+def average_along(points: Float, width: float, direction: Float) -> Float:
     """Return points (K, 2) averaged per bin of their principal axis, (J, 2) in the order along the path, m.
 
     Args:

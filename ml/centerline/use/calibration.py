@@ -58,7 +58,7 @@ class IntervalCalibration:
         return cls(float(data["factor"]), widths, before, after, int(data["count"]))
 
 
-def calibrated(error: Float, std: Float) -> IntervalCalibration:
+def calibrate_target(error: Float, std: Float) -> IntervalCalibration:
     """Return the calibration of one target.
 
     Args:
@@ -73,15 +73,15 @@ def calibrated(error: Float, std: Float) -> IntervalCalibration:
     # The share that is covered changes only where the interval's end passes an error.
     tried = np.unique(np.concatenate([ratio / deviation for deviation in DEVIATIONS]))
     tried = tried[tried > 0.0]
-    factor = float(tried[np.argmin(_missed(ratio, tried))]) if len(tried) else 1.0
+    factor = float(tried[np.argmin(_share_error(ratio, tried))]) if len(tried) else 1.0
     return IntervalCalibration(
-        factor, (widths[0], widths[1]), _covered(ratio, 1.0), _covered(ratio, factor), len(ratio)
+        factor, (widths[0], widths[1]), _covered_share(ratio, 1.0), _covered_share(ratio, factor), len(ratio)
     )
 
 
 def all_calibrated(names: Sequence[str], error: Float, std: Float) -> dict[str, IntervalCalibration]:
     """Return the calibration of several targets by name, from errors and deviations (N, T)."""
-    return {name: calibrated(error[:, column], std[:, column]) for column, name in enumerate(names)}
+    return {name: calibrate_target(error[:, column], std[:, column]) for column, name in enumerate(names)}
 
 
 def _pair(values: Sequence[float | None]) -> tuple[float, float]:
@@ -95,12 +95,12 @@ def _conformal(ratio: Float, level: float) -> float:
     return float(ratio[min(rank, len(ratio)) - 1])
 
 
-def _covered(ratio: Float, factor: float) -> tuple[float, float]:
+def _covered_share(ratio: Float, factor: float) -> tuple[float, float]:
     shares = [float(np.searchsorted(ratio, factor * d, side="right") / len(ratio)) for d in DEVIATIONS]
     return shares[0], shares[1]
 
 
-def _missed(ratio: Float, factors: Float) -> Float:
+def _share_error(ratio: Float, factors: Float) -> Float:
     """Return for each factor the larger of the two shares' errors in units of their tolerances."""
     missed = [
         np.abs(np.searchsorted(ratio, factors * deviation, side="right") / len(ratio) - level) / tolerance

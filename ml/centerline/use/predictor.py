@@ -18,7 +18,7 @@ from synthroads_addon.base.schema import quantity
 
 from ...configuration import Part
 from ..data.corridor import CORRIDOR, Truth
-from ..data.frames import Frames, interleaved, stretches
+from ..data.frames import Frames, interleave_count, stretches
 from ..data.roads import LearningRoad
 from ..data.slices import FrameSlices, SliceSettings, collate
 from ..networks.models import LINES, TARGETS, CenterlineModel, both_ways
@@ -106,7 +106,7 @@ class CenterlinePredictor:
 
         A frame in several sequences has the mean of what they say, weighted by the inverse variances. Its variance is
         their mean as well, since errors of the same points don't average out. Where sequences are interleaved, lines
-        are `joined`.
+        are `join_line`.
         """
         mean, raw = self._found(road, frames)
         factors = np.array([self.calibration[name].factor for name in TARGETS])
@@ -138,10 +138,10 @@ class CenterlinePredictor:
             mean, raw = value / weight, np.sqrt(spread / weight)
         around = np.convolve(seen, np.ones(2 * _NEAR + 1))[_NEAR:-_NEAR] if len(seen) else np.zeros(0)
         mean[around == 0], raw[around == 0] = np.nan, np.nan
-        reach = interleaved(frames, self.settings.spacing)
+        reach = interleave_count(frames, self.settings.spacing)
         for line in LINES:
             column = TARGETS.index(line)
-            mean[:, column] = joined(frames, mean[:, column], raw[:, column], reach)
+            mean[:, column] = join_line(frames, mean[:, column], raw[:, column], reach)
         return mean, raw
 
     def calibrated_on(self, shown: Iterable[tuple[LearningRoad, Frames]]) -> tuple[CenterlinePredictor, Float]:
@@ -192,7 +192,7 @@ class CenterlinePredictor:
             yield some.flatten(), batch["frame"][..., 3].flatten().cpu().numpy(), filled, values, deviations
 
 
-def joined(frames: Frames, y: Float, std: Float, reach: int) -> Float:
+def join_line(frames: Frames, y: Float, std: Float, reach: int) -> Float:
     """Return y of a line in M frames, those of neighbours joined that come from different sequences.
 
     Each is that of the straight line through the places in fewer than ``reach`` frames to either side, weighted by the

@@ -74,10 +74,10 @@ def geojson(found: Found, name: str, spacing: float) -> dict[str, Any]:
                 continue
             properties = {
                 "feature": "centerline" if line == "center" else line,
-                "stations": _listed(found.frames.station[part]),
-                "std": _listed(found.std[part, column]),
-                "interval_68": _listed(found.widths[part, column, 0]),
-                "interval_95": _listed(found.widths[part, column, 1]),
+                "stations": _as_list(found.frames.station[part]),
+                "std": _as_list(found.std[part, column]),
+                "interval_68": _as_list(found.widths[part, column, 0]),
+                "interval_95": _as_list(found.widths[part, column, 1]),
             }
             geometry = {"type": "LineString", "coordinates": np.round(points[part], DIGITS).tolist()}
             features.append({"type": "Feature", "properties": properties, "geometry": geometry})
@@ -96,17 +96,17 @@ def corridor_json(found: Found, calibration: Mapping[str, Any]) -> dict[str, Any
     """
     frames = found.frames
     columns: dict[str, Any] = {
-        "station": _listed(frames.station),
-        "x": _listed(frames.position[:, 0]),
-        "y": _listed(frames.position[:, 1]),
-        "direction": _listed(frames.direction, 6),
+        "station": _as_list(frames.station),
+        "x": _as_list(frames.position[:, 0]),
+        "y": _as_list(frames.position[:, 1]),
+        "direction": _as_list(frames.direction, 6),
     }
     for index, name in enumerate(TARGETS):
         digits = 6 if name == "heading" else DIGITS
-        columns[name] = _listed(found.value[:, index], digits)
-        columns[f"{name}_std"] = _listed(found.std[:, index], digits)
-        columns[f"{name}_68"] = _listed(found.widths[:, index, 0], digits)
-        columns[f"{name}_95"] = _listed(found.widths[:, index, 1], digits)
+        columns[name] = _as_list(found.value[:, index], digits)
+        columns[f"{name}_std"] = _as_list(found.std[:, index], digits)
+        columns[f"{name}_68"] = _as_list(found.widths[:, index, 0], digits)
+        columns[f"{name}_95"] = _as_list(found.widths[:, index, 1], digits)
     return {
         "type": "Corridor",
         "version": "1.0",
@@ -117,5 +117,5 @@ def corridor_json(found: Found, calibration: Mapping[str, Any]) -> dict[str, Any
     }
 
 
-def _listed(values: Float, digits: int = DIGITS) -> list[float | None]:
+def _as_list(values: Float, digits: int = DIGITS) -> list[float | None]:
     return [round(value, digits) + 0.0 if np.isfinite(value) else None for value in values.tolist()]

@@ -115,7 +115,7 @@ class CropDataset(Dataset[Item]):
     def __getitem__(self, place: int) -> Item:
         draw = self.plan[place]
         random = stream(self.seed, "crop", self.epoch, draw.tile, draw.number)
-        return _drawn(self, draw.tile, random)
+        return _draw_crop(self, draw.tile, random)
 
 
 class CropStream(IterableDataset[Item]):
@@ -140,10 +140,10 @@ class CropStream(IterableDataset[Item]):
         worker = get_worker_info()
         random = stream(self.seed, "crops", 0 if worker is None else worker.id)
         while True:
-            yield _drawn(self, int(random.integers(len(self.tiles))), random)
+            yield _draw_crop(self, int(random.integers(len(self.tiles))), random)
 
 
-def cut(tile: CloudTile, middle: NDArray[np.float32], points: int, scaling: Scaling) -> Crop:
+def cut_crop(tile: CloudTile, middle: NDArray[np.float32], points: int, scaling: Scaling) -> Crop:
     """Return the points of a tile nearest a place (3,) by horizontal distance, at most as many as given.
 
     Columns rather than balls: a gantry stays with its posts and a crown with its trunk.
@@ -185,11 +185,11 @@ def item(crop: Crop, settings: CropSettings, random: np.random.Generator) -> Ite
     return {name: torch.from_numpy(np.ascontiguousarray(array)) for name, array in arrays.items()}
 
 
-def _drawn(crops: CropDataset | CropStream, place: int, random: np.random.Generator) -> Item:
+def _draw_crop(crops: CropDataset | CropStream, place: int, random: np.random.Generator) -> Item:
     """Return a crop around a seed of a planned tile, or of the tile that the seeds have chosen in its place."""
     number, point = crops.seeds.draw(place, random)
     tile = crops.tiles[number]
-    crop = cut(tile, tile.coord[point], crops.settings.points, crops.scalings[tile.scene])
+    crop = cut_crop(tile, tile.coord[point], crops.settings.points, crops.scalings[tile.scene])
     return item(crops.effects.apply(crop, random), crops.settings, random)
 
 

@@ -47,7 +47,7 @@ def corridor_tiles(
         length: of a tile along the road, m.
     """
     home = folder / "scenes" / scene
-    line = densified(_line(home / "centerline.geojson"), 0.5)
+    line = densify_polyline(_line(home / "centerline.geojson"), 0.5)
     tree = cKDTree(line)
     clouds = sorted(home.glob("cloud.*"))
     if not clouds:
@@ -85,7 +85,7 @@ def _line(path: Path) -> NDArray[np.float64]:
     return line
 
 
-def densified(line: NDArray[np.float64], spacing: float) -> NDArray[np.float64]:
+def densify_polyline(line: NDArray[np.float64], spacing: float) -> NDArray[np.float64]:
     """Return points (K, 2) every ``spacing`` along a polyline (M, 2), m."""
     along = np.r_[0.0, np.cumsum(np.hypot(*np.diff(line, axis=0).T))]
     at = np.arange(int(along[-1] / spacing) + 1) * spacing

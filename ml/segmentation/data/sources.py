@@ -97,10 +97,10 @@ def _packed_tiles(path: Path, scheme: ClassScheme, voxel: float | None) -> Itera
         raise InputError("voxel", voxel, f"must be at least {pack.voxel:g} m, as the points of {path} were thinned")
     table = table_between(dict(enumerate(class_names(pack.scheme))), scheme, str(path))
     for place in range(len(pack)):
-        yield _relabelled(pack.tile(place), table)
+        yield _relabel(pack.tile(place), table)
 
 
-def _relabelled(tile: CloudTile, table: NDArray[np.int16]) -> CloudTile:
+def _relabel(tile: CloudTile, table: NDArray[np.int16]) -> CloudTile:
     known = tile.segment != IGNORED
     return replace(tile, segment=np.where(known, table[np.where(known, tile.segment, 0)], IGNORED).astype(np.int16))
 

@@ -19,8 +19,8 @@ from ..data.classes import IGNORED, class_names
 from ..data.crops import Item
 from ..data.sources import Source, read_tiles
 from ..data.tiles import CloudTile, scalings
-from ..loading import adaptation_batches, thinned, watched_workers
-from ..network import adapted, build, on_device, plan_of, prepared, scores_of
+from ..loading import adaptation_batches, thin_tiles, watched_workers
+from ..network import adapt_network, build, on_device, plan_of, prepare_batch, scores_of
 from ..recipes import SegmentationConfiguration
 from .metrics import Confusion
 from .scoring import Classifier, label_tile, score_tile
@@ -51,7 +51,7 @@ def classifier(model: nn.Module, configuration: SegmentationConfiguration, devic
     def scores(batch: Item) -> Tensor:
         model.eval()
         with torch.inference_mode():
-            return scores_of(model, on_device(prepared(batch, neighbourhood), device))
+            return scores_of(model, on_device(prepare_batch(batch, neighbourhood), device))
 
     return scores
 
@@ -97,9 +97,9 @@ def score(
     scheme = configuration.scheme()
     confusion = Confusion(_targets(sources, scheme))
     if configuration.adaptation.adabn:
-        tiles = list(thinned(sources, configuration, "test"))
+        tiles = list(thin_tiles(sources, configuration, "test"))
         with watched_workers(configuration):
-            model = adapted(model, adaptation_batches(tiles, configuration), device)
+            model = adapt_network(model, adaptation_batches(tiles, configuration), device)
     scores = classifier(model, configuration, device)
     shown = None
     for source in sources:

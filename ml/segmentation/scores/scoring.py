@@ -57,10 +57,10 @@ def pieces(
     if len(wanted) == 0:
         return
     position = np.asarray(plan, dtype=np.float64)
-    yield from _cut(position, wanted, np.arange(len(plan)), position[wanted].min(axis=0), edge, margin, largest)
+    yield from _cut_squares(position, wanted, np.arange(len(plan)), position[wanted].min(axis=0), edge, margin, largest)
 
 
-def _cut(
+def _cut_squares(
     position: NDArray[np.float64],
     own: NDArray[np.intp],
     seen: NDArray[np.intp],
@@ -77,7 +77,7 @@ def _cut(
         near = position[seen]
         around = seen[np.all((near >= corner - margin) & (near < corner + edge + margin), axis=1)]
         if len(around) > largest and edge / 2 >= _SMALLEST_EDGE:
-            yield from _cut(position, inside, around, corner, edge / 2, min(margin, edge / 2), largest)
+            yield from _cut_squares(position, inside, around, corner, edge / 2, min(margin, edge / 2), largest)
         else:
             yield inside, around
 
@@ -102,7 +102,7 @@ def label_tile(
     """
     keep = thin(tile.coord, settings.voxel)
     small = tile.select(keep)
-    own = _wanted(small.coord, tile.coord, core, settings.voxel)
+    own = _needed_points(small.coord, tile.coord, core, settings.voxel)
     strength = None if small.strength is None else scaling.apply(small.strength)
     whole = replace(crop_of(small, strength), segment=np.full(len(small), IGNORED, dtype=np.int16))
     labels = np.zeros(len(small), dtype=np.int16)
@@ -113,7 +113,7 @@ def label_tile(
     return carry(small.coord[own], labels[own], tile.coord if core is None else tile.coord[core])
 
 
-def _wanted(
+def _needed_points(
     small: NDArray[np.float32], full: NDArray[np.float32], core: NDArray[np.bool_] | None, voxel: float
 ) -> NDArray[np.bool_]:
     """Return which of the thinned points are needed for the classes of the core: those within two cells of it."""

@@ -68,11 +68,11 @@ def _bare_seconds(request: LayerRequest, views: list[View]) -> float:
             seconds = 0.0
             for view in views:
                 aim(bare.camera, view)
-                seconds += seconds_of(partial(_rendered, bare, view))
+                seconds += seconds_of(partial(_render_picture, bare, view))
     return seconds
 
 
-def _rendered(bare: RenderStage, view: View) -> None:
+def _render_picture(bare: RenderStage, view: View) -> None:
     render = bare.scene.render
     render.resolution_x, render.resolution_y, render.resolution_percentage = *view.size, 100
     bpy.ops.render.render(scene=bare.scene.name)

@@ -14,7 +14,7 @@ import numpy as np
 from mathutils import Vector
 
 from ...road.surroundings import Environment
-from ...scanning.colour.light import SunAndSky, exposed, sun_direction
+from ...scanning.colour.light import SunAndSky, expose_light, sun_direction
 from ..compat import sky_texture
 from .stage import SUN_GROUP, Passes, stage
 
@@ -63,7 +63,7 @@ def daylight(environment: Environment, sharp: bool) -> Iterator[Daylight]:
         world = stack.enter_context(_world(sky))
         # A lamp's irradiance falls on a matt surface, which spreads it over pi.
         facing = np.array(_SUN_COLOR) * lamp.energy / math.pi
-        light, exposure = exposed(towards, facing, np.array(_sky_radiance(sky)))
+        light, exposure = expose_light(towards, facing, np.array(_sky_radiance(sky)))
         yield Daylight(sun, world, light, exposure)
 
 

@@ -130,7 +130,7 @@ class ReturnCamera:
         columns = 1 << (width - 1).bit_length()
         for name, values in {"coarse": coarse, "fine": start - coarse, "direction": along}.items():
             path = self._stage.folder / f"{name}-{self._blocks}.exr"
-            write_image(path, _filled(values, width, height, columns))
+            write_image(path, _fill_image(values, width, height, columns))
             names[name] = path.as_posix()
         self._set_shader(_SHADER.format(width=width, height=height, columns=columns, **names))
         camera = self._stage.camera
@@ -159,7 +159,7 @@ class ReturnCamera:
             (self._stage.folder / f"{name}-{self._blocks - 1}.exr").unlink(missing_ok=True)
 
 
-def _filled(values: Float, width: int, height: int, columns: int) -> NDArray[np.float32]:
+def _fill_image(values: Float, width: int, height: int, columns: int) -> NDArray[np.float32]:
     """Return (N, 3) values row by row as an image (height, columns, 3) that only `width` columns are used of.
 
     What is left of the last row repeats the last value.

@@ -9,7 +9,7 @@ import bpy
 
 from ...base.errors import nearest_name
 from ...materials.table import UNKNOWN, Material, materials
-from ...materials.variation import varied
+from ...materials.variation import vary_material
 from ...road.parameters import Environment, MaterialVariation
 from . import furniture, ground, paving, plants, signs, structures, vehicles
 from .shading import Shade, shade
@@ -54,7 +54,7 @@ def vary(
     """
     for item in bpy.data.materials:
         if PROPERTY in item and item[PROPERTY] in materials():
-            mean = varied(item[PROPERTY], variation, environment, own)
+            mean = vary_material(item[PROPERTY], variation, environment, own)
             if mean.to_json() != item.get(MEAN):
                 _shade(item, mean)
 

@@ -68,7 +68,7 @@ def _gantry_steel(shade: Shade) -> None:
     shade.vary(0.06, shade.noise(2.5, 2.0, (1.0, 1.0, 0.3)))
 
 
-def _worn(shade: Shade) -> None:
+def _make_worn(shade: Shade) -> None:
     shade.vary(0.10, shade.noise(0.05, 3.0))
 
 
@@ -80,6 +80,6 @@ BUILDERS = {
     "noise_wood": _noise_wood,
     "acrylic_glass": _acrylic_glass,
     "gantry_steel": _gantry_steel,
-    "plastic_red": _worn,
-    "rubber": _worn,
+    "plastic_red": _make_worn,
+    "rubber": _make_worn,
 }

@@ -16,7 +16,7 @@ from ...road.parameters import RoadParameters
 from ..materials import vary
 from ..nodes.builder import remove_unused_groups
 from ..things.model_builder import ROLE, ModelBuilder
-from .parts import PARTS, needed
+from .parts import PARTS, required_parts
 from .stage import Made, in_scene, new_staging, remove_staged, remove_with_meshes
 
 COLLECTION = "SynthRoads"
@@ -148,7 +148,7 @@ class _Build:
     def build(self) -> None:
         """Make the objects; see `base.stepper` for how this is done in steps."""
         self._builder.lay_out()
-        there = needed(self._wanted)
+        there = required_parts(self._wanted)
         for number, (name, build) in enumerate(PARTS.items()):
             if name in there:
                 self._builder.hidden = name not in self._wanted

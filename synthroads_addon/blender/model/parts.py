@@ -50,7 +50,7 @@ ON_THE_ROAD = ("painted_areas", "guardrails", "delineators", "assets")
 """Parts that need no terrain: all others stand on it."""
 
 
-def needed(wanted: set[str]) -> set[str]:
+def required_parts(wanted: set[str]) -> set[str]:
     """Return the parts that must be there for those wanted: what they stand on, too."""
     surfaces = {"road"} if wanted else set()
     return wanted | surfaces | ({"terrain"} if wanted - {"road", *ON_THE_ROAD} else set())

@@ -106,7 +106,7 @@ def _road(parameters: RoadParameters, modifier: bpy.types.NodesModifier) -> Iter
     for name, carriageway in parameters.of_type(Carriageway).items():
         edited = _carriageway(carriageway, modifier)
         turnouts = [shape.turnout for shape in sections[carriageway.side].turnouts]
-        pavement = _stretched(sections[carriageway.side], CarriagewaySection(edited, turnouts))
+        pavement = _fit_damage(sections[carriageway.side], CarriagewaySection(edited, turnouts))
         yield name, edited.model_copy(update={"pavement": pavement})
     for name, line in parameters.of_type(LineMarking).items():
         fields = {
@@ -142,7 +142,7 @@ def _carriageway(carriageway: Carriageway, modifier: bpy.types.NodesModifier) ->
     )
 
 
-def _stretched(before: CarriagewaySection, after: CarriagewaySection) -> Pavement:
+def _fit_damage(before: CarriagewaySection, after: CarriagewaySection) -> Pavement:
     """Return the pavement's damage where it lies now: it moves and widens with the strips that it lies in."""
     pavement, sign = before.carriageway.pavement, before.carriageway.sign
     ruts = []

@@ -18,11 +18,11 @@ def row(backbone: Value, number: Value) -> tuple[Value, Value, Value]:
     """Return axis point, left vector and curvature of the backbone's row `number`."""
     tree = backbone.tree
     axis = op.sample_index(backbone, op.position(tree), number)
-    left = op.sample_index(backbone, op.named(tree, "left", "FLOAT_VECTOR"), number)
-    return axis, left, op.sample_index(backbone, op.named(tree, "curvature"), number)
+    left = op.sample_index(backbone, op.named_attribute(tree, "left", "FLOAT_VECTOR"), number)
+    return axis, left, op.sample_index(backbone, op.named_attribute(tree, "curvature"), number)
 
 
-def cut(offset: Value, curvature: Value) -> Value:
+def limit_offset(offset: Value, curvature: Value) -> Value:
     """Return the offset, cut where its curve would fold."""
     return op.switch(offset * curvature > FOLD_SHARE, offset, FOLD_SHARE / curvature)
 
@@ -37,10 +37,10 @@ def station_ribbon(backbone: Value, numbers: tuple[str, ...] = ()) -> Value:
         mesh, column, number = op.grid(tree, 2, op.point_count(backbone))
         axis, left, _ = row(backbone, number)
         names = ("station", "curvature", *numbers)
-        values = {name: op.sample_index(backbone, op.named(tree, name), number) for name in names}
+        values = {name: op.sample_index(backbone, op.named_attribute(tree, name), number) for name in names}
         for name, value in {"axis": axis, "left": left, **values}.items():
             mesh = op.store(mesh, name, value)
-        place = op.vector(tree, op.named(tree, "station"), 0.5 - column)
+        place = op.vector(tree, op.named_attribute(tree, "station"), 0.5 - column)
         return op.set_position(mesh, place)
 
 
@@ -48,7 +48,7 @@ def look_up(ribbon: Value, name: str, station: Value) -> Value:
     """Return the backbone's attribute (``axis`` is its position) at any station, linear between its rows."""
     tree = ribbon.tree
     kind = "FLOAT_VECTOR" if name in ("axis", "left") else "FLOAT"
-    return op.sample_surface(ribbon, op.named(tree, name, kind), op.vector(tree, station))
+    return op.sample_surface(ribbon, op.named_attribute(tree, name, kind), op.vector(tree, station))
 
 
 def height_on(road: Value, terrain: Value, place: Value) -> Value:
@@ -73,14 +73,14 @@ def height_on(road: Value, terrain: Value, place: Value) -> Value:
 
 def first_station(backbone: Value) -> Value:
     """Return the station of the backbone's first point."""
-    return op.sample_index(backbone, op.named(backbone.tree, "station"), 0)
+    return op.sample_index(backbone, op.named_attribute(backbone.tree, "station"), 0)
 
 
 def last_station(backbone: Value) -> Value:
     """Return the station of the backbone's last point."""
-    return op.sample_index(backbone, op.named(backbone.tree, "station"), op.point_count(backbone) - 1)
+    return op.sample_index(backbone, op.named_attribute(backbone.tree, "station"), op.point_count(backbone) - 1)
 
 
-def raised(place: Value, height: Operand) -> Value:
+def raise_place(place: Value, height: Operand) -> Value:
     """Return `place` moved up by `height`."""
     return place + op.vector(place.tree, 0.0, 0.0, height)

@@ -18,7 +18,7 @@ def pavement_near(road: Value, reach: Value) -> Value:
     place = op.position(tree)
     flat = op.vector(tree, op.component(place, "X"), op.component(place, "Y"))
     near = tree.node("ShaderNodeVectorMath", flat, operation="LENGTH")["Value"] < reach
-    paved = op.named(tree, "class_id", "INT").equals(class_id("road"))
+    paved = op.named_attribute(tree, "class_id", "INT").equals(class_id("road"))
     return op.separate(road, paved & near, "FACE")
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import bpy
 
 from . import operations as op
-from .backbone import height_on, look_up, raised, station_ribbon
+from .backbone import height_on, look_up, raise_place, station_ribbon
 from .builder import Operand, Tree, Value, node_group
 
 FAR = (-1000.0, 1000.0)
@@ -42,6 +42,6 @@ def _build(tree: Tree) -> None:
         left = look_up(ribbon, "left", station)
         place = look_up(ribbon, "axis", station) + left * offset
     with tree.frame("On the surface"):
-        foot = raised(place, height_on(road, terrain, place) - op.component(place, "Z"))
+        foot = raise_place(place, height_on(road, terrain, place) - op.component(place, "Z"))
         tree.output("Foot", foot, description="Point on the surface")
     tree.output("Left", left, description="Unit vector to the left")

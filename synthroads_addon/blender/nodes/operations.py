@@ -21,7 +21,7 @@ def position(tree: Tree) -> Value:
     return tree.node("GeometryNodeInputPosition").value
 
 
-def named(tree: Tree, name: str, data_type: str = "FLOAT") -> Value:
+def named_attribute(tree: Tree, name: str, data_type: str = "FLOAT") -> Value:
     """Return the attribute `name` of the geometry that the field is evaluated on."""
     return tree.node("GeometryNodeInputNamedAttribute", name, data_type=data_type).value
 

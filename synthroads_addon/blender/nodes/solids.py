@@ -12,20 +12,20 @@ Point = tuple[float, float, float]
 
 def box(tree: Tree, size: Operand, middle: Operand = (0.0, 0.0, 0.0)) -> Value:
     """Return a box of a size (vector) around its middle."""
-    return moved(tree.node("GeometryNodeMeshCube", size=size).value, middle)
+    return move_geometry(tree.node("GeometryNodeMeshCube", size=size).value, middle)
 
 
-def moved(geometry: Value, by: Operand) -> Value:
+def move_geometry(geometry: Value, by: Operand) -> Value:
     """Return the geometry moved as a whole."""
     return geometry.tree.node("GeometryNodeTransform", geometry, translation=by).value
 
 
-def painted(geometry: Value, material: Value) -> Value:
+def paint_faces(geometry: Value, material: Value) -> Value:
     """Give all faces a material."""
     return geometry.tree.node("GeometryNodeSetMaterial", geometry, material=material).value
 
 
-def flipped(geometry: Value) -> Value:
+def flip_faces(geometry: Value) -> Value:
     """Turn all faces round."""
     return geometry.tree.node("GeometryNodeFlipFaces", geometry).value
 
@@ -56,7 +56,7 @@ def loft(
         lid = tree.node("GeometryNodeMeshCircle", vertices=columns, fill_type="NGON").value
         number = tree.node("FunctionNodeInputInt", integer=0).value
         lid = op.set_position(lid, place(outline(op.index(tree)), rows - 1 + number if last else number))
-        lids.append(lid if last else flipped(lid))
+        lids.append(lid if last else flip_faces(lid))
     return op.join(body, *lids)
 
 
@@ -89,11 +89,13 @@ def bars(points: Value, start: Value, end: Value, width: Operand) -> Value:
 
 
 def row_of_points(tree: Tree, count: Operand) -> Value:
-    """Return points for `put` and `bars`."""
+    """Return points for `put_on_points` and `bars`."""
     return tree.node("GeometryNodeMeshLine", count=count).value
 
 
-def put(points: Value, body: Value, place: Value, scale: Operand = 1.0, rotation: Operand | None = None) -> Value:
+def put_on_points(
+    points: Value, body: Value, place: Value, scale: Operand = 1.0, rotation: Operand | None = None
+) -> Value:
     """Return a copy of the body (as an instance) at a place on every point (a field)."""
     settings = {} if rotation is None else {"rotation": rotation}
     return points.tree.node(

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from . import operations as op
-from .backbone import height_on, raised
+from .backbone import height_on, raise_place
 from .builder import Operand, Tree, Value
 from .strip import INSTANCES
 
@@ -53,13 +53,13 @@ def on_surface(points: Value, road: Value, terrain: Value) -> Value:
     place = op.position(tree)
     height = height_on(op.object_geometry(road), op.object_geometry(terrain), place)
     flat = tree.node("ShaderNodeVectorMath", place, (1.0, 1.0, 0.0), operation="MULTIPLY").value
-    return op.set_position(points, raised(flat, height + op.named(tree, "elevation")))
+    return op.set_position(points, raise_place(flat, height + op.named_attribute(tree, "elevation")))
 
 
 def put_on(points: Value, body: Value, scale: Operand = 1.0) -> Value:
     """Return the body on every point, turned by the point's ``heading``; attributes of the points go with it."""
     tree = points.tree
-    turn = op.turn(tree, z=op.named(tree, "heading"))
+    turn = op.turn(tree, z=op.named_attribute(tree, "heading"))
     return op.realize(
         tree.node("GeometryNodeInstanceOnPoints", points, instance=body, rotation=turn, scale=scale).value
     )

@@ -5,7 +5,7 @@ from __future__ import annotations
 import bpy
 
 from . import operations as op
-from .backbone import cut, row
+from .backbone import limit_offset, row
 from .builder import Tree, node_group
 
 _DETAIL = (
@@ -57,22 +57,22 @@ def _build(tree: Tree) -> None:
             op.sample_index(backbone, value, number) for value in (left, right, left_height, right_height)
         )
     with tree.frame("Share of the left edge and depth of every column"):
-        share = op.switch(detailed > 0, 1.0 - column, op.sample_index(detail, op.named(tree, "share"), point))
-        depth = op.switch(detailed > 0, 0.0, op.sample_index(detail, op.named(tree, "depth"), point))
+        share = op.switch(detailed > 0, 1.0 - column, op.sample_index(detail, op.named_attribute(tree, "share"), point))
+        depth = op.switch(detailed > 0, 0.0, op.sample_index(detail, op.named_attribute(tree, "depth"), point))
         # Where a strip closes, rounding would fold its fine columns: they all lie on the right edge.
         wide = left - right > NARROW
         share = op.switch(wide, op.switch(share > 0.999, 0.0, 1.0), share)
         depth = op.switch(wide, 0.0, depth)
     with tree.frame("Offset, cut where it would fold, and the height there"):
-        offset = cut(left * share + right * (1.0 - share), curvature)
+        offset = limit_offset(left * share + right * (1.0 - share), curvature)
         inside = (offset - right) / op.maximum(left - right, 1e-9)
         height = left_height * inside + right_height * (1.0 - inside) - depth
     with tree.frame("Place and label"):
         place = axis + leftwards * offset + op.vector(tree, 0.0, 0.0, height)
         mesh = op.store(op.store(mesh, "offset", offset), "row", number)
         mesh = op.store(mesh, "strip_width", left - right)
-        mesh = op.store(mesh, "station", op.sample_index(backbone, op.named(tree, "station"), number))
+        mesh = op.store(mesh, "station", op.sample_index(backbone, op.named_attribute(tree, "station"), number))
         mesh = op.label(op.set_position(mesh, place), class_id, instance, material)
         # Of faces that narrow, rounding would decide which way they look.
-        mesh = op.delete_faces(op.without_degenerate(mesh), op.named(tree, "strip_width") < CLOSED)
+        mesh = op.delete_faces(op.without_degenerate(mesh), op.named_attribute(tree, "strip_width") < CLOSED)
     tree.output("Mesh", mesh, description="Ribbon whose faces look up")

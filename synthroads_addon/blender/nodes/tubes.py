@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from . import operations as op
 from .builder import Operand, Tree, Value
-from .solids import moved
+from .solids import move_geometry
 
 
 def tube(tree: Tree, radius: Operand, height: Value | float, sides: int = 12) -> Value:
     """Return an upright closed tube from z = 0 on."""
     cylinder = tree.node("GeometryNodeMeshCylinder", vertices=sides, radius=radius, depth=height)
     smooth = tree.node("GeometryNodeSetShadeSmooth", cylinder["Mesh"], cylinder["Side"]).value
-    return moved(smooth, op.vector(tree, 0.0, 0.0, height * 0.5))
+    return move_geometry(smooth, op.vector(tree, 0.0, 0.0, height * 0.5))
 
 
 def cone(tree: Tree, bottom: Operand, top: Operand, height: Operand, sides: int = 16) -> Value:

@@ -28,7 +28,7 @@ from ..labels import Label, Labels, velocity_of
 from ..model.build import ORIGIN
 from ..things.model_builder import ROLE, SUPPORT
 from .changes import Changes
-from .reading import Copied, MeshPart, Places, Whole, copy_mesh, placed, slot_names
+from .reading import Copied, MeshPart, Places, Whole, copy_mesh, join_parts, slot_names
 
 Float = NDArray[np.float64]
 Source: TypeAlias = bpy.types.Depsgraph | bpy.types.Scene | None
@@ -66,7 +66,7 @@ def scene_mesh(
     reading = _Reading(depsgraph, objects, classes)
     reading.copy_all()
     whole = reading.whole(_origin(depsgraph.scene), number_objects)
-    return placed(reading.pairs(None), whole)
+    return join_parts(reading.pairs(None), whole)
 
 
 def scanned_scene(
@@ -149,7 +149,7 @@ def scanned_scene_steps(
 def _put_together(reading: _Reading, origin: Float, number_objects: bool) -> ScannedScene:
     whole = reading.whole(origin, number_objects)
     moving = tuple(_moving(reading, carrier, motion, whole) for carrier, motion in reading.motions.items())
-    return ScannedScene(placed(reading.pairs(None), whole), moving, reading.labels.by_name.unmatched())
+    return ScannedScene(join_parts(reading.pairs(None), whole), moving, reading.labels.by_name.unmatched())
 
 
 @dataclass(frozen=True)
@@ -171,7 +171,7 @@ def _moving(reading: _Reading, carrier: Hashable, motion: Motion, whole: Whole) 
     into = np.eye(4)
     into[:3, :3] = rotation[0].T
     into[:3, 3] = -rotation[0].T @ translation[0]
-    mesh = placed(reading.pairs(carrier), whole, into)
+    mesh = join_parts(reading.pairs(carrier), whole, into)
     if len(mesh) and isinstance(motion, LaneMotion):
         far = float(np.abs(mesh.vertices).max())
         if far > _FARTHEST_FROM_MOTION:

@@ -207,7 +207,7 @@ def _face_values(mesh: bpy.types.Mesh, name: str) -> NDArray[Any] | None:
     return values
 
 
-def placed(pairs: list[tuple[MeshPart, Places]], whole: Whole, frame: Float | None = None) -> SceneMesh:
+def join_parts(pairs: list[tuple[MeshPart, Places]], whole: Whole, frame: Float | None = None) -> SceneMesh:
     """Return parts at their places as one mesh, without triangles that have no area.
 
     Args:

@@ -45,7 +45,7 @@ class VehicleMeshes:
         names = tuple(self._materials)
         meshes = {model: _with_materials(mesh, names) for model, mesh in models.items()}
         moving = tuple(
-            MovingMesh(_numbered(meshes[vehicle.model], vehicle.instance), motions[name])
+            MovingMesh(_with_instance(meshes[vehicle.model], vehicle.instance), motions[name])
             for name, vehicle in vehicles.items()
         )
         return ScannedScene(_with_materials(static, names), moving)
@@ -81,7 +81,7 @@ def _own_frame(model: str) -> SceneMesh:
     )
 
 
-def _numbered(mesh: SceneMesh, instance: int) -> SceneMesh:
+def _with_instance(mesh: SceneMesh, instance: int) -> SceneMesh:
     return replace(mesh, instance_id=np.full(len(mesh), instance, np.uint32))
 
 

@@ -82,14 +82,14 @@ def _read_blend(path: Path, name: str | None) -> list[bpy.types.Object]:
 
 
 def _read_glb(path: Path, _: str | None) -> list[bpy.types.Object]:
-    return _imported(lambda: bpy.ops.import_scene.gltf(filepath=str(path)))
+    return _import_objects(lambda: bpy.ops.import_scene.gltf(filepath=str(path)))
 
 
 def _read_obj(path: Path, _: str | None) -> list[bpy.types.Object]:
-    return _imported(lambda: bpy.ops.wm.obj_import(filepath=str(path)))
+    return _import_objects(lambda: bpy.ops.wm.obj_import(filepath=str(path)))
 
 
-def _imported(run: Callable[[], object]) -> list[bpy.types.Object]:
+def _import_objects(run: Callable[[], object]) -> list[bpy.types.Object]:
     """Return the objects that an importer adds."""
     before = set(bpy.data.objects)
     run()

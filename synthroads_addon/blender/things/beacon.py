@@ -14,7 +14,7 @@ from ..materials import material
 from ..nodes import operations as op
 from ..nodes.backbone import height_on
 from ..nodes.builder import Tree, Value, node_group
-from ..nodes.solids import box, flipped, moved, painted, prism, put
+from ..nodes.solids import box, flip_faces, move_geometry, paint_faces, prism, put_on_points
 from .model_builder import ModelBuilder
 
 CELLS = (2, 8)
@@ -40,7 +40,7 @@ def _build(tree: Tree) -> None:
     )
 
     with tree.frame("Foot and its tenon"):
-        foot = painted(op.join(_foot(tree), box(tree, (0.07, 0.05, 0.1), (0.0, 0.0, 0.12))), rubber)
+        foot = paint_faces(op.join(_foot(tree), box(tree, (0.07, 0.05, 0.1), (0.0, 0.0, 0.12))), rubber)
     with tree.frame("Blades of size 1: stripes fall to the left or to the right"):
         blades = [_blade(tree, red, white, side) for side in (1, -1)]
     with tree.frame("Lamp"):
@@ -49,21 +49,29 @@ def _build(tree: Tree) -> None:
         place = op.position(tree)
         height = height_on(op.object_geometry(road), op.object_geometry(terrain), place)
         flat = tree.node("ShaderNodeVectorMath", place, (1.0, 1.0, 0.0), operation="MULTIPLY").value
-        points = op.set_position(points, flat + op.vector(tree, 0.0, 0.0, height + op.named(tree, "elevation")))
+        points = op.set_position(
+            points, flat + op.vector(tree, 0.0, 0.0, height + op.named_attribute(tree, "elevation"))
+        )
     with tree.frame("Beacons"):
-        turned = op.turn(tree, z=op.named(tree, "heading"))
-        place, tall = op.position(tree), op.named(tree, "height")
+        turned = op.turn(tree, z=op.named_attribute(tree, "heading"))
+        place, tall = op.position(tree), op.named_attribute(tree, "height")
         bottom = place + (0.0, 0.0, BEACON_BLADE_BOTTOM)
-        parts = [put(points, foot, place, 1.0, turned)]
+        parts = [put_on_points(points, foot, place, 1.0, turned)]
         for side, blade in zip((1, -1), blades, strict=True):
-            chosen = op.separate(points, op.named(tree, "pass_side", "INT").equals(side))
-            parts.append(put(chosen, blade, bottom, op.vector(tree, op.named(tree, "width"), 1.0, tall), turned))
-        parts.append(put(points, lamp, bottom + op.vector(tree, 0.0, 0.0, tall), 1.0, turned))
+            chosen = op.separate(points, op.named_attribute(tree, "pass_side", "INT").equals(side))
+            parts.append(
+                put_on_points(
+                    chosen, blade, bottom, op.vector(tree, op.named_attribute(tree, "width"), 1.0, tall), turned
+                )
+            )
+        parts.append(put_on_points(points, lamp, bottom + op.vector(tree, 0.0, 0.0, tall), 1.0, turned))
         beacons = op.join(*parts)
     with tree.frame("Labels"):
-        beacons = op.realize(op.store(beacons, "beacon_instance", op.named(tree, "instance", "INT"), "INSTANCE"))
+        beacons = op.realize(
+            op.store(beacons, "beacon_instance", op.named_attribute(tree, "instance", "INT"), "INSTANCE")
+        )
         beacons = op.store(beacons, "class_id", class_id("construction_barrier"), "FACE")
-        beacons = op.store(beacons, "instance_id", op.named(tree, "beacon_instance", "INT"), "FACE")
+        beacons = op.store(beacons, "instance_id", op.named_attribute(tree, "beacon_instance", "INT"), "FACE")
     tree.output("Mesh", beacons, description="Beacons; each face has its own beacon's instance number")
 
 
@@ -75,12 +83,12 @@ def _foot(tree: Tree) -> Value:
     outline += [(-a, -b) for a, b in outline]
     slab = prism(tree, outline, (1.0, 1.0, BEACON_FOOT[2] * 0.7 + 0.01))
     upper = prism(tree, outline, (0.86, 0.92, BEACON_FOOT[2]))
-    return op.join(moved(slab, (0.0, 0.0, -0.01)), upper)
+    return op.join(move_geometry(slab, (0.0, 0.0, -0.01)), upper)
 
 
 def _blade(tree: Tree, red: Value, white: Value, side: int) -> Value:
     """Return a blade of width 1 and height 1 on z = 0, whose stripes fall to the left (side 1) or to the right (-1)."""
-    stripes = _striped(tree)
+    stripes = _blade_face(tree)
     faces = []
     for front in (True, False):
         # Seen from the front they rise to the right. A mirror turns the faces round.
@@ -89,15 +97,15 @@ def _blade(tree: Tree, red: Value, white: Value, side: int) -> Value:
         face = tree.node(
             "GeometryNodeTransform", stripes, translation=(0.0, y if front else -y, 0.0), scale=scale
         ).value
-        faces.append(face if (side > 0) == front else flipped(face))
-    mesh = painted(op.join(*faces), white)
-    first = (op.named(tree, "stripe", "INT") % 2).equals(0)
+        faces.append(face if (side > 0) == front else flip_faces(face))
+    mesh = paint_faces(op.join(*faces), white)
+    first = (op.named_attribute(tree, "stripe", "INT") % 2).equals(0)
     mesh = tree.node("GeometryNodeSetMaterial", mesh, first, material=red).value
     plate = box(tree, (1.0, BEACON_BLADE, 1.0), (0.0, 0.0, 0.5))
-    return op.join(painted(plate, white), mesh)
+    return op.join(paint_faces(plate, white), mesh)
 
 
-def _striped(tree: Tree) -> Value:
+def _blade_face(tree: Tree) -> Value:
     """Return the face of a blade, towards -y, in triangles with the number of their ``stripe``, which rises with x."""
     columns, rows = CELLS
     halves = []
@@ -111,14 +119,14 @@ def _striped(tree: Tree) -> Value:
         column, row = op.index(tree) % columns, op.index(tree) // columns
         cells = op.store(cells, "stripe", row - column + upper + columns)
         place = op.vector(tree, column / float(columns) - 0.5, 0.0, row / float(rows))
-        halves.append(put(cells, half, place, (1.0 / columns, 1.0, 1.0 / rows)))
+        halves.append(put_on_points(cells, half, place, (1.0 / columns, 1.0, 1.0 / rows)))
     return op.realize(op.join(*halves))
 
 
 def _lamp(tree: Tree, housing: Value, lens: Value) -> Value:
     """Return a warning lamp that shines both ways."""
     radius, deep = _LENS
-    body = painted(box(tree, (0.11, 0.07, 0.12), (0.0, 0.0, 0.05)), housing)
+    body = paint_faces(box(tree, (0.11, 0.07, 0.12), (0.0, 0.0, 0.05)), housing)
     middle = (0.0, 0.0, 0.17)
     drum = tree.node("GeometryNodeMeshCylinder", vertices=_HEXADECAGON, radius=radius, depth=deep).value
     glass = tree.node("GeometryNodeMeshCylinder", vertices=_HEXADECAGON, radius=radius * 0.85, depth=deep + 0.03).value
@@ -126,7 +134,7 @@ def _lamp(tree: Tree, housing: Value, lens: Value) -> Value:
     parts = [
         tree.node("GeometryNodeTransform", mesh, translation=middle, rotation=lying).value for mesh in (drum, glass)
     ]
-    return op.join(body, painted(parts[0], housing), painted(parts[1], lens))
+    return op.join(body, paint_faces(parts[0], housing), paint_faces(parts[1], lens))
 
 
 def build_beacons(builder: ModelBuilder) -> None:

@@ -11,7 +11,7 @@ from ...road.parameters import Cabinet
 from ..materials import material
 from ..nodes import operations as op
 from ..nodes.builder import Tree, Value, node_group
-from ..nodes.solids import box, painted, put, row_of_points
+from ..nodes.solids import box, paint_faces, put_on_points, row_of_points
 from ..nodes.standing import declare_standing, put_on
 from .emergency_phone import emergency_phone_group
 from .model_builder import ModelBuilder
@@ -66,7 +66,7 @@ def _build(tree: Tree) -> None:
         foot = _block(tree, cabinet, 2.0 * _OVERHANG, -BURIED, _PLINTH)
         walls = _block(tree, cabinet, _OVERHANG, _PLINTH, cabinet.height - _LID)
         lid = _block(tree, cabinet, 0.0, cabinet.height - _LID, cabinet.height)
-        parts = [painted(foot, plinth), painted(op.join(walls, lid), body)]
+        parts = [paint_faces(foot, plinth), paint_faces(op.join(walls, lid), body)]
     with tree.frame("Doors"):
         count = op.switch(cabinet.width >= _WIDE, 1, 2)
         pitch = (cabinet.width - 2.0 * _OVERHANG) / count
@@ -75,17 +75,21 @@ def _build(tree: Tree) -> None:
         front = cabinet.depth * -0.5 + (_OVERHANG - _DOOR * 0.5)
         beside = (op.index(tree) - (count - 1.0) * 0.5) * pitch
         door = box(tree, op.vector(tree, pitch - 2.0 * _GAP, _DOOR, tall))
-        parts.append(painted(put(row_of_points(tree, count), door, op.vector(tree, beside, front, middle)), body))
+        parts.append(
+            paint_faces(put_on_points(row_of_points(tree, count), door, op.vector(tree, beside, front, middle)), body)
+        )
     with tree.frame("Handles"):
         handle = op.vector(tree, beside + pitch * 0.36, front - _DOOR * 0.5, middle)
-        parts.append(painted(put(row_of_points(tree, count), box(tree, (0.025, 0.01, 0.12)), handle), fitting))
+        parts.append(
+            paint_faces(put_on_points(row_of_points(tree, count), box(tree, (0.025, 0.01, 0.12)), handle), fitting)
+        )
     with tree.frame("Slots for air, some at the top of each door"):
         number = op.index(tree)
         beside = ((number // _SLOTS) - (count - 1.0) * 0.5) * pitch
         level = cabinet.height - (_LID + 0.08) - (number % _SLOTS) * 0.022
         slot = box(tree, op.vector(tree, pitch * 0.6, 0.002, 0.007))
         place = op.vector(tree, beside, front - _DOOR * 0.5, level)
-        parts.append(painted(put(row_of_points(tree, count * _SLOTS), slot, place), fitting))
+        parts.append(paint_faces(put_on_points(row_of_points(tree, count * _SLOTS), slot, place), fitting))
     with tree.frame("Put onto the points"):
         mesh = standing.labelled(put_on(standing.places(), op.join(*parts)), class_id("utility"))
     tree.output("Mesh", mesh, description="Cabinet")

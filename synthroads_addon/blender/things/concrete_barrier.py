@@ -79,7 +79,7 @@ def _build(tree: Tree) -> None:
         ramp = op.minimum(barrier.terminal, (barrier.last - barrier.first) * 0.5)
         line = _rows(tree, barrier, begin, end, ramp)
     with tree.frame("Foot and top"):
-        station = op.named(tree, "station")
+        station = op.named_attribute(tree, "station")
         foot, left = foot_at(axis, surfaces, station, barrier.offset)
         line = op.store(op.store(line, "left", left), "foot", foot)
         inside = op.minimum(station - barrier.first, barrier.last - station)
@@ -114,15 +114,15 @@ def _swept(tree: Tree, line: Value, barrier: _Barrier) -> Value:
         return op.switch(barrier.new_jersey, step, jersey)
 
     def place(point: Value, row: Value) -> Value:
-        foot = op.sample_index(line, op.named(tree, "foot", "FLOAT_VECTOR"), row)
-        left = op.sample_index(line, op.named(tree, "left", "FLOAT_VECTOR"), row)
-        tall = op.sample_index(line, op.named(tree, "tall"), row)
+        foot = op.sample_index(line, op.named_attribute(tree, "foot", "FLOAT_VECTOR"), row)
+        left = op.sample_index(line, op.named_attribute(tree, "left", "FLOAT_VECTOR"), row)
+        tall = op.sample_index(line, op.named_attribute(tree, "tall"), row)
         share = op.component(point, "Z")
         z = op.switch(share < 0.0, tall * share, -BURIED)
         return foot + left * (op.component(point, "X") * barrier.width * 0.5) + op.vector(tree, 0.0, 0.0, z)
 
     def station(row: Value) -> Value:
-        return op.sample_index(line, op.named(tree, "station"), row)
+        return op.sample_index(line, op.named_attribute(tree, "station"), row)
 
     return loft(tree, outline, len(_outline("step")), op.point_count(line), place, {"station": station})
 

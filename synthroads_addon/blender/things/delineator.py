@@ -48,11 +48,11 @@ def _build(tree: Tree) -> None:
         body = op.join(body, _front(tree, glass), _behind(tree, glass, 0.07), _behind(tree, glass, -0.07))
     with tree.frame("On the surface"):
         places = on_surface(points, road, terrain)
-        tall = op.vector(tree, 1.0, 1.0, op.named(tree, "height"))
+        tall = op.vector(tree, 1.0, 1.0, op.named_attribute(tree, "height"))
         posts = put_on(places, body, tall)
     with tree.frame("Labels"):
         posts = op.store(posts, "class_id", class_id("warning_post"), "FACE")
-        posts = op.store(posts, "instance_id", op.named(tree, "instance", "INT"), "FACE")
+        posts = op.store(posts, "instance_id", op.named_attribute(tree, "instance", "INT"), "FACE")
     tree.output("Mesh", posts, description="Posts; each face has its own post's instance number")
 
 
@@ -80,7 +80,7 @@ def _front(tree: Tree, glass: Value) -> Value:
     mesh, column, row = op.grid(tree, 2, 2)
     x = column * REFLECTOR[0] - REFLECTOR[0] / 2
     place = op.vector(tree, x, -_flank(x), row * REFLECTOR[1] - REFLECTOR[1] / 2 + _MIDDLE)
-    return _raised(op.set_position(mesh, place), glass)
+    return _reflector_body(op.set_position(mesh, place), glass)
 
 
 def _behind(tree: Tree, glass: Value, above: float) -> Value:
@@ -89,7 +89,7 @@ def _behind(tree: Tree, glass: Value, above: float) -> Value:
     place = op.position(tree)
     x = op.component(place, "X")
     place = op.vector(tree, -x, _flank(-x), op.component(place, "Y") + _MIDDLE + above)
-    return _raised(op.set_position(disc, place), glass)
+    return _reflector_body(op.set_position(disc, place), glass)
 
 
 def _flank(x: Value) -> Value:
@@ -97,7 +97,7 @@ def _flank(x: Value) -> Value:
     return (x + 0.045) * (-0.041 / 0.095) + (0.055 - _UNDER)
 
 
-def _raised(face: Value, glass: Value) -> Value:
+def _reflector_body(face: Value, glass: Value) -> Value:
     """Return a reflector as thick as it stands out of the post."""
     solid = face.tree.node("GeometryNodeExtrudeMesh", face, offset_scale=_UNDER + _PROUD, individual=False).value
     return _set_material(solid, glass)

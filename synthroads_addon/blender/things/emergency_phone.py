@@ -10,7 +10,7 @@ import bpy
 from ...base.classes import class_id
 from ..nodes import operations as op
 from ..nodes.builder import Tree, Value, node_group
-from ..nodes.solids import Point, box, loft, moved, painted
+from ..nodes.solids import Point, box, loft, move_geometry, paint_faces
 from ..nodes.standing import BURIED, declare_standing, put_on
 from ..nodes.tubes import tube
 from .sign.writing import sign_writing_group
@@ -54,20 +54,20 @@ def _build(tree: Tree) -> None:
 
     with tree.frame("Plinth, body with its roof, and reflective band"):
         solids = ((_PLINTH, plinth), (_BODY, body), (_BAND, band))
-        parts = [painted(_pillar(tree, phone, rows), material) for rows, material in solids]
+        parts = [paint_faces(_pillar(tree, phone, rows), material) for rows, material in solids]
     with tree.frame("Speech panel with its button"):
         front = phone.depth * (-0.5 * _BODY_WIDTH)
         size = op.vector(tree, phone.width * 0.6, 0.012, phone.height * 0.15)
-        parts.append(painted(box(tree, size, op.vector(tree, 0.0, front, phone.height * 0.68)), panel))
+        parts.append(paint_faces(box(tree, size, op.vector(tree, 0.0, front, phone.height * 0.68)), panel))
         button = tree.node(
             "GeometryNodeTransform",
             tube(tree, phone.width * 0.08, 0.01),
             translation=op.vector(tree, 0.0, front, phone.height * 0.64),
             rotation=(math.pi / 2, 0.0, 0.0),
         ).value
-        parts.append(painted(button, body))
+        parts.append(paint_faces(button, body))
     with tree.frame("SOS on all four sides"):
-        parts.append(painted(_writing(tree, phone), writing))
+        parts.append(paint_faces(_writing(tree, phone), writing))
     with tree.frame("Put onto the points"):
         mesh = standing.labelled(put_on(standing.places(), op.join(*parts)), class_id("utility"))
     tree.output("Mesh", mesh, description="Emergency telephone")
@@ -109,6 +109,6 @@ def _writing(tree: Tree, phone: _Phone) -> Value:
         )
         letters = tree.call(sign_writing_group(), line_1="SOS", low_corner=low, high_corner=high).value
         upright = tree.node("GeometryNodeTransform", letters, rotation=(math.pi / 2, 0.0, 0.0)).value
-        upright = moved(upright, op.vector(tree, 0.0, deep * (-0.5 * _BODY_WIDTH) - 0.001))
+        upright = move_geometry(upright, op.vector(tree, 0.0, deep * (-0.5 * _BODY_WIDTH) - 0.001))
         sides.append(tree.node("GeometryNodeTransform", upright, rotation=(0.0, 0.0, turns * math.pi / 2)).value)
     return op.join(*sides)

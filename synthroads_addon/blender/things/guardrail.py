@@ -18,7 +18,7 @@ from ...road.things.body_shapes import (
 )
 from ..materials import material
 from ..nodes import operations as op
-from ..nodes.backbone import first_station, height_on, last_station, look_up, raised, station_ribbon
+from ..nodes.backbone import first_station, height_on, last_station, look_up, raise_place, station_ribbon
 from ..nodes.builder import Operand, Tree, Value, node_group
 from ..nodes.strip import INSTANCES
 from .model_builder import ModelBuilder
@@ -72,7 +72,7 @@ class Rail:
         left = look_up(ribbon, "left", station)
         place = look_up(ribbon, "axis", station) + left * self.offset
         rise = height_on(*surfaces, place) - op.component(place, "Z")
-        return raised(place, rise), left
+        return raise_place(place, rise), left
 
 
 def _declare(tree: Tree) -> Rail:
@@ -114,12 +114,12 @@ def _build(tree: Tree) -> None:
         begin, end = first_station(axis), last_station(axis)
         line = _rows(tree, rail, ramp)
         # What lies beyond the backbone's ends collapses there.
-        within = op.minimum(op.maximum(op.named(tree, "station"), begin), end)
+        within = op.minimum(op.maximum(op.named_attribute(tree, "station"), begin), end)
         line = op.store(line, "station", within)
     with tree.frame("Line of the beams' top edge"):
-        station = op.named(tree, "station")
+        station = op.named_attribute(tree, "station")
         foot, left = rail.foot_at(station, ribbon, surfaces)
-        line = op.store(op.store(line, "left", left), "top", raised(foot, rail.top_at(station, ramp)))
+        line = op.store(op.store(line, "left", left), "top", raise_place(foot, rail.top_at(station, ramp)))
     parts = []
     for side, wanted in rail.beams.items():
         with tree.frame(f"{'Left' if side > 0 else 'Right'} beam"):
@@ -131,7 +131,7 @@ def _build(tree: Tree) -> None:
         posts = op.delete_points(posts, beyond | (station < begin))
         foot, left = rail.foot_at(station, ribbon, surfaces)
         posts = op.set_position(op.store(posts, "left", left), foot)
-        posts = op.delete_points(posts, op.named(tree, "tall") < GUARDRAIL_LOWEST_POST)
+        posts = op.delete_points(posts, op.named_attribute(tree, "tall") < GUARDRAIL_LOWEST_POST)
         parts += _instances(tree, posts, rail.spacer, rail.beams)
     with tree.frame("Labels"):
         mesh = op.label(op.realize(op.join(*parts)), class_id("guardrail"), instance, steel)
@@ -172,8 +172,8 @@ def _beam(tree: Tree, line: Value, side: float, spacer: Value) -> Value:
     """Sweep the beam's profile along the line of its top edge."""
     mesh, column, number = op.grid(tree, len(BEAM_PROFILE), op.point_count(line))
     profile = op.choose(column, BEAM_PROFILE)
-    top = op.sample_index(line, op.named(tree, "top", "FLOAT_VECTOR"), number)
-    left = op.sample_index(line, op.named(tree, "left", "FLOAT_VECTOR"), number)
+    top = op.sample_index(line, op.named_attribute(tree, "top", "FLOAT_VECTOR"), number)
+    left = op.sample_index(line, op.named_attribute(tree, "left", "FLOAT_VECTOR"), number)
     depth = (op.component(profile, "X") + spacer + POST_DEPTH) * side
     place = top + left * depth + op.vector(tree, 0.0, 0.0, op.component(profile, "Z"))
     mesh = op.without_degenerate(op.set_position(mesh, place))
@@ -183,7 +183,7 @@ def _beam(tree: Tree, line: Value, side: float, spacer: Value) -> Value:
 
 def _instances(tree: Tree, posts: Value, spacer: Value, beams: dict[float, Value]) -> list[Value]:
     """Put a post on every point, and beside it the spacers of the beams that there are."""
-    left, tall = op.named(tree, "left", "FLOAT_VECTOR"), op.named(tree, "tall")
+    left, tall = op.named_attribute(tree, "left", "FLOAT_VECTOR"), op.named_attribute(tree, "tall")
     upright = tree.node(
         "FunctionNodeAxesToRotation", (0.0, 0.0, 1.0), left, primary_axis="Z", secondary_axis="X"
     ).value

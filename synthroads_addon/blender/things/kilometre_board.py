@@ -12,7 +12,7 @@ from ...road.things.body_shapes import KILOMETRE_POST
 from ..materials import material
 from ..nodes import operations as op
 from ..nodes.builder import Tree, node_group
-from ..nodes.solids import moved
+from ..nodes.solids import move_geometry
 from ..nodes.standing import declare_standing, put_on
 from .model_builder import ModelBuilder
 from .sign.face import declare_face, sign_face_group
@@ -40,10 +40,10 @@ def _build(tree: Tree) -> None:
 
     with tree.frame("Two faces back to back around the post"):
         plate = tree.call(sign_face_group(), instance=standing.instance, **face).value
-        front = moved(plate, op.vector(tree, 0.0, -face["thickness"]))
+        front = move_geometry(plate, op.vector(tree, 0.0, -face["thickness"]))
         behind = tree.node("GeometryNodeTransform", front, rotation=(0.0, 0.0, math.pi)).value
         middle = lower_edge + face["height"] * 0.5
-        board = moved(op.join(front, behind), op.vector(tree, 0.0, 0.0, middle))
+        board = move_geometry(op.join(front, behind), op.vector(tree, 0.0, 0.0, middle))
     with tree.frame("Put onto the points"):
         places = standing.places()
         mesh = put_on(places, board)

@@ -33,7 +33,7 @@ def points_mesh(
     turn = heading - np.pi / 2.0 + np.deg2rad([item.rotation_deg for item in items])
     attribute(mesh, "heading", np.arctan2(np.sin(turn), np.cos(turn)))
     attribute(mesh, "elevation", np.array([item.elevation for item in items]))
-    attribute(mesh, "instance", signed([item.instance for item in items]))
+    attribute(mesh, "instance", signed_instance([item.instance for item in items]))
     for key, values in attributes.items():
         attribute(mesh, key, values)
     return mesh
@@ -48,7 +48,7 @@ def on_plan(geometry: RoadGeometry, items: Sequence[PointObject]) -> Float:
     return np.column_stack([position + offset[:, None] * left, geometry.profile.elevation(station)])
 
 
-def signed(instances: Sequence[int]) -> NDArray[np.int32]:
+def signed_instance(instances: Sequence[int]) -> NDArray[np.int32]:
     """Return instance numbers as the nodes hold them: they have 32 bits and no sign, the nodes' numbers have one."""
     return np.array(instances, dtype=np.uint32).astype(np.int32)
 

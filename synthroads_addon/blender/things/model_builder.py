@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 from ...base.stepper import aside, pause, rest
 from ...road.geometry import RoadGeometry
 from ...road.parameters import PointObject, RoadParameters
-from ...road.stretches import cut, frame_of
+from ...road.stretches import cut_stretch, frame_of
 from ...road.tessellation import sample_stations
 from ..compat import set_modifier_input
-from .meshes import points_mesh, signed
+from .meshes import points_mesh, signed_instance
 
 ROLE = "synthroads_role"
 """Custom property of the objects that `build_road` makes: what they are in the model."""
@@ -72,7 +72,7 @@ class ModelBuilder:
         self.stations = aside(lambda: sample_stations(self.geometry, self.tolerance, *self._given))
         if not self._whole:
             self.stretch = (float(self.stations[0]), float(self.stations[-1]))
-            self.parameters = cut(self.parameters, *self.stretch)
+            self.parameters = cut_stretch(self.parameters, *self.stretch)
             self.origin, self.zero = frame_of(self.geometry, *self.stretch)
 
     @cached_property
@@ -127,7 +127,9 @@ class ModelBuilder:
             modifier = item.modifiers.new("SynthRoads", "NODES")
             modifier.node_group = group
             for name, value in (inputs or {}).items():
-                set_modifier_input(modifier, name, int(signed([value])[0]) if name.endswith("Instance") else value)
+                set_modifier_input(
+                    modifier, name, int(signed_instance([value])[0]) if name.endswith("Instance") else value
+                )
         self._added(role, item)
 
     def add_instance(self, role: str, collection: bpy.types.Collection) -> bpy.types.Object:

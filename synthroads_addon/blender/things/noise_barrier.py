@@ -15,7 +15,7 @@ from ..nodes import operations as op
 from ..nodes.backbone import first_station, last_station
 from ..nodes.builder import Tree, Value, node_group
 from ..nodes.foot import foot_at
-from ..nodes.solids import box, painted, prism, put, row_of_points
+from ..nodes.solids import box, paint_faces, prism, put_on_points, row_of_points
 from ..nodes.strip import INSTANCES
 from .model_builder import ModelBuilder
 
@@ -120,7 +120,7 @@ def _build(tree: Tree) -> None:
         count = op.rounded_up(op.maximum((wall.last - wall.first) / wall.spacing - SHORTEST_ELEMENT, 1.0))
     with tree.frame("Posts"):
         posts = _posts(tree, wall, count, axis, surfaces)
-        posts = painted(op.realize(posts), steel)
+        posts = paint_faces(op.realize(posts), steel)
     with tree.frame("Bays: both ends' feet"):
         bays = _bays(tree, wall, count, axis, surfaces)
     with tree.frame("Plinths and panels"):
@@ -136,7 +136,7 @@ def _build(tree: Tree) -> None:
             panel_material=face,
             frame_material=frame,
         ).value
-        walls = _filled(tree, wall, bays, (gap, plinth), (panel, painted(box(tree, 1.0), concrete)))
+        walls = _fill_bays(tree, wall, bays, (gap, plinth), (panel, paint_faces(box(tree, 1.0), concrete)))
     with tree.frame("Labels"):
         mesh = op.join(posts, walls)
         mesh = op.store(mesh, "class_id", class_id("noise_barrier"), "FACE")
@@ -149,13 +149,13 @@ def _posts(tree: Tree, wall: _Wall, count: Value, axis: Value, surfaces: tuple[V
     posts = tree.node("GeometryNodeMeshLine", count=count + 1).value
     number = op.index(tree)
     posts = op.store(posts, "station", op.switch(number < count, wall.last, wall.first + number * wall.spacing))
-    station, end = op.named(tree, "station"), last_station(axis)
+    station, end = op.named_attribute(tree, "station"), last_station(axis)
     passed = (station > end - 1e-3) & (wall.last > end + 1e-3)
     posts = op.delete_points(posts, passed | (station < first_station(axis)))
     foot, left = foot_at(axis, surfaces, station, wall.offset)
     size = op.vector(tree, wall.post_width, wall.post_width, wall.height + BURIED)
     upright = tree.node("FunctionNodeAxesToRotation", (0.0, 0.0, 1.0), left, primary_axis="Z", secondary_axis="X")
-    return put(posts, _post(tree), foot + (0.0, 0.0, -BURIED), size, upright.value)
+    return put_on_points(posts, _post(tree), foot + (0.0, 0.0, -BURIED), size, upright.value)
 
 
 def _post(tree: Tree) -> Value:
@@ -176,17 +176,17 @@ def _bays(tree: Tree, wall: _Wall, count: Value, axis: Value, surfaces: tuple[Va
         within = op.minimum(op.maximum(station, first_station(axis)), last_station(axis))
         bays = op.store(bays, name, within)
     bays = op.store(bays, "bay", number)
-    bays = op.delete_points(bays, op.named(tree, "to") - op.named(tree, "from") < 0.05)
+    bays = op.delete_points(bays, op.named_attribute(tree, "to") - op.named_attribute(tree, "from") < 0.05)
     for name, station_name in {"start": "from", "end": "to"}.items():
-        foot, _ = foot_at(axis, surfaces, op.named(tree, station_name), wall.offset)
+        foot, _ = foot_at(axis, surfaces, op.named_attribute(tree, station_name), wall.offset)
         bays = op.store(bays, name, foot)
     return bays
 
 
-def _filled(tree: Tree, wall: _Wall, bays: Value, sizes: tuple[Value, Value], bodies: tuple[Value, Value]) -> Value:
+def _fill_bays(tree: Tree, wall: _Wall, bays: Value, sizes: tuple[Value, Value], bodies: tuple[Value, Value]) -> Value:
     """Put a panel, and a plinth below it, into every bay, level at the lower one of its posts."""
     (gap, plinth), (panel, block) = sizes, bodies
-    start, end = (op.named(tree, name, "FLOAT_VECTOR") for name in ("start", "end"))
+    start, end = (op.named_attribute(tree, name, "FLOAT_VECTOR") for name in ("start", "end"))
     low = op.minimum(op.component(start, "Z"), op.component(end, "Z"))
     along = tree.node("ShaderNodeVectorMath", end - start, (1.0, 1.0, 0.0), operation="MULTIPLY").value
     length = op.maximum(tree.node("ShaderNodeVectorMath", along, operation="LENGTH")["Value"] - gap * 2.0, 0.02)
@@ -200,10 +200,12 @@ def _filled(tree: Tree, wall: _Wall, bays: Value, sizes: tuple[Value, Value], bo
         op.turn(tree, z=op.switch(wall.offset < 0.0, 0.0, math.pi)),
         rotation_space="LOCAL",
     ).value
-    panels = put(bays, panel, level, op.vector(tree, length / (wall.spacing - gap * 2.0), 1.0, 1.0), facing)
+    panels = put_on_points(bays, panel, level, op.vector(tree, length / (wall.spacing - gap * 2.0), 1.0, 1.0), facing)
     deep = plinth + BURIED
     below = level - op.vector(tree, 0.0, 0.0, deep * 0.5)
-    return op.realize(op.join(panels, put(bays, block, below, op.vector(tree, length, wall.thickness, deep), turned)))
+    return op.realize(
+        op.join(panels, put_on_points(bays, block, below, op.vector(tree, length, wall.thickness, deep), turned))
+    )
 
 
 def _panel_group() -> bpy.types.NodeTree:
@@ -233,12 +235,12 @@ def _build_panel(tree: Tree) -> None:
     parts = []
     for number, name in enumerate(_KINDS):
         with tree.frame(f"{name.capitalize()} panel"):
-            made = _slatted(tree, panel, _RELIEFS[name]) if name in _RELIEFS else _glazed(tree, panel)
+            made = _slatted_wall(tree, panel, _RELIEFS[name]) if name in _RELIEFS else _glass_pane(tree, panel)
             parts.append(op.only_if(kind.equals(number), made))
     tree.output("Mesh", op.realize(op.join(*parts)), description="The panel")
 
 
-def _slatted(tree: Tree, panel: _Panel, relief: _Relief) -> Value:
+def _slatted_wall(tree: Tree, panel: _Panel, relief: _Relief) -> Value:
     """Return a wall with slats on its face."""
     out = op.minimum(panel.thickness * 0.3, relief.depth)
     tall = panel.height - (_CAP if relief.cap else 0.0)
@@ -256,18 +258,18 @@ def _slatted(tree: Tree, panel: _Panel, relief: _Relief) -> Value:
     size = op.vector(tree, pitch * relief.share, out + _SUNK, length - 0.002)
     if relief.lying:
         start = op.vector(tree, 0.001 - length * 0.5, front, across)
-        slats = put(row_of_points(tree, count), slat, start, size, op.turn(tree, y=math.pi / 2))
+        slats = put_on_points(row_of_points(tree, count), slat, start, size, op.turn(tree, y=math.pi / 2))
     else:
         start = op.vector(tree, across - panel.length * 0.5, front, 0.001)
-        slats = put(row_of_points(tree, count), slat, start, size)
-    parts = [painted(core, panel.face), painted(op.realize(slats), panel.face)]
+        slats = put_on_points(row_of_points(tree, count), slat, start, size)
+    parts = [paint_faces(core, panel.face), paint_faces(op.realize(slats), panel.face)]
     if relief.cap:
         strip = op.vector(tree, panel.length, panel.thickness, _CAP)
-        parts.append(painted(box(tree, strip, op.vector(tree, 0.0, 0.0, tall + _CAP / 2)), panel.frame))
+        parts.append(paint_faces(box(tree, strip, op.vector(tree, 0.0, 0.0, tall + _CAP / 2)), panel.frame))
     return op.join(*parts)
 
 
-def _glazed(tree: Tree, panel: _Panel) -> Value:
+def _glass_pane(tree: Tree, panel: _Panel) -> Value:
     """Return a pane in a frame."""
     deep, tall = panel.thickness, panel.height
     level = box(tree, op.vector(tree, panel.length, deep, _RAIL))
@@ -284,7 +286,7 @@ def _glazed(tree: Tree, panel: _Panel) -> Value:
     ]
     inside = op.vector(tree, panel.length - 1.9 * _RAIL, op.minimum(deep * 0.6, _PANE), tall - 1.9 * _RAIL)
     pane = box(tree, inside, op.vector(tree, 0.0, 0.0, tall * 0.5))
-    return op.join(painted(op.join(*frame), panel.frame), painted(pane, panel.face))
+    return op.join(paint_faces(op.join(*frame), panel.frame), paint_faces(pane, panel.face))
 
 
 def build_noise_barriers(builder: ModelBuilder) -> None:

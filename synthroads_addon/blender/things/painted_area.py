@@ -16,7 +16,7 @@ from ..materials import material
 from ..nodes import operations as op
 from ..nodes.backbone import height_on, look_up, station_ribbon
 from ..nodes.builder import Tree, node_group
-from .meshes import attribute, fill_polygons, signed
+from .meshes import attribute, fill_polygons, signed_instance
 from .model_builder import ModelBuilder
 
 _LONGEST = 1.0
@@ -45,12 +45,12 @@ def _build(tree: Tree) -> None:
         plan = look_up(ribbon, "axis", station) + look_up(ribbon, "left", station) * offset
     with tree.frame("On the pavement"):
         surface = op.object_geometry(road)
-        height = height_on(surface, surface, plan) + op.named(tree, "film")
+        height = height_on(surface, surface, plan) + op.named_attribute(tree, "film")
         flat = tree.node("ShaderNodeVectorMath", plan, (1.0, 1.0, 0.0), operation="MULTIPLY").value
         mesh = op.set_position(outlines, flat + op.vector(tree, 0.0, 0.0, height))
     with tree.frame("Labels"):
-        mesh = op.label(mesh, class_id("road_marking"), op.named(tree, "instance", "INT"), white)
-        temporary = op.named(tree, "yellow") > 0.5
+        mesh = op.label(mesh, class_id("road_marking"), op.named_attribute(tree, "instance", "INT"), white)
+        temporary = op.named_attribute(tree, "yellow") > 0.5
         mesh = tree.node("GeometryNodeSetMaterial", mesh, temporary, material=yellow).value
     tree.output("Mesh", mesh, description="Paint whose faces look up")
 
@@ -68,7 +68,7 @@ def build_painted_areas(builder: ModelBuilder) -> None:
     items = [item for _, item in outlines]
     attribute(mesh, "film", np.repeat([item.film_thickness for item in items], sizes))
     attribute(mesh, "yellow", np.repeat([float(item.color == "yellow") for item in items], sizes))
-    attribute(mesh, "instance", np.repeat(signed([item.instance for item in items]), sizes))
+    attribute(mesh, "instance", np.repeat(signed_instance([item.instance for item in items]), sizes))
     inputs = {
         "Backbone": builder.objects["Backbone"],
         "Road": builder.objects["Road"],

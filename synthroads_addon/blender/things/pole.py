@@ -12,7 +12,7 @@ from ...road.parameters import Pole
 from ..materials import material
 from ..nodes import operations as op
 from ..nodes.builder import Tree, Value, node_group
-from ..nodes.solids import box, moved, painted, prism
+from ..nodes.solids import box, move_geometry, paint_faces, prism
 from ..nodes.standing import BURIED, declare_standing, put_on
 from ..nodes.tubes import cone, tube
 from .model_builder import ModelBuilder
@@ -81,9 +81,9 @@ def _mast(tree: Tree, pole: _Pole, top: Value) -> Value:
     """Return the mast with its foot below the surface and a door for the cables."""
     radius = pole.diameter * 0.5
     mast = cone(tree, radius, radius * _TAPER, top)
-    foot = moved(tube(tree, radius, BURIED, 16), (0.0, 0.0, -BURIED))
+    foot = move_geometry(tube(tree, radius, BURIED, 16), (0.0, 0.0, -BURIED))
     door = box(tree, op.vector(tree, radius * 0.9, 0.02, 0.35), op.vector(tree, 0.0, radius * -0.93, 0.8))
-    return painted(op.join(mast, foot, door), pole.steel)
+    return paint_faces(op.join(mast, foot, door), pole.steel)
 
 
 def _arm(tree: Tree, pole: _Pole, end: Value) -> Value:
@@ -97,29 +97,29 @@ def _arm(tree: Tree, pole: _Pole, end: Value) -> Value:
     curve = tree.node("GeometryNodeMeshToCurve", line).value
     pipe = tree.node("GeometryNodeCurveToMesh", curve, profile_curve=profile, fill_caps=True).value
     pipe = tree.node("GeometryNodeSetShadeSmooth", pipe).value
-    return op.only_if(pole.arm > _SHORTEST_ARM, painted(pipe, pole.steel))
+    return op.only_if(pole.arm > _SHORTEST_ARM, paint_faces(pipe, pole.steel))
 
 
 def _luminaire(tree: Tree, pole: _Pole) -> Value:
     """Return the street light at the end of the arm; its top is the pole's."""
-    body = painted(prism(tree, _LUMINAIRE, (1.0, 1.0, _THICK)), pole.housing)
-    glass = painted(prism(tree, _GLASS, (1.0, 1.0, 0.01)), pole.glass)
-    parts = op.join(body, moved(glass, (0.0, 0.0, -0.01)))
-    return moved(parts, op.vector(tree, -pole.arm, 0.0, pole.height - _THICK))
+    body = paint_faces(prism(tree, _LUMINAIRE, (1.0, 1.0, _THICK)), pole.housing)
+    glass = paint_faces(prism(tree, _GLASS, (1.0, 1.0, 0.01)), pole.glass)
+    parts = op.join(body, move_geometry(glass, (0.0, 0.0, -0.01)))
+    return move_geometry(parts, op.vector(tree, -pole.arm, 0.0, pole.height - _THICK))
 
 
 def _cameras(tree: Tree, pole: _Pole, mount: Value) -> Value:
     """Return a camera along the road either way, a dome camera at the end of the arm, and a cabinet on the mast."""
-    front = moved(_camera(tree, pole), op.vector(tree, 0.0, (pole.diameter + _CAMERA[1]) * -0.5))
+    front = move_geometry(_camera(tree, pole), op.vector(tree, 0.0, (pole.diameter + _CAMERA[1]) * -0.5))
     behind = tree.node("GeometryNodeTransform", front, rotation=(0.0, 0.0, math.pi)).value
-    pair = moved(op.join(front, behind), op.vector(tree, 0.0, 0.0, mount - 0.3))
-    cap = painted(moved(tube(tree, _DOME, 0.14), (0.0, 0.0, -0.17)), pole.housing)
+    pair = move_geometry(op.join(front, behind), op.vector(tree, 0.0, 0.0, mount - 0.3))
+    cap = paint_faces(move_geometry(tube(tree, _DOME, 0.14), (0.0, 0.0, -0.17)), pole.housing)
     ball = tree.node("GeometryNodeMeshUVSphere", segments=12, rings=6, radius=_DOME * 0.9).value
     ball = tree.node("GeometryNodeSetShadeSmooth", ball).value
-    dome = op.join(cap, painted(moved(ball, (0.0, 0.0, -0.18)), pole.glass))
-    dome = op.only_if(pole.arm > _SHORTEST_ARM, moved(dome, op.vector(tree, -pole.arm, 0.0, mount)))
+    dome = op.join(cap, paint_faces(move_geometry(ball, (0.0, 0.0, -0.18)), pole.glass))
+    dome = op.only_if(pole.arm > _SHORTEST_ARM, move_geometry(dome, op.vector(tree, -pole.arm, 0.0, mount)))
     cabinet = box(tree, (0.3, 0.22, 0.45), op.vector(tree, 0.0, pole.diameter * 0.5 + 0.1, 2.2))
-    return op.join(pair, dome, painted(cabinet, pole.housing))
+    return op.join(pair, dome, paint_faces(cabinet, pole.housing))
 
 
 def _camera(tree: Tree, pole: _Pole) -> Value:
@@ -132,7 +132,7 @@ def _camera(tree: Tree, pole: _Pole) -> Value:
         translation=(0.0, 0.01 - along / 2, 0.0),
         rotation=(math.pi / 2, 0.0, 0.0),
     ).value
-    camera = op.join(painted(op.join(box(tree, _CAMERA), shield), pole.housing), painted(lens, pole.glass))
+    camera = op.join(paint_faces(op.join(box(tree, _CAMERA), shield), pole.housing), paint_faces(lens, pole.glass))
     return tree.node("GeometryNodeTransform", camera, rotation=(math.radians(8.0), 0.0, 0.0)).value
 
 

@@ -14,7 +14,7 @@ from ..nodes import operations as op
 from ..nodes.backbone import first_station, last_station
 from ..nodes.builder import Tree, Value, node_group
 from ..nodes.foot import foot_at
-from ..nodes.solids import box, loft, painted, put
+from ..nodes.solids import box, loft, paint_faces, put_on_points
 from ..nodes.strip import INSTANCES
 from .model_builder import ModelBuilder
 
@@ -73,18 +73,18 @@ def _build(tree: Tree) -> None:
         points = _elements(tree, barrier, first_station(axis), last_station(axis))
     with tree.frame("Both ends on the surface"):
         for end in ("from", "to"):
-            station = op.named(tree, end)
+            station = op.named_attribute(tree, end)
             foot, _ = foot_at(axis, surfaces, station, _offset(barrier, station))
             points = op.store(points, f"{end}_foot", foot)
     with tree.frame("Element of length 1"):
         body = _body(tree, barrier)
-        marks = op.only_if(~barrier.plastic, painted(_reflectors(tree, barrier), glass))
+        marks = op.only_if(~barrier.plastic, paint_faces(_reflectors(tree, barrier), glass))
     with tree.frame("Elements from foot to foot"):
         parts = []
         for parity, finish in enumerate((first, second)):
-            chosen = op.separate(points, (op.named(tree, "number", "INT") % 2).equals(parity))
-            parts.append(_stood(tree, chosen, painted(body, finish), True))
-            parts.append(_stood(tree, chosen, marks, False))
+            chosen = op.separate(points, (op.named_attribute(tree, "number", "INT") % 2).equals(parity))
+            parts.append(_put_on_elements(tree, chosen, paint_faces(body, finish), True))
+            parts.append(_put_on_elements(tree, chosen, marks, False))
     with tree.frame("Labels"):
         mesh = op.realize(op.join(*parts))
         mesh = op.store(mesh, "class_id", class_id("construction_barrier"), "FACE")
@@ -101,7 +101,7 @@ def _elements(tree: Tree, barrier: _TemporaryBarrier, begin: Value, end: Value) 
     stop = op.switch(op.index(tree) < count - 1, barrier.last, start + barrier.length)
     for name, station in {"from": start + TEMPORARY_GAP / 2, "to": stop - TEMPORARY_GAP / 2}.items():
         points = op.store(points, name, op.minimum(op.maximum(station, begin), end))
-    return op.delete_points(points, op.named(tree, "to") - op.named(tree, "from") < 0.05)
+    return op.delete_points(points, op.named_attribute(tree, "to") - op.named_attribute(tree, "from") < 0.05)
 
 
 def _offset(barrier: _TemporaryBarrier, station: Value) -> Value:
@@ -135,14 +135,14 @@ def _reflectors(tree: Tree, barrier: _TemporaryBarrier) -> Value:
     return op.join(*sides)
 
 
-def _stood(tree: Tree, points: Value, body: Value, whole: bool) -> Value:
+def _put_on_elements(tree: Tree, points: Value, body: Value, whole: bool) -> Value:
     """Put a body on every element: along the whole of it, or in its middle."""
-    start, end = (op.named(tree, f"{name}_foot", "FLOAT_VECTOR") for name in ("from", "to"))
+    start, end = (op.named_attribute(tree, f"{name}_foot", "FLOAT_VECTOR") for name in ("from", "to"))
     turned = tree.node("FunctionNodeAxesToRotation", end - start, (0.0, 0.0, 1.0), primary_axis="X", secondary_axis="Z")
     if not whole:
-        return put(points, body, (start + end) * 0.5, 1.0, turned.value)
+        return put_on_points(points, body, (start + end) * 0.5, 1.0, turned.value)
     length = tree.node("ShaderNodeVectorMath", end - start, operation="LENGTH")["Value"]
-    return put(points, body, start, op.vector(tree, length, 1.0, 1.0), turned.value)
+    return put_on_points(points, body, start, op.vector(tree, length, 1.0, 1.0), turned.value)
 
 
 def build_temporary_barriers(builder: ModelBuilder) -> None:

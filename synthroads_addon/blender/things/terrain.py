@@ -14,7 +14,7 @@ from ...road.parameters import Terrain
 from ...road.terrain import GROUND_MARGIN, ground_elevation
 from ..materials import material
 from ..nodes import operations as op
-from ..nodes.backbone import cut, row
+from ..nodes.backbone import limit_offset, row
 from ..nodes.builder import Tree, Value, node_group
 from ..nodes.strip import INSTANCES
 from .meshes import fill
@@ -54,7 +54,7 @@ def _build(tree: Tree) -> None:
     sides = []
     for name, sign in (("Left", 1.0), ("Right", -1.0)):
         with tree.frame(f"{name} edge of the road"):
-            edge = op.separate(edges, op.named(tree, "edge") * sign > 0.5)
+            edge = op.separate(edges, op.named_attribute(tree, "edge") * sign > 0.5)
         with tree.frame(f"{name} side"):
             sides.append(tree.call(
                 _side_group(),
@@ -99,7 +99,7 @@ def _build_side(tree: Tree) -> None:
         start = op.sample_index(edge, op.position(tree), number)
         start_offset = op.dot(start - axis, left)
         width = op.maximum(reach - start_offset * side, 0.0)
-        beyond = cut(start_offset + width * spread * side, curvature) - start_offset
+        beyond = limit_offset(start_offset + width * spread * side, curvature) - start_offset
         distance = beyond * side
     with tree.frame("Height: the ground, as far as the batter reaches to it"):
         place = start + left * beyond

@@ -13,7 +13,7 @@ from ...road.things.body_shapes import TRAFFIC_LIGHT_POST
 from ..materials import material
 from ..nodes import operations as op
 from ..nodes.builder import Tree, Value, node_group
-from ..nodes.solids import box, loft, moved, painted, put, row_of_points
+from ..nodes.solids import box, loft, move_geometry, paint_faces, put_on_points, row_of_points
 from ..nodes.standing import BURIED, declare_standing, put_on
 from ..nodes.tubes import cone, tube
 from .model_builder import ModelBuilder
@@ -76,7 +76,7 @@ def _build(tree: Tree) -> None:
 
     with tree.frame("Post"):
         tall = light.height + (BURIED - 0.03)
-        parts = [painted(moved(tube(tree, TRAFFIC_LIGHT_POST / 2, tall), (0.0, 0.0, -BURIED)), light.steel)]
+        parts = [paint_faces(move_geometry(tube(tree, TRAFFIC_LIGHT_POST / 2, tall), (0.0, 0.0, -BURIED)), light.steel)]
     with tree.frame("Board with its rim, and housing"):
         parts += _housing(tree, light)
     with tree.frame("Lights by their number from above: red, yellow, green, yellow"):
@@ -84,8 +84,8 @@ def _build(tree: Tree) -> None:
     with tree.frame("Visors"):
         number = op.index(tree)
         place = op.vector(tree, 0.0, _front(light), light.level(number))
-        visors = put(row_of_points(tree, light.count), _visor(tree, light.diameter), place)
-        parts.append(painted(visors, light.housing))
+        visors = put_on_points(row_of_points(tree, light.count), _visor(tree, light.diameter), place)
+        parts.append(paint_faces(visors, light.housing))
     with tree.frame("Put onto the points"):
         mesh = standing.labelled(put_on(standing.places(), op.join(*parts)), class_id("traffic_light"))
     tree.output("Mesh", mesh, description="Traffic light with its post")
@@ -106,10 +106,10 @@ def _housing(tree: Tree, light: _Light) -> list[Value]:
     depth = light.diameter * _CHAMBER[1]
     chamber = op.vector(tree, light.diameter * _CHAMBER[0], depth, light.diameter * (_CHAMBER[2] - 0.02))
     level = light.level(op.index(tree))
-    chambers = put(
+    chambers = put_on_points(
         row_of_points(tree, light.count), box(tree, chamber), op.vector(tree, 0.0, depth * -0.5 - 0.055, level)
     )
-    return [painted(rim, light.rim), painted(op.join(board, chambers), light.housing)]
+    return [paint_faces(rim, light.rim), paint_faces(op.join(board, chambers), light.housing)]
 
 
 def _lamps(tree: Tree, light: _Light) -> Value:
@@ -119,8 +119,8 @@ def _lamps(tree: Tree, light: _Light) -> Value:
     dome = tree.node("GeometryNodeTransform", dome, rotation=(math.pi / 2, 0.0, 0.0)).value
     number = op.index(tree)
     points = op.store(row_of_points(tree, light.count), "number", number)
-    lamps = op.realize(put(points, dome, op.vector(tree, 0.0, _front(light), light.level(number))))
-    number = op.named(tree, "number", "INT")
+    lamps = op.realize(put_on_points(points, dome, op.vector(tree, 0.0, _front(light), light.level(number))))
+    number = op.named_attribute(tree, "number", "INT")
     red, yellow, green = light.lamps
     is_green = (number > 0) & number.equals(op.rounded_up(op.minimum(light.count, 3.0)) - 1)
     for glass, chosen in ((yellow, True), (red, number.equals(0)), (green, is_green)):

@@ -63,7 +63,7 @@ def make_gallery(folder: Path, quality: Quality, only: str, say: Callable[[str],
         name = f"class-{design_class.lower()}"
         if only in name:
             road = {"design_class": design_class, "cross_section": section, "length": 800.0}
-            parameters = _built({"road": road, "seed": 2})
+            parameters = _build_scene({"road": road, "seed": 2})
             _aerial(parameters)
             made.append(_render(folder / f"{name}.png", quality, say))
     made += _material_pictures(folder, quality, only, say)
@@ -82,7 +82,7 @@ def _scene_pictures(
     views = {"aerial": _aerial, "driver": _driver}
     if only and not only.startswith("object") and not any(only in f"scene-{name}-{view}" for view in views):
         return []
-    parameters = _built(scene)
+    parameters = _build_scene(scene)
     made = []
     for view, aim in views.items():
         if only in f"scene-{name}-{view}":
@@ -97,7 +97,7 @@ def _scene_pictures(
     return made
 
 
-def _built(scene: dict[str, Any]) -> RoadParameters:
+def _build_scene(scene: dict[str, Any]) -> RoadParameters:
     empty_file()
     parameters = sample_road(RoadScenario.from_dict(scene["road"]), scene["seed"])
     build_road(parameters, _TOLERANCE)

@@ -94,7 +94,7 @@ def _obstacles(road: Road) -> Iterator[tuple[int, str]]:
                 yield i, what
 
 
-def _unguarded(road: Road, edges: Edges, index: int, reach: tuple[float, float]) -> tuple[float, float] | None:
+def _missing_barrier(road: Road, edges: Edges, index: int, reach: tuple[float, float]) -> tuple[float, float] | None:
     """Return (metres, first station) that barriers lack between a carriageway and a body beside it, or None.
 
     Args:
@@ -120,7 +120,7 @@ def _obstacle_barrier(road: Road) -> Iterator[Finding]:
             distance = float(road.around.clearance[side][i])
             if distance < 0.0 or not below(distance, limit):
                 continue
-            if lacking := _unguarded(road, edges, i, (OBSTACLE_LEAD, OBSTACLE_TAIL)):
+            if lacking := _missing_barrier(road, edges, i, (OBSTACLE_LEAD, OBSTACLE_TAIL)):
                 text = (
                     f"The {what} stands {distance:.2f} m from {side} and {lacking[0]:.1f} m of the barrier in front of "
                     f"it are missing; nearer than {limit} m it is needed (RPS)."
@@ -136,7 +136,7 @@ def _noise_barrier(road: Road) -> Iterator[Finding]:
             if distance < 0.0 or not road.around.outer[side][i]:
                 continue
             reach = (OBSTACLE_LEAD, OBSTACLE_TAIL) if below(distance, limit) else (0.0, 0.0)
-            if lacking := _unguarded(road, edges, i, reach):
+            if lacking := _missing_barrier(road, edges, i, reach):
                 text = (
                     f"The noise barrier stands {distance:.2f} m from {side} and {lacking[0]:.1f} m of the barrier in "
                     "front of it are missing (RPS)."

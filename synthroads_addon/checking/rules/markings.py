@@ -67,7 +67,7 @@ def _spans(marks: Float, where: Bool) -> _Spans:
     return [(float(marks[first]), float(marks[last + 1])) for first, last in stretches(where)]
 
 
-def _needed(road: Road, edges: Edges) -> Iterator[tuple[str, int, _Spans, _Lines]]:
+def _required_lines(road: Road, edges: Edges) -> Iterator[tuple[str, int, _Spans, _Lines]]:
     """Yield (kind, boundary, where it must run, its lines) of every line along a carriageway's lanes."""
     own, whole, last = _own_lines(road, edges), [(0.0, road.length)], len(edges.lane_widths)
     yield "outer_edge", 0, whole, _lines(own, ("outer_edge", "block"), 0)
@@ -87,7 +87,7 @@ def _needed_at(road: Road, turnout: TurnoutEdges) -> Iterator[tuple[str, tuple[f
 
 def _marking_missing(road: Road) -> Iterator[Finding]:
     for name, edges in road.sides.items():
-        for kind, boundary, spans, lines in _needed(road, edges):
+        for kind, boundary, spans, lines in _required_lines(road, edges):
             if spans and not lines:
                 text = f"There is no {_words(kind)} line on lane boundary {boundary} (RMS)."
                 yield Finding(name, spans[0][0], 0.0, 1.0, text)
@@ -108,16 +108,18 @@ def _marking_missing(road: Road) -> Iterator[Finding]:
 
 def _marking_coverage(road: Road) -> Iterator[Finding]:
     for edges in road.sides.values():
-        for _, boundary, spans, lines in _needed(road, edges):
+        for _, boundary, spans, lines in _required_lines(road, edges):
             what = f"Lane boundary {boundary}"
-            yield from _uncovered(road, what, spans if lines else [], lines)
+            yield from _find_uncovered(road, what, spans if lines else [], lines)
     for _, turnout in road.turnouts:
         if turnout.turnout.ramp is not None:
             for kind, span, lines in _needed_at(road, turnout):
-                yield from _uncovered(road, f"The {_words(kind)} of {turnout.name}", [span] if lines else [], lines)
+                yield from _find_uncovered(
+                    road, f"The {_words(kind)} of {turnout.name}", [span] if lines else [], lines
+                )
 
 
-def _uncovered(road: Road, what: str, spans: _Spans, lines: _Lines) -> Iterator[Finding]:
+def _find_uncovered(road: Road, what: str, spans: _Spans, lines: _Lines) -> Iterator[Finding]:
     covered = [(line.start_station, line.end_station) for _, line in lines]
     for low, high in spans:
         for start, end in gaps(covered, max(low, 0.0), min(high, road.length)):
@@ -138,7 +140,7 @@ def _marking_between(road: Road) -> Iterator[Finding]:
                         yield Finding(name, start, end - start, 0.0, text)
 
 
-def _ruled(road: Road) -> Iterator[tuple[str, LineMarking]]:
+def _regulated_lines(road: Road) -> Iterator[tuple[str, LineMarking]]:
     """Yield the lines whose width and pattern the RMS give: not free ones, nor temporary (yellow) ones."""
     for name, line in road.of(LineMarking).items():
         if line.color == "white" and line.kind != "free":
@@ -146,7 +148,7 @@ def _ruled(road: Road) -> Iterator[tuple[str, LineMarking]]:
 
 
 def _marking_width(road: Road) -> Iterator[Finding]:
-    for name, line in _ruled(road):
+    for name, line in _regulated_lines(road):
         limit = min(LINE_WIDTHS[line.kind], key=lambda width: abs(width - line.width))
         if below(line.width, limit) or above(line.width, limit):
             text = f"The line is {line.width:.3f} m wide; {_words(line.kind)} lines have {limit:.2f} m (RMS)."
@@ -154,7 +156,7 @@ def _marking_width(road: Road) -> Iterator[Finding]:
 
 
 def _marking_pattern(road: Road) -> Iterator[Finding]:
-    for name, line in _ruled(road):
+    for name, line in _regulated_lines(road):
         wanted = PATTERNS.get(line.kind, (0.0, 0.0))
         for part, value, limit in zip(("dash", "gap"), (line.dash_length, line.gap_length), wanted, strict=True):
             if below(value, limit) or above(value, limit):

@@ -27,7 +27,7 @@ def _place(road: Road, turnout: Turnout) -> float:
     return float(min(max(turnout.start_station, 0.0), road.length))
 
 
-def _ramped(road: Road, with_ramp: bool) -> Iterator[tuple[str, Turnout]]:
+def _turnouts_of_kind(road: Road, with_ramp: bool) -> Iterator[tuple[str, Turnout]]:
     """Yield the exits and entries, or the emergency bays, with their ids."""
     for name, turnout in road.of(Turnout).items():
         if (turnout.ramp is not None) == with_ramp:
@@ -36,14 +36,14 @@ def _ramped(road: Road, with_ramp: bool) -> Iterator[tuple[str, Turnout]]:
 
 def _lane_length(road: Road) -> Iterator[Finding]:
     least = TURNOUT_LANE_LENGTH[road.design_class]
-    for name, turnout in _ramped(road, True):
+    for name, turnout in _turnouts_of_kind(road, True):
         if below(turnout.lane_length, least):
             text = f"The {turnout.kind}'s lane is {turnout.lane_length:.1f} m long; {least:.0f} m are needed (RAA)."
             yield Finding(name, _place(road, turnout), turnout.lane_length, least, text)
 
 
 def _lane_width(road: Road) -> Iterator[Finding]:
-    for name, turnout in _ramped(road, True):
+    for name, turnout in _turnouts_of_kind(road, True):
         if below(turnout.lane_width, TURNOUT_LANE_WIDTH):
             width, least = turnout.lane_width, TURNOUT_LANE_WIDTH
             text = f"The {turnout.kind}'s lane is {width:.2f} m wide; {least} m are needed (RAA)."
@@ -51,14 +51,14 @@ def _lane_width(road: Road) -> Iterator[Finding]:
 
 
 def _bay_width(road: Road) -> Iterator[Finding]:
-    for name, bay in _ramped(road, False):
+    for name, bay in _turnouts_of_kind(road, False):
         if below(bay.lane_width, EMERGENCY_BAY_WIDTH):
             text = f"The emergency bay is {bay.lane_width:.2f} m wide; {EMERGENCY_BAY_WIDTH} m are needed (RAA)."
             yield Finding(name, _place(road, bay), bay.lane_width, EMERGENCY_BAY_WIDTH, text)
 
 
 def _bay_length(road: Road) -> Iterator[Finding]:
-    for name, bay in _ramped(road, False):
+    for name, bay in _turnouts_of_kind(road, False):
         if below(bay.lane_length, EMERGENCY_BAY_LENGTH):
             text = f"The emergency bay is {bay.lane_length:.1f} m long; {EMERGENCY_BAY_LENGTH:.0f} m are needed (RAA)."
             yield Finding(name, _place(road, bay), bay.lane_length, EMERGENCY_BAY_LENGTH, text)

@@ -323,6 +323,6 @@ def finite_coordinates(path: Path, done: int, xyz: NDArray[np.float64]) -> NDArr
     return xyz
 
 
-def damaged(path: Path, at: int, count: int) -> InputError:
+def damage_error(path: Path, at: int, count: int) -> InputError:
     """Return the error of a file whose points can be read up to the one numbered ``at`` only."""
     return InputError(str(path), None, f"is truncated or damaged after {at:,} of {count:,} points")

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from ...base.errors import InputError
 from ..layers import LAYERS, Column, columns, gather
 from ..points import PointBlock, make_block
-from .base import BLOCK, CloudHeader, CloudReader, CloudWriter, damaged, finite_coordinates, header_from_notes
+from .base import BLOCK, CloudHeader, CloudReader, CloudWriter, damage_error, finite_coordinates, header_from_notes
 
 SCALE = 1e-4
 """Size of a coordinate's step, m."""
@@ -278,9 +278,9 @@ class E57Reader(CloudReader):
                     reader = reader or scan["points"].reader(buffers)
                     got = reader.read()
                 except Exception:
-                    raise damaged(self.header.path, done, self.header.count) from None
+                    raise damage_error(self.header.path, done, self.header.count) from None
                 if got == 0:
-                    raise damaged(self.header.path, done, self.header.count)
+                    raise damage_error(self.header.path, done, self.header.count)
                 block = self._block({name: array[:got] for name, array in arrays.items()}, got, _pose(scan))
                 invalid = arrays["cartesianInvalidState"][:got] if "cartesianInvalidState" in arrays else None
                 block = block if invalid is None else block.select(invalid == 0)

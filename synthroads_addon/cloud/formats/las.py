@@ -26,7 +26,7 @@ from ...base.errors import InputError, OutputError
 from ...base.schema import canonical_json
 from ..layers import Column, attributes_of, columns, gather
 from ..points import PointBlock, make_block
-from .base import BLOCK, CloudHeader, CloudReader, CloudWriter, damaged, epsg_of, intensity_scale
+from .base import BLOCK, CloudHeader, CloudReader, CloudWriter, damage_error, epsg_of, intensity_scale
 from .laz_chunks import check_chunks
 
 SCALE = 0.001
@@ -226,13 +226,13 @@ class LasReader(CloudReader):
             try:
                 record = self._reader.read_points(wanted)
             except _FAULTS:
-                raise damaged(path, done, self.header.count) from None
+                raise damage_error(path, done, self.header.count) from None
             except BaseException as problem:
                 if type(problem).__name__ == "PanicException":  # the decompressor's own way to fail
-                    raise damaged(path, done, self.header.count) from None
+                    raise damage_error(path, done, self.header.count) from None
                 raise
             if len(record) != wanted:
-                raise damaged(path, done + len(record), self.header.count)
+                raise damage_error(path, done + len(record), self.header.count)
             done += wanted
             yield self._block(record)
 
@@ -247,7 +247,7 @@ class LasReader(CloudReader):
         if not header.are_points_compressed:
             there = max(0, size - start) // header.point_format.size
             if there < header.point_count:
-                raise damaged(path, there, header.point_count)
+                raise damage_error(path, there, header.point_count)
         elif header.point_count:
             check_chunks(path, start, header.vlrs.get("LasZipVlr")[0].record_data)
 

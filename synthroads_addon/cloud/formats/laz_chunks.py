@@ -46,10 +46,10 @@ def check_chunks(path: Path, start: int, record: bytes) -> None:
         file.seek(max(table, 0))
         _, count = struct.unpack("<II", file.read(8))
         if not start + 8 <= table or count > size - start:
-            raise _damaged(path)
+            raise _damage_error(path)
         chunks = _chunk_sizes(path, file, start, record)
         if start + 8 + sum(chunks) > table:
-            raise _damaged(path)
+            raise _damage_error(path)
         layers = _layers_of(record)
         at = start + 8
         for number, length in enumerate(chunks):
@@ -58,7 +58,7 @@ def check_chunks(path: Path, start: int, record: bytes) -> None:
             at += length
 
 
-def _damaged(path: Path) -> InputError:
+def _damage_error(path: Path) -> InputError:
     return InputError(str(path), None, "is damaged: the table of its chunks doesn't fit the file")
 
 
@@ -68,10 +68,10 @@ def _chunk_sizes(path: Path, file: BinaryIO, start: int, record: bytes) -> list[
     try:
         table: list[tuple[int, int]] = lazrs.read_chunk_table(file, lazrs.LazVlr(record))
     except (lazrs.LazrsError, ValueError, OSError, TypeError):
-        raise _damaged(path) from None
+        raise _damage_error(path) from None
     except BaseException as problem:
         if type(problem).__name__ == "PanicException":  # the decompressor's own way to fail
-            raise _damaged(path) from None
+            raise _damage_error(path) from None
         raise
     return [length for _, length in table]
 

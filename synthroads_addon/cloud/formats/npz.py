@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 from ...base.errors import InputError
 from ..layers import LAYERS, columns, gather, layer_arrays
 from ..points import PointBlock, make_block
-from .base import BLOCK, CloudHeader, CloudReader, CloudWriter, damaged, finite_coordinates, header_from_notes
+from .base import BLOCK, CloudHeader, CloudReader, CloudWriter, damage_error, finite_coordinates, header_from_notes
 
 _ALWAYS = {
     "xyz": ("<f8", 3),
@@ -138,7 +138,7 @@ class NpzReader(CloudReader):
                 try:
                     arrays = {name: self._rows(members[name], name, wanted) for name in members}
                 except ARCHIVE_FAULTS:
-                    raise damaged(self.header.path, done, self.header.count) from None
+                    raise damage_error(self.header.path, done, self.header.count) from None
                 finite_coordinates(self.header.path, done, arrays["xyz"])
                 yield self._block(arrays, wanted)
         finally:

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from ...base.errors import InputError
 from ..layers import LAYERS, Column, columns, gather
 from ..points import PointBlock, make_block
-from .base import BLOCK, CloudHeader, CloudReader, CloudWriter, damaged, finite_coordinates, header_from_notes
+from .base import BLOCK, CloudHeader, CloudReader, CloudWriter, damage_error, finite_coordinates, header_from_notes
 
 _NAMES = {"NormalX": "nx", "NormalY": "ny", "NormalZ": "nz"}
 """Columns that PLY has names of its own for."""
@@ -134,7 +134,7 @@ class PlyReader(CloudReader):
             self._start = self._file.tell()
             there = (path.stat().st_size - self._start) // self._type.itemsize
             if there < count:
-                raise damaged(path, max(0, there), count)
+                raise damage_error(path, max(0, there), count)
         except BaseException:
             self._file.close()
             raise
@@ -156,7 +156,7 @@ class PlyReader(CloudReader):
             wanted = min(size, self.header.count - done)
             data = self._file.read(wanted * self._type.itemsize)
             if len(data) != wanted * self._type.itemsize:
-                raise damaged(self.header.path, done, self.header.count)
+                raise damage_error(self.header.path, done, self.header.count)
             yield self._block(np.frombuffer(data, dtype=self._type), done)
 
     def close(self) -> None:

@@ -47,7 +47,7 @@ def convert(
     with open_cloud(source) as cloud:
         scheme = _scheme_of(cloud, classes)
         with _writer_like(cloud, output, scheme) as writer:
-            for points in _watched(cloud.blocks(block), cloud.header.count, progress, "convert"):
+            for points in _pass_with_progress(cloud.blocks(block), cloud.header.count, progress, "convert"):
                 writer.write(points)
         return _done(cloud, writer)
 
@@ -65,7 +65,7 @@ def subsample(
     _check_output(source, output, overwrite)
     with open_cloud(source) as cloud, GridSubsampler(cell, output.parent) as grid:
         scheme = _scheme_of(cloud, classes)
-        for points in _watched(cloud.blocks(block), cloud.header.count, progress, "read"):
+        for points in _pass_with_progress(cloud.blocks(block), cloud.header.count, progress, "read"):
             grid.add(points)
         with _writer_like(cloud, output, scheme) as writer:
             for points in grid.blocks():
@@ -87,7 +87,7 @@ def map_intensity(
     with open_cloud(source) as cloud, open_cloud(target) as other:
         mapping = IntensityMapping(cloud, other, per_class)
         with _writer_like(cloud, output, _scheme_of(cloud, None), mapping.scale) as writer:
-            for block in _watched(mapping.blocks(cloud), cloud.header.count, progress, "map"):
+            for block in _pass_with_progress(mapping.blocks(cloud), cloud.header.count, progress, "map"):
                 writer.write(block)
         result = _done(cloud, writer) | {
             "target": other.header.path.name,
@@ -129,7 +129,7 @@ def draw_previews(
         low, high = extent.across(start, end)
         view = TopView(start, end, low, high, cloud.header.scheme)
         path = extent.axis() if centerline is None else centerline
-        middle, right, reach = _cut(line, station, path, max(1.0, (high - low) / 2), extent)
+        middle, right, reach = _cross_cut(line, station, path, max(1.0, (high - low) / 2), extent)
         slab: list[PointBlock] = []
         for block in cloud.blocks():
             view.add(block)
@@ -218,7 +218,7 @@ class _Extent:
         return float(along.min()) - slack, float(along.max()) + slack
 
 
-def _cut(
+def _cross_cut(
     line: tuple[float, float, float, float] | None,
     station: float | None,
     path: NDArray[np.float64],
@@ -298,7 +298,9 @@ def _check_output(source: Path, output: Path, overwrite: bool) -> None:
         raise OutputError("--output", str(output), "cannot be written (Permission denied)")
 
 
-def _watched(blocks: Iterable[PointBlock], count: int, progress: Progress, stage: str) -> Iterator[PointBlock]:
+def _pass_with_progress(
+    blocks: Iterable[PointBlock], count: int, progress: Progress, stage: str
+) -> Iterator[PointBlock]:
     done = 0
     for block in blocks:
         yield block

@@ -60,7 +60,7 @@ def gray(values: NDArray[np.float64], filled: NDArray[np.bool_], text: str) -> t
     return np.repeat(shade[:, None], 3, axis=1), GrayBar(float(low), float(high), text)
 
 
-def framed(
+def add_frame(
     pixels: NDArray[np.uint8],
     title: str,
     legend: Sequence[tuple[str, Color]] | GrayBar | None,
@@ -78,7 +78,7 @@ def framed(
     height, width = pixels.shape[:2]
     left = _MARGIN + (52 if ticks else 0)
     size = (max(width + left, 900) + _MARGIN, height + 2 * _MARGIN + (_LINE if ticks else 0))
-    lines = _wrapped(legend, size[0] - 2 * _MARGIN) if isinstance(legend, Sequence) else [[]] if legend else []
+    lines = _wrap_entries(legend, size[0] - 2 * _MARGIN) if isinstance(legend, Sequence) else [[]] if legend else []
     picture = Image.new("RGB", (size[0], size[1] + _LINE * (1 + len(lines)) + 10), PAPER)
     picture.paste(Image.fromarray(pixels), (left, _MARGIN))
     draw = ImageDraw.Draw(picture)
@@ -110,7 +110,7 @@ def _font(size: int) -> ImageFont.FreeTypeFont | ImageFont.ImageFont:
     return ImageFont.load_default(size=size)
 
 
-def _wrapped(legend: Sequence[tuple[str, Color]], width: float) -> list[list[tuple[str, Color]]]:
+def _wrap_entries(legend: Sequence[tuple[str, Color]], width: float) -> list[list[tuple[str, Color]]]:
     """Return the legend's entries in lines that fit."""
     lines: list[list[tuple[str, Color]]] = []
     used = np.inf

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ...base.classes import ClassScheme, class_scheme
 from ..points import PointBlock
-from .picture import PAPER, Axes, GrayBar, class_legend, framed, gray, nice_step
+from .picture import PAPER, Axes, GrayBar, add_frame, class_legend, gray, nice_step
 from .raster import Raster
 
 WIDTH = 1800
@@ -79,7 +79,7 @@ class TopView:
         for name, (colors, legend) in pictures.items():
             title = f"{name}   {int(raster.count.sum()):,} points{system}   pixel {self.pixel:.3g} m"
             paths.append(folder / f"preview_{name}.png")
-            framed(raster.picture(colors, PAPER), title, legend, axes, north).save(paths[-1])
+            add_frame(raster.picture(colors, PAPER), title, legend, axes, north).save(paths[-1])
         return paths
 
 
@@ -143,7 +143,7 @@ class CrossSection:
         scale = "" if abs(self.exaggeration - 1) < 0.01 else f"   heights x {self.exaggeration:.3g}"
         title = f"{what}   {int(raster.count.sum()):,} points in {self.depth:g} m{scale}"
         axes = Axes(raster.left, raster.low, raster.across, raster.up)
-        framed(raster.picture(colors, _SECTION_PAPER), title, legend, axes, ticks=True).save(path)
+        add_frame(raster.picture(colors, _SECTION_PAPER), title, legend, axes, ticks=True).save(path)
         return path
 
 

@@ -76,7 +76,7 @@ class Raster:
         filled = (self.count > 0).reshape(shape)
         result = np.where(self.count[:, None] > 0, colors, paper).astype(np.uint8).reshape(*shape, 3)
         for _ in range(self._dot_growth(filled)):
-            result, filled = _grown(result, filled)
+            result, filled = _grow_cells(result, filled)
         return result
 
     def _dot_growth(self, filled: NDArray[np.bool_]) -> int:
@@ -93,7 +93,7 @@ class Raster:
         self.label[cell[foremost]] = label[foremost]
 
 
-def _grown(picture: NDArray[np.uint8], filled: NDArray[np.bool_]) -> tuple[NDArray[np.uint8], NDArray[np.bool_]]:
+def _grow_cells(picture: NDArray[np.uint8], filled: NDArray[np.bool_]) -> tuple[NDArray[np.uint8], NDArray[np.bool_]]:
     """Fill empty cells beside filled ones with their colours."""
     result, done = picture.copy(), filled.copy()
     for axis, step in ((1, 1), (1, -1), (0, 1), (0, -1)):

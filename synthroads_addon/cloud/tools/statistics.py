@@ -116,7 +116,7 @@ class _FirstPass:
         self.low = np.minimum(self.low, block.xyz.min(axis=0))
         self.high = np.maximum(self.high, block.xyz.max(axis=0))
         self._cells.add(block.xyz, block.class_id)
-        ranks = scattered(block.xyz)
+        ranks = hash_positions(block.xyz)
         for label in np.unique(block.class_id):
             chosen = block.class_id == label
             self._samples[int(label)].add(block.xyz[chosen], ranks[chosen])
@@ -195,7 +195,7 @@ class _Sample:
         self.xyz, self._ranks = np.concatenate([self.xyz, xyz])[order], ranks[order]
 
 
-def scattered(xyz: NDArray[np.float64]) -> NDArray[np.uint64]:
+def hash_positions(xyz: NDArray[np.float64]) -> NDArray[np.uint64]:
     """Return a well-mixed number (N,) of each position (N, 3), rounded to 0.1 mm (SplitMix64, Steele et al. 2014)."""
     mixed = np.zeros(len(xyz), dtype=np.uint64)
     for axis in range(3):

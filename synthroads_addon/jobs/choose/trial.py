@@ -30,7 +30,7 @@ from ...scanning.noise import Noise
 from ...scanning.plan import ScanConditions, ScanPlan
 from ...scanning.platforms.path import Path as ScanPath
 from ...scanning.record import record_as_measured
-from ...scanning.samples import scattered
+from ...scanning.samples import scatter_stretches
 from ...scanning.scan import BlockResult, joined_results
 from ...scanning.scene.motion import ScannedScene
 from ...scenario.scenario import Scenario
@@ -69,7 +69,7 @@ class Trial:
         scenario: the job, without noise.
         scene: what is scanned.
         plan: of the whole path.
-        phase: see `scanning.samples.scattered`: other phases are other stretches.
+        phase: see `scanning.samples.scatter_stretches`: other phases are other stretches.
         lines: of these is the error taken.
         clock: measures seconds.
     """
@@ -96,7 +96,7 @@ class Trial:
 
     def scan_lines(self, rings: tuple[int, ...], lines: int = 0) -> list[BlockResult]:
         """Scan the stretches that errors are taken of with a beam; return the points of each, and where they are."""
-        path = scattered(self.plan.path, lines or self.lines, PULSES / self.plan.setting.shot_rate, self.phase)
+        path = scatter_stretches(self.plan.path, lines or self.lines, PULSES / self.plan.setting.shot_rate, self.phase)
         results = iter(record_as_measured(replace(self.plan, path=path, rings=rings)))
         blocks = Blocks(self.plan.setting, path, len(beam_pattern(rings).weights))
         return [joined_results([next(results) for _ in blocks.of(strip)]) for strip in path.strips]
@@ -166,7 +166,7 @@ class Trial:
         Colours are the materials' means and the relief is the coarsest: what more than that costs is known apart.
         """
         count = max(_TIMED, 2 * available_cores())
-        path = scattered(self.plan.path, count, _TIMED_PULSES / self.plan.setting.shot_rate, 0.5, _TIMED_SHARE)
+        path = scatter_stretches(self.plan.path, count, _TIMED_PULSES / self.plan.setting.shot_rate, 0.5, _TIMED_SHARE)
         # Pulses come in whole lines, so that stretches hold fewer of them than their duration says.
         share = sum(map(self.plan.pulses, path.strips)) / self.pulses
         request = self.layer_request({"colour.source": "material"})

@@ -89,7 +89,7 @@ def measure_demo(scenario: Scenario) -> dict[str, Any]:
     return {"cores": available_cores(), "stages": timer.stages, "lines": lines, "floors": floors}
 
 
-def _spread(plan: ScanPlan, count: int) -> list[Any]:
+def _spread_blocks(plan: ScanPlan, count: int) -> list[Any]:
     """Return so many whole blocks, spread over a scan."""
     blocks = plan.blocks()
     return [blocks[i] for i in np.unique(np.linspace(0, len(blocks) - 1, count + 2).astype(int)[1:-1])]
@@ -122,7 +122,7 @@ def _casting(plan: ScanPlan) -> Iterator[Rate]:
 
 
 def _cast_beside(plan: ScanPlan) -> Rate:
-    threads, blocks = available_cores(), _spread(plan, _CAST_BLOCKS)
+    threads, blocks = available_cores(), _spread_blocks(plan, _CAST_BLOCKS)
     part = plan.target._parts[0]
     caster, kept = part.caster, _KeptRays(part.caster)
     object.__setattr__(part, "caster", kept)
@@ -157,7 +157,7 @@ def _best_of_both(ours: Callable[[], float], floor: Callable[[], float]) -> dict
 
 def _writing(plan: ScanPlan, files: CloudFiles, folder: Path) -> Rate:
     """Return the writing of LAZ beside the mere compression of the same records by lazrs through laspy."""
-    few = replace(plan, only=tuple(_spread(plan, _WRITTEN_BLOCKS)))
+    few = replace(plan, only=tuple(_spread_blocks(plan, _WRITTEN_BLOCKS)))
     kept = CollectedBlocks()
     record(few, kept)
     blocks = [result.points for result in kept.results]

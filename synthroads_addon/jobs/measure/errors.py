@@ -26,7 +26,7 @@ from ...scanning.colour.colour import FROM_MATERIAL, MATERIAL_LAYERS, NEARBY, La
 from ...scanning.colour.difference import ciede2000, lab
 from ...scanning.colour.request import LayerRequest
 from ...scanning.colour.settings import ColourSettings
-from ...scanning.relief import MicroRelief, adjusted
+from ...scanning.relief import MicroRelief, shift_along_normals
 from ...scanning.scan import BlockResult
 from ...scenario.colour import image_scale
 
@@ -78,7 +78,7 @@ def shift_points(
 ) -> list[Float]:
     """Return the places (N, 3) of the points of each part as micro-relief shifts them, m."""
     return [
-        adjusted(one.points, one.seen.position, relief, strength, seed, octaves).xyz
+        shift_along_normals(one.points, one.seen.position, relief, strength, seed, octaves).xyz
         for one in results
         if one.seen is not None
     ]

@@ -34,7 +34,7 @@ from ...scanning.colour.request import LayerRequest
 from ...scanning.plan import ScanPlan
 from ...scanning.record import RETURNS_AT_ONCE, record_as_measured
 from ...scanning.relief import micro_relief
-from ...scanning.samples import middle, spread
+from ...scanning.samples import middle, spread_stretches
 from ...scanning.scan import BlockResult, joined_results
 from ...scanning.scene.motion import ScannedScene
 from ...scenario.scenario import Scenario, load_scenario
@@ -88,7 +88,7 @@ def measure_row(scenario_name: str, knob: str, value: Any) -> dict[str, Any]:
     plan = plan_road_scan(scenario, road, scene)
     ready = time.process_time()
     whole = load_scenario(scenario_name).vegetation_detail or 1.0
-    cost, errors = _run(scenario, knob, road, scene, plan, whole)
+    cost, errors = _measure_stretches(scenario, knob, road, scene, plan, whole)
     return {
         "knob": knob,
         "value": value,
@@ -152,7 +152,7 @@ class _Cost:
     shares: dict[str, float]
 
 
-def _run(
+def _measure_stretches(
     scenario: Scenario, knob: str, road: RoadGeometry, scene: ScannedScene, plan: ScanPlan, plants: float
 ) -> tuple[_Cost, dict[str, Any]]:
     """Do the job on stretches of the path; return what it costs and the errors.
@@ -165,7 +165,7 @@ def _run(
     assert request is not None
     if coloured:
         request = replace(request, wanted=LAYERS)
-    path = spread(plan.path, _STRETCHES, _SECONDS)
+    path = spread_stretches(plan.path, _STRETCHES, _SECONDS)
     part = replace(plan, path=path)
     result = joined_results(record_as_measured(part))
     start = time.process_time()

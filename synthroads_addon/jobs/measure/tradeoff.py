@@ -132,7 +132,9 @@ def row_scenario(scenario: str, knob: str, value: Any, changes: Iterable[str] = 
     """
     scale = image_scale(seen_from(load_scenario(scenario).scan.platform))
     base = () if KNOBS[knob].table == "presets" else ("fidelity=standard",)
-    return load_scenario(scenario, [*base, *changes, *(_scaled(change, scale) for change in KNOBS[knob].rows[value])])
+    return load_scenario(
+        scenario, [*base, *changes, *(_scale_change(change, scale) for change in KNOBS[knob].rows[value])]
+    )
 
 
 def seen_from(platform: Platform) -> float:
@@ -141,6 +143,6 @@ def seen_from(platform: Platform) -> float:
     return usual.seen_from(platform.height or usual.height) if usual else USUAL_RANGE
 
 
-def _scaled(change: str, scale: float) -> str:
+def _scale_change(change: str, scale: float) -> str:
     path, _, value = change.partition("=")
     return f"{path}={float(value) * scale:g}" if path in _LENGTHS_OF_IMAGES else change

@@ -7,7 +7,7 @@ import numpy as np
 from ...cloud.layers import optional_arrays
 from ...cloud.tools.previews import TopView
 from ...materials.surfaces import surfaces_of
-from ...materials.variation import varied
+from ...materials.variation import vary_material
 from ...road.geometry import RoadGeometry
 from ...scanning.beam import RINGS
 from ...scanning.colour.request import LayerRequest
@@ -47,7 +47,7 @@ def plan_scan(
     means, by_layers = services.materials(materials), scenario.colour.intensity_from_layers
     table = scenario.own_materials()
     scanned = [
-        varied(name, conditions.variation, conditions.environment, table) if name in table else mean
+        vary_material(name, conditions.variation, conditions.environment, table) if name in table else mean
         for name, mean in zip(materials, means, strict=True)
     ]
     loss, weather = scan.attenuation, scan.weather or weather_of(conditions.environment)

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...base.errors import InputError
-from ...base.schema import rounded
+from ...base.schema import round_value
 from ...road.section_geometry import CarriagewaySection
 from ...road.things.furniture import Asset
 from ...scenario.assets import FARTHEST, AssetPlacement, read_asset_library
@@ -34,9 +34,9 @@ def sample_assets(site: PlacementSite) -> Iterator[tuple[str, Asset]]:
                 count += 1
                 placed = Asset(
                     instance=1,
-                    station=rounded(station),
-                    offset=rounded(offset),
-                    rotation_deg=rounded(rotation),
+                    station=round_value(station),
+                    offset=round_value(offset),
+                    rotation_deg=round_value(rotation),
                     library=path,
                     name=name,
                     class_name=asset.class_name,
@@ -58,16 +58,16 @@ def _places(
         for number, side in enumerate(group):
             section, own = site.sections[side], stations[half == number]
             edge, room = _room(site, section, in_median, own, field, placement.distance.minimum)
-            distance = _drawn(rng, placement.distance, len(own), np.minimum(placement.distance.maximum, room))
+            distance = _draw_places(rng, placement.distance, len(own), np.minimum(placement.distance.maximum, room))
             away = edge - distance if in_median else edge + distance
-            turn = _drawn(rng, placement.rotation_deg, len(own), placement.rotation_deg.maximum)
+            turn = _draw_places(rng, placement.rotation_deg, len(own), placement.rotation_deg.maximum)
             turn += 0.0 if section.carriageway.traffic > 0 else 180.0
             there = room >= placement.distance.minimum
             offset = section.carriageway.sign * away
             yield from zip(own[there], offset[there], ((turn + 180.0) % 360.0 - 180.0)[there], strict=True)
 
 
-def _drawn(rng: np.random.Generator, limits: Interval, number: int, highest: Float | float) -> Float:
+def _draw_places(rng: np.random.Generator, limits: Interval, number: int, highest: Float | float) -> Float:
     return limits.minimum + (highest - limits.minimum) * rng.random(number)
 
 
@@ -78,11 +78,11 @@ def _stations(rng: np.random.Generator, placement: AssetPlacement, length: float
     if end <= start:
         return np.empty(0)
     if placement.per_km is not None:
-        per_km = float(_drawn(rng, placement.per_km, 1, placement.per_km.maximum)[0])
+        per_km = float(_draw_places(rng, placement.per_km, 1, placement.per_km.maximum)[0])
         return np.sort(rng.uniform(start, end, int(per_km * (end - start) / 1000.0 + rng.random())))
     assert placement.spacing is not None
     number = int((end - start) / placement.spacing.minimum) + 1
-    steps = _drawn(rng, placement.spacing, number, placement.spacing.maximum)
+    steps = _draw_places(rng, placement.spacing, number, placement.spacing.maximum)
     steps[0] *= rng.random()  # the first stands anywhere within a spacing
     stations = start + np.cumsum(steps)
     return stations[stations <= end]

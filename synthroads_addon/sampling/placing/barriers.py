@@ -9,7 +9,7 @@ from typing import Literal
 
 import numpy as np
 
-from ...base.schema import rounded
+from ...base.schema import round_value
 from ...road.guidelines import BARRIER_DISTANCE, EMBANKMENT_HEIGHT, EMBANKMENT_RUN, OBSTACLE_LEAD, SHORTEST_BARRIER
 from ...road.objects import LineObject
 from ...road.things.furniture import ConcreteBarrier, Guardrail, NoiseBarrier
@@ -17,7 +17,7 @@ from ...scenario.road import BarrierLimits
 from .draw import draw, pick
 from .edge import STEP_OF_BARRIERS, Segment
 from .layout import BARRIER_AXIS, FAR_ZONE, Layout, Piece, Roadside
-from .ranges import Range, draw_start, free_ranges, lengthened, merged
+from .ranges import Range, draw_start, free_ranges, lengthen_range, merge_ranges
 
 POST_SPACINGS = (4.0, 2.0, 1.33)
 """Distances between posts of the guardrail systems, m."""
@@ -69,8 +69,8 @@ class BarrierSystem:
 
     def beside(self, roadside: Roadside, piece: Piece, terminal: float) -> LineObject:
         """Return a barrier of a piece; its nearest part stands 0.5 m from the base."""
-        terminal = rounded(min(terminal, (piece.end - piece.start) / 4.0))
-        start, end = rounded(piece.start), rounded(piece.end)
+        terminal = round_value(min(terminal, (piece.end - piece.start) / 4.0))
+        start, end = round_value(piece.start), round_value(piece.end)
         if self.concrete:
             axis = piece.base + BARRIER_DISTANCE + self.concrete[2] / 2.0
             return _concrete(self.concrete, (start, end), roadside.sign * axis, terminal)
@@ -78,7 +78,7 @@ class BarrierSystem:
             instance=1,
             start_station=start,
             end_station=end,
-            offset=rounded(roadside.sign * (piece.base + BARRIER_AXIS)),
+            offset=round_value(roadside.sign * (piece.base + BARRIER_AXIS)),
             faces=roadside.towards_road,
             height=self.height,
             post_spacing=self.post_spacing,
@@ -92,7 +92,7 @@ def median_barriers(layout: Layout, rng: np.random.Generator) -> Iterator[tuple[
     system = BarrierSystem.draw(rng, limits, limits.concrete_median)
     if not limits.median or len(median.inner) < 2:
         return
-    span = (0.0, rounded(layout.length))
+    span = (0.0, round_value(layout.length))
     if median.has_obstacles:
         for side, inner in median.inner.items():
             sign = layout.sides[side].sign
@@ -114,7 +114,7 @@ def roadside_barriers(layout: Layout, roadside: Roadside, rng: np.random.Generat
     if not limits.roadside:
         return
     wanted = [*roadside.protected, *_by_the_road(layout, roadside), *_elsewhere(roadside, rng)]
-    roadside.pieces = list(_pieces(roadside, merged(wanted, _JOIN)))
+    roadside.pieces = list(_pieces(roadside, merge_ranges(wanted, _JOIN)))
     borders = {segment.end for segment in roadside.edge.segments[:-1]}
     for number, piece in enumerate(roadside.pieces, start=1):
         terminal = SHORT_TERMINAL if borders & {piece.start, piece.end} else TERMINAL
@@ -138,7 +138,7 @@ def plan_noise_barrier(layout: Layout, roadside: Roadside, rng: np.random.Genera
     ]
     longest = max((end - start for start, end in free), default=0.0)
     least, most = limits.noise_barrier_length.minimum, min(limits.noise_barrier_length.maximum, longest)
-    length = rounded(least + max(0.0, most - least) * rng.random())
+    length = round_value(least + max(0.0, most - least) * rng.random())
     panel, thickness = pick(rng, PANELS)
     start = draw_start(rng, free, length)
     if start is None:
@@ -148,9 +148,9 @@ def plan_noise_barrier(layout: Layout, roadside: Roadside, rng: np.random.Genera
     base = roadside.edge.base_at(start + length)
     return NoiseBarrier(
         instance=1,
-        start_station=rounded(start),
-        end_station=rounded(start + length),
-        offset=rounded(roadside.sign * (base + FAR_ZONE + NOISE_POST_WIDTH / 2.0)),
+        start_station=round_value(start),
+        end_station=round_value(start + length),
+        offset=round_value(roadside.sign * (base + FAR_ZONE + NOISE_POST_WIDTH / 2.0)),
         height=draw(rng, limits.noise_barrier_height),
         panel=panel,
         thickness=thickness,
@@ -194,18 +194,20 @@ def _pieces(roadside: Roadside, stretches: list[Range]) -> Iterator[Piece]:
     """Yield the barriers of stretches: one in each segment of the edge, long enough where there is room."""
     for segment in roadside.edge.segments:
         inside = [
-            lengthened(max(start, segment.start), min(end, segment.end), SHORTEST_BARRIER, segment.start, segment.end)
+            lengthen_range(
+                max(start, segment.start), min(end, segment.end), SHORTEST_BARRIER, segment.start, segment.end
+            )
             for start, end in stretches
             if start < segment.end and end > segment.start
         ]
-        for start, end in merged(inside, _JOIN):
-            piece = _prolonged(roadside, segment, Piece(start, end, segment.base, segment.ramp))
+        for start, end in merge_ranges(inside, _JOIN):
+            piece = _prolong_piece(roadside, segment, Piece(start, end, segment.base, segment.ramp))
             # Beside a gore no rule asks for a barrier: rather none than a stump.
             if not segment.ramp or piece.end - piece.start >= SHORTEST_BARRIER:
                 yield piece
 
 
-def _prolonged(roadside: Roadside, segment: Segment, piece: Piece) -> Piece:
+def _prolong_piece(roadside: Roadside, segment: Segment, piece: Piece) -> Piece:
     """Return a piece that fills a short segment made longer beside a neighbour that stands nearer to the road."""
     lack = SHORTEST_BARRIER - (piece.end - piece.start)
     if lack <= 0.0:
@@ -224,7 +226,7 @@ def _rail(system: BarrierSystem, span: Range, offset: float, faces: Literal["lef
         instance=1,
         start_station=span[0],
         end_station=span[1],
-        offset=rounded(offset),
+        offset=round_value(offset),
         faces=faces,
         height=system.height,
         post_spacing=system.post_spacing,
@@ -238,9 +240,9 @@ def _concrete(shape: Profile, span: Range, offset: float, terminal: float) -> Co
         instance=1,
         start_station=span[0],
         end_station=span[1],
-        offset=rounded(offset),
+        offset=round_value(offset),
         profile=profile,
         height=height,
-        base_width=rounded(foot),
+        base_width=round_value(foot),
         terminal_length=terminal,
     )

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ...base.schema import rounded
+from ...base.schema import round_value
 from ...road.guidelines import CONSTRUCTION_LANE_WIDTH
 from ...road.objects import RoadObject, WidthPoint, width_kinks
 from ...road.section import Carriageway, LineMarking
@@ -98,7 +98,7 @@ def _zone(layout: Layout, roadside: Roadside, rng: np.random.Generator) -> Zone 
     most = min(longest, limits.maximum)
     if most < least:
         return None
-    reach = rounded(least + (most - least) * rng.random())
+    reach = round_value(least + (most - least) * rng.random())
     start = draw_start(rng, free, reach)
     if start is None:
         return None
@@ -136,15 +136,15 @@ def _equipment(
             f"beacon-{side}-{number:03d}",
             ConstructionBeacon(
                 instance=1,
-                station=rounded(station),
-                offset=rounded(sign * distance),
+                station=round_value(station),
+                offset=round_value(sign * distance),
                 rotation_deg=roadside.facing,
                 pass_side="left" if sign < 0 else "right",
             ),
         )
     if marks[2] - marks[1] >= SHORTEST_TEMPORARY_BARRIER + 2.0 * BARRIER_SETBACK:
-        offset = rounded(sign * (zone.boundary + BARRIER_DISTANCE))
-        low, high = rounded(marks[1] + BARRIER_SETBACK), rounded(marks[2] - BARRIER_SETBACK)
+        offset = round_value(sign * (zone.boundary + BARRIER_DISTANCE))
+        low, high = round_value(marks[1] + BARRIER_SETBACK), round_value(marks[2] - BARRIER_SETBACK)
         yield (
             f"temporary-barrier-{side}",
             TemporaryBarrier(instance=1, start_station=low, end_station=high, offset=offset, end_offset=offset),
@@ -163,7 +163,9 @@ def _beacon_stations(marks: tuple[float, float, float, float]) -> NDArray[np.flo
 def _line(side: Side, zone: Zone, film_thickness: float) -> LineMarking:
     """Return the yellow line along the beacons."""
     distances = zone.distance(np.array(zone.stations), LINE_DISTANCE).tolist()
-    points = [WidthPoint(station=rounded(s), width=rounded(d)) for s, d in zip(zone.stations, distances, strict=True)]
+    points = [
+        WidthPoint(station=round_value(s), width=round_value(d)) for s, d in zip(zone.stations, distances, strict=True)
+    ]
     return LineMarking(
         instance=1,
         carriageway=f"carriageway-{side}",

@@ -7,7 +7,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from ...base.schema import rounded
+from ...base.schema import round_value
 from ...scenario.road import Interval
 
 T = TypeVar("T")
@@ -15,7 +15,7 @@ T = TypeVar("T")
 
 def draw(rng: np.random.Generator, limits: Interval) -> float:
     """Return a number within limits, each with the same chance."""
-    return rounded(limits.minimum + (limits.maximum - limits.minimum) * rng.random())
+    return round_value(limits.minimum + (limits.maximum - limits.minimum) * rng.random())
 
 
 def pick(rng: np.random.Generator, options: Sequence[T]) -> T:

@@ -164,10 +164,10 @@ def _segments(stations: Float, line: Float, paved: Float) -> list[Segment]:
     found = [
         run._replace(ramp=run.ramp and run.base > max(around[i], around[i + 2]) + _LEVEL) for i, run in enumerate(runs)
     ]
-    return _joined(_raised(_joined(found), stations[in_island].tolist()))
+    return _join_segments(_raise_short_segments(_join_segments(found), stations[in_island].tolist()))
 
 
-def _joined(segments: list[Segment]) -> list[Segment]:
+def _join_segments(segments: list[Segment]) -> list[Segment]:
     """Join neighbours whose bases differ too little for two lines of barriers."""
     found: list[Segment] = []
     for segment in segments:
@@ -183,7 +183,7 @@ def _in_line(before: Segment, after: Segment) -> bool:
     return before.end == after.start and abs(before.base - after.base) < STEP_OF_BARRIERS
 
 
-def _raised(segments: list[Segment], beside_island: list[float]) -> list[Segment]:
+def _raise_short_segments(segments: list[Segment], beside_island: list[float]) -> list[Segment]:
     """Return the segments, those too short for a barrier between two wider ones at the base of the less wide one.
 
     Beside an island (stations, m) a barrier can't stand farther out: that part of the segment falls away.

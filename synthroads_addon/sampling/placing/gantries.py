@@ -8,7 +8,7 @@ from typing import Literal
 
 import numpy as np
 
-from ...base.schema import rounded
+from ...base.schema import round_value
 from ...road.things.furniture import Gantry, GantrySign, Side
 from ...road.things.signs import sign_catalogue
 from .draw import draw, pick
@@ -66,7 +66,7 @@ def plan_gantries(layout: Layout, rng: np.random.Generator) -> list[GantryPlan]:
         return []
     kind, sides = _kind(layout, rng)
     start = draw_start(rng, free_ranges(0.0, layout.length, *_in_the_way(layout, kind, sides)), 2.0 * _HALF)
-    return [] if start is None else [_reserved(layout, GantryPlan(kind, start + _HALF, sides), _HALF)]
+    return [] if start is None else [_reserve_place(layout, GantryPlan(kind, start + _HALF, sides), _HALF)]
 
 
 def gantries(layout: Layout, plans: list[GantryPlan], rng: np.random.Generator) -> Iterator[tuple[str, Gantry]]:
@@ -80,13 +80,13 @@ def gantries(layout: Layout, plans: list[GantryPlan], rng: np.random.Generator) 
         reaches = {side: _reach(layout, plan, layout.sides[side], post) for side in plan.sides}
         ends = [layout.sides[side].sign * distance for side in plan.sides for distance in reaches[side]]
         displays = bool(rng.random() < 0.5)
-        left, right = rounded(max(ends)), rounded(min(ends))
+        left, right = round_value(max(ends)), round_value(min(ends))
         yield (
             f"gantry-{number}",
             Gantry(
                 instance=1,
-                station=rounded(plan.station),
-                offset=rounded((left + right) / 2.0),
+                station=round_value(plan.station),
+                offset=round_value((left + right) / 2.0),
                 kind=plan.kind,
                 left_offset=left,
                 right_offset=right,
@@ -94,8 +94,8 @@ def gantries(layout: Layout, plans: list[GantryPlan], rng: np.random.Generator) 
                 clearance=draw(rng, limits.gantry_clearance),
                 beam=beam,
                 beam_height=height,
-                beam_depth=rounded(min(depth, 0.6 * (limits.gantry_spacing or 10.0))),
-                post_width=rounded(post),
+                beam_depth=round_value(min(depth, 0.6 * (limits.gantry_spacing or 10.0))),
+                post_width=round_value(post),
                 shade=pick(rng, SHADES),
                 signs=tuple(s for side in plan.sides for s in _signs(layout, plan, side, reaches[side], displays, rng)),
             ),
@@ -124,11 +124,11 @@ def _at(layout: Layout, rng: np.random.Generator, station: float, half: float) -
     """Return the gantry at a station (m), its place reserved, or None where something is in the way."""
     kind, sides = _kind(layout, rng)
     if all(item.is_free(station - half, station + half) for item in _in_the_way(layout, kind, sides)):
-        return _reserved(layout, GantryPlan(kind, station, sides), half)
+        return _reserve_place(layout, GantryPlan(kind, station, sides), half)
     return None
 
 
-def _reserved(layout: Layout, plan: GantryPlan, half: float) -> GantryPlan:
+def _reserve_place(layout: Layout, plan: GantryPlan, half: float) -> GantryPlan:
     low, high = plan.station - half, plan.station + half
     for roadside in (layout.sides[side] for side in plan.sides):
         roadside.near.add(low, high)
@@ -171,8 +171,8 @@ def _signs(
             continue
         width = min(DISPLAY_SIZE, outer - inner) if displays else outer - inner - 2.0 * _BESIDE_SIGN
         yield GantrySign(
-            offset=rounded(layout.sides[side].sign * (inner + outer) / 2.0),
-            width=rounded(width),
+            offset=round_value(layout.sides[side].sign * (inner + outer) / 2.0),
+            width=round_value(width),
             height=DISPLAY_SIZE if displays else pick(rng, DESTINATION_HEIGHTS),
             kind="display" if displays else "destination",
             text=(pick(rng, DISPLAY_TEXTS),) if displays else (pick(rng, names), pick(rng, names)),

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, NamedTuple
 
-from ...base.schema import rounded
+from ...base.schema import round_value
 from ...road.guidelines import OBSTACLE_LEAD, OBSTACLE_TAIL, TIGHT_CURVE
 from ...road.objects import AnyWidth, PointObject
 from ...road.things.furniture import Side, TrafficSign
@@ -164,8 +164,8 @@ class Roadside:
                 f"{spot.name}-{self.side}-{counts[spot.name]:03d}",
                 spot.make(
                     instance=1,
-                    station=rounded(spot.station),
-                    offset=rounded(self.sign * self._distance(spot)),
+                    station=round_value(spot.station),
+                    offset=round_value(self.sign * self._distance(spot)),
                     rotation_deg=self.facing,
                     **spot.fields,
                 ),

@@ -7,7 +7,7 @@ from math import cos, radians, sin, tan
 
 import numpy as np
 
-from ...base.schema import rounded
+from ...base.schema import round_value
 from ...road.things.furniture import Overpass
 from .draw import draw, pick
 from .layout import SMALL_ZONE, Layout
@@ -59,7 +59,7 @@ def plan_overpass(layout: Layout, rng: np.random.Generator) -> OverpassPlan | No
     limits = layout.site.scenario.furniture
     if rng.random() >= limits.overpass:
         return None
-    width, skew = draw(rng, limits.overpass_width), rounded(LARGEST_SKEW * (2.0 * rng.random() - 1.0))
+    width, skew = draw(rng, limits.overpass_width), round_value(LARGEST_SKEW * (2.0 * rng.random() - 1.0))
     room = 2.0 * layout.median.obstacle_half
     in_median = bool(rng.random() < 0.67) and room >= LEAST_PIER_WIDTH
     beside = bool(rng.random() < 0.5) and in_median
@@ -74,7 +74,7 @@ def plan_overpass(layout: Layout, rng: np.random.Generator) -> OverpassPlan | No
     start = draw_start(rng, free_ranges(0.0, layout.length, *taken), 2.0 * half)
     if start is None:
         return None
-    return _reserved(layout, OverpassPlan(start + half, half, width, skew, pier, in_median, beside))
+    return _reserve_place(layout, OverpassPlan(start + half, half, width, skew, pier, in_median, beside))
 
 
 def overpass(layout: Layout, plan: OverpassPlan, rng: np.random.Generator) -> Overpass:
@@ -88,13 +88,13 @@ def overpass(layout: Layout, plan: OverpassPlan, rng: np.random.Generator) -> Ov
         nearest = max(road_edge + ABUTMENT_DISTANCE, front + SMALL_ZONE + _SMALL_THINGS)
         if plan.beside:
             axis = front + SMALL_ZONE + plan.pier / 2.0
-            offsets.append(rounded(roadside.sign * axis))
+            offsets.append(round_value(roadside.sign * axis))
             nearest = max(nearest, axis + plan.pier / 2.0 + ABUTMENT_DISTANCE)
-        abutments[side] = rounded(roadside.sign * (nearest + plan.corner + span))
+        abutments[side] = round_value(roadside.sign * (nearest + plan.corner + span))
     limits = layout.site.scenario.furniture
     return Overpass(
         instance=1,
-        station=rounded(plan.station),
+        station=round_value(plan.station),
         offset=0.0,
         rotation_deg=plan.skew,
         width=plan.width,
@@ -103,11 +103,11 @@ def overpass(layout: Layout, plan: OverpassPlan, rng: np.random.Generator) -> Ov
         clearance=draw(rng, limits.overpass_clearance),
         deck_thickness=pick(rng, DECK_THICKNESSES),
         pier_offsets=tuple(sorted(offsets)),
-        pier_width=rounded(plan.pier),
+        pier_width=round_value(plan.pier),
     )
 
 
-def _reserved(layout: Layout, plan: OverpassPlan) -> OverpassPlan:
+def _reserve_place(layout: Layout, plan: OverpassPlan) -> OverpassPlan:
     low, high = plan.station - plan.half, plan.station + plan.half
     for roadside in layout.sides.values():
         roadside.far.add(low, high)

@@ -10,7 +10,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from ...base.schema import rounded
+from ...base.schema import round_value
 from ...road.objects import LineObject
 from ...road.things.furniture import Delineator, Guardrail, TrafficLight
 from ...road.things.signs import sign_catalogue
@@ -67,13 +67,13 @@ def random_median_barrier(layout: Layout, rng: np.random.Generator) -> Iterator[
             "guardrail-median",
             Guardrail(
                 instance=1,
-                start_station=rounded(span[0]),
-                end_station=rounded(span[1]),
-                offset=rounded(room * pick(rng, (-1.0, -0.5, 0.0, 0.5, 1.0))),
+                start_station=round_value(span[0]),
+                end_station=round_value(span[1]),
+                offset=round_value(room * pick(rng, (-1.0, -0.5, 0.0, 0.5, 1.0))),
                 faces="both",
                 height=system.height,
                 post_spacing=system.post_spacing,
-                terminal_length=rounded(min(TERMINAL, (span[1] - span[0]) / 4.0)),
+                terminal_length=round_value(min(TERMINAL, (span[1] - span[0]) / 4.0)),
             ),
         )
 
@@ -111,8 +111,8 @@ def _delineators(
             f"delineator-{roadside.side}-{number:04d}",
             Delineator(
                 instance=1,
-                station=rounded(station),
-                offset=rounded(roadside.sign * (edge + pick(rng, DELINEATOR_DISTANCES))),
+                station=round_value(station),
+                offset=round_value(roadside.sign * (edge + pick(rng, DELINEATOR_DISTANCES))),
                 rotation_deg=roadside.facing,
             ),
         )

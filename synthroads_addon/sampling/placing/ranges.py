@@ -89,7 +89,7 @@ def nearest_free(station: float, half: float, room: float, length: float, *taken
     return min(found, key=lambda place: abs(place - station), default=None)
 
 
-def merged(ranges: Iterable[Range], gap: float) -> list[Range]:
+def merge_ranges(ranges: Iterable[Range], gap: float) -> list[Range]:
     """Return the ranges in order, those joined that overlap or lie less than a gap (m) apart."""
     found: list[Range] = []
     for start, end in sorted(ranges):
@@ -100,7 +100,7 @@ def merged(ranges: Iterable[Range], gap: float) -> list[Range]:
     return found
 
 
-def lengthened(start: float, end: float, least: float, low: float, high: float) -> Range:
+def lengthen_range(start: float, end: float, least: float, low: float, high: float) -> Range:
     """Return a range made at least so long to both sides, as far as low and high (all m) allow."""
     lack = max(0.0, least - (end - start))
     start = max(low, start - lack / 2.0)

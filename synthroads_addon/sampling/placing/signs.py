@@ -7,7 +7,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from ...base.schema import rounded
+from ...base.schema import round_value
 from ...road.guidelines import BARRIER_DISTANCE, EXIT_SEQUENCE, EXIT_SIGN_ROOM, GORE_SIGN, OBSTACLE_POST, SIGN_DISTANCE
 from ...road.section import Turnout
 from ...road.things.furniture import Side, TrafficSign
@@ -48,7 +48,7 @@ def plan_gore_signs(layout: Layout) -> None:
             width = min(sign.width, outer - inner - 2.0 * (SIGN_DISTANCE + _GORE_MARGIN))
             if width < _NARROWEST_GORE_SIGN:
                 continue
-            fields = sign.fields() | {"width": rounded(width), "code": GORE_SIGN, "text": sign.text}
+            fields = sign.fields() | {"width": round_value(width), "code": GORE_SIGN, "text": sign.text}
             middle = (inner + outer) / 2.0
             roadside.put(Spot("sign-gore", TrafficSign, station, _LARGE_HALF, width, fields, distance=middle))
 
@@ -134,8 +134,8 @@ def stand_on_both_sides(layout: Layout, roadside: Roadside, code: str, station: 
     median.signs.append(
         TrafficSign(
             instance=1,
-            station=rounded(place),
-            offset=rounded(roadside.sign * offset),
+            station=round_value(place),
+            offset=round_value(roadside.sign * offset),
             rotation_deg=roadside.facing,
             code=code,
             text=sign.text,

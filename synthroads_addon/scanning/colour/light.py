@@ -65,7 +65,7 @@ class SunAndSky:
         return share * self.above.astype(np.float32) + (1.0 - share) * self.below.astype(np.float32)
 
 
-def exposed(direction: Float, sun: Float, sky: Float) -> tuple[SunAndSky, float]:
+def expose_light(direction: Float, sun: Float, sky: Float) -> tuple[SunAndSky, float]:
     """Return sun and sky as a camera sees them that is set for a horizontal surface in the sun, and its exposure.
 
     Args:

@@ -205,12 +205,12 @@ def _at(
     ground = float(np.median(below)) if len(below) else typical_range
     if ground < _HIGH:
         focal = max(8.0, typical_range / settings.ground_sampling_distance)
-        around = (_cut(place, level @ axes, focal, time, points, (1.0, 1.0), largest) for axes in _AROUND)
+        around = (_cut_view(place, level @ axes, focal, time, points, (1.0, 1.0), largest) for axes in _AROUND)
         return [view for view in around if view is not None]
     focal = ground / settings.ground_sampling_distance
     aside = min(_STEEPEST, np.tan(min(field_of_view / 2.0, 1.5)) * 1.05)
     along = min(_STEEPEST, OVERLAP * settings.image_spacing / 2.0 / ground)
-    view = _cut(place, level @ _NADIR, focal, time, points, (aside, along), largest)
+    view = _cut_view(place, level @ _NADIR, focal, time, points, (aside, along), largest)
     return [] if view is None else [view]
 
 
@@ -227,7 +227,7 @@ def _around() -> Iterable[Float]:
 _AROUND: Sequence[Float] = tuple(_around())
 
 
-def _cut(
+def _cut_view(
     place: Float,
     rotation: Float,
     focal: float,

@@ -71,12 +71,12 @@ def shots(setting: ScannerSetting, first: int, count: int, with_frame: bool = Fa
     if length > _LARGEST_TABLE:
         chosen = _shots(setting, number, with_frame)
     else:
-        chosen = _chosen(_table(setting, with_frame), number)
+        chosen = _look_up_shots(_table(setting, with_frame), number)
     chosen.time[:] += cycle * lines / setting.lines_per_second
     return chosen
 
 
-def _chosen(table: Shots, number: Numbers) -> Shots:
+def _look_up_shots(table: Shots, number: Numbers) -> Shots:
     """Return shots of a table by their numbers (P,)."""
     return Shots(
         table.time[number],

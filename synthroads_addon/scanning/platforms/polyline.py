@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ...base.errors import InputError
-from ...base.rotations import wrapped
+from ...base.rotations import wrap_angle
 from ...road.alignment import CURVATURE_LIMIT, Alignment, Element, finite_array
 from ...road.centerline import read_axis
 from ...road.profile import IntersectionPoint, Profile
@@ -56,12 +56,12 @@ class PolylineGuide:
         given = finite_array("points", points)
         if given.ndim != 2 or given.shape[1] not in (2, 3):
             raise InputError("points", given.shape, "an array of shape (N, 2) or (N, 3) is needed")
-        kept = _kept(given, tolerance)
+        kept = _thin_points(given, tolerance)
         line = given[kept]
         self.origin = np.array(origin, dtype=np.float64)
         step = np.diff(line[:, :2], axis=0)
         span, heading = np.hypot(*step.T), np.arctan2(step[:, 1], step[:, 0])
-        turn = wrapped(np.diff(heading))
+        turn = wrap_angle(np.diff(heading))
         reach = np.minimum(CORNER, 0.49 * np.minimum(span[:-1], span[1:]))
         lengths = _clothoid_lengths(turn, reach)
         _refuse_sharp(given, kept, turn, lengths)
@@ -134,7 +134,7 @@ class PolylineGuide:
         return np.zeros(len(station))
 
 
-def _kept(points: Float, tolerance: float) -> NDArray[np.intp]:
+def _thin_points(points: Float, tolerance: float) -> NDArray[np.intp]:
     """Return the indices of the points that make the line: without repetitions, and thinned in three dimensions."""
     apart = np.concatenate(([True], np.hypot(*np.diff(points[:, :2], axis=0).T) > _REPEATED))[: len(points)]
     kept = np.flatnonzero(apart)

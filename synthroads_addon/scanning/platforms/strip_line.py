@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...base.errors import InputError
-from ...base.rotations import wrapped
+from ...base.rotations import wrap_angle
 from .guides import Float, Guide
 
 FOLD = 0.98
@@ -131,8 +131,8 @@ class StripTrack:
     def bend(self) -> tuple[float, float]:
         """Return the largest curvature, 1/m, and the largest jump of the course, rad."""
         table = self._table
-        turn = np.abs(wrapped(table.course[:, 1] - table.course[:, 0])) / np.diff(table.distance)
-        jump = np.abs(wrapped(table.course[1:, 0] - table.course[:-1, 1]))
+        turn = np.abs(wrap_angle(table.course[:, 1] - table.course[:, 0])) / np.diff(table.distance)
+        jump = np.abs(wrap_angle(table.course[1:, 0] - table.course[:-1, 1]))
         return float(turn.max()), float(jump.max(initial=0.0))
 
     def _frame(self, station: Float) -> tuple[Float, Float, Float, Float, Float]:
@@ -238,7 +238,7 @@ class Eased:
         return rate, bend
 
     def _near(self, centre: Float, values: Float) -> Float:
-        return centre + wrapped(values - centre) if self._angles else values
+        return centre + wrap_angle(values - centre) if self._angles else values
 
     def _at_nodes(self, numbers: NDArray[np.float64]) -> Float:
         """Return the function at nodes; beyond the ends it goes on with the slope of the parabola that ends there."""

@@ -83,9 +83,9 @@ class Target:
         self.moving: tuple[MovingMesh, ...] = scene.moving
         self._poses = [KeptPoses(part.motion.pose) for part in scene.moving]
         meshes = [static, *(part.mesh for part in scene.moving)]
-        self.class_id = _joined([mesh.class_id for mesh in meshes])
-        self.instance_id = _joined([mesh.instance_id for mesh in meshes])
-        self.material = _joined([mesh.material for mesh in meshes])
+        self.class_id = _join_arrays([mesh.class_id for mesh in meshes])
+        self.instance_id = _join_arrays([mesh.instance_id for mesh in meshes])
+        self.material = _join_arrays([mesh.material for mesh in meshes])
         self.triangles = len(self.class_id)
         self.vertices = sum(len(mesh.vertices) for mesh in meshes)
         firsts = np.cumsum([0, *(len(mesh.triangles) for mesh in meshes)])
@@ -191,7 +191,7 @@ class Target:
         return result
 
 
-def _joined(arrays: list[NDArray[Any]]) -> NDArray[Any]:
+def _join_arrays(arrays: list[NDArray[Any]]) -> NDArray[Any]:
     return arrays[0] if len(arrays) == 1 else np.concatenate(arrays)
 
 

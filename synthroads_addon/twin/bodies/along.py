@@ -41,7 +41,7 @@ def _feet(geometry: RoadGeometry, station: Float, offset: Float) -> tuple[Float,
     return on_ground(geometry, station, offset), left
 
 
-def _ramped(item: Guardrail | ConcreteBarrier, end: float, station: Float) -> Float:
+def _ramped_height_share(item: Guardrail | ConcreteBarrier, end: float, station: Float) -> Float:
     """Return the share (N,) of its height that a barrier with ramped ends has at stations."""
     ramp = min(item.terminal_length, (end - item.start_station) / 2.0)
     if ramp <= 1e-3:
@@ -62,7 +62,7 @@ def _swept_rows(geometry: RoadGeometry, item: Guardrail | ConcreteBarrier, toler
 def _guardrail(geometry: RoadGeometry, rail: Guardrail, tolerance: float) -> list[Faces]:
     station, end = _swept_rows(geometry, rail, tolerance)
     feet, left = _feet(geometry, station, np.full(len(station), rail.offset))
-    share = _ramped(rail, end, station)
+    share = _ramped_height_share(rail, end, station)
     top = rail.height * share + shapes.GUARDRAIL_TIP * (1.0 - share)
     profile = np.array(shapes.GUARDRAIL_BEAM)
     back = shapes.GUARDRAIL_POST[0] / 2.0 + shapes.GUARDRAIL_SPACER[rail.faces]
@@ -86,7 +86,7 @@ def _posts(geometry: RoadGeometry, rail: Guardrail, end: float) -> list[Faces]:
     count = int((rail.end_station - rail.start_station) / rail.post_spacing + 1e-4) + 1
     station = rail.start_station + np.arange(count) * rail.post_spacing
     station = station[station <= end + 1e-9]
-    share = _ramped(rail, end, station)
+    share = _ramped_height_share(rail, end, station)
     tall = rail.height * share + shapes.GUARDRAIL_TIP * (1.0 - share)
     station, tall = station[tall >= shapes.GUARDRAIL_LOWEST_POST], tall[tall >= shapes.GUARDRAIL_LOWEST_POST]
     feet, left = _feet(geometry, station, np.full(len(station), rail.offset))
@@ -107,11 +107,11 @@ def _boxes(feet: Float, left: Float, size: Float, tall: Float) -> list[Faces]:
 def _concrete(geometry: RoadGeometry, barrier: ConcreteBarrier, tolerance: float) -> Faces:
     station, end = _swept_rows(geometry, barrier, tolerance)
     feet, left = _feet(geometry, station, np.full(len(station), barrier.offset))
-    tall = np.maximum(barrier.height * _ramped(barrier, end, station), shapes.CONCRETE_TIP)
-    return loft(_flanked(feet, left, shapes.CONCRETE_FLANKS[barrier.profile], barrier.base_width, tall))
+    tall = np.maximum(barrier.height * _ramped_height_share(barrier, end, station), shapes.CONCRETE_TIP)
+    return loft(_symmetric_sections(feet, left, shapes.CONCRETE_FLANKS[barrier.profile], barrier.base_width, tall))
 
 
-def _flanked(
+def _symmetric_sections(
     feet: Float, left: Float, flank: tuple[tuple[float, float], ...], width: float, tall: Float
 ) -> Float:
     """Return the sections (N, K, 3) of a body symmetric about its axis, given by one flank's shares."""
@@ -159,6 +159,6 @@ def _elements(geometry: RoadGeometry, barrier: TemporaryBarrier) -> list[Faces]:
     flank = shapes.TEMPORARY_FLANKS["plastic" if barrier.segment_length <= shapes.LONGEST_PLASTIC else "steel"]
     tall = np.full(2, barrier.height)
     return [
-        loft(_flanked(pair, np.stack([side, side]), flank, barrier.base_width, tall))
+        loft(_symmetric_sections(pair, np.stack([side, side]), flank, barrier.base_width, tall))
         for pair, side in zip(feet, left, strict=True)
     ]

@@ -27,7 +27,9 @@ def furniture_objects(geometry: RoadGeometry, tolerance: float) -> Iterator[City
         tolerance: chord error of what runs along the road, m.
     """
     objects = geometry.parameters.objects
-    standing = {name: item for name, item in objects.items() if isinstance(item, PointObject) and not _painted(item)}
+    standing = {
+        name: item for name, item in objects.items() if isinstance(item, PointObject) and not _is_painted(item)
+    }
     places = dict(zip(standing, places_of(geometry, list(standing.values())), strict=True))
     for name, item in objects.items():
         if isinstance(item, Overpass):
@@ -42,7 +44,7 @@ def furniture_objects(geometry: RoadGeometry, tolerance: float) -> Iterator[City
             yield CityObject(name, "CityFurniture", attributes_of(item), bodies)
 
 
-def _painted(item: PointObject) -> bool:
+def _is_painted(item: PointObject) -> bool:
     return isinstance(item, Arrow)
 
 

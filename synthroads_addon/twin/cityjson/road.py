@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from ...road.geometry import RoadGeometry
 from ...road.parameters import Arrow, Carriageway, Hatching, LineMarking, Median, RoadObject, Turnout
 from ..attributes import attributes_of
-from ..faces import Faces, Int, joined
+from ..faces import Faces, Int, join_polygons
 from ..strips import StripSurface, strip_surfaces
 from ..surfaces import dash_surfaces, painted_surface, pothole_surface
 from .model import CityGeometry, CityObject, lines
@@ -78,7 +78,7 @@ def _road(name: str, item: RoadObject, surfaces: list[Surface]) -> CityObject:
     faces = [part for _, part in surfaces]
     values = np.repeat(np.arange(len(surfaces)), [len(part) for part in faces])
     semantics = tuple(about for about, _ in surfaces)
-    shape = CityGeometry("MultiSurface", LOD, (joined(faces),), semantics, values)
+    shape = CityGeometry("MultiSurface", LOD, (join_polygons(faces),), semantics, values)
     return CityObject(name, "Road", attributes, (shape,))
 
 

@@ -117,7 +117,7 @@ def _guardrail(scene: Scene, item: Guardrail) -> list[_Mesh]:
         up, down = (rear, front) if side > 0.0 else (front, rear)
         ring = np.concatenate([up[::-1], down])
         across = side * (ring[:, 0] + spacer + _POST_REACH)
-        height = _ramped(item, station, GUARDRAIL_TIP)[:, None] + ring[:, 1]
+        height = _ramped_height(item, station, GUARDRAIL_TIP)[:, None] + ring[:, 1]
         meshes.append(_swept(scene, station, offset, across, height))
     return [*meshes, *_posts(scene, item, sides, spacer)]
 
@@ -127,7 +127,7 @@ def _posts(scene: Scene, item: Guardrail, sides: list[float], spacer: float) -> 
     low, high = ((station - item.start_station) / item.post_spacing for station in _span(scene, item))
     numbers = np.arange(np.ceil(low - 1e-4), np.floor(high + 1e-4) + 1.0)
     station = item.start_station + item.post_spacing * numbers
-    top = _ramped(item, station, GUARDRAIL_TIP)
+    top = _ramped_height(item, station, GUARDRAIL_TIP)
     station, top = station[top >= GUARDRAIL_LOWEST_POST], top[top >= GUARDRAIL_LOWEST_POST]
     if not len(station):
         return []
@@ -143,7 +143,7 @@ def _posts(scene: Scene, item: Guardrail, sides: list[float], spacer: float) -> 
 
 def _concrete(scene: Scene, item: ConcreteBarrier) -> list[_Mesh]:
     station = _rows(scene, item, item.terminal_length)
-    tall = np.maximum(_ramped(item, station, 0.0), CONCRETE_TIP)
+    tall = np.maximum(_ramped_height(item, station, 0.0), CONCRETE_TIP)
     flank = np.array(CONCRETE_FLANKS[item.profile])
     across, height = _both_flanks(flank, item.base_width / 2.0, tall, _CONCRETE_BURIED)
     return [_swept(scene, station, np.full(station.shape, item.offset), across, height)]
@@ -209,7 +209,7 @@ def _bays(scene: Scene, item: Any, length: float) -> list[tuple[float, float]]:
     return list(pairwise([*starts, float(last)]))
 
 
-def _ramped(item: Any, station: Float, tip: float) -> Float:
+def _ramped_height(item: Any, station: Float, tip: float) -> Float:
     """Return the height (N,) of what is ramped down at both ends, m."""
     ramp = min(item.terminal_length, (item.end_station - item.start_station) / 2.0)
     inside = np.minimum(station - item.start_station, item.end_station - station)
@@ -237,7 +237,7 @@ def _swept(scene: Scene, station: Float, offset: Float, across: Float, height: F
     if len(station) < 2:
         return np.empty((0, 3)), np.empty((0, 3), dtype=np.intp)
     rows, count = len(station), len(across)
-    points = scene.points(station, offset)[:, None, :] + across[:, None] * _left(scene, station)[:, None, :]
+    points = scene.points(station, offset)[:, None, :] + across[:, None] * _left_vectors(scene, station)[:, None, :]
     points[:, :, 2] += height
     caps = [(i, i + 1, count - 1 - i) for i in range(count // 2 - 1)]
     caps += [(i + 1, count - 2 - i, count - 1 - i) for i in range(count // 2 - 1)]
@@ -262,7 +262,7 @@ def _boxes(
         foot: (N,) offsets where the surface is looked up, m; their own if None.
     """
     middle = scene.points(station, offset if foot is None else foot)
-    left = _left(scene, station)
+    left = _left_vectors(scene, station)
     middle = middle + (0.0 if foot is None else (offset - foot)[:, None] * left)
     ahead = np.column_stack([left[:, 1], -left[:, 0], np.zeros(len(station))])
     corners = [(-1.0, -1.0), (-1.0, 1.0), (1.0, 1.0), (1.0, -1.0)]
@@ -275,7 +275,7 @@ def _boxes(
     return points.reshape(-1, 3), (_BOX[None] + first).reshape(-1, 3)
 
 
-def _left(scene: Scene, station: Float) -> Float:
+def _left_vectors(scene: Scene, station: Float) -> Float:
     heading = scene.geometry.alignment.heading(station)
     return np.column_stack([-np.sin(heading), np.cos(heading), np.zeros(len(station))])
 

@@ -69,7 +69,7 @@ def _georeference(ifc: IfcFile, parameters: RoadParameters, model: Entity, metre
     So the file's coordinates stay small, and the map's origin is kept in float64.
     """
     text = wkt(parameters.metadata.epsg)
-    names = {key: _quoted(text, key) for key in ("DATUM", "VERT_DATUM", "PROJECTION")}
+    names = {key: _quoted_name(text, key) for key in ("DATUM", "VERT_DATUM", "PROJECTION")}
     title = re.search(r'"([^"]*)"', text)
     target = ifc.add(
         "IfcProjectedCRS",
@@ -84,7 +84,7 @@ def _georeference(ifc: IfcFile, parameters: RoadParameters, model: Entity, metre
     ifc.add("IfcMapConversion", model, target, east, north, height, 1.0, 0.0, 1.0)
 
 
-def _quoted(text: str, key: str) -> str | None:
+def _quoted_name(text: str, key: str) -> str | None:
     """Return the name that stands behind a keyword of well-known text."""
     found = re.search(rf'\b{key}\["([^"]*)"', text)
     return found[1] if found else None

@@ -61,7 +61,7 @@ def cubics(function: Function, borders: Float) -> Cubics:
         values = function((borders[:-1, None] + length[:, None] * _SHARES).ravel())
         values = values.reshape(len(length), len(_SHARES), -1)
         found = _through(values, length)
-        wrong = np.abs(_sampled(found, length) - values).max(axis=(1, 2)) > _EXACT
+        wrong = np.abs(_sample_cubics(found, length) - values).max(axis=(1, 2)) > _EXACT
         wrong &= length > _SHORTEST
         if not wrong.any():
             return Cubics(borders, found)
@@ -86,12 +86,12 @@ def _through(values: Float, length: Float) -> Float:
     bend = 4.5 * (f0 - f1 - f2 + f3) / (2.0 * h**2)
     for lower in ((f0, line - bend * h, bend, none), (f0, line, none, none), (f0, none, none, none)):
         trial = np.stack(lower, axis=-1)
-        fits = np.abs(_sampled(trial, length) - values).max(axis=1) <= _EXACT / 10.0
+        fits = np.abs(_sample_cubics(trial, length) - values).max(axis=1) <= _EXACT / 10.0
         best = np.where(fits[..., None], trial, best)
-    return _rounded(best, length)
+    return _round_coefficients(best, length)
 
 
-def _rounded(coefficients: Float, length: Float) -> Float:
+def _round_coefficients(coefficients: Float, length: Float) -> Float:
     """Return coefficients without the bits that differ between machines: what each adds is exact to a fine step."""
     result = coefficients.copy()
     for power in (1, 2, 3):
@@ -101,7 +101,7 @@ def _rounded(coefficients: Float, length: Float) -> Float:
     return result
 
 
-def _sampled(coefficients: Float, length: Float) -> Float:
+def _sample_cubics(coefficients: Float, length: Float) -> Float:
     """Return the cubics' values (P, S, F) at all shares of their pieces."""
     return _value(coefficients[:, None], (length[:, None] * _SHARES)[..., None])
 
@@ -124,12 +124,12 @@ def runs(borders: Float, coefficients: Float) -> list[tuple[float, list[float]]]
         own = coefficients[first]
         while last < len(length):
             longest = first + int(np.argmax(length[first : last + 1]))
-            trial = _shifted(coefficients[longest], borders[first] - borders[longest])
+            trial = _shift_cubic(coefficients[longest], borders[first] - borders[longest])
             if not _goes_on(trial, borders, coefficients, (first, last + 1)):
                 break
             own, last = trial, last + 1
         whole = np.array([borders[last] - borders[first]])
-        found.append((float(borders[first]), _rounded(own[None, None], whole)[0, 0].tolist()))
+        found.append((float(borders[first]), _round_coefficients(own[None, None], whole)[0, 0].tolist()))
         first = last
     return found
 
@@ -143,7 +143,7 @@ def _goes_on(cubic: Float, borders: Float, coefficients: Float, pieces: tuple[in
     return bool(np.abs(_value(cubic, ahead) - wanted).max() <= _SAME)
 
 
-def _shifted(cubic: Float, by: float) -> Float:
+def _shift_cubic(cubic: Float, by: float) -> Float:
     """Return a cubic (4,) whose distances are counted from a place that lies `by` (m) ahead."""
     a, b, c, d = cubic.tolist()
     return np.array([a + by * (b + by * (c + by * d)), b + by * (2.0 * c + 3.0 * by * d), c + 3.0 * by * d, d])
@@ -170,7 +170,7 @@ def chords(function: Function, borders: Float, tolerance: float, shortest: float
         length = np.concatenate([half, half])
         found.append(begin[len(half) :])
     stations = np.sort(np.concatenate(found))
-    return _straightened(stations, function(stations))
+    return _drop_straight_stations(stations, function(stations))
 
 
 def _no_longer(borders: Float, longest: float) -> Float:
@@ -180,7 +180,7 @@ def _no_longer(borders: Float, longest: float) -> Float:
     return np.append(np.repeat(borders[:-1], count) + nth * np.repeat(np.diff(borders) / count, count), borders[-1])
 
 
-def _straightened(stations: Float, values: Float) -> Float:
+def _drop_straight_stations(stations: Float, values: Float) -> Float:
     """Return the stations without those at which nothing bends."""
     kept = [0]
     for i in range(1, len(stations) - 1):

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from xml.etree import ElementTree
 
-from ...base.schema import rounded
+from ...base.schema import round_value
 
 Element = ElementTree.Element
 Value = str | int | float | bool | None
@@ -31,7 +31,7 @@ def text(value: str | int | float | bool) -> str:
     if isinstance(value, bool):
         return "true" if value else "false"
     if isinstance(value, float):
-        return repr(rounded(value, DIGITS)).removesuffix(".0")
+        return repr(round_value(value, DIGITS)).removesuffix(".0")
     return _FORBIDDEN.sub("", str(value))
 
 

@@ -91,11 +91,11 @@ def _own(
     row.prop(owner, field.own, text="")
     if getattr(owner, field.own):
         return row
-    _greyed(row, inherited_text(settings, field.path, field.unit))
+    _draw_greyed(row, inherited_text(settings, field.path, field.unit))
     return None
 
 
-def _greyed(row: bpy.types.UILayout, text: str) -> None:
+def _draw_greyed(row: bpy.types.UILayout, text: str) -> None:
     greyed = row.row(align=True)
     greyed.active = False
     greyed.label(text=text)
@@ -105,7 +105,7 @@ def _choice(layout: bpy.types.UILayout, settings: Any, owner: Any, field: Choice
     row = value_row(layout, field.label)
     row.prop(owner, field.name, text="")
     if field.optional and getattr(owner, field.name) == AUTOMATIC:
-        _greyed(row, inherited_text(settings, field.path, field.unit))
+        _draw_greyed(row, inherited_text(settings, field.path, field.unit))
 
 
 def _choices(layout: bpy.types.UILayout, settings: Any, owner: Any, field: ChoicesField) -> None:
@@ -174,7 +174,7 @@ def _images(settings: Any) -> bool:
     return settings.colour.source in ("auto", "images")
 
 
-def _rendered(settings: Any) -> bool:
+def _renders(settings: Any) -> bool:
     return settings.colour.source != "material"
 
 
@@ -193,13 +193,13 @@ RELEVANT: dict[str, Callable[[Any], bool]] = {
     "scan.platform.turn_seconds": _on("tripod"),
     "scan.platform.turn_deg": _on("tripod"),
     "scan.platform.file": _on("trajectory"),
-    "colour.engine": _rendered,
+    "colour.engine": _renders,
     "colour.mode": lambda settings: settings.colour.rgb,
-    "colour.lighting": _rendered,
+    "colour.lighting": _renders,
     "colour.image_spacing": _images,
     "colour.ground_sampling_distance": _images,
     "colour.max_resolution": _images,
-    "colour.samples": lambda settings: _rendered(settings) and settings.colour.lighting == "path",
-    "colour.intensity_from_layers": _rendered,
+    "colour.samples": lambda settings: _renders(settings) and settings.colour.lighting == "path",
+    "colour.intensity_from_layers": _renders,
 }
 """Path -> whether a field has a meaning; those without are left out."""

@@ -19,7 +19,7 @@ from ...base.errors import InputError
 from ...base.schema import unit_of
 from ...scenario.road import Interval
 from .choices import ITEMS
-from .numbers import exact, fitting, is_share, listed, number_property, numbers_in, push_along
+from .numbers import exact, fitting, is_share, list_as_text, number_property, numbers_in, push_along
 from .wording import label, value_name
 
 AUTOMATIC = "AUTOMATIC"
@@ -259,7 +259,7 @@ class NumbersField(TextField):
 
     def properties(self, hooks: Hooks) -> dict[str, Any]:
         """Return a line of text."""
-        default = listed(self.default or ())
+        default = list_as_text(self.default or ())
         return {self.name: bpy.props.StringProperty(**self._common(hooks), default=default)}
 
     def read(self, owner: Any, base: Any) -> list[float] | None:
@@ -274,7 +274,7 @@ class NumbersField(TextField):
 
     def write(self, owner: Any, value: Any) -> None:
         """Show numbers."""
-        setattr(owner, self.name, listed(value or ()))
+        setattr(owner, self.name, list_as_text(value or ()))
 
 
 class JsonField(TextField):

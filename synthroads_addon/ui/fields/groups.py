@@ -203,7 +203,7 @@ def write_fields(fields: Mapping[str, Field], owner: Any, data: Mapping[str, Any
         field.write(owner, data.get(field.name))
 
 
-def shown(fields: Mapping[str, Field], owner: Any) -> list[Any]:
+def shown_state(fields: Mapping[str, Field], owner: Any) -> list[Any]:
     """Return all that a property group shows, right or wrong, to tell whether it has changed; quick."""
     result: list[Any] = []
     for field in fields.values():
@@ -214,7 +214,7 @@ def shown(fields: Mapping[str, Field], owner: Any) -> list[Any]:
             elif isinstance(value, bpy.types.PropertyGroup):
                 group = field.by_hand if isinstance(field, NamedOrByHandField) else field
                 assert isinstance(group, GroupField)
-                value = shown(group.fields, value)
+                value = shown_state(group.fields, value)
             result.append(sorted(value) if isinstance(value, set) else value)
     return result
 

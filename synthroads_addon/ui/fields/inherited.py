@@ -18,26 +18,26 @@ from ...scenario.scan import ScanScenario
 from ...scenario.scenario import FIDELITIES
 from .choices import device_of
 from .groups import BY_HAND
-from .numbers import exact, listed, numbers_in
+from .numbers import exact, list_as_text, numbers_in
 from .wording import written_unit
 
 Value = float | tuple[float, ...] | None
 
 
-def inherited(settings: Any, path: str) -> Value:
+def inherited_value(settings: Any, path: str) -> Value:
     """Return the number, the numbers or the interval that a field has while it isn't given; None if there is none."""
     return _VALUES[path](settings) if path in _VALUES else None
 
 
 def inherited_text(settings: Any, path: str, unit: str) -> str:
     """Return in words what a field has while it isn't given."""
-    value = inherited(settings, path)
+    value = inherited_value(settings, path)
     if value is None:
         return _WORDS.get(path, "Automatic")
     suffix = "" if unit in ("", "1") else f" {written_unit(unit)}"
     if not isinstance(value, tuple):
         return f"{value:.4g}{suffix}"
-    return f"{value[0]:g} – {value[1]:g}{suffix}" if path in _INTERVALS else f"{listed(value)}{suffix}"
+    return f"{value[0]:g} – {value[1]:g}{suffix}" if path in _INTERVALS else f"{list_as_text(value)}{suffix}"
 
 
 def begin_with_inherited(path: str) -> Callable[[Any, Any], None]:
@@ -45,7 +45,7 @@ def begin_with_inherited(path: str) -> Callable[[Any, Any], None]:
     name = path.rpartition(".")[2]
 
     def begin(group: Any, context: Any) -> None:
-        value = inherited(group.id_data.synthroads, path)
+        value = inherited_value(group.id_data.synthroads, path)
         if value is None or not getattr(group, f"own_{name}"):
             return
         if not isinstance(value, tuple):

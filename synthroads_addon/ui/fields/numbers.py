@@ -81,7 +81,7 @@ def fitting(value: int) -> int:
     return max(-LARGEST_INTEGER, min(value, LARGEST_INTEGER))
 
 
-def listed(values: Sequence[float]) -> str:
+def list_as_text(values: Sequence[float]) -> str:
     """Return numbers as a text that `numbers_in` reads, exactly."""
     return ", ".join(json.dumps(value).removesuffix(".0") for value in values)
 

@@ -14,7 +14,7 @@ import bpy
 from ...base.errors import InputError
 from ...scenario.scenario import Scenario, load_scenario
 from .fields import SYNTHROADS_PG_file
-from .groups import NOT_HERE, leaves, make_fields, read_fields, shown, write_fields
+from .groups import NOT_HERE, leaves, make_fields, read_fields, shown_state, write_fields
 from .hooks import HOOKS
 from .preferences import preferences
 
@@ -94,7 +94,7 @@ class SYNTHROADS_PG_settings(_Generated, bpy.types.PropertyGroup):
 
     def road_values(self) -> str:
         """Return what a road is built from, to tell whether it has changed."""
-        return json.dumps(shown({name: FIELDS[name] for name in _OF_ROAD}, self))
+        return json.dumps(shown_state({name: FIELDS[name] for name in _OF_ROAD}, self))
 
     def chosen_folder(self) -> str:
         """Return the folder as it is written here or else in the preferences."""

@@ -170,7 +170,7 @@ class SYNTHROADS_PT_calibration(Sidebar, bpy.types.Panel):
 
 
 def _draw_classes(layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup) -> None:
-    textured = calibration_settings.textured()
+    textured = calibration_settings.textured_materials()
     for index, item in enumerate(settings.classes):
         box = layout.box()
         row = box.row(align=True)

@@ -123,7 +123,7 @@ class SYNTHROADS_PG_calibration(bpy.types.PropertyGroup):
         names = [row.material for row in self.classes]
         here = _of_scene(names)
         job = CalibrationJob(
-            wanted=tuple(_wanted(row, here, bool(self.real)) for row in self.classes),
+            wanted=tuple(_material_target(row, here, bool(self.real)) for row in self.classes),
             table=table if table is not None and table.exists() else None,
             real=file_of(self.real),
             class_field=self.class_field or None,
@@ -144,7 +144,7 @@ class SYNTHROADS_PG_calibration(bpy.types.PropertyGroup):
         return job
 
 
-def textured() -> set[str]:
+def textured_materials() -> set[str]:
     """Return the names of the scene's materials that have an image as their base colour."""
     return {table_name(item) for item in bpy.data.materials if color_image_node(item) is not None}
 
@@ -155,7 +155,7 @@ def _of_scene(names: list[str]) -> dict[str, Material]:
     return dict(constants(name for name in names if name in there))
 
 
-def _wanted(row: Any, here: dict[str, Material], compared: bool) -> Wanted:
+def _material_target(row: Any, here: dict[str, Material], compared: bool) -> Wanted:
     told = row.told if compared else None
     if not row.texture:
         return Wanted(row.material, told)

@@ -25,7 +25,7 @@ from ..work.file_operator import FileOperator
 from ..work.job import Aside, PanelJob, Report, Work
 from ..work.long_operator import draw_job
 from .cloud_view import ENDINGS_GLOB, cloud_path, last_cloud
-from .rules import road_now, wrapped
+from .rules import road_now, wrap_text
 
 _FORMATS = {
     ".laz": ("LAZ", "LAS 1.4, compressed"),
@@ -262,7 +262,7 @@ def draw_missing(layout: bpy.types.UILayout, context: bpy.types.Context) -> None
 def _say_what_is_missing(layout: bpy.types.UILayout, context: bpy.types.Context, missing: Mapping[str, str]) -> None:
     for name, package in missing.items():
         text = f"{name} needs the package {package}: pip install {package}, with Blender's Python"
-        for line in wrapped(text, context):
+        for line in wrap_text(text, context):
             layout.label(text=line)
 
 

@@ -267,7 +267,7 @@ def _details(layout: bpy.types.UILayout, context: bpy.types.Context, rules: SYNT
     item = rules.violations[rules.index]
     rule = RULES[item.rule]
     box = layout.box().column(align=True)
-    for line in wrapped(item.text, context):
+    for line in wrap_text(item.text, context):
         box.label(text=line)
     box.separator()
     for title, value in (
@@ -281,12 +281,12 @@ def _details(layout: bpy.types.UILayout, context: bpy.types.Context, rules: SYNT
         row.label(text=title)
         row.label(text=value)
     source = f"{rule.source}: " if rule.source else ""
-    for line in wrapped(source + _SURENESS[rule.sure], context):
+    for line in wrap_text(source + _SURENESS[rule.sure], context):
         box.label(text=line)
     box.operator(SYNTHROADS_OT_show_violation.bl_idname, icon="VIEWZOOM").index = rules.index
 
 
-def wrapped(text: str, context: bpy.types.Context) -> list[str]:
+def wrap_text(text: str, context: bpy.types.Context) -> list[str]:
     """Return a text in lines that the sidebar is wide enough for."""
     width = context.region.width if context.region else 300
     scale = context.preferences.system.ui_scale or 1.0  # 0 without a window
@@ -301,7 +301,9 @@ def _fill(rules: SYNTHROADS_PG_rules, parameters: RoadParameters, violations: li
         row.name = RULES[violation.rule].title
         row.rule, row.object, row.text = violation.rule, violation.object, violation.text
         row.station, row.offset = violation.station, offset_of(geometry, violation)
-        row.value, row.limit = (_shown(number, violation.unit) for number in (violation.value, violation.limit))
+        row.value, row.limit = (
+            _write_number(number, violation.unit) for number in (violation.value, violation.limit)
+        )
         row.found = f"{_brief(violation.value)} / {_brief(violation.limit)} {violation.unit}".removesuffix(" 1")
     rules["index"] = -1  # past its update: nothing was clicked yet
 
@@ -315,7 +317,7 @@ def _count(number: int) -> str:
     return {0: "No rule is broken", 1: "1 rule is broken"}.get(number, f"Rules are broken at {number} places")
 
 
-def _shown(value: float, unit: str) -> str:
+def _write_number(value: float, unit: str) -> str:
     return f"{value:,.6g}" + (f" {unit}" if unit != "1" else "")
 
 

@@ -51,13 +51,13 @@ def _scan(job: dict[str, Any]) -> dict[str, Any]:
     window.scene, window.view_layer = scene, scene.view_layers[job["view_layer"]]
     scenario = Scenario.from_dict(job["scenario"])
     road = RoadGeometry(RoadParameters.from_dict(job["parameters"]))
-    timer = StageTimer(_shown(takes_returns(scenario.colour.settings(scenario.fidelity))))
+    timer = StageTimer(_overall_progress(takes_returns(scenario.colour.settings(scenario.fidelity))))
     with bpy.context.temp_override(window=window):
         counts = scan_road(scenario, road, Path(job["folder"]), timer)
     return {"counts": counts, "stages": timer.stages}
 
 
-def _shown(by_return: bool) -> Progress:
+def _overall_progress(by_return: bool) -> Progress:
     """Map stage progress to overall progress.
 
     Args:

@@ -92,7 +92,7 @@ def scan_work(scan: RoadScan) -> Work[Written]:
     timer, renders = StageTimer(), may_render(scenario)
     with output_folder(scan.target, names, scan.overwrite) as folder:
         yield Step(0.0, "Reading")
-        measure = yield from (_saved(scan, folder, timer) if renders else _read(scan, timer))
+        measure = yield from (_save_copy(scan, folder, timer) if renders else _read_open_scene(scan, timer))
         if "scene" in scenario.outputs:
             with timer.stage("scene file"):
                 save_scene(folder / "scene.blend")
@@ -104,7 +104,7 @@ def scan_work(scan: RoadScan) -> Work[Written]:
     return Written(points, scan.target)
 
 
-def _saved(scan: RoadScan, folder: Path, timer: StageTimer) -> Generator[Step, None, _Measure]:
+def _save_copy(scan: RoadScan, folder: Path, timer: StageTimer) -> Generator[Step, None, _Measure]:
     """Save a copy of the open file; return what has another Blender scan it."""
     with timer.stage("scene copy"):
         saved = save_open_scene(scan.scenario, scan.parameters, folder)
@@ -118,7 +118,7 @@ def _scan_saved(saved: SavedScene, output: _Output) -> dict[str, Any]:
     return done.counts
 
 
-def _read(scan: RoadScan, timer: StageTimer) -> Generator[Step, None, _Measure]:
+def _read_open_scene(scan: RoadScan, timer: StageTimer) -> Generator[Step, None, _Measure]:
     """Read the open scene; return what scans it."""
     speed_factor = scan.scenario.scan.traffic_speed_factor
     with timer.stage("scene mesh"):

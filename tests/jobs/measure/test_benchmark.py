@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from headless.benchmark_table import LIMITS, TABLE, judged, markdown
+from headless.benchmark_table import LIMITS, TABLE, judge_lines, markdown
 from headless.cli import main
 from headless.marked_documents import BEGIN, END
 
@@ -23,7 +23,7 @@ def a_result(quick: bool, **lines: float) -> dict[str, object]:
 
 def test_limits_are_judged_on_two_cores() -> None:
     result = a_result(False, model=8.5, casting=61.0, writing=3.0)
-    assert {name: kept for name, _, kept in judged(result)} == {"model": False, "casting": True, "writing": True}
+    assert {name: kept for name, _, kept in judge_lines(result)} == {"model": False, "casting": True, "writing": True}
     table = markdown(result)
     assert "| model | 8.50 | 8.50 | at most 8 s | **missed** |" in table
     assert "| writing LAZ | 3.00 | 3.00 | at least 3 million points/s | kept |" in table
@@ -31,7 +31,7 @@ def test_limits_are_judged_on_two_cores() -> None:
     assert "| writing | 2 | million points/s | 3.00 | 6.00 | 50 |" in table
     assert "missed" not in markdown(a_result(True, model=8.5))
     one = result | {"runs": result["runs"][:1]}  # type: ignore[index]
-    assert not list(judged(one))
+    assert not list(judge_lines(one))
 
 
 @pytest.mark.slow

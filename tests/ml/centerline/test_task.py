@@ -15,7 +15,7 @@ import torch
 from ml.centerline import task
 from ml.centerline.data.batches import Batches, BatchOptions, MeasuredRoad, Roads, read_roads
 from ml.centerline.data.effects import SequenceEffects
-from ml.centerline.data.mirroring import mirrored
+from ml.centerline.data.mirroring import mirror_batch
 from ml.configuration import from_data, load_configuration
 from ml.runs import CALIBRATION, METRICS, Run
 from ml.tasks import Evaluation, Prediction
@@ -200,7 +200,7 @@ def test_batches_hang_on_seed_and_epoch_alone():
     assert not torch.equal(one[0]["center"], other[0]["center"])
     # The second pass has the mirror images of the first, in another order.
     drawn_once = torch.cat([batch["center"] for batch in one[:2]])
-    mirror = torch.cat([mirrored(batch)["center"] for batch in one[2:]])
+    mirror = torch.cat([mirror_batch(batch)["center"] for batch in one[2:]])
     assert torch.equal(drawn_once.sort(0).values, mirror.sort(0).values)
     assert not torch.equal(drawn_once, mirror)
 

@@ -232,7 +232,7 @@ def test_a_variant_is_tested_anew_when_its_network_or_its_settings_have_changed(
     monkeypatch.setattr(experiment, "score_all", counted)
 
     def scores(settings: SegmentationConfiguration) -> Any:
-        return experiment._tested(settings, run, tmp_path / "seed-1.json", silent)
+        return experiment._test_variant(settings, run, tmp_path / "seed-1.json", silent)
 
     first = scores(configuration)
     assert scores(configuration.model_copy(update={"threads": 2})) == first

@@ -8,8 +8,8 @@ from synthroads_addon.sampling.placing.ranges import (
     Taken,
     draw_start,
     free_ranges,
-    lengthened,
-    merged,
+    lengthen_range,
+    merge_ranges,
     nearest_free,
 )
 
@@ -65,9 +65,9 @@ def test_the_nearest_place() -> None:
 
 
 def test_ranges_are_joined_and_made_longer() -> None:
-    assert merged([(5.0, 6.0), (0.0, 3.0), (2.0, 4.0), (8.0, 9.0)], 1.5) == [(0.0, 6.0), (8.0, 9.0)]
-    assert lengthened(10.0, 20.0, 30.0, 0.0, 100.0) == (0.0, 30.0)
-    assert lengthened(50.0, 60.0, 30.0, 0.0, 100.0) == (40.0, 70.0)
-    assert lengthened(95.0, 100.0, 30.0, 0.0, 100.0) == (70.0, 100.0)
-    assert lengthened(40.0, 80.0, 30.0, 0.0, 100.0) == (40.0, 80.0)
-    assert lengthened(5.0, 10.0, 30.0, 0.0, 20.0) == (0.0, 20.0)
+    assert merge_ranges([(5.0, 6.0), (0.0, 3.0), (2.0, 4.0), (8.0, 9.0)], 1.5) == [(0.0, 6.0), (8.0, 9.0)]
+    assert lengthen_range(10.0, 20.0, 30.0, 0.0, 100.0) == (0.0, 30.0)
+    assert lengthen_range(50.0, 60.0, 30.0, 0.0, 100.0) == (40.0, 70.0)
+    assert lengthen_range(95.0, 100.0, 30.0, 0.0, 100.0) == (70.0, 100.0)
+    assert lengthen_range(40.0, 80.0, 30.0, 0.0, 100.0) == (40.0, 80.0)
+    assert lengthen_range(5.0, 10.0, 30.0, 0.0, 20.0) == (0.0, 20.0)

@@ -23,7 +23,15 @@ from synthroads_addon.scanning.colour.colour import (
     shares_by_source,
     surface_constants,
 )
-from synthroads_addon.scanning.colour.light import SHADE, SUN, WHITE, CloudShadows, SunAndSky, exposed, sun_direction
+from synthroads_addon.scanning.colour.light import (
+    SHADE,
+    SUN,
+    WHITE,
+    CloudShadows,
+    SunAndSky,
+    expose_light,
+    sun_direction,
+)
 from synthroads_addon.scenario.colour import COLOUR_FIDELITIES, ColourScenario
 
 ALL = frozenset({"rgb", *MATERIAL_LAYERS})
@@ -108,7 +116,7 @@ def test_the_sun_stands_where_the_environment_says(azimuth: float, elevation: fl
 @given(st.floats(0.0, 89.0), st.floats(0.1, 5.0), st.floats(0.05, 2.0))
 def test_the_exposure_suits_a_white_surface_in_the_sun(elevation: float, sun: float, sky: float) -> None:
     direction = sun_direction(Environment(sun_elevation_deg=elevation))
-    light, exposure = exposed(direction, np.full(3, sun), np.full(3, sky))
+    light, exposure = expose_light(direction, np.full(3, sun), np.full(3, sky))
     up = np.array([[0.0, 0.0, 1.0]])
     assert np.allclose(light.sunlight(up) + light.sky(up), WHITE, rtol=1e-5)
     assert np.isclose(exposure * (sun * direction[2] + sky), WHITE)

@@ -34,7 +34,7 @@ from synthroads_addon.ui.fields.groups import (
     read_fields,
     write_fields,
 )
-from synthroads_addon.ui.fields.inherited import inherited, inherited_text
+from synthroads_addon.ui.fields.inherited import inherited_text, inherited_value
 from synthroads_addon.ui.fields.properties import FIELDS, PATHS
 from synthroads_addon.ui.fields.wording import BLENDERS, label
 
@@ -365,14 +365,14 @@ def test_another_device_takes_its_own_setting(panel: Any) -> None:
     scan = panel.scenario().scan
     own = (scan.pulse_rate_khz, scan.field_of_view_deg, scan.lines_per_second, scan.angle_step_deg)
     assert own == (None, None, None, None)
-    assert inherited(panel, "scan.pulse_rate_khz") == load_device("velodyne-vlp-16").modes[0].pulse_rate_khz
+    assert inherited_value(panel, "scan.pulse_rate_khz") == load_device("velodyne-vlp-16").modes[0].pulse_rate_khz
 
 
 def test_another_platform_takes_its_usual_path(panel: Any) -> None:
     panel.scan.platform.kind = "vehicle"
     platform = panel.scenario().scan.platform
     assert (platform.height, platform.speed, platform.lateral_offsets) == (None, None, None)
-    assert inherited(panel, "scan.platform.height") == USUAL["vehicle"].height
+    assert inherited_value(panel, "scan.platform.height") == USUAL["vehicle"].height
 
 
 def test_section_and_class_go_together(panel: Any) -> None:
@@ -434,7 +434,7 @@ def test_a_value_of_ones_own_begins_with_what_was_shown(panel: Any, path: str) -
     panel.take(Scenario())
     if path == "scan.weather.visibility":
         panel.scan.own_weather = True
-    field, owner, value = PATHS[path], owner_of(panel, path), inherited(panel, path)
+    field, owner, value = PATHS[path], owner_of(panel, path), inherited_value(panel, path)
     shown = inherited_text(panel, path, field.unit)
     assert shown not in ("", "Automatic"), "says nothing of what it has while it isn't given"
     setattr(owner, field.own, True)
@@ -449,10 +449,10 @@ def test_what_is_inherited_is_what_the_scenario_has(panel: Any) -> None:
     panel.take(Scenario(fidelity="high"))
     scenario = panel.scenario()
     numbers, colour = scenario.settings(), scenario.colour.settings("high")
-    assert inherited(panel, "geometric_tolerance") == numbers.tolerance
-    assert inherited(panel, "scan.rays_per_pulse") == numbers.rays_per_pulse
-    assert inherited(panel, "colour.image_spacing") == colour.image_spacing
-    assert inherited(panel, "colour.samples") == colour.samples
+    assert inherited_value(panel, "geometric_tolerance") == numbers.tolerance
+    assert inherited_value(panel, "scan.rays_per_pulse") == numbers.rays_per_pulse
+    assert inherited_value(panel, "colour.image_spacing") == colour.image_spacing
+    assert inherited_value(panel, "colour.samples") == colour.samples
 
 
 def test_a_seed_too_long_for_blender_is_kept_until_another_is_given(panel: Any) -> None:

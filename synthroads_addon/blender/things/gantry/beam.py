@@ -8,7 +8,7 @@ import bpy
 
 from ...nodes import operations as op
 from ...nodes.builder import Tree, Value, node_group
-from ...nodes.solids import bars, box, moved, put, row_of_points
+from ...nodes.solids import bars, box, move_geometry, put_on_points, row_of_points
 
 KINDS = ("box", "truss", "tube")
 # Bars of one bay of the truss from x = 0 to 1, y = -1 to 1, z = 0 to 1; the first four are its frame.
@@ -64,7 +64,7 @@ def _chords(tree: Tree, length: Value, height: Value, depth: Value) -> Value:
     bar = box(tree, op.vector(tree, length, width, width))
     return op.join(
         *(
-            moved(
+            move_geometry(
                 bar,
                 op.vector(tree, length * 0.5, (depth - width) * (0.5 * y), height * 0.5 + (height - width) * (0.5 * z)),
             )
@@ -101,4 +101,4 @@ def _joints(tree: Tree, kind: Value, length: Value, height: Value, depth: Value)
     ring = tree.node("GeometryNodeTransform", ring, rotation=op.turn(tree, y=math.pi / 2)).value
     ring = tree.node("GeometryNodeTransform", ring, scale=op.vector(tree, 1.0, depth + 0.08, height * 0.995)).value
     flange = op.join(op.only_if(kind.equals(0), plate), op.only_if(kind.equals(2), ring))
-    return put(points, flange, place)
+    return put_on_points(points, flange, place)

@@ -9,7 +9,7 @@ import bpy
 from ....base.classes import class_id
 from ...nodes import operations as op
 from ...nodes.builder import Tree, node_group
-from ...nodes.solids import moved, put
+from ...nodes.solids import move_geometry, put_on_points
 from ...nodes.strip import INSTANCES
 from ..sign.face import declare_face, sign_face_group
 
@@ -29,12 +29,12 @@ def _build(tree: Tree) -> None:
     face = declare_face(tree)
     instance = tree.integer("Instance", 0, INSTANCES, description="Instance number of the faces")
     with tree.frame("Middle of the sign"):
-        points = op.separate(op.object_geometry(gantry), op.named(tree, "number", "INT").equals(number))
+        points = op.separate(op.object_geometry(gantry), op.named_attribute(tree, "number", "INT").equals(number))
     with tree.frame("Face"):
         plate = tree.call(sign_face_group(), instance=instance, **face).value
-        plate = moved(plate, op.vector(tree, 0.0, face["thickness"] * -1.0 - _BEFORE))
-        turned = op.turn(tree, z=op.switch(op.named(tree, "facing") > 0.0, math.pi, 0.0))
-        mesh = op.realize(put(points, plate, op.position(tree), 1.0, turned))
+        plate = move_geometry(plate, op.vector(tree, 0.0, face["thickness"] * -1.0 - _BEFORE))
+        turned = op.turn(tree, z=op.switch(op.named_attribute(tree, "facing") > 0.0, math.pi, 0.0))
+        mesh = op.realize(put_on_points(points, plate, op.position(tree), 1.0, turned))
     with tree.frame("Labels"):
         mesh = op.store(mesh, "class_id", class_id("shield_gantry"), "FACE")
         mesh = op.store(mesh, "instance_id", instance, "FACE")

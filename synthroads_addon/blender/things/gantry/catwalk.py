@@ -6,7 +6,7 @@ import bpy
 
 from ...nodes import operations as op
 from ...nodes.builder import Tree, node_group
-from ...nodes.solids import box, moved, put, row_of_points
+from ...nodes.solids import box, move_geometry, put_on_points, row_of_points
 
 _SPACING = 2.0  # m, between the railings' posts
 _HANDRAIL = 1.1  # m above the grating
@@ -35,17 +35,19 @@ def _build(tree: Tree) -> None:
         top = _SUPPORT + _GRATING + _HANDRAIL
         parts = [grating]
         for side in (-1.0, 1.0):
-            parts.append(moved(toe, op.vector(tree, 0.0, edge * side)))
-            parts += [moved(rail, op.vector(tree, 0.0, edge * side, z)) for z in (top - _BAR / 2, top - _HANDRAIL / 2)]
+            parts.append(move_geometry(toe, op.vector(tree, 0.0, edge * side)))
+            parts += [
+                move_geometry(rail, op.vector(tree, 0.0, edge * side, z)) for z in (top - _BAR / 2, top - _HANDRAIL / 2)
+            ]
     with tree.frame("Posts of the railings, and supports below the grating"):
         bays = op.rounded_up(length / _SPACING)
         points = row_of_points(tree, bays + 1)
         x = op.index(tree) * ((length - _BAR) / bays) + _BAR / 2
         tall = top - _BAR - _SUPPORT
         post = box(tree, (_BAR * 0.8, _BAR * 0.8, tall), (0.0, 0.0, _SUPPORT + tall / 2))
-        frame = [moved(post, op.vector(tree, 0.0, edge * side)) for side in (-1.0, 1.0)]
+        frame = [move_geometry(post, op.vector(tree, 0.0, edge * side)) for side in (-1.0, 1.0)]
         support = box(tree, op.vector(tree, 0.06, width * 0.96, _SUPPORT + 0.02), (0.0, 0.0, _SUPPORT / 2))
-        parts.append(put(points, op.join(support, *frame), op.vector(tree, x)))
+        parts.append(put_on_points(points, op.join(support, *frame), op.vector(tree, x)))
     with tree.frame("All"):
         mesh = op.realize(op.join(*parts))
     tree.output("Mesh", mesh, description="The catwalk")

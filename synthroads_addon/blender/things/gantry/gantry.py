@@ -13,7 +13,7 @@ from ...nodes import operations as op
 from ...nodes.backbone import height_on
 from ...nodes.builder import Tree, Value, node_group
 from ...nodes.clearance import highest_below, pavement_near
-from ...nodes.solids import box, moved, painted, put, row_of_points
+from ...nodes.solids import box, move_geometry, paint_faces, put_on_points, row_of_points
 from ...nodes.strip import INSTANCES
 from .beam import gantry_beam_group
 from .catwalk import gantry_catwalk_group
@@ -103,16 +103,16 @@ def _build(tree: Tree) -> None:
             height=gantry.height,
             depth=gantry.depth,
         ).value
-        beam = moved(beam, op.vector(tree, -gantry.left, 0.0, bottom))
+        beam = move_geometry(beam, op.vector(tree, -gantry.left, 0.0, bottom))
     with tree.frame("Posts"):
         posts = _posts(tree, gantry, surfaces, bottom)
     with tree.frame("Catwalk and ladder"):
         walk = op.only_if(gantry.catwalk, _catwalk(tree, gantry, surfaces, bottom + gantry.height))
     with tree.frame("Boards and what they hang on"):
-        signs = _placed(tree, gantry, signs, low, bottom)
+        signs = _place_signs(tree, gantry, signs, low, bottom)
         boards, hangers = _boards(tree, gantry, signs)
     with tree.frame("Labels"):
-        steel = painted(op.join(beam, walk, hangers), gantry.steel)
+        steel = paint_faces(op.join(beam, walk, hangers), gantry.steel)
         mesh = op.store(op.realize(op.join(steel, posts, boards)), "shade", shade)
         mesh = op.store(mesh, "class_id", class_id("shield_gantry"), "FACE")
         mesh = op.store(mesh, "instance_id", instance, "FACE")
@@ -123,7 +123,7 @@ def _build(tree: Tree) -> None:
 
 def _thickness(signs: Value) -> Value:
     """Return the depth of a sign's body (a field on the signs' points)."""
-    return op.switch(op.named(signs.tree, "display", "INT").equals(1), GANTRY_BOARD, GANTRY_DISPLAY)
+    return op.switch(op.named_attribute(signs.tree, "display", "INT").equals(1), GANTRY_BOARD, GANTRY_DISPLAY)
 
 
 def _levels(tree: Tree, gantry: _Gantry, signs: Value, road: Value) -> tuple[Value, Value]:
@@ -135,12 +135,13 @@ def _levels(tree: Tree, gantry: _Gantry, signs: Value, road: Value) -> tuple[Val
     reach = op.maximum(op.unary("ABSOLUTE", gantry.left), op.unary("ABSOLUTE", gantry.right)) + 10.0
     beyond = _thickness(signs) + GANTRY_HANGER
     front, rear = (
-        gantry.depth * 0.5 + op.maximum(most(op.switch(op.named(tree, "facing") * side > 0.0, 0.0, beyond)), 0.0)
+        gantry.depth * 0.5
+        + op.maximum(most(op.switch(op.named_attribute(tree, "facing") * side > 0.0, 0.0, beyond)), 0.0)
         for side in (1.0, -1.0)
     )
     below = highest_below(pavement_near(road, reach), -gantry.left, -gantry.right, (-front, rear))
     low = below + gantry.clearance
-    return low, low + op.maximum(most(op.named(tree, "height")) - gantry.height, 0.0) * GANTRY_OVERHANG
+    return low, low + op.maximum(most(op.named_attribute(tree, "height")) - gantry.height, 0.0) * GANTRY_OVERHANG
 
 
 def _posts(tree: Tree, gantry: _Gantry, surfaces: tuple[Value, Value], bottom: Value) -> Value:
@@ -161,7 +162,7 @@ def _posts(tree: Tree, gantry: _Gantry, surfaces: tuple[Value, Value], bottom: V
             steel_material=gantry.steel,
             concrete_material=gantry.concrete,
         ).value
-        parts.append(op.only_if(wanted, moved(post, op.vector(tree, -place, 0.0, foot))))
+        parts.append(op.only_if(wanted, move_geometry(post, op.vector(tree, -place, 0.0, foot))))
     return op.join(*parts)
 
 
@@ -170,54 +171,56 @@ def _catwalk(tree: Tree, gantry: _Gantry, surfaces: tuple[Value, Value], top: Va
     clear = gantry.post_width * 0.5 + 0.05
     length = op.maximum(gantry.left - gantry.right - clear * 2.0, 1.0)
     walk = tree.call(gantry_catwalk_group(), length=length, beam_depth=gantry.depth).value
-    walk = moved(walk, op.vector(tree, clear - gantry.left, 0.0, top))
+    walk = move_geometry(walk, op.vector(tree, clear - gantry.left, 0.0, top))
     # Behind the boards of the carriageway that the post stands beside.
     place = op.switch(gantry.right_post, gantry.left, gantry.right)
     side = op.switch(gantry.right_post, -1.0, 1.0)
     foot = height_on(*surfaces, op.vector(tree, -place)) + gantry.elevation + _LADDER_FOOT
     tall = top + 1.1 - foot
     rail = box(tree, op.vector(tree, 0.05, 0.05, tall), op.vector(tree, 0.0, 0.0, tall * 0.5))
-    rungs = put(
+    rungs = put_on_points(
         row_of_points(tree, op.rounded_up(tall / _RUNG - 1.0)),
         box(tree, (0.4, 0.03, 0.03)),
         op.vector(tree, 0.0, 0.0, (op.index(tree) + 0.5) * _RUNG),
     )
-    ladder = op.join(moved(rail, (-0.2, 0.0, 0.0)), moved(rail, (0.2, 0.0, 0.0)), rungs)
+    ladder = op.join(move_geometry(rail, (-0.2, 0.0, 0.0)), move_geometry(rail, (0.2, 0.0, 0.0)), rungs)
     away = (gantry.depth * 0.5 + 0.2) * side
-    return op.join(walk, moved(op.realize(ladder), op.vector(tree, -place, away, foot)))
+    return op.join(walk, move_geometry(op.realize(ladder), op.vector(tree, -place, away, foot)))
 
 
-def _placed(tree: Tree, gantry: _Gantry, signs: Value, low: Value, bottom: Value) -> Value:
+def _place_signs(tree: Tree, gantry: _Gantry, signs: Value, low: Value, bottom: Value) -> Value:
     """Put the signs' points into the middles of their faces: lower edges in line, or small ones before the beam."""
-    tall = op.named(tree, "height")
+    tall = op.named_attribute(tree, "height")
     behind = low + tall < bottom + gantry.height
     z = op.switch(behind, low + tall * 0.5, bottom + gantry.height * 0.5)
     thickness = _thickness(signs)
     signs = op.store(signs, "thickness", thickness)
-    y = op.named(tree, "facing") * -1.0 * (gantry.depth * 0.5 + GANTRY_HANGER + thickness)
+    y = op.named_attribute(tree, "facing") * -1.0 * (gantry.depth * 0.5 + GANTRY_HANGER + thickness)
     signs = op.set_position(signs, op.vector(tree, op.component(op.position(tree), "X"), y, z))
     return op.store(signs, "level", bottom + gantry.height * 0.5 - z)
 
 
 def _boards(tree: Tree, gantry: _Gantry, signs: Value) -> tuple[Value, Value]:
     """Return the bodies of boards and displays behind the signs' points, and their hangers."""
-    wide, tall, thick = (op.named(tree, name) for name in ("width", "height", "thickness"))
-    facing = op.turn(tree, z=op.switch(op.named(tree, "facing") > 0.0, math.pi, 0.0))
+    wide, tall, thick = (op.named_attribute(tree, name) for name in ("width", "height", "thickness"))
+    facing = op.turn(tree, z=op.switch(op.named_attribute(tree, "facing") > 0.0, math.pi, 0.0))
     body = box(tree, 1.0, (0.0, 0.5, 0.0))
     boards = []
     for kind, material in enumerate((gantry.board, gantry.display)):
-        chosen = op.separate(signs, op.named(tree, "display", "INT").equals(kind))
+        chosen = op.separate(signs, op.named_attribute(tree, "display", "INT").equals(kind))
         size = op.vector(tree, wide, thick, tall)
-        boards.append(put(chosen, painted(body, material), op.position(tree), size, facing))
+        boards.append(put_on_points(chosen, paint_faces(body, material), op.position(tree), size, facing))
     hangers = []
     for side in (-1.0, 1.0):
         x = wide * (0.32 * side)
-        back = op.named(tree, "facing") * (thick + GANTRY_HANGER / 2)
+        back = op.named_attribute(tree, "facing") * (thick + GANTRY_HANGER / 2)
         upright = op.vector(tree, 0.1, GANTRY_HANGER + 0.01, op.maximum(tall - 0.2, tall * 0.5))
-        hangers.append(put(signs, box(tree, 1.0), op.position(tree) + op.vector(tree, x, back), upright, facing))
+        hangers.append(
+            put_on_points(signs, box(tree, 1.0), op.position(tree) + op.vector(tree, x, back), upright, facing)
+        )
         # A clamp that reaches into the beam.
-        inwards = op.named(tree, "facing") * (thick + GANTRY_HANGER + gantry.depth * 0.1)
+        inwards = op.named_attribute(tree, "facing") * (thick + GANTRY_HANGER + gantry.depth * 0.1)
         clamp = op.vector(tree, 0.16, gantry.depth * 0.3 + 0.05, gantry.height * 0.3)
-        place = op.position(tree) + op.vector(tree, x, inwards, op.named(tree, "level"))
-        hangers.append(put(signs, box(tree, 1.0), place, clamp, facing))
+        place = op.position(tree) + op.vector(tree, x, inwards, op.named_attribute(tree, "level"))
+        hangers.append(put_on_points(signs, box(tree, 1.0), place, clamp, facing))
     return op.realize(op.join(*boards)), op.realize(op.join(*hangers))

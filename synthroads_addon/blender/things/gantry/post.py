@@ -6,7 +6,7 @@ import bpy
 
 from ...nodes import operations as op
 from ...nodes.builder import Tree, Value, node_group
-from ...nodes.solids import box, painted, prism, put, row_of_points
+from ...nodes.solids import box, paint_faces, prism, put_on_points, row_of_points
 
 PLINTH = 0.3
 """Top of the plinth above the surface, m."""
@@ -32,7 +32,7 @@ def _build(tree: Tree) -> None:
     with tree.frame("Plinth"):
         margin = 2.0 * _PLINTH_MARGIN
         size = op.vector(tree, width + margin, depth + margin, PLINTH + BURIED)
-        plinth = painted(box(tree, size, (0.0, 0.0, (PLINTH - BURIED) / 2)), concrete)
+        plinth = paint_faces(box(tree, size, (0.0, 0.0, (PLINTH - BURIED) / 2)), concrete)
     with tree.frame("Base plate"):
         margin = 2.0 * _PLATE_MARGIN
         plate = box(tree, op.vector(tree, width + margin, depth + margin, _PLATE + 0.01), (0.0, 0.0, PLINTH + 0.015))
@@ -46,7 +46,7 @@ def _build(tree: Tree) -> None:
     with tree.frame("Bolts"):
         bolts = _bolts(tree, width, depth)
     with tree.frame("All of steel"):
-        mesh = op.join(plinth, painted(op.join(plate, post, op.realize(bolts)), steel))
+        mesh = op.join(plinth, paint_faces(op.join(plate, post, op.realize(bolts)), steel))
     tree.output("Mesh", mesh, description="The post")
 
 
@@ -54,4 +54,4 @@ def _bolts(tree: Tree, width: Value, depth: Value) -> Value:
     """Return bolts around the post, on the base plate."""
     half = op.vector(tree, width * 0.5 + _PLATE_MARGIN * 0.55, depth * 0.5 + _PLATE_MARGIN * 0.55, 0.0)
     place = op.choose(op.index(tree), _BOLTS) * half + (0.0, 0.0, PLINTH + 0.03)
-    return put(row_of_points(tree, len(_BOLTS)), prism(tree, _BOLT, (1.0, 1.0, 0.06)), place)
+    return put_on_points(row_of_points(tree, len(_BOLTS)), prism(tree, _BOLT, (1.0, 1.0, 0.06)), place)

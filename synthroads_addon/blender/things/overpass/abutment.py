@@ -7,7 +7,7 @@ import bpy
 from ....road.things.body_shapes import BRIDGE_ABUTMENT, BRIDGE_BEARING, BRIDGE_SEAT
 from ...nodes import operations as op
 from ...nodes.builder import Operand, Tree, Value, node_group
-from ...nodes.solids import box, painted
+from ...nodes.solids import box, paint_faces
 from .deck import PAVEMENT, WEB
 
 _WALL = 0.5
@@ -54,5 +54,5 @@ def _build(tree: Tree) -> None:
             for side in (1.0, -1.0)
         ]
     with tree.frame("All"):
-        mesh = op.join(painted(op.join(*walls), concrete), painted(op.join(*pads), steel))
+        mesh = op.join(paint_faces(op.join(*walls), concrete), paint_faces(op.join(*pads), steel))
     tree.output("Mesh", mesh, description="The abutment")

@@ -7,7 +7,7 @@ import bpy
 from ....road.things.body_shapes import BRIDGE_DECK
 from ...nodes import operations as op
 from ...nodes.builder import Tree, Value, node_group
-from ...nodes.solids import box, flipped, loft, moved, painted
+from ...nodes.solids import box, flip_faces, loft, move_geometry, paint_faces
 from .railing import bridge_railing_group
 
 WEB = BRIDGE_DECK[1][0], BRIDGE_DECK[2][0]
@@ -50,20 +50,20 @@ def _build(tree: Tree) -> None:
         tree.input(f"{name} Material", "Material", description=f"Material of {what}") for name, what in names.items()
     )
     with tree.frame("Deck"):
-        deck = painted(_deck(tree, ends, width, height), concrete)
+        deck = paint_faces(_deck(tree, ends, width, height), concrete)
     with tree.frame("Edge beam"):
-        beam = painted(_edge_beam(tree, (start, end), width, height), edge)
-        beams = op.join(beam, flipped(tree.node("GeometryNodeTransform", beam, scale=(1.0, -1.0, 1.0)).value))
+        beam = paint_faces(_edge_beam(tree, (start, end), width, height), edge)
+        beams = op.join(beam, flip_faces(tree.node("GeometryNodeTransform", beam, scale=(1.0, -1.0, 1.0)).value))
     with tree.frame("Pavement between the edge beams"):
         size = op.vector(tree, end - start, width * (1.0 - 1.96 * EDGE), PAVEMENT)
         road = box(tree, size, op.vector(tree, (start + end) * 0.5, 0.0, height - PAVEMENT / 2))
     with tree.frame("Railings"):
         railing = tree.call(bridge_railing_group(), length=end - start, height=parapet - _CURB).value
         beside = width * 0.5 - 0.2
-        pair = [moved(railing, op.vector(tree, start, beside * side, height + _CURB)) for side in (1.0, -1.0)]
-        railings = op.only_if(parapet > _LOWEST_PARAPET, painted(op.join(*pair), steel))
+        pair = [move_geometry(railing, op.vector(tree, start, beside * side, height + _CURB)) for side in (1.0, -1.0)]
+        railings = op.only_if(parapet > _LOWEST_PARAPET, paint_faces(op.join(*pair), steel))
     with tree.frame("All"):
-        mesh = op.join(deck, beams, painted(road, asphalt), railings)
+        mesh = op.join(deck, beams, paint_faces(road, asphalt), railings)
     tree.output("Mesh", mesh, description="The deck")
 
 

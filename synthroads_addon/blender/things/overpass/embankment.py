@@ -10,7 +10,7 @@ import bpy
 from ....base.classes import class_id
 from ...nodes import operations as op
 from ...nodes.builder import Tree, Value, node_group
-from ...nodes.solids import flipped, painted
+from ...nodes.solids import flip_faces, paint_faces
 
 _GRADE = 0.05
 """Fall of the crossing road behind the wing walls."""
@@ -89,9 +89,9 @@ def _build(tree: Tree) -> None:
             slopes.append(_slope(tree, bank, across))
     with tree.frame("End"):
         end = _end(tree, *slopes)
-        turned = tree.node("GeometryNodeSwitch", bank.side > 0.0, flipped(end), end, input_type="GEOMETRY").value
+        turned = tree.node("GeometryNodeSwitch", bank.side > 0.0, flip_faces(end), end, input_type="GEOMETRY").value
     with tree.frame("Labels"):
-        earth = op.store(painted(op.join(*slopes, turned), grass), "class_id", class_id("ground"), "FACE")
+        earth = op.store(paint_faces(op.join(*slopes, turned), grass), "class_id", class_id("ground"), "FACE")
         mesh = op.without_degenerate(op.join(crown, earth))
     tree.output("Mesh", mesh, description="Embankment with its classes; the road on it is part of the bridge")
 
@@ -108,7 +108,7 @@ def _crown(tree: Tree, bank: _Bank, asphalt: Value, grass: Value) -> Value:
     middle = (op.index(tree) // (_EDGE - 1)).equals(1)
     ground = tree.node("FunctionNodeInputInt", integer=class_id("ground")).value
     label = op.switch(middle, ground, class_id("bridge"))
-    mesh = op.store(painted(mesh, grass), "class_id", label, "FACE")
+    mesh = op.store(paint_faces(mesh, grass), "class_id", label, "FACE")
     return tree.node("GeometryNodeSetMaterial", mesh, middle, material=asphalt).value
 
 
@@ -136,7 +136,7 @@ def _slope(tree: Tree, bank: _Bank, across: float) -> Value:
     )
     mesh = op.set_position(mesh, op.switch(row > 0, crown, crown + down * fall))
     turned = bank.side * across < 0.0
-    return tree.node("GeometryNodeSwitch", turned, mesh, flipped(mesh), input_type="GEOMETRY").value
+    return tree.node("GeometryNodeSwitch", turned, mesh, flip_faces(mesh), input_type="GEOMETRY").value
 
 
 def _end(tree: Tree, left: Value, right: Value) -> Value:

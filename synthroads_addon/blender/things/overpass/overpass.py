@@ -12,7 +12,7 @@ from ...nodes import operations as op
 from ...nodes.backbone import height_on
 from ...nodes.builder import Tree, Value, node_group
 from ...nodes.clearance import highest_below, pavement_near
-from ...nodes.solids import flipped, moved, put
+from ...nodes.solids import flip_faces, move_geometry, put_on_points
 from ...nodes.strip import INSTANCES
 from .abutment import bridge_abutment_group
 from .deck import EDGE, bridge_deck_group
@@ -142,7 +142,7 @@ def _deck(bridge: _Overpass, low: Value, wings: dict[float, Value]) -> Value:
         steel_material=bridge.materials["Steel"],
         pavement_material=bridge.materials["Pavement"],
     ).value
-    return moved(deck, op.vector(bridge.tree, 0.0, 0.0, low))
+    return move_geometry(deck, op.vector(bridge.tree, 0.0, 0.0, low))
 
 
 def _abutment(bridge: _Overpass, low: Value, feet: dict[float, Value], wings: dict[float, Value], side: float) -> Value:
@@ -157,8 +157,8 @@ def _abutment(bridge: _Overpass, low: Value, feet: dict[float, Value], wings: di
         steel_material=bridge.materials["Steel"],
     ).value
     if side < 0.0:
-        made = flipped(tree.node("GeometryNodeTransform", made, scale=(-1.0, 1.0, 1.0)).value)
-    return moved(made, op.vector(tree, bridge.faces[side], 0.0, low))
+        made = flip_faces(tree.node("GeometryNodeTransform", made, scale=(-1.0, 1.0, 1.0)).value)
+    return move_geometry(made, op.vector(tree, bridge.faces[side], 0.0, low))
 
 
 def _piers(bridge: _Overpass, points: Value, surfaces: tuple[Value, Value], shear: Value, low: Value) -> Value:
@@ -173,10 +173,10 @@ def _piers(bridge: _Overpass, points: Value, surfaces: tuple[Value, Value], shea
     x = op.component(op.position(tree), "X")
     plan = op.vector(tree, x, x * shear)
     points = op.store(points, "foot", height_on(*surfaces, plan) - BRIDGE_BURIED)
-    tall = low - BRIDGE_BEARING - op.named(tree, "foot")
+    tall = low - BRIDGE_BEARING - op.named_attribute(tree, "foot")
     top = plan + op.vector(tree, 0.0, 0.0, low - BRIDGE_BEARING)
-    bodies = put(points, pier["Body"], top, op.vector(tree, 1.0, 1.0, tall))
-    return op.realize(op.join(bodies, put(points, pier["Bearings"], plan + op.vector(tree, 0.0, 0.0, low))))
+    bodies = put_on_points(points, pier["Body"], top, op.vector(tree, 1.0, 1.0, tall))
+    return op.realize(op.join(bodies, put_on_points(points, pier["Bearings"], plan + op.vector(tree, 0.0, 0.0, low))))
 
 
 def _embankment(bridge: _Overpass, ground: Value, low: Value, wing: Value, shear: Value, side: float) -> Value:

@@ -9,7 +9,7 @@ import bpy
 from ....road.things.body_shapes import BRIDGE_BEARING, BRIDGE_PIER_LENGTH
 from ...nodes import operations as op
 from ...nodes.builder import Tree, Value, node_group
-from ...nodes.solids import box, loft, painted
+from ...nodes.solids import box, loft, paint_faces
 from .deck import WEB
 
 _ROUND = 8
@@ -43,5 +43,5 @@ def _build(tree: Tree) -> None:
         beside = op.minimum(deck * (0.25 * sum(WEB)), straight)
         size = op.vector(tree, op.minimum(width * 0.8, 0.6), 0.5, BRIDGE_BEARING + 0.02)
         pads = [box(tree, size, op.vector(tree, 0.0, beside * side, -BRIDGE_BEARING / 2)) for side in (1.0, -1.0)]
-    tree.output("Body", painted(body, concrete), description="The pier, from z = -1 to 0")
-    tree.output("Bearings", painted(op.join(*pads), steel), description="The bearings")
+    tree.output("Body", paint_faces(body, concrete), description="The pier, from z = -1 to 0")
+    tree.output("Bearings", paint_faces(op.join(*pads), steel), description="The bearings")

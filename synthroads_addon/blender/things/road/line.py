@@ -52,15 +52,15 @@ def _build(tree: Tree) -> None:
         ribbon = tree.call(
             strip_group(),
             backbone=rows,
-            left_offset=op.named(tree, "edge_left"),
-            right_offset=op.named(tree, "edge_right"),
-            left_height=op.named(tree, "edge_left_height") + film,
-            right_height=op.named(tree, "edge_right_height") + film,
+            left_offset=op.named_attribute(tree, "edge_left"),
+            right_offset=op.named_attribute(tree, "edge_right"),
+            left_height=op.named_attribute(tree, "edge_left_height") + film,
+            right_height=op.named_attribute(tree, "edge_right_height") + film,
             class_=given["class_"],
             instance=given["instance"],
             material=given["material"],
         ).value
-        station = op.named(tree, "station")
+        station = op.named_attribute(tree, "station")
         painted = (station > first) & (station < end) & ((station - first) % period < length)
         tree.output("Mesh", op.delete_faces(ribbon, ~painted), description="Dashes whose faces look up")
 
@@ -95,15 +95,15 @@ def _with_ends(tree: Tree, backbone: Value, dashes: tuple[Value, Value, Value, V
         number = op.index(tree)
         wanted = op.minimum(first + (number // 2) * period + (number % 2) * length, end)
         near = tree.node("GeometryNodeSampleNearest", ribbon, op.vector(tree, wanted), domain="POINT").value
-        snapped = op.sample_index(ribbon, op.named(tree, "station"), near)
+        snapped = op.sample_index(ribbon, op.named_attribute(tree, "station"), near)
         distance = op.unary("ABSOLUTE", wanted - snapped)
         points = op.delete_points(op.store(points, "station", wanted), distance < SNAP)
-        station = op.named(tree, "station")
+        station = op.named_attribute(tree, "station")
         for name in ("curvature", *_EDGES):
             points = op.store(points, name, look_up(ribbon, name, station))
         points = op.store(points, "left", look_up(ribbon, "left", station))
         points = op.set_position(points, look_up(ribbon, "axis", station))
         both = op.join(backbone, points)
         return tree.node(
-            "GeometryNodeSortElements", both, domain="POINT", sort_weight=op.named(tree, "station")
+            "GeometryNodeSortElements", both, domain="POINT", sort_weight=op.named_attribute(tree, "station")
         ).value

@@ -83,7 +83,7 @@ def _middle(
     """Return the distance of a line's middle from the axis."""
     if marking.kind == "free":
         middle = values["Distance"]
-        return middle * op.named(tree, attribute_name("marking", marking.name)) if marking.varies else middle
+        return middle * op.named_attribute(tree, attribute_name("marking", marking.name)) if marking.varies else middle
     if marking.kind in ("turnout_edge", "gore_edge"):
         boundary = strips_of(layout).index("Turnout Lane") + (marking.kind == "turnout_edge")
     else:

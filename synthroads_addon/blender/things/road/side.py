@@ -102,7 +102,7 @@ class _Side:
         return width
 
     def attribute(self, name: str) -> Value:
-        return op.named(self.tree, attribute_name(self.layout.side, name))
+        return op.named_attribute(self.tree, attribute_name(self.layout.side, name))
 
 
 def _build(tree: Tree, layout: SideLayout) -> None:
@@ -154,7 +154,7 @@ def section_inputs(
         "side": layout.sign,
         "paved_edge": plane,
         "pivot": pivot,
-        "crossfall": op.named(tree, f"crossfall_{layout.side.lower()}"),
+        "crossfall": op.named_attribute(tree, f"crossfall_{layout.side.lower()}"),
         "verge_slope": verge_slope,
     }
 
@@ -177,14 +177,14 @@ def _surfaces(side: _Side, backbone: Value, verge: Value) -> Iterator[Value]:
             **detail,
         ).value
         if strip == "Verge":
-            at_row = op.sample_index(backbone, side.distances[-1], op.named(side.tree, "row", "INT"))
-            mesh = op.store(mesh, "distance", op.unary("ABSOLUTE", op.named(side.tree, "offset")) - at_row)
+            at_row = op.sample_index(backbone, side.distances[-1], op.named_attribute(side.tree, "row", "INT"))
+            mesh = op.store(mesh, "distance", op.unary("ABSOLUTE", op.named_attribute(side.tree, "offset")) - at_row)
         yield mesh
 
 
 def _turnout_instance(side: _Side) -> Value:
     """Return the instance number of the turnout that a face of the strips beside the main road belongs to."""
-    station, result = op.named(side.tree, "station"), side.input("Instance")
+    station, result = op.named_attribute(side.tree, "station"), side.input("Instance")
     for name in side.layout.turnouts:
         inside = (station >= side.inputs[f"{name} Start Station"]) & (station <= side.inputs[f"{name} End Station"])
         result = op.switch(inside, result, side.inputs[f"{name} Instance"])

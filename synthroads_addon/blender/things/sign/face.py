@@ -9,7 +9,7 @@ import bpy
 from ....base.classes import class_id
 from ...nodes import operations as op
 from ...nodes.builder import Tree, Value, node_group
-from ...nodes.solids import flipped, moved, painted
+from ...nodes.solids import flip_faces, move_geometry, paint_faces
 from ...nodes.strip import INSTANCES
 from .outline import SHAPES, sign_outline_group
 from .pictogram import pictogram_group
@@ -104,17 +104,17 @@ def _build(tree: Tree) -> None:
         outer, middle, inner = outline(0.0), outline(edge), outline(edge + border)
     with tree.frame("Front"):
         front = [
-            painted(_filled(inner), face["ground_material"]),
-            op.only_if(border > 1e-4, painted(_filled(op.join(middle, inner)), face["border_material"])),
-            op.only_if(edge > 1e-4, painted(_filled(op.join(outer, middle)), face["edge_material"])),
+            paint_faces(_fill_curves(inner), face["ground_material"]),
+            op.only_if(border > 1e-4, paint_faces(_fill_curves(op.join(middle, inner)), face["border_material"])),
+            op.only_if(edge > 1e-4, paint_faces(_fill_curves(op.join(outer, middle)), face["edge_material"])),
         ]
     with tree.frame("Back and rim"):
         plate = tree.node(
-            "GeometryNodeExtrudeMesh", flipped(_filled(outer)), offset_scale=face["thickness"], individual=False
+            "GeometryNodeExtrudeMesh", flip_faces(_fill_curves(outer)), offset_scale=face["thickness"], individual=False
         ).value
-        back = painted(plate, face["back_material"])
+        back = paint_faces(plate, face["back_material"])
     with tree.frame("Writing and pictogram"):
-        drawn = [moved(part, (0.0, 0.0, RAISED)) for part in _drawn(tree, face)]
+        drawn = [move_geometry(part, (0.0, 0.0, RAISED)) for part in _draw_writing(tree, face)]
     with tree.frame("Upright, and labelled"):
         mesh = tree.node(
             "GeometryNodeTransform", op.join(back, *front, *drawn), rotation=(math.pi / 2.0, 0.0, 0.0)
@@ -123,12 +123,12 @@ def _build(tree: Tree) -> None:
     tree.output("Mesh", mesh, description="Plate; its front is at y = 0")
 
 
-def _filled(curve: Value) -> Value:
+def _fill_curves(curve: Value) -> Value:
     """Return the area inside of curves, less what is inside of two of them."""
     return curve.tree.node("GeometryNodeFillCurve", curve).value
 
 
-def _drawn(tree: Tree, face: dict[str, Value]) -> list[Value]:
+def _draw_writing(tree: Tree, face: dict[str, Value]) -> list[Value]:
     """Return writing and pictogram in the xy plane."""
     lines = {f"line_{number}": face[f"line_{number}"] for number in range(1, LINES + 1)}
     low, high = _box(tree, face, "text")
@@ -140,7 +140,7 @@ def _drawn(tree: Tree, face: dict[str, Value]) -> list[Value]:
     pictogram = tree.call(
         pictogram_group(), pictogram=face["pictogram"], low_corner=low, high_corner=high, **colors
     ).value
-    return [painted(writing, face["writing_material"]), pictogram]
+    return [paint_faces(writing, face["writing_material"]), pictogram]
 
 
 def _box(tree: Tree, face: dict[str, Value], prefix: str) -> tuple[Value, Value]:

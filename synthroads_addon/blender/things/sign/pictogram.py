@@ -6,7 +6,7 @@ import bpy
 
 from ...nodes import operations as op
 from ...nodes.builder import Tree, Value, node_group
-from ...nodes.solids import painted
+from ...nodes.solids import paint_faces
 from .pictograms import NAMES, PICTOGRAMS, RED
 
 Row = tuple[float, float, float]
@@ -39,8 +39,8 @@ def _build(tree: Tree) -> None:
     with tree.frame("Filled one by one: the red ones come first"):
         red = op.index(tree) < others
         mesh = op.join(
-            painted(_filled(op.separate(curves, red, "CURVE")), border),
-            painted(_filled(op.separate(curves, ~red, "CURVE")), color),
+            paint_faces(_fill_curves(op.separate(curves, red, "CURVE")), border),
+            paint_faces(_fill_curves(op.separate(curves, ~red, "CURVE")), color),
         )
     with tree.frame("Fitted into the box"):
         extent = tree.node("GeometryNodeBoundBox", mesh)
@@ -70,6 +70,6 @@ def _tables() -> tuple[list[Row], list[Row]]:
     return ranges, corners
 
 
-def _filled(curves: Value) -> Value:
+def _fill_curves(curves: Value) -> Value:
     """Return the areas of curves that may overlap."""
     return curves.tree.node("GeometryNodeFillCurve", curves, group_id=op.index(curves.tree)).value

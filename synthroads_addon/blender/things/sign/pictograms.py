@@ -45,7 +45,7 @@ def _polygon(points: list[NDArray[np.float64]]) -> Polygon:
     return [(round(float(x), 4), round(float(y), 4)) for x, y in points]
 
 
-def _mirrored(polygons: list[Polygon]) -> list[Polygon]:
+def _mirror(polygons: list[Polygon]) -> list[Polygon]:
     return [[(-x, y) for x, y in reversed(polygon)] for polygon in polygons]
 
 
@@ -110,11 +110,11 @@ PICTOGRAMS: dict[str, list[Polygon]] = {
         _arrow([(-0.15, -0.42), (0.04, -0.2), (0.36, 0.3)], 0.14, 2.8),
     ],
     "curve_left": _CURVE,
-    "curve_right": _mirrored(_CURVE),
+    "curve_right": _mirror(_CURVE),
     "double_curve_left": _DOUBLE_CURVE,
-    "double_curve_right": _mirrored(_DOUBLE_CURVE),
+    "double_curve_right": _mirror(_DOUBLE_CURVE),
     "narrow_left": _NARROW,
-    "narrow_right": _mirrored(_NARROW),
+    "narrow_right": _mirror(_NARROW),
     "works": _WORKS,
     "no_overtaking": [*_car(-0.24), *_car(0.24)],
     "bars_1": _bars(1),

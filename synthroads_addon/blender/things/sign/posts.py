@@ -8,7 +8,7 @@ import bpy
 
 from ...nodes import operations as op
 from ...nodes.builder import Tree, Value, node_group
-from ...nodes.solids import bars, painted, row_of_points
+from ...nodes.solids import bars, paint_faces, row_of_points
 from ...nodes.standing import BURIED, on_surface, put_on
 from ...nodes.tubes import tube
 
@@ -43,7 +43,7 @@ def _build(tree: Tree) -> None:
         places = on_surface(put_on(level, side_by_side), road, terrain)
     with tree.frame("Length from below the surface up"):
         foot = op.component(op.position(tree), "Z") - BURIED
-        places = op.store(places, "tall", op.maximum(op.named(tree, "level") + top - foot, 0.1))
+        places = op.store(places, "tall", op.maximum(op.named_attribute(tree, "level") + top - foot, 0.1))
         places = op.set_position(places, op.position(tree) - (0.0, 0.0, BURIED))
     with tree.frame("Tube of height 1"):
         pipe = tube(tree, diameter * 0.5, 1.0)
@@ -51,8 +51,8 @@ def _build(tree: Tree) -> None:
         girder = _lattice(tree, diameter * 0.5 - _CHORD / 2.0, top + BURIED)
     with tree.frame("Posts"):
         post = tree.node("GeometryNodeSwitch", input_type="GEOMETRY", switch=lattice, false=pipe, true=girder).value
-        posts = put_on(places, post, op.vector(tree, 1.0, 1.0, op.named(tree, "tall")))
-        posts = painted(posts, material)
+        posts = put_on(places, post, op.vector(tree, 1.0, 1.0, op.named_attribute(tree, "tall")))
+        posts = paint_faces(posts, material)
     tree.output("Mesh", posts, description="Posts")
 
 

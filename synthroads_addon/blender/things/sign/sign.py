@@ -10,7 +10,7 @@ from ....base.classes import class_id
 from ....road.things.body_shapes import SIGN_RAIL
 from ...nodes import operations as op
 from ...nodes.builder import Tree, Value, node_group
-from ...nodes.solids import box, moved, painted, put, row_of_points
+from ...nodes.solids import box, move_geometry, paint_faces, put_on_points, row_of_points
 from ...nodes.standing import declare_standing, put_on
 from ...nodes.tubes import tube
 from .face import declare_face, sign_face_group
@@ -72,7 +72,7 @@ def _build(tree: Tree) -> None:
     with tree.frame("Face, in front of the posts"):
         plate = tree.call(sign_face_group(), instance=standing.instance, **face).value
         front = (sign.diameter * 0.5 + face["thickness"] + SIGN_RAIL) * -1.0
-        plate = moved(plate, op.vector(tree, 0.0, front, sign.lower_edge + face["height"] * 0.5))
+        plate = move_geometry(plate, op.vector(tree, 0.0, front, sign.lower_edge + face["height"] * 0.5))
     mounting = _mounting(tree, sign, spread, long)
     with tree.frame("Put onto the points"):
         places = standing.places()
@@ -107,12 +107,12 @@ def _mounting(tree: Tree, sign: _Sign, spread: Value, long: Value) -> Value:
         # A little less deep than the gap: faces that coincide with the plate's have no first hit.
         bar = box(tree, op.vector(tree, face["width"] * long, SIGN_RAIL - 2.0 * _PLAY, SIGN_RAIL))
         depth = (sign.diameter + SIGN_RAIL) * -0.5
-        rails = put(row_of_points(tree, count), bar, op.vector(tree, 0.0, depth, level(op.index(tree))))
+        rails = put_on_points(row_of_points(tree, count), bar, op.vector(tree, 0.0, depth, level(op.index(tree))))
     with tree.frame("Clamps around the posts"):
         radius, height = sign.diameter * 0.5 + _CLAMP[0], _CLAMP[1]
         clamp = tube(tree, radius, height, 8)
         number = op.index(tree)
         beside = (((number % sign.posts) + 0.5) / sign.posts - 0.5) * face["width"]
         place = op.vector(tree, beside, 0.0, level(number // sign.posts) - height / 2.0)
-        clamps = put(row_of_points(tree, sign.posts * count), clamp, place)
-        return painted(op.join(rails, clamps), face["back_material"])
+        clamps = put_on_points(row_of_points(tree, sign.posts * count), clamp, place)
+        return paint_faces(op.join(rails, clamps), face["back_material"])

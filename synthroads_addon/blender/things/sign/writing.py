@@ -6,7 +6,7 @@ import bpy
 
 from ...nodes import operations as op
 from ...nodes.builder import Tree, node_group
-from ...nodes.solids import moved
+from ...nodes.solids import move_geometry
 
 LINES = 6
 """Most lines of writing on one face."""
@@ -74,6 +74,6 @@ def _build_line(tree: Tree) -> None:
         # The bounds of instances would be those of each letter.
         extent = tree.node("GeometryNodeBoundBox", op.realize(curves), use_radius=False)
         first, last = op.component(extent["Min"], "X"), op.component(extent["Max"], "X")
-        curves = moved(curves, op.vector(tree, -first))
+        curves = move_geometry(curves, op.vector(tree, -first))
     tree.output("Curves", curves, description="Outlines of the letters")
     tree.output("Length", last - first, description="Length of the line (m)")

@@ -120,9 +120,9 @@ def _beginnings(tree: Tree, shape: dict[str, Value], ground: Value, end: Value, 
 
 
 def _branches(tree: Tree, points: Value, thick: Value) -> Value:
-    along = op.named(tree, "end", "FLOAT_VECTOR") - op.position(tree)
+    along = op.named_attribute(tree, "end", "FLOAT_VECTOR") - op.position(tree)
     length = tree.node("ShaderNodeVectorMath", along, operation="LENGTH")["Value"]
-    width = thick * (1.0 - op.named(tree, "share") * 0.6)
+    width = thick * (1.0 - op.named_attribute(tree, "share") * 0.6)
     cone = tree.node(
         "GeometryNodeMeshCone",
         fill_type="NONE",
@@ -147,9 +147,9 @@ def _leaves(tree: Tree, branches: Value, shape: dict[str, Value], seed: Value, d
     number = op.index(tree)
     branch = number % shape["branches"]
     begin = op.sample_index(branches, op.position(tree), branch)
-    end = op.sample_index(branches, op.named(tree, "end", "FLOAT_VECTOR"), branch)
+    end = op.sample_index(branches, op.named_attribute(tree, "end", "FLOAT_VECTOR"), branch)
     along = 1.0 - op.random(tree, 0.0, 1.0, seed + 3) * shape["leafy_share"]
-    size = op.sample_index(branches, op.named(tree, "size"), branch)
+    size = op.sample_index(branches, op.named_attribute(tree, "size"), branch)
     radius = shape["cluster_radius"] * size * op.random(tree, 0.75, 1.25, seed + 5, branch)
     around = _in_ball(tree, seed + 4, number) * radius
     place = begin + (end - begin) * along + around
@@ -184,7 +184,7 @@ def _in_ball(tree: Tree, seed: Value, identifier: Value) -> Value:
     return direction * op.power(op.random(tree, 0.0, 1.0, seed + 100, identifier), 0.4)
 
 
-def grown(tree: Tree, plant: Value, seed: Value) -> Value:
+def bend_stems(tree: Tree, plant: Value, seed: Value) -> Value:
     """Return the plant with its stems bent a little, and exactly 1 high."""
     place = op.position(tree)
     bent = tree.node("ShaderNodeTexNoise", place, noise_dimensions="4D", w=seed, scale=2.5, detail=1.0)

@@ -7,7 +7,7 @@ import bpy
 from ....base.classes import class_id
 from ...nodes import operations as op
 from ...nodes.builder import Tree, Value, node_group
-from .plants import declare_stand, one_high, planted, points_in_band, points_on
+from .plants import declare_stand, one_high, plant_points, points_in_band, points_on
 
 _VARIANTS = 4
 _GOLDEN_ANGLE = 2.4
@@ -37,18 +37,18 @@ def _build(tree: Tree) -> None:
         points = points_in_band(tree, stand, stand.density * stand.detail)
         points = op.store(points, "share", 1.0)
     with tree.frame("Places on verges and median"):
-        roadside = op.named(tree, "class_id", "INT").equals(class_id("roadside"))
+        roadside = op.named_attribute(tree, "class_id", "INT").equals(class_id("roadside"))
         faces = op.separate(op.object_geometry(stand.road), roadside, "FACE")
         mown = points_on(tree, stand, faces, beside * stand.detail, near, stand.seed + 7)
         points = op.join(points, op.store(mown, "share", short))
     with tree.frame("Kinds of tufts"):
         variants = [tree.call(tuft_group(), **shape, seed=100 * n).value for n in range(_VARIANTS)]
     with tree.frame("Tufts"):
-        share = op.named(tree, "share")
+        share = op.named_attribute(tree, "share")
         height = op.random(tree, stand.lowest, stand.tallest, stand.seed + 3) * share
         # Low tufts are broad for their height. Fewer tufts are broader, so that they cover as much of the ground.
         broad = (height + stand.tallest * share) * 0.65 / op.unary("SQRT", op.maximum(stand.detail, 0.05))
-        mesh = planted(tree, stand, points, variants, op.vector(tree, broad, broad, height), 0.12)
+        mesh = plant_points(tree, stand, points, variants, op.vector(tree, broad, broad, height), 0.12)
         mesh = op.label(mesh, class_id("vegetation"), stand.instance, material)
     tree.output("Mesh", mesh, description="Grass; only faces that scanner and camera can see")
 
@@ -82,12 +82,12 @@ def _build_tuft(tree: Tree) -> None:
     seed = tree.integer("Seed", 0, (0, 2**30), description="Seed of the blades")
     with tree.frame("A blade"):
         disc = tree.node("GeometryNodeMeshCircle", vertices=3, fill_type="NGON").value
-        blade = _shaped(disc, _BLADE, shape["blade_width"])
+        blade = _shape_blade(disc, _BLADE, shape["blade_width"])
     with tree.frame("Blades, the outer ones lean more"):
         blades = _around(tree, blade, shape["blades"], shape["spread"], shape["lean"], seed)
     with tree.frame("A stalk with its ear"):
         face = tree.node("GeometryNodeMeshGrid", vertices_x=2, vertices_y=2).value
-        stalk = _shaped(face, _STALK, shape["ear_width"])
+        stalk = _shape_blade(face, _STALK, shape["ear_width"])
     with tree.frame("Stalks"):
         stalks = _around(tree, stalk, shape["stalks"], shape["spread"] * 0.6, shape["lean"] * 0.3, seed + 50)
     with tree.frame("Blades of their height, all 1 high"):
@@ -98,7 +98,7 @@ def _build_tuft(tree: Tree) -> None:
     tree.output("Mesh", tuft, description="The tuft's blades")
 
 
-def _shaped(face: Value, outline: list[tuple[float, float, float]], width: Value) -> Value:
+def _shape_blade(face: Value, outline: list[tuple[float, float, float]], width: Value) -> Value:
     tree = face.tree
     size = op.vector(tree, 1.0, width, 1.0)
     place = tree.node("ShaderNodeVectorMath", op.choose(op.index(tree), outline), size, operation="MULTIPLY").value

@@ -101,17 +101,17 @@ def points_on(
     metre = number // each
     # A number of its own for every place on the road, however much of the road is here.
     points = op.store(points, "id", (stand.first_metre + metre) * each + number % each)
-    own = op.named(tree, "id", "INT")
+    own = op.named_attribute(tree, "id", "INT")
     points = op.store(points, "station", (metre + first) + op.random(tree, 0.0, 1.0, seed + 11, own))
     points = op.store(points, "offset", op.random(tree, -1.0, 1.0, seed + 12, own) * reach)
-    station, offset = op.named(tree, "station"), op.named(tree, "offset")
+    station, offset = op.named_attribute(tree, "station"), op.named_attribute(tree, "offset")
     points = op.delete_points(points, (station < first_station(axis)) | (station > last_station(axis)))
     above = look_up(ribbon, "axis", station) + look_up(ribbon, "left", station) * offset + (0.0, 0.0, _ABOVE)
     points = op.set_position(points, above)
     ray = tree.node(
         "GeometryNodeRaycast",
         target_geometry=surface,
-        attribute=op.named(tree, "distance"),
+        attribute=op.named_attribute(tree, "distance"),
         source_position=op.position(tree),
         ray_length=2.0 * _ABOVE,
     )
@@ -129,7 +129,7 @@ def _integer(value: Value, least: int) -> Value:
     return value.tree.node("FunctionNodeIntegerMath", value, least, operation="MAXIMUM").value
 
 
-def planted(tree: Tree, stand: Stand, points: Value, variants: list[Value], height: Value, lean: float) -> Value:
+def plant_points(tree: Tree, stand: Stand, points: Value, variants: list[Value], height: Value, lean: float) -> Value:
     """Put one of the variants (of height 1) on each point, turned and leant at random, and make it real."""
     bodies = op.join(*(tree.node("GeometryNodeGeometryToInstance", variant).value for variant in variants))
     # A whole random number would be another one in Blender 5.

@@ -7,8 +7,8 @@ import bpy
 from ....base.classes import class_id
 from ...nodes import operations as op
 from ...nodes.builder import Tree, Value, node_group
-from .crown import crown_group, declare_crown, declare_materials, declare_plant, grown
-from .plants import declare_stand, planted, points_in_band
+from .crown import bend_stems, crown_group, declare_crown, declare_materials, declare_plant
+from .plants import declare_stand, plant_points, points_in_band
 
 # Kinds of one species: seed, and a factor on the crown's radius.
 _KINDS = ((5, 1.0), (17, 0.82), (29, 1.15))
@@ -46,7 +46,7 @@ def _build(tree: Tree) -> None:
         tall = op.random(tree, stand.lowest, stand.tallest, stand.seed + 3)
         broad = op.random(tree, 0.85, 1.25, stand.seed + 4)
         scale = op.vector(tree, tall * broad, tall * broad, tall)
-        mesh = planted(tree, stand, points, kinds, scale, _LEAN)
+        mesh = plant_points(tree, stand, points, kinds, scale, _LEAN)
         mesh = op.store(mesh, "class_id", class_id("vegetation"), "FACE")
         mesh = op.store(mesh, "instance_id", stand.instance, "FACE")
     tree.output("Mesh", mesh, description="Shrubs")
@@ -73,5 +73,5 @@ def _build_shape(tree: Tree) -> None:
     with tree.frame("Stems and leaves"):
         shrub = tree.call(crown_group(), **shape, **plant, branch_radius=radius, from_ground=True).value
     with tree.frame("Crooked, and 1 high"):
-        grown_up = grown(tree, shrub, plant["seed"])
+        grown_up = bend_stems(tree, shrub, plant["seed"])
     tree.output("Mesh", grown_up, description="The shrub, upright on the origin")

@@ -7,8 +7,8 @@ import bpy
 from ....base.classes import class_id
 from ...nodes import operations as op
 from ...nodes.builder import Tree, Value, node_group
-from .crown import crown_group, declare_crown, declare_materials, declare_plant, grown
-from .plants import declare_stand, planted, points_in_band
+from .crown import bend_stems, crown_group, declare_crown, declare_materials, declare_plant
+from .plants import declare_stand, plant_points, points_in_band
 
 # Kinds of one species: seed, and factors on the crown's bottom and radius.
 _KINDS = ((11, 1.0, 1.0), (23, 0.85, 0.86), (37, 1.2, 1.12))
@@ -38,7 +38,7 @@ def _build(tree: Tree) -> None:
         tall = op.random(tree, stand.lowest, stand.tallest, stand.seed + 3)
         slender = op.random(tree, 0.9, 1.15, stand.seed + 4)
         scale = op.vector(tree, tall * slender, tall * slender, tall)
-        mesh = planted(tree, stand, points, kinds, scale, _LEAN)
+        mesh = plant_points(tree, stand, points, kinds, scale, _LEAN)
         mesh = op.store(mesh, "class_id", class_id("vegetation"), "FACE")
         mesh = op.store(mesh, "instance_id", stand.instance, "FACE")
     tree.output("Mesh", mesh, description="Trees")
@@ -70,7 +70,7 @@ def _build_shape(tree: Tree) -> None:
     with tree.frame("Crown"):
         crown = tree.call(crown_group(), **shape, **plant, branch_radius=radius * 0.4).value
     with tree.frame("Crooked, and 1 high"):
-        grown_up = grown(tree, op.join(trunk, crown), plant["seed"])
+        grown_up = bend_stems(tree, op.join(trunk, crown), plant["seed"])
     tree.output("Mesh", grown_up, description="The tree, upright on the origin")
 
 

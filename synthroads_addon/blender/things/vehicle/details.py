@@ -9,7 +9,7 @@ import bpy
 
 from ...nodes import operations as op
 from ...nodes.builder import Tree, Value, node_group
-from ...nodes.solids import Point, box, moved, painted, put
+from ...nodes.solids import Point, box, move_geometry, paint_faces, put_on_points
 
 MATERIALS = {
     "paint": "Paint, in the vehicle's colour",
@@ -51,7 +51,7 @@ def wheels(
     points = tree.node("GeometryNodeMeshLine", count=len(stands)).value
     place = op.choose(op.index(tree), stands)
     turned = op.switch(op.component(place, "X") < 0.0, math.pi, 0.0)
-    return op.realize(put(points, wheel, place, rotation=op.turn(tree, z=turned)))
+    return op.realize(put_on_points(points, wheel, place, rotation=op.turn(tree, z=turned)))
 
 
 def pair(x: float, y: float) -> list[tuple[float, float]]:
@@ -90,7 +90,7 @@ def rod(
 def ball(tree: Tree, middle: Point, size: Point, material: Value) -> Value:
     """Return an ellipsoid of half axes `size`."""
     sphere = tree.node("GeometryNodeMeshUVSphere", segments=12, rings=8, radius=1.0).value
-    return painted(tree.node("GeometryNodeTransform", sphere, translation=middle, scale=size).value, material)
+    return paint_faces(tree.node("GeometryNodeTransform", sphere, translation=middle, scale=size).value, material)
 
 
 def smooth(vehicle: Value) -> Value:
@@ -121,7 +121,7 @@ def _build_wheel(tree: Tree) -> None:
         turned = op.vector(tree, -across, op.unary("COSINE", angle) * out, op.unary("SINE", angle) * out)
         wheel = op.without_degenerate(op.set_position(mesh, turned))
     with tree.frame("Tyre and rim"):
-        wheel = painted(wheel, rubber)
+        wheel = paint_faces(wheel, rubber)
         rim = (op.index(tree) % (len(_WHEEL) - 1)) < _RIM_FACES
         wheel = tree.node("GeometryNodeSetMaterial", wheel, rim, material=chrome).value
     tree.output("Mesh", wheel, description="The wheel")
@@ -137,10 +137,10 @@ def _build_box(tree: Tree) -> None:
     size = tree.input("Size", "Vector", description="Its size (m)")
     both, material = _declare_sides(tree)
     with tree.frame("Box"):
-        body = painted(moved(box(tree, size), middle), material)
+        body = paint_faces(move_geometry(box(tree, size), middle), material)
     with tree.frame("On the other side"):
-        other = moved(box(tree, size), _mirrored(middle))
-        body = op.join(body, op.only_if(both, painted(other, material)))
+        other = move_geometry(box(tree, size), _mirror(middle))
+        body = op.join(body, op.only_if(both, paint_faces(other, material)))
     tree.output("Mesh", body, description="The box")
 
 
@@ -169,12 +169,12 @@ def _build_rod(tree: Tree) -> None:
         ).value
         turned = tree.node("FunctionNodeAlignRotationToVector", vector=way, axis="Z").value
         body = tree.node("GeometryNodeTransform", cone, translation=first, rotation=turned).value
-        return painted(body, material)
+        return paint_faces(body, material)
 
     with tree.frame("Rod"):
         body = between(start, end)
     with tree.frame("On the other side"):
-        body = op.join(body, op.only_if(both, between(_mirrored(start), _mirrored(end))))
+        body = op.join(body, op.only_if(both, between(_mirror(start), _mirror(end))))
     tree.output("Mesh", body, description="The rod")
 
 
@@ -183,5 +183,5 @@ def _declare_sides(tree: Tree) -> tuple[Value, Value]:
     return both, tree.input("Material", "Material", description="Material of the faces")
 
 
-def _mirrored(place: Value) -> Value:
+def _mirror(place: Value) -> Value:
     return place.tree.node("ShaderNodeVectorMath", place, (-1.0, 1.0, 1.0), operation="MULTIPLY").value

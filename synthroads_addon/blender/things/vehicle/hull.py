@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ...nodes import operations as op
 from ...nodes.builder import Operand, Tree, Value
-from ...nodes.solids import painted
+from ...nodes.solids import paint_faces
 
 Float = NDArray[np.float64]
 
@@ -94,7 +94,7 @@ def hull(tree: Tree, shape: Hull, materials: Mapping[str, Value]) -> Value:
     across = op.dot(op.choose(step, _triples(_widths(shape.tumble))), widths) * side
     height = op.dot(op.choose(step, _triples(_LOWER)), lower) + op.dot(op.choose(step, _triples(_UPPER)), upper)
     mesh = op.set_position(mesh, op.vector(tree, across, op.component(place, "X"), height))
-    mesh = painted(mesh, materials["paint"])
+    mesh = paint_faces(mesh, materials["paint"])
     # Faces of a grid run column by column.
     number = op.index(tree)
     face_row, face_column = number % (len(table) - 1), number // (len(table) - 1)

@@ -73,18 +73,18 @@ def _build_on_wheels(tree: Tree) -> None:
             secondary_axis="X",
         ).value
         vehicles = tree.node("GeometryNodeInstanceOnPoints", points, instance=vehicle, rotation=rotation).value
-        place = op.named(tree, "vehicle_place", "FLOAT_VECTOR")
+        place = op.named_attribute(tree, "vehicle_place", "FLOAT_VECTOR")
         vehicles = tree.node("GeometryNodeSetPosition", vehicles, position=place).value
     with tree.frame("Labels"):
-        vehicles = op.store(vehicles, "vehicle_instance", op.named(tree, "instance", "INT"), "INSTANCE")
+        vehicles = op.store(vehicles, "vehicle_instance", op.named_attribute(tree, "instance", "INT"), "INSTANCE")
         vehicles = op.store(op.realize(vehicles), "class_id", class_id("vehicle"), "FACE")
-        vehicles = op.store(vehicles, "instance_id", op.named(tree, "vehicle_instance", "INT"), "FACE")
+        vehicles = op.store(vehicles, "instance_id", op.named_attribute(tree, "vehicle_instance", "INT"), "FACE")
     tree.output("Mesh", vehicles, description="Vehicles; each face has its own vehicle's instance number")
 
 
 def _axle(tree: Tree, road: Value, along: Value, track: Value) -> tuple[Value, Value]:
     """Return the middle between the road's points below an axle's wheels, and the way from the left to the right."""
-    heading = op.named(tree, "heading")
+    heading = op.named_attribute(tree, "heading")
     sine, cosine = op.unary("SINE", heading), op.unary("COSINE", heading)
     way, right = op.vector(tree, -sine, cosine), op.vector(tree, cosine, sine)
     left_wheel, right_wheel = (
@@ -100,7 +100,7 @@ def _on_road(road: Value, place: Value, way: Value) -> Value:
         "GeometryNodeRaycast", target_geometry=road, source_position=place + (0.0, 0.0, 500.0), ray_length=1000.0
     )
     nearest = op.sample_surface(road, op.position(tree), place)
-    beyond = op.component(nearest, "Z") + op.dot(place - nearest, way) * op.named(tree, "grade")
+    beyond = op.component(nearest, "Z") + op.dot(place - nearest, way) * op.named_attribute(tree, "grade")
     height = op.switch(ray["Is Hit"], beyond, op.component(ray["Hit Position"], "Z"))
     flat = tree.node("ShaderNodeVectorMath", place, (1.0, 1.0, 0.0), operation="MULTIPLY").value
     return flat + op.vector(tree, 0.0, 0.0, height)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from ml.centerline.data.axis import MeasuredAxis
-from ml.centerline.data.frames import Frames, along, displaced, estimated_path, read_path, sequences, wander
+from ml.centerline.data.frames import Frames, along, displace_frames, estimated_path, read_path, sequences, wander
 from synthroads_addon.base.errors import InputError
 
 RADIUS = 300.0
@@ -141,7 +141,7 @@ def test_wander_is_smooth_and_uniform() -> None:
 def test_displaced_frames_stay_in_their_window_and_turn_with_their_path() -> None:
     axis = arc(400.0)
     exact = along(axis)
-    moved = [displaced(exact, np.random.default_rng(seed), 12.0, 0.0, 100.0) for seed in range(20)]
+    moved = [displace_frames(exact, np.random.default_rng(seed), 12.0, 0.0, 100.0) for seed in range(20)]
     offsets = np.array([axis.project(frames.position)[1] for frames in moved])
     assert np.abs(offsets).max() <= 6.0 + 1e-3
     assert np.abs(offsets).max() > 5.0
@@ -151,9 +151,9 @@ def test_displaced_frames_stay_in_their_window_and_turn_with_their_path() -> Non
     heading = np.arctan2(path[:, 1], path[:, 0])
     between = 0.5 * (moved[0].direction[1:] + moved[0].direction[:-1])
     np.testing.assert_allclose(heading[5:-5], between[5:-5], atol=0.001)
-    turned = displaced(exact, np.random.default_rng(0), 0.0, 2.0, 100.0)
+    turned = displace_frames(exact, np.random.default_rng(0), 0.0, 2.0, 100.0)
     assert 0.1 < np.rad2deg(np.abs(turned.direction - exact.direction)).max() <= 4.0
-    again = displaced(exact, np.random.default_rng(0), 0.0, 2.0, 100.0)
+    again = displace_frames(exact, np.random.default_rng(0), 0.0, 2.0, 100.0)
     assert (again.direction == turned.direction).all()
 
 

@@ -9,7 +9,7 @@ import pytest
 
 from ml.centerline.data.axis import MeasuredAxis
 from ml.centerline.data.corridor import CORRIDOR, Truth, truths
-from ml.centerline.data.frames import Frames, along, displaced
+from ml.centerline.data.frames import Frames, along, displace_frames
 from synthroads_addon.base.errors import InputError
 from synthroads_addon.road.geometry import RoadGeometry
 from synthroads_addon.road.objects import WidthPoint
@@ -56,7 +56,7 @@ def test_whole_road_is_that_of_the_parameters(section: str) -> None:
 def test_frames_beside_the_axis_and_turned_see_the_road_where_it_is() -> None:
     truth = truths(parameters(), "road")[0]
     exact = on_the_axis(truth)
-    frames = displaced(exact, np.random.default_rng(3), 12.0, 2.0, 60.0)
+    frames = displace_frames(exact, np.random.default_rng(3), 12.0, 2.0, 60.0)
     there = truth.at(frames.position, frames.direction, zeros(frames) + 1.5)
     for name, line in (("left_edge", truth.left), ("right_edge", truth.right)):
         assert line is not None
@@ -71,7 +71,7 @@ def test_frames_beside_the_axis_and_turned_see_the_road_where_it_is() -> None:
 @pytest.mark.parametrize("kind", ["road", "carriageway"])
 def test_frames_against_the_road_see_it_turned_by_half(kind: str) -> None:
     for truth in truths(parameters(), kind):  # type: ignore[arg-type]
-        frames = displaced(on_the_axis(truth), np.random.default_rng(3), 12.0, 2.0, 60.0)
+        frames = displace_frames(on_the_axis(truth), np.random.default_rng(3), 12.0, 2.0, 60.0)
         there = truth.at(frames.position, frames.direction, zeros(frames))
         back = frames.turned_round()
         turned = truth.at(back.position, back.direction, zeros(frames))

@@ -26,7 +26,7 @@ from ml.centerline.data.effects import (
     transform,
     turn_round,
 )
-from ml.centerline.data.frames import along, displaced
+from ml.centerline.data.frames import along, displace_frames
 from ml.centerline.data.lighting import _waves
 from ml.centerline.data.slices import SliceSettings, stretch
 from synthroads_addon.base.errors import InputError
@@ -57,7 +57,7 @@ def cut(kind: str = "road", which: int = 0, seed: int = 4, spacing: int = 1) -> 
 def _cut(kind: str, which: int, seed: int, spacing: int) -> Stretch:
     road = roads(kind)[which]  # type: ignore[arg-type]
     assert road.truth is not None
-    frames = displaced(along(road.truth.axis), rng(seed), 12.0, 2.0, 100.0)
+    frames = displace_frames(along(road.truth.axis), rng(seed), 12.0, 2.0, 100.0)
     frames = frames.select(slice(40, 40 + 10 * spacing, spacing))
     return stretch(road, frames, SETTINGS.model_copy(update={"truth": kind}))
 

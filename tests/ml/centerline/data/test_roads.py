@@ -11,7 +11,7 @@ import pytest
 import torch
 
 from ml.centerline.data.effects import SequenceEffects
-from ml.centerline.data.roads import cropped, read_measured, read_scene, scene_folders
+from ml.centerline.data.roads import crop_road, read_measured, read_scene, scene_folders
 from ml.centerline.data.slices import SliceDataset, SliceSettings, collate
 from ml.points import Points
 from synthroads_addon.base.classes import class_scheme
@@ -27,9 +27,9 @@ REAL = Path(__file__).resolve().parents[4].parent / "shared" / "real"
 def test_cropping_a_road_leaves_its_axis_inside_but_not_in_the_middle() -> None:
     road = roads()[0]
     assert road.truth is not None
-    cut = cropped(road, 0.75, seed=1)
-    assert len(cut) == len(cropped(road, 0.75, seed=1))
-    assert not np.array_equal(cut.xyz, cropped(road, 0.75, seed=2).xyz)
+    cut = crop_road(road, 0.75, seed=1)
+    assert len(cut) == len(crop_road(road, 0.75, seed=1))
+    assert not np.array_equal(cut.xyz, crop_road(road, 0.75, seed=2).xyz)
     station, offset = road.truth.axis.project(cut.xyz)
     number = np.floor(station).astype(int) - int(np.floor(station.min()))
     high, low = np.full(number.max() + 1, -np.inf), np.full(number.max() + 1, np.inf)
@@ -45,10 +45,10 @@ def test_cropping_a_road_leaves_its_axis_inside_but_not_in_the_middle() -> None:
     assert abs(np.corrcoef(high[inner][1:], high[inner][:-1])[0, 1]) < 0.3
     whole = np.abs(road.truth.axis.project(road.xyz)[1]).max()
     assert 0.2 * whole < high[inner].min() < 0.4 * whole
-    long = cropped(road, 0.75, seed=1, length=20.0)
+    long = crop_road(road, 0.75, seed=1, length=20.0)
     assert len(long) != len(cut)
     with pytest.raises(InputError, match="crop"):
-        cropped(replace(road, truth=None), 0.5, 1)
+        crop_road(replace(road, truth=None), 0.5, 1)
 
 
 def write_scene(folder: Path) -> Points:

@@ -14,7 +14,7 @@ from torch.utils.data import DataLoader
 from ml.centerline.data.axis import MeasuredAxis
 from ml.centerline.data.corridor import CORRIDOR, Truth
 from ml.centerline.data.effects import SequenceEffects, Stretch, mirror, turn_round
-from ml.centerline.data.frames import Frames, along, displaced
+from ml.centerline.data.frames import Frames, along, displace_frames
 from ml.centerline.data.roads import LearningRoad
 from ml.centerline.data.slices import (
     FEATURE_LIMIT,
@@ -39,7 +39,7 @@ ALL_POINTS = SliceSettings(points_per_slice=100_000, half_width=18.0)
 def path_of(road: LearningRoad, seed: int = 4) -> Frames:
     assert road.truth is not None
     exact = along(road.truth.axis)
-    return displaced(exact, np.random.default_rng(seed), 12.0, 2.0, 100.0)
+    return displace_frames(exact, np.random.default_rng(seed), 12.0, 2.0, 100.0)
 
 
 def rng() -> np.random.Generator:

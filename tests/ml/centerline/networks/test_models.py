@@ -8,8 +8,8 @@ import torch
 
 from ml.centerline.data.axis import MeasuredAxis
 from ml.centerline.data.corridor import CORRIDOR
-from ml.centerline.data.frames import along, displaced
-from ml.centerline.data.mirroring import mirrored
+from ml.centerline.data.frames import along, displace_frames
+from ml.centerline.data.mirroring import mirror_batch
 from ml.centerline.networks.layers import DeformableKernelPoints, PointFeatures, cell_features, cell_sums
 from ml.centerline.networks.models import TARGETS, ModelOptions, both_ways, build
 from ml.centerline.networks.refinement import parabola
@@ -88,7 +88,7 @@ def test_only_single_sees_one_slice_alone(model):
 @torch.no_grad()
 def test_mirror_carries_over_exactly(model):
     one = batch(3)
-    here, there = both_ways(model, one), both_ways(model, mirrored(one))
+    here, there = both_ways(model, one), both_ways(model, mirror_batch(one))
     assert torch.equal(there["center"], -here["center"])
     assert torch.equal(there["center_std"], here["center_std"])
     left, right, heading = (CORRIDOR.index(name) for name in ("left_edge", "right_edge", "heading"))
@@ -97,12 +97,14 @@ def test_mirror_carries_over_exactly(model):
     assert torch.equal(there["corridor"][..., heading], -here["corridor"][..., heading])
     for name in ("lanes", "lane_width", "height"):
         assert torch.equal(there["corridor"][..., CORRIDOR.index(name)], here["corridor"][..., CORRIDOR.index(name)])
-    assert not torch.equal(model(mirrored(one))["center"], -model(one)["center"]), "without averaging it isn't exact"
+    assert not torch.equal(model(mirror_batch(one))["center"], -model(one)["center"]), (
+        "without averaging it isn't exact"
+    )
 
 
 def test_mirrored_twice_is_the_same():
     one = batch(2)
-    back = mirrored(mirrored(one))
+    back = mirror_batch(mirror_batch(one))
     assert all(torch.equal(back[name].nan_to_num(), one[name].nan_to_num()) for name in one)
 
 
@@ -154,7 +156,7 @@ def test_parabola_finds_the_direction_in_frames_that_wander(towards: float):
     turn = towards + np.linspace(0.0, 0.1, 200)
     axis = MeasuredAxis(300.0 * np.column_stack([np.sin(turn), 1.0 - np.cos(turn)]))
     exact = along(axis).select(slice(8, 18))
-    frames = displaced(exact, np.random.default_rng(2), window=12.0, direction_deg=3.0, length=100.0)
+    frames = displace_frames(exact, np.random.default_rng(2), window=12.0, direction_deg=3.0, length=100.0)
     y, station = axis.crossing(frames.position, frames.direction)
     frame = torch.from_numpy(np.column_stack([frames.position, frames.direction, 0.0 * y]))[None]
     center = torch.from_numpy(y).float()[None]

@@ -7,7 +7,7 @@ import pytest
 from numpy.typing import NDArray
 from skimage.morphology import skeletonize
 
-from ml.centerline.scores.skeleton import SkeletonSettings, averaged, centers, crossings, pruned
+from ml.centerline.scores.skeleton import SkeletonSettings, average_along, centers, crossings, prune_skeleton
 from synthroads_addon.base.random_streams import stream
 
 Float = NDArray[np.float64]
@@ -95,10 +95,10 @@ def comb(tooth: int, every: int = 20, length: int = 110) -> NDArray[np.bool_]:
 
 def test_short_branches_are_cut_and_long_ones_stay() -> None:
     image = comb(6)
-    without = pruned(skeletonize(image), 10.0)
+    without = prune_skeleton(skeletonize(image), 10.0)
     assert without[:, 4:].sum() == 0, "at most the junctions' pixels stay"
     assert without[25:75, 2:4].any(axis=1).all()
-    assert pruned(skeletonize(image), 4.0)[:, 3:].sum() >= 5 * 4
+    assert prune_skeleton(skeletonize(image), 4.0)[:, 3:].sum() >= 5 * 4
 
 
 def test_branches_of_branches_go_in_later_rounds() -> None:
@@ -106,8 +106,8 @@ def test_branches_of_branches_go_in_later_rounds() -> None:
     image[:, 5] = True
     image[50, 5:18] = True  # a branch of 12 pixels ...
     image[46:55, 17] = True  # ... with a fork at its end, whose arms are short
-    assert pruned(skeletonize(image), 10.0)[:, 7:].sum() >= 9, "the arms go, the branch stays"
-    assert pruned(skeletonize(image), 14.0)[:, 8:].sum() == 0, "then it ends freely and goes as well"
+    assert prune_skeleton(skeletonize(image), 10.0)[:, 7:].sum() >= 9, "the arms go, the branch stays"
+    assert prune_skeleton(skeletonize(image), 14.0)[:, 8:].sum() == 0, "then it ends freely and goes as well"
 
 
 def test_steps_in_a_line_are_no_junctions() -> None:
@@ -116,7 +116,7 @@ def test_steps_in_a_line_are_no_junctions() -> None:
     for width in (0, 1):
         image[row + 1, column + width] = True
     thin = skeletonize(image)
-    assert (pruned(thin, 15.0) == thin).all()
+    assert (prune_skeleton(thin, 15.0) == thin).all()
 
 
 def test_stairs_are_no_junctions_either() -> None:
@@ -125,38 +125,38 @@ def test_stairs_are_no_junctions_either() -> None:
     for step in range(20):
         image[10 + step, 4 + step : 6 + step] = True
     image[30:38, 24] = True
-    assert (pruned(image, 12.0) == image).all(), "the straight ends are no branches"
+    assert (prune_skeleton(image, 12.0) == image).all(), "the straight ends are no branches"
 
 
 def test_diagonal_branches_are_longer_than_their_pixels() -> None:
     image = np.zeros((101, 60), dtype=bool)
     image[:, 5] = True
     image[50 + np.arange(12), 6 + np.arange(12)] = True
-    assert pruned(skeletonize(image), 14.0)[:, 8:].sum() >= 8
-    assert pruned(skeletonize(image), 18.0)[:, 8:].sum() == 0
+    assert prune_skeleton(skeletonize(image), 14.0)[:, 8:].sum() >= 8
+    assert prune_skeleton(skeletonize(image), 18.0)[:, 8:].sum() == 0
 
 
 def test_specks_go_and_an_empty_skeleton_stays_empty() -> None:
     image = np.zeros((100, 40), dtype=bool)
     image[5:95, 5] = True
     image[20:25, 30] = True
-    found = pruned(image, 15.0)
+    found = prune_skeleton(image, 15.0)
     assert found[:, 5].sum() == 90
     assert found[:, 30].sum() == 0
-    assert pruned(np.zeros((10, 10), dtype=bool), 5.0).sum() == 0
+    assert prune_skeleton(np.zeros((10, 10), dtype=bool), 5.0).sum() == 0
 
 
 def test_averages_follow_the_principal_axis() -> None:
     along = np.arange(0.0, 50.0, 0.25)
     two = np.vstack([np.column_stack([along, along + side]) for side in (-3.0, 3.0)]) + 5e5
-    chain = averaged(two, 1.0, np.array([np.pi / 4]))
+    chain = average_along(two, 1.0, np.array([np.pi / 4]))
     assert len(chain) >= 65
     assert (np.diff(chain.sum(axis=1)) > 0).all()
-    back = averaged(two, 1.0, np.array([-3 * np.pi / 4]))
+    back = average_along(two, 1.0, np.array([-3 * np.pi / 4]))
     assert (np.diff(back.sum(axis=1)) < 0).all(), "in the path's order"
     inner = chain[5:-5] - 5e5
     assert np.abs(inner[:, 1] - inner[:, 0]).max() < 0.6
-    assert len(averaged(two[:1], 1.0, np.zeros(1))) == 0
+    assert len(average_along(two[:1], 1.0, np.zeros(1))) == 0
 
 
 def test_a_chain_is_crossed_between_its_points_and_not_in_its_gaps() -> None:

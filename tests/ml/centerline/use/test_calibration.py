@@ -7,7 +7,7 @@ import json
 import numpy as np
 import pytest
 
-from ml.centerline.use.calibration import DEVIATIONS, LEVELS, IntervalCalibration, calibrated
+from ml.centerline.use.calibration import DEVIATIONS, LEVELS, IntervalCalibration, calibrate_target
 from synthroads_addon.base.random_streams import stream
 
 
@@ -20,7 +20,7 @@ def _errors(kind: str, count: int, seed: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 def test_factor_of_gaussian_errors():
-    found = calibrated(*_errors("gauss", 5000, 1))
+    found = calibrate_target(*_errors("gauss", 5000, 1))
     assert found.factor == pytest.approx(2.0, rel=0.05)
     assert found.holds
     assert found.before[0] == pytest.approx(0.38, abs=0.03)
@@ -32,7 +32,7 @@ def test_factor_of_gaussian_errors():
 
 
 def test_heavy_tails_have_no_factor_but_intervals():
-    found = calibrated(*_errors("heavy", 5000, 1))
+    found = calibrate_target(*_errors("heavy", 5000, 1))
     assert not found.holds
     error, std = _errors("heavy", 5000, 2)
     for level, width in zip(LEVELS, found.widths, strict=True):
@@ -45,22 +45,22 @@ def test_heavy_tails_have_no_factor_but_intervals():
 def test_unknown_errors_do_not_count():
     error, std = _errors("gauss", 1000, 1)
     holes = np.concatenate([error, [np.nan, 0.1]]), np.concatenate([std, [0.1, np.nan]])
-    assert calibrated(*holes) == calibrated(error, std)
+    assert calibrate_target(*holes) == calibrate_target(error, std)
 
 
 def test_nothing_to_calibrate_with():
-    found = calibrated(np.full(3, np.nan), np.ones(3))
+    found = calibrate_target(np.full(3, np.nan), np.ones(3))
     assert found.factor == 1.0
     assert found.widths == DEVIATIONS
     assert not found.holds
 
 
 def test_errors_of_zero():
-    assert calibrated(np.zeros(10), np.ones(10)).factor == 1.0
+    assert calibrate_target(np.zeros(10), np.ones(10)).factor == 1.0
 
 
 def test_survives_json():
-    for found in (calibrated(*_errors("heavy", 100, 1)), IntervalCalibration()):
+    for found in (calibrate_target(*_errors("heavy", 100, 1)), IntervalCalibration()):
         data = found.to_dict() | {"after": [None if np.isnan(x) else x for x in found.after]}
         data["before"] = [None if np.isnan(x) else x for x in found.before]
         again = IntervalCalibration.from_dict(json.loads(json.dumps(data)))

@@ -13,12 +13,12 @@ import pytest
 from ml.centerline.data import strips
 from ml.centerline.data.axis import MeasuredAxis
 from ml.centerline.data.corridor import CORRIDOR
-from ml.centerline.data.frames import Frames, along, displaced
+from ml.centerline.data.frames import Frames, along, displace_frames
 from ml.centerline.data.roads import LearningRoad
 from ml.centerline.networks.models import TARGETS
 from ml.centerline.use.calibration import IntervalCalibration
 from ml.centerline.use.find_road import find_road
-from ml.centerline.use.predictor import CenterlinePredictor, Regression, UseOptions, errors, joined
+from ml.centerline.use.predictor import CenterlinePredictor, Regression, UseOptions, errors, join_line
 from ml.centerline.use.writing import Found, corridor_json, geojson
 from synthroads_addon.base.errors import InputError, MissingFileError
 from tests.helpers.clouds.centerline_batches import SETTINGS, small
@@ -42,7 +42,7 @@ def frames(first: float = 20.0, last: float = 100.0) -> Frames:
     assert road().truth is not None
     every = along(road().truth.axis)
     some = every.select((every.station >= first) & (every.station <= last))
-    return displaced(some, np.random.default_rng(4), 6.0, 1.0, 100.0)
+    return displace_frames(some, np.random.default_rng(4), 6.0, 1.0, 100.0)
 
 
 def test_columns_are_those_that_evaluations_want():
@@ -80,7 +80,7 @@ def test_frames_in_several_sequences_have_the_mean_by_inverse_variances(monkeypa
             )
 
     monkeypatch.setattr(ready, "_sequences", told)
-    monkeypatch.setattr("ml.centerline.use.predictor.joined", lambda frames, y, std, reach: y)
+    monkeypatch.setattr("ml.centerline.use.predictor.join_line", lambda frames, y, std, reach: y)
     found = ready.regress(road(), places)
     # 1 / 0.1^2 = 100 and 1 / 0.2^2 = 25: (100 x 2 + 25 x 5) / 125; the mean of the inverse variances is 62.5.
     np.testing.assert_allclose(found.center, [1.0, 2.6, 4.0])
@@ -256,22 +256,22 @@ def test_lines_of_interleaved_sequences_are_joined():
     )
     true, _ = known.crossing(places.position, places.direction)
     std = np.full(len(station), 0.1)
-    np.testing.assert_allclose(joined(places, true, std, 1), true, atol=1e-12)
-    np.testing.assert_allclose(joined(places, true, std, 4), true, atol=0.006)
+    np.testing.assert_allclose(join_line(places, true, std, 1), true, atol=1e-12)
+    np.testing.assert_allclose(join_line(places, true, std, 4), true, atol=0.006)
     jagged = true + 0.2 * (station % 4 == 0) - 0.05
     inner = np.r_[4:56, 64:86]
-    assert np.abs(joined(places, jagged, std, 4) - true)[inner].max() < 0.01
+    assert np.abs(join_line(places, jagged, std, 4) - true)[inner].max() < 0.01
     # Who isn't sure counts for little.
     std[station % 4 == 0] = 1.0
-    assert np.abs(joined(places, jagged, std, 4) - true + 0.05)[inner].max() < 0.01
+    assert np.abs(join_line(places, jagged, std, 4) - true + 0.05)[inner].max() < 0.01
     jagged[20] = np.nan
-    again = joined(places, jagged, std, 4)
+    again = join_line(places, jagged, std, 4)
     assert np.isnan(again[20])
     assert np.isfinite(np.delete(again, 20)).all()
     # Nothing crosses the gap.
     other = jagged.copy()
     other[60:] += 5.0
-    np.testing.assert_array_equal(joined(places, other, std, 4)[:60], again[:60])
+    np.testing.assert_array_equal(join_line(places, other, std, 4)[:60], again[:60])
 
 
 def test_what_was_found_is_remembered_by_points_and_frames(monkeypatch: pytest.MonkeyPatch):

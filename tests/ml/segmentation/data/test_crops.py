@@ -19,7 +19,7 @@ from ml.segmentation.data.crops import (
     Draw,
     Seeds,
     collate,
-    cut,
+    cut_crop,
 )
 from ml.segmentation.data.effects import MISSING_SIGMA, NO_EFFECTS, Crop, Effects, crop_of
 from ml.segmentation.data.tiles import CloudTile, Scaling, scalings
@@ -66,12 +66,12 @@ def test_items_have_pointcepts_keys_shapes_and_types() -> None:
 def test_a_crop_is_the_nearest_points_as_columns() -> None:
     tile = road_tile()
     middle = tile.coord[17]
-    crop = cut(tile, middle, 900, Scaling())
+    crop = cut_crop(tile, middle, 900, Scaling())
     away = np.hypot(*(tile.coord[:, :2] - middle[:2]).T)
     inside = np.hypot(*(crop.coord[:, :2] - middle[:2]).T)
     assert len(crop.coord) == 900
     assert inside.max() <= np.sort(away)[899] + 1e-6
-    assert len(cut(tile, middle, 10**6, Scaling()).coord) == len(tile)
+    assert len(cut_crop(tile, middle, 10**6, Scaling()).coord) == len(tile)
 
 
 def test_items_depend_on_seed_epoch_and_place_alone() -> None:
