@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -83,7 +84,13 @@ def built(parameters: RoadParameters, tolerance: float = 0.005, parts: tuple[str
     return Built(parameters, RoadGeometry(parameters), build_road(parameters, tolerance, 0.3, parts))
 
 
-@pytest.mark.parametrize(("design_class", "cross_section"), CASES)
+def cases() -> Iterator[Any]:
+    """Yield all cross-sections; every fourth is built in both Blenders."""
+    for number, case in enumerate(CASES):
+        yield case if number % 4 == 0 else pytest.param(*case, marks=pytest.mark.any_blender)
+
+
+@pytest.mark.parametrize(("design_class", "cross_section"), cases())
 def test_every_cross_section_follows_the_analytic_surface(design_class: str, cross_section: str) -> None:
     road = built(sample_road(everything(design_class, cross_section), 3))
     mesh = road.mesh("Road")

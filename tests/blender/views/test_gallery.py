@@ -25,7 +25,13 @@ def short_roads(tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.Mo
 
 
 @pytest.mark.usefixtures("short_roads")
-@pytest.mark.parametrize("only", ["materials-base_color", "materials-lit", "scene-rural-driver"])
+@pytest.mark.parametrize(
+    "only",
+    [
+        "materials-base_color",
+        *(pytest.param(name, marks=pytest.mark.any_blender) for name in ("materials-lit", "scene-rural-driver")),
+    ],
+)
 def test_a_picture_is_made(tmp_path: Path, only: str, capsys: pytest.CaptureFixture[str]) -> None:
     arguments = ["--output", str(tmp_path), "--only", only, "--width", "160", "--samples", "1"]
     assert command("gallery", arguments) == 0

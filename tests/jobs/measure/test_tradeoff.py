@@ -153,6 +153,7 @@ def test_relief_and_spacing_leave_their_errors(tmp_path: Path) -> None:
     assert 20.0 < thin < 100.0
 
 
+@pytest.mark.any_blender
 def test_heights_are_within_the_tolerance_but_where_the_pavement_changes_at_once() -> None:
     scenario = load_scenario("airborne-1000m", ["road.half_width=40"])
     parameters = sample_road(scenario.road, scenario.seed)

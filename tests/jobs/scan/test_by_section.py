@@ -62,6 +62,7 @@ def triangles_within(parameters: RoadParameters, low: float, high: float) -> dic
     return {int(i): {corner.tobytes() for corner in chosen[instance == i]} for i in np.unique(instance)}
 
 
+@pytest.mark.any_blender
 def test_a_stretch_has_the_whole_road_s_triangles() -> None:
     parameters, low, high = barriers(), 110.3, 190.9
     build_road(parameters, 0.005, 0.1)
@@ -155,6 +156,7 @@ def test_only_the_whole_model_can_be_saved(tmp_path: Path) -> None:
     assert not (tmp_path / "out").exists() or not list((tmp_path / "out").iterdir())
 
 
+@pytest.mark.any_blender
 @pytest.mark.parametrize(
     ("kind", "pitch", "beyond"), [("uav", 0.0, 40.0), ("uav", 30.0, 90.0), ("vehicle", 0.0, 600.0)]
 )
