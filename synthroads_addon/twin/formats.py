@@ -8,34 +8,65 @@ from __future__ import annotations
 
 import importlib.util
 from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
-from typing import Literal, get_args
+from typing import TYPE_CHECKING, Literal
 
 from ..base.errors import InputError, nearest_name
 from ..road.parameters import RoadParameters
 
-TwinFormat = Literal["cityjson", "ifc", "opendrive", "geojson"]
-TWIN_FORMATS: tuple[TwinFormat, ...] = get_args(TwinFormat)
-"""Every format; each is written by ``write_NAME(parameters, path, tolerance)`` of its module in `_WRITERS`."""
-_WRITERS = {
-    "cityjson": ".cityjson.writer",
-    "ifc": ".ifc.writer",
-    "opendrive": ".opendrive.writer",
-    "geojson": ".geojson",
+
+@dataclass(frozen=True)
+class FormatEntry:
+    """A format of the model.
+
+    Attributes:
+        label, description: for people.
+        file: name of the file.
+        module: module beside this one with ``write_NAME(parameters, path, tolerance)``.
+        package: package that it needs and that not every installation has.
+    """
+
+    label: str
+    description: str
+    file: str
+    module: str
+    package: str | None = None
+
+
+FORMATS = {
+    "cityjson": FormatEntry(
+        "CityJSON", "Surfaces and objects with their meaning (OGC CityJSON 2.0)", "twin.city.json", ".cityjson.writer"
+    ),
+    "ifc": FormatEntry(
+        "IFC",
+        "Alignment, pavement and furniture for building information models (IFC 4.3)",
+        "twin.ifc",
+        ".ifc.writer",
+        package="ifcopenshell",
+    ),
+    "opendrive": FormatEntry(
+        "OpenDRIVE",
+        "Lanes, markings, signs and objects for driving simulators (ASAM OpenDRIVE)",
+        "twin.xodr",
+        ".opendrive.writer",
+    ),
+    "geojson": FormatEntry(
+        "GeoJSON", "Lines, areas and points for geographic information systems", "twin.geojson", ".geojson"
+    ),
 }
-"""Modules with the functions that write the formats."""
+"""Every format by its name."""
+
+if TYPE_CHECKING:
+    TwinFormat = str
+else:
+    TwinFormat = Literal[tuple(FORMATS)]
+TWIN_FORMATS: tuple[TwinFormat, ...] = tuple(FORMATS)
 
 TOLERANCE = 0.005
 """Chord error of curved surfaces and lines that isn't asked for otherwise, m."""
 
-_FILES = {
-    "cityjson": "twin.city.json",
-    "ifc": "twin.ifc",
-    "opendrive": "twin.xodr",
-    "geojson": "twin.geojson",
-}
-_PACKAGES = {"ifc": "ifcopenshell"}
 _Writer = Callable[[RoadParameters, Path, float], None]
 
 
@@ -45,7 +76,7 @@ def twin_file_names(formats: Iterable[str]) -> tuple[str, ...]:
     Raises:
         InputError: a format is unknown.
     """
-    return tuple(_FILES[known_format(name)] for name in formats)
+    return tuple(FORMATS[known_format(name)].file for name in formats)
 
 
 def known_format(name: str) -> TwinFormat:
@@ -66,7 +97,7 @@ def missing_packages(name: str) -> str | None:
     Raises:
         InputError: the format is unknown.
     """
-    package = _PACKAGES.get(known_format(name))
+    package = FORMATS[known_format(name)].package
     return package if package and importlib.util.find_spec(package) is None else None
 
 
@@ -97,5 +128,5 @@ def write_twin(
     """
     check_formats(formats)
     for name, file_name in zip(formats, twin_file_names(formats), strict=True):
-        writer: _Writer = getattr(import_module(_WRITERS[name], __package__), f"write_{name}")
+        writer: _Writer = getattr(import_module(FORMATS[name].module, __package__), f"write_{name}")
         writer(parameters, folder / file_name, tolerance)

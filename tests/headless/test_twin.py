@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -70,7 +71,7 @@ def test_bad_input_is_one_line_and_nothing_is_written(
 def test_a_missing_package_is_named_with_its_extra(
     parameters: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setitem(twin._PACKAGES, "geojson", "no_such_package")
+    monkeypatch.setitem(twin.FORMATS, "geojson", replace(twin.FORMATS["geojson"], package="no_such_package"))
     assert twin.missing_packages("geojson") == "no_such_package"
     assert twin.missing_packages("cityjson") is None
     assert run(parameters, "--output", tmp_path / "out", "--twin", "cityjson,geojson") == 2

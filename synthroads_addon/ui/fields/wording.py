@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from ...cloud.layers import LAYERS
+from ...twin.formats import FORMATS
 
 LABELS = {
     "road.lane_changes.share": "Lane Drops and Gains",
@@ -80,10 +81,6 @@ NAMES = {
     "ply": "PLY",
     "e57": "E57",
     "npz": "NPZ",
-    "cityjson": "CityJSON",
-    "ifc": "IFC",
-    "opendrive": "OpenDRIVE",
-    "geojson": "GeoJSON",
     "rules": "By the Rules",
     "random": "At Random",
     "auto": "Automatic",
@@ -146,6 +143,8 @@ def value_name(path: str, value: str) -> str:
     """Return what the panel calls a value of a choice."""
     if path == "cloud.attributes":
         return LAYERS[value].label
+    if path == "twin":
+        return FORMATS[value].label
     return OWN_NAMES.get(path, {}).get(value) or NAMES.get(value) or title_case(value)
 
 

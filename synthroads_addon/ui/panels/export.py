@@ -18,7 +18,15 @@ from ...cloud.formats.registry import missing_package as cloud_package
 from ...cloud.tools.convert import convert, subsample
 from ...cloud.tools.display import BLOCK
 from ...road.parameters import RoadParameters
-from ...twin.formats import TOLERANCE, TWIN_FORMATS, check_formats, missing_packages, twin_file_names, write_twin
+from ...twin.formats import (
+    FORMATS,
+    TOLERANCE,
+    TWIN_FORMATS,
+    check_formats,
+    missing_packages,
+    twin_file_names,
+    write_twin,
+)
 from ..fields.numbers import exact
 from ..work.common import Sidebar, column, is_free
 from ..work.file_operator import FileOperator
@@ -33,12 +41,6 @@ _FORMATS = {
     ".ply": ("PLY", "Polygon file format, binary, points only"),
     ".e57": ("E57", "ASTM E57"),
     ".npz": ("NPZ", "NumPy arrays"),
-}
-_TWIN_LABELS = {
-    "cityjson": ("CityJSON", "Surfaces and objects with their meaning (OGC CityJSON 2.0)"),
-    "ifc": ("IFC", "Alignment, pavement and furniture for building information models (IFC 4.3)"),
-    "opendrive": ("OpenDRIVE", "Lanes, markings, signs and objects for driving simulators (ASAM OpenDRIVE)"),
-    "geojson": ("GeoJSON", "Lines, areas and points for geographic information systems"),
 }
 
 
@@ -149,7 +151,7 @@ class SYNTHROADS_OT_export_twin(FileOperator, bpy.types.Operator):
     filter_folder: bpy.props.BoolProperty(default=True, options={"HIDDEN"})
     formats: bpy.props.EnumProperty(
         name="Formats",
-        items=[(name, *_TWIN_LABELS[name]) for name in TWIN_FORMATS],
+        items=[(name, FORMATS[name].label, FORMATS[name].description) for name in TWIN_FORMATS],
         options={"ENUM_FLAG"},
         default={"cityjson"},
         description="Formats that are written",
@@ -247,14 +249,14 @@ def _draw_formats(layout: bpy.types.UILayout, context: bpy.types.Context, operat
         row = rows.row()
         row.enabled = name not in missing
         row.prop_enum(operator, "formats", name)
-    _say_what_is_missing(rows, context, {_TWIN_LABELS[name][0]: package for name, package in missing.items()})
+    _say_what_is_missing(rows, context, {FORMATS[name].label: package for name, package in missing.items()})
 
 
 def draw_missing(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     """Say which packages the chosen formats of scans need and don't find."""
     settings = context.scene.synthroads
     clouds = {_FORMATS[f".{name}"][0]: cloud_package(f".{name}") for name in sorted(settings.cloud.formats)}
-    twins = {_TWIN_LABELS[name][0]: missing_packages(name) for name in TWIN_FORMATS if name in settings.twin}
+    twins = {FORMATS[name].label: missing_packages(name) for name in TWIN_FORMATS if name in settings.twin}
     missing = {name: package for name, package in (clouds | twins).items() if package}
     _say_what_is_missing(layout, context, missing)
 

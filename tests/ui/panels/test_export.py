@@ -2,6 +2,7 @@
 
 import os
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -19,7 +20,7 @@ from synthroads_addon.cloud.formats.registry import ENDINGS
 from synthroads_addon.cloud.tools.convert import convert, subsample
 from synthroads_addon.twin import formats as twin
 from synthroads_addon.twin import geojson
-from synthroads_addon.twin.formats import TWIN_FORMATS, twin_file_names, write_twin
+from synthroads_addon.twin.formats import twin_file_names, write_twin
 from synthroads_addon.ui.panels import export, panels
 from tests.helpers.clouds.random_points import make_points
 from tests.helpers.scenes.fake_layout import FakeLayout, drawn
@@ -112,7 +113,10 @@ def test_the_model_is_of_the_edited_road(settings: Any, tmp_path: Path) -> None:
 
 
 def test_the_panel_knows_every_format() -> None:
-    assert set(export._TWIN_LABELS) == set(TWIN_FORMATS)
+    items = bpy.ops.synthroads.export_twin.get_rna_type().properties["formats"].enum_items
+    assert [(item.identifier, item.name) for item in items] == [
+        (name, entry.label) for name, entry in twin.FORMATS.items()
+    ]
 
 
 def test_models_are_replaced_only_if_asked_for(settings: Any, tmp_path: Path) -> None:
@@ -127,7 +131,7 @@ def test_models_are_replaced_only_if_asked_for(settings: Any, tmp_path: Path) ->
 
 
 def test_what_a_model_lacks_is_a_message(settings: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(twin, "_PACKAGES", {"ifc": "no_such_package"})
+    monkeypatch.setitem(twin.FORMATS, "ifc", replace(twin.FORMATS["ifc"], package="no_such_package"))
     with pytest.raises(RuntimeError, match="Build a road first"):
         bpy.ops.synthroads.export_twin(directory=str(tmp_path))
     build(settings)
@@ -172,7 +176,7 @@ def test_the_panel_has_its_buttons() -> None:
 
 
 def test_formats_that_cannot_be_written_say_what_they_need(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(twin, "_PACKAGES", {"ifc": "no_such_package"})
+    monkeypatch.setitem(twin.FORMATS, "ifc", replace(twin.FORMATS["ifc"], package="no_such_package"))
     layout, known = FakeLayout(), bpy.ops.synthroads.export_twin.get_rna_type()
     export._draw_formats(layout, bpy.context, SimpleNamespace(bl_rna=known, formats={"geojson"}))
     text = " ".join(layout.lines)
@@ -183,7 +187,7 @@ def test_formats_that_cannot_be_written_say_what_they_need(monkeypatch: pytest.M
 
 
 def test_the_output_panel_says_what_chosen_formats_need(settings: Any, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(twin, "_PACKAGES", {"ifc": "no_such_package"})
+    monkeypatch.setitem(twin.FORMATS, "ifc", replace(twin.FORMATS["ifc"], package="no_such_package"))
     monkeypatch.setattr(registry, "_PACKAGES", {".e57": "nor_this"})
     settings.twin, settings.cloud.formats = {"cityjson", "ifc"}, {"laz", "e57"}
     panel = next(one for one in panels.CLASSES if one.bl_idname == "SYNTHROADS_PT_output")
