@@ -87,7 +87,7 @@ def built(parameters: RoadParameters, tolerance: float = 0.005, parts: tuple[str
 def cases() -> Iterator[Any]:
     """Yield all cross-sections; every fourth is built in both Blenders."""
     for number, case in enumerate(CASES):
-        yield pytest.param(*case, marks=[pytest.mark.any_blender] if number % 4 else [])
+        yield pytest.param(*case.values, marks=[*case.marks, *([pytest.mark.any_blender] if number % 4 else [])])
 
 
 @pytest.mark.parametrize(("design_class", "cross_section"), cases())
