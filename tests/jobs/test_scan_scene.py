@@ -425,6 +425,7 @@ AS_BLENDER = "import runpy, sys; sys.argv[0] = 'blender'; runpy.run_path('headle
 """Runs the equivalent of ``blender -b -P headless/scan.py -- ...``."""
 
 
+@pytest.mark.any_blender
 @pytest.mark.parametrize("words", [["-m", "headless.scan"], ["-c", AS_BLENDER, "-b", "-P", "headless/scan.py", "--"]])
 def test_it_is_a_command_of_its_own(words: list[str], scene: Callable[[str], Path], tmp_path: Path) -> None:
     arguments = [scene(".glb"), "--output", tmp_path / "out", "--height", "30", *DRAFT, "--json"]

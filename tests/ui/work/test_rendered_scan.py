@@ -106,7 +106,7 @@ def test_the_scene_that_the_window_shows_is_scanned_as_it_is_now(road: Any, tmp_
     assert (bpy.data.filepath, Path(name).read_bytes()) == (name, saved)
 
 
-@pytest.mark.parametrize("when", ["begin", "later"])
+@pytest.mark.parametrize("when", ["begin", pytest.param("later", marks=pytest.mark.any_blender)])
 def test_a_cancelled_scan_leaves_nothing_and_no_process(
     road: Any,  # noqa: F811
     tmp_path: Path,
@@ -128,6 +128,7 @@ def test_a_cancelled_scan_leaves_nothing_and_no_process(
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.any_blender
 def test_its_error_is_one_line(road: Any, tmp_path: Path) -> None:  # noqa: F811
     choose(road, **NO_PICTURES)
     bpy.context.view_layer.layer_collection.children["SynthRoads"].exclude = True
@@ -151,6 +152,7 @@ def test_a_blender_that_is_missing_dies_or_fails_is_reported(tmp_path: Path) -> 
     assert not (tmp_path / "place").exists()
 
 
+@pytest.mark.any_blender
 def test_the_other_blender_ends_with_this_one(road: Any, tmp_path: Path) -> None:  # noqa: F811
     choose(road, **NO_PICTURES)
     asked = scan.asked_for(bpy.context)
