@@ -1,10 +1,14 @@
 """Points for the tests of cloud files."""
 
+from collections.abc import Iterator
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from synthroads_addon.cloud.points import PointBlock
+from synthroads_addon.cloud.layers import layer_arrays
+from synthroads_addon.cloud.points import FIELDS, PointBlock
 
 
 def with_every_attribute(points: PointBlock, seed: int = 1) -> PointBlock:
@@ -23,4 +27,12 @@ def with_every_attribute(points: PointBlock, seed: int = 1) -> PointBlock:
         metallic=rng.uniform(0, 1, count).astype(np.float32),
         specular=rng.uniform(0, 1, count).astype(np.float32),
         color_source=rng.integers(0, 256, count).astype(np.uint8),
+        more=dict(_other_layers(count, rng)),
     )
+
+
+def _other_layers(count: int, rng: np.random.Generator) -> Iterator[tuple[str, NDArray[Any]]]:
+    """Yield arrays of the layers that have no field of their own in `PointBlock`: 0 or 1, which every file can hold."""
+    for name, (kind, width) in layer_arrays().items():
+        if name not in FIELDS:
+            yield name, rng.integers(0, 2, (count, width) if width > 1 else count).astype(kind)
