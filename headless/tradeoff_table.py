@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
-from synthroads_addon.jobs.measure.tradeoff import ALIKE, KNOBS, seen_from
-from synthroads_addon.scenario.colour import image_scale
+from synthroads_addon.jobs.measure.tradeoff import ALIKE, KNOBS
+from synthroads_addon.scenario.colour import USUAL_RANGE, image_scale
 from synthroads_addon.scenario.scenario import load_scenario
 
 ROW_TITLES = {
@@ -105,7 +105,7 @@ def markdown(results: Sequence[Mapping[str, Any]], scenario: str) -> str:
         lines += [*left_out, ""] if left_out else []
     front = front_lines(results)
     lines += [*front, ""] if front else []
-    scale = image_scale(seen_from(load_scenario(scenario).scan.platform))
+    scale = image_scale(load_scenario(scenario).scan.platform.typical_range() or USUAL_RANGE)
     if scale != 1.0 and any(KNOBS[row["knob"]].table == "colours" for row in results):
         lines += [f"Spacings and pixels of images are for a range of 60 m; here they are {scale:.3g} times as large."]
     truths = dict.fromkeys(row["colour_truth"] for row in results if "colour_truth" in row)

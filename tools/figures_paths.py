@@ -22,8 +22,9 @@ sys.path.insert(0, str(ROOT))
 from synthroads_addon.road.geometry import RoadGeometry  # noqa: E402
 from synthroads_addon.road.parameters import AlignmentObject, HorizontalElement, VerticalPoint  # noqa: E402
 from synthroads_addon.sampling.road import sample_road  # noqa: E402
-from synthroads_addon.scanning.platforms.path import RoadGuide, make_path  # noqa: E402
+from synthroads_addon.scanning.platforms.guides import RoadGuide  # noqa: E402
 from synthroads_addon.scanning.platforms.platform import Platform  # noqa: E402
+from synthroads_addon.scanning.platforms.registry import make_platform  # noqa: E402
 from synthroads_addon.scenario.road import RoadScenario  # noqa: E402
 
 TARGET = ROOT / "docs" / "pictures" / "scan-paths.png"
@@ -81,7 +82,7 @@ def draw_road(axes: Axes, guide: RoadGuide) -> None:
 
 def draw_path(axes: Axes, guide: RoadGuide, platform: Platform) -> None:
     """Draw a platform's strips with arrows in the direction of travel."""
-    path = make_path(platform, guide)
+    path = platform.make_path(guide)
     for strip in path.strips:
         position, _ = path.pose(strip, strip.start_time + np.linspace(0.0, strip.duration, 1200))
         color = COLORS[strip.index % 2]
@@ -94,7 +95,7 @@ def draw_path(axes: Axes, guide: RoadGuide, platform: Platform) -> None:
 
 def draw_tripods(axes: Axes, guide: RoadGuide) -> None:
     """Mark the usual positions of a tripod."""
-    path = make_path(Platform(kind="tripod"), guide)
+    path = make_platform("tripod").make_path(guide)
     place = np.array([path.pose(strip, np.array([strip.start_time]))[0][0] for strip in path.strips])
     axes.plot(*place[:, :2].T, ls="", marker="^", color="#222222", ms=6)
     for number, (x, y) in enumerate(place[:, :2]):
@@ -108,7 +109,7 @@ def main() -> None:
     figure, grid = plt.subplots(2, 2, figsize=(13.0, 4.1), layout="constrained", sharex=True, sharey=True)
     for axes, (title, options) in zip(grid.ravel(), PANELS, strict=True):
         draw_road(axes, guide)
-        draw_path(axes, guide, Platform(**options))
+        draw_path(axes, guide, make_platform(**options))
         if options.get("kind") == "vehicle":
             draw_tripods(axes, guide)
         axes.set_title(title, size=10, loc="left")

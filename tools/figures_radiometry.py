@@ -226,7 +226,7 @@ def print_tables() -> None:
 
 
 def _print_weather(weather: Weather) -> None:
-    usual = weather.usual_visibility if weather.visibility is None else weather.visibility
+    usual = weather.usual["visibility"] if weather.visibility is None else weather.visibility
     rate = weather.rate_mm_h if isinstance(weather, Precipitation) else None
     measure = f"{usual:,.0f} m" if rate is None else f"{rate:g} mm/h"
     there_and_back = weather.attenuation(905.0)

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from importlib import import_module
 from pkgutil import iter_modules
-from typing import TypeVar
+from typing import Annotated, Any, TypeVar, Union
 
-from pydantic import BaseModel
+from pydantic import BaseModel, BeforeValidator, Field
 
 M = TypeVar("M", bound=BaseModel)
 _LAST = 1000
@@ -33,6 +33,31 @@ def discover_models(package: str, base: type[M], tag: str) -> dict[str, type[M]]
             raise ValueError(f"{models[name].__module__} and {model.__module__} both have the {tag} {name!r}")
         models[name] = model
     return models
+
+
+def discriminated_union(models: Mapping[str, type[BaseModel]], tag: str) -> Any:
+    """Return the type of a field that is one of several models; data without the tag are of the first.
+
+    A field that only other models have is refused with their names.
+
+    Args:
+        models: of `discover_models`.
+        tag: field by which they differ.
+    """
+
+    def prepare(data: Any) -> Any:
+        if not isinstance(data, dict):
+            return data
+        if data.get(tag) is None:
+            data = data | {tag: next(iter(models))}
+        model = models.get(str(data[tag]))
+        for key in data if model else ():
+            others = [name for name, other in models.items() if key in other.model_fields]
+            if others and data[tag] not in others:
+                raise ValueError(f"{key} can't be given for {data[tag]}, only for {', '.join(others)}")
+        return data
+
+    return Annotated[Union[tuple(models.values())], Field(discriminator=tag), BeforeValidator(prepare)]  # noqa: UP007
 
 
 def _place(pair: tuple[str, type[BaseModel]]) -> tuple[int, str]:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import cache
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, TypeVar, get_args
@@ -27,26 +27,50 @@ Finite = Annotated[float, Field(strict=True, ge=-1e8, le=1e8)]
 """A coordinate or a distance in a list, which has no declaration of its own."""
 
 
+def notes(
+    *,
+    unit: str = "",
+    only_with: Mapping[str, Sequence[Any]] | None = None,
+    inherits: str = "",
+    unset: str = "",
+    labels: Mapping[str, str] | None = None,
+) -> dict[str, Any]:
+    """Return what a field's declaration says beside its type: for the JSON Schema, and for the panel that follows it.
+
+    Args:
+        unit: ``m``, ``deg``, ``1``, ...
+        only_with: fields beside it and the values of theirs with which it has an effect; all of them are needed.
+        inherits: where its value comes from while it isn't given, e.g. ``fidelity.tolerance``.
+        unset: the same in two or three words, where it is no number.
+        labels: values of a choice, and what people call them.
+    """
+    said = {"unit": unit, "only_with": only_with, "inherits": inherits, "unset": unset, "labels": labels}
+    return {name: value for name, value in said.items() if value}
+
+
 def quantity(
     default: Any = ...,
     *,
     unit: str,
     description: str,
+    title: str | None = None,
     ge: float | None = None,
     gt: float | None = None,
     le: float | None = None,
     lt: float | None = None,
+    **further: Any,
 ) -> Any:
-    """Declare a numeric field with its unit (``m``, ``deg``, ``1``, ...) and limits."""
+    """Declare a numeric field with its unit (``m``, ``deg``, ``1``, ...) and limits; ``further`` are `notes`."""
     return Field(
         default,
+        title=title,
         description=description,
         ge=-LARGEST if ge is None and gt is None else ge,
         gt=gt,
         le=LARGEST if le is None and lt is None else le,
         lt=lt,
         strict=True,
-        json_schema_extra={"unit": unit},
+        json_schema_extra=notes(unit=unit, **further),
     )
 
 
@@ -209,10 +233,15 @@ def read_yaml(path: Path) -> Any:
         raise InputError(str(path), None, "must be valid YAML (a value is not what its tag says)") from None
 
 
+def note_of(field: FieldInfo, name: str) -> Any:
+    """Return one of the `notes` of a field's declaration, or None."""
+    extra = field.json_schema_extra
+    return extra.get(name) if isinstance(extra, dict) else None
+
+
 def unit_of(field: FieldInfo) -> str:
     """Return the unit declared by `quantity`, or an empty string."""
-    extra = field.json_schema_extra
-    return str(extra.get("unit", "")) if isinstance(extra, dict) else ""
+    return str(note_of(field, "unit") or "")
 
 
 def _refuse_constant(name: str) -> float:

@@ -23,10 +23,11 @@ from ..road.centerline import read_axis
 from ..road.geometry import RoadGeometry
 from ..road.parameters import RoadParameters
 from ..scanning.plan import ScanConditions
-from ..scanning.platforms.path import USUAL, PolylineGuide, RoadGuide, make_path
+from ..scanning.platforms.guides import RoadGuide
 from ..scanning.platforms.path import Path as ScanPath
-from ..scanning.platforms.trajectory import read_trajectory
-from ..scanning.platforms.tripod import PositionsPath
+from ..scanning.platforms.polyline import PolylineGuide
+from ..scanning.platforms.trajectory import RecordedTrajectory, read_trajectory
+from ..scanning.platforms.tripod import PositionsPath, Tripod
 from ..scanning.scene.extent import bounds, elevation_at, middle_line
 from ..scanning.scene.mesh import SceneMesh
 from ..scanning.scene.motion import ScannedScene
@@ -137,16 +138,16 @@ def check_scene_scan(job: SceneScan) -> ClassMapping | None:
         check_scene_file(job.scene, job.up)
     if not set(job.scenario.outputs) & set(OUTPUTS):
         raise InputError("outputs", list(job.scenario.outputs), f"must name at least one of {', '.join(OUTPUTS)}")
-    if job.tripods and platform.kind != "tripod":
-        raise InputError("scan.platform.kind", platform.kind, "must be tripod where its positions are given")
-    if job.path and (job.tripods or platform.kind == "trajectory"):
+    if job.tripods:
+        tripod = _tripod_of(job)
+        if tripod.height is not None and any(len(place) == 3 for place in job.tripods):
+            raise InputError("--height", tripod.height, "can't be given with a tripod whose z is the scanner's own")
+    if job.path and (job.tripods or isinstance(platform, RecordedTrajectory)):
         raise InputError("--path", str(job.path), "can't be given together with a trajectory or a tripod's positions")
     if job.path:
         read_axis(job.path)
-    if platform.kind == "trajectory" and platform.file:
+    if isinstance(platform, RecordedTrajectory) and platform.file:
         read_trajectory(platform.file)
-    if platform.height is not None and any(len(place) == 3 for place in job.tripods):
-        raise InputError("--height", platform.height, "can't be given with a tripod whose z is the scanner's own")
     scanner_setting(job.scenario.scan)
     job.scenario.own_materials()
     if job.epsg is not None:
@@ -184,13 +185,18 @@ def scene_path(job: SceneScan, mesh: SceneMesh, geometry: RoadGeometry | None) -
     """
     platform, origin = job.scenario.scan.platform, mesh.origin.tolist()
     if job.tripods:
-        return PositionsPath(platform, [_scanner_place(job, place, mesh) for place in job.tripods])
+        return PositionsPath(_tripod_of(job), [_scanner_place(job, place, mesh) for place in job.tripods])
     if geometry and not job.path:
-        return make_path(platform, RoadGuide(geometry))
-    if platform.lateral_offsets is None and platform.kind in ("uav", "airborne"):
-        platform = platform.model_copy(update={"lateral_offsets": (0.0,)})
+        return platform.make_path(RoadGuide(geometry))
     guide = PolylineGuide.read(job.path, origin) if job.path else PolylineGuide(middle_line(mesh), origin)
-    return make_path(platform, guide, origin)
+    return platform.as_single_strip().make_path(guide, origin)
+
+
+def _tripod_of(job: SceneScan) -> Tripod:
+    platform = job.scenario.scan.platform
+    if not isinstance(platform, Tripod):
+        raise InputError("scan.platform.kind", platform.kind, "must be tripod where its positions are given")
+    return platform
 
 
 def _scanner_place(job: SceneScan, place: tuple[float, ...], mesh: SceneMesh) -> list[float]:
@@ -202,8 +208,7 @@ def _scanner_place(job: SceneScan, place: tuple[float, ...], mesh: SceneMesh) ->
     if ground is None:
         shown = ",".join(f"{value:g}" for value in place)
         raise InputError("--tripod", shown, "there is no surface below: give the scanner's elevation, X,Y,Z")
-    height = job.scenario.scan.platform.height
-    return [*local, ground + (USUAL["tripod"].height if height is None else height)]
+    return [*local, ground + _tripod_of(job).value("height")]
 
 
 def scene_view(mesh: SceneMesh) -> TopView:

@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from ..base.random_streams import stream
 from ..base.rotations import rotation_matrix
 from ..base.schema import ClosedModel, quantity
-from .platforms.base import Strip
+from .platforms.path import Strip
 
 Float = NDArray[np.float64]
 
@@ -40,16 +40,37 @@ class Noise(ClosedModel):
 
     range_bias: float = quantity(0.0, ge=-1, le=1, unit="m", description="Systematic error of the range.")
     range_sigma: float | None = quantity(
-        None, ge=0, le=1, unit="m", description="Standard deviation of the range; the device's if not given."
+        None,
+        ge=0,
+        le=1,
+        unit="m",
+        title="Range",
+        description="Standard deviation of the range; the device's if not given.",
+        inherits="device.range_sigma",
     )
-    angle_sigma_mrad: float = quantity(0.0, ge=0, le=20, unit="mrad", description="Pointing error, each axis.")
-    position_sigma: float = quantity(0.0, ge=0, le=10, unit="m", description="Platform's position, each axis.")
-    attitude_sigma_deg: float = quantity(0.0, ge=0, le=5, unit="deg", description="Platform's roll and pitch.")
-    heading_sigma_deg: float = quantity(0.0, ge=0, le=5, unit="deg", description="Platform's heading.")
+    angle_sigma_mrad: float = quantity(
+        0.0, ge=0, le=20, unit="mrad", title="Angle (mrad)", description="Pointing error, each axis."
+    )
+    position_sigma: float = quantity(
+        0.0, ge=0, le=10, unit="m", title="Position", description="Platform's position, each axis."
+    )
+    attitude_sigma_deg: float = quantity(
+        0.0, ge=0, le=5, unit="deg", title="Roll, Pitch (°)", description="Platform's roll and pitch."
+    )
+    heading_sigma_deg: float = quantity(
+        0.0, ge=0, le=5, unit="deg", title="Heading (°)", description="Platform's heading."
+    )
     correlation_time: float = quantity(
-        30.0, gt=0, le=10_000, unit="s", description="Time in which a platform's errors fall to 1/e of correlation."
+        30.0,
+        gt=0,
+        le=10_000,
+        unit="s",
+        title="Correlated over",
+        description="Time in which a platform's errors fall to 1/e of correlation.",
     )
-    dropout: float = quantity(0.0, ge=0, le=1, unit="1", description="Share of the returns that is lost at random.")
+    dropout: float = quantity(
+        0.0, ge=0, le=1, unit="1", title="Lost Returns", description="Share of the returns that is lost at random."
+    )
 
 
 class TrajectoryNoise:

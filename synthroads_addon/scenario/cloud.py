@@ -25,13 +25,23 @@ class CloudScenario(ClosedModel):
     )
     classes: str = Field("17", min_length=1, description="17, 5, or a JSON file of classes of one's own.")
     point_spacing: float | None = quantity(
-        None, ge=0.001, le=10, unit="m", description="Grid of which one point per cell is kept; all if not given."
+        None,
+        ge=0.001,
+        le=10,
+        unit="m",
+        title="Thin Out to",
+        description="Grid of which one point per cell is kept; all if not given.",
+        unset="All points",
     )
     intensity: Intensity = Field(
         "received", description="As received, or times the squared range: what instruments call reflectance."
     )
     intensity_scale: float | None = quantity(
-        None, gt=0, unit="1", description="16-bit steps per unit of intensity; by the usual range if not given."
+        None,
+        gt=0,
+        unit="1",
+        description="16-bit steps per unit of intensity; by the usual range if not given.",
+        unset="By the range",
     )
 
     @model_validator(mode="after")

@@ -6,7 +6,7 @@ from typing import Any
 
 from pydantic import Field, model_validator
 
-from ..base.schema import ClosedModel, quantity
+from ..base.schema import ClosedModel, notes, quantity
 from ..scanning.colour.settings import ColourMode, ColourSettings, ColourSource, Engine, Lighting
 
 USUAL_RANGE = 60.0
@@ -24,30 +24,71 @@ class ColourScenario(ClosedModel):
 
     source: ColourSource = Field(
         "auto",
+        json_schema_extra=notes(labels={"material": "Material's Mean"}),
         description="Images along the path, a pixel per return (Blender 5.0 and newer), or each material's mean; "
         "auto takes a pixel per return where Blender has it.",
     )
-    rgb: bool = Field(True, description="Whether the points are coloured; without, RGB is 0 and needs no light.")
-    engine: Engine = Field("cycles", description="Renderer of the images.")
+    rgb: bool = Field(
+        True,
+        title="Coloured Points",
+        description="Whether the points are coloured; without, RGB is 0 and needs no light.",
+    )
+    engine: Engine = Field(
+        "cycles",
+        description="Renderer of the images.",
+        json_schema_extra=notes(only_with={"source": ("auto", "images", "returns")}),
+    )
     mode: ColourMode = Field(
         "lit",
+        title="RGB Shows",
         description="RGB under sun and sky, of the base colour, or of the layers: roughness, metallic, specular "
         "as red, green, blue.",
+        json_schema_extra=notes(only_with={"rgb": (True,)}),
     )
     lighting: Lighting = Field(
         "direct",
         description="Sun with shadows and an open sky, without noise; or whole light paths, which need more samples.",
+        json_schema_extra=notes(only_with={"source": ("auto", "images", "returns")}),
     )
     image_spacing: float | None = quantity(
-        None, ge=0.5, le=1000, unit="m", description="Distance between two images along the path."
+        None,
+        ge=0.5,
+        le=1000,
+        unit="m",
+        description="Distance between two images along the path.",
+        inherits="images.image_spacing",
+        only_with={"source": ("auto", "images")},
     )
     ground_sampling_distance: float | None = quantity(
-        None, ge=0.002, le=10, unit="m", description="Width of a pixel on the ground, or at the platform's usual range."
+        None,
+        ge=0.002,
+        le=10,
+        unit="m",
+        description="Width of a pixel on the ground, or at the platform's usual range.",
+        inherits="images.ground_sampling_distance",
+        only_with={"source": ("auto", "images")},
     )
-    samples: int | None = quantity(None, ge=1, le=4096, unit="1", description="Samples per pixel of the lit colours.")
-    max_resolution: int = quantity(4096, ge=16, le=16384, unit="px", description="Largest side of an image.")
+    samples: int | None = quantity(
+        None,
+        ge=1,
+        le=4096,
+        unit="1",
+        description="Samples per pixel of the lit colours.",
+        inherits="images.samples",
+        only_with={"source": ("auto", "images", "returns"), "lighting": ("path",)},
+    )
+    max_resolution: int = quantity(
+        4096,
+        ge=16,
+        le=16384,
+        unit="px",
+        description="Largest side of an image.",
+        only_with={"source": ("auto", "images")},
+    )
     intensity_from_layers: bool = Field(
-        False, description="Intensities from each point's own layers, in place of its material's means."
+        False,
+        description="Intensities from each point's own layers, in place of its material's means.",
+        json_schema_extra=notes(only_with={"source": ("auto", "images", "returns")}),
     )
 
     @model_validator(mode="after")

@@ -6,7 +6,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Discriminator, Field, Tag, model_validator
 
-from ..base.schema import ClosedModel, Finite, quantity
+from ..base.schema import ClosedModel, Finite, notes, quantity
 from ..road.guidelines import SECTIONS_OF_CLASS, STANDARD_CROSS_SECTIONS, USUAL_SECTION, design_class_of
 from ..road.section import SHORTEST_DASH
 from ..road.surroundings import GRASSES, SHRUBS, TREES
@@ -25,21 +25,22 @@ class Interval(ClosedModel):
         return self
 
 
-def interval(low: float, high: float, unit: str, description: str) -> Any:
+def interval(low: float, high: float, unit: str, description: str, title: str | None = None) -> Any:
     """Declare an interval with its default limits."""
-    return Field(Interval(minimum=low, maximum=high), description=description, json_schema_extra={"unit": unit})
+    limits = Interval(minimum=low, maximum=high)
+    return Field(limits, title=title, description=description, json_schema_extra=notes(unit=unit))
 
 
-def share(default: float, description: str) -> Any:
+def share(default: float, description: str, title: str | None = None) -> Any:
     """Declare a probability that a road (or a carriageway) has something."""
-    return quantity(default, ge=0, le=1, unit="1", description=description)
+    return quantity(default, ge=0, le=1, unit="1", title=title, description=description)
 
 
 class FreeCrossSection(ClosedModel):
     """One direction of a cross-section by hand, lanes from outside to inside."""
 
     lanes: tuple[Annotated[float, Field(strict=True, ge=2, le=6)], ...] = Field(
-        min_length=1, max_length=8, description="Widths of the lanes, m.", json_schema_extra={"unit": "m"}
+        min_length=1, max_length=8, description="Widths of the lanes, m.", json_schema_extra=notes(unit="m")
     )
     hard_shoulder: float = quantity(2.5, ge=0, le=6, unit="m", description="Width of the hard shoulder.")
     outer_edge_strip: float = quantity(0.5, ge=0.3, le=2, unit="m", description="Width of the outer edge strip.")
@@ -65,8 +66,10 @@ CrossSection = Annotated[
 class LaneChangeLimits(ClosedModel):
     """Lane drops and gains."""
 
-    share: float = share(0.25, "Probability that a carriageway of three lanes or more drops or gains one.")
-    taper_length: Interval = interval(80.0, 200.0, "m", "Length over which a lane begins or ends.")
+    share: float = share(
+        0.25, "Probability that a carriageway of three lanes or more drops or gains one.", title="Lane Drops and Gains"
+    )
+    taper_length: Interval = interval(80.0, 200.0, "m", "Length over which a lane begins or ends.", title="Their Taper")
 
 
 class TurnoutLimits(ClosedModel):
@@ -89,11 +92,11 @@ class TurnoutLimits(ClosedModel):
 class PavementLimits(ClosedModel):
     """Pavement of the carriageways, and its damage."""
 
-    concrete: float = share(0.2, "Probability of a concrete pavement.")
-    rutted: float = share(0.3, "Probability that a carriageway's outer lane is rutted.")
+    concrete: float = share(0.2, "Probability of a concrete pavement.", title="Concrete Pavement")
+    rutted: float = share(0.3, "Probability that a carriageway's outer lane is rutted.", title="Ruts in the Outer Lane")
     rut_depth: Interval = interval(0.004, 0.025, "m", "Depth of ruts.")
     rut_width: Interval = interval(0.6, 1.0, "m", "Width of a wheel track.")
-    potholes_per_km: Interval = interval(0.0, 8.0, "1/km", "Potholes per km of carriageway.")
+    potholes_per_km: Interval = interval(0.0, 8.0, "1/km", "Potholes per km of carriageway.", title="Potholes (per km)")
     pothole_size: Interval = interval(0.1, 0.8, "m", "Diameters of potholes.")
     pothole_depth: Interval = interval(0.01, 0.06, "m", "Depth of potholes.")
 
@@ -102,10 +105,20 @@ class MarkingLimits(ClosedModel):
     """Line markings; what isn't given follows the RMS."""
 
     lane_dash: float | None = quantity(
-        None, ge=SHORTEST_DASH, le=100, unit="m", description="Dash of lane lines; 6 m by the RMS."
+        None,
+        ge=SHORTEST_DASH,
+        le=100,
+        unit="m",
+        description="Dash of lane lines; 6 m by the RMS.",
+        inherits="rms.lane_dash",
     )
     lane_gap: float | None = quantity(
-        None, ge=SHORTEST_DASH, le=100, unit="m", description="Gap of lane lines; 12 m by the RMS."
+        None,
+        ge=SHORTEST_DASH,
+        le=100,
+        unit="m",
+        description="Gap of lane lines; 12 m by the RMS.",
+        inherits="rms.lane_gap",
     )
     film_thickness: Interval = interval(0.0015, 0.004, "m", "Thickness of the film.")
 
@@ -113,14 +126,18 @@ class MarkingLimits(ClosedModel):
 class BarrierLimits(ClosedModel):
     """Guardrails, concrete barriers and noise barriers."""
 
-    median: bool = Field(True, description="A barrier in the median.")
-    roadside: bool = Field(True, description="Barriers at the edges, by the safety rules.")
-    concrete_median: float = share(0.3, "Probability that the median's barrier is of concrete.")
-    concrete_roadside: float = share(0.1, "Probability that a roadside barrier is of concrete.")
+    median: bool = Field(True, title="In the Median", description="A barrier in the median.")
+    roadside: bool = Field(True, title="At the Edges", description="Barriers at the edges, by the safety rules.")
+    concrete_median: float = share(
+        0.3, "Probability that the median's barrier is of concrete.", title="Of Concrete in the Median"
+    )
+    concrete_roadside: float = share(
+        0.1, "Probability that a roadside barrier is of concrete.", title="Of Concrete at the Edges"
+    )
     guardrail_height: Interval = interval(0.75, 0.9, "m", "Top of guardrails.")
-    noise_barrier: float = share(0.25, "Probability of a noise barrier beside a carriageway.")
-    noise_barrier_height: Interval = interval(2.5, 6.0, "m", "Height of noise barriers.")
-    noise_barrier_length: Interval = interval(100.0, 800.0, "m", "Length of noise barriers.")
+    noise_barrier: float = share(0.25, "Probability of a noise barrier beside a carriageway.", title="Noise Barriers")
+    noise_barrier_height: Interval = interval(2.5, 6.0, "m", "Height of noise barriers.", title="Their Height")
+    noise_barrier_length: Interval = interval(100.0, 800.0, "m", "Length of noise barriers.", title="Their Length")
 
 
 class FurnitureLimits(ClosedModel):
@@ -130,30 +147,37 @@ class FurnitureLimits(ClosedModel):
     delineators: bool = Field(True, description="Delineator posts.")
     gantries: float = share(0.3, "Probability of a gantry, where no spacing is given.")
     gantry_spacing: float | None = quantity(
-        None, ge=1, le=10_000, unit="m", description="Spacing of gantries; they then stand all along."
+        None,
+        ge=1,
+        le=10_000,
+        unit="m",
+        description="Spacing of gantries; they then stand all along.",
+        unset="Single ones",
     )
     gantry_clearance: Interval = interval(5.0, 5.8, "m", "Clearance under gantries.")
-    lighting: float = share(0.15, "Probability of lighting poles.")
-    lighting_spacing: Interval = interval(35.0, 50.0, "m", "Spacing of lighting poles.")
-    lighting_height: Interval = interval(10.0, 14.0, "m", "Height of lighting poles.")
-    surveillance: float = share(0.2, "Probability of a surveillance pole.")
-    surveillance_height: Interval = interval(8.0, 15.0, "m", "Height of surveillance poles.")
-    traffic_lights: float = share(0.3, "Probability that an entry is metered by traffic lights.")
+    lighting: float = share(0.15, "Probability of lighting poles.", title="Lighting Poles")
+    lighting_spacing: Interval = interval(35.0, 50.0, "m", "Spacing of lighting poles.", title="Their Spacing")
+    lighting_height: Interval = interval(10.0, 14.0, "m", "Height of lighting poles.", title="Their Height")
+    surveillance: float = share(0.2, "Probability of a surveillance pole.", title="Surveillance Pole")
+    surveillance_height: Interval = interval(8.0, 15.0, "m", "Height of surveillance poles.", title="Its Height")
+    traffic_lights: float = share(
+        0.3, "Probability that an entry is metered by traffic lights.", title="Traffic Lights at an Entry"
+    )
     kilometre_boards: bool = Field(True, description="Kilometre boards every 500 m.")
     emergency_phones: bool = Field(True, description="Emergency phones every 2 km.")
-    cabinets_per_km: Interval = interval(0.0, 3.0, "1/km", "Utility cabinets per km.")
+    cabinets_per_km: Interval = interval(0.0, 3.0, "1/km", "Utility cabinets per km.", title="Cabinets (per km)")
     overpass: float = share(0.15, "Probability of an overpass.")
-    overpass_clearance: Interval = interval(4.7, 5.6, "m", "Clearance under an overpass.")
-    overpass_width: Interval = interval(6.0, 14.0, "m", "Width of an overpass.")
+    overpass_clearance: Interval = interval(4.7, 5.6, "m", "Clearance under an overpass.", title="Its Clearance")
+    overpass_width: Interval = interval(6.0, 14.0, "m", "Width of an overpass.", title="Its Width")
     construction_zone: float = share(0.1, "Probability that a carriageway long enough has a construction zone.")
-    construction_length: Interval = interval(120.0, 400.0, "m", "Length of a construction zone.")
+    construction_length: Interval = interval(120.0, 400.0, "m", "Length of a construction zone.", title="Its Length")
 
 
 class VehicleLimits(ClosedModel):
     """Traffic."""
 
-    per_km: Interval = interval(0.0, 25.0, "1/km", "Vehicles per km of carriageway.")
-    trucks: Interval = interval(0.1, 0.35, "1", "Share of trucks, semitrailers and buses.")
+    per_km: Interval = interval(0.0, 25.0, "1/km", "Vehicles per km of carriageway.", title="Vehicles (per km)")
+    trucks: Interval = interval(0.1, 0.35, "1", "Share of trucks, semitrailers and buses.", title="Share of Trucks")
     speed: Interval = interval(22.0, 36.0, "m/s", "Speed of cars; trucks drive at most 25 m/s.")
 
 
@@ -174,7 +198,7 @@ class EnvironmentLimits(ClosedModel):
     sun_azimuth_deg: Interval = interval(0.0, 360.0, "deg", "Direction of the sun, clockwise from north.")
     sun_elevation_deg: Interval = interval(20.0, 62.0, "deg", "Height of the sun.")
     cloud_cover: Interval = interval(0.0, 0.6, "1", "Share of the ground in clouds' shadow.")
-    wet: float = share(0.15, "Probability of a wet road.")
+    wet: float = share(0.15, "Probability of a wet road.", title="Wet Road")
     wetness: Interval = interval(0.3, 1.0, "1", "Wetness of a wet road.")
     bad_weather: float = share(0.15, "Probability of haze, fog, rain, snow or dust.")
 
@@ -200,25 +224,45 @@ class RoadScenario(ClosedModel):
         "EKA1A", description="Design class (RAA); if not given, the first that has the cross-section."
     )
     cross_section: CrossSection = Field(
-        "RQ31", description="Standard cross-section, or one by hand; if not given, EKA2 has RQ28 and EKA3 RQ25."
+        "RQ31",
+        title="Cross-Section",
+        description="Standard cross-section, or one by hand; if not given, EKA2 has RQ28 and EKA3 RQ25.",
     )
     lanes: int | None = quantity(
-        None, ge=1, le=8, unit="1", description="Lanes per direction; the cross-section's if not given."
+        None,
+        ge=1,
+        le=8,
+        unit="1",
+        title="Lanes Each Way",
+        description="Lanes per direction; the cross-section's if not given.",
+        inherits="section.lanes",
     )
     lane_width: float | None = quantity(
-        None, ge=2, le=6, unit="m", description="Width of every lane; the cross-section's if not given."
+        None,
+        ge=2,
+        le=6,
+        unit="m",
+        description="Width of every lane; the cross-section's if not given.",
+        inherits="section.lane_width",
     )
     median_width: float | None = quantity(
-        None, ge=0.5, le=40, unit="m", description="Width of the median; the cross-section's if not given."
+        None,
+        ge=0.5,
+        le=40,
+        unit="m",
+        description="Width of the median; the cross-section's if not given.",
+        inherits="section.median_width",
     )
     length: float = quantity(600.0, ge=1, le=200_000, unit="m", description="Length of the centreline.")
     radius: Interval | None = Field(
         None,
         description="Radii of curves; from the class's smallest to 5000 m if not given.",
-        json_schema_extra={"unit": "m"},
+        json_schema_extra=notes(unit="m", inherits="design_class.radius"),
     )
     grade_percent: Interval | None = Field(
-        None, description="Longitudinal grades; the class's if not given.", json_schema_extra={"unit": "%"}
+        None,
+        description="Longitudinal grades; the class's if not given.",
+        json_schema_extra=notes(unit="%", inherits="design_class.grade_percent"),
     )
     placement: Literal["rules", "random"] = Field(
         "rules", description="Furniture by the safety rules, or at random within its limits."
@@ -230,22 +274,36 @@ class RoadScenario(ClosedModel):
     barriers: BarrierLimits = Field(BarrierLimits(), description="Guardrails and other barriers.")
     furniture: FurnitureLimits = Field(FurnitureLimits(), description="Signs, gantries, equipment.")
     vehicles: VehicleLimits = Field(VehicleLimits(), description="Traffic.")
-    embankment_height: Interval = interval(-4.0, 5.0, "m", "Mean height of the road above the ground.")
+    embankment_height: Interval = interval(
+        -4.0, 5.0, "m", "Mean height of the road above the ground.", title="Embankment"
+    )
     undulation: Interval = interval(0.05, 0.8, "m", "Standard deviation of the ground.")
     wavelength: Interval = interval(30.0, 60.0, "m", "Shortest wavelength of the ground's undulation.")
     batter_slope: Interval = interval(1.5, 2.5, "m/m", "Run of the batter per height.")
-    half_width: float = quantity(78.0, ge=5, le=1000, unit="m", description="Reach built to either side.")
-    elevation_model: str | None = Field(
-        None, description="File of a digital elevation model (GeoTIFF, ESRI ASCII grid) instead of generated ground."
+    half_width: float = quantity(
+        78.0, ge=5, le=1000, unit="m", title="Reach Each Side", description="Reach built to either side."
     )
-    epsg: int = quantity(25832, ge=1024, le=99_999_999, unit="1", description="Map coordinate system.")
+    elevation_model: str | None = Field(
+        None,
+        description="File of a digital elevation model (GeoTIFF, ESRI ASCII grid) instead of generated ground.",
+        json_schema_extra=notes(unset="Generated"),
+    )
+    epsg: int = quantity(
+        25832, ge=1024, le=99_999_999, unit="1", title="EPSG Code", description="Map coordinate system."
+    )
     map_origin: tuple[Finite, Finite, Finite] = Field(
         (294_000.0, 5_628_000.0, 180.0),
-        description="Map coordinates (east, north, elevation) of the local origin, m.",
+        title="Map Origin", description="Map coordinates (east, north, elevation) of the local origin, m.",
     )
-    grass_density: float = quantity(0.8, ge=0, le=50, unit="1/m2", description="Tufts of grass per area.")
-    shrubs_per_hectare: float = quantity(60.0, ge=0, le=5000, unit="1/ha", description="Shrubs per hectare.")
-    trees_per_hectare: float = quantity(40.0, ge=0, le=2000, unit="1/ha", description="Trees per hectare.")
+    grass_density: float = quantity(
+        0.8, ge=0, le=50, unit="1/m2", title="Grass (per m²)", description="Tufts of grass per area."
+    )
+    shrubs_per_hectare: float = quantity(
+        60.0, ge=0, le=5000, unit="1/ha", title="Shrubs (per ha)", description="Shrubs per hectare."
+    )
+    trees_per_hectare: float = quantity(
+        40.0, ge=0, le=2000, unit="1/ha", title="Trees (per ha)", description="Trees per hectare."
+    )
     vegetation: VegetationLimits = Field(VegetationLimits(), description="Species and sizes of plants.")
     environment: EnvironmentLimits = Field(EnvironmentLimits(), description="Light and weather.")
     materials: MaterialLimits = Field(MaterialLimits(), description="Variation of materials.")

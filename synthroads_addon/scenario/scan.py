@@ -6,10 +6,10 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, model_validator
 
-from ..base.schema import quantity
+from ..base.schema import notes, quantity
 from ..scanning.devices.device import DeviceChoice, ScannerSetting, load_device, setting_of
 from ..scanning.noise import Noise
-from ..scanning.platforms.platform import Platform
+from ..scanning.platforms.registry import PlatformModel, make_platform
 from ..scanning.weather.registry import WeatherModel
 
 _RingRays = Annotated[int, Field(ge=3, le=60)]
@@ -18,30 +18,57 @@ _RingRays = Annotated[int, Field(ge=3, le=60)]
 class ScanScenario(DeviceChoice):
     """How the road is scanned. What isn't given is the device's own value."""
 
-    platform: Platform = Field(Platform(), description="Platform and path.")
+    platform: PlatformModel = Field(make_platform(), description="Platform and path.")
     noise: Noise = Field(Noise(), description="Measurement noise.")
     relief: float = quantity(
-        1.0, ge=0, le=100, unit="1", description="Strength of the surfaces' micro-relief in the cloud; 0 is none."
+        1.0,
+        ge=0,
+        le=100,
+        unit="1",
+        title="Micro-Relief",
+        description="Strength of the surfaces' micro-relief in the cloud; 0 is none.",
     )
     relief_octaves: int | None = quantity(
-        None, ge=1, le=8, unit="1", description="Octaves of the micro-relief; the fidelity's if not given."
+        None,
+        ge=1,
+        le=8,
+        unit="1",
+        description="Octaves of the micro-relief; the fidelity's if not given.",
+        inherits="fidelity.relief_octaves",
     )
     reflection: Literal["lambert", "oren_nayar"] = Field("lambert", description="How rough surfaces reflect.")
     attenuation: float | None = quantity(
-        None, ge=0, le=1, unit="1/m", description="Attenuation per metre of range (there and back); else the weather's."
+        None,
+        ge=0,
+        le=1,
+        unit="1/m",
+        description="Attenuation per metre of range (there and back); else the weather's.",
+        unset="The weather's",
     )
-    weather: WeatherModel | None = Field(None, description="Weather; the road's own if not given.")
+    weather: WeatherModel | None = Field(
+        None, description="Weather; the road's own if not given.", json_schema_extra=notes(unset="The road's")
+    )
     rays_per_pulse: Literal[1, 7, 19, 37, 61] | None = Field(
-        None, description="Rays that sample a pulse's footprint; the fidelity's if not given."
+        None,
+        description="Rays that sample a pulse's footprint; the fidelity's if not given.",
+        json_schema_extra=notes(inherits="fidelity.rays_per_pulse"),
     )
     beam_rings: tuple[_RingRays, ...] | None = Field(
-        None, max_length=6, description="Rays on each ring around the beam's axis, instead of rays_per_pulse."
+        None,
+        max_length=6,
+        description="Rays on each ring around the beam's axis, instead of rays_per_pulse.",
+        json_schema_extra=notes(unset="By the rays"),
     )
     beam: Literal["conical", "cylindrical"] = Field(
         "conical", description="Rays diverge from the aperture, or run parallel over the footprint at the first hit."
     )
     traffic_speed_factor: float = quantity(
-        1.0, ge=0, le=10, unit="1", description="Factor on the vehicles' speeds; 0 stops the traffic."
+        1.0,
+        ge=0,
+        le=10,
+        unit="1",
+        title="Speed of Traffic",
+        description="Factor on the vehicles' speeds; 0 stops the traffic.",
     )
     section_length: float | None = quantity(
         None,
@@ -49,7 +76,7 @@ class ScanScenario(DeviceChoice):
         le=1e6,
         unit="m",
         description="Roads longer than two of these are built and scanned section by section; if not given, roads of "
-        "more than 5 km by sections of 500 m.",
+        "more than 5 km by sections of 500 m.", unset="500 m beyond 5 km",
     )
     caster: Literal["auto", "embree", "bvhtree"] = Field("auto", description="How rays are cast.")
     threads: int = quantity(0, ge=0, le=1024, unit="1", description="Threads; 0 uses every core.")

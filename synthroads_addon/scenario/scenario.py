@@ -11,7 +11,7 @@ from pydantic import Field, field_validator
 
 from ..base.errors import InputError, nearest_name
 from ..base.files import PRESETS
-from ..base.schema import ClosedModel, Model, quantity, read_json
+from ..base.schema import ClosedModel, Model, notes, quantity, read_json
 from ..base.typed_text import typed_value
 from ..materials.table import Material, material_table_path, read_material_table
 from ..twin.formats import TwinFormat
@@ -41,10 +41,22 @@ class Scenario(ClosedModel):
     seed: int = quantity(1, ge=0, le=2**63 - 1, unit="1", description="Seed of everything random.")
     fidelity: Literal["draft", "standard", "high"] = Field("standard", description="Point on the trade-off.")
     geometric_tolerance: float | None = quantity(
-        None, ge=1e-4, le=1, unit="m", description="Chord error of the model; the fidelity's if not given."
+        None,
+        ge=1e-4,
+        le=1,
+        unit="m",
+        title="Model's Tolerance",
+        description="Chord error of the model; the fidelity's if not given.",
+        inherits="fidelity.tolerance",
     )
     vegetation_detail: float | None = quantity(
-        None, ge=0, le=1, unit="1", description="Share of the vegetation built; the fidelity's if not given."
+        None,
+        ge=0,
+        le=1,
+        unit="1",
+        title="Plants Built",
+        description="Share of the vegetation built; the fidelity's if not given.",
+        inherits="fidelity.vegetation_detail",
     )
     tolerance: Tolerance | None = Field(
         None, description="Largest errors; the cheapest settings that keep them are chosen, but for knobs given here."
@@ -53,17 +65,22 @@ class Scenario(ClosedModel):
         None, gt=0, le=1e7, unit="s", description="Time for the whole job; the best settings that fit it are chosen."
     )
     materials_table: str | None = Field(
-        None, description="JSON file, or shipped table, of materials in place of the usual ones of the same names."
+        None,
+        title="Table of Your Own",
+        description="JSON file, or shipped table, of materials in place of the usual ones of the same names.",
+        json_schema_extra=notes(unset="The shipped ones"),
     )
     road: RoadScenario = Field(RoadScenario(), description="The road's limits.")
     scan: ScanScenario = Field(ScanScenario(), description="The scan.")
     colour: ColourScenario = Field(ColourScenario(), description="Colours and material layers.")
     cloud: CloudScenario = Field(CloudScenario(), description="The cloud's files and what they hold.")
     outputs: tuple[Output, ...] = Field(
-        OUTPUTS, description="Files wanted; nothing is computed that none of them needs."
+        OUTPUTS, title="Files", description="Files wanted; nothing is computed that none of them needs."
     )
 
-    twin: tuple[TwinFormat, ...] = Field((), description="Formats of the geometric-semantic model that are wanted.")
+    twin: tuple[TwinFormat, ...] = Field(
+        (), title="Semantic Model", description="Formats of the geometric-semantic model that are wanted."
+    )
 
     @field_validator("time_budget", mode="before")
     @classmethod
@@ -165,11 +182,11 @@ def with_changes(data: Any, changes: Iterable[tuple[str, Any]]) -> Any:
 
     What the scenario said itself and doesn't fit them any more gives way, see `without_what_gives_way`.
     """
-    named = set()
+    before, named = data, set()
     for path, value in changes:
         data = apply_values(data, {path: value})
         named.add(path)
-    return without_what_gives_way(data, named)
+    return without_what_gives_way(data, before, named)
 
 
 def apply_change(data: Any, change: str, model: type[Model] = Scenario) -> Any:

@@ -165,7 +165,7 @@ def test_fields_say_all_that_is_to_be_known(capsys: Capture) -> None:
         "maximum": 5000,
         "required": False,
         "default": None,
-        "description": "Height above the road, or above the ground below a tripod.",
+        "description": "Height above the road.",
     }
     assert by_path["fidelity"]["allowed"] == ["draft", "standard", "high"]
     assert by_path["road.undulation.minimum"]["unit"] == "m"

@@ -24,7 +24,7 @@ from synthroads_addon.cloud.formats.registry import open_cloud
 from synthroads_addon.jobs.scan_scene import SceneScan, scan_scene, scene_path
 from synthroads_addon.road.geometry import RoadGeometry
 from synthroads_addon.sampling.road import sample_road
-from synthroads_addon.scanning.platforms.path import USUAL
+from synthroads_addon.scanning.platforms.tripod import Tripod
 from synthroads_addon.scenario.scenario import Scenario, load_scenario
 from tests.helpers.scenes.scene_hash import digest
 
@@ -214,7 +214,7 @@ def test_tripods_stand_on_the_surface_or_where_they_are_put(scene: Callable[[str
     job = replace(job, tripods=((-15, -5, 2.8),), scenario=scenario)
     assert np.allclose(scene_path(job, scene_mesh(), None).positions, [[-15, -5, 2.8]])
     job = replace(job, tripods=((-15, -5),))
-    assert np.allclose(scene_path(job, scene_mesh(), None).positions, [[-15, -5, 1.0 + USUAL["tripod"].height]])
+    assert np.allclose(scene_path(job, scene_mesh(), None).positions, [[-15, -5, 1.0 + Tripod.usual["height"]]])
 
 
 @pytest.fixture

@@ -31,9 +31,8 @@ from synthroads_addon.road.parameters import RoadParameters, read_parameters
 from synthroads_addon.road.things.signs import SignCatalogue
 from synthroads_addon.sampling.road import sample_road
 from synthroads_addon.scanning.devices.device import load_device, setting_of
-from synthroads_addon.scanning.platforms.path import make_path
-from synthroads_addon.scanning.platforms.platform import Platform
 from synthroads_addon.scanning.platforms.polyline import PolylineGuide
+from synthroads_addon.scanning.platforms.registry import make_platform
 from synthroads_addon.scenario.assets import LIBRARIES, read_asset_library
 from synthroads_addon.scenario.road import RoadScenario
 from synthroads_addon.scenario.scenario import Scenario, apply_change, load_scenario, parsed_change
@@ -172,7 +171,7 @@ def test_axes_in_geojson(put: Put, count: int) -> None:
 
 def use_trajectory(path: Path) -> None:
     guide = PolylineGuide(np.array(LINE)[:, :2] - LINE[0][:2], [*LINE[0][:2], 0.0])
-    route = make_path(Platform(kind="trajectory", file=str(path)), guide, [*LINE[0][:2], 0.0])
+    route = make_platform(kind="trajectory", file=str(path)).make_path(guide, [*LINE[0][:2], 0.0])
     for strip in route.strips:
         place, _ = route.pose(strip, np.linspace(strip.start_time, strip.start_time + strip.duration, 9))
         assert np.isfinite(place).all()

@@ -17,6 +17,30 @@ def test_changes_are_applied_and_unknown_keys_named() -> None:
     assert Scenario.from_dict(load_scenario("rq31-600m").to_dict()) == load_scenario("rq31-600m")
 
 
+def test_a_platform_has_the_fields_of_its_kind_only() -> None:
+    with pytest.raises(
+        InputError, match=r"scan\.platform: speed can't be given for tripod, only for uav, vehicle, airborne"
+    ):
+        Scenario.from_dict({"scan": {"platform": {"kind": "tripod", "speed": 3.0}}})
+    with pytest.raises(InputError, match=r"scan\.platform\.kind is 'uvv': must be one of .*did you mean 'uav'"):
+        Scenario.from_dict({"scan": {"platform": {"kind": "uvv"}}})
+    assert Scenario.from_dict({"scan": {"platform": {"height": 3.0}}}).scan.platform.kind == "uav"
+
+
+def test_another_kind_of_platform_or_weather_begins_anew() -> None:
+    mounted = "scan.platform.pitch_deg=10"
+    vehicle = load_scenario("rq31-600m", [mounted, "scan.platform.kind=vehicle"]).scan.platform
+    assert (vehicle.kind, vehicle.height, vehicle.lateral_offsets, vehicle.pitch_deg) == ("vehicle", None, None, 10.0)
+    changes = ["scan.platform.height=2.5", "scan.platform.kind=vehicle"]
+    for order in (changes, changes[::-1]):
+        assert load_scenario("rq31-600m", order).scan.platform.height == 2.5
+    assert load_scenario("rq31-600m", ["scan.platform.kind=uav"]) == load_scenario("rq31-600m")
+    fog = load_scenario(
+        "rq31-600m", ['scan.weather={"condition": "rain", "rate_mm_h": 5}', "scan.weather.condition=fog"]
+    )
+    assert fog.scan.weather.to_dict() == {"condition": "fog"}
+
+
 TYPED = {
     "cloud.classes=5": "5",
     'cloud.classes="5"': "5",

@@ -6,8 +6,6 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
-from ...scanning.platforms.path import USUAL
-from ...scanning.platforms.platform import Platform
 from ...scenario.colour import USUAL_RANGE, image_scale
 from ...scenario.scenario import Scenario, load_scenario
 
@@ -130,17 +128,11 @@ def row_scenario(scenario: str, knob: str, value: Any, changes: Iterable[str] = 
     What a knob doesn't change is as in the standard fidelity, so that its errors aren't drowned by those of a coarser
     one. Spacings and pixels of images are those for a range of 60 m, and farther apart and coarser from farther away.
     """
-    scale = image_scale(seen_from(load_scenario(scenario).scan.platform))
+    scale = image_scale(load_scenario(scenario).scan.platform.typical_range() or USUAL_RANGE)
     base = () if KNOBS[knob].table == "presets" else ("fidelity=standard",)
     return load_scenario(
         scenario, [*base, *changes, *(_scale_change(change, scale) for change in KNOBS[knob].rows[value])]
     )
-
-
-def seen_from(platform: Platform) -> float:
-    """Return the usual distance of a platform to what it scans, m."""
-    usual = USUAL.get(platform.kind)
-    return usual.seen_from(platform.height or usual.height) if usual else USUAL_RANGE
 
 
 def _scale_change(change: str, scale: float) -> str:

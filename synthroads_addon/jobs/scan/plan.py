@@ -12,8 +12,8 @@ from ...road.geometry import RoadGeometry
 from ...scanning.beam import RINGS
 from ...scanning.colour.request import LayerRequest
 from ...scanning.plan import ScanConditions, ScanPlan, SceneServices
+from ...scanning.platforms.guides import RoadGuide
 from ...scanning.platforms.path import Path as ScanPath
-from ...scanning.platforms.path import RoadGuide, make_path
 from ...scanning.relief import micro_relief
 from ...scanning.scene.motion import ScannedScene
 from ...scanning.scene.target import Target
@@ -68,7 +68,7 @@ def plan_scan(
         wanted=(kept & optional_arrays("scan")) | ({"normal", "material"} if shifts else set()),
         targets=bool(coloured) or by_layers or shifts,
         detects_later=by_layers,
-        driven=scan.platform.kind == "vehicle",
+        driven=scan.platform.driven,
         coloured=coloured,
         kept=kept,
         means=surfaces_of(means),
@@ -110,7 +110,7 @@ def may_render(scenario: Scenario) -> bool:
 
 def road_path(scenario: Scenario, geometry: RoadGeometry) -> ScanPath:
     """Return the scanner's path along a road."""
-    return make_path(scenario.scan.platform, RoadGuide(geometry))
+    return scenario.scan.platform.make_path(RoadGuide(geometry))
 
 
 def road_view(geometry: RoadGeometry) -> TopView:

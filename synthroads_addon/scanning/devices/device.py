@@ -30,11 +30,22 @@ class DeviceChoice(ClosedModel):
     """A device and how it is set. What isn't given is the device's own value."""
 
     device: str = Field("riegl-minivux-3uav", description="Device preset or file.")
-    pulse_rate_khz: float | None = quantity(None, gt=0, le=5000, unit="kHz", description="Pulse repetition rate.")
-    field_of_view_deg: float | None = quantity(None, gt=0, le=360, unit="deg", description="Field of view.")
-    lines_per_second: float | None = quantity(None, gt=0, le=1000, unit="1/s", description="Scan lines per second.")
+    pulse_rate_khz: float | None = quantity(
+        None, gt=0, le=5000, unit="kHz", description="Pulse repetition rate.", inherits="device.pulse_rate_khz"
+    )
+    field_of_view_deg: float | None = quantity(
+        None, gt=0, le=360, unit="deg", description="Field of view.", inherits="device.field_of_view_deg"
+    )
+    lines_per_second: float | None = quantity(
+        None, gt=0, le=1000, unit="1/s", description="Scan lines per second.", inherits="device.lines_per_second"
+    )
     angle_step_deg: float | None = quantity(
-        None, gt=0, le=90, unit="deg", description="Angle between two pulses; instead of the lines per second."
+        None,
+        gt=0,
+        le=90,
+        unit="deg",
+        description="Angle between two pulses; instead of the lines per second.",
+        inherits="device.angle_step_deg",
     )
 
 

@@ -1,60 +1,114 @@
-"""Platforms that move along a guide: UAV, airborne and vehicle."""
+"""Platforms that move along a guide at a constant speed over ground: what they share, and level flight."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import lru_cache
+from typing import Literal
 
 import numpy as np
+from pydantic import Field
 
 from ...base.errors import InputError
 from ...base.rotations import rotation_matrix
-from .base import KNOT_RANGE, USUAL, Strip, knots_for, mounting, strips_of
+from ...base.schema import Finite, notes, quantity
 from .guides import Float, Guide, SmoothedGuide
+from .path import KNOT_RANGE, Strip, knots_for, strips_of
 from .platform import Platform
 from .strip_line import Eased, StripTrack, Sway
-
-AXLES = 3.0
-"""Distance between a vehicle's axles, m: its pitch is that of the line through both."""
-WHEELS = 1.6
-"""Distance between a vehicle's left and right wheels, m: its roll is that of the line through both."""
 
 _HEIGHT_STEP = 1.0  # m
 _ATTITUDE_STEP = 5.0  # m
 _TRACKS_KEPT = 4
 
 
-class MovingPath:
-    """Strips along a guide at a constant speed over ground.
+class MovingPlatform(Platform):
+    """Platform that moves along a guide, in strips."""
 
-    An aircraft flies level at its height above the guide's elevation, its nose along the path. A vehicle drives on the
-    undamaged surface at its offset, and stands on it with four wheels.
+    height: float | None = quantity(
+        None, ge=0.1, le=5000, unit="m", description="Height above the road."
+    )
+    speed: float | None = quantity(None, ge=0.1, le=150, unit="m/s", description="Speed over ground.")
+    lateral_offsets: tuple[Finite, ...] | None = Field(
+        None,
+        min_length=1,
+        max_length=64,
+        title="Strips at (m)",
+        description="Offset of each strip from the centreline, m.",
+        json_schema_extra=notes(unset="In the lanes"),
+    )
+    path: Literal["direct", "smoothed", "zigzag"] = Field(
+        "direct",
+        description="Along the centreline, along a polynomial fitted to it, or swaying about it.",
+        json_schema_extra=notes(labels={"direct": "Along the Centreline"}),
+    )
+    polynomial_degree: int = quantity(
+        3,
+        ge=1,
+        le=9,
+        unit="1",
+        description="Degree of the smoothed path's polynomials.",
+        only_with={"path": ("smoothed",)},
+    )
+    zigzag_amplitude: float = quantity(
+        5.0, ge=0, le=500, unit="m", description="Sway to either side.", only_with={"path": ("zigzag",)}
+    )
+    zigzag_wavelength: float = quantity(
+        100.0, ge=5, le=5000, unit="m", description="Length of a sway.", only_with={"path": ("zigzag",)}
+    )
+
+    def make_path(self, guide: Guide, origin: Sequence[float] | None = None) -> MovingPath:
+        """Return the strips; see `Platform.make_path`."""
+        return MovingPath(self, guide)
+
+    def runs_forward(self, strip: int, offset: float) -> bool:
+        """Return whether a strip, at an offset (m), is gone along with the stations."""
+        raise NotImplementedError
+
+
+class AerialPlatform(MovingPlatform):
+    """Platform that flies level at its height above the guide's elevation, its nose along the path."""
+
+    there_and_back: bool = Field(True, description="Every second strip against the stations.")
+
+    def runs_forward(self, strip: int, offset: float) -> bool:
+        """Return whether a strip is flown along with the stations."""
+        return strip % 2 == 0 or not self.there_and_back
+
+    def as_single_strip(self) -> AerialPlatform:
+        """Return the platform with one strip on its guide, unless offsets are given."""
+        return self if self.lateral_offsets is not None else self.model_copy(update={"lateral_offsets": (0.0,)})
+
+
+class MovingPath:
+    """Strips along a guide at a constant speed over ground, level at the platform's height above the guide.
+
+    What moves otherwise says so by `heights` and `attitudes`.
 
     Attributes:
         strips: in the order of time.
+        height: of the scanner above what it follows, m.
         knot_spacing: s, see `Path`.
         typical_range: m, see `Path`.
         deviation: largest horizontal distance of the path's form from the guide and its offsets, m: that of the
             fitted polynomials, or the sway.
 
     Args:
-        platform: uav, airborne or vehicle.
+        platform: what moves.
         guide: what to follow.
 
     Raises:
         InputError: a strip would turn back on itself, or leaves what is known of the ground.
     """
 
-    def __init__(self, platform: Platform, guide: Guide) -> None:
-        usual = USUAL[platform.kind]
-        self._vehicle = platform.kind == "vehicle"
+    def __init__(self, platform: MovingPlatform, guide: Guide) -> None:
         self._guide, self._sway, self.deviation = _form(platform, guide)
-        self._offsets = platform.lateral_offsets or usual.lateral_offsets or self._guide.driving_offsets()
-        self._forward = [self._runs_forward(platform, i) for i in range(len(self._offsets))]
-        self._height = usual.height if platform.height is None else platform.height
-        self._speed = usual.speed if platform.speed is None else platform.speed
-        self._mounting = mounting(platform)
+        self._offsets: tuple[float, ...] = platform.value("lateral_offsets") or self._guide.driving_offsets()
+        self._forward = [platform.runs_forward(strip, offset) for strip, offset in enumerate(self._offsets)]
+        self.height, self._speed = float(platform.value("height")), float(platform.value("speed"))
+        self._mounting = platform.mounting()
         self._named = platform.lateral_offsets is not None
-        self.typical_range = usual.seen_from(self._height)
+        self.typical_range = platform.typical_range() or self.height
         self._strip_track = lru_cache(_TRACKS_KEPT)(self._make_track)
         lengths, spacings = [], []
         for index in range(len(self._offsets)):
@@ -75,11 +129,6 @@ class MovingPath:
         position = np.column_stack([plan, height(distance)])
         return position, rotation_matrix(*attitude(distance).T) @ self._mounting
 
-    def _runs_forward(self, platform: Platform, index: int) -> bool:
-        if self._vehicle:
-            return self._offsets[index] <= 0.0  # traffic keeps to the right
-        return index % 2 == 0 or not platform.there_and_back
-
     def _make_track(self, index: int) -> StripTrack:
         field = f"scan.platform.lateral_offsets[{index}]" if self._named else "scan.platform.lateral_offsets"
         return StripTrack(self._guide, self._offsets[index], self._sway, self._forward[index], field)
@@ -88,30 +137,25 @@ class MovingPath:
         """Return height (K, 1) and heading, pitch, roll (K, 3) as functions of the distance travelled."""
         step = min(_ATTITUDE_STEP, self._sway.wavelength / 40.0) if self._sway else _ATTITUDE_STEP
         return (
-            Eased(lambda distance: self._heights(track, distance)[:, None], track.length, _HEIGHT_STEP, False),
-            Eased(lambda distance: self._attitudes(track, distance), track.length, step, True),
+            Eased(lambda distance: self.heights(track, distance)[:, None], track.length, _HEIGHT_STEP, False),
+            Eased(lambda distance: self.attitudes(track, distance), track.length, step, True),
         )
 
-    def _heights(self, track: StripTrack, distance: Float) -> Float:
-        if self._vehicle:
-            return self._height + self._surface(track, distance, 0.0)
-        return self._height + self._guide.elevation(track.stations(distance))
+    def heights(self, track: StripTrack, distance: Float) -> Float:
+        """Return the scanner's local elevation (K,) at distances travelled (K,), m."""
+        return self.height + self._guide.elevation(track.stations(distance))
 
-    def _attitudes(self, track: StripTrack, distance: Float) -> Float:
+    def attitudes(self, track: StripTrack, distance: Float) -> Float:
+        """Return heading, pitch, roll (K, 3), rad, at distances travelled (K,), m."""
         course = track.place(distance)[1]
-        if not self._vehicle:
-            return np.column_stack([course, np.zeros((len(course), 2))])
-        reach = min(AXLES, track.length) / 2.0
-        # At the ends the axles stay on the track.
-        middle = np.clip(distance, reach, track.length - reach)
-        rise = self._surface(track, middle + reach, 0.0) - self._surface(track, middle - reach, 0.0)
-        pitch = np.arctan(rise / (2.0 * reach))
-        across = self._surface(track, distance, WHEELS / 2.0) - self._surface(track, distance, -WHEELS / 2.0)
-        # Left of the body is a tangent of the surface: tan(roll) is the slope across times cos(pitch).
-        return np.column_stack([course, pitch, np.arctan(across / WHEELS * np.cos(pitch))])
+        return np.column_stack([course, np.zeros((len(course), 2))])
 
-    def _surface(self, track: StripTrack, distance: Float, left: float) -> Float:
-        """Return the surface's elevation (K,) on the track or beside it, by the direction of travel."""
+    def surface(self, track: StripTrack, distance: Float, left: float) -> Float:
+        """Return the undamaged surface's elevation (K,) so far (m) to the left of a strip, in the direction of travel.
+
+        Raises:
+            InputError: there is no ground known.
+        """
         station = track.stations(distance)
         offset = track.offsets(station)[0] + (left if track.forward else -left)
         ground = self._guide.ground(station, offset, False)
@@ -133,7 +177,7 @@ class MovingPath:
         return knots_for(bend * self._speed**2, jump * self._speed)
 
 
-def _form(platform: Platform, guide: Guide) -> tuple[Guide, Sway | None, float]:
+def _form(platform: MovingPlatform, guide: Guide) -> tuple[Guide, Sway | None, float]:
     """Return what the strips lie beside, their sway, and how far this form leaves the guide."""
     if platform.path == "smoothed":
         smoothed = SmoothedGuide(guide, platform.polynomial_degree)

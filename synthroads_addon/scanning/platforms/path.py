@@ -1,53 +1,107 @@
-"""Where the scanner is at any time: `make_path` for every kind of platform, and what paths follow."""
+"""Base of all paths: strips, poses, and knots between which poses may be interpolated."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
 
 from ...base.errors import InputError
-from .base import KNOT_ERROR, KNOT_RANGE, TURNAROUND, USUAL, Path, Strip, Usual
-from .guides import Guide, RoadGuide, SmoothedGuide
-from .moving import MovingPath
-from .platform import Platform
-from .polyline import PolylineGuide
-from .trajectory import TrajectoryPath
-from .tripod import TripodPath
 
-__all__ = [
-    "KNOT_ERROR",
-    "KNOT_RANGE",
-    "TURNAROUND",
-    "USUAL",
-    "Guide",
-    "MovingPath",
-    "Path",
-    "PolylineGuide",
-    "RoadGuide",
-    "SmoothedGuide",
-    "Strip",
-    "TrajectoryPath",
-    "TripodPath",
-    "Usual",
-    "make_path",
-]
+Float = NDArray[np.float64]
+
+TURNAROUND = 10.0
+"""Seconds between two strips."""
+KNOT_ERROR = 2e-5
+"""Largest error of interpolation between two knots, m, in the place of a point at `KNOT_RANGE` from the scanner."""
+KNOT_RANGE = 100.0
+"""m."""
+
+_SLOWEST_KNOTS = 0.25  # s, where nothing turns or accelerates
+_FASTEST_KNOTS = 1e-6  # s
+_MARGIN = 0.95  # of `KNOT_ERROR`
+_MOST_STRIPS = 65_536  # a point's strip is a number of 16 bits
 
 
-def make_path(platform: Platform, guide: Guide, origin: Sequence[float] | None = None) -> Path:
-    """Return the path of a platform.
+@dataclass(frozen=True)
+class Strip:
+    """One pass along the road, or one position of a tripod.
 
-    Args:
-        platform: what carries the scanner, and where; what it leaves open is usual for its kind (`USUAL`).
-        guide: the centreline that it follows.
-        origin: map coordinates of the local origin (m), for a trajectory's file; the guide's if not given.
+    Attributes:
+        index: number of the strip, from 0.
+        start_time: time of its first pulse since the first strip's, s.
+        duration: s.
+    """
+
+    index: int
+    start_time: float
+    duration: float
+
+
+class Path(Protocol):
+    """Where the scanner is, and how it is turned, at any time."""
+
+    @property
+    def strips(self) -> tuple[Strip, ...]:
+        """Return the strips in the order of time."""
+        ...
+
+    @property
+    def knot_spacing(self) -> float:
+        """Return the time (s) between knots from a strip's start on, at most.
+
+        Between the poses at two of them, linear interpolation of position and rotation matrix errs less than
+        `KNOT_ERROR` at `KNOT_RANGE`. It can be shorter than the time between two pulses, where knots don't pay.
+        """
+        ...
+
+    @property
+    def typical_range(self) -> float:
+        """Return the usual distance (m) to what is scanned, to which the scale of intensities refers."""
+        ...
+
+    @property
+    def deviation(self) -> float:
+        """Return the largest horizontal distance (m) by which the path's form leaves what it follows."""
+        ...
+
+    def pose(self, strip: Strip, time: Float) -> tuple[Float, Float]:
+        """Return where the scanner is at times of a strip.
+
+        Args:
+            strip: one of `strips`.
+            time: (K,) seconds since the first strip's start; a little beyond the strip's ends is allowed.
+
+        Returns:
+            local positions (K, 3), m, and rotations (K, 3, 3) from the scanner's frame (x forward, y left, z up) to
+            the local one, its mounting included.
+        """
+        ...
+
+
+def strips_of(durations: list[float]) -> tuple[Strip, ...]:
+    """Return strips of these durations (s), `TURNAROUND` apart.
 
     Raises:
-        InputError: the path would turn back on itself, a station isn't on the guide, the ground below isn't known, or
-            the trajectory's file is missing or wrong.
+        InputError: there are more than a point cloud can number.
     """
-    if platform.kind == "trajectory":
-        return TrajectoryPath(platform, guide, origin)
-    if platform.file is not None:
-        raise InputError("scan.platform.file", platform.file, f"only a trajectory has one, not a {platform.kind}")
-    if platform.kind == "tripod":
-        return TripodPath(platform, guide)
-    return MovingPath(platform, guide)
+    if len(durations) > _MOST_STRIPS:
+        raise InputError("scan.platform", len(durations), f"at most {_MOST_STRIPS} strips or positions are possible")
+    starts = np.concatenate(([0.0], np.cumsum(np.array(durations) + TURNAROUND)))
+    return tuple(Strip(i, float(starts[i]), float(duration)) for i, duration in enumerate(durations))
+
+
+def knots_for(bend: float, jump: float = 0.0) -> float:
+    """Return the knots' spacing, s, that keeps `KNOT_ERROR`.
+
+    Args:
+        bend: largest second derivative by time of the place of a point at `KNOT_RANGE`, m/s2: between knots h apart
+            linear interpolation errs by up to bend h^2 / 8.
+        jump: largest jump of that place's velocity, m/s: it errs by up to jump h / 4.
+    """
+    # Both at once: bend h^2 / 8 + jump h / 4 = error, solved in the form that doesn't cancel.
+    error = 8.0 * _MARGIN * KNOT_ERROR
+    spacing = error / max(jump + np.sqrt(jump * jump + error * bend), 1e-300)
+    return float(np.clip(spacing, _FASTEST_KNOTS, _SLOWEST_KNOTS))

@@ -1,51 +1,32 @@
-"""`Platform`: what carries a scanner, and where."""
+"""`Platform`: base of all that carries a scanner."""
 
 from __future__ import annotations
 
-from typing import Literal
+from collections.abc import Mapping, Sequence
+from typing import Any, ClassVar
 
-from pydantic import Field
+import numpy as np
 
-from ...base.schema import ClosedModel, Finite, quantity
-
-PlatformKind = Literal["uav", "vehicle", "tripod", "airborne", "trajectory"]
+from ...base.rotations import rotation_matrix
+from ...base.schema import ClosedModel, quantity
+from .guides import Guide
+from .path import Float, Path
 
 
 class Platform(ClosedModel):
-    """Carrier of the scanner and its place. What is left out is usual for the kind (`platforms.base.USUAL`)."""
+    """Carrier of the scanner and its place; each kind adds its own fields.
 
-    kind: PlatformKind = Field("uav", description="Platform.")
-    height: float | None = quantity(
-        None, ge=0.1, le=5000, unit="m", description="Height above the road, or above the ground below a tripod."
-    )
-    speed: float | None = quantity(None, ge=0.1, le=150, unit="m/s", description="Speed over ground.")
-    lateral_offsets: tuple[Finite, ...] | None = Field(
-        None, min_length=1, max_length=64, description="Offset of each strip from the centreline, m."
-    )
-    there_and_back: bool = Field(
-        True, description="Every second strip against the stations; a vehicle always drives with the traffic."
-    )
-    path: Literal["direct", "smoothed", "zigzag"] = Field(
-        "direct", description="Along the centreline, along a polynomial fitted to it, or swaying about it."
-    )
-    polynomial_degree: int = quantity(
-        3, ge=1, le=9, unit="1", description="Degree of the smoothed path's polynomials."
-    )
-    zigzag_amplitude: float = quantity(5.0, ge=0, le=500, unit="m", description="Sway to either side.")
-    zigzag_wavelength: float = quantity(100.0, ge=5, le=5000, unit="m", description="Length of a sway.")
-    stations: tuple[Finite, ...] | None = Field(
-        None, min_length=1, max_length=1000, description="Stations of a tripod's positions, m."
-    )
-    station_spacing: float = quantity(
-        80.0, ge=1, le=5000, unit="m", description="Spacing of a tripod's positions where no stations are given."
-    )
-    turn_seconds: float = quantity(
-        60.0, gt=0, le=3600, unit="s", description="Time in which a tripod turns the scanner at each position."
-    )
-    turn_deg: float = quantity(
-        360.0, ge=0, le=360, unit="deg", description="Angle of that turn; 0 for a head that turns by itself."
-    )
-    file: str | None = Field(None, description="CSV with time, x, y, z, roll, pitch, heading of a trajectory.")
+    Attributes:
+        usual: values of fields while they aren't given, by name; a field without one follows from the road or a file.
+        usual_range: usual distance to what is scanned, m; None for the height.
+        driven: whether it drives in the road's lanes, so that vehicles catch up with it.
+    """
+
+    usual: ClassVar[Mapping[str, Any]] = {}
+    usual_range: ClassVar[float | None] = None
+    driven: ClassVar[bool] = False
+
+    kind: str
     roll_deg: float = quantity(
         0.0, ge=-180, le=180, unit="deg", description="Mounting of the scanner: about the forward axis."
     )
@@ -55,3 +36,36 @@ class Platform(ClosedModel):
     yaw_deg: float = quantity(
         0.0, ge=-180, le=180, unit="deg", description="Mounting of the scanner: counter-clockwise from above."
     )
+
+    def make_path(self, guide: Guide, origin: Sequence[float] | None = None) -> Path:
+        """Return the way of the scanner.
+
+        Args:
+            guide: the line that it follows, e.g. a road's centreline.
+            origin: map coordinates of the local origin (m), for a file's coordinates; the guide's if not given.
+
+        Raises:
+            InputError: there is no such way, e.g. because an offset line would turn back on itself or the ground below
+                isn't known.
+        """
+        raise NotImplementedError
+
+    def value(self, field: str) -> Any:
+        """Return a field's value, or its usual one while it isn't given."""
+        given = getattr(self, field)
+        return self.usual.get(field) if given is None else given
+
+    def typical_range(self) -> float | None:
+        """Return the usual distance to what is scanned, m; None where only the path shows it."""
+        if "height" not in self.usual:
+            return None
+        height = float(self.value("height"))
+        return height if self.usual_range is None else max(self.usual_range, height)
+
+    def as_single_strip(self) -> Platform:
+        """Return the platform with one strip on its guide, unless offsets are given or it keeps to lanes."""
+        return self
+
+    def mounting(self) -> Float:
+        """Return the rotation (3, 3) from the scanner's frame to the platform's."""
+        return rotation_matrix(*np.deg2rad([self.yaw_deg, self.pitch_deg, self.roll_deg]))

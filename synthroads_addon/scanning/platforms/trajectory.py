@@ -6,16 +6,18 @@ import math
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import ClassVar, Literal
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import Field
 
 from ...base.errors import InputError, nearest_name
 from ...base.files import read_text
 from ...base.rotations import angle_between, matrices, quaternions, rotation_matrix, slerp
 from ...road.centerline import FARTHEST, fields_of
-from .base import KNOT_RANGE, Strip, knots_for, mounting, strips_of
 from .guides import Float, Guide
+from .path import KNOT_RANGE, Strip, knots_for, strips_of
 from .platform import Platform
 
 COLUMNS = ("time", "x", "y", "z", "roll", "pitch", "heading")
@@ -26,6 +28,21 @@ _NEAREST = 8.0  # m, of the typical range
 _GRID = 1e-6  # s, that times may lie beside an even grid
 _SUBDIVISIONS = 50
 _LARGEST_TURN = np.deg2rad(150.0)
+
+
+class RecordedTrajectory(Platform):
+    """Platform that moved as a file says, along a trajectory measured or made up."""
+
+    order: ClassVar[int] = 4
+
+    kind: Literal["trajectory"] = Field("trajectory", title="Platform", description="Platform.")
+    file: str | None = Field(
+        None, title="Trajectory", description="CSV with time, x, y, z, roll, pitch, heading."
+    )
+
+    def make_path(self, guide: Guide, origin: Sequence[float] | None = None) -> TrajectoryPath:
+        """Return the file's strip; see `Platform.make_path`."""
+        return TrajectoryPath(self, guide, origin)
 
 
 class TrajectoryPath:
@@ -49,7 +66,7 @@ class TrajectoryPath:
 
     deviation = 0.0
 
-    def __init__(self, platform: Platform, guide: Guide, origin: Sequence[float] | None = None) -> None:
+    def __init__(self, platform: RecordedTrajectory, guide: Guide, origin: Sequence[float] | None = None) -> None:
         if platform.file is None:
             raise InputError("scan.platform.file", None, "a trajectory needs a CSV file")
         rows = read_trajectory(platform.file)
@@ -60,7 +77,7 @@ class TrajectoryPath:
         angles = np.deg2rad([90.0 - rows.heading, rows.pitch, rows.roll])
         self._attitude = quaternions(rotation_matrix(*angles))
         _refuse_wide_turns(platform.file, rows, self._attitude)
-        self._mounting = mounting(platform)
+        self._mounting = platform.mounting()
         self.strips = strips_of([float(self._time[-1])])
         self.knot_spacing = self._knots()
         self.typical_range = max(_NEAREST, float(np.median(self._height_above(guide))))

@@ -2,15 +2,76 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any, ClassVar, Literal
 
 import numpy as np
+from pydantic import Field
 
 from ...base.errors import InputError
 from ...base.rotations import rotation_matrix
-from .base import KNOT_RANGE, USUAL, Strip, knots_for, mounting, strips_of, turning
+from ...base.schema import Finite, notes, quantity
 from .guides import Float, Guide
+from .path import KNOT_RANGE, Strip, knots_for, strips_of
 from .platform import Platform
+
+_USUAL_RANGE = 15.0
+"""Usual distance to what is scanned, m."""
+
+
+class Tripod(Platform):
+    """Tripod beside the road that turns the scanner at each of its positions, usually 1.8 m above the ground."""
+
+    order: ClassVar[int] = 2
+    usual: ClassVar[Mapping[str, Any]] = {"height": 1.8}
+    usual_range: ClassVar[float | None] = _USUAL_RANGE
+
+    kind: Literal["tripod"] = Field("tripod", title="Platform", description="Platform.")
+    height: float | None = quantity(None, ge=0.1, le=5000, unit="m", description="Height above the ground below.")
+    lateral_offsets: tuple[Finite, ...] | None = Field(
+        None,
+        min_length=1,
+        max_length=64,
+        title="Offsets (m)",
+        description="Offsets from the centreline, used by turns, m; the pavement's outer edges if not given.",
+        json_schema_extra=notes(unset="At the edges"),
+    )
+    stations: tuple[Finite, ...] | None = Field(
+        None,
+        min_length=1,
+        max_length=1000,
+        title="Stations (m)",
+        description="Stations of a tripod's positions, m.",
+        json_schema_extra=notes(unset="By the spacing"),
+    )
+    station_spacing: float = quantity(
+        80.0, ge=1, le=5000, unit="m", description="Spacing of a tripod's positions where no stations are given."
+    )
+    turn_seconds: float = quantity(
+        60.0,
+        gt=0,
+        le=3600,
+        unit="s",
+        title="Time of a Turn",
+        description="Time in which a tripod turns the scanner at each position.",
+    )
+    turn_deg: float = quantity(
+        360.0,
+        ge=0,
+        le=360,
+        unit="deg",
+        title="Angle of a Turn (°)",
+        description="Angle of that turn; 0 for a head that turns by itself.",
+    )
+
+    def make_path(self, guide: Guide, origin: Sequence[float] | None = None) -> TripodPath:
+        """Return the positions; see `Platform.make_path`."""
+        return TripodPath(self, guide)
+
+    def turn_rate(self) -> float:
+        """Return the rate at which the scanner is turned, counter-clockwise, rad/s."""
+        return math.radians(self.turn_deg) / self.turn_seconds
 
 
 class TripodPath:
@@ -32,7 +93,7 @@ class TripodPath:
 
     deviation = 0.0
 
-    def __init__(self, platform: Platform, guide: Guide) -> None:
+    def __init__(self, platform: Tripod, guide: Guide) -> None:
         station = _stations(platform, guide.length)
         if platform.lateral_offsets is None:
             offset = guide.roadside_offsets(station)
@@ -45,13 +106,12 @@ class TripodPath:
             place = int(np.argmin(np.isfinite(ground)))
             allowed = f"there is no ground known at station {station[place]:.1f} m; a smaller one is needed"
             raise InputError("scan.platform.lateral_offsets", float(offset[place]), allowed)
-        height = USUAL["tripod"].height if platform.height is None else platform.height
-        self.positions = np.column_stack([plan + offset[:, None] * left, ground + height])
-        self._turning = turning(platform)
-        self._mounting = mounting(platform)
+        self.positions = np.column_stack([plan + offset[:, None] * left, ground + platform.value("height")])
+        self._turning = platform.turn_rate()
+        self._mounting = platform.mounting()
         self.strips = strips_of([platform.turn_seconds] * len(station))
         self.knot_spacing = knots_for(KNOT_RANGE * self._turning**2)
-        self.typical_range = USUAL["tripod"].typical_range or height
+        self.typical_range = _USUAL_RANGE
 
     def pose(self, strip: Strip, time: Float) -> tuple[Float, Float]:
         """Return local positions (K, 3), m, and rotations (K, 3, 3) at times (K,) since the first strip's start."""
@@ -61,7 +121,7 @@ class TripodPath:
         return position, rotation_matrix(heading) @ self._mounting
 
 
-def _stations(platform: Platform, length: float) -> Float:
+def _stations(platform: Tripod, length: float) -> Float:
     if platform.stations is None:
         spaces = int(length / platform.station_spacing + 1e-9)
         first = (length - spaces * platform.station_spacing) / 2.0
@@ -91,13 +151,13 @@ class PositionsPath:
 
     deviation = 0.0
 
-    def __init__(self, platform: Platform, positions: Sequence[Sequence[float]]) -> None:
+    def __init__(self, platform: Tripod, positions: Sequence[Sequence[float]]) -> None:
         self.positions = np.array(positions, dtype=np.float64).reshape(-1, 3)
-        self._turning = turning(platform)
-        self._mounting = mounting(platform)
+        self._turning = platform.turn_rate()
+        self._mounting = platform.mounting()
         self.strips = strips_of([platform.turn_seconds] * len(self.positions))
         self.knot_spacing = knots_for(KNOT_RANGE * self._turning**2)
-        self.typical_range = USUAL["tripod"].typical_range or USUAL["tripod"].height
+        self.typical_range = _USUAL_RANGE
 
     def pose(self, strip: Strip, time: Float) -> tuple[Float, Float]:
         """Return local positions (K, 3), m, and rotations (K, 3, 3) at times (K,) since the first strip's start."""

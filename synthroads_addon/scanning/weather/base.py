@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import ClassVar
 
 from ...base.schema import ClosedModel, quantity
@@ -14,10 +15,10 @@ class Weather(ClosedModel):
 
     Attributes:
         order: place among the weathers in lists, if it has one; else they are listed by name.
-        usual_visibility: m, where none is given; the same as of sampled roads.
+        usual: values of fields while they aren't given, by name: the ``visibility``, m, as of sampled roads.
     """
 
-    usual_visibility: ClassVar[float]
+    usual: ClassVar[Mapping[str, float]]
 
     condition: str
     visibility: float | None = quantity(
@@ -30,7 +31,7 @@ class Weather(ClosedModel):
 
     def extinction(self, wavelength_nm: float) -> float:
         """Return the extinction coefficient of the air at a wavelength of the laser, 1/m of path."""
-        visibility = self.usual_visibility if self.visibility is None else self.visibility
+        visibility = self.usual["visibility"] if self.visibility is None else self.visibility
         return visibility_extinction(visibility, wavelength_nm, self.exponent(visibility))
 
     def exponent(self, visibility: float) -> float:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import ClassVar, Literal
 
 from pydantic import Field
@@ -14,7 +15,7 @@ class Clear(Weather):
     """Clear air, by its visibility; 23 km is the usual standard clear atmosphere."""
 
     order: ClassVar[int] = 1
-    usual_visibility: ClassVar[float] = 23_000.0
+    usual: ClassVar[Mapping[str, float]] = {"visibility": 23_000.0}
 
     condition: Literal["clear"] = Field("clear", description="Weather.")
 

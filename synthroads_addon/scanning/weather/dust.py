@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import ClassVar, Literal
 
 from pydantic import Field
@@ -14,7 +15,7 @@ class Dust(Weather):
     """Dust, by its visibility."""
 
     order: ClassVar[int] = 6
-    usual_visibility: ClassVar[float] = 2000.0
+    usual: ClassVar[Mapping[str, float]] = {"visibility": 2000.0}
 
     condition: Literal["dust"] = Field("dust", description="Weather.")
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import ClassVar, Literal
 
 from pydantic import Field
@@ -14,7 +15,7 @@ class Haze(Weather):
     """Haze, by its visibility."""
 
     order: ClassVar[int] = 2
-    usual_visibility: ClassVar[float] = 4000.0
+    usual: ClassVar[Mapping[str, float]] = {"visibility": 4000.0}
 
     condition: Literal["haze"] = Field("haze", description="Weather.")
 

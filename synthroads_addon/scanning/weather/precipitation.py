@@ -12,7 +12,12 @@ class Precipitation(Weather):
     """Rain or snow, by its visibility or by its rate."""
 
     rate_mm_h: float | None = quantity(
-        None, gt=0, le=200, unit="mm/h", description="Rain, or snow as water; instead of the visibility."
+        None,
+        gt=0,
+        le=200,
+        unit="mm/h",
+        description="Rain, or snow as water; instead of the visibility.",
+        unset="By the visibility",
     )
 
     @model_validator(mode="after")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import ClassVar, Literal
 
 from pydantic import Field
@@ -14,7 +15,7 @@ class Rain(Precipitation):
     """Rain, by its visibility or by its rate; the same at every wavelength."""
 
     order: ClassVar[int] = 4
-    usual_visibility: ClassVar[float] = 7000.0
+    usual: ClassVar[Mapping[str, float]] = {"visibility": 7000.0}
 
     condition: Literal["rain"] = Field("rain", description="Weather.")
 

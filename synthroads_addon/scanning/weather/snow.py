@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import ClassVar, Literal
 
 from pydantic import Field
@@ -14,7 +15,7 @@ class Snow(Precipitation):
     """Snow, by its visibility, then the same at every wavelength, or by its rate, as wet snow."""
 
     order: ClassVar[int] = 5
-    usual_visibility: ClassVar[float] = 1500.0
+    usual: ClassVar[Mapping[str, float]] = {"visibility": 1500.0}
 
     condition: Literal["snow"] = Field("snow", description="Weather.")
 

@@ -9,7 +9,6 @@ from pathlib import Path
 from ...base.errors import InputError
 from ...road.guidelines import SECTIONS_OF_CLASS, STANDARD_CROSS_SECTIONS
 from ...scanning.devices.device import Device, load_device
-from ...scanning.platforms.path import USUAL
 from ...scenario.scenario import FIDELITIES
 from .wording import value_name
 
@@ -35,17 +34,9 @@ def _design_classes() -> Iterator[tuple[str, str, str]]:
         yield name, value_name("road.design_class", name), f"With {', '.join(sections)}"
 
 
-def _platforms() -> Iterator[tuple[str, str, str]]:
-    path = "scan.platform.kind"
-    for kind, usual in USUAL.items():
-        yield kind, value_name(path, kind), f"Usually {usual.height:g} m up, at {usual.speed:g} m/s"
-    yield "trajectory", value_name(path, "trajectory"), "Along a trajectory read from a file"
-
-
 ITEMS: dict[str, Items] = {
     "fidelity": tuple(_fidelities()),
     "road.design_class": tuple(_design_classes()),
-    "scan.platform.kind": tuple(_platforms()),
 }
 """Path of a choice and its items."""
 STANDARD_PARTS: dict[str, Items] = {"road.cross_section": tuple(_cross_sections())}

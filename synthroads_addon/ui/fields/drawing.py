@@ -8,6 +8,7 @@ from typing import Any
 
 import bpy
 
+from .declared import BY_HAND, has_effect
 from .fields import (
     AUTOMATIC,
     ChoiceField,
@@ -19,7 +20,7 @@ from .fields import (
     NumberField,
     TextField,
 )
-from .groups import BY_HAND, GroupField, NamedOrByHandField
+from .groups import GroupField, NamedOrByHandField
 from .inherited import inherited_text
 
 ADD_FILE, REMOVE_FILE = "synthroads.add_file", "synthroads.remove_file"
@@ -30,7 +31,7 @@ _NAMES_SHARE = 0.45
 
 def draw_field(layout: bpy.types.UILayout, settings: Any, field: Field) -> None:
     """Draw one field of the scenario, unless the other settings leave it without meaning."""
-    if not RELEVANT.get(field.path, _always)(settings):
+    if not has_effect(settings, field.path):
         return
     owner = owner_of(settings, field.path)
     for kind, draw in _DRAWN.items():
@@ -156,50 +157,3 @@ _DRAWN: Mapping[type[Field], Callable[..., None]] = {
     GroupField: _group,
     NamedOrByHandField: _by_hand,
 }
-
-
-def _always(settings: Any) -> bool:
-    return True
-
-
-def _on(*kinds: str) -> Callable[[Any], bool]:
-    return lambda settings: settings.scan.platform.kind in kinds
-
-
-def _along(path: str) -> Callable[[Any], bool]:
-    return lambda settings: _on(*_MOVING)(settings) and settings.scan.platform.path == path
-
-
-def _images(settings: Any) -> bool:
-    return settings.colour.source in ("auto", "images")
-
-
-def _renders(settings: Any) -> bool:
-    return settings.colour.source != "material"
-
-
-_MOVING = ("uav", "vehicle", "airborne")
-RELEVANT: dict[str, Callable[[Any], bool]] = {
-    "scan.platform.height": _on(*_MOVING, "tripod"),
-    "scan.platform.speed": _on(*_MOVING),
-    "scan.platform.lateral_offsets": _on(*_MOVING, "tripod"),
-    "scan.platform.there_and_back": _on("uav", "airborne"),
-    "scan.platform.path": _on(*_MOVING),
-    "scan.platform.polynomial_degree": _along("smoothed"),
-    "scan.platform.zigzag_amplitude": _along("zigzag"),
-    "scan.platform.zigzag_wavelength": _along("zigzag"),
-    "scan.platform.stations": _on("tripod"),
-    "scan.platform.station_spacing": _on("tripod"),
-    "scan.platform.turn_seconds": _on("tripod"),
-    "scan.platform.turn_deg": _on("tripod"),
-    "scan.platform.file": _on("trajectory"),
-    "colour.engine": _renders,
-    "colour.mode": lambda settings: settings.colour.rgb,
-    "colour.lighting": _renders,
-    "colour.image_spacing": _images,
-    "colour.ground_sampling_distance": _images,
-    "colour.max_resolution": _images,
-    "colour.samples": lambda settings: _renders(settings) and settings.colour.lighting == "path",
-    "colour.intensity_from_layers": _renders,
-}
-"""Path -> whether a field has a meaning; those without are left out."""

@@ -16,7 +16,7 @@ import bpy
 from pydantic.fields import FieldInfo
 
 from ...base.errors import InputError
-from ...base.schema import unit_of
+from ...base.schema import note_of, unit_of
 from ...scenario.road import Interval
 from .choices import ITEMS
 from .numbers import exact, fitting, is_share, list_as_text, number_property, numbers_in, push_along
@@ -46,7 +46,7 @@ class Field:
         self.path, self.info, self.kind, self.optional, self.default = path, info, kind, optional, default
         self.name = path.rpartition(".")[2]
         self.unit = unit_of(info)
-        self.label = label(path, self.unit)
+        self.label = label(path, info)
 
     @property
     def tooltip(self) -> str:
@@ -183,7 +183,9 @@ class ChoiceField(Field):
 
     def properties(self, hooks: Hooks) -> dict[str, Any]:
         """Return a menu."""
-        items = list(ITEMS.get(self.path, [(name, value_name(self.path, name), "") for name in self.values]))
+        tips = note_of(self.info, "tooltips") or {}
+        plain = [(name, value_name(self.path, name, self.info), tips.get(name, "")) for name in self.values]
+        items = list(ITEMS.get(self.path, plain))
         if self.optional:
             items.insert(0, (AUTOMATIC, "Automatic", self.tooltip))
         default = AUTOMATIC if self.default is None else str(self.default)
@@ -207,7 +209,7 @@ class ChoicesField(Field):
 
     def properties(self, hooks: Hooks) -> dict[str, Any]:
         """Return buttons of which several can be pressed."""
-        items = [(name, value_name(self.path, name), "") for name in self.values]
+        items = [(name, value_name(self.path, name, self.info), "") for name in self.values]
         flags = {"items": items, "default": set(self.default or ()), "options": {"ENUM_FLAG", "ANIMATABLE"}}
         return {self.name: bpy.props.EnumProperty(**self._common(hooks), **flags)}
 

@@ -13,10 +13,8 @@ from pydantic.fields import FieldInfo
 from ...scenario.road import Interval
 from . import fields as kinds
 from .choices import STANDARD_PARTS, Items
+from .declared import BY_HAND, BY_HAND_ENDING, is_constant
 from .fields import Field, FilesField, Hooks, checkbox
-
-BY_HAND = "BY_HAND"
-"""Item of a choice that stands for a part by hand."""
 
 
 class GroupField(Field):
@@ -72,27 +70,41 @@ class GroupField(Field):
 class KindField(GroupField):
     """A part of one of several kinds: the fields of all kinds in one group, of which those of the chosen one count.
 
+    A kind may have a ``label`` for people, and `usual` values of fields that aren't given.
+
     Attributes:
         tag: name of the field that says the kind.
-        kinds: names of each kind's fields, by its value of the tag.
+        kinds: model of each kind, by its value of the tag.
     """
 
     def __init__(
         self, path: str, info: FieldInfo, union: Any, tag: str, optional: bool, default: Any, hooks: Hooks
     ) -> None:
         models = get_args(union)
-        self.tag, self.kinds = tag, {model.model_fields[tag].default: set(model.model_fields) for model in models}
+        self.tag, self.kinds = tag, {model.model_fields[tag].default: model for model in models}
         every = [field for model in reversed(models) for field in model.model_fields.items()]
         fields: dict[str, Any] = {name: (info.annotation, info) for name, info in every}
         first = models[0].model_fields[tag]
-        choice = FieldInfo(default=first.default, description=first.description)
+        labels = {kind: model.label for kind, model in self.kinds.items() if hasattr(model, "label")}
+        tips = {kind: (model.__doc__ or "").partition("\n")[0].removesuffix(".") for kind, model in self.kinds.items()}
+        said: dict[str, Any] = {"labels": labels, "tooltips": tips}
+        choice = FieldInfo(
+            default=first.default, title=first.title, description=first.description, json_schema_extra=said
+        )
         fields[tag] = (Literal[tuple(self.kinds)], choice)
         super().__init__(path, info, create_model(models[0].__name__, **fields), optional, default, hooks)
 
     def fields_in_use(self, owner: Any) -> Mapping[str, Field]:
         """Return the fields of the kind that is chosen."""
-        kind = self.kinds[getattr(getattr(owner, self.name), self.tag)]
-        return {name: field for name, field in self.fields.items() if name in kind}
+        return {name: field for name, field in self.fields.items() if name in self.kind_of(owner).model_fields}
+
+    def write(self, owner: Any, value: Any) -> None:
+        """Show the part's data; the fields of other kinds are as at first."""
+        super().write(owner, None if value is None else _defaults(self.kind) | value)
+
+    def kind_of(self, owner: Any) -> type[BaseModel]:
+        """Return the model of the kind that is chosen."""
+        return self.kinds[getattr(getattr(owner, self.name), self.tag)]
 
 
 class NamedOrByHandField(Field):
@@ -109,7 +121,7 @@ class NamedOrByHandField(Field):
         super().__init__(path, info, model, False, default)
         self.items = items
         start = default if isinstance(default, dict) else _first_values(model)
-        self.by_hand = GroupField(f"{path}_by_hand", info, model, False, start, hooks)
+        self.by_hand = GroupField(path + BY_HAND_ENDING, info, model, False, start, hooks)
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -157,7 +169,7 @@ def make_field(path: str, info: FieldInfo, default: Any, hooks: Hooks) -> Field 
     if path in NOT_HERE:
         return None
     kind, optional = _without_none(info.annotation)
-    tag = _tag(info.annotation)
+    tag = _tag(info)
     if tag:
         return KindField(path, info, kind, tag, optional, default, hooks)
     if get_origin(kind) is Union or isinstance(kind, types.UnionType):
@@ -167,7 +179,7 @@ def make_field(path: str, info: FieldInfo, default: Any, hooks: Hooks) -> Field 
         return kinds.JsonField(path, info, kind, optional, default)
     if kind is not Interval and _is_model(kind):
         return GroupField(path, info, kind, optional, default, hooks)
-    if get_origin(kind) is Literal and len(get_args(kind)) == 1:
+    if is_constant(info):
         return None
     return _simple(kind)(path, info, kind, optional, default)
 
@@ -238,9 +250,11 @@ def _without_none(kind: Any) -> tuple[Any, bool]:
     return kind, False
 
 
-def _tag(kind: Any) -> str:
+def _tag(info: FieldInfo) -> str:
     """Return the field by which the models of a union differ, e.g. ``condition``; empty if it is no such union."""
-    for part in [kind, *get_args(kind)]:
+    if isinstance(info.discriminator, str):
+        return info.discriminator
+    for part in [info.annotation, *get_args(info.annotation)]:
         for note in get_args(part)[1:] if get_origin(part) is Annotated else ():
             if isinstance(note, FieldInfo) and isinstance(note.discriminator, str):
                 return note.discriminator

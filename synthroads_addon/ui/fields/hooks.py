@@ -6,9 +6,9 @@ from collections.abc import Callable
 from typing import Any
 
 from ...road.guidelines import SECTIONS_OF_CLASS, design_class_of
+from .declared import BY_HAND, optional_fields
 from .fields import AUTOMATIC, own
-from .groups import BY_HAND
-from .inherited import BEGINNINGS, begin_with_inherited
+from .inherited import begin_with_inherited
 
 Hook = Callable[[Any, Any], None]
 _DEVICE_SETTINGS = ("pulse_rate_khz", "field_of_view_deg", "lines_per_second", "angle_step_deg")
@@ -70,7 +70,7 @@ def _in_turn(first: Hook, second: Hook) -> Hook:
     return both
 
 
-HOOKS: dict[str, Hook] = {own(path): begin_with_inherited(path) for path in BEGINNINGS} | {
+HOOKS: dict[str, Hook] = {own(path): begin_with_inherited(path) for path in optional_fields()} | {
     "road.cross_section": _class_for_section,
     "road.design_class": _section_for_class,
     # A pulse rate and angles are those of one device, strips and heights those of one platform.

@@ -19,22 +19,13 @@ from synthroads_addon.road.geometry import RoadGeometry
 from synthroads_addon.road.parameters import AlignmentObject, HorizontalElement, RoadParameters, VerticalPoint
 from synthroads_addon.sampling.road import sample_road
 from synthroads_addon.scanning.devices.shots import shot_count, shots
-from synthroads_addon.scanning.platforms.path import (
-    KNOT_ERROR,
-    TURNAROUND,
-    USUAL,
-    MovingPath,
-    Path,
-    PolylineGuide,
-    RoadGuide,
-    SmoothedGuide,
-    Strip,
-    TripodPath,
-    make_path,
-)
-from synthroads_addon.scanning.platforms.platform import Platform
+from synthroads_addon.scanning.platforms.guides import RoadGuide, SmoothedGuide
+from synthroads_addon.scanning.platforms.moving import MovingPath
+from synthroads_addon.scanning.platforms.path import KNOT_ERROR, TURNAROUND, Path, Strip
+from synthroads_addon.scanning.platforms.polyline import PolylineGuide
+from synthroads_addon.scanning.platforms.registry import make_platform
 from synthroads_addon.scanning.platforms.strip_line import Sway
-from synthroads_addon.scanning.platforms.tripod import PositionsPath
+from synthroads_addon.scanning.platforms.tripod import PositionsPath, TripodPath
 from synthroads_addon.scenario.scan import scanner_setting
 from synthroads_addon.scenario.scenario import load_scenario
 
@@ -81,7 +72,7 @@ def sampled_road(length: float) -> RoadGuide:
 
 
 def path_of(guide=None, **platform) -> MovingPath | TripodPath:
-    return make_path(Platform(**platform), guide or road())
+    return make_platform(**platform).make_path(guide or road())
 
 
 def times(strip: Strip, count: int = 50) -> np.ndarray:
@@ -193,7 +184,7 @@ FORMS = {
 @pytest.mark.parametrize("form", FORMS)
 def test_the_speed_over_ground_is_kept_and_the_nose_points_along_the_path(form: str) -> None:
     path = path_of(**FORMS[form])
-    speed = USUAL[Platform(**FORMS[form]).kind].speed
+    speed = make_platform(**FORMS[form]).value("speed")
     for strip in path.strips:
         time, h = times(strip, 200)[1:-1], 1e-3
         before, after = (path.pose(strip, time + d)[0] for d in (-h, h))
@@ -251,7 +242,7 @@ def test_every_form_keeps_the_height_above_the_centreline(path: str) -> None:
     guide = road()
     moving = path_of(guide, path=path, height=75.0, lateral_offsets=(0.0,))
     position, _ = moving.pose(moving.strips[0], times(moving.strips[0], 300))
-    line = SmoothedGuide(guide, Platform().polynomial_degree) if path == "smoothed" else guide
+    line = SmoothedGuide(guide, make_platform().polynomial_degree) if path == "smoothed" else guide
     station = nearest_station(line, position[:, :2]) if path == "smoothed" else guide.project(position[:, :2])[0]
     np.testing.assert_allclose(position[:, 2] - guide.geometry.profile.elevation(station), 75.0, atol=1e-4)
 
@@ -437,7 +428,7 @@ def test_a_smoothed_path_turns_through_west_without_a_jerk() -> None:
     """There its direction leaps from +180 to -180 degrees."""
     angle = np.linspace(0.0, np.pi, 100)
     guide = PolylineGuide(400.0 * np.stack([np.cos(angle), np.sin(angle)], axis=1))
-    path = make_path(Platform(path="smoothed", polynomial_degree=7, lateral_offsets=(0.0,)), guide)
+    path = make_platform(path="smoothed", polynomial_degree=7, lateral_offsets=(0.0,)).make_path(guide)
     strip = path.strips[0]
     headings = SmoothedGuide(guide, 7).frame(np.linspace(0.0, guide.length, 500))[1]
     assert np.abs(np.diff(headings)).max() > 6.0
@@ -453,7 +444,7 @@ def test_a_smoothed_path_turns_through_west_without_a_jerk() -> None:
 @settings(max_examples=10, deadline=None)
 def test_a_straight_line_is_smoothed_into_itself(degree: int, length: float) -> None:
     guide = PolylineGuide([(5.0, 3.0), (5.0 - length * 0.6, 3.0 + length * 0.8)])
-    path = make_path(Platform(path="smoothed", polynomial_degree=degree, lateral_offsets=(2.0,)), guide)
+    path = make_platform(path="smoothed", polynomial_degree=degree, lateral_offsets=(2.0,)).make_path(guide)
     assert path.deviation < 1e-9 * length
     position, rotation = path.pose(path.strips[0], times(path.strips[0], 7))
     np.testing.assert_allclose(guide.project(position[:, :2])[1], 2.0, atol=1e-9 * length)
@@ -493,7 +484,7 @@ def test_a_zigzag_that_folds_or_runs_across_is_refused() -> None:
 def test_polynomials_that_turn_back_are_refused() -> None:
     there_and_back = PolylineGuide([(0, 0), (500, 0), (500, 12), (0, 12)])
     with pytest.raises(InputError, match=r"polynomial_degree is 2: the smoothed path turns back at station \d+"):
-        make_path(Platform(path="smoothed", polynomial_degree=2), there_and_back)
+        make_platform(path="smoothed", polynomial_degree=2).make_path(there_and_back)
 
 
 # --- Tripod
@@ -519,8 +510,8 @@ def test_a_tripod_turns_once_at_each_position() -> None:
 
 @pytest.mark.parametrize("angle", [0.0, 90.0])
 def test_a_tripod_turns_as_far_as_told_or_stands_still(angle: float) -> None:
-    platform = Platform(kind="tripod", turn_seconds=2.0, turn_deg=angle, stations=(50.0, 90.0))
-    for path in (make_path(platform, road()), PositionsPath(platform, [(0, 0, 0), (1, 2, 3)])):
+    platform = make_platform(kind="tripod", turn_seconds=2.0, turn_deg=angle, stations=(50.0, 90.0))
+    for path in (platform.make_path(road()), PositionsPath(platform, [(0, 0, 0), (1, 2, 3)])):
         for strip in path.strips:
             _, rotation = path.pose(strip, strip.start_time + np.array([0.0, 1.0, 2.0]))
             heading = np.unwrap(np.arctan2(rotation[:, 1, 0], rotation[:, 0, 0]))
@@ -530,7 +521,7 @@ def test_a_tripod_turns_as_far_as_told_or_stands_still(angle: float) -> None:
 def test_a_recipe_of_sweeps_sees_all_around() -> None:
     """A head that turns one way on a tripod that turns the other way at the same rate would look one way only."""
     job = scene_jobs(load_recipe("sweeps"))[0]
-    path = make_path(job.scenario.scan.platform, road())
+    path = job.scenario.scan.platform.make_path(road())
     setting = scanner_setting(job.scenario.scan)
     (strip,) = path.strips
     fired = shots(setting, 0, shot_count(setting, strip.duration))
@@ -639,7 +630,7 @@ def interpolation_error(path: Path, strip: Strip, knots: np.ndarray) -> float:
 @pytest.mark.parametrize("case", KNOT_CASES)
 def test_poses_may_be_interpolated_between_knots(case: str) -> None:
     guide, platform = KNOT_CASES[case]
-    path = make_path(Platform(**platform), guide())
+    path = make_platform(**platform).make_path(guide())
     assert knot_error(path) < KNOT_ERROR == 2e-5
 
 
@@ -697,7 +688,7 @@ def test_usual_values_stand_where_nothing_is_given() -> None:
     assert path.typical_range == 800.0
     assert path_of(kind="airborne", height=500.0).typical_range == 500.0
     assert path_of(kind="tripod").strips[0].duration == 60.0
-    with pytest.raises(InputError, match=r"scan\.platform\.file is 'a\.csv': only a trajectory"):
+    with pytest.raises(InputError, match=r"file can't be given for uav, only for trajectory"):
         path_of(kind="uav", file="a.csv")
 
 
@@ -747,7 +738,7 @@ def test_any_polyline_without_sharp_corners_is_followed(steps: list[tuple[float,
     np.testing.assert_allclose(np.exp(1j * turned[-1]), np.exp(1j * heading[-1]), atol=1e-9)
     assert np.abs(np.diff(turned)).max() <= sharpest * (station[1] - station[0]) * (1 + 1e-9) + 1e-12
     assert sharpest < 1.0
-    path = make_path(Platform(lateral_offsets=(0.0,)), guide)
+    path = make_platform(lateral_offsets=(0.0,)).make_path(guide)
     position, _ = path.pose(path.strips[0], times(path.strips[0], 100))
     step = np.hypot(*np.diff(position[:, :2], axis=0).T)
     assert step.max() <= guide.length / 99 * (1 + 1e-6)
@@ -772,10 +763,10 @@ def test_a_jittering_line_is_thinned_within_its_tolerance() -> None:
     arc = 1000.0 * np.stack([np.cos(angle), np.sin(angle)], axis=1)
     measured = arc + rng.normal(0.0, 0.01, arc.shape)
     with pytest.raises(InputError, match="radius is"):
-        make_path(Platform(lateral_offsets=(60.0,)), PolylineGuide(measured))
+        make_platform(lateral_offsets=(60.0,)).make_path(PolylineGuide(measured))
     guide = PolylineGuide(measured, tolerance=0.05)
     assert guide.deviation < 0.06
-    path = make_path(Platform(lateral_offsets=(60.0, -60.0)), guide)
+    path = make_platform(lateral_offsets=(60.0, -60.0)).make_path(guide)
     for strip, offset in zip(path.strips, (60.0, -60.0), strict=True):
         position, _ = path.pose(strip, times(strip))
         np.testing.assert_allclose(np.hypot(*position[1:-1, :2].T), 1000.0 - offset, atol=1.0)
@@ -789,7 +780,7 @@ def test_a_polyline_is_read_from_a_file_in_map_coordinates(tmp_path) -> None:
     np.testing.assert_array_equal(guide.origin, (500_000.0, 5_600_000.0, 90.0))
     centred = PolylineGuide.read(file)
     np.testing.assert_allclose(centred.at(np.array([0.0]))[0] + centred.origin, [[500_000.0, 5_600_000.0, 100.0]])
-    path = make_path(Platform(kind="vehicle"), guide)
+    path = make_platform(kind="vehicle").make_path(guide)
     assert len(path.strips) == 1
     assert path.pose(path.strips[0], np.array([5.0]))[0][0, 2] == pytest.approx(10.0 + 1.0 + 2.2, abs=1e-3)
 
@@ -799,7 +790,7 @@ def test_a_guide_of_elements_and_one_of_points_agree() -> None:
     axis = Alignment([Element(*row) for row in WINDING], -200.0, 100.0, math.radians(30.0))
     station = np.linspace(0.0, 600.0, 301)
     line = PolylineGuide(axis.position(station))
-    path = make_path(Platform(lateral_offsets=(20.0,), speed=10.0), line)
+    path = make_platform(lateral_offsets=(20.0,), speed=10.0).make_path(line)
     position, rotation = path.pose(path.strips[0], np.linspace(0.0, path.strips[0].duration, 50))
     s, offset = axis.project(position[:, :2])
     np.testing.assert_allclose(offset, 20.0, atol=0.02)

@@ -12,9 +12,10 @@ from scipy.spatial.transform import Rotation, Slerp
 
 from synthroads_addon.base.errors import InputError, MissingFileError
 from synthroads_addon.base.rotations import matrices, quaternions, rotation_matrix, slerp
-from synthroads_addon.scanning.platforms.path import KNOT_ERROR, PolylineGuide, TrajectoryPath, make_path
-from synthroads_addon.scanning.platforms.platform import Platform
-from synthroads_addon.scanning.platforms.trajectory import COLUMNS, read_trajectory
+from synthroads_addon.scanning.platforms.path import KNOT_ERROR
+from synthroads_addon.scanning.platforms.polyline import PolylineGuide
+from synthroads_addon.scanning.platforms.registry import make_platform
+from synthroads_addon.scanning.platforms.trajectory import COLUMNS, TrajectoryPath, read_trajectory
 from tests.scanning.platforms.test_path import knot_error
 
 ORIGIN = (500_000.0, 5_600_000.0, 100.0)
@@ -39,7 +40,7 @@ def rows_of(time: np.ndarray) -> np.ndarray:
 
 def trajectory(folder: Path, rows: np.ndarray, **platform) -> TrajectoryPath:
     text = "\n".join([HEADER, *(",".join(f"{v:.9f}" for v in row) for row in rows)])
-    path = make_path(Platform(kind="trajectory", file=write(folder, text), **platform), GUIDE)
+    path = make_platform(kind="trajectory", file=write(folder, text), **platform).make_path(GUIDE)
     assert isinstance(path, TrajectoryPath)
     return path
 
@@ -85,7 +86,9 @@ def test_map_coordinates_keep_their_precision(tmp_path) -> None:
     rows[:, 1:4] = np.array(ORIGIN) + [[0.0, 0.0, 0.0], [0.0001, 0.0002, 0.0003], [1.0, 1.0, 1.0]]
     position, _ = trajectory(tmp_path, rows).pose(None, np.array([1.0]))
     np.testing.assert_allclose(position[0], [0.0001, 0.0002, 0.0003], atol=2e-9)
-    other = make_path(Platform(kind="trajectory", file=str(tmp_path / "trajectory.csv")), GUIDE, (499_999.0, 0.0, 0.0))
+    other = make_platform(kind="trajectory", file=str(tmp_path / "trajectory.csv")).make_path(
+        GUIDE, (499_999.0, 0.0, 0.0)
+    )
     np.testing.assert_allclose(other.pose(None, np.array([0.0]))[0][0], [1.0, 5_600_000.0, 100.0], atol=1e-6)
 
 
@@ -141,17 +144,17 @@ def test_columns_may_stand_in_any_order_and_case_beside_others(tmp_path, separat
 )
 def test_what_is_wrong_is_named_by_file_line_column_and_value(tmp_path, text: str, message: str) -> None:
     with pytest.raises(InputError, match=message) as info:
-        make_path(Platform(kind="trajectory", file=write(tmp_path, text)), GUIDE)
+        make_platform(kind="trajectory", file=write(tmp_path, text)).make_path(GUIDE)
     assert "\n" not in str(info.value)
 
 
 def test_a_missing_file_and_no_file_and_no_text(tmp_path) -> None:
     with pytest.raises(MissingFileError, match=r"none\.csv: a trajectory file is needed here"):
-        make_path(Platform(kind="trajectory", file=str(tmp_path / "none.csv")), GUIDE)
+        make_platform(kind="trajectory", file=str(tmp_path / "none.csv")).make_path(GUIDE)
     with pytest.raises(MissingFileError):
         read_trajectory(tmp_path)
     with pytest.raises(InputError, match=r"scan\.platform\.file: a trajectory needs a CSV file"):
-        make_path(Platform(kind="trajectory"), GUIDE)
+        make_platform(kind="trajectory").make_path(GUIDE)
     (tmp_path / "binary.csv").write_bytes(b"\xff\xfe\x00\x9f")
     with pytest.raises(InputError, match="this is no text"):
         read_trajectory(tmp_path / "binary.csv")

@@ -90,14 +90,14 @@ def test_kims_exponent_has_no_jumps_in_fog_and_haze(visibility) -> None:
 
 def test_usual_visibilities_are_those_of_sampled_roads() -> None:
     assert {name: visibility for name, (visibility, _) in WEATHER.items()} == {
-        name: WEATHERS[name].usual_visibility for name in OF_ROADS if name != "clear"
+        name: WEATHERS[name].usual["visibility"] for name in OF_ROADS if name != "clear"
     }
-    assert WEATHERS["clear"].usual_visibility == Environment.model_fields["visibility"].default
+    assert WEATHERS["clear"].usual["visibility"] == Environment.model_fields["visibility"].default
 
 
 @pytest.mark.parametrize("condition", OF_ROADS)
 def test_weather_of_a_road(condition) -> None:
-    usual = WEATHERS[condition](visibility=WEATHERS[condition].usual_visibility)
+    usual = WEATHERS[condition](visibility=WEATHERS[condition].usual["visibility"])
     assert weather_of(Environment(weather=condition)) == usual
     assert weather_of(Environment(weather=condition, visibility=321.0)).visibility == 321.0
     written = Environment.from_dict(Environment(weather=condition).to_dict())

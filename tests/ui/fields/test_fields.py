@@ -20,8 +20,9 @@ from synthroads_addon.base.errors import InputError
 from synthroads_addon.base.schema import ClosedModel, quantity
 from synthroads_addon.road.guidelines import SECTIONS_OF_CLASS, STANDARD_CROSS_SECTIONS
 from synthroads_addon.scanning.devices.device import device_names, load_device
-from synthroads_addon.scanning.platforms.path import USUAL
+from synthroads_addon.scanning.platforms.registry import PLATFORMS
 from synthroads_addon.scenario.road import Interval, interval
+from synthroads_addon.scenario.scan import ScanScenario
 from synthroads_addon.scenario.scenario import FIDELITIES, Scenario, load_scenario, scenario_names
 from synthroads_addon.ui.fields import fields as kinds
 from synthroads_addon.ui.fields.drawing import owner_of
@@ -36,7 +37,7 @@ from synthroads_addon.ui.fields.groups import (
 )
 from synthroads_addon.ui.fields.inherited import inherited_text, inherited_value
 from synthroads_addon.ui.fields.properties import FIELDS, PATHS
-from synthroads_addon.ui.fields.wording import BLENDERS, label
+from synthroads_addon.ui.fields.wording import BLENDERS
 
 PANELS_OUTPUTS = 'outputs=["parameters","cloud","centerline","previews"]'
 
@@ -234,7 +235,8 @@ def schema_of(path: str) -> dict[str, Any]:
     """Return what the published JSON Schema says of a field."""
     node: dict[str, Any] = SCHEMA
     for part in path.split("."):
-        node = resolved(node["properties"][part])
+        kinds_of_node = map(resolved, node.get("oneOf", [node]))
+        node = resolved(next(kind["properties"][part] for kind in kinds_of_node if part in kind["properties"]))
     return node
 
 
@@ -280,16 +282,17 @@ def test_choices_are_the_schemas(panel: Any) -> None:
         for path in ("fidelity", "scan.platform.kind", "road.design_class", "road.cross_section", "scan.rays_per_pulse")
     }
     assert shown["fidelity"] == list(FIDELITIES)
-    assert shown["scan.platform.kind"] == [*USUAL, "trajectory"]
+    assert shown["scan.platform.kind"] == list(PLATFORMS)
     assert shown["road.design_class"] == list(SECTIONS_OF_CLASS)
     assert shown["road.cross_section"] == [*STANDARD_CROSS_SECTIONS, BY_HAND]
     assert shown["scan.rays_per_pulse"] == [kinds.AUTOMATIC, "1", "7", "19", "37", "61"]
 
 
 def test_labels_are_for_people() -> None:
-    assert label("scan.field_of_view_deg", "deg") == "Field of View (°)"
-    assert label("scan.pulse_rate_khz", "kHz") == "Pulse Rate (kHz)"
-    assert label("road.turnouts.lane_length", "m") == "Lane Length"
+    assert PATHS["scan.field_of_view_deg"].label == "Field of View (°)"
+    assert PATHS["scan.pulse_rate_khz"].label == "Pulse Rate (kHz)"
+    assert PATHS["road.turnouts.lane_length"].label == "Lane Length"
+    assert PATHS["scan.relief"].label == ScanScenario.model_fields["relief"].title == "Micro-Relief"
     raw = [field.label for field in PATHS.values() if "_" in field.label or field.label != field.label.strip()]
     assert raw == []
 
@@ -372,7 +375,7 @@ def test_another_platform_takes_its_usual_path(panel: Any) -> None:
     panel.scan.platform.kind = "vehicle"
     platform = panel.scenario().scan.platform
     assert (platform.height, platform.speed, platform.lateral_offsets) == (None, None, None)
-    assert inherited_value(panel, "scan.platform.height") == USUAL["vehicle"].height
+    assert inherited_value(panel, "scan.platform.height") == PLATFORMS["vehicle"].usual["height"]
 
 
 def test_section_and_class_go_together(panel: Any) -> None:

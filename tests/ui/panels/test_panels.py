@@ -12,6 +12,7 @@ import pytest
 from pydantic import BaseModel
 
 import synthroads_addon
+from synthroads_addon.base.schema import note_of
 from synthroads_addon.blender.model.build import build_road
 from synthroads_addon.blender.model.store import remember
 from synthroads_addon.sampling.road import sample_road
@@ -19,12 +20,10 @@ from synthroads_addon.scanning.devices.device import DEVICES, device_names
 from synthroads_addon.scenario.road import Interval
 from synthroads_addon.scenario.scenario import Scenario, load_scenario, scenario_names
 from synthroads_addon.ui.fields import preferences
-from synthroads_addon.ui.fields.drawing import RELEVANT
-from synthroads_addon.ui.fields.groups import BY_HAND
-from synthroads_addon.ui.fields.inherited import _VALUES, _WORDS
+from synthroads_addon.ui.fields.declared import BY_HAND, declaration
+from synthroads_addon.ui.fields.inherited import SOURCES
 from synthroads_addon.ui.fields.properties import PATHS
 from synthroads_addon.ui.fields.sheets import SHEETS, fields_of, homeless
-from synthroads_addon.ui.fields.wording import LABELS
 from synthroads_addon.ui.panels import panels, presets
 from tests.helpers.scenes.fake_layout import drawn
 
@@ -117,7 +116,9 @@ def schema_paths(model: type[BaseModel], prefix: str = "") -> Iterator[str]:
     def walk(node: dict[str, Any], path: str) -> Iterator[str]:
         if "$ref" in node:
             node = schema["$defs"][node["$ref"].rpartition("/")[2]]
-        inner = [part for part in node.get("anyOf", [node]) if "$ref" in part or "properties" in part]
+        inner = [
+            part for part in node.get("anyOf", node.get("oneOf", [node])) if "$ref" in part or "properties" in part
+        ]
         if node.get("title") == Interval.__name__ or not inner:
             yield path
             return
@@ -175,10 +176,17 @@ def _seen(path: str, used: set[str]) -> bool:
     return any(one in used for one in names)
 
 
-def test_tables_name_fields_that_are_there() -> None:
-    inner = {"scan.weather.visibility", "scan.weather.rate_mm_h"}
-    for table in (LABELS, RELEVANT, _VALUES, _WORDS):
-        assert set(table) - set(PATHS) - inner == set()
+def test_notes_of_the_schema_name_what_is_there(panel: Any) -> None:
+    for _ in states(panel):
+        for path in PATHS:
+            declared = declaration(panel, path)
+            if declared is not None:
+                beside = note_of(declared.info, "only_with") or {}
+                assert set(beside) <= set(declared.model.model_fields), path
+                assert (note_of(declared.info, "inherits") or "device.").partition(".")[0] in SOURCES, path
+
+
+def test_sheets_name_fields_that_are_there() -> None:
     for sheet in SHEETS:
         for row in sheet.rows:
             assert row.endswith("*") or row in PATHS, row
