@@ -22,14 +22,14 @@ BothMarks = tuple[Marks, Marks]
 
 
 def apply_effects(
-    scan: ScanPlan, strip: Strip, key: int, pulses: Pulses, traced: Traced, marks: BothMarks
+    plan: ScanPlan, strip: Strip, key: int, pulses: Pulses, traced: Traced, marks: BothMarks
 ) -> tuple[Traced, BothMarks]:
     """Return what the rays of a block meet, and its marks, after the scan's effects, one after the other.
 
     Echoes that are added join what lies behind permeable surfaces, with the face -1.
 
     Args:
-        scan: with the effects in their order; each sees what those before it have left.
+        plan: with the effects in their order; each sees what those before it have left.
         strip, key: of the block, for its random numbers.
         pulses: the block's.
         traced: what their rays meet.
@@ -38,17 +38,17 @@ def apply_effects(
     Raises:
         ValueError: an effect's echoes are of no ray, or not finite numbers.
     """
-    for effect in scan.effects:
-        hits = _pulse_hits(scan, pulses, traced, marks)
-        changes = effect.change_echoes(hits, stream(scan.seed, f"effect {effect.name}", strip.index, key))
+    for effect in plan.effects:
+        hits = _pulse_hits(plan, pulses, traced, marks)
+        changes = effect.change_echoes(hits, stream(plan.seed, f"effect {effect.name}", strip.index, key))
         _check(effect.name, changes, hits.distance.shape)
         if changes.transmission is not None:
             traced, marks = _weaken(traced, marks, np.broadcast_to(changes.transmission, hits.distance.shape))
-        traced, marks = _add(scan, traced, marks, changes)
+        traced, marks = _add(plan, traced, marks, changes)
     return traced, marks
 
 
-def _pulse_hits(scan: ScanPlan, pulses: Pulses, traced: Traced, marks: BothMarks) -> PulseHits:
+def _pulse_hits(plan: ScanPlan, pulses: Pulses, traced: Traced, marks: BothMarks) -> PulseHits:
     first, behind = marks
     ray, pulse = np.divmod(traced.ray, len(pulses.time))
     return PulseHits(
@@ -57,12 +57,12 @@ def _pulse_hits(scan: ScanPlan, pulses: Pulses, traced: Traced, marks: BothMarks
         direction=pulses.direction,
         share=traced.rays.share[:, 0],
         distance=first.distance,
-        brightness=_brightness(first, scan.attenuation),
+        brightness=_brightness(first, plan.attenuation),
         behind_pulse=pulse,
         behind_ray=ray,
         behind_distance=behind.distance,
-        behind_brightness=_brightness(behind, scan.attenuation),
-        setting=scan.setting,
+        behind_brightness=_brightness(behind, plan.attenuation),
+        setting=plan.setting,
     )
 
 
@@ -97,16 +97,16 @@ def _weaken(traced: Traced, marks: BothMarks, transmission: Float) -> tuple[Trac
     return replace(traced, behind=kept, ray=traced.ray[seen]), (first, behind)
 
 
-def _add(scan: ScanPlan, traced: Traced, marks: BothMarks, changes: EchoChanges) -> tuple[Traced, BothMarks]:
+def _add(plan: ScanPlan, traced: Traced, marks: BothMarks, changes: EchoChanges) -> tuple[Traced, BothMarks]:
     """Return everything with the echoes of an effect that the scanner records."""
     distance = np.asarray(changes.distance, dtype=np.float64)
-    here = np.flatnonzero((distance >= scan.setting.minimum_range) & (distance <= scan.setting.maximum_range))
+    here = np.flatnonzero((distance >= plan.setting.minimum_range) & (distance <= plan.setting.maximum_range))
     distance, brightness = distance[here], np.asarray(changes.brightness, dtype=np.float64)[here]
     none = np.zeros(len(here), dtype=np.intp)
     # In the air there is no face; it counts as one that lies across the beam.
     hits = Hits(none - 1, none, distance, none - 1.0, brightness)
     added = Marks(
-        distance, np.maximum(brightness, UNCOUNTED), received_intensity(brightness, distance, scan.attenuation)
+        distance, np.maximum(brightness, UNCOUNTED), received_intensity(brightness, distance, plan.attenuation)
     )
     first, behind = marks
     ray = changes.ray[here] * len(traced.rays.time) + changes.pulse[here]

@@ -39,17 +39,17 @@ class Errors:
     lost: NDArray[np.bool_] | None
 
     @classmethod
-    def drawn(cls, scan: ScanPlan, strip: Strip, count: int, key: int) -> Errors:
+    def drawn(cls, plan: ScanPlan, strip: Strip, count: int, key: int) -> Errors:
         """Draw the errors of a block."""
 
         def source(purpose: str) -> np.random.Generator:
-            return stream(scan.seed, purpose, strip.index, key)
+            return stream(plan.seed, purpose, strip.index, key)
 
-        shape = (count, scan.most_returns)
-        angle, dropout = scan.noise.angle_sigma_mrad * 1e-3, scan.noise.dropout
+        shape = (count, plan.most_returns)
+        angle, dropout = plan.noise.angle_sigma_mrad * 1e-3, plan.noise.dropout
         return cls(
             source("range noise").standard_normal((2, max(shape)), dtype=np.float32)
-            if scan.setting.range_sigma
+            if plan.setting.range_sigma
             else None,
             source("angle noise").normal(scale=angle, size=(2, count)) if angle else None,
             source("dropouts").random(shape, dtype=np.float32) < dropout if dropout else None,
@@ -90,26 +90,26 @@ class Poses:
     motions: list[Track]
 
     @classmethod
-    def between(cls, scan: ScanPlan, strip: Strip, begin: float, end: float) -> Poses:
+    def between(cls, plan: ScanPlan, strip: Strip, begin: float, end: float) -> Poses:
         """Return the poses between two times."""
-        spacing = scan.path.knot_spacing
+        spacing = plan.path.knot_spacing
 
         def true(time: Float) -> tuple[Float, Float, Float]:
-            position, rotation = scan.path.pose(strip, time)
+            position, rotation = plan.path.pose(strip, time)
             return rotation, position, np.ones(len(time))
 
         def measured(time: Float) -> tuple[Float, Float, Float]:
-            errors = TrajectoryNoise(scan.noise, scan.seed, strip).errors(time)
-            position, rotation = measured_pose(*scan.path.pose(strip, time), errors)
+            errors = TrajectoryNoise(plan.noise, plan.seed, strip).errors(time)
+            position, rotation = measured_pose(*plan.path.pose(strip, time), errors)
             return rotation, position, np.ones(len(time))
 
         track = Track.of(true, begin, end, spacing)
-        noisy = scan.noise.position_sigma or scan.noise.attitude_sigma_deg or scan.noise.heading_sigma_deg
+        noisy = plan.noise.position_sigma or plan.noise.attitude_sigma_deg or plan.noise.heading_sigma_deg
         return cls(
             track,
             # Linear between knots, errors would lose some of their spread if they changed much meanwhile.
-            Track.of(measured, begin, end, min(spacing, scan.noise.correlation_time / 50.0)) if noisy else track,
-            scan.target.motions(begin, end, min(spacing, _MOTION_KNOTS), track if scan.driven else None),
+            Track.of(measured, begin, end, min(spacing, plan.noise.correlation_time / 50.0)) if noisy else track,
+            plan.target.motions(begin, end, min(spacing, _MOTION_KNOTS), track if plan.driven else None),
         )
 
 
@@ -148,14 +148,14 @@ class Pulses:
         return Pulses(**chosen)
 
 
-def make_pulses(scan: ScanPlan, strip: Strip, poses: Poses, angle: Float | None, first: int, count: int) -> Pulses:
+def make_pulses(plan: ScanPlan, strip: Strip, poses: Poses, angle: Float | None, first: int, count: int) -> Pulses:
     """Return pulses ``first`` to ``first + count`` of a strip.
 
     Args:
         angle: (2, P) pointing errors in the scan plane and across it, rad; None without.
     """
-    several = scan.rays_per_pulse > 1
-    shot = shots(scan.setting, first, count, several or angle is not None)
+    several = plan.rays_per_pulse > 1
+    shot = shots(plan.setting, first, count, several or angle is not None)
     time = shot.time + strip.start_time
     rotation, origin, _ = poses.true.at(time)
     direction = _turn_vectors(rotation, shot.direction)
@@ -187,15 +187,15 @@ def _turn_vectors(rotation: Float, vectors: Float) -> Float:
     return result
 
 
-def reaching_scene(scan: ScanPlan, pulses: Pulses, motions: list[Track]) -> NDArray[np.bool_] | None:
+def reaching_scene(plan: ScanPlan, pulses: Pulses, motions: list[Track]) -> NDArray[np.bool_] | None:
     """Return which pulses (P,) may hit anything at all, as those into the sky don't; None if all may."""
-    boxes = [] if scan.target.bounds is None else [scan.target.bounds]
-    boxes += scan.target.moving_bounds(motions)
+    boxes = [] if plan.target.bounds is None else [plan.target.bounds]
+    boxes += plan.target.moving_bounds(motions)
     if not boxes:
         return np.zeros(len(pulses.time), dtype=bool)
     low, high = np.min([box[0] for box in boxes], axis=0), np.max([box[1] for box in boxes], axis=0)
-    cone = max(scan.setting.divergence) * 2.0
-    width = cone * scan.setting.maximum_range
+    cone = max(plan.setting.divergence) * 2.0
+    width = cone * plan.setting.maximum_range
     towards: NDArray[np.bool_] | None = None
     for axis in range(3):
         place, direction = pulses.origin[axis], pulses.direction[axis]

@@ -71,96 +71,96 @@ def joined_results(results: list[BlockResult]) -> BlockResult:
     )
 
 
-def scan_block(scan: ScanPlan, strip: Strip, block: int) -> BlockResult:
+def scan_block(plan: ScanPlan, strip: Strip, block: int) -> BlockResult:
     """ScanPlan one block; blocks can be computed in any order and by any worker."""
-    return scan_pulses(scan, strip, *scan.cut.pulses_of(strip, block), block)
+    return scan_pulses(plan, strip, *plan.cut.pulses_of(strip, block), block)
 
 
-def scan_pulses(scan: ScanPlan, strip: Strip, first: int, count: int, key: int = 0) -> BlockResult:
+def scan_pulses(plan: ScanPlan, strip: Strip, first: int, count: int, key: int = 0) -> BlockResult:
     """ScanPlan pulses ``first`` to ``first + count`` of a strip at once; ``key`` is that of their random numbers.
 
     A block isn't cut any smaller, though its arrays leave the processor's cache: blocks are scanned side by side in
     threads that take turns in Python, so that few long calls beat many short ones.
     """
-    errors = Errors.drawn(scan, strip, count, key)
-    poses = Poses.between(scan, strip, *(scan.cut.time(strip, i) for i in (first, first + count - 1)))
-    pulses = make_pulses(scan, strip, poses, errors.angle, first, count)
+    errors = Errors.drawn(plan, strip, count, key)
+    poses = Poses.between(plan, strip, *(plan.cut.time(strip, i) for i in (first, first + count - 1)))
+    pulses = make_pulses(plan, strip, poses, errors.angle, first, count)
     number = np.arange(count)  # of each pulse within the block
     # In the air, echoes come from pulses into the sky as well.
-    in_air = bool(scan.effects and scan.target.triangles)
-    towards = None if in_air else reaching_scene(scan, pulses, poses.motions)
+    in_air = bool(plan.effects and plan.target.triangles)
+    towards = None if in_air else reaching_scene(plan, pulses, poses.motions)
     if towards is not None:
         number = np.flatnonzero(towards)
         pulses = pulses.select(number)
-    rays = beam_rays(scan, pulses, poses.motions)
+    rays = beam_rays(plan, pulses, poses.motions)
     traced = trace(
-        scan.target, scan.surfaces, rays, poses.motions, scan.setting.minimum_range, scan.setting.maximum_range
+        plan.target, plan.surfaces, rays, poses.motions, plan.setting.minimum_range, plan.setting.maximum_range
     )
-    marks = hit_marks(scan, traced)
+    marks = hit_marks(plan, traced)
     if in_air:
-        traced, marks = apply_effects(scan, strip, key, pulses, traced, marks)
-    echoes = group_returns(*marks, traced.pulse, scan.setting.range_resolution)
-    if scan.surfaces.varying:
-        echoes = _vary_brightness(scan, traced, echoes, poses.motions)
-    threshold = scan.setting.threshold * (LENIENT if scan.detects_later else 1.0)
+        traced, marks = apply_effects(plan, strip, key, pulses, traced, marks)
+    echoes = group_returns(*marks, traced.pulse, plan.setting.range_resolution)
+    if plan.surfaces.varying:
+        echoes = _vary_brightness(plan, traced, echoes, poses.motions)
+    threshold = plan.setting.threshold * (LENIENT if plan.detects_later else 1.0)
     strong = np.flatnonzero(echoes.intensity >= threshold)
     weak = len(echoes.pulse) - len(strong)
     if weak:
         echoes = chosen_echoes(echoes, strong)
     if errors.lost is not None:
         echoes = _drop_lost_echoes(echoes, errors.lost[number])
-    points, seen, clipped = _points(scan, strip, pulses, traced, echoes, errors, number, poses.motions)
+    points, seen, clipped = _points(plan, strip, pulses, traced, echoes, errors, number, poses.motions)
     return BlockResult(points, seen, count, traced.first.face.size, weak, clipped)
 
 
-def beam_rays(scan: ScanPlan, pulses: Pulses, motions: list[Track]) -> Rays:
+def beam_rays(plan: ScanPlan, pulses: Pulses, motions: list[Track]) -> Rays:
     """Return the rays that sample the pulses' footprints."""
-    origin, share = pulses.origin[:, None, :], scan.pattern.weights[:, None]
-    if scan.rays_per_pulse == 1:
+    origin, share = pulses.origin[:, None, :], plan.pattern.weights[:, None]
+    if plan.rays_per_pulse == 1:
         return Rays(origin, pulses.direction[:, None, :], share, pulses.time)
     assert pulses.in_plane is not None
     assert pulses.across is not None
-    divergence = scan.setting.divergence
-    if scan.beam == "conical":
-        direction = conical(pulses.direction, pulses.in_plane, pulses.across, scan.pattern, divergence)
+    divergence = plan.setting.divergence
+    if plan.beam == "conical":
+        direction = conical(pulses.direction, pulses.in_plane, pulses.across, plan.pattern, divergence)
         return Rays(origin, direction, share, pulses.time)
-    reach = scan.setting.maximum_range
-    distance = scan.target.cast(pulses.origin, pulses.direction, reach, pulses.time, motions).distance
-    offsets = cylindrical_offsets(pulses.in_plane, pulses.across, scan.pattern, divergence, distance)
-    direction = np.repeat(pulses.direction[:, None, :], scan.rays_per_pulse, axis=1)
+    reach = plan.setting.maximum_range
+    distance = plan.target.cast(pulses.origin, pulses.direction, reach, pulses.time, motions).distance
+    offsets = cylindrical_offsets(pulses.in_plane, pulses.across, plan.pattern, divergence, distance)
+    direction = np.repeat(pulses.direction[:, None, :], plan.rays_per_pulse, axis=1)
     return Rays(origin + offsets, direction, share, pulses.time)
 
 
-def hit_marks(scan: ScanPlan, traced: Traced) -> BothMarks:
+def hit_marks(plan: ScanPlan, traced: Traced) -> BothMarks:
     """Return what the hits of traced rays add to returns: what each ray meets first, and what lies behind."""
-    return _marks(scan, traced.first), _marks(scan, traced.behind)
+    return _marks(plan, traced.first), _marks(plan, traced.behind)
 
 
-def _marks(scan: ScanPlan, hits: Hits) -> Marks:
+def _marks(plan: ScanPlan, hits: Hits) -> Marks:
     """Return what hits add to returns."""
-    surfaces, material = scan.surfaces, hits.material.ravel()
+    surfaces, material = plan.surfaces, hits.material.ravel()
     brightness = brightness_of(surfaces, material, np.abs(hits.along.ravel())).reshape(hits.face.shape)
     brightness *= hits.share
     weight = np.maximum(np.take(surfaces.reflectivity, material), UNCOUNTED).reshape(hits.face.shape)
     weight *= hits.share
-    return Marks(hits.distance, weight, received_intensity(brightness, hits.distance, scan.attenuation))
+    return Marks(hits.distance, weight, received_intensity(brightness, hits.distance, plan.attenuation))
 
 
-def _vary_brightness(scan: ScanPlan, traced: Traced, echoes: Echoes, motions: list[Track]) -> Echoes:
+def _vary_brightness(plan: ScanPlan, traced: Traced, echoes: Echoes, motions: list[Track]) -> Echoes:
     """Return the echoes as bright as the places are that gave most of them, see `materials.texture_spread`."""
     material = traced.pick("material", echoes.hit)
-    own = np.flatnonzero(np.take(scan.surfaces.uneven, material, mode="clip"))
-    if scan.effects:
+    own = np.flatnonzero(np.take(plan.surfaces.uneven, material, mode="clip"))
+    if plan.effects:
         own = own[traced.pick("face", echoes.hit[own]) >= 0]
     if not len(own):
         return echoes
     hit = echoes.hit[own]
     ray, reach, face = traced.ray_of(hit), traced.pick("distance", hit), traced.pick("face", hit)
     position, _ = _ray_ends(traced.rays, ray, reach)
-    if scan.target.moving:
-        (position,) = scan.target.at_start(face, position, traced.rays.time[ray % len(traced.rays.time)], motions)
+    if plan.target.moving:
+        (position,) = plan.target.at_start(face, position, traced.rays.time[ray % len(traced.rays.time)], motions)
     intensity = echoes.intensity.copy()
-    intensity[own] *= spread_factors(scan.surfaces, material[own], position.T + scan.frame, scan.seed)
+    intensity[own] *= spread_factors(plan.surfaces, material[own], position.T + plan.frame, plan.seed)
     return replace(echoes, intensity=intensity)
 
 
@@ -181,7 +181,7 @@ def _drop_lost_echoes(echoes: Echoes, lost: NDArray[np.bool_]) -> Echoes:
 
 
 def _points(
-    scan: ScanPlan,
+    plan: ScanPlan,
     strip: Strip,
     pulses: Pulses,
     traced: Traced,
@@ -191,23 +191,23 @@ def _points(
     motions: list[Track],
 ) -> tuple[PointBlock, Targets | None, int]:
     """Return the points of the echoes, where they were seen, and how many of them saturated the detector."""
-    keep, number, returns = number_returns(echoes.pulse, scan.most_returns)
+    keep, number, returns = number_returns(echoes.pulse, plan.most_returns)
     if not keep.all():
         echoes = chosen_echoes(echoes, keep)
-    pulse, hit, target = echoes.pulse, echoes.hit, scan.target
+    pulse, hit, target = echoes.pulse, echoes.hit, plan.target
     face, along = traced.pick("face", hit), traced.pick("along", hit)
-    distance = echoes.range + scan.noise.range_bias
+    distance = echoes.range + plan.noise.range_bias
     if errors.range is not None:
-        own = errors.of_range(number_in_block[pulse], number, scan.most_returns)
-        distance = distance + scan.setting.range_sigma * own
-    intensity, clipped = saturate(echoes.intensity, np.inf if scan.detects_later else scan.setting.saturation)
+        own = errors.of_range(number_in_block[pulse], number, plan.most_returns)
+        distance = distance + plan.setting.range_sigma * own
+    intensity, clipped = saturate(echoes.intensity, np.inf if plan.detects_later else plan.setting.saturation)
     normal = None
-    if scan.targets or "normal" in scan.wanted:
+    if plan.targets or "normal" in plan.wanted:
         normal = target.normals(face, along, pulses.time[pulse], motions)
-        if scan.effects:
+        if plan.effects:
             air = np.flatnonzero(face < 0)
             normal[:, air] = -np.take(traced.rays.direction.reshape(3, -1), traced.ray_of(hit[air]), axis=1)
-    measured = MeasuredPoints(scan, pulses, pulse, echoes.range, echoes.intensity, face, normal)
+    measured = MeasuredPoints(plan, pulses, pulse, echoes.range, echoes.intensity, face, normal)
     points = make_block(
         xyz=place_points(pulses.measured_origin, pulses.measured_direction, pulse, distance, target.origin),
         intensity=intensity,
@@ -224,20 +224,20 @@ def _points(
         **fill_layers(measured),
     )
     seen = None
-    if scan.targets and normal is not None:
+    if plan.targets and normal is not None:
         ray, reach = traced.ray_of(hit), traced.pick("distance", hit)
-        seen = _seen_targets(scan, traced.rays, ray, reach, face, normal, motions)
+        seen = _seen_targets(plan, traced.rays, ray, reach, face, normal, motions)
     return points, seen, clipped
 
 
 def _seen_targets(
-    scan: ScanPlan, rays: Rays, ray: Index, reach: Float, face: Index, normal: Float, motions: list[Track]
+    plan: ScanPlan, rays: Rays, ray: Index, reach: Float, face: Index, normal: Float, motions: list[Track]
 ) -> Targets:
     """Return where the points were seen, in the scene as it stands at the time 0: as it is rendered.
 
     That is on the surface that gave most of the return: the mean of all its hits may lie in the air between them.
     """
-    target, time = scan.target, rays.time[ray % len(rays.time)]
+    target, time = plan.target, rays.time[ray % len(rays.time)]
     position, scanner = _ray_ends(rays, ray, reach)
     if target.moving:
         begin, offset, normal = target.at_start(face, position, time, motions, (scanner - position, normal))

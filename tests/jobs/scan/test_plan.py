@@ -1,0 +1,116 @@
+"""A scenario resolved into a plan and recorded, with stand-ins for Blender: exact hits on a plane, its own colour."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from synthroads_addon.cloud.points import PointBlock
+from synthroads_addon.jobs.scan.plan import plan_scan
+from synthroads_addon.materials.table import Material, materials
+from synthroads_addon.road.surroundings import Environment
+from synthroads_addon.scanning.colour.colour import LayerSource, MaterialLayers, surface_constants
+from synthroads_addon.scanning.colour.request import LayerRequest
+from synthroads_addon.scanning.plan import ScanConditions, ScanPlan
+from synthroads_addon.scanning.record import CollectedBlocks, record
+from synthroads_addon.scanning.scene.caster import Caster
+from synthroads_addon.scanning.scene.mesh import SceneMesh
+from synthroads_addon.scanning.scene.motion import ScannedScene
+from synthroads_addon.scanning.weather.registry import WEATHERS
+from synthroads_addon.scenario.scenario import Scenario
+from tests.helpers.scenes.scan_scenes import BruteForce, Standing, plane
+
+ROOT = Path(__file__).resolve().parents[3]
+
+
+class StandIns:
+    """Services without Blender: rays tested against every face, layers as the table of materials has them.
+
+    Attributes:
+        asked: what was asked for, in turn.
+    """
+
+    def __init__(self) -> None:
+        self.asked: list[Any] = []
+
+    def caster(self, name: str, mesh: SceneMesh) -> Caster:
+        self.asked.append(("caster", name))
+        return BruteForce(mesh)
+
+    def materials(self, names: Sequence[str]) -> list[Material]:
+        return [materials()[name] for name in names]
+
+    @contextmanager
+    def layers(self, request: LayerRequest, progress: Callable[[float], None]) -> Iterator[LayerSource]:
+        self.asked.append(("layers", request.wanted, request.settings.image_spacing))
+        progress(1.0)
+        yield MaterialLayers(surface_constants(self.materials(request.mesh.materials)))
+
+
+def planned(services: StandIns, conditions: ScanConditions | None = None, **changes: Any) -> ScanPlan:
+    """Return the plan of a short scan over a plane at z = 0, from 60 m above."""
+    path = Standing()
+    path.strips = (type(path.strips[0])(0, 0.0, 0.02),)  # type: ignore[misc]
+    scan = {"noise": {"range_sigma": 0.0}, "relief": 0.0, "caster": "embree"} | changes.pop("scan", {})
+    scenario = Scenario.from_dict({"fidelity": "draft", "scan": scan} | changes)
+    return plan_scan(scenario, ScannedScene(plane()), path, services, conditions)
+
+
+def recorded(plan: ScanPlan) -> PointBlock:
+    """Return the points of a plan's only block."""
+    blocks = CollectedBlocks()
+    record(plan, blocks)
+    (result,) = blocks.results
+    return result.points
+
+
+def test_every_default_is_filled_in_once() -> None:
+    services = StandIns()
+    foggy = ScanConditions(Environment(weather="fog", visibility=500.0))
+    plan = planned(services, foggy)
+    device = plan.setting.device
+    assert (plan.rings, plan.relief_octaves) == ((), 2), "the draft fidelity's"
+    assert plan.setting.pulse_rate == device.modes[0].pulse_rate_khz * 1e3
+    fog = WEATHERS["fog"].from_dict({"condition": "fog", "visibility": 500.0})
+    assert plan.attenuation == fog.attenuation(device.wavelength_nm)
+    assert planned(services, foggy, scan={"attenuation": 0.01}).attenuation == 0.01
+    assert not plan.driven
+    assert planned(services, scan={"platform": {"kind": "vehicle"}}).driven
+    with pytest.raises(AttributeError):
+        plan.seed = 2  # type: ignore[misc]
+
+
+def test_it_asks_the_services_for_what_the_scenario_wants() -> None:
+    services = StandIns()
+    points = recorded(planned(services, cloud={"attributes": ["normal", "noise_free", "roughness"]}))
+    ((_, name), (_, wanted, spacing)) = services.asked
+    assert (name, wanted) == ("embree", {"rgb", "roughness"})
+    assert spacing == Scenario.from_dict({"fidelity": "draft"}).colour.settings("draft", 60.0).image_spacing
+    assert len(points) > 100
+    assert np.allclose(points.xyz[:, 2], 180.0, atol=1e-4), "every point lies on the plane"
+    assert np.allclose(points.array("normal"), [0.0, 0.0, 1.0])
+    table = materials()["asphalt"]
+    assert np.allclose(points.array("roughness"), table.roughness, atol=1e-6)
+    assert points.rgb.any()
+    assert len(np.unique(points.rgb, axis=0)) == 1
+
+
+def test_nothing_is_asked_for_that_nobody_wants() -> None:
+    services = StandIns()
+    points = recorded(planned(services, colour={"rgb": False}, cloud={"attributes": []}))
+    assert [asked[:2] for asked in services.asked] == [("caster", "embree"), ("layers", frozenset())]
+    assert not points.rgb.any()
+    assert not points.more
+
+
+def test_none_of_it_needs_blender() -> None:
+    program = "import sys; import synthroads_addon.jobs.scan.plan, synthroads_addon.scanning.record; "
+    program += "sys.exit('bpy' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", program], cwd=ROOT, check=False).returncode == 0
