@@ -47,14 +47,14 @@ def __getattr__(name: str) -> Any:
 
 def register() -> None:
     """Register the extension's classes with Blender."""
-    from . import ui
+    from . import ui  # needs Blender, which the library doesn't
 
     ui.register()
 
 
 def unregister() -> None:
     """Remove the extension's classes from Blender."""
-    from . import ui
+    from . import ui  # see `register`
 
     ui.unregister()
 

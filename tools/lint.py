@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import subprocess
 import sys
 from pathlib import Path
@@ -23,6 +24,44 @@ def print_what_docstrings() -> bool:
     return bool(found)
 
 
+def print_late_imports() -> bool:
+    """Print the imports within functions that don't say why they aren't at the module's top.
+
+    Reasons are a comment beside or above, or an `except ImportError`: the package is optional. In `headless` all
+    commands load what they need when they run, so that ``--help`` and completion come at once.
+    """
+    print("-- imports within functions", flush=True)
+    found = [
+        f"{path.relative_to(ROOT)}:{number}: an import within a function says why, in a comment beside or above it"
+        for folder in ("synthroads_addon", "ml")
+        for path in sorted((ROOT / folder).rglob("*.py"))
+        for number in late_imports(path.read_text(encoding="utf-8"))
+    ]
+    print("\n".join(found) or "each import within a function says why")
+    return bool(found)
+
+
+def late_imports(source: str) -> list[int]:
+    """Return the line of the first import within each function that says no reason for any of them."""
+    lines, found = source.splitlines(), []
+    functions = [node for node in ast.walk(ast.parse(source)) if isinstance(node, ast.FunctionDef)]
+    for function in functions:
+        tried = {
+            id(inner)
+            for node in ast.walk(function)
+            if isinstance(node, ast.Try) and any("Error" in ast.unparse(handler) for handler in node.handlers)
+            for inner in node.body
+        }
+        numbers = sorted(
+            node.lineno
+            for node in ast.walk(function)
+            if isinstance(node, ast.Import | ast.ImportFrom) and id(node) not in tried
+        )
+        if numbers and not any("#" in line for number in numbers for line in lines[number - 2 : number]):
+            found.append(numbers[0])
+    return found
+
+
 def main() -> int:
     """Run every check, also after one has failed, and return 0 if all passed."""
     checks = {
@@ -33,7 +72,8 @@ def main() -> int:
         checks["mypy"] = [sys.executable, "-m", "mypy"]
     else:  # the annotations are those of Blender 4.5's NumPy
         print("-- mypy is left out: types are checked with the libraries that Python 3.11 has")
-    failed = ["docstrings"] if print_what_docstrings() else []
+    own = {"docstrings": print_what_docstrings, "imports within functions": print_late_imports}
+    failed = [name for name, print_faults in own.items() if print_faults()]
     for name, command in checks.items():
         print(f"-- {name}", flush=True)
         if subprocess.run(command, cwd=ROOT, check=False).returncode != 0:

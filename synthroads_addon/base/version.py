@@ -9,7 +9,7 @@ from pathlib import Path
 @cache
 def version() -> str:
     """Return the version from `blender_manifest.toml`: in the package in the extension, above it in a checkout."""
-    import tomllib
+    import tomllib  # hardly anything asks for the version
     from importlib import metadata
 
     here = Path(__file__).parents[1]

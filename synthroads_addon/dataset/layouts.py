@@ -214,7 +214,7 @@ def layout_descriptions(recipe: Recipe, jobs: Sequence[SceneJob]) -> dict[str, s
 
 def _kitti_configuration(scheme: ClassScheme, jobs: Sequence[SceneJob]) -> str:
     """Return the configuration in the form of SemanticKITTI's own (labels, color_map in BGR, learning maps, split)."""
-    import yaml
+    import yaml  # Blender's Python has none
 
     ids = {row.id + 1: row for row in scheme.rows}
     order = {raw: place for place, raw in enumerate(sorted(ids), 1)}

@@ -27,7 +27,7 @@ _BEYOND = 6.0  # m outside of the pavement
 
 def draw(found: Reconstruction, cloud: RoadCloud, path: FilePath) -> None:
     """Write the picture (PNG)."""
-    import matplotlib
+    import matplotlib  # takes half a second, and few ask for the picture
 
     matplotlib.use("Agg")
     import matplotlib.pyplot as plt

@@ -181,7 +181,7 @@ class ElevationModel:
             InputError: that is more than fits into memory.
             rasterio.errors.RasterioIOError: the file is truncated or damaged.
         """
-        from rasterio.windows import Window
+        from rasterio.windows import Window  # the package is optional
 
         wanted = np.ones(self._number.shape, dtype=bool) if cells is None else np.zeros(self._number.shape, dtype=bool)
         if cells is not None:
@@ -283,7 +283,7 @@ def _check_unit(name: str, what: str, unit: str) -> None:
 
 def _check_system(name: str, dataset: DatasetReader, epsg: int) -> None:
     """Refuse another map coordinate system than the road's, and feet."""
-    from rasterio.crs import CRS
+    from rasterio.crs import CRS  # the package is optional
     from rasterio.errors import CRSError
 
     described = Path(name).with_suffix(".prj")

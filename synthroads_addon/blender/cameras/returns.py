@@ -140,7 +140,7 @@ class ReturnCamera:
 
     def _set_shader(self, text: str) -> None:
         """Compile a shader and give it to the camera."""
-        import _cycles
+        import _cycles  # not every Blender has it
 
         source, compiled = self._stage.folder / "camera.osl", self._stage.folder / "camera.oso"
         source.write_text(text, encoding="utf-8")

@@ -24,7 +24,7 @@ def make_caster(name: str, mesh: SceneMesh) -> Caster:
             if name == "embree":
                 raise InputError("scan.caster", name, "needs the package embreex; bvhtree is always there") from None
     if name in ("auto", "bvhtree"):
-        from .bvhtree import BVHTreeCaster
+        from .bvhtree import BVHTreeCaster  # only where it is needed
 
         return BVHTreeCaster(mesh)
     raise InputError("scan.caster", name, f"must be auto or one of {', '.join(NAMES)}")

@@ -50,8 +50,9 @@ def open_writer(
 
 
 def _writer_class(ending: str) -> type[CloudWriter]:
+    """Return the class that writes a kind of file; only its own library is loaded."""
     if ending == ".ply":
-        from .ply import PlyWriter
+        from .ply import PlyWriter  # of all kinds only this one's library is loaded
 
         return PlyWriter
     if ending == ".e57":
@@ -84,7 +85,7 @@ def open_cloud(path: Path) -> CloudReader:
     except OSError as problem:
         raise MissingFileError(str(path), None, f"cannot be read ({problem.strerror})") from None
     if ending == ".ply":
-        from .ply import PlyReader
+        from .ply import PlyReader  # of all kinds only this one's library is loaded
 
         return PlyReader(path)
     if ending == ".e57":

@@ -14,6 +14,7 @@ from ...base.classes import ClassScheme, class_scheme
 from ...base.errors import InputError, OutputError
 from ...base.files import output_folder
 from ...base.progress import Progress, silent
+from ...base.schema import read_json
 from ..formats.base import BLOCK, CloudReader, CloudWriter
 from ..formats.registry import check_ending, open_cloud, open_writer
 from ..points import PointBlock, concatenate
@@ -153,8 +154,6 @@ def draw_previews(
 
 def read_centerline(path: Path) -> NDArray[np.float64]:
     """Return the points (N, 2) of the first line of a GeoJSON file, as `synthroads generate` writes one."""
-    from ...base.schema import read_json
-
     data = read_json(path)
     try:
         shapes = [feature["geometry"] for feature in data["features"]] if "features" in data else [data]

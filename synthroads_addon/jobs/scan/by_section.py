@@ -16,6 +16,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...base.progress import StageTimer
+from ...blender.materials import vary
+from ...blender.model.build import build_road, remove_road
+from ...blender.scene.evaluated import scene_mesh
+from ...blender.scene.vehicle_meshes import VehicleMeshes
+from ...blender.services import BlenderServices
 from ...road.geometry import RoadGeometry
 from ...road.parameters import RoadParameters
 from ...scanning.beam import RINGS, beam_pattern
@@ -70,8 +75,6 @@ class SectionScan:
     """
 
     def __init__(self, scenario: Scenario, parameters: RoadParameters) -> None:
-        from ...blender.scene.vehicle_meshes import VehicleMeshes
-
         self.scenario, self.parameters = scenario, parameters
         self.geometry = RoadGeometry(parameters)
         setting, path = scanner_setting(scenario.scan), road_path(scenario, self.geometry)
@@ -92,8 +95,6 @@ class SectionScan:
 
     def plans(self, timer: StageTimer) -> Generator[ScanPlan, None, None]:
         """Build one section after the other and yield its plan; afterwards the section is dropped."""
-        from ...blender.model.build import remove_road
-
         done, total = 0, len(self.cut.all())
         for section in self.sections():
             shares = done / total, (done + len(section.blocks)) / total
@@ -107,8 +108,6 @@ class SectionScan:
 
     def plan(self, section: Section, timer: StageTimer) -> ScanPlan:
         """Build a section and return the plan of its blocks."""
-        from ...blender.services import BlenderServices
-
         with timer.stage("model"):
             scene, frame = self._built(section)
         path = ShiftedPath(self.cut.path, frame, self.cut.path.strips)
@@ -121,10 +120,6 @@ class SectionScan:
 
     def _built(self, section: Section) -> tuple[ScannedScene, Float]:
         """Return what is scanned of a section, and where its frame begins in the road's."""
-        from ...blender.materials import vary
-        from ...blender.model.build import build_road
-        from ...blender.scene.evaluated import scene_mesh
-
         settings, scenario = self.scenario.settings(), self.scenario
         stretch = (section.low, section.high)
         tolerance, detail = settings.tolerance, settings.vegetation_detail

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import bpy
 
+from ...blender.model.read_back import edited_parameters
 from ...blender.model.store import find_road, objects_of, recall
 from ..fields.preferences import with_preferences
 from .common import is_free
@@ -44,8 +45,6 @@ class SYNTHROADS_OT_scan(LongOperator, bpy.types.Operator):
 
 def asked_for(context: bpy.types.Context) -> RoadScan:
     """Return what the panel's button scans; raise `InputError` if that can't be done."""
-    from ...blender.model.read_back import edited_parameters
-
     settings, road = context.scene.synthroads, find_road(context.scene)
     assert road  # poll() has seen it
     parameters, built = recall(road)
