@@ -12,14 +12,14 @@ from ..materials.surfaces import brightness_of
 from ..materials.texture_spread import spread_factors
 from .apply_effects import BothMarks, apply_effects
 from .beam import conical, cylindrical_offsets
-from .colour.colour import Targets, joined_targets
+from .colour.colour import SeenPoints
 from .knots import Track
 from .plan import ScanPlan
 from .platforms.path import Strip
 from .point_layers import MeasuredPoints, fill_layers, place_points
 from .pulses import Errors, Poses, Pulses, make_pulses, reaching_scene
 from .radiometry import received_intensity, saturate
-from .returns import UNCOUNTED, Echoes, Marks, chosen_echoes, group_returns, number_returns
+from .returns import UNCOUNTED, Echoes, Marks, group_returns, number_returns
 from .trace import Hits, Rays, Traced, trace
 
 Float = NDArray[np.float64]
@@ -44,7 +44,7 @@ class BlockResult:
     """
 
     points: PointBlock
-    seen: Targets | None
+    seen: SeenPoints | None
     pulses: int
     rays: int
     below_threshold: int
@@ -62,7 +62,7 @@ def joined_results(results: list[BlockResult]) -> BlockResult:
 
     return BlockResult(
         points=concatenate([result.points for result in results]),
-        seen=joined_targets(seen) if seen else None,
+        seen=SeenPoints.joined(seen) if seen else None,
         pulses=total("pulses"),
         rays=total("rays"),
         below_threshold=total("below_threshold"),
@@ -106,7 +106,7 @@ def scan_pulses(plan: ScanPlan, strip: Strip, first: int, count: int, key: int =
     strong = np.flatnonzero(echoes.intensity >= threshold)
     weak = len(echoes.pulse) - len(strong)
     if weak:
-        echoes = chosen_echoes(echoes, strong)
+        echoes = echoes.select(strong)
     if errors.lost is not None:
         echoes = _drop_lost_echoes(echoes, errors.lost[number])
     points, seen, clipped = _points(plan, strip, pulses, traced, echoes, errors, number, poses.motions)
@@ -177,7 +177,7 @@ def _drop_lost_echoes(echoes: Echoes, lost: NDArray[np.bool_]) -> Echoes:
     keep, number, _ = number_returns(echoes.pulse, lost.shape[1])
     chosen = np.flatnonzero(keep)
     chosen = chosen[~lost[echoes.pulse[chosen], number - 1]]
-    return chosen_echoes(echoes, chosen)
+    return echoes.select(chosen)
 
 
 def _points(
@@ -189,11 +189,11 @@ def _points(
     errors: Errors,
     number_in_block: Index,
     motions: list[Track],
-) -> tuple[PointBlock, Targets | None, int]:
+) -> tuple[PointBlock, SeenPoints | None, int]:
     """Return the points of the echoes, where they were seen, and how many of them saturated the detector."""
     keep, number, returns = number_returns(echoes.pulse, plan.most_returns)
     if not keep.all():
-        echoes = chosen_echoes(echoes, keep)
+        echoes = echoes.select(keep)
     pulse, hit, target = echoes.pulse, echoes.hit, plan.target
     face, along = traced.pick("face", hit), traced.pick("along", hit)
     distance = echoes.range + plan.noise.range_bias
@@ -232,7 +232,7 @@ def _points(
 
 def _seen_targets(
     plan: ScanPlan, rays: Rays, ray: Index, reach: Float, face: Index, normal: Float, motions: list[Track]
-) -> Targets:
+) -> SeenPoints:
     """Return where the points were seen, in the scene as it stands at the time 0: as it is rendered.
 
     That is on the surface that gave most of the return: the mean of all its hits may lie in the air between them.
@@ -242,7 +242,7 @@ def _seen_targets(
     if target.moving:
         begin, offset, normal = target.at_start(face, position, time, motions, (scanner - position, normal))
         position, scanner = begin, begin + offset
-    return Targets(
+    return SeenPoints(
         position=np.ascontiguousarray(position.T),
         scanner=np.ascontiguousarray(scanner.T),
         normal=np.ascontiguousarray(normal.T),

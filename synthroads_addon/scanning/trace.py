@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..materials.surfaces import Surfaces
+from .array_rows import ArrayRows
 from .knots import Track
 from .scene.target import Target
 
@@ -42,7 +43,7 @@ class Rays:
 
 
 @dataclass(frozen=True)
-class Hits:
+class Hits(ArrayRows):
     """Surfaces that rays meet; all arrays have one shape.
 
     Attributes:
@@ -146,12 +147,11 @@ def trace(
 def _gather_hits(rays: Rays, first: Hits, layers: list[Hits], on: list[NDArray[np.intp]]) -> Traced:
     """Return everything; of what lies behind only what is within reach."""
     if not layers:
-        nothing = Hits(*(np.empty(0, dtype=getattr(first, field.name).dtype) for field in fields(Hits)))
-        return Traced(rays, first, nothing, np.empty(0, dtype=np.intp))
-    behind = Hits(*(np.concatenate([getattr(layer, field.name) for layer in layers]) for field in fields(Hits)))
+        none, nothing = np.empty(0, dtype=np.intp), np.empty(0)
+        return Traced(rays, first, Hits(none, none, nothing, nothing, nothing), none)
+    behind = Hits.joined(layers)
     inside = np.flatnonzero(behind.distance < np.inf)
-    chosen = Hits(*(getattr(behind, field.name)[inside] for field in fields(Hits)))
-    return Traced(rays, first, chosen, np.concatenate(on)[inside])
+    return Traced(rays, first, behind.select(inside), np.concatenate(on)[inside])
 
 
 def _within(distance: Float, nearest: float, farthest: float) -> Float:

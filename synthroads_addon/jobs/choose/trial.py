@@ -22,7 +22,7 @@ from ...blender.services import BlenderServices
 from ...cloud.points import PointBlock
 from ...scanning.beam import RINGS, beam_pattern
 from ...scanning.blocks import Blocks
-from ...scanning.colour.colour import LayerValues, Targets, sample_targets
+from ...scanning.colour.colour import LayerValues, SeenPoints, sample_points
 from ...scanning.colour.request import LayerRequest
 from ...scanning.colour.settings import ColourSettings
 from ...scanning.colour.views import View
@@ -144,14 +144,14 @@ class Trial:
         return replace(self.plan.request, settings=settings)
 
     def _layers(
-        self, settings: ColourSettings, lines: Sequence[Targets], wanted: frozenset[str]
+        self, settings: ColourSettings, lines: Sequence[SeenPoints], wanted: frozenset[str]
     ) -> list[LayerValues]:
         assert self.plan.request is not None
         request = replace(
             self.plan.request, settings=settings, wanted=wanted, pick=lambda views: views_near_lines(views, lines)
         )
         with layer_source(request) as source:
-            return [sample_targets(source, seen, wanted) for seen in lines]
+            return [sample_points(source, seen, wanted) for seen in lines]
 
     def count_images(self, changes: Mapping[str, Any]) -> tuple[int, float]:
         """Return how many images the whole path would have, and their megapixels; 0 where none are rendered."""
@@ -179,7 +179,7 @@ class Trial:
         return seconds / share, round(files.counts.points / share)
 
 
-def views_near_lines(views: Sequence[View], lines: Sequence[Targets]) -> list[View]:
+def views_near_lines(views: Sequence[View], lines: Sequence[SeenPoints]) -> list[View]:
     """Return what the nearest images show of each scan line: parts of them."""
     parts: list[View | None] = []
     for line in lines:

@@ -26,7 +26,7 @@ from ...scanning.colour.colour import (
     MATERIAL_LAYERS,
     LayerSource,
     LayerValues,
-    sample_targets,
+    sample_points,
     shares_by_source,
     source_name,
 )
@@ -171,12 +171,12 @@ def _measure_stretches(
     start = time.process_time()
     with layer_source(request) as source:
         if coloured and result.seen is not None:
-            sample_targets(source, result.seen.select(slice(0, _FEW)), LAYERS)
+            sample_points(source, result.seen.select(slice(0, _FEW)), LAYERS)
         prepared, rendered = time.process_time(), dict(source.report)
         counts = _count_points_in_file(scenario, part, source)
         done = time.process_time()
         peak = peak_memory_mb()
-        values = sample_targets(source, result.seen, LAYERS) if coloured and result.seen is not None else None
+        values = sample_points(source, result.seen, LAYERS) if coloured and result.seen is not None else None
     seconds, images = done - prepared, prepared - start
     restarts = 0
     if coloured and takes_returns(request.settings):  # stretches are too few for the renderer to begin anew
@@ -272,7 +272,7 @@ def _true_colours(knob: Knob, sample: Sample) -> tuple[LayerValues, str, NDArray
         pixel, spacing = settings.ground_sampling_distance, settings.image_spacing
         name = f"images of {pixel:g} m pixels every {spacing:g} m, of the points that these show"
     with layer_source(replace(request, settings=settings, wanted=LAYERS)) as source:
-        return sample_targets(source, seen.select(chosen), LAYERS), name, chosen
+        return sample_points(source, seen.select(chosen), LAYERS), name, chosen
 
 
 def _colour_errors(

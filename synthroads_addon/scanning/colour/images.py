@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .colour import FROM_MATERIAL, NEARBY, LayerValues, MaterialLayers, Targets
+from .colour import FROM_MATERIAL, NEARBY, LayerValues, MaterialLayers, SeenPoints
 from .nearby import REACH, light_nearby, sample_nearby
 from .views import RenderedImage, View
 
@@ -69,17 +70,9 @@ class ImageLayers:
         apart = np.linalg.norm(np.diff(places, axis=0), axis=1) if len(places) > 1 else np.ones(1)
         self._cell = max(float(np.median(apart)) / 2.0, 0.5)
 
-    def sample(
-        self,
-        position: Float,
-        scanner: Float,
-        normal: NDArray[np.floating],
-        material: NDArray[np.uint16],
-        time: Float,
-        wanted: frozenset[str],
-    ) -> LayerValues:
+    def sample(self, points: SeenPoints, wanted: frozenset[str]) -> LayerValues:
         """Return the wanted layers of N points; see `LayerSource.sample`."""
-        points = Targets(position, scanner, normal, material, np.array(time, np.float64))
+        points = replace(points, time=np.array(points.time, np.float64))  # the images' times are written into it
         source = np.full(len(points), FROM_MATERIAL, np.uint8)
         taken = np.zeros((len(points), sum(part.stop - part.start for part in self.channels.values())), np.float32)
         if len(points) and self.images:
@@ -88,7 +81,7 @@ class ImageLayers:
             points, {name: taken[:, part] for name, part in self.channels.items()}, source, wanted
         )
 
-    def _take_all(self, points: Targets, taken: NDArray[np.float32], source: NDArray[np.uint8]) -> None:
+    def _take_all(self, points: SeenPoints, taken: NDArray[np.float32], source: NDArray[np.uint8]) -> None:
         """Fill in values, sources, and times of the points that an image shows."""
         cube = np.floor(points.scanner / self._cell).astype(np.int64)
         if (cube == cube[0]).all():
@@ -101,7 +94,7 @@ class ImageLayers:
             self._take(part, values, own)
             taken[rows], source[rows], points.time[rows] = values, own, part.time
 
-    def _take(self, points: Targets, taken: NDArray[np.float32], source: NDArray[np.uint8]) -> None:
+    def _take(self, points: SeenPoints, taken: NDArray[np.float32], source: NDArray[np.uint8]) -> None:
         """Do so for points that the scanner saw from about one place."""
         chosen, misfit = self._misfits(points, self._candidates)
         order = np.argsort(misfit, axis=0, kind="stable")[:TRIES]
@@ -121,7 +114,7 @@ class ImageLayers:
             self._take_hidden(few, values, own)
             taken[hidden], source[hidden], points.time[hidden] = values, own, few.time
 
-    def _take_hidden(self, points: Targets, taken: NDArray[np.float32], source: NDArray[np.uint8]) -> None:
+    def _take_hidden(self, points: SeenPoints, taken: NDArray[np.float32], source: NDArray[np.uint8]) -> None:
         """Fill in what any image around shows of points that the best ones don't, and then what it shows close by.
 
         These are few: it is quicker to look at all of them in image by image than to go by their own order.
@@ -148,7 +141,7 @@ class ImageLayers:
         near = np.flatnonzero(source == NEARBY)
         taken[near] = light_nearby(self.material, points.select(near), taken[near], self.channels)
 
-    def _misfits(self, points: Targets, candidates: int) -> tuple[NDArray[np.intp], NDArray[np.float32]]:
+    def _misfits(self, points: SeenPoints, candidates: int) -> tuple[NDArray[np.intp], NDArray[np.float32]]:
         """Return the images (C,) nearest to the scanner and how badly they suit each point (C, N)."""
         away = np.linalg.norm(self._places - points.scanner.mean(axis=0), axis=1)
         chosen = np.argsort(away, kind="stable")[:candidates]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from .colour import MaterialLayers, Targets
+from .colour import MaterialLayers, SeenPoints
 from .views import RenderedImage
 
 Float = NDArray[np.float64]
@@ -50,7 +50,7 @@ def sample_nearby(
 
 
 def light_nearby(
-    fallback: MaterialLayers, points: Targets, taken: NDArray[np.float32], channels: dict[str, slice]
+    fallback: MaterialLayers, points: SeenPoints, taken: NDArray[np.float32], channels: dict[str, slice]
 ) -> NDArray[np.float32]:
     """Return channels (N, C) taken at places close by, with the sun's light as the points' own slope has it.
 

@@ -90,8 +90,6 @@ class MovingPath:
         height: of the scanner above what it follows, m.
         knot_spacing: s, see `Path`.
         typical_range: m, see `Path`.
-        deviation: largest horizontal distance of the path's form from the guide and its offsets, m: that of the
-            fitted polynomials, or the sway.
 
     Args:
         platform: what moves.
@@ -102,7 +100,7 @@ class MovingPath:
     """
 
     def __init__(self, platform: MovingPlatform, guide: Guide) -> None:
-        self._guide, self._sway, self.deviation = _form(platform, guide)
+        self._guide, self._sway = _form(platform, guide)
         self._offsets: tuple[float, ...] = platform.value("lateral_offsets") or self._guide.driving_offsets()
         self._forward = [platform.runs_forward(strip, offset) for strip, offset in enumerate(self._offsets)]
         self.height, self._speed = float(platform.value("height")), float(platform.value("speed"))
@@ -177,14 +175,13 @@ class MovingPath:
         return knots_for(bend * self._speed**2, jump * self._speed)
 
 
-def _form(platform: MovingPlatform, guide: Guide) -> tuple[Guide, Sway | None, float]:
-    """Return what the strips lie beside, their sway, and how far this form leaves the guide."""
+def _form(platform: MovingPlatform, guide: Guide) -> tuple[Guide, Sway | None]:
+    """Return what the strips lie beside, and their sway."""
     if platform.path == "smoothed":
-        smoothed = SmoothedGuide(guide, platform.polynomial_degree)
-        return smoothed, None, smoothed.deviation
+        return SmoothedGuide(guide, platform.polynomial_degree), None
     if platform.path == "direct" or platform.zigzag_amplitude == 0.0:
-        return guide, None, 0.0
+        return guide, None
     if platform.zigzag_wavelength < platform.zigzag_amplitude:
         allowed = f"at least the amplitude, {platform.zigzag_amplitude:g} m, is needed: a shorter sway runs across"
         raise InputError("scan.platform.zigzag_wavelength", platform.zigzag_wavelength, allowed)
-    return guide, Sway(platform.zigzag_amplitude, platform.zigzag_wavelength), platform.zigzag_amplitude
+    return guide, Sway(platform.zigzag_amplitude, platform.zigzag_wavelength)

@@ -53,7 +53,6 @@ class TrajectoryPath:
         knot_spacing: s, see `Path`. Where the file's times lie on an even grid, knots do too, and positions between
             them are exact; otherwise it is short enough for the corners of the trajectory.
         typical_range: median height above the guide, but `_NEAREST` at least, m.
-        deviation: 0.
 
     Args:
         platform: with a file and a mounting.
@@ -63,8 +62,6 @@ class TrajectoryPath:
     Raises:
         InputError: there is no file, it is wrong, or two rows are turned too far to know the way between them.
     """
-
-    deviation = 0.0
 
     def __init__(self, platform: RecordedTrajectory, guide: Guide, origin: Sequence[float] | None = None) -> None:
         if platform.file is None:

@@ -15,6 +15,7 @@ from synthroads_addon.scanning.colour.colour import (
     MATERIAL_LAYERS,
     NEARBY,
     MaterialLayers,
+    SeenPoints,
     Shading,
     encode,
     surface_constants,
@@ -62,9 +63,8 @@ def _sampled(layers: ImageLayers, places: np.ndarray, normal: np.ndarray | None 
     count = len(places)
     up = np.tile([0.0, 0.0, 1.0], (count, 1)) if normal is None else normal
     scanner = places + [0.0, 0.0, 50.0]
-    return layers.sample(
-        places, scanner, up, np.full(count, material, np.uint16), np.zeros(count), frozenset({"base_color"})
-    )
+    points = SeenPoints(places, scanner, up, np.full(count, material, np.uint16), np.zeros(count))
+    return layers.sample(points, frozenset({"base_color"}))
 
 
 @given(st.floats(-15.0, 15.0), st.floats(-15.0, 15.0), st.floats(-5.0, 30.0))
@@ -201,9 +201,8 @@ def test_light_from_close_by_is_that_of_the_points_own_slope(lit: bool) -> None:
     constants = surface_constants(ROWS, varies)
     layers = ImageLayers([image], {"base_color": 3, "sun": 3}, MaterialLayers(constants, Shading("lit", light)))
     places, normal = np.array([[0.0, -0.15, 0.0]]), own[None]
-    values = layers.sample(
-        places, places + [0.0, 0.0, 50.0], normal, np.zeros(1, np.uint16), np.zeros(1), frozenset({"rgb"})
-    )
+    points = SeenPoints(places, places + [0.0, 0.0, 50.0], normal, np.zeros(1, np.uint16), np.zeros(1))
+    values = layers.sample(points, frozenset({"rgb"}))
     assert values.source.tolist() == [NEARBY]
     expected = color * (light.sunlight(normal) * lit + light.sky(normal))
     np.testing.assert_allclose(values.arrays["rgb"] / 65535.0, encode(expected) / 65535.0, atol=1e-3)
