@@ -29,8 +29,8 @@ from ...scanning.colour.views import View
 from ...scanning.noise import Noise
 from ...scanning.plan import ScanConditions, ScanPlan
 from ...scanning.platforms.path import Path as ScanPath
+from ...scanning.platforms.stretches import scatter_stretches
 from ...scanning.record import record_as_measured
-from ...scanning.samples import scatter_stretches
 from ...scanning.scan import BlockResult, joined_results
 from ...scanning.scene.motion import ScannedScene
 from ...scenario.scenario import Scenario
@@ -69,7 +69,7 @@ class Trial:
         scenario: the job, without noise.
         scene: what is scanned.
         plan: of the whole path.
-        phase: see `scanning.samples.scatter_stretches`: other phases are other stretches.
+        phase: see `scanning.platforms.stretches.scatter_stretches`: other phases are other stretches.
         lines: of these is the error taken.
         clock: measures seconds.
     """

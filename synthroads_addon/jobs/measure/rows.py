@@ -32,9 +32,9 @@ from ...scanning.colour.colour import (
 )
 from ...scanning.colour.request import LayerRequest
 from ...scanning.plan import ScanPlan
+from ...scanning.platforms.stretches import middle_stretches, spread_stretches
 from ...scanning.record import RETURNS_AT_ONCE, record_as_measured
 from ...scanning.relief import micro_relief
-from ...scanning.samples import middle, spread_stretches
 from ...scanning.scan import BlockResult, joined_results
 from ...scanning.scene.motion import ScannedScene
 from ...scenario.scenario import Scenario, load_scenario
@@ -265,7 +265,7 @@ def _true_colours(knob: Knob, sample: Sample) -> tuple[LayerValues, str, NDArray
         settings = replace(settings, lighting="path", samples=TRUE_SAMPLES)
         chosen, name = chosen[::_TENTH], f"a pixel per return with {TRUE_SAMPLES} samples of whole light paths"
     elif not HAS_RETURN_CAMERA:
-        part = middle(request.path, _MIDDLE)  # type: ignore[arg-type]
+        part = middle_stretches(request.path, _MIDDLE)
         request = replace(request, path=part)
         within = [(strip.start_time, strip.start_time + strip.duration) for strip in part.strips]
         chosen = np.flatnonzero(np.any([(low <= seen.time) & (seen.time <= high) for low, high in within], axis=0))

@@ -80,6 +80,24 @@ class LinearMotion:
         return rotation, self.place + time[:, None] * self.velocity, np.ones(len(time), dtype=bool)
 
 
+@dataclass(frozen=True)
+class ShiftedMotion:
+    """A motion in a frame that begins elsewhere; see `Motion`.
+
+    Attributes:
+        whole: the motion in the road's local frame.
+        origin: (3,) where the frame begins in the road's, m.
+    """
+
+    whole: Motion
+    origin: Float
+
+    def pose(self, time: Float) -> Pose:
+        """Return the motion's pose in this frame."""
+        rotation, place, present = self.whole.pose(time)
+        return rotation, place - self.origin, present
+
+
 class LaneMotion:
     """A vehicle in its lane, with its carriageway's traffic.
 
