@@ -168,11 +168,6 @@ def layer_arrays() -> dict[str, tuple[str, int]]:
     return {name: (rows[name][0], sum(column.array == name for column in rows[name][1].columns)) for name in names}
 
 
-def arrays_of(attribute: Attribute) -> frozenset[str]:
-    """Return the names of the `PointBlock` arrays that an attribute is made of."""
-    return frozenset(LAYERS[attribute].types)
-
-
 def columns(attributes: tuple[Attribute, ...]) -> tuple[Column, ...]:
     """Return the columns that a file with these attributes has beyond the fields of LAS, in their order."""
     return LABELS + tuple(column for name in ATTRIBUTES if name in attributes for column in LAYERS[name].columns)

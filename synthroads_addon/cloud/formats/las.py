@@ -10,7 +10,6 @@ from __future__ import annotations
 import json
 import struct
 from collections.abc import Iterator
-from contextlib import suppress
 from datetime import date
 from pathlib import Path
 from typing import Any, BinaryIO
@@ -83,12 +82,6 @@ class LasWriter(CloudWriter):
         header.number_of_points_by_return = self._by_return[1:].astype(np.uint64)
         self._writer.close()
         self._file.close()
-
-    def _abandon(self) -> None:
-        with suppress(AttributeError, OSError):
-            self._file.close()
-        with suppress(OSError):
-            self._temporary.unlink(missing_ok=True)
 
     def _flush(self) -> None:
         """Hand the packed points on. laspy's own bookkeeping sorts and searches them: ours is kept while packing."""
@@ -235,10 +228,6 @@ class LasReader(CloudReader):
                 raise damage_error(path, done + len(record), self.header.count)
             done += wanted
             yield self._block(record)
-
-    def close(self) -> None:
-        """Close the file."""
-        self._file.close()
 
     def _check_size(self, path: Path) -> None:
         """Refuse a file that ends before its points do (LAS), or whose chunks don't fill it (LAZ), before any work."""

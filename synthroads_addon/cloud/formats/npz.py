@@ -23,9 +23,9 @@ from numpy.lib import format as npy
 from numpy.typing import NDArray
 
 from ...base.errors import InputError
-from ..layers import LAYERS, columns, gather, layer_arrays
+from ..layers import columns, gather, layer_arrays
 from ..points import PointBlock, make_block
-from .base import BLOCK, CloudHeader, CloudReader, CloudWriter, damage_error, finite_coordinates, header_from_notes
+from .base import BLOCK, CloudReader, CloudWriter, damage_error, finite_coordinates, header_from_notes
 
 _ALWAYS = {
     "xyz": ("<f8", 3),
@@ -73,7 +73,6 @@ class NpzWriter(CloudWriter):
     def _finish(self) -> None:
         for file in self._files.values():
             file.close()
-        notes = {**self.notes(), "offset": self.offset.tolist(), "crs": self.crs_text}
         with zipfile.ZipFile(self._temporary, "w", zipfile.ZIP_STORED, allowZip64=True) as archive:
             for name, (kind, width) in self._arrays.items():
                 shape = (self.count, width) if width > 1 else (self.count,)
@@ -83,16 +82,14 @@ class NpzWriter(CloudWriter):
                         shutil.copyfileobj(part, member, 1 << 22)
                 (self._parts / name).unlink()
             with archive.open(zipfile.ZipInfo("notes.npy", _TIME), "w") as member:
-                npy.write_array(member, np.array(json.dumps(notes)), allow_pickle=False)
+                npy.write_array(member, np.array(json.dumps(self.placed_notes())), allow_pickle=False)
         self._parts.rmdir()
 
-    def _abandon(self) -> None:
-        for file in getattr(self, "_files", {}).values():
+    def _close(self) -> None:
+        for file in self._files.values():
             with suppress(OSError):
                 file.close()
-        shutil.rmtree(self.path.with_name(f".{self.path.name}.parts"), ignore_errors=True)
-        with suppress(OSError):
-            self._temporary.unlink(missing_ok=True)
+        shutil.rmtree(self._parts, ignore_errors=True)
 
 
 class NpzReader(CloudReader):
@@ -107,7 +104,7 @@ class NpzReader(CloudReader):
 
     def __init__(self, path: Path) -> None:
         try:
-            self._archive = zipfile.ZipFile(path)
+            self._file = zipfile.ZipFile(path)
         except ARCHIVE_FAULTS:
             raise InputError(str(path), None, "is not an NPZ file, or truncated") from None
         try:
@@ -120,16 +117,21 @@ class NpzReader(CloudReader):
             self.close()
             raise
         arrays = set(self._kinds)
-        names = {c.name for layer in LAYERS.values() for c in layer.columns if c.array in arrays}
-        header = header_from_notes(path, "NPZ", self._kinds["xyz"][0][0], names, notes)
-        others = {name.removesuffix(".npy") for name in self._archive.namelist()} - arrays - {"notes"}
-        self.header = CloudHeader(
-            **{**header.__dict__, "has_color": "rgb" in arrays, "left_out": tuple(sorted(others))}
+        stored = {name.removesuffix(".npy") for name in self._file.namelist()}
+        self.header = header_from_notes(
+            path,
+            "NPZ",
+            self._kinds["xyz"][0][0],
+            stored,
+            notes,
+            name_of=lambda column: column.array,
+            usual=arrays | {"notes"},
+            has_color="rgb" in arrays,
         )
 
     def blocks(self, size: int = BLOCK) -> Iterator[PointBlock]:
         """See `CloudReader`."""
-        members = {name: self._archive.open(f"{name}.npy") for name in self._kinds}
+        members = {name: self._file.open(f"{name}.npy") for name in self._kinds}
         try:
             for member in members.values():
                 _npy_header(member)
@@ -144,10 +146,6 @@ class NpzReader(CloudReader):
         finally:
             for member in members.values():
                 member.close()
-
-    def close(self) -> None:
-        """Close the file."""
-        self._archive.close()
 
     def _rows(self, member: IO[bytes], name: str, wanted: int) -> NDArray[Any]:
         shape, kind = self._kinds[name]
@@ -173,8 +171,8 @@ class NpzReader(CloudReader):
         """Return shape and type of each array that is known here."""
         kinds = {}
         for name in _ALWAYS | _ON_REQUEST:
-            if f"{name}.npy" in self._archive.namelist():
-                with self._archive.open(f"{name}.npy") as member:
+            if f"{name}.npy" in self._file.namelist():
+                with self._file.open(f"{name}.npy") as member:
                     kinds[name] = _npy_header(member)
         if "xyz" not in kinds:
             raise InputError(str(path), None, "has no array xyz")
@@ -187,14 +185,14 @@ class NpzReader(CloudReader):
         return kinds
 
     def _read_notes(self) -> Any:
-        if "notes.npy" not in self._archive.namelist():
+        if "notes.npy" not in self._file.namelist():
             return None
-        if self._archive.getinfo("notes.npy").file_size > _LONGEST_NOTES:
+        if self._file.getinfo("notes.npy").file_size > _LONGEST_NOTES:
             raise ValueError("its notes are too long")
-        with self._archive.open("notes.npy") as member:
+        with self._file.open("notes.npy") as member:
             if math.prod(_npy_header(member)[0]) != 1:
                 raise ValueError("its notes are no text")
-        with self._archive.open("notes.npy") as member:
+        with self._file.open("notes.npy") as member:
             return json.loads(str(npy.read_array(member, allow_pickle=False)))
 
 

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator
-from contextlib import suppress
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -17,9 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...base.errors import InputError
-from ..layers import LAYERS, Column, columns, gather
+from ..layers import Column, columns, gather
 from ..points import PointBlock, make_block
-from .base import BLOCK, CloudHeader, CloudReader, CloudWriter, damage_error, finite_coordinates, header_from_notes
+from .base import BLOCK, CloudReader, CloudWriter, damage_error, finite_coordinates, header_from_notes
 
 _NAMES = {"NormalX": "nx", "NormalY": "ny", "NormalZ": "nz"}
 """Columns that PLY has names of its own for."""
@@ -84,24 +83,16 @@ class PlyWriter(CloudWriter):
             else:
                 values = self.finite(column.of(block), column.name)
                 record[ply_name(column)] = self.integers(values, column.dtype, column.name) if column.whole else values
-        self._file.write(record)  # type: ignore[arg-type]
+        self._file.write(record)
 
     def _finish(self) -> None:
         self._file.seek(0)
         self._file.write(self._header(self.count))
         self._file.close()
 
-    def _abandon(self) -> None:
-        with suppress(AttributeError, OSError):
-            self._file.close()
-        with suppress(OSError):
-            self._temporary.unlink(missing_ok=True)
-
     def _header(self, count: int) -> bytes:
         """Return the header, which has the same length for any number of points."""
-        notes = json.dumps(
-            {**self.notes(), "offset": self.offset.tolist(), "crs": self.crs_text}, separators=(",", ":")
-        )
+        notes = json.dumps(self.placed_notes(), separators=(",", ":"))
         lines = [
             "ply",
             "format binary_little_endian 1.0",
@@ -138,15 +129,10 @@ class PlyReader(CloudReader):
         except BaseException:
             self._file.close()
             raise
-        own = {column.name for layer in LAYERS.values() for column in layer.columns if ply_name(column) in self._names}
-        header = header_from_notes(path, "PLY", count, own, notes)
-        read = {name for name, _ in _FIXED} | {ply_name(c) for c in columns(header.attributes)} | {*_CLASS_NAMES}
-        self.header = CloudHeader(
-            **{
-                **header.__dict__,
-                "has_color": {"red", "green", "blue"} <= self._names,
-                "left_out": tuple(sorted(self._names - read)),
-            }
+        usual = {name for name, _ in _FIXED} | {*_CLASS_NAMES}
+        colored = {"red", "green", "blue"} <= self._names
+        self.header = header_from_notes(
+            path, "PLY", count, self._names, notes, name_of=ply_name, usual=usual, has_color=colored
         )
 
     def blocks(self, size: int = BLOCK) -> Iterator[PointBlock]:
@@ -158,10 +144,6 @@ class PlyReader(CloudReader):
             if len(data) != wanted * self._type.itemsize:
                 raise damage_error(self.header.path, done, self.header.count)
             yield self._block(np.frombuffer(data, dtype=self._type), done)
-
-    def close(self) -> None:
-        """Close the file."""
-        self._file.close()
 
     def _block(self, record: NDArray[Any], done: int) -> PointBlock:
         count = len(record)

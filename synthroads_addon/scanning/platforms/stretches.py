@@ -1,4 +1,4 @@
-"""Stretches of a path: a sample of a job in place of all of it, or the part that a section of the road is scanned from."""
+"""Stretches of a path: a sample in place of all of it, or what a section of the road is scanned from."""
 
 from __future__ import annotations
 
