@@ -28,9 +28,9 @@ from synthroads_addon.calibration.plot import save_plot
 from synthroads_addon.calibration.texture import read_texture, texture_of
 from synthroads_addon.materials.reflectance import facet_terms
 from synthroads_addon.materials.table import Material, materials, read_material_table, write_material_table
-from synthroads_addon.scanning.radiometry import lambert_intensity, oren_nayar_intensity
 from synthroads_addon.scenario.scenario import Scenario
 from tests.helpers.clouds.calibration_cloud import labelled, striped
+from tests.helpers.laser_equation import intensity_of
 
 ASPHALT, PAINT = materials()["asphalt"], materials()["paint_white"]
 ASKED = (Wanted("asphalt", "40"), Wanted("paint_white", "60"))
@@ -45,9 +45,7 @@ def test_expected_intensities_are_the_laser_equations(reflection) -> None:
     views = chosen_views((0.0, 30.0, 75.0), (20.0, 90.0))
     expectation = Expectation(views, Receiver(attenuation=0.002), reflection)
     args = (np.cos(expectation.incidence), expectation.distance)
-    wanted = lambert_intensity(ASPHALT.reflectivity, *args, 0.002)
-    if reflection == "oren_nayar":
-        wanted = oren_nayar_intensity(ASPHALT.reflectivity, *args, ASPHALT.slope, 0.002)
+    wanted = intensity_of(ASPHALT.reflectivity, *args, ASPHALT.slope if reflection == "oren_nayar" else 0.0, 0.002)
     assert expectation.linear(ASPHALT) == pytest.approx(wanted)
     assert len(np.unique(np.stack([expectation.incidence, expectation.distance]), axis=1).T) == 6
     leaves = materials()["leaves"]
