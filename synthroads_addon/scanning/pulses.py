@@ -119,7 +119,7 @@ class Pulses:
 
     Attributes:
         time: (P,) s since the first strip's start.
-        scan_angle: (P,) rad, see `shots.Shots`.
+        scan_angle: (P,) rad, see `patterns.base.PulseRays`.
         origin: (3, P) where each leaves the scanner, m.
         direction: (3, P) unit vectors of the beam's axis.
         in_plane: (3, P) unit vectors across the beam, in the scan plane; None for a single ray.
