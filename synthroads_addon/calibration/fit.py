@@ -92,9 +92,7 @@ def fit_level_and_spreads(
     return _fit(_levenberg_marquardt(miss, np.array([level, *np.log(first)])), material)
 
 
-def apply_gain(
-    expectation: Expectation, material: Material, fit: Fit, beside: tuple[Material, float] | None
-) -> Float:
+def apply_gain(expectation: Expectation, material: Material, fit: Fit, beside: tuple[Material, float] | None) -> Float:
     """Return linear intensities with a fit's spreads and level; what lies beside a strip keeps its own level."""
     uneven = material.model_copy(update={"spread_below": fit.below, "spread_above": fit.above})
     if beside is None:

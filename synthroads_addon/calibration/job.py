@@ -163,7 +163,6 @@ class Compared:
         data |= {"before": self.before.to_dict(), "after": self.after.to_dict()}
         return data | {"reflectivity": [_short(row.reflectivity) for row in (self.before, self.after)]}
 
-
     def _by_view(self) -> list[dict[str, float]]:
         """Return the expected quartiles at each incidence angle and range, where these are few."""
         views, owner = np.unique(np.stack([self.incidence, self.distance]), axis=1, return_inverse=True)
@@ -441,5 +440,3 @@ def _mean(levels: list[float]) -> float:
 def _short(value: float) -> float:
     """Return a number with six digits."""
     return float(f"{value:.6g}")
-
-

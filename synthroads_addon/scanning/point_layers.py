@@ -58,9 +58,7 @@ def fill_layers(points: MeasuredPoints) -> dict[str, NDArray[Any]]:
     return {array: filler(points) for array, filler in FILLERS.items() if array in points.plan.wanted}
 
 
-def place_points(
-    origin: Float, direction: Float, pulse: NDArray[np.intp], distance: Float, map_origin: Float
-) -> Float:
+def place_points(origin: Float, direction: Float, pulse: NDArray[np.intp], distance: Float, map_origin: Float) -> Float:
     """Return the map coordinates (N, 3) of points at a distance (N,) along the beams (3, P) of their pulses, m."""
     result = np.empty((len(pulse), 3))
     for axis in range(3):

@@ -171,9 +171,7 @@ def make_pulses(plan: ScanPlan, strip: Strip, poses: Poses, angle: Float | None,
             believed /= np.sqrt(np.einsum("ij,ij->j", believed, believed))
         rotation, measured_origin, _ = poses.measured.at(time)
         measured_direction = _turn_vectors(rotation, believed)
-    return Pulses(
-        time, shot.scan_angle, origin, direction, in_plane, across, measured_origin, measured_direction
-    )
+    return Pulses(time, shot.scan_angle, origin, direction, in_plane, across, measured_origin, measured_direction)
 
 
 def _turn_vectors(rotation: Float, vectors: Float) -> Float:

@@ -157,9 +157,7 @@ def shift_along_normals(
         return points
     rough = found if len(found) < len(points) else slice(None)
     material = points.material[rough]
-    height = heights(
-        position[rough], strength * relief.amplitude[material], relief.wavelength[material], seed, octaves
-    )
+    height = heights(position[rough], strength * relief.amplitude[material], relief.wavelength[material], seed, octaves)
     xyz, distance = points.xyz.copy(), points.range.copy()
     xyz[rough] += height[:, None] * points.normal[rough]
     before, cosine = distance[rough], np.cos(np.radians(points.incidence_deg[rough].astype(np.float64)))

@@ -150,9 +150,7 @@ def _merge_echoes(one: Echoes, several: Echoes) -> Echoes:
     return echoes.select(np.argsort(echoes.pulse, kind="stable"))
 
 
-def number_returns(
-    pulse: Index, maximum: int
-) -> tuple[NDArray[np.bool_], NDArray[np.uint8], NDArray[np.uint8]]:
+def number_returns(pulse: Index, maximum: int) -> tuple[NDArray[np.bool_], NDArray[np.uint8], NDArray[np.uint8]]:
     """Return which echoes are recorded, and for these the return number and the number of returns.
 
     Args:

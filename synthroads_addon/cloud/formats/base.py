@@ -308,9 +308,7 @@ def header_from_notes(
     names = {column.name for layer in LAYERS.values() for column in layer.columns if name_of(column) in stored}
     attributes = attributes_of(names)
     left_out = tuple(sorted(stored - usual - {name_of(column) for column in columns(attributes)}))
-    header = CloudHeader(
-        path, kind, count, np.zeros(3), attributes=attributes, has_color=has_color, left_out=left_out
-    )
+    header = CloudHeader(path, kind, count, np.zeros(3), attributes=attributes, has_color=has_color, left_out=left_out)
     if not isinstance(notes, dict):
         return header
     text = notes.get("crs")

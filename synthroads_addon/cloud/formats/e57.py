@@ -196,9 +196,7 @@ class E57Writer(CloudWriter):
             elif scale is None:
                 node = e57.IntegerNode(image, 0, int(np.iinfo(kind).min), int(np.iinfo(kind).max))
             else:
-                node = e57.ScaledIntegerNode(
-                    image, 0, int(np.iinfo(kind).min), int(np.iinfo(kind).max), scale, shift
-                )
+                node = e57.ScaledIntegerNode(image, 0, int(np.iinfo(kind).min), int(np.iinfo(kind).max), scale, shift)
             prototype.set(name, node)
         return prototype
 

@@ -305,5 +305,3 @@ def _pass_with_progress(
         yield block
         done += len(block)
         progress(stage, done / max(count, 1))
-
-

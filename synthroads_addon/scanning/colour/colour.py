@@ -120,9 +120,7 @@ class SurfaceConstants:
         return tuple(name for name in MATERIAL_LAYERS if name in wanted and bool(self.varies[name].any()))
 
 
-def surface_constants(
-    rows: Sequence[Material], varies: dict[str, NDArray[np.bool_]] | None = None
-) -> SurfaceConstants:
+def surface_constants(rows: Sequence[Material], varies: dict[str, NDArray[np.bool_]] | None = None) -> SurfaceConstants:
     """Return the constants of materials in the order of the scene mesh's; nothing varies if not said so."""
     values = {
         name: np.array([getattr(row, name) for row in rows], np.float32).reshape((-1, 3) if parts == 3 else (-1,))

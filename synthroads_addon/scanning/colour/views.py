@@ -102,9 +102,7 @@ class RenderedImage:
     material: NDArray[np.uint16]
 
 
-def views_along(
-    path: Path, points: Float, settings: ColourSettings, field_of_view: float, largest: int
-) -> list[View]:
+def views_along(path: Path, points: Float, settings: ColourSettings, field_of_view: float, largest: int) -> list[View]:
     """Return the cameras along a path, each cut to what it can see of the scene.
 
     High platforms look straight down, with images as wide as the swath. Others look around: ahead, back, to both

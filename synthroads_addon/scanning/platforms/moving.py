@@ -25,9 +25,7 @@ _TRACKS_KEPT = 4
 class MovingPlatform(Platform):
     """Platform that moves along a guide, in strips."""
 
-    height: float | None = quantity(
-        None, ge=0.1, le=5000, unit="m", description="Height above the road."
-    )
+    height: float | None = quantity(None, ge=0.1, le=5000, unit="m", description="Height above the road.")
     speed: float | None = quantity(None, ge=0.1, le=150, unit="m/s", description="Speed over ground.")
     lateral_offsets: tuple[Finite, ...] | None = Field(
         None,

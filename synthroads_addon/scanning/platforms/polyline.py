@@ -47,9 +47,7 @@ class PolylineGuide(AlignmentGuide):
         InputError: points that aren't finite, fewer than two distinct ones, or a corner too sharp to be rounded.
     """
 
-    def __init__(
-        self, points: ArrayLike, origin: Sequence[float] = (0.0, 0.0, 0.0), tolerance: float = 0.0
-    ) -> None:
+    def __init__(self, points: ArrayLike, origin: Sequence[float] = (0.0, 0.0, 0.0), tolerance: float = 0.0) -> None:
         given = finite_array("points", points)
         if given.ndim != 2 or given.shape[1] not in (2, 3):
             raise InputError("points", given.shape, "an array of shape (N, 2) or (N, 3) is needed")

@@ -36,9 +36,7 @@ class RecordedTrajectory(Platform):
     order: ClassVar[int] = 4
 
     kind: Literal["trajectory"] = Field("trajectory", title="Platform", description="Platform.")
-    file: str | None = Field(
-        None, title="Trajectory", description="CSV with time, x, y, z, roll, pitch, heading."
-    )
+    file: str | None = Field(None, title="Trajectory", description="CSV with time, x, y, z, roll, pitch, heading.")
 
     def make_path(self, guide: Guide, origin: Sequence[float] | None = None) -> TrajectoryPath:
         """Return the file's strip; see `Platform.make_path`."""

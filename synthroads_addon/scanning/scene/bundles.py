@@ -56,9 +56,7 @@ class Bundles:
         angle = np.where(spread < length, np.arcsin(np.minimum(spread / np.maximum(length, 1e-300), 1.0)), np.pi)
         axis /= np.maximum(length, 1e-300)
         farthest = np.maximum.reduceat(reach, starts)
-        return cls(
-            origins, directions, times, reach, time[0], delay, apex, ball, axis, angle + _SLACK, farthest
-        )
+        return cls(origins, directions, times, reach, time[0], delay, apex, ball, axis, angle + _SLACK, farthest)
 
     def near(self, track: Track, centre: Float, radius: float) -> Index:
         """Return the rays that come nearer to a moving ball than its radius before the end of their reach.

@@ -49,9 +49,7 @@ class SceneMesh:
     def __post_init__(self) -> None:
         for name, (dtype, shape) in _SHAPES.items():
             array = np.asarray(getattr(self, name))
-            fits = array.ndim == len(shape) and all(
-                n in (None, m) for n, m in zip(shape, array.shape, strict=True)
-            )
+            fits = array.ndim == len(shape) and all(n in (None, m) for n, m in zip(shape, array.shape, strict=True))
             if not fits or array.dtype != dtype:
                 wanted = f"must be {np.dtype(dtype)} of shape {shape} with None for any length"
                 raise InputError(f"scene mesh: {name}", f"{array.dtype} {array.shape}", wanted)

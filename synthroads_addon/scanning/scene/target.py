@@ -126,9 +126,7 @@ class Target:
         boxes = (track.swept(part.centre, part.radius) for part, track in zip(self._parts[1:], motions, strict=True))
         return [np.array(box) for box in boxes if box is not None]
 
-    def cast(
-        self, origins: Float, directions: Float, maximum_range: float, times: Float, motions: list[Track]
-    ) -> Met:
+    def cast(self, origins: Float, directions: Float, maximum_range: float, times: Float, motions: list[Track]) -> Met:
         """Return what each ray meets first.
 
         Args:
