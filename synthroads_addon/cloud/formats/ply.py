@@ -32,7 +32,7 @@ _WORDS = {
     "<f4": ("float", "float32"),
     "<f8": ("double", "float64"),
 }
-_TYPES = {word: kind for kind, words in _WORDS.items() for word in words}
+PLY_TYPES = {word: kind for kind, words in _WORDS.items() for word in words}
 """Types by their names in headers, of which there are two."""
 _FIXED = (
     *(("x", "<f8"), ("y", "<f8"), ("z", "<f8"), ("red", "u1"), ("green", "u1"), ("blue", "u1"), ("intensity", "<f4")),
@@ -199,9 +199,9 @@ def _read_header(path: Path, file: BinaryIO) -> tuple[int, np.dtype[Any], Any]:
             if count < 0:
                 count = _number_of_points(path, words)
         elif words[:1] == ["property"] and element == "vertex":
-            if len(words) != 3 or words[1] not in _TYPES:
+            if len(words) != 3 or words[1] not in PLY_TYPES:
                 raise InputError(str(path), line, "properties of points must be numbers")
-            fields.append((words[2], _TYPES[words[1]]))
+            fields.append((words[2], PLY_TYPES[words[1]]))
     if count < 0 or not fields or len({name for name, _ in fields}) != len(fields):
         raise InputError(str(path), None, "is a PLY file without points")
     return count, np.dtype(fields), _notes(path, notes)

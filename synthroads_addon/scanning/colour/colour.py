@@ -138,7 +138,12 @@ def needed_layers(wanted: frozenset[str], mode: ColourMode) -> frozenset[str]:
     return frozenset(needed)
 
 
-def encode(linear: NDArray[np.floating]) -> NDArray[np.uint16]:
+def decode_srgb(stored: Float) -> Float:
+    """Return linear values of sRGB's (IEC 61966-2-1), 0 to 1."""
+    return np.where(stored <= 0.04045, stored / 12.92, ((stored + 0.055) / 1.055) ** 2.4)
+
+
+def encode_srgb(linear: NDArray[np.floating]) -> NDArray[np.uint16]:
     """Return linear colours as 16-bit sRGB (IEC 61966-2-1), clipped to what that can show."""
     linear = np.clip(np.asarray(linear, np.float32), 0.0, 1.0)
     curve = np.float32(1.055) * np.power(linear, np.float32(1 / 2.4)) - np.float32(0.055)
@@ -232,10 +237,10 @@ class MaterialLayers:
         found: NDArray[np.bool_],
     ) -> NDArray[np.uint16]:
         if self.shading.mode == "false_colour":
-            return encode(np.stack([layers[name] for name in _FALSE_COLOUR], axis=1))
+            return encode_srgb(np.stack([layers[name] for name in _FALSE_COLOUR], axis=1))
         color = layers["base_color"]
         if self.shading.mode == "unlit":
-            return encode(color)
+            return encode_srgb(color)
         sun, sky = color * self.shading.light.sunlight(points.normal), color * self.shading.light.sky(points.normal)
         if "sun" in channels:
             sun[found] = channels["sun"][found]
@@ -243,4 +248,4 @@ class MaterialLayers:
             sky[found] = channels["sky"][found]
         if self.shading.clouds is not None:
             sun *= self.shading.clouds.transmission(points.position, points.time)[:, None]
-        return encode(sun + sky)
+        return encode_srgb(sun + sky)

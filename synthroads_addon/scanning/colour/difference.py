@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from .colour import decode_srgb
+
 Float = NDArray[np.float64]
 
 _WHITE = np.array([0.95047, 1.0, 1.08883])
@@ -13,11 +15,9 @@ _TO_XYZ = np.array(
 )
 
 
-def lab(rgb: NDArray[np.uint16]) -> Float:
+def cie_lab(rgb: NDArray[np.uint16]) -> Float:
     """Return CIE L*a*b* (N, 3) under D65 of 16-bit sRGB (N, 3)."""
-    value = rgb.astype(np.float64) / 65535.0
-    linear = np.where(value <= 0.04045, value / 12.92, ((value + 0.055) / 1.055) ** 2.4)
-    ratio = linear @ _TO_XYZ.T / _WHITE
+    ratio = decode_srgb(rgb.astype(np.float64) / 65535.0) @ _TO_XYZ.T / _WHITE
     f = np.where(ratio > (6 / 29) ** 3, np.cbrt(ratio), ratio * (29 / 6) ** 2 / 3 + 4 / 29)
     return np.stack([116 * f[:, 1] - 16, 500 * (f[:, 0] - f[:, 1]), 200 * (f[:, 1] - f[:, 2])], axis=1)
 

@@ -79,6 +79,12 @@ class SceneMesh:
         """Return the size of all arrays, bytes."""
         return sum(value.nbytes for f in fields(self) if hasattr(value := getattr(self, f.name), "nbytes"))
 
+    def vertex_bounds(self) -> NDArray[np.float64] | None:
+        """Return the smallest and the largest local coordinates (2, 3) of the vertices, m; None without any."""
+        if not len(self.vertices):
+            return None
+        return np.array([self.vertices.min(axis=0), self.vertices.max(axis=0)], dtype=np.float64)
+
     def normals(self) -> NDArray[np.float64]:
         """Return (T, 3) unit normals; triangles without area have the zero vector."""
         result = np.empty((len(self.triangles), 3))

@@ -93,11 +93,7 @@ class Target:
             _part(mesh, make_caster(mesh), int(first)) for mesh, first in zip(meshes, firsts[:-1], strict=True)
         ]
         self.caster = self._parts[0].caster
-        self.bounds = (
-            np.array([static.vertices.min(axis=0), static.vertices.max(axis=0)], dtype=np.float64)
-            if len(static.vertices)
-            else None
-        )
+        self.bounds = static.vertex_bounds()
 
     def of_faces(self, name: str, faces: Faces) -> NDArray[Any]:
         """Return ``class_id``, ``instance_id`` or ``material`` of faces (H,); of -1 what stands for none."""
@@ -194,10 +190,8 @@ def _join_arrays(arrays: list[NDArray[Any]]) -> NDArray[Any]:
 
 
 def _part(mesh: SceneMesh, caster: Caster, first: int) -> _TargetPart:
-    if len(mesh.vertices):
-        low, high = mesh.vertices.min(axis=0).astype(np.float64), mesh.vertices.max(axis=0).astype(np.float64)
-    else:
-        low = high = np.zeros(3)
+    bounds = mesh.vertex_bounds()
+    low, high = np.zeros((2, 3)) if bounds is None else bounds
     centre = (low + high) / 2.0
     half = (high - low) / 2.0
     radius = float(np.linalg.norm(half)) + 1e-3

@@ -157,7 +157,7 @@ def test_a_return_from_something_else_takes_its_materials_mean() -> None:
 
 
 def _linear(values: np.ndarray) -> np.ndarray:
-    """Return what `encode` made of values above its linear part."""
+    """Return what `encode_srgb` made of values above its linear part."""
     return ((values / 65535.0 + 0.055) / 1.055) ** 2.4
 
 

@@ -17,7 +17,7 @@ from synthroads_addon.scanning.colour.colour import (
     MaterialLayers,
     SeenPoints,
     Shading,
-    encode,
+    encode_srgb,
     surface_constants,
 )
 from synthroads_addon.scanning.colour.images import ImageLayers, sample_image
@@ -205,7 +205,7 @@ def test_light_from_close_by_is_that_of_the_points_own_slope(lit: bool) -> None:
     values = layers.sample(points, frozenset({"rgb"}))
     assert values.source.tolist() == [NEARBY]
     expected = color * (light.sunlight(normal) * lit + light.sky(normal))
-    np.testing.assert_allclose(values.arrays["rgb"] / 65535.0, encode(expected) / 65535.0, atol=1e-3)
+    np.testing.assert_allclose(values.arrays["rgb"] / 65535.0, encode_srgb(expected) / 65535.0, atol=1e-3)
 
 
 def test_points_of_a_whole_strip_find_the_images_along_it() -> None:

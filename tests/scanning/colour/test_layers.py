@@ -19,7 +19,7 @@ from synthroads_addon.scanning.colour.colour import (
     MaterialLayers,
     SeenPoints,
     Shading,
-    encode,
+    encode_srgb,
     needed_layers,
     shares_by_source,
     surface_constants,
@@ -93,16 +93,16 @@ def test_a_mode_of_rgb_needs_its_layers(mode: str, needed: set[str]) -> None:
 def test_unlit_and_false_colours_are_layers() -> None:
     points, constants = _points(), surface_constants(ROWS)
     unlit = MaterialLayers(constants, Shading("unlit")).sample(SeenPoints(**points), ALL).arrays
-    np.testing.assert_array_equal(unlit["rgb"], encode(unlit["base_color"]))
+    np.testing.assert_array_equal(unlit["rgb"], encode_srgb(unlit["base_color"]))
     false = MaterialLayers(constants, Shading("false_colour")).sample(SeenPoints(**points), ALL).arrays
-    np.testing.assert_array_equal(false["rgb"][:, 1], encode(false["metallic"]))
+    np.testing.assert_array_equal(false["rgb"][:, 1], encode_srgb(false["metallic"]))
 
 
 @given(st.floats(0.0, 1.0), st.floats(0.0, 1.0))
 def test_encoding_keeps_order_and_ends(a: float, b: float) -> None:
     low, high = sorted([a, b])
-    assert encode(np.array([low]))[0] <= encode(np.array([high]))[0]
-    assert encode(np.array([0.0, 1.0, 2.0])).tolist() == [0, 65535, 65535]
+    assert encode_srgb(np.array([low]))[0] <= encode_srgb(np.array([high]))[0]
+    assert encode_srgb(np.array([0.0, 1.0, 2.0])).tolist() == [0, 65535, 65535]
 
 
 @given(st.floats(0.0, 360.0), st.floats(0.0, 90.0))
