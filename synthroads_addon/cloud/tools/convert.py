@@ -147,7 +147,7 @@ def draw_previews(
         section.add(cut)
         with output_folder(folder, PREVIEWS, overwrite) as temporary:
             paths = view.save(temporary, cloud.header.epsg, cloud.header.has_color)
-            paths.append(section.save(temporary / PREVIEWS[3], "cross-section"))
+            paths.append(section.save(temporary / PREVIEWS[3]))
             names = [path.name for path in paths]
     return {"file": source.name, "points": int(view.raster.count.sum()), "pictures": names, "section_points": len(cut)}
 

@@ -22,7 +22,7 @@ from ...base.random_streams import stream
 from ..formats.base import CloudHeader
 from ..formats.registry import open_cloud
 from .picture import gray
-from .previews import Brightness
+from .raster import Brightness
 
 ColourBy = Literal["class", "intensity", "rgb", "height"]
 COLOURINGS: tuple[ColourBy, ...] = get_args(ColourBy)

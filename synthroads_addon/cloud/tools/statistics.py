@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ...materials.reflectance import LUMINANCE
 from ..formats.base import CloudReader
 from ..points import PointBlock
 
@@ -24,7 +25,7 @@ _PAIRS_AT_ONCE = 4_000_000
 
 def luminance(rgb: NDArray[np.uint16]) -> NDArray[np.float64]:
     """Return 0.3 r + 0.59 g + 0.11 b (N,), 0 to 1, of colours (N, 3) as they are stored."""
-    return rgb @ np.array([0.30, 0.59, 0.11]) / 65535.0
+    return rgb @ LUMINANCE / 65535.0
 
 
 def cloud_statistics(cloud: CloudReader, radius: float = RADIUS, samples: int = SAMPLES) -> dict[str, Any]:
