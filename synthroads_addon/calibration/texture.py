@@ -47,10 +47,10 @@ def texture_of(pixels: Float, width: float, material: Material) -> Texture:
         width: of the surface that it shows, m.
         material: whose metallic and specular it has.
     """
-    own = reflectivity(pixels, material.metallic, material.specular)
+    values = reflectivity(pixels, material.metallic, material.specular)
     mean = pixels.reshape(-1, 3).mean(axis=0)
     return Texture(
-        values=own / max(float(own.mean()), 1e-9),
+        values=values / max(float(values.mean()), 1e-9),
         size=(width, width * pixels.shape[0] / pixels.shape[1]),
         mean_color=(float(mean[0]), float(mean[1]), float(mean[2])),
     )

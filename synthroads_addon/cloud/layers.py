@@ -192,7 +192,7 @@ def gather(values: dict[str, NDArray[Any]], attributes: tuple[Attribute, ...], c
     for column in columns(attributes):
         if column.name in values:
             parts.setdefault(column.array, []).append(values[column.name])
-    for array, found in parts.items():
-        joined = found[0] if len(found) == 1 else np.stack(found, axis=1)
+    for array, components in parts.items():
+        joined = components[0] if len(components) == 1 else np.stack(components, axis=1)
         arrays[array] = joined.astype(_TYPES[array], copy=False)
     return arrays

@@ -133,10 +133,10 @@ class KeptPoses:
         first, last = _knot_numbers(begin, end, spacing)
         before = first // _AT_ONCE
         stretches = [self._stretch(number, spacing) for number in range(before, last // _AT_ONCE + 1)]
-        own = slice(first - before * _AT_ONCE, last + 1 - before * _AT_ONCE)
+        knots = slice(first - before * _AT_ONCE, last + 1 - before * _AT_ONCE)
         names = ("rotation", "position", "present")
         joined = (np.concatenate([getattr(one, name) for one in stretches], axis=-1) for name in names)
-        return Track(first * spacing, spacing, *(array[..., own] for array in joined))
+        return Track(first * spacing, spacing, *(array[..., knots] for array in joined))
 
 
 def track_knots(begin: float, end: float, spacing: float) -> Float:

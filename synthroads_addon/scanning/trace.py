@@ -136,9 +136,9 @@ def trace(
         hit = np.flatnonzero(met.face >= 0)
         on, left, start = on[hit], left[hit], start[hit] + met.distance[hit]
         face = met.face[hit]
-        own = np.take(target.material, face).astype(np.intp)
-        through = np.take(surfaces.transmission, own)
-        layers.append(Hits(face, own, _within(start, nearest, farthest), met.along[hit], left * (1.0 - through)))
+        surface = np.take(target.material, face).astype(np.intp)
+        through = np.take(surfaces.transmission, surface)
+        layers.append(Hits(face, surface, _within(start, nearest, farthest), met.along[hit], left * (1.0 - through)))
         rays_on.append(on)
         left = left * through
     return _gather_hits(rays, first, layers, rays_on)

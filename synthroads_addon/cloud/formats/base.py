@@ -275,8 +275,8 @@ class CloudReader(ABC):
 
 def epsg_of(text: str | None) -> int | None:
     """Return the EPSG code that WKT 1 or 2 ends with, or None."""
-    found = re.search(r'(?:AUTHORITY|ID)\["EPSG",\s*"?(\d+)"?\](?:\]|\s)*$', text.rstrip("\0 \n")) if text else None
-    return int(found[1]) if found else None
+    match = re.search(r'(?:AUTHORITY|ID)\["EPSG",\s*"?(\d+)"?\](?:\]|\s)*$', text.rstrip("\0 \n")) if text else None
+    return int(match[1]) if match else None
 
 
 def header_from_notes(

@@ -234,8 +234,8 @@ class E57Reader(CloudReader):
             self._scans = [root["data3D"][i] for i in range(len(root["data3D"]))]
             self._fields = [_field_names(e57.StructureNode(scan["points"].prototype())) for scan in self._scans]
             counts = [int(scan["points"].childCount()) for scan in self._scans]
-            told = f"{EXTENSION}:notes" in _field_names(root)
-            notes = json.loads(root[f"{EXTENSION}:notes"].value()) if told else None
+            noted = f"{EXTENSION}:notes" in _field_names(root)
+            notes = json.loads(root[f"{EXTENSION}:notes"].value()) if noted else None
         except Exception as problem:
             self.close()
             raise InputError(str(path), None, f"is an E57 file that is damaged ({_short(problem)})") from None
@@ -252,9 +252,9 @@ class E57Reader(CloudReader):
         """See `CloudReader`."""
         done = 0
         for scan, fields, count in zip(self._scans, self._fields, self._counts, strict=True):
-            wanted = [name for name in sorted(_STANDARD | self._own()) if name in fields]
+            names = [name for name in sorted(_STANDARD | self._layer_names()) if name in fields]
             room = min(size, count)
-            arrays = {name: np.zeros(room) for name in wanted}
+            arrays = {name: np.zeros(room) for name in names}
             buffers = self._e57.VectorSourceDestBuffer()
             for name, array in arrays.items():
                 buffers.append(self._e57.SourceDestBuffer(self._file, name, array, room, True, True))
@@ -276,7 +276,7 @@ class E57Reader(CloudReader):
             if reader:
                 reader.close()
 
-    def _own(self) -> set[str]:
+    def _layer_names(self) -> set[str]:
         return {e57_name(column) for column in columns(self.header.attributes)}
 
     def _block(
@@ -287,10 +287,9 @@ class E57Reader(CloudReader):
 
         rotation, translation = pose
         local = np.stack([arrays[f"cartesian{axis}"] for axis in "XYZ"], axis=1)
-        own = columns(self.header.attributes)
-        found = gather(
-            {c.name: arrays[e57_name(c)].copy() for c in own if e57_name(c) in arrays}, self.header.attributes, count
-        )
+        stored = [column for column in columns(self.header.attributes) if e57_name(column) in arrays]
+        parts = {column.name: arrays[e57_name(column)].copy() for column in stored}
+        layers = gather(parts, self.header.attributes, count)
         return make_block(
             xyz=local @ rotation.T + translation,
             intensity=values("intensity", np.float64),
@@ -300,7 +299,7 @@ class E57Reader(CloudReader):
             gps_time=values("timeStamp", np.float64),
             scan_angle_deg=values(f"{EXTENSION}:scan_angle", np.float32),
             strip=values(f"{EXTENSION}:strip", np.uint16),
-            **found,
+            **layers,
         )
 
 

@@ -215,18 +215,18 @@ class LasReader(CloudReader):
         if self._reader.points_read:
             self._reader.seek(0)
         while done < self.header.count:
-            wanted = min(size, self.header.count - done)
+            count = min(size, self.header.count - done)
             try:
-                record = self._reader.read_points(wanted)
+                record = self._reader.read_points(count)
             except _FAULTS:
                 raise damage_error(path, done, self.header.count) from None
             except BaseException as problem:
                 if type(problem).__name__ == "PanicException":  # the decompressor's own way to fail
                     raise damage_error(path, done, self.header.count) from None
                 raise
-            if len(record) != wanted:
+            if len(record) != count:
                 raise damage_error(path, done + len(record), self.header.count)
-            done += wanted
+            done += count
             yield self._block(record)
 
     def _check_size(self, path: Path) -> None:
@@ -251,8 +251,8 @@ class LasReader(CloudReader):
 
         scale = self.header.intensity_scale or 1.0
         labels = "class_id" if self.header.labelled else "classification"
-        found = {c.name: np.asarray(record[c.name]) for c in columns(self.header.attributes) if c.name in names}
-        arrays = gather(found | {"class_id": values(labels, np.uint8)}, self.header.attributes, count)
+        stored = {c.name: np.asarray(record[c.name]) for c in columns(self.header.attributes) if c.name in names}
+        arrays = gather(stored | {"class_id": values(labels, np.uint8)}, self.header.attributes, count)
         return make_block(
             xyz=steps * header.scales + header.offsets,
             intensity=values("intensity", np.float64) / scale,
@@ -323,21 +323,21 @@ def _scan_angle(values: Any, names: set[str]) -> NDArray[np.float32]:
 
 def _header(path: Path, las: laspy.LasHeader) -> CloudHeader:
     names = set(las.point_format.dimension_names)
-    notes = next((v.record_data_bytes() for v in las.vlrs if v.user_id == "SynthRoads" and v.record_id == 1), None)
-    told = json.loads(notes) if notes else {}
-    if not isinstance(told, dict):
+    record = next((v.record_data_bytes() for v in las.vlrs if v.user_id == "SynthRoads" and v.record_id == 1), None)
+    notes = json.loads(record) if record else {}
+    if not isinstance(notes, dict):
         raise InputError(str(path), None, "its notes on intensity scale and classes are damaged")
     if not (np.isfinite(las.offsets).all() and np.isfinite(las.scales).all() and np.all(las.scales != 0.0)):
         scales = [*las.scales.tolist(), *las.offsets.tolist()]
         raise InputError(f"{path}: scales and offsets", scales, "must be finite numbers, the scales not 0")
-    labelled = bool(told) and "class_id" in names
-    attributes = attributes_of(names) if told else ()
+    labelled = bool(notes) and "class_id" in names
+    attributes = attributes_of(names) if notes else ()
     read = _READ | _FLAGS | {column.name for column in columns(attributes)}
     if not labelled:
         read -= {"class_id"}
     scheme = asprs_scheme(range(256))
     if labelled:
-        rows = told.get("classes")
+        rows = notes.get("classes")
         scheme = stored_scheme(rows, str(path)) if isinstance(rows, dict) else class_scheme("17")
     text = _crs_text(las)
     return CloudHeader(
@@ -347,7 +347,7 @@ def _header(path: Path, las: laspy.LasHeader) -> CloudHeader:
         np.array(las.offsets, dtype=np.float64),
         crs_text=text,
         epsg=epsg_of(text) or _geotiff_epsg(las),
-        intensity_scale=intensity_scale(path, told) if told else None,
+        intensity_scale=intensity_scale(path, notes) if notes else None,
         scheme=scheme,
         labelled=labelled,
         attributes=attributes,

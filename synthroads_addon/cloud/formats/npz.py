@@ -54,8 +54,8 @@ class NpzWriter(CloudWriter):
     """Writes point blocks to an NPZ file; see `CloudWriter`. Nothing is rounded or clipped."""
 
     def _open(self) -> None:
-        wanted = {column.array for column in self.columns}
-        self._arrays = _ALWAYS | {name: kind for name, kind in _ON_REQUEST.items() if name in wanted}
+        names = {column.array for column in self.columns}
+        self._arrays = _ALWAYS | {name: kind for name, kind in _ON_REQUEST.items() if name in names}
         self._parts = self.path.with_name(f".{self.path.name}.parts")
         self._files: dict[str, IO[bytes]] = {}
         shutil.rmtree(self._parts, ignore_errors=True)
@@ -136,36 +136,36 @@ class NpzReader(CloudReader):
             for member in members.values():
                 _npy_header(member)
             for done in range(0, self.header.count, size):
-                wanted = min(size, self.header.count - done)
+                rows = min(size, self.header.count - done)
                 try:
-                    arrays = {name: self._rows(members[name], name, wanted) for name in members}
+                    arrays = {name: self._rows(members[name], name, rows) for name in members}
                 except ARCHIVE_FAULTS:
                     raise damage_error(self.header.path, done, self.header.count) from None
                 finite_coordinates(self.header.path, done, arrays["xyz"])
-                yield self._block(arrays, wanted)
+                yield self._block(arrays, rows)
         finally:
             for member in members.values():
                 member.close()
 
-    def _rows(self, member: IO[bytes], name: str, wanted: int) -> NDArray[Any]:
+    def _rows(self, member: IO[bytes], name: str, count: int) -> NDArray[Any]:
         shape, kind = self._kinds[name]
-        rows = (wanted, *shape[1:])
+        rows = (count, *shape[1:])
         data = np.frombuffer(member.read(int(np.prod(rows)) * kind.itemsize), dtype=kind)
         return data.reshape(rows)
 
     def _block(self, arrays: dict[str, NDArray[Any]], count: int) -> PointBlock:
-        own = columns(self.header.attributes)
+        attribute_columns = columns(self.header.attributes)
         parts = {
             c.name: arrays[c.array] if c.component is None else arrays[c.array][:, c.component]
-            for c in own
+            for c in attribute_columns
             if c.array in arrays
         }
-        found = gather(parts, self.header.attributes, count)
+        result = gather(parts, self.header.attributes, count)
         for name, (kind, width) in _ALWAYS.items():
             if name not in ("class_id", "instance_id"):
                 shape = (count, width) if width > 1 else (count,)
-                found[name] = arrays[name].astype(kind) if name in arrays else np.zeros(shape, dtype=kind)
-        return make_block(**found)
+                result[name] = arrays[name].astype(kind) if name in arrays else np.zeros(shape, dtype=kind)
+        return make_block(**result)
 
     def _read_kinds(self, path: Path) -> dict[str, tuple[tuple[int, ...], np.dtype[Any]]]:
         """Return shape and type of each array that is known here."""
@@ -180,8 +180,8 @@ class NpzReader(CloudReader):
         for name, (shape, kind) in kinds.items():
             width = (_ALWAYS | _ON_REQUEST)[name][1]
             if shape != ((count, width) if width > 1 else (count,)) or kind.kind not in "fiub":
-                wanted = f"({count}, {width})" if width > 1 else f"({count},)"
-                raise InputError(f"{path}: {name}", shape, f"must be numbers of shape {wanted}")
+                expected = f"({count}, {width})" if width > 1 else f"({count},)"
+                raise InputError(f"{path}: {name}", shape, f"must be numbers of shape {expected}")
         return kinds
 
     def _read_notes(self) -> Any:

@@ -139,9 +139,9 @@ class PlyReader(CloudReader):
         """See `CloudReader`."""
         self._file.seek(self._start)
         for done in range(0, self.header.count, size):
-            wanted = min(size, self.header.count - done)
-            data = self._file.read(wanted * self._type.itemsize)
-            if len(data) != wanted * self._type.itemsize:
+            rows = min(size, self.header.count - done)
+            data = self._file.read(rows * self._type.itemsize)
+            if len(data) != rows * self._type.itemsize:
                 raise damage_error(self.header.path, done, self.header.count)
             yield self._block(np.frombuffer(data, dtype=self._type), done)
 
@@ -154,12 +154,12 @@ class PlyReader(CloudReader):
         def channel(name: str) -> NDArray[np.uint16]:
             return _sixteen_bits(record[name]) if name in self._names else np.zeros(count, dtype=np.uint16)
 
-        own = columns(self.header.attributes)
-        found = {c.name: record[ply_name(c)] for c in own if ply_name(c) in self._names}
+        attribute_columns = columns(self.header.attributes)
+        stored = {c.name: record[ply_name(c)] for c in attribute_columns if ply_name(c) in self._names}
         if not self.header.labelled:
             name = next((name for name in _CLASS_NAMES if name in self._names), "")
-            found["class_id"] = values(name, np.uint8)
-        arrays = gather(found, self.header.attributes, count)
+            stored["class_id"] = values(name, np.uint8)
+        arrays = gather(stored, self.header.attributes, count)
         return make_block(
             xyz=finite_coordinates(
                 self.header.path, done, np.stack([values(name, np.float64) for name in "xyz"], axis=1)

@@ -236,14 +236,14 @@ def _cross_cut(
     length = float(stations[-1])
     if length == 0:
         return extent.middle, np.array([0.0, -1.0]), reach
-    wanted = length / 2 if station is None else station
-    if not 0 <= wanted <= length:
+    station = length / 2 if station is None else station
+    if not 0 <= station <= length:
         raise InputError("--station", station, f"must be 0 to {length:.1f} m")
-    at = int(np.clip(np.searchsorted(stations, wanted, side="right") - 1, 0, len(steps) - 1))
+    at = int(np.clip(np.searchsorted(stations, station, side="right") - 1, 0, len(steps) - 1))
     while steps[at] == 0:
         at -= 1
     along = (path[at + 1] - path[at]) / steps[at]
-    return path[at] + along * (wanted - stations[at]), np.array([along[1], -along[0]]), reach
+    return path[at] + along * (station - stations[at]), np.array([along[1], -along[0]]), reach
 
 
 def _scheme_of(cloud: CloudReader, classes: str | None) -> ClassScheme:

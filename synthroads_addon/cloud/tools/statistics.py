@@ -238,8 +238,8 @@ class _Roughness:
         inside = np.flatnonzero(np.all((column >= 0) & (column < 2**31), axis=1))
         key = column[inside, 0] << 31 | column[inside, 1]
         slot = np.minimum(np.searchsorted(self._keys, key), len(self._keys) - 1)
-        found = self._keys[slot] == key
-        inside, slot = inside[found], slot[found]
+        known = self._keys[slot] == key
+        inside, slot = inside[known], slot[known]
         for part in _parts(self._counts[slot]):
             counts = self._counts[slot[part]]
             point = np.repeat(inside[part], counts)

@@ -68,8 +68,8 @@ class ImageLayers:
         most = int(count.max(initial=0))
         self._candidates, self._all = max(CANDIDATES, 3 * most), max(ALL_CANDIDATES, 9 * most)
         # Points whose scanner stood within one such cube share their candidates.
-        apart = np.linalg.norm(np.diff(places, axis=0), axis=1) if len(places) > 1 else np.ones(1)
-        self._cell = max(float(np.median(apart)) / 2.0, 0.5)
+        spacing = np.linalg.norm(np.diff(places, axis=0), axis=1) if len(places) > 1 else np.ones(1)
+        self._cell = max(float(np.median(spacing)) / 2.0, 0.5)
 
     def sample(self, points: SeenPoints, wanted: frozenset[str]) -> LayerValues:
         """Return the wanted layers of N points; see `LayerSource.sample`."""

@@ -45,8 +45,8 @@ def sample_nearby(
     away = np.linalg.norm(view.place(i, j, image.depth[j, i]) - position[:, None, :], axis=2)
     away[~good] = np.inf
     best = np.arange(len(position)), away.argmin(axis=1)
-    found = away[best] < limit
-    return image.layers[j[best], i[best]][found].astype(np.float32), found, away[best][found]
+    near = away[best] < limit
+    return image.layers[j[best], i[best]][near].astype(np.float32), near, away[best][near]
 
 
 def light_nearby(

@@ -91,14 +91,14 @@ class PolylineGuide(AlignmentGuide):
 
 def _thin_points(points: Float, tolerance: float) -> NDArray[np.intp]:
     """Return the indices of the points that make the line: without repetitions, and thinned in three dimensions."""
-    apart = np.concatenate(([True], np.hypot(*np.diff(points[:, :2], axis=0).T) > _REPEATED))[: len(points)]
-    kept = np.flatnonzero(apart)
+    distinct = np.concatenate(([True], np.hypot(*np.diff(points[:, :2], axis=0).T) > _REPEATED))[: len(points)]
+    kept = np.flatnonzero(distinct)
     if len(kept) < 2:
         raise InputError("points", len(points), "at least two points, more than 1 mm apart in plan, are needed")
     if tolerance <= 0.0:
         return kept
-    line, wanted = points[kept], np.zeros(len(kept), dtype=bool)
-    wanted[[0, -1]] = True
+    line, needed = points[kept], np.zeros(len(kept), dtype=bool)
+    needed[[0, -1]] = True
     stack = [(0, len(kept) - 1)]
     while stack:
         first, last = stack.pop()
@@ -110,9 +110,9 @@ def _thin_points(points: Float, tolerance: float) -> NDArray[np.intp]:
         farthest = int(distance.argmax())
         if distance[farthest] > tolerance:
             middle = first + 1 + farthest
-            wanted[middle] = True
+            needed[middle] = True
             stack += [(first, middle), (middle, last)]
-    return kept[wanted]
+    return kept[needed]
 
 
 def _clothoid_lengths(turn: Float, reach: Float) -> Float:

@@ -82,9 +82,9 @@ class TrajectoryPath:
 
         Beyond the ends positions go on straight, and the attitude is that of the end.
         """
-        wanted = np.asarray(time, dtype=np.float64)
-        row = np.clip(np.searchsorted(self._time, wanted, side="right") - 1, 0, len(self._time) - 2)
-        share = (wanted - self._time[row]) / (self._time[row + 1] - self._time[row])
+        time = np.asarray(time, dtype=np.float64)
+        row = np.clip(np.searchsorted(self._time, time, side="right") - 1, 0, len(self._time) - 2)
+        share = (time - self._time[row]) / (self._time[row + 1] - self._time[row])
         step = self._position[row + 1] - self._position[row]
         position = self._position[row] + share[:, None] * step
         turned = slerp(self._attitude[row], self._attitude[row + 1], np.clip(share, 0.0, 1.0))
@@ -181,13 +181,13 @@ def _text(name: str) -> str:
 
 def _columns(place: str, head: list[str]) -> list[int]:
     names = [entry.lower() for entry in head]
-    for wanted in COLUMNS:
-        if names.count(wanted) != 1:
-            often = "is missing" if wanted not in names else f"is there {names.count(wanted)} times"
-            hint = nearest_name(wanted, set(names) - set(COLUMNS)) if wanted not in names else ""
-            allowed = f"a header with the columns {', '.join(COLUMNS)} is needed: {wanted} {often}{hint}"
+    for column in COLUMNS:
+        if names.count(column) != 1:
+            often = "is missing" if column not in names else f"is there {names.count(column)} times"
+            hint = nearest_name(column, set(names) - set(COLUMNS)) if column not in names else ""
+            allowed = f"a header with the columns {', '.join(COLUMNS)} is needed: {column} {often}{hint}"
             raise InputError(place, ", ".join(head), allowed)
-    return [names.index(wanted) for wanted in COLUMNS]
+    return [names.index(column) for column in COLUMNS]
 
 
 def _row(place: str, entries: list[str], places: list[int]) -> list[float]:

@@ -51,8 +51,8 @@ class SceneMesh:
             array = np.asarray(getattr(self, name))
             fits = array.ndim == len(shape) and all(n in (None, m) for n, m in zip(shape, array.shape, strict=True))
             if not fits or array.dtype != dtype:
-                wanted = f"must be {np.dtype(dtype)} of shape {shape} with None for any length"
-                raise InputError(f"scene mesh: {name}", f"{array.dtype} {array.shape}", wanted)
+                allowed = f"must be {np.dtype(dtype)} of shape {shape} with None for any length"
+                raise InputError(f"scene mesh: {name}", f"{array.dtype} {array.shape}", allowed)
         for name in ("class_id", "instance_id", "material"):
             if len(getattr(self, name)) != len(self.triangles):
                 raise InputError(

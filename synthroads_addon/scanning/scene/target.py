@@ -164,8 +164,8 @@ class Target:
                 continue
             rotation, place, _ = track.at(times[mine])
             begin_rotation, begin_place, _ = moving.motion.pose(np.zeros(1))
-            own = _inverse(rotation, places[:, mine] - place)
-            results[0][:, mine] = begin_rotation[0] @ own + begin_place[0][:, None]
+            local = _inverse(rotation, places[:, mine] - place)
+            results[0][:, mine] = begin_rotation[0] @ local + begin_place[0][:, None]
             for result, vector in zip(results[1:], vectors, strict=True):
                 result[:, mine] = begin_rotation[0] @ _inverse(rotation, vector[:, mine])
         return results
@@ -200,8 +200,8 @@ def _part(mesh: SceneMesh, caster: Caster, first: int) -> _TargetPart:
 
 def _out_of_the_way(track: Track, part: _TargetPart, scanner: Float) -> Track:
     """Return a part's track on which it isn't there where the scanner's vehicle is; places (3, K) at its knots."""
-    own = _inverse(track.rotation, scanner - track.position)
-    away = (np.abs(own.T - part.centre) > part.half + CLEARANCE).any(axis=1)
+    offset = _inverse(track.rotation, scanner - track.position)
+    away = (np.abs(offset.T - part.centre) > part.half + CLEARANCE).any(axis=1)
     return replace(track, present=track.present & away)
 
 
@@ -242,10 +242,10 @@ def _cast_moving(part: _TargetPart, track: Track, rays: Bundles, maximum_range: 
     rotation, place, present = track.at(rays.times[near])
     near, rotation, place = near[present], rotation[:, present], place[:, present]
     begin, towards = rays.origins[:, near] - place, rays.directions[:, near]
-    own = _cast(part, _inverse(rotation, begin), _inverse(rotation, towards), maximum_range)
-    closer = np.flatnonzero(own.distance < nearest.distance[near])
+    met = _cast(part, _inverse(rotation, begin), _inverse(rotation, towards), maximum_range)
+    closer = np.flatnonzero(met.distance < nearest.distance[near])
     for name in ("face", "distance", "along"):
-        getattr(nearest, name)[near[closer]] = getattr(own, name)[closer]
+        getattr(nearest, name)[near[closer]] = getattr(met, name)[closer]
 
 
 def _inverse(rotation: Float, vectors: Float) -> Float:
