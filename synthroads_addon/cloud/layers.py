@@ -44,7 +44,7 @@ class Column:
         """Return whether the values are whole numbers."""
         return self.scale is None
 
-    def of(self, block: PointBlock) -> NDArray[Any]:
+    def values(self, block: PointBlock) -> NDArray[Any]:
         """Return the column (N,) of a block; KeyError if the block doesn't have it."""
         array = block.array(self.array)
         if array is None:

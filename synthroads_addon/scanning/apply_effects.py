@@ -107,5 +107,5 @@ def _add(plan: ScanPlan, traced: Traced, marks: BothMarks, changes: EchoChanges)
     )
     first, behind = marks
     ray = changes.ray[here] * len(traced.rays.time) + changes.pulse[here]
-    traced = replace(traced, behind=Hits.joined([traced.behind, hits]), ray=np.concatenate([traced.ray, ray]))
-    return traced, (first, Marks.joined([behind, added]))
+    traced = replace(traced, behind=Hits.join([traced.behind, hits]), ray=np.concatenate([traced.ray, ray]))
+    return traced, (first, Marks.join([behind, added]))

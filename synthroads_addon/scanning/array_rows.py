@@ -19,6 +19,6 @@ class ArrayRows:
         return type(self)(*(getattr(self, field.name)[rows] for field in fields(self)))
 
     @classmethod
-    def joined(cls, parts: Sequence[Any]) -> Self:
+    def join(cls, parts: Sequence[Any]) -> Self:
         """Return the rows of several records of this class, in order; at least one record is needed."""
         return cls(*(np.concatenate([getattr(part, field.name) for part in parts]) for field in fields(cls)))

@@ -94,4 +94,4 @@ def _true_xyz(points: MeasuredPoints) -> NDArray[Any]:
 
 @fills("material")
 def _material(points: MeasuredPoints) -> NDArray[Any]:
-    return points.plan.target.of_faces("material", points.face)
+    return points.plan.target.face_values("material", points.face)

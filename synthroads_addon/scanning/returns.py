@@ -146,7 +146,7 @@ def _strongest(energy: Float, group: Index, starts: Index) -> Index:
 
 def _merge_echoes(one: Echoes, several: Echoes) -> Echoes:
     """Return both in the order of pulses; no pulse is in both."""
-    echoes = Echoes.joined([one, several])
+    echoes = Echoes.join([one, several])
     return echoes.select(np.argsort(echoes.pulse, kind="stable"))
 
 

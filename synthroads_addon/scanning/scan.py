@@ -11,7 +11,7 @@ from ..cloud.points import PointBlock, concatenate, make_block
 from ..materials.surfaces import brightness_of
 from ..materials.texture_spread import spread_factors
 from .apply_effects import BothMarks, apply_effects
-from .beam import conical, cylindrical_offsets
+from .beam import conical_directions, cylindrical_offsets
 from .colour.colour import SeenPoints
 from .knots import Track
 from .plan import ScanPlan
@@ -62,7 +62,7 @@ def joined_results(results: list[BlockResult]) -> BlockResult:
 
     return BlockResult(
         points=concatenate([result.points for result in results]),
-        seen=SeenPoints.joined(seen) if seen else None,
+        seen=SeenPoints.join(seen) if seen else None,
         pulses=total("pulses"),
         rays=total("rays"),
         below_threshold=total("below_threshold"),
@@ -82,7 +82,7 @@ def scan_pulses(plan: ScanPlan, strip: Strip, first: int, count: int, key: int =
     A block isn't cut any smaller, though its arrays leave the processor's cache: blocks are scanned side by side in
     threads that take turns in Python, so that few long calls beat many short ones.
     """
-    errors = Errors.drawn(plan, strip, count, key)
+    errors = Errors.draw(plan, strip, count, key)
     poses = Poses.between(plan, strip, *(plan.cut.time(strip, i) for i in (first, first + count - 1)))
     pulses = make_pulses(plan, strip, poses, errors.angle, first, count)
     number = np.arange(count)  # of each pulse within the block
@@ -122,7 +122,7 @@ def beam_rays(plan: ScanPlan, pulses: Pulses, motions: list[Track]) -> Rays:
     assert pulses.across is not None
     divergence = plan.setting.divergence
     if plan.beam == "conical":
-        direction = conical(pulses.direction, pulses.in_plane, pulses.across, plan.pattern, divergence)
+        direction = conical_directions(pulses.direction, pulses.in_plane, pulses.across, plan.pattern, divergence)
         return Rays(origin, direction, share, pulses.time)
     reach = plan.setting.maximum_range
     distance = plan.target.cast(pulses.origin, pulses.direction, reach, pulses.time, motions).distance
@@ -198,7 +198,7 @@ def _points(
     face, along = traced.pick("face", hit), traced.pick("along", hit)
     distance = echoes.range + plan.noise.range_bias
     if errors.range is not None:
-        own = errors.of_range(number_in_block[pulse], number, plan.most_returns)
+        own = errors.range_errors(number_in_block[pulse], number, plan.most_returns)
         distance = distance + plan.setting.range_sigma * own
     intensity, clipped = saturate(echoes.intensity, np.inf if plan.detects_later else plan.setting.saturation)
     normal = None
@@ -212,8 +212,8 @@ def _points(
         xyz=place_points(pulses.measured_origin, pulses.measured_direction, pulse, distance, target.origin),
         intensity=intensity,
         rgb=np.zeros((len(pulse), 3), dtype=np.uint16),
-        class_id=target.of_faces("class_id", face),
-        instance_id=target.of_faces("instance_id", face),
+        class_id=target.face_values("class_id", face),
+        instance_id=target.face_values("instance_id", face),
         return_number=number,
         number_of_returns=returns,
         gps_time=pulses.time[pulse],
@@ -246,6 +246,6 @@ def _seen_targets(
         position=np.ascontiguousarray(position.T),
         scanner=np.ascontiguousarray(scanner.T),
         normal=np.ascontiguousarray(normal.T),
-        material=target.of_faces("material", face),
+        material=target.face_values("material", face),
         time=time,
     )

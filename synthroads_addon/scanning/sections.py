@@ -100,7 +100,7 @@ def shadow_length(geometry: RoadGeometry) -> float:
 
 def _middles(cut: Blocks, geometry: RoadGeometry, strip: Strip) -> Float:
     """Return the stations (B,) of the scanner in the middle of a strip's blocks."""
-    borders = [cut.pulses_of(strip, block) for block in cut.of(strip)]
+    borders = [cut.pulses_of(strip, block) for block in cut.block_numbers(strip)]
     times = np.array([cut.time(strip, first + count // 2) for first, count in borders])
     return geometry.alignment.project(cut.path.pose(strip, times)[0][:, :2])[0]
 

@@ -149,7 +149,7 @@ def _gather_hits(rays: Rays, first: Hits, layers: list[Hits], on: list[NDArray[n
     if not layers:
         none, nothing = np.empty(0, dtype=np.intp), np.empty(0)
         return Traced(rays, first, Hits(none, none, nothing, nothing, nothing), none)
-    behind = Hits.joined(layers)
+    behind = Hits.join(layers)
     inside = np.flatnonzero(behind.distance < np.inf)
     return Traced(rays, first, behind.select(inside), np.concatenate(on)[inside])
 

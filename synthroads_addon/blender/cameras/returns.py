@@ -82,7 +82,7 @@ class ReturnCamera:
     def _block(self, points: SeenPoints, wanted: frozenset[str]) -> LayerValues:
         channels, found = self._rendered(points) if len(points) else ({}, np.zeros(0, bool))
         source = np.where(found, FROM_RETURN, FROM_MATERIAL).astype(np.uint8)
-        return self.material.completed(points, channels, source, wanted)
+        return self.material.layer_values(points, channels, source, wanted)
 
     def _rendered(self, points: SeenPoints) -> tuple[dict[str, NDArray[np.float32]], NDArray[np.bool_]]:
         """Return the channels (N, C) of points, and which of them are what their pixels show (N,)."""

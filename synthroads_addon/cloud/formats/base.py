@@ -150,15 +150,15 @@ class CloudWriter(ABC):
             raise self.refused(worst.tolist(), f"{name} must be finite")
         return values
 
-    def own_class_ids(self, block: PointBlock) -> NDArray[np.uint8]:
+    def file_class_ids(self, block: PointBlock) -> NDArray[np.uint8]:
         """Return the block's classes (N,) in the file's scheme."""
         return np.take(self.scheme.ids, self.integers(block.class_id, "uint8", "class_id"))
 
     def stored(self, column: Column, block: PointBlock) -> NDArray[Any]:
         """Return a column (N,) of a block as the integers that LAS and E57 store."""
         if column.array == "class_id":
-            return self.own_class_ids(block)
-        values = column.of(block)
+            return self.file_class_ids(block)
+        values = column.values(block)
         if column.local and column.component is not None:
             values = values - self.offset[column.component]
         return self.integers(values, column.dtype, column.name, column.scale)

@@ -79,9 +79,9 @@ class PlyWriter(CloudWriter):
         record["strip"] = self.integers(block.strip, "uint16", "strip")
         for column in self.columns:
             if column.array == "class_id":
-                record["class_id"] = self.own_class_ids(block)
+                record["class_id"] = self.file_class_ids(block)
             else:
-                values = self.finite(column.of(block), column.name)
+                values = self.finite(column.values(block), column.name)
                 record[ply_name(column)] = self.integers(values, column.dtype, column.name) if column.whole else values
         self._file.write(record)
 

@@ -71,7 +71,7 @@ def subsample(
         with _writer_like(cloud, output, scheme) as writer:
             for points in grid.blocks():
                 writer.write(points)
-        return _done(cloud, writer) | {"grid": cell, "points_read": grid.taken}
+        return _done(cloud, writer) | {"grid": cell, "points_read": grid.points_read}
 
 
 def map_intensity(

@@ -171,7 +171,7 @@ def read_display(
             result.xyz[into] = points.xyz[here] - origin
             result.class_id[into] = points.class_id[here]
             rgb[into] = points.rgb[here]
-            result.brightness[into] = np.nan_to_num(measure.of(points)[here])
+            result.brightness[into] = np.nan_to_num(measure.values(points)[here])
             done, kept = done + len(points), last
             progress(done / cloud.header.count)
         result.brightness_text = measure.text

@@ -37,7 +37,7 @@ class Brightness:
 
     text = "intensity as stored"
 
-    def of(self, block: PointBlock) -> Float:
+    def values(self, block: PointBlock) -> Float:
         """Return a block's values (N,)."""
         if not len(block) or np.isnan(block.range[0]):
             return block.intensity
@@ -76,7 +76,7 @@ class Raster:
             place: their two coordinates (N,) in the picture, m; what lies outside is left out.
             depth: (N,) the larger, the further in front.
         """
-        brightness = self.brightness.of(block)
+        brightness = self.brightness.values(block)
         column = np.floor((place[0] - self.axes.left) / self.axes.across)
         row = self.height - 1 - np.floor((place[1] - self.axes.low) / self.axes.up)
         inside = np.flatnonzero((column >= 0) & (column < self.width) & (row >= 0) & (row < self.height))

@@ -89,7 +89,7 @@ class Moments:
             self.mean[row] += step * count / together
         self.count += count
 
-    def of(self, row: int, labels: list[int]) -> tuple[float, float]:
+    def mean_and_deviation(self, row: int, labels: list[int]) -> tuple[float, float]:
         """Return mean and standard deviation of a quantity over the points of some labels."""
         count = self.count[labels]
         mean = float(np.average(self.mean[row, labels], weights=count))
@@ -134,7 +134,7 @@ class _FirstPass:
         """Return the figures of the points of some classes together."""
         count = int(self.moments.count[labels].sum())
         area = self._cells.area(labels)
-        height, intensity, light = (self.moments.of(row, labels) for row in range(3))
+        height, intensity, light = (self.moments.mean_and_deviation(row, labels) for row in range(3))
         colored = self.has_color and light != (0.0, 0.0)  # point formats with colours are used without them
         known = [label for label in labels if label in rough]
         weights = self.moments.count[known]

@@ -32,7 +32,7 @@ class GridSubsampler(TileFiles):
         folder: where the tiles are kept meanwhile, as large as the cloud; a folder in it is made and removed.
 
     Attributes:
-        taken: points handed in so far.
+        points_read: points handed in so far.
     """
 
     def __init__(self, cell: float, folder: Path) -> None:
@@ -40,14 +40,14 @@ class GridSubsampler(TileFiles):
             raise InputError("grid", cell, "must be 0.0005 to 1000 m")
         super().__init__(folder)
         self.cell = float(cell)
-        self.taken = 0
+        self.points_read = 0
         self._tile = max(_CELLS_ACROSS_TILE, int(np.ceil(_SMALLEST_TILE / self.cell)))  # cells: none is cut in two
 
     def add(self, block: PointBlock) -> None:
         """Take a block; all blocks must have the same attributes. Thinning it at once saves room on the disk."""
         if len(block) == 0:
             return
-        self.taken += len(block)
+        self.points_read += len(block)
         block = block.select(keep_one_per_cell(block, self.cell))
         self.append(block, np.floor(block.xyz[:, :2] / self.cell).astype(np.int64) // self._tile)
 

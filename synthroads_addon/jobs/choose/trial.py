@@ -99,7 +99,7 @@ class Trial:
         path = scatter_stretches(self.plan.path, lines or self.lines, PULSES / self.plan.setting.shot_rate, self.phase)
         results = iter(record_as_measured(replace(self.plan, path=path, rings=rings)))
         blocks = Blocks(self.plan.setting, path, len(beam_pattern(rings).weights))
-        return [joined_results([next(results) for _ in blocks.of(strip)]) for strip in path.strips]
+        return [joined_results([next(results) for _ in blocks.block_numbers(strip)]) for strip in path.strips]
 
     def points(self, rings: tuple[int, ...] = RINGS[CONVERGED]) -> list[PointBlock]:
         """Return the points of the stretches with a beam: the converged one, which is the truth, if none is given."""

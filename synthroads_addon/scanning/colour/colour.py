@@ -199,9 +199,9 @@ class MaterialLayers:
 
     def sample(self, points: SeenPoints, wanted: frozenset[str]) -> LayerValues:
         """Return the wanted layers of N points; see `LayerSource.sample`."""
-        return self.completed(points, {}, np.full(len(points), FROM_MATERIAL, np.uint8), wanted)
+        return self.layer_values(points, {}, np.full(len(points), FROM_MATERIAL, np.uint8), wanted)
 
-    def completed(
+    def layer_values(
         self,
         points: SeenPoints,
         channels: dict[str, NDArray[np.float32]],

@@ -78,7 +78,7 @@ class ImageLayers:
         taken = np.zeros((len(points), sum(part.stop - part.start for part in self.channels.values())), np.float32)
         if len(points) and self.images:
             self._take_all(points, taken, source)
-        return self.material.completed(
+        return self.material.layer_values(
             points, {name: taken[:, part] for name, part in self.channels.items()}, source, wanted
         )
 

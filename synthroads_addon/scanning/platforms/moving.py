@@ -15,7 +15,7 @@ from ...base.schema import Finite, notes, quantity
 from .guides import Float, Guide, SmoothedGuide
 from .path import KNOT_RANGE, Strip, knots_for, strips_of
 from .platform import Platform
-from .strip_line import Eased, StripTrack, Sway
+from .strip_line import EasedFunction, StripTrack, Sway
 
 _HEIGHT_STEP = 1.0  # m
 _ATTITUDE_STEP = 5.0  # m
@@ -121,7 +121,7 @@ class MovingPath:
         plan, course, _, _ = track.place(within)
         beyond = (distance - within)[:, None]
         plan = plan + beyond * np.stack([np.cos(course), np.sin(course)], axis=1)
-        height, attitude = self._eased(track)
+        height, attitude = self._eased_functions(track)
         position = np.column_stack([plan, height(distance)])
         return position, rotation_matrix(*attitude(distance).T) @ self._mounting
 
@@ -129,12 +129,12 @@ class MovingPath:
         field = f"scan.platform.lateral_offsets[{index}]" if self._named else "scan.platform.lateral_offsets"
         return StripTrack(self._guide, self._offsets[index], self._sway, self._forward[index], field)
 
-    def _eased(self, track: StripTrack) -> tuple[Eased, Eased]:
+    def _eased_functions(self, track: StripTrack) -> tuple[EasedFunction, EasedFunction]:
         """Return height (K, 1) and heading, pitch, roll (K, 3) as functions of the distance travelled."""
         step = min(_ATTITUDE_STEP, self._sway.wavelength / 40.0) if self._sway else _ATTITUDE_STEP
         return (
-            Eased(lambda distance: self.heights(track, distance)[:, None], track.length, _HEIGHT_STEP, False),
-            Eased(lambda distance: self.attitudes(track, distance), track.length, step, True),
+            EasedFunction(lambda distance: self.heights(track, distance)[:, None], track.length, _HEIGHT_STEP, False),
+            EasedFunction(lambda distance: self.attitudes(track, distance), track.length, step, True),
         )
 
     def heights(self, track: StripTrack, distance: Float) -> Float:
@@ -164,7 +164,7 @@ class MovingPath:
 
     def _knots(self, index: int) -> float:
         track = self._strip_track(index)
-        height, attitude = self._eased(track)
+        height, attitude = self._eased_functions(track)
         rate, turn = attitude.bends()
         curvature, jump = track.bend
         # A rotation's second derivative is at most the angular velocity squared plus the angular acceleration.

@@ -59,7 +59,7 @@ class VehiclePasses:
         return replace(moved, entry=self.entry + max(0.0, moved.leave - self.leave))
 
 
-def passes(
+def lane_passes(
     start: Sequence[float], speed: Sequence[float], length: Sequence[float], whole: float
 ) -> list[VehiclePasses]:
     """Return the passes of all vehicles of one lane, in their order.

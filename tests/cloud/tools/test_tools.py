@@ -168,7 +168,7 @@ def test_moments_in_parts_are_those_of_all(values, cut) -> None:
     for part in np.array_split(np.arange(len(values)), cut):
         moments.add(label[part], [values[part] + 5e6])
     present = np.unique(label).tolist()
-    mean, deviation = moments.of(0, present)
+    mean, deviation = moments.mean_and_deviation(0, present)
     assert mean == pytest.approx((values + 5e6).mean(), rel=1e-12)
     assert deviation == pytest.approx(values.std(), rel=1e-6, abs=1e-3)
 
