@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 
 from ...base.errors import InputError
 from ...base.rotations import matrices
-from ..layers import Column, columns, gather
-from ..points import PointBlock, make_block
+from ..layers import Column, columns, make_points
+from ..points import PointBlock
 from .base import BLOCK, CloudReader, CloudWriter, damage_error, finite_coordinates, header_from_notes
 
 SCALE = 1e-4
@@ -207,6 +207,14 @@ class E57Writer(CloudWriter):
         return self._e57.StringNode(self._file, text)
 
 
+_FIELDS = {
+    "intensity": "intensity",
+    "number_of_returns": "returnCount",
+    "gps_time": "timeStamp",
+    "scan_angle_deg": f"{EXTENSION}:scan_angle",
+    "strip": f"{EXTENSION}:strip",
+}
+"""Names of the arrays that every block has."""
 _STANDARD = {
     *("cartesianX", "cartesianY", "cartesianZ", "intensity", "colorRed", "colorGreen", "colorBlue", "timeStamp"),
     *("returnIndex", "returnCount", "cartesianInvalidState", f"{EXTENSION}:scan_angle", f"{EXTENSION}:strip"),
@@ -282,25 +290,17 @@ class E57Reader(CloudReader):
     def _block(
         self, arrays: dict[str, NDArray[Any]], count: int, pose: tuple[NDArray[Any], NDArray[Any]]
     ) -> PointBlock:
-        def values(name: str, kind: Any) -> NDArray[Any]:
-            return arrays[name].astype(kind) if name in arrays else np.zeros(count, dtype=kind)
-
         rotation, translation = pose
-        local = np.stack([arrays[f"cartesian{axis}"] for axis in "XYZ"], axis=1)
-        stored = [column for column in columns(self.header.attributes) if e57_name(column) in arrays]
-        parts = {column.name: arrays[e57_name(column)].copy() for column in stored}
-        layers = gather(parts, self.header.attributes, count)
-        return make_block(
-            xyz=local @ rotation.T + translation,
-            intensity=values("intensity", np.float64),
-            rgb=np.stack([values(f"color{c}", np.uint16) * np.uint16(257) for c in ("Red", "Green", "Blue")], axis=1),
-            return_number=values("returnIndex", np.uint8) + np.uint8(1),
-            number_of_returns=values("returnCount", np.uint8),
-            gps_time=values("timeStamp", np.float64),
-            scan_angle_deg=values(f"{EXTENSION}:scan_angle", np.float32),
-            strip=values(f"{EXTENSION}:strip", np.uint16),
-            **layers,
-        )
+        present = [column for column in columns(self.header.attributes) if e57_name(column) in arrays]
+        stored = {column.name: arrays[e57_name(column)].copy() for column in present}
+        stored |= {name: arrays[field] for name, field in _FIELDS.items() if field in arrays}
+        stored["xyz"] = np.stack([arrays[f"cartesian{axis}"] for axis in "XYZ"], axis=1) @ rotation.T + translation
+        index = arrays.get("returnIndex", np.zeros(count))  # counts from 0
+        stored["return_number"] = index.astype(np.uint8) + np.uint8(1)
+        dark = np.zeros(count)
+        channels = [arrays.get(f"color{name}", dark).astype(np.uint16) for name in ("Red", "Green", "Blue")]
+        stored["rgb"] = np.stack(channels, axis=1) * np.uint16(257)
+        return make_points(stored, self.header.attributes, count)
 
 
 def _field_names(prototype: Any) -> set[str]:

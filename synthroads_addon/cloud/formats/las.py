@@ -23,8 +23,8 @@ from numpy.typing import NDArray
 from ...base.classes import asprs_scheme, class_scheme, stored_scheme
 from ...base.errors import InputError, OutputError
 from ...base.schema import canonical_json
-from ..layers import Column, attributes_of, columns, gather
-from ..points import PointBlock, make_block
+from ..layers import Column, attributes_of, columns, make_points
+from ..points import PointBlock
 from .base import BLOCK, CloudHeader, CloudReader, CloudWriter, damage_error, epsg_of, intensity_scale
 from .laz_chunks import check_chunks
 
@@ -241,29 +241,20 @@ class LasReader(CloudReader):
             check_chunks(path, start, header.vlrs.get("LasZipVlr")[0].record_data)
 
     def _block(self, record: Any) -> PointBlock:
-        header, count = self._reader.header, len(record)
+        header = self._reader.header
         names = set(record.point_format.dimension_names)
-        raw = record.array
-        steps = np.stack([raw["X"], raw["Y"], raw["Z"]], axis=1)
-
-        def values(name: str, kind: Any) -> NDArray[Any]:
-            return np.asarray(record[name]).astype(kind) if name in names else np.zeros(count, dtype=kind)
-
-        scale = self.header.intensity_scale or 1.0
-        labels = "class_id" if self.header.labelled else "classification"
-        stored = {c.name: np.asarray(record[c.name]) for c in columns(self.header.attributes) if c.name in names}
-        arrays = gather(stored | {"class_id": values(labels, np.uint8)}, self.header.attributes, count)
-        return make_block(
-            xyz=steps * header.scales + header.offsets,
-            intensity=values("intensity", np.float64) / scale,
-            rgb=np.stack([values(name, np.uint16) for name in ("red", "green", "blue")], axis=1),
-            return_number=values("return_number", np.uint8),
-            number_of_returns=values("number_of_returns", np.uint8),
-            gps_time=values("gps_time", np.float64),
-            scan_angle_deg=_scan_angle(values, names),
-            strip=values("point_source_id", np.uint16) - np.uint16(1),
-            **arrays,
-        )
+        present = [column.name for column in columns(self.header.attributes) if column.name in names]
+        fields = [name for name in ("return_number", "number_of_returns", "gps_time") if name in names]
+        stored = {name: np.asarray(record[name]) for name in (*present, *fields)}
+        stored["class_id"] = np.asarray(record["class_id" if self.header.labelled else "classification"])
+        steps = np.stack([record.array[axis] for axis in "XYZ"], axis=1)
+        stored["xyz"] = steps * header.scales + header.offsets
+        stored["intensity"] = np.asarray(record["intensity"]).astype(np.float64) / (self.header.intensity_scale or 1.0)
+        if self.header.has_color:
+            stored["rgb"] = np.stack([record[name] for name in ("red", "green", "blue")], axis=1)
+        stored["scan_angle_deg"] = _scan_angle(record, names)
+        stored["strip"] = np.asarray(record["point_source_id"]) - np.uint16(1)
+        return make_points(stored, self.header.attributes, len(record))
 
 
 def open_to_copy(path: Path) -> laspy.LasReader:
@@ -315,10 +306,11 @@ def _check_start(path: Path, file: BinaryIO) -> None:
         raise InputError(str(path), None, "is not a LAS file that can be read (its header is damaged or truncated)")
 
 
-def _scan_angle(values: Any, names: set[str]) -> NDArray[np.float32]:
+def _scan_angle(record: Any, names: set[str]) -> NDArray[Any]:
+    """Return scan angles (N,) in degrees."""
     if "scan_angle" in names:
-        return (values("scan_angle", np.float64) * SCAN_ANGLE_STEP).astype(np.float32)
-    return values("scan_angle_rank", np.float32)
+        return np.asarray(record["scan_angle"]).astype(np.float64) * SCAN_ANGLE_STEP
+    return np.asarray(record["scan_angle_rank"])
 
 
 def _header(path: Path, las: laspy.LasHeader) -> CloudHeader:

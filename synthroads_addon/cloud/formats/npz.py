@@ -23,22 +23,10 @@ from numpy.lib import format as npy
 from numpy.typing import NDArray
 
 from ...base.errors import InputError
-from ..layers import columns, gather, layer_arrays
-from ..points import PointBlock, make_block
+from ..layers import columns, layer_arrays, make_points
+from ..points import POINT_TYPES, PointBlock
 from .base import BLOCK, CloudReader, CloudWriter, damage_error, finite_coordinates, header_from_notes
 
-_ALWAYS = {
-    "xyz": ("<f8", 3),
-    "intensity": ("<f8", 1),
-    "rgb": ("<u2", 3),
-    "class_id": ("|u1", 1),
-    "instance_id": ("<u4", 1),
-    "return_number": ("|u1", 1),
-    "number_of_returns": ("|u1", 1),
-    "gps_time": ("<f8", 1),
-    "scan_angle_deg": ("<f4", 1),
-    "strip": ("<u2", 1),
-}
 _ON_REQUEST = {name: (np.dtype(kind).str, width) for name, (kind, width) in layer_arrays().items()}
 ARCHIVE_FAULTS = (
     *(KeyError, ValueError, EOFError, OSError, RuntimeError, MemoryError, SyntaxError, OverflowError),
@@ -55,7 +43,7 @@ class NpzWriter(CloudWriter):
 
     def _open(self) -> None:
         names = {column.array for column in self.columns}
-        self._arrays = _ALWAYS | {name: kind for name, kind in _ON_REQUEST.items() if name in names}
+        self._arrays = POINT_TYPES | {name: kind for name, kind in _ON_REQUEST.items() if name in names}
         self._parts = self.path.with_name(f".{self.path.name}.parts")
         self._files: dict[str, IO[bytes]] = {}
         shutil.rmtree(self._parts, ignore_errors=True)
@@ -154,23 +142,17 @@ class NpzReader(CloudReader):
         return data.reshape(rows)
 
     def _block(self, arrays: dict[str, NDArray[Any]], count: int) -> PointBlock:
-        attribute_columns = columns(self.header.attributes)
-        parts = {
+        stored = {
             c.name: arrays[c.array] if c.component is None else arrays[c.array][:, c.component]
-            for c in attribute_columns
+            for c in columns(self.header.attributes)
             if c.array in arrays
         }
-        result = gather(parts, self.header.attributes, count)
-        for name, (kind, width) in _ALWAYS.items():
-            if name not in ("class_id", "instance_id"):
-                shape = (count, width) if width > 1 else (count,)
-                result[name] = arrays[name].astype(kind) if name in arrays else np.zeros(shape, dtype=kind)
-        return make_block(**result)
+        return make_points(arrays | stored, self.header.attributes, count)
 
     def _read_kinds(self, path: Path) -> dict[str, tuple[tuple[int, ...], np.dtype[Any]]]:
         """Return shape and type of each array that is known here."""
         kinds = {}
-        for name in _ALWAYS | _ON_REQUEST:
+        for name in POINT_TYPES | _ON_REQUEST:
             if f"{name}.npy" in self._file.namelist():
                 with self._file.open(f"{name}.npy") as member:
                     kinds[name] = _npy_header(member)
@@ -178,7 +160,7 @@ class NpzReader(CloudReader):
             raise InputError(str(path), None, "has no array xyz")
         count = kinds["xyz"][0][0] if kinds["xyz"][0] else 0
         for name, (shape, kind) in kinds.items():
-            width = (_ALWAYS | _ON_REQUEST)[name][1]
+            width = (POINT_TYPES | _ON_REQUEST)[name][1]
             if shape != ((count, width) if width > 1 else (count,)) or kind.kind not in "fiub":
                 expected = f"({count}, {width})" if width > 1 else f"({count},)"
                 raise InputError(f"{path}: {name}", shape, f"must be numbers of shape {expected}")

@@ -16,8 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...base.errors import InputError
-from ..layers import Column, columns, gather
-from ..points import PointBlock, make_block
+from ..layers import Column, columns, make_points
+from ..points import PointBlock
 from .base import BLOCK, CloudReader, CloudWriter, damage_error, finite_coordinates, header_from_notes
 
 _NAMES = {"NormalX": "nx", "NormalY": "ny", "NormalZ": "nz"}
@@ -39,6 +39,11 @@ _FIXED = (
     *(("return_number", "u1"), ("number_of_returns", "u1"), ("gps_time", "<f8"), ("scan_angle", "<f4")),
     ("strip", "<u2"),
 )
+_FIELDS = {
+    **{name: name for name in ("intensity", "return_number", "number_of_returns", "gps_time", "strip")},
+    "scan_angle_deg": "scan_angle",
+}
+"""Properties of the arrays that every block has."""
 _CLASS_NAMES = ("classification", "class", "label", "scalar_Classification", "scalar_Label")
 """Where others keep classes."""
 _PIECE = 160
@@ -146,33 +151,17 @@ class PlyReader(CloudReader):
             yield self._block(np.frombuffer(data, dtype=self._type), done)
 
     def _block(self, record: NDArray[Any], done: int) -> PointBlock:
-        count = len(record)
-
-        def values(name: str, kind: Any) -> NDArray[Any]:
-            return record[name].astype(kind) if name in self._names else np.zeros(count, dtype=kind)
-
-        def channel(name: str) -> NDArray[np.uint16]:
-            return _sixteen_bits(record[name]) if name in self._names else np.zeros(count, dtype=np.uint16)
-
-        attribute_columns = columns(self.header.attributes)
-        stored = {c.name: record[ply_name(c)] for c in attribute_columns if ply_name(c) in self._names}
+        stored = {c.name: record[ply_name(c)] for c in columns(self.header.attributes) if ply_name(c) in self._names}
+        stored |= {name: record[field] for name, field in _FIELDS.items() if field in self._names}
         if not self.header.labelled:
-            name = next((name for name in _CLASS_NAMES if name in self._names), "")
-            stored["class_id"] = values(name, np.uint8)
-        arrays = gather(stored, self.header.attributes, count)
-        return make_block(
-            xyz=finite_coordinates(
-                self.header.path, done, np.stack([values(name, np.float64) for name in "xyz"], axis=1)
-            ),
-            intensity=values("intensity", np.float64),
-            rgb=np.stack([channel(name) for name in ("red", "green", "blue")], axis=1),
-            return_number=values("return_number", np.uint8),
-            number_of_returns=values("number_of_returns", np.uint8),
-            gps_time=values("gps_time", np.float64),
-            scan_angle_deg=values("scan_angle", np.float32),
-            strip=values("strip", np.uint16),
-            **arrays,
-        )
+            label = next((name for name in _CLASS_NAMES if name in self._names), None)
+            stored["class_id"] = record[label] if label else np.zeros(len(record))
+        xyz = np.stack([record[name].astype(np.float64) for name in "xyz"], axis=1)
+        stored["xyz"] = finite_coordinates(self.header.path, done, xyz)
+        dark = np.zeros(len(record), dtype=np.uint16)
+        channels = (_sixteen_bits(record[name]) if name in self._names else dark for name in ("red", "green", "blue"))
+        stored["rgb"] = np.stack(list(channels), axis=1)
+        return make_points(stored, self.header.attributes, len(record))
 
 
 def _sixteen_bits(channel: NDArray[Any]) -> NDArray[np.uint16]:
