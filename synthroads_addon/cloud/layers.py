@@ -185,7 +185,7 @@ def make_points(stored: dict[str, NDArray[Any]], attributes: tuple[Attribute, ..
 
     Args:
         stored: columns (N,) by name, of which those of a vector are put together, and the arrays of `POINT_TYPES`,
-            in any type.
+            in any type; the block keeps them where it can.
         attributes: that the file holds.
         count: N.
     """
@@ -204,5 +204,5 @@ def make_points(stored: dict[str, NDArray[Any]], attributes: tuple[Attribute, ..
     for name, (kind, width) in POINT_TYPES.items():
         if name not in _TYPES:
             shape = (count, width) if width > 1 else (count,)
-            arrays[name] = stored[name].astype(kind) if name in stored else np.zeros(shape, dtype=kind)
+            arrays[name] = stored[name].astype(kind, copy=False) if name in stored else np.zeros(shape, dtype=kind)
     return make_block(**arrays)

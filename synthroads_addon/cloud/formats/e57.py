@@ -293,7 +293,7 @@ class E57Reader(CloudReader):
         rotation, translation = pose
         present = [column for column in columns(self.header.attributes) if e57_name(column) in arrays]
         stored = {column.name: arrays[e57_name(column)].copy() for column in present}
-        stored |= {name: arrays[field] for name, field in _FIELDS.items() if field in arrays}
+        stored |= {name: arrays[field].copy() for name, field in _FIELDS.items() if field in arrays}
         stored["xyz"] = np.stack([arrays[f"cartesian{axis}"] for axis in "XYZ"], axis=1) @ rotation.T + translation
         index = arrays.get("returnIndex", np.zeros(count))  # counts from 0
         stored["return_number"] = index.astype(np.uint8) + np.uint8(1)

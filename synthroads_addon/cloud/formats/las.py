@@ -245,8 +245,8 @@ class LasReader(CloudReader):
         names = set(record.point_format.dimension_names)
         present = [column.name for column in columns(self.header.attributes) if column.name in names]
         fields = [name for name in ("return_number", "number_of_returns", "gps_time") if name in names]
-        stored = {name: np.asarray(record[name]) for name in (*present, *fields)}
-        stored["class_id"] = np.asarray(record["class_id" if self.header.labelled else "classification"])
+        stored = {name: np.array(record[name]) for name in (*present, *fields)}
+        stored["class_id"] = np.array(record["class_id" if self.header.labelled else "classification"])
         steps = np.stack([record.array[axis] for axis in "XYZ"], axis=1)
         stored["xyz"] = steps * header.scales + header.offsets
         stored["intensity"] = np.asarray(record["intensity"]).astype(np.float64) / (self.header.intensity_scale or 1.0)

@@ -139,7 +139,7 @@ class NpzReader(CloudReader):
         shape, kind = self._kinds[name]
         rows = (count, *shape[1:])
         data = np.frombuffer(member.read(int(np.prod(rows)) * kind.itemsize), dtype=kind)
-        return data.reshape(rows)
+        return data.reshape(rows).copy()
 
     def _block(self, arrays: dict[str, NDArray[Any]], count: int) -> PointBlock:
         stored = {

@@ -152,7 +152,7 @@ class PlyReader(CloudReader):
 
     def _block(self, record: NDArray[Any], done: int) -> PointBlock:
         stored = {c.name: record[ply_name(c)] for c in columns(self.header.attributes) if ply_name(c) in self._names}
-        stored |= {name: record[field] for name, field in _FIELDS.items() if field in self._names}
+        stored |= {name: record[field].copy() for name, field in _FIELDS.items() if field in self._names}
         if not self.header.labelled:
             label = next((name for name in _CLASS_NAMES if name in self._names), None)
             stored["class_id"] = record[label] if label else np.zeros(len(record))
