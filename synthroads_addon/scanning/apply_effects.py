@@ -81,7 +81,7 @@ def _check(name: str, changes: EchoChanges, shape: tuple[int, ...]) -> None:
 
 
 def _weaken(traced: Traced, marks: BothMarks, transmission: Float) -> tuple[Traced, BothMarks]:
-    """Return everything with factors (K, P) on its brightness, without what none of the light comes back from."""
+    """Return hits and marks with factors (K, P) on the brightness; hits that send no light back are left out."""
     first, behind = marks
     left = transmission.ravel()[traced.ray]
     seen = np.flatnonzero(left > 0.0)
@@ -95,7 +95,7 @@ def _weaken(traced: Traced, marks: BothMarks, transmission: Float) -> tuple[Trac
 
 
 def _add(plan: ScanPlan, traced: Traced, marks: BothMarks, changes: EchoChanges) -> tuple[Traced, BothMarks]:
-    """Return everything with the echoes of an effect that the scanner records."""
+    """Return hits and marks with those echoes of an effect that the scanner records."""
     distance = np.asarray(changes.distance, dtype=np.float64)
     here = np.flatnonzero((distance >= plan.setting.minimum_range) & (distance <= plan.setting.maximum_range))
     distance, brightness = distance[here], np.asarray(changes.brightness, dtype=np.float64)[here]

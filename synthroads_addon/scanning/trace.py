@@ -145,7 +145,7 @@ def trace(
 
 
 def _gather_hits(rays: Rays, first: Hits, layers: list[Hits], on: list[NDArray[np.intp]]) -> Traced:
-    """Return everything; of what lies behind only what is within reach."""
+    """Return all hits; behind permeable surfaces only those within reach."""
     if not layers:
         none, nothing = np.empty(0, dtype=np.intp), np.empty(0)
         return Traced(rays, first, Hits(none, none, nothing, nothing, nothing), none)

@@ -257,7 +257,7 @@ class E57Reader(CloudReader):
         )
 
     def blocks(self, size: int = BLOCK) -> Iterator[PointBlock]:
-        """See `CloudReader`."""
+        """Yield all points in the file's order; see `CloudReader.blocks`."""
         done = 0
         for scan, fields, count in zip(self._scans, self._fields, self._counts, strict=True):
             names = [name for name in sorted(_STANDARD | self._layer_names()) if name in fields]

@@ -210,7 +210,7 @@ class LasReader(CloudReader):
             raise InputError(str(path), None, f"is not a LAS file that can be read ({problem})") from None
 
     def blocks(self, size: int = BLOCK) -> Iterator[PointBlock]:
-        """See `CloudReader`."""
+        """Yield all points in the file's order; see `CloudReader.blocks`."""
         done, path = 0, self.header.path
         if self._reader.points_read:
             self._reader.seek(0)

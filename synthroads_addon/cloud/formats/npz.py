@@ -118,7 +118,7 @@ class NpzReader(CloudReader):
         )
 
     def blocks(self, size: int = BLOCK) -> Iterator[PointBlock]:
-        """See `CloudReader`."""
+        """Yield all points in the file's order; see `CloudReader.blocks`."""
         members = {name: self._file.open(f"{name}.npy") for name in self._kinds}
         try:
             for member in members.values():

@@ -141,7 +141,7 @@ class PlyReader(CloudReader):
         )
 
     def blocks(self, size: int = BLOCK) -> Iterator[PointBlock]:
-        """See `CloudReader`."""
+        """Yield all points in the file's order; see `CloudReader.blocks`."""
         self._file.seek(self._start)
         for done in range(0, self.header.count, size):
             rows = min(size, self.header.count - done)

@@ -6,7 +6,6 @@ import shutil
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
-from types import TracebackType
 from typing import Any, Self
 
 import numpy as np
@@ -31,9 +30,7 @@ class TileFiles:
         self._made = Path(tempfile.mkdtemp(prefix=".tiles-", dir=self._folder))
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         shutil.rmtree(self._made, ignore_errors=True)
 
     def append(self, block: PointBlock, tile: NDArray[np.int64]) -> None:

@@ -194,7 +194,7 @@ class MaterialLayers:
 
     @property
     def report(self) -> dict[str, Any]:
-        """Return that nothing was rendered."""
+        """Return an empty report: nothing was rendered."""
         return {}
 
     def sample(self, points: SeenPoints, wanted: frozenset[str]) -> LayerValues:

@@ -62,7 +62,7 @@ class ImageLayers:
         self._locate()
 
     def _locate(self) -> None:
-        """Note where the images were taken."""
+        """Fill in the images' places, and how points are grouped by where their scanner stood."""
         self._places = np.array([image.view.position for image in self.images]).reshape(-1, 3)
         places, count = np.unique(self._places, axis=0, return_counts=True)
         most = int(count.max(initial=0))
@@ -94,7 +94,7 @@ class ImageLayers:
             self._take(points, rows, taken, source)
 
     def _take(self, points: SeenPoints, rows: Index, taken: NDArray[np.float32], source: NDArray[np.uint8]) -> None:
-        """Do so for rows of points that the scanner saw from about one place."""
+        """Fill in rows of points that the scanner saw from about one place."""
         seen = points.select(rows)
         chosen, misfit = self._misfits(seen, self._candidates)
         order = np.argsort(misfit, axis=0, kind="stable")[:TRIES]

@@ -97,11 +97,11 @@ class AlignmentGuide(Guide):
         return self.alignment.project(plan)
 
     def driving_offsets(self) -> tuple[float, ...]:
-        """Return that a vehicle drives along the line."""
+        """Return 0: a vehicle drives along the line itself."""
         return (0.0,)
 
     def roadside_offsets(self, station: Float) -> Float:
-        """Return that a tripod stands on the line."""
+        """Return zeros (K,): a tripod stands on the line itself."""
         return np.zeros(len(station))
 
 
@@ -195,11 +195,11 @@ class SmoothedGuide(Guide):
         return self._guide.project(plan)
 
     def driving_offsets(self) -> tuple[float, ...]:
-        """Return the guide's."""
+        """Return the driving offsets beside the guide, m."""
         return self._guide.driving_offsets()
 
     def roadside_offsets(self, station: Float) -> Float:
-        """Return the guide's."""
+        """Return the roadside offsets (K,) beside the guide, m."""
         return self._guide.roadside_offsets(station)
 
 

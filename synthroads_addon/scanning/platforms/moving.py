@@ -60,7 +60,7 @@ class MovingPlatform(Platform):
         return MovingPath(self, guide)
 
     def runs_forward(self, strip: int, offset: float) -> bool:
-        """Return whether a strip, at an offset (m), is gone along with the stations."""
+        """Return whether the platform moves along a strip, at an offset (m), in the direction of the stations."""
         raise NotImplementedError
 
 
@@ -174,7 +174,7 @@ class MovingPath:
 
 
 def _form(platform: MovingPlatform, guide: Guide) -> tuple[Guide, Sway | None]:
-    """Return what the strips lie beside, and their sway."""
+    """Return the guide that the strips lie beside, and their sway."""
     if platform.path == "smoothed":
         return SmoothedGuide(guide, platform.polynomial_degree), None
     if platform.path == "direct" or platform.zigzag_amplitude == 0.0:

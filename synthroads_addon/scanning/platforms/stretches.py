@@ -28,12 +28,12 @@ class PathStretches:
 
     @property
     def knot_spacing(self) -> float:
-        """Return the whole path's."""
+        """Return the whole path's time between knots, s."""
         return self.whole.knot_spacing
 
     @property
     def typical_range(self) -> float:
-        """Return the whole path's."""
+        """Return the whole path's usual range, m."""
         return self.whole.typical_range
 
     @property
