@@ -16,7 +16,7 @@ from ..layers import DEFAULT_ATTRIBUTES, Attribute
 from .base import CloudReader, CloudWriter
 
 _FORMATS = {".laz": "Las", ".las": "Las", ".ply": "Ply", ".e57": "E57", ".npz": "Npz"}
-"""What the classes of a file's ending begin with; their module has the same name in small letters."""
+"""Beginnings of the names of the classes, by ending; their module has the same name in small letters."""
 ENDINGS = tuple(_FORMATS)
 """Endings of the files that can be written and read."""
 _PACKAGES = {".e57": "pye57"}
