@@ -20,7 +20,15 @@ from headless.commands import Outcome, add_common_arguments, entry
 from headless.messages import progress_bar
 from synthroads_addon.base.errors import InputError
 from synthroads_addon.base.progress import Progress, silent
-from synthroads_addon.calibration.job import PARTS, Calibration, CalibrationJob, Wanted, check, save_fitted, steps
+from synthroads_addon.calibration.job import (
+    PARTS,
+    Calibration,
+    CalibrationJob,
+    MaterialTarget,
+    check,
+    save_fitted,
+    steps,
+)
 from synthroads_addon.calibration.pavement import RoadClasses
 
 
@@ -131,8 +139,8 @@ def follow_job(job: CalibrationJob, progress: Progress = silent) -> Calibration:
 def job_of(arguments: argparse.Namespace) -> CalibrationJob:
     """Return the job that the arguments stand for."""
     textures = dict(_texture(text) for text in arguments.texture)
-    wanted = [_parse_target(text, textures) for text in arguments.material]
-    unknown = set(textures) - {one.material for one in wanted}
+    targets = [_parse_target(text, textures) for text in arguments.material]
+    unknown = set(textures) - {one.material for one in targets}
     if unknown:
         raise InputError("--texture", sorted(unknown)[0], "must be one of the materials asked for")
     if arguments.axis is None and (arguments.paved or arguments.line):
@@ -141,7 +149,7 @@ def job_of(arguments: argparse.Namespace) -> CalibrationJob:
     if arguments.axis is not None:
         road = RoadClasses(arguments.axis, tuple(arguments.paved), tuple(arguments.line), arguments.line_width)
     return CalibrationJob(
-        wanted=tuple(wanted),
+        targets=tuple(targets),
         table=arguments.table,
         real=arguments.real,
         class_field=arguments.class_field,
@@ -202,10 +210,10 @@ def _parts(text: str) -> list[Any]:
     return parts
 
 
-def _parse_target(text: str, textures: dict[str, tuple[Path, float]]) -> Wanted:
-    name, _, told = text.partition("=")
+def _parse_target(text: str, textures: dict[str, tuple[Path, float]]) -> MaterialTarget:
+    name, _, real_class = text.partition("=")
     image, width = textures.get(name, (None, 1.0))
-    return Wanted(name, told or None, image, width)
+    return MaterialTarget(name, real_class or None, image, width)
 
 
 def _texture(text: str) -> tuple[str, tuple[Path, float]]:

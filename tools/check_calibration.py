@@ -22,7 +22,7 @@ sys.path.insert(0, str(ROOT))
 
 from synthroads_addon.blender.files import empty_file  # noqa: E402
 from synthroads_addon.blender.materials import material  # noqa: E402
-from synthroads_addon.calibration.job import Calibration, CalibrationJob, Wanted, calibrate  # noqa: E402
+from synthroads_addon.calibration.job import Calibration, CalibrationJob, MaterialTarget, calibrate  # noqa: E402
 from synthroads_addon.calibration.pavement import RoadClasses  # noqa: E402
 from synthroads_addon.calibration.plot import save_plot  # noqa: E402
 from synthroads_addon.jobs.scan_scene import SceneScan, scan_scene  # noqa: E402
@@ -90,7 +90,7 @@ def compare(table: Path, output: Path, cloud: Path) -> Calibration:
     axis.write_text("x,y,z\n" + "".join(f"{x},0,0\n" for x in range(int(LENGTH) + 1)), encoding="utf-8")
     return calibrate(
         CalibrationJob(
-            wanted=(Wanted("asphalt", "paved"), Wanted("paint_white", "line")),
+            targets=(MaterialTarget("asphalt", "paved"), MaterialTarget("paint_white", "line")),
             table=table,
             real=cloud,
             road=RoadClasses(axis, ((-14.0, 14.0),), LINES, WIDTH),

@@ -22,7 +22,7 @@ from synthroads_addon.materials.reflectance import facet_terms, returned_share  
 from synthroads_addon.materials.table import Material, materials  # noqa: E402
 from synthroads_addon.materials.variation import vary_material  # noqa: E402
 from synthroads_addon.road.surroundings import Environment, MaterialVariation  # noqa: E402
-from synthroads_addon.scanning.beam import RINGS, beam_pattern, conical, cylindrical_offsets  # noqa: E402
+from synthroads_addon.scanning.beam import RINGS, beam_pattern, conical_directions, cylindrical_offsets  # noqa: E402
 from synthroads_addon.scanning.weather.base import Weather  # noqa: E402
 from synthroads_addon.scanning.weather.clear import Clear  # noqa: E402
 from synthroads_addon.scanning.weather.dust import Dust  # noqa: E402
@@ -116,7 +116,7 @@ def _step(axes: Any, beam: str) -> None:
     origin = np.zeros((3, len(pattern)))
     direction = np.repeat(down, len(pattern), axis=1)
     if beam == "conical":
-        direction = conical(down, east, north, pattern, divergence)
+        direction = conical_directions(down, east, north, pattern, divergence)
     else:
         origin = cylindrical_offsets(east, north, pattern, divergence, np.array([height - roof]))
     edge = 0.9

@@ -47,14 +47,14 @@ class RealClass:
     """The points of a class that have an intensity.
 
     Attributes:
-        told: how they were told from the others, in words.
+        selection: how they are told from the others, in words.
         place: (N, 3) map coordinates, m.
         intensity: (N,) as stored, above 0.
         zeros: how many more there are whose intensity is 0: left out.
         distance, incidence: (N,) m and rad; NaN where unknown.
     """
 
-    told: str
+    selection: str
     place: Float
     intensity: Float
     zeros: int
@@ -100,14 +100,14 @@ def _attribute(path: Path, name: str) -> NDArray[np.int64]:
         return np.asarray(file.read_points(file.header.point_count)[name]).astype(np.int64)
 
 
-def by_label(cloud: RealCloud, code: str) -> RealClass:
+def class_by_label(cloud: RealCloud, code: str) -> RealClass:
     """Return the points of a class by its number or name.
 
     Raises:
         InputError: there is no such class, or fewer than `FEWEST` of its points have an intensity.
     """
     number, name = _number(cloud, code)
-    return points_of(cloud, np.flatnonzero(cloud.label == number), f"labelled {name} in the file")
+    return select_class(cloud, np.flatnonzero(cloud.label == number), f"labelled {name} in the file")
 
 
 def _number(cloud: RealCloud, code: str) -> tuple[int, str]:
@@ -126,13 +126,13 @@ def _number(cloud: RealCloud, code: str) -> tuple[int, str]:
     return named[code], f"{code} ({named[code]})"
 
 
-def points_of(cloud: RealCloud, chosen: Index, told: str) -> RealClass:
+def select_class(cloud: RealCloud, chosen: Index, selection: str) -> RealClass:
     """Return chosen points of a cloud as a class; zeros are counted and left out."""
     bright = chosen[cloud.intensity[chosen] > 0.0]
     if len(bright) < FEWEST:
-        raise InputError("--real", told, f"{len(bright)} points have an intensity, at least {FEWEST} are needed")
+        raise InputError("--real", selection, f"{len(bright)} points have an intensity, at least {FEWEST} are needed")
     return RealClass(
-        told=told,
+        selection=selection,
         place=cloud.xyz[bright],
         intensity=cloud.intensity[bright],
         zeros=len(chosen) - len(bright),

@@ -63,21 +63,21 @@ class Receiver:
     range_corrected: bool = False
     decibels: float | None = None
 
-    def arrived(self, brightness: Float, distance: Float) -> Float:
+    def at_range(self, brightness: Float, distance: Float) -> Float:
         """Return linear intensities (N,) of surfaces' brightness at ranges (N,), m."""
         if self.range_corrected:
             return brightness
         return received_intensity(brightness, distance, self.attenuation)
 
-    def stored(self, linear: Float) -> Float:
+    def to_stored(self, linear: Float) -> Float:
         """Return what the device writes, without rounding, for linear intensities times its gain; -inf dB for 0."""
         if self.decibels is None:
             return linear
         with np.errstate(divide="ignore"):
             return FULL_SCALE / self.decibels * 10.0 * np.log10(linear)
 
-    def linear(self, stored: Float) -> Float:
-        """Return linear intensities times the gain: the inverse of `stored`."""
+    def to_linear(self, stored: Float) -> Float:
+        """Return linear intensities times the gain: the inverse of `to_stored`."""
         if self.decibels is None:
             return stored
         return np.asarray(10.0 ** (stored * self.decibels / (10.0 * FULL_SCALE)))
@@ -124,16 +124,17 @@ class Expectation:
             beside: what lies beside its strip; not needed for a plane.
         """
         surfaces = surfaces_of([material] if beside is None else [material, beside], self._reflection)
-        own = np.zeros(SAMPLES, dtype=np.intp)
-        brightness = brightness_of(surfaces, own, self._cosine)
+        own_material = np.zeros(SAMPLES, dtype=np.intp)
+        brightness = brightness_of(surfaces, own_material, self._cosine)
         if self._texture is not None:
             brightness = brightness * self._texture
         if self._share is not None and beside is not None:
-            brightness = self._share * brightness + (1.0 - self._share) * brightness_of(surfaces, own + 1, self._cosine)
+            around = brightness_of(surfaces, own_material + 1, self._cosine)
+            brightness = self._share * brightness + (1.0 - self._share) * around
         if surfaces.uneven[0]:
             place = self._place * material.spread_wavelength
-            brightness = brightness * spread_factors(surfaces, own, place, _SEED)
-        return self._receiver.arrived(brightness * (1.0 - material.transmission), self.distance)
+            brightness = brightness * spread_factors(surfaces, own_material, place, _SEED)
+        return self._receiver.at_range(brightness * (1.0 - material.transmission), self.distance)
 
     def _rays(self) -> tuple[Float, Float, Float]:
         """Return where the footprint's rays (`SAMPLES`, K) fall, m: along the scan line, across it, and their shares.

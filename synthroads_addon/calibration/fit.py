@@ -58,7 +58,7 @@ def interquartile(quantiles: Float) -> float:
 def fit_level_and_spreads(
     expectation: Expectation,
     material: Material,
-    wanted: Float,
+    quantiles: Float,
     receiver: Receiver,
     beside: tuple[Material, float] | None = None,
     spread: bool = True,
@@ -75,26 +75,24 @@ def fit_level_and_spreads(
         beside: for a strip, the material beside it and its level.
         spread: whether the spreads are fitted as well; else they are the material's.
     """
-    width = interquartile(wanted)
+    width = interquartile(quantiles)
 
     def miss(x: Float) -> Float:
-        got = np.quantile(receiver.stored(apply_gain(expectation, material, _fit(x, material), beside)), FITTED)
-        return np.asarray((got - wanted) / width)
+        got = np.quantile(receiver.to_stored(apply_gain(expectation, material, _fit(x, material), beside)), FITTED)
+        return np.asarray((got - quantiles) / width)
 
     start = float(np.median(expectation.linear(material, beside[0] if beside else None)))
     if start <= 0.0:
         raise InputError("material", material.to_dict(), "gives nothing back at these incidence angles and ranges")
-    level = np.log(float(receiver.linear(wanted[1:2])[0]) / start)
+    level = np.log(float(receiver.to_linear(quantiles[1:2])[0]) / start)
     if not spread:
         return _fit(_levenberg_marquardt(miss, np.array([level])), material)
-    linear = np.log(receiver.linear(wanted))
+    linear = np.log(receiver.to_linear(quantiles))
     first = [max(0.02, abs(float(linear[1 + side] - linear[1])) / 0.6745) for side in (-1, 1)]
     return _fit(_levenberg_marquardt(miss, np.array([level, *np.log(first)])), material)
 
 
-def apply_gain(
-    expectation: Expectation, material: Material, fit: Fit, beside: tuple[Material, float] | None
-) -> Float:
+def apply_gain(expectation: Expectation, material: Material, fit: Fit, beside: tuple[Material, float] | None) -> Float:
     """Return linear intensities with a fit's spreads and level; what lies beside a strip keeps its own level."""
     uneven = material.model_copy(update={"spread_below": fit.below, "spread_above": fit.above})
     if beside is None:
@@ -141,13 +139,13 @@ def gain_of(
         InputError: with the given gain or the held material another one had to reflect more than that.
     """
     least = max(level * row.reflectivity / BRIGHTEST for row, level in zip(materials, levels, strict=True))
-    wanted = levels[hold] if hold is not None else given
-    if wanted is None:
+    gain = levels[hold] if hold is not None else given
+    if gain is None:
         return max(float(np.exp(np.mean(np.log(levels)))), least)
-    if least > wanted * (1.0 + 1e-9):
-        allowed = f"a material would have to reflect {least / wanted * BRIGHTEST:.2f} of the light"
-        raise InputError("--gain" if hold is None else "--hold", wanted, allowed)
-    return wanted
+    if least > gain * (1.0 + 1e-9):
+        allowed = f"a material would have to reflect {least / gain * BRIGHTEST:.2f} of the light"
+        raise InputError("--gain" if hold is None else "--hold", gain, allowed)
+    return gain
 
 
 def brighten_material(material: Material, change: float, limited: bool = True) -> Material:
@@ -160,14 +158,14 @@ def brighten_material(material: Material, change: float, limited: bool = True) -
         change: above 0.
         limited: refuse a reflectivity above `BRIGHTEST`; else the result may be any, and serves to compute only.
     """
-    wanted, metal = change * material.reflectivity, material.metallic
+    reflectivity, metal = change * material.reflectivity, material.metallic
     luminance = float(np.array(material.base_color) @ LUMINANCE)
-    specular = (wanted - metal * luminance) / max(1.0 - metal, 1e-9) - 0.5 * luminance
+    specular = (reflectivity - metal * luminance) / max(1.0 - metal, 1e-9) - 0.5 * luminance
     update: dict[str, Any] = {"specular": specular, "retroreflection": change * material.retroreflection}
     if not limited:
         return material.model_copy(update=update)
-    if wanted > BRIGHTEST * (1.0 + 1e-6):
-        raise InputError("reflectivity", round(wanted, 3), f"no material reflects more than {BRIGHTEST:g}")
+    if reflectivity > BRIGHTEST * (1.0 + 1e-6):
+        raise InputError("reflectivity", round(reflectivity, 3), f"no material reflects more than {BRIGHTEST:g}")
     if not 0.0 <= specular <= 1.0:
         color = np.array(material.base_color) * change
         if color.max() > 1.0 or change * material.specular > 1.0:
@@ -195,8 +193,8 @@ def fitted_slope(incidence: Float, linear: Float) -> float | None:
     slopes = np.linspace(0.0, 1.5, 76)
     a, b = (terms[:, None] for terms in facet_terms(slopes))
     model = a * np.cos(angle) + b * np.sin(angle) ** 2
-    apart = np.log(median / model)
-    return float(slopes[apart.std(axis=1).argmin()])
+    misfit = np.log(median / model)
+    return float(slopes[misfit.std(axis=1).argmin()])
 
 
 def fitted_wavelength(place: Float, intensity: Float) -> float:
@@ -211,11 +209,11 @@ def fitted_wavelength(place: Float, intensity: Float) -> float:
     """
     squares = [_members(place, size) for size in _CELLS]
     real = _within(_scores(intensity), squares)
-    apart = []
+    misfits = []
     for wavelength in WAVELENGTHS:
-        own = field(place - place.min(axis=0), wavelength, 1, OCTAVES)
-        apart.append(float(np.nansum((_within(_scores(own), squares) - real) ** 2)))
-    return WAVELENGTHS[int(np.argmin(apart))]
+        values = field(place - place.min(axis=0), wavelength, 1, OCTAVES)
+        misfits.append(float(np.nansum((_within(_scores(values), squares) - real) ** 2)))
+    return WAVELENGTHS[int(np.argmin(misfits))]
 
 
 def _members(place: Float, size: float) -> NDArray[np.intp]:

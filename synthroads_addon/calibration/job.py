@@ -17,7 +17,7 @@ from ..base.errors import InputError, nearest_name
 from ..materials.surfaces import Reflection
 from ..materials.table import Material, materials, read_material_table, write_material_table
 from ..scanning.devices.device import load_device
-from .classes import RealClass, RealCloud, by_label, read_real, seen_from
+from .classes import RealClass, RealCloud, class_by_label, read_real, seen_from
 from .expected import Expectation, Receiver, Views, chosen_views
 from .fit import (
     FITTED,
@@ -42,18 +42,18 @@ _MOST_VIEWS = 60
 
 
 @dataclass(frozen=True)
-class Wanted:
+class MaterialTarget:
     """A material and the class that it is compared with.
 
     Attributes:
         material: name in the table.
-        told: number or name of a class in the cloud; ``paved`` or ``line`` beside an axis; None without a cloud.
+        real_class: number or name of a class in the cloud; ``paved`` or ``line`` beside an axis; None without a cloud.
         texture: image of it; None for the table's constants.
         texture_width: of the surface that the image shows, m.
     """
 
     material: str
-    told: str | None = None
+    real_class: str | None = None
     texture: Path | Texture | None = None
     texture_width: float = 1.0
 
@@ -63,7 +63,7 @@ class CalibrationJob:
     """Request for a calibration: what is to be compared, and how it was seen.
 
     Attributes:
-        wanted: materials with their classes; a strip's is compared after the one that lies beside it.
+        targets: materials with their classes; a strip's is compared after the one that lies beside it.
         table: the material table to begin with; None for the shipped one.
         scene: materials of a scene, in place of the table's of the same names.
         real: cloud to compare with; None for expected intensities alone.
@@ -81,7 +81,7 @@ class CalibrationJob:
         gain: of the device, if it is known from another cloud; else it is free.
     """
 
-    wanted: tuple[Wanted, ...]
+    targets: tuple[MaterialTarget, ...]
     table: Path | None = None
     real: Path | None = None
     class_field: str | None = None
@@ -116,14 +116,14 @@ class Compared:
     """One material beside its class.
 
     Attributes:
-        wanted: what was asked for.
+        target: the material and its class.
         before, after: the material; the same without a fit.
         expected: (`SAMPLES`,) intensities as the device would store them.
         incidence, distance: (`SAMPLES`,) rad and m, of these.
         real: the class; None without a cloud.
     """
 
-    wanted: Wanted
+    target: MaterialTarget
     before: Material
     after: Material
     expected: Float
@@ -145,11 +145,11 @@ class Compared:
         def quantiles(values: Float) -> dict[str, float]:
             return {name: _short(value) for name, value in zip(names, np.quantile(values, SHOWN), strict=True)}
 
-        data: dict[str, Any] = {"material": self.wanted.material, "expected": quantiles(self.expected)}
+        data: dict[str, Any] = {"material": self.target.material, "expected": quantiles(self.expected)}
         errors = self.errors()
         if self.real is not None and errors is not None:
             data |= {
-                "told_by": self.real.told,
+                "told_by": self.real.selection,
                 "points": len(self.real.intensity),
                 "zeros_left_out": self.real.zeros,
                 "real": quantiles(self.real.intensity),
@@ -162,7 +162,6 @@ class Compared:
         data["views"] = self._by_view()
         data |= {"before": self.before.to_dict(), "after": self.after.to_dict()}
         return data | {"reflectivity": [_short(row.reflectivity) for row in (self.before, self.after)]}
-
 
     def _by_view(self) -> list[dict[str, float]]:
         """Return the expected quartiles at each incidence angle and range, where these are few."""
@@ -233,14 +232,15 @@ def steps(job: CalibrationJob) -> Generator[float, None, Calibration]:
     yield 0.02
     real = _real_classes(job)
     yield 0.4
-    started = [_start(job, wanted, table[wanted.material], own) for wanted, own in zip(job.wanted, real, strict=True)]
+    pairs = zip(job.targets, real, strict=True)
+    inputs = [_fit_input(job, target, table[target.material], points) for target, points in pairs]
     fits: list[Fit] = []
-    for number, item in enumerate(started):
-        beside = _beside(job, started, fits, number)
+    for number, item in enumerate(inputs):
+        beside = _beside(job, inputs, fits, number)
         fits.append(_level(job, item, beside))
-        yield 0.4 + 0.5 * (number + 1) / len(started)
+        yield 0.4 + 0.5 * (number + 1) / len(inputs)
     yield 0.95
-    return _result(job, table, started, fits)
+    return _result(job, table, inputs, fits)
 
 
 def save_fitted(result: Calibration, path: Path, overwrite: bool = False) -> None:
@@ -251,25 +251,25 @@ def save_fitted(result: Calibration, path: Path, overwrite: bool = False) -> Non
     """
     if result.job.real is None or not result.job.fit:
         raise InputError("--save", str(path), "needs a cloud that materials are fitted to")
-    own = dict(read_material_table(result.job.table)) if result.job.table else {}
-    own |= {entry.wanted.material: entry.after for entry in result.compared}
-    write_material_table(path, own, overwrite)
+    rows = dict(read_material_table(result.job.table)) if result.job.table else {}
+    rows |= {entry.target.material: entry.after for entry in result.compared}
+    write_material_table(path, rows, overwrite)
 
 
 def check(job: CalibrationJob) -> None:
     """Refuse a job that can't be done, before any work."""
     table = job.start()
-    if not job.wanted:
+    if not job.targets:
         raise InputError("--material", None, "at least one is needed")
-    for wanted in job.wanted:
-        if wanted.material not in table:
-            hint = nearest_name(wanted.material, table)
-            raise InputError("--material", wanted.material, f"must be a material of the table{hint}")
-        if (wanted.told is None) != (job.real is None):
-            raise InputError("--material", wanted.material, "needs its class with a cloud (NAME=CLASS), none without")
-        if wanted.texture_width <= 0.0:
-            raise InputError("--texture", wanted.texture_width, "the width that it shows must be above 0 m")
-    names = [wanted.material for wanted in job.wanted]
+    for target in job.targets:
+        if target.material not in table:
+            hint = nearest_name(target.material, table)
+            raise InputError("--material", target.material, f"must be a material of the table{hint}")
+        if (target.real_class is None) != (job.real is None):
+            raise InputError("--material", target.material, "needs its class with a cloud (NAME=CLASS), none without")
+        if target.texture_width <= 0.0:
+            raise InputError("--texture", target.texture_width, "the width that it shows must be above 0 m")
+    names = [target.material for target in job.targets]
     if job.hold is not None and job.hold not in names:
         raise InputError("--hold", job.hold, f"must be one of {', '.join(names)}")
     if len(set(names)) < len(names):
@@ -294,12 +294,13 @@ def _check_views(job: CalibrationJob) -> None:
 
 
 def _check_road(job: CalibrationJob, road: RoadClasses) -> None:
-    for wanted in job.wanted:
-        if wanted.told not in _ROAD:
-            raise InputError("--material", f"{wanted.material}={wanted.told}", "must be paved or line beside an axis")
+    for target in job.targets:
+        if target.real_class not in _ROAD:
+            given = f"{target.material}={target.real_class}"
+            raise InputError("--material", given, "must be paved or line beside an axis")
     if any(low >= high for low, high in road.paved):
         raise InputError("--paved", [list(span) for span in road.paved], "must be FROM,TO, FROM being the smaller")
-    asked = {wanted.told for wanted in job.wanted}
+    asked = {target.real_class for target in job.targets}
     for name, there, option in (("paved", road.paved, "--paved"), ("line", road.lines, "--line")):
         if name in asked and not there:
             raise InputError(option, None, f"is needed to tell what is {name}")
@@ -308,10 +309,10 @@ def _check_road(job: CalibrationJob, road: RoadClasses) -> None:
 
 
 @dataclass(frozen=True)
-class _Started:
+class _FitInput:
     """A class before its fit."""
 
-    wanted: Wanted
+    target: MaterialTarget
     before: Material
     material: Material
     expectation: Expectation
@@ -321,26 +322,26 @@ class _Started:
 
 def _real_classes(job: CalibrationJob) -> list[RealClass | None]:
     if job.real is None:
-        return [None] * len(job.wanted)
+        return [None] * len(job.targets)
     cloud: RealCloud = read_real(job.real, job.class_field)
     if job.road is not None:
-        found = road_classes(cloud, job.road)
-        return [found[str(wanted.told)] for wanted in job.wanted]
-    return [by_label(cloud, str(wanted.told)) for wanted in job.wanted]
+        classes = road_classes(cloud, job.road)
+        return [classes[str(target.real_class)] for target in job.targets]
+    return [class_by_label(cloud, str(target.real_class)) for target in job.targets]
 
 
-def _start(job: CalibrationJob, wanted: Wanted, before: Material, real: RealClass | None) -> _Started:
+def _fit_input(job: CalibrationJob, target: MaterialTarget, before: Material, real: RealClass | None) -> _FitInput:
     material, texture, receiver = before, None, job.receiver
-    if wanted.texture is not None:
-        given = wanted.texture
-        texture = given if isinstance(given, Texture) else read_texture(given, wanted.texture_width, before)
+    if target.texture is not None:
+        given = target.texture
+        texture = given if isinstance(given, Texture) else read_texture(given, target.texture_width, before)
         material = before.model_copy(update={"base_color": texture.mean_color})
     views = _views(job, real)
     if job.fit and real is not None:
         material = _with_facets(job, material, real, views)
-    strip = job.road.line_width if job.road is not None and wanted.told == "line" else None
+    strip = job.road.line_width if job.road is not None and target.real_class == "line" else None
     expectation = Expectation(views, receiver, job.reflection, texture, strip)
-    return _Started(wanted, before, material, expectation, real, strip is not None)
+    return _FitInput(target, before, material, expectation, real, strip is not None)
 
 
 def _with_facets(job: CalibrationJob, material: Material, real: RealClass, views: Views) -> Material:
@@ -350,7 +351,7 @@ def _with_facets(job: CalibrationJob, material: Material, real: RealClass, views
         update["spread_wavelength"] = fitted_wavelength(real.place, real.intensity)
     scattering = job.reflection == "oren_nayar" and material.retroreflection == 0.0
     if "slope" in job.parts and scattering and len(views.incidence) == len(real.intensity):
-        near = job.receiver.linear(real.intensity) * (1.0 if job.range_corrected else views.distance**2)
+        near = job.receiver.to_linear(real.intensity) * (1.0 if job.range_corrected else views.distance**2)
         slope = fitted_slope(views.incidence, near)
         update |= {} if slope is None else {"facet_slope": slope}
     return material.model_copy(update=update)
@@ -367,30 +368,30 @@ def _views(job: CalibrationJob, real: RealClass | None) -> Views:
 
 
 def _beside(
-    job: CalibrationJob, started: list[_Started], fits: list[Fit], number: int
+    job: CalibrationJob, inputs: list[_FitInput], fits: list[Fit], number: int
 ) -> tuple[Material, float] | None:
     """Return the material beside a strip and its level: the pavement's, which must come first."""
-    if not started[number].strip:
+    if not inputs[number].strip:
         return None
-    for item, fit in zip(started, fits, strict=False):
-        if item.wanted.told == "paved":
+    for item, fit in zip(inputs, fits, strict=False):
+        if item.target.real_class == "paved":
             return item.material, fit.level
-    raise InputError("--material", started[number].wanted.material, "the material of the pavement must come before it")
+    raise InputError("--material", inputs[number].target.material, "the material of the pavement must come before it")
 
 
-def _level(job: CalibrationJob, item: _Started, beside: tuple[Material, float] | None) -> Fit:
+def _level(job: CalibrationJob, item: _FitInput, beside: tuple[Material, float] | None) -> Fit:
     if item.real is None:
         return Fit(1.0, item.material.spread_below, item.material.spread_above)
-    wanted = np.quantile(item.real.intensity, FITTED)
+    quantiles = np.quantile(item.real.intensity, FITTED)
     spread = job.fit and "spread" in job.parts
-    return fit_level_and_spreads(item.expectation, item.material, wanted, job.receiver, beside, spread)
+    return fit_level_and_spreads(item.expectation, item.material, quantiles, job.receiver, beside, spread)
 
 
 def _result(
-    job: CalibrationJob, table: Mapping[str, Material], started: list[_Started], fits: list[Fit]
+    job: CalibrationJob, table: Mapping[str, Material], inputs: list[_FitInput], fits: list[Fit]
 ) -> Calibration:
-    names = [item.wanted.material for item in started]
-    rows = [item.material for item in started]
+    names = [item.target.material for item in inputs]
+    rows = [item.material for item in inputs]
     hold = None if job.hold is None else names.index(job.hold)
     fitting = job.fit and job.real is not None
     gain = 1.0
@@ -405,22 +406,21 @@ def _result(
             for row, fit in zip(rows, fits, strict=True)
         ]
         rows = [_round_material(row) for row in rows]
-    compared = tuple(
-        _compare_class(job, item, row, gain, rows, started) for item, row in zip(started, rows, strict=True)
-    )
+    compared = tuple(_compare_class(job, item, row, gain, rows, inputs) for item, row in zip(inputs, rows, strict=True))
     return Calibration(job, gain, compared, {**table, **dict(zip(names, rows, strict=True))} if fitting else table)
 
 
 def _compare_class(
-    job: CalibrationJob, item: _Started, row: Material, gain: float, rows: list[Material], started: list[_Started]
+    job: CalibrationJob, item: _FitInput, row: Material, gain: float, rows: list[Material], inputs: list[_FitInput]
 ) -> Compared:
     """Return a class with the intensities that its final material gives."""
-    beside = next((own for own, other in zip(rows, started, strict=True) if other.wanted.told == "paved"), None)
+    pairs = zip(rows, inputs, strict=True)
+    beside = next((material for material, other in pairs if other.target.real_class == "paved"), None)
     fit = Fit(gain, row.spread_below, row.spread_above)
     seen = item.expectation
     linear = apply_gain(seen, row, fit, (beside, gain) if item.strip and beside is not None else None)
     return Compared(
-        item.wanted, item.before, row, job.receiver.stored(linear), seen.incidence, seen.distance, item.real
+        item.target, item.before, row, job.receiver.to_stored(linear), seen.incidence, seen.distance, item.real
     )
 
 
@@ -441,5 +441,3 @@ def _mean(levels: list[float]) -> float:
 def _short(value: float) -> float:
     """Return a number with six digits."""
     return float(f"{value:.6g}")
-
-

@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from ..base.errors import InputError
 from ..base.thresholds import otsu
 from ..road.centerline import read_axis
-from .classes import RealClass, RealCloud, points_of
+from .classes import RealClass, RealCloud, select_class
 
 Float = NDArray[np.float64]
 Index = NDArray[np.intp]
@@ -74,16 +74,16 @@ def road_classes(cloud: RealCloud, road: RoadClasses) -> dict[str, RealClass]:
     spans = " and ".join(f"{low:g} to {high:g}" for low, high in road.paved)
     result = {}
     if road.paved:
-        told = f"{spans} m beside the axis, more than {CLEAR:g} m from the lines" if road.lines else f"{spans} m"
-        result["paved"] = points_of(cloud, np.flatnonzero(on & free), told)
+        selection = f"{spans} m beside the axis, more than {CLEAR:g} m from the lines" if road.lines else f"{spans} m"
+        result["paved"] = select_class(cloud, np.flatnonzero(on & free), selection)
     if road.lines:
         chosen, threshold = _on_lines(cloud.intensity, station, offset, road)
-        told = (
+        selection = (
             f"within {road.line_width / 2:g} m of the lines at {', '.join(f'{line:g}' for line in road.lines)} m, "
             f"each {STRETCH:g} m of them moved by up to {REACH:g} m to where it is brightest, where the "
             f"median intensities of {ALONG:g} m of the line before and behind exceed {threshold:,.0f} (Otsu)"
         )
-        result["line"] = points_of(cloud, chosen, told)
+        result["line"] = select_class(cloud, chosen, selection)
     return result
 
 
@@ -95,18 +95,18 @@ def _on_lines(intensity: Float, station: Float, offset: Float, road: RoadClasses
         near = np.flatnonzero(np.abs(offset - line) < REACH + half)
         stretch = np.floor(station[near] / STRETCH)
         for number in np.unique(stretch):
-            own = near[stretch == number]
-            aside = offset[own] - line
-            shift = _brightest(aside, intensity[own], half)
-            own = own[np.abs(aside - shift) <= half]
-            if len(own) >= _FEWEST_OF_LINE // 2:
-                points.append(own)
-                medians.append(_median_along(station[own], intensity[own]))
+            rows = near[stretch == number]
+            aside = offset[rows] - line
+            shift = _brightest(aside, intensity[rows], half)
+            rows = rows[np.abs(aside - shift) <= half]
+            if len(rows) >= _FEWEST_OF_LINE // 2:
+                points.append(rows)
+                medians.append(_median_along(station[rows], intensity[rows]))
     if not points:
         raise InputError("--line", list(road.lines), "no points lie there")
-    found, level = np.concatenate(points), np.concatenate(medians)
+    chosen, level = np.concatenate(points), np.concatenate(medians)
     threshold = otsu(level)
-    return found[level > threshold], threshold
+    return chosen[level > threshold], threshold
 
 
 def _brightest(aside: Float, intensity: Float, half: float) -> float:
@@ -144,21 +144,21 @@ def beside_axis(points: Float, axis: Float) -> tuple[Float, Float]:
     corners, owner = np.unique(cell, axis=0, return_inverse=True)
     order = np.argsort(owner.ravel(), kind="stable")
     groups = np.split(order, np.cumsum(np.bincount(owner.ravel(), minlength=len(corners)))[:-1])
-    for corner, own in zip(corners, groups, strict=True):
+    for corner, rows in zip(corners, groups, strict=True):
         middle = (corner + 0.5) * _CELL
         near = np.flatnonzero(np.abs(begin - middle).max(axis=1) < _CELL / 2.0 + _FARTHEST)
         if len(near):
-            found = _nearest(points[own], begin[near], step[near], length[near])
-            station[own], offset[own] = start[near][found[0]] + found[1], found[2]
+            nearest = _nearest(points[rows], begin[near], step[near], length[near])
+            station[rows], offset[rows] = start[near][nearest[0]] + nearest[1], nearest[2]
     return station, offset
 
 
 def _nearest(points: Float, begin: Float, step: Float, length: Float) -> tuple[Index, Float, Float]:
     """Return of each point (P,) the nearest segment, how far along it (m), and the offset; NaN beyond all ends."""
     direction = step / length[:, None]
-    apart = points[:, None, :] - begin
-    along = np.einsum("psi,si->ps", apart, direction)
-    aside = direction[:, 0] * apart[:, :, 1] - direction[:, 1] * apart[:, :, 0]
+    offset = points[:, None, :] - begin
+    along = np.einsum("psi,si->ps", offset, direction)
+    aside = direction[:, 0] * offset[:, :, 1] - direction[:, 1] * offset[:, :, 0]
     beyond = along - np.clip(along, 0.0, length)
     distance = np.hypot(aside, beyond)
     best = distance.argmin(axis=1)

@@ -108,7 +108,7 @@ def _draw_class(
         _draw_marks(frame, np.quantile(entry.real.intensity, FITTED), _INK, 0.0)
     draw.line(_steps(frame, edges, expected)[1:-1], fill=color, width=2 * _SCALE, joint="curve")
     _draw_marks(frame, np.quantile(entry.expected, FITTED), color, 1.0)
-    _text(draw, (_MARGIN, top), entry.wanted.material, 17)
+    _text(draw, (_MARGIN, top), entry.target.material, 17)
     for number, line in enumerate(_words(entry)):
         _text(draw, (_MARGIN, top + 28 + 19 * number), line, 13, _SOFT if number else color)
 
@@ -146,7 +146,7 @@ def _draw_fall_off(draw: ImageDraw.ImageDraw, top: float, result: Calibration) -
     for number, (curve, entry) in enumerate(zip(curves, result.compared, strict=True)):
         color = _LINES[number % len(_LINES)]
         draw.line(frame.at(_ANGLES, curve), fill=color, width=2 * _SCALE)
-        _text(draw, (_MARGIN, top + 104 + 19 * number), entry.wanted.material, 13, color)
+        _text(draw, (_MARGIN, top + 104 + 19 * number), entry.target.material, 13, color)
 
 
 def _draw_heights(frame: _Frame) -> None:

@@ -12,6 +12,7 @@ from PIL import Image
 from ..base.errors import InputError, MissingFileError
 from ..materials.reflectance import reflectivity
 from ..materials.table import Material
+from ..scanning.colour.colour import decode_srgb
 
 Float = NDArray[np.float64]
 
@@ -46,10 +47,10 @@ def texture_of(pixels: Float, width: float, material: Material) -> Texture:
         width: of the surface that it shows, m.
         material: whose metallic and specular it has.
     """
-    own = reflectivity(pixels, material.metallic, material.specular)
+    values = reflectivity(pixels, material.metallic, material.specular)
     mean = pixels.reshape(-1, 3).mean(axis=0)
     return Texture(
-        values=own / max(float(own.mean()), 1e-9),
+        values=values / max(float(values.mean()), 1e-9),
         size=(width, width * pixels.shape[0] / pixels.shape[1]),
         mean_color=(float(mean[0]), float(mean[1]), float(mean[2])),
     )
@@ -69,9 +70,4 @@ def read_texture(path: Path, width: float, material: Material) -> Texture:
         raise MissingFileError(str(path), None, "no such file") from None
     except Exception:  # each of PIL's formats has errors of its own for what is damaged
         raise InputError(str(path), None, "is no image that can be read") from None
-    return texture_of(linear_of(stored), width, material)
-
-
-def linear_of(stored: Float) -> Float:
-    """Return linear values of sRGB's (IEC 61966-2-1), 0 to 1."""
-    return np.where(stored <= 0.04045, stored / 12.92, ((stored + 0.055) / 1.055) ** 2.4)
+    return texture_of(decode_srgb(stored), width, material)

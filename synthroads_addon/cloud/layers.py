@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from .points import FIELDS, PointBlock
+from .points import FIELDS, POINT_TYPES, PointBlock, make_block
 
 
 @dataclass(frozen=True)
@@ -44,7 +44,7 @@ class Column:
         """Return whether the values are whole numbers."""
         return self.scale is None
 
-    def of(self, block: PointBlock) -> NDArray[Any]:
+    def values(self, block: PointBlock) -> NDArray[Any]:
         """Return the column (N,) of a block; KeyError if the block doesn't have it."""
         array = block.array(self.array)
         if array is None:
@@ -168,11 +168,6 @@ def layer_arrays() -> dict[str, tuple[str, int]]:
     return {name: (rows[name][0], sum(column.array == name for column in rows[name][1].columns)) for name in names}
 
 
-def arrays_of(attribute: Attribute) -> frozenset[str]:
-    """Return the names of the `PointBlock` arrays that an attribute is made of."""
-    return frozenset(LAYERS[attribute].types)
-
-
 def columns(attributes: tuple[Attribute, ...]) -> tuple[Column, ...]:
     """Return the columns that a file with these attributes has beyond the fields of LAS, in their order."""
     return LABELS + tuple(column for name in ATTRIBUTES if name in attributes for column in LAYERS[name].columns)
@@ -183,10 +178,16 @@ def attributes_of(names: set[str]) -> tuple[Attribute, ...]:
     return tuple(name for name in ATTRIBUTES if {column.name for column in LAYERS[name].columns} <= names)
 
 
-def gather(values: dict[str, NDArray[Any]], attributes: tuple[Attribute, ...], count: int) -> dict[str, NDArray[Any]]:
-    """Return `PointBlock` arrays from columns (N,) by name; a vector's columns are put together.
+def make_points(stored: dict[str, NDArray[Any]], attributes: tuple[Attribute, ...], count: int) -> PointBlock:
+    """Return the block of N points that a file's arrays make up.
 
-    Arrays that a block always has and the file hasn't are NaN, or 0 where they are whole numbers.
+    Arrays that a block always has and the file hasn't are 0; range and incidence are NaN.
+
+    Args:
+        stored: columns (N,) by name, of which those of a vector are put together, and the arrays of `POINT_TYPES`,
+            in any type; the block keeps them where it can.
+        attributes: that the file holds.
+        count: N.
     """
     arrays: dict[str, NDArray[Any]] = {
         name: np.full(count, np.nan if np.dtype(kind).kind == "f" else 0, dtype=kind)
@@ -195,9 +196,13 @@ def gather(values: dict[str, NDArray[Any]], attributes: tuple[Attribute, ...], c
     }
     parts: dict[str, list[NDArray[Any]]] = {}
     for column in columns(attributes):
-        if column.name in values:
-            parts.setdefault(column.array, []).append(values[column.name])
-    for array, found in parts.items():
-        joined = found[0] if len(found) == 1 else np.stack(found, axis=1)
+        if column.name in stored:
+            parts.setdefault(column.array, []).append(stored[column.name])
+    for array, components in parts.items():
+        joined = components[0] if len(components) == 1 else np.stack(components, axis=1)
         arrays[array] = joined.astype(_TYPES[array], copy=False)
-    return arrays
+    for name, (kind, width) in POINT_TYPES.items():
+        if name not in _TYPES:
+            shape = (count, width) if width > 1 else (count,)
+            arrays[name] = stored[name].astype(kind, copy=False) if name in stored else np.zeros(shape, dtype=kind)
+    return make_block(**arrays)

@@ -87,6 +87,19 @@ class PointBlock:
         return make_block(**kept)
 
 
+POINT_TYPES: dict[str, tuple[str, int]] = {
+    "xyz": ("<f8", 3),
+    "intensity": ("<f8", 1),
+    "rgb": ("<u2", 3),
+    "class_id": ("|u1", 1),
+    "instance_id": ("<u4", 1),
+    "return_number": ("|u1", 1),
+    "number_of_returns": ("|u1", 1),
+    "gps_time": ("<f8", 1),
+    "scan_angle_deg": ("<f4", 1),
+    "strip": ("<u2", 1),
+}
+"""Type and number of components of the arrays that every block has and every file holds."""
 FIELDS = tuple(f.name for f in fields(PointBlock) if f.name != "more")
 
 

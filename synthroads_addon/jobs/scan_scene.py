@@ -27,7 +27,7 @@ from ..scanning.platforms.guides import RoadGuide
 from ..scanning.platforms.path import Path as ScanPath
 from ..scanning.platforms.polyline import PolylineGuide
 from ..scanning.platforms.trajectory import RecordedTrajectory, read_trajectory
-from ..scanning.platforms.tripod import PositionsPath, Tripod
+from ..scanning.platforms.tripod import Tripod, TripodPath
 from ..scanning.scene.extent import bounds, elevation_at, middle_line
 from ..scanning.scene.mesh import SceneMesh
 from ..scanning.scene.motion import ScannedScene
@@ -185,7 +185,7 @@ def scene_path(job: SceneScan, mesh: SceneMesh, geometry: RoadGeometry | None) -
     """
     platform, origin = job.scenario.scan.platform, mesh.origin.tolist()
     if job.tripods:
-        return PositionsPath(_tripod_of(job), [_scanner_place(job, place, mesh) for place in job.tripods])
+        return TripodPath(_tripod_of(job), [_scanner_place(job, place, mesh) for place in job.tripods])
     if geometry and not job.path:
         return platform.make_path(RoadGuide(geometry))
     guide = PolylineGuide.read(job.path, origin) if job.path else PolylineGuide(middle_line(mesh), origin)

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import fields, replace
-from typing import Any
+from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..base.random_streams import stream
 from .effects import EchoChanges, Float, PulseHits
@@ -83,7 +81,7 @@ def _check(name: str, changes: EchoChanges, shape: tuple[int, ...]) -> None:
 
 
 def _weaken(traced: Traced, marks: BothMarks, transmission: Float) -> tuple[Traced, BothMarks]:
-    """Return everything with factors (K, P) on its brightness, without what none of the light comes back from."""
+    """Return hits and marks with factors (K, P) on the brightness; hits that send no light back are left out."""
     first, behind = marks
     left = transmission.ravel()[traced.ray]
     seen = np.flatnonzero(left > 0.0)
@@ -93,12 +91,11 @@ def _weaken(traced: Traced, marks: BothMarks, transmission: Float) -> tuple[Trac
         intensity=first.intensity * transmission,
     )
     behind = Marks(behind.distance[seen], behind.weight[seen] * left[seen], behind.intensity[seen] * left[seen])
-    kept = Hits(*(getattr(traced.behind, field.name)[seen] for field in fields(Hits)))
-    return replace(traced, behind=kept, ray=traced.ray[seen]), (first, behind)
+    return replace(traced, behind=traced.behind.select(seen), ray=traced.ray[seen]), (first, behind)
 
 
 def _add(plan: ScanPlan, traced: Traced, marks: BothMarks, changes: EchoChanges) -> tuple[Traced, BothMarks]:
-    """Return everything with the echoes of an effect that the scanner records."""
+    """Return hits and marks with those echoes of an effect that the scanner records."""
     distance = np.asarray(changes.distance, dtype=np.float64)
     here = np.flatnonzero((distance >= plan.setting.minimum_range) & (distance <= plan.setting.maximum_range))
     distance, brightness = distance[here], np.asarray(changes.brightness, dtype=np.float64)[here]
@@ -110,10 +107,5 @@ def _add(plan: ScanPlan, traced: Traced, marks: BothMarks, changes: EchoChanges)
     )
     first, behind = marks
     ray = changes.ray[here] * len(traced.rays.time) + changes.pulse[here]
-    traced = replace(traced, behind=Hits(*_join_arrays(traced.behind, hits)), ray=np.concatenate([traced.ray, ray]))
-    return traced, (first, Marks(*_join_arrays(behind, added)))
-
-
-def _join_arrays(one: Hits | Marks, other: Hits | Marks) -> list[NDArray[Any]]:
-    """Return the arrays of two of a kind, one after the other."""
-    return [np.concatenate([getattr(one, field.name), getattr(other, field.name)]) for field in fields(one)]
+    traced = replace(traced, behind=Hits.join([traced.behind, hits]), ray=np.concatenate([traced.ray, ray]))
+    return traced, (first, Marks.join([behind, added]))

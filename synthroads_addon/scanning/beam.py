@@ -119,7 +119,7 @@ def beam_radii(divergence: Sequence[float]) -> tuple[float, float]:
     return math.tan(divergence[0] / 2.0), math.tan(divergence[1] / 2.0)
 
 
-def conical(
+def conical_directions(
     direction: Float, in_plane: Float, across: Float, pattern: BeamPattern, divergence: Sequence[float]
 ) -> Float:
     """Return the directions of rays that diverge from the aperture.

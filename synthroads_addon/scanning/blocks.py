@@ -40,13 +40,13 @@ class Blocks:
         """Return how many pulses a strip has."""
         return shot_count(self.setting, strip.duration)
 
-    def of(self, strip: Strip) -> range:
+    def block_numbers(self, strip: Strip) -> range:
         """Return the numbers of a strip's blocks."""
         return range(-(-self.pulses(strip) // self.size))
 
     def all(self) -> list[Block]:
         """Return every block, in the order of time."""
-        return [(strip, block) for strip in self.path.strips for block in self.of(strip)]
+        return [(strip, block) for strip in self.path.strips for block in self.block_numbers(strip)]
 
     def pulses_of(self, strip: Strip, block: int) -> tuple[int, int]:
         """Return the first pulse of a block, counted within its strip, and how many it has."""

@@ -12,7 +12,7 @@ from ..cloud.layers import optional_arrays
 from ..cloud.points import NO_MATERIAL, PointBlock
 from ..materials.reflectance import reflectivity, returned_share
 from ..materials.surfaces import brightness_of
-from .colour.colour import LayerSource, LayerValues, Targets, sample_targets
+from .colour.colour import LayerSource, LayerValues, SeenPoints, sample_points
 from .devices.device import ScannerSetting
 from .plan import ScanPlan
 from .radiometry import saturate
@@ -45,10 +45,10 @@ def finish(plan: ScanPlan, source: LayerSource, result: BlockResult) -> BlockRes
     return replace(result, points=points.with_arrays(changes), seen=None)
 
 
-def _with_layers(plan: ScanPlan, source: LayerSource, result: BlockResult, seen: Targets) -> BlockResult:
+def _with_layers(plan: ScanPlan, source: LayerSource, result: BlockResult, seen: SeenPoints) -> BlockResult:
     """Return a block with its points' colours and layers, and with the intensities that follow from these."""
     layers = plan.coloured | (_OF_INTENSITY if plan.detects_later else frozenset())
-    values = sample_targets(source, seen, layers)
+    values = sample_points(source, seen, layers)
     changes: dict[str, Any] = {name: values.arrays[name] for name in plan.coloured}
     changes["color_source"] = values.source
     if plan.detects_later:
@@ -61,7 +61,7 @@ def _with_layers(plan: ScanPlan, source: LayerSource, result: BlockResult, seen:
 
 
 def _relative_brightness(
-    plan: ScanPlan, points: PointBlock, seen: Targets, values: LayerValues
+    plan: ScanPlan, points: PointBlock, seen: SeenPoints, values: LayerValues
 ) -> NDArray[np.float64]:
     """Return how many times as bright points are by their own layers as by their materials' means (N,).
 

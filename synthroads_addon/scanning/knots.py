@@ -40,7 +40,7 @@ class Track:
     present: NDArray[np.bool_]
 
     @classmethod
-    def of(cls, pose: Callable[[Float], Any], begin: float, end: float, spacing: float) -> Track:
+    def between(cls, pose: Callable[[Float], Any], begin: float, end: float, spacing: float) -> Track:
         """Return the track of ``pose(time (K,)) -> (rotation (K, 3, 3), position (K, 3), present (K,))``.
 
         Knots are whole multiples of the spacing, so that no result depends on where a block begins.
@@ -70,13 +70,13 @@ class Track:
             return rotation, position, np.ones(len(times), dtype=bool)
         return rotation, position, self.present[index] & self.present[index + 1]
 
-    def way(self, point: Float) -> Way:
-        """Return the way of a point (3,) of the own frame, m."""
+    def point_track(self, point: Float) -> PointTrack:
+        """Return the track of a point (3,) of the own frame, m."""
         place = np.einsum("ijk,j->ik", self.rotation.reshape(3, 3, -1), point) + self.position
-        return Way(self.begin, self.spacing, place)
+        return PointTrack(self.begin, self.spacing, place)
 
-    def swept(self, centre: Float, radius: float) -> tuple[Float, Float] | None:
-        """Return the smallest and largest corner (3,) that a sphere reaches on the way; None where it is never there.
+    def swept_box(self, centre: Float, radius: float) -> Float | None:
+        """Return the smallest and largest corner (2, 3) that a sphere reaches on the way; None where it is never there.
 
         Args:
             centre: (3,) of the sphere, own frame, m.
@@ -87,11 +87,11 @@ class Track:
             return None
         rotation = self.rotation[:, there].reshape(3, 3, -1)
         middle = np.einsum("ijn,j->in", rotation, centre) + self.position[:, there]
-        return middle.min(axis=1) - radius, middle.max(axis=1) + radius
+        return np.array([middle.min(axis=1) - radius, middle.max(axis=1) + radius])
 
 
 @dataclass(frozen=True)
-class Way:
+class PointTrack:
     """Where a point of a body is on its track, whether the body is there or not.
 
     Attributes:
@@ -114,11 +114,11 @@ class Way:
         return _between(self.position, *_knots(self, times))
 
 
-class KeptPoses:
+class PoseCache:
     """Poses of one body, kept for other blocks that ask for the same knots; any threads may share it.
 
     Args:
-        pose: see `Track.of`.
+        pose: see `Track.between`.
     """
 
     def __init__(self, pose: Callable[[Float], Any]) -> None:
@@ -129,14 +129,14 @@ class KeptPoses:
         self._stretch = stretch
 
     def track(self, begin: float, end: float, spacing: float) -> Track:
-        """Return the track between two times, s, as `Track.of` does."""
+        """Return the track between two times, s, as `Track.between` does."""
         first, last = _knot_numbers(begin, end, spacing)
         before = first // _AT_ONCE
         stretches = [self._stretch(number, spacing) for number in range(before, last // _AT_ONCE + 1)]
-        own = slice(first - before * _AT_ONCE, last + 1 - before * _AT_ONCE)
+        knots = slice(first - before * _AT_ONCE, last + 1 - before * _AT_ONCE)
         names = ("rotation", "position", "present")
         joined = (np.concatenate([getattr(one, name) for one in stretches], axis=-1) for name in names)
-        return Track(first * spacing, spacing, *(array[..., own] for array in joined))
+        return Track(first * spacing, spacing, *(array[..., knots] for array in joined))
 
 
 def track_knots(begin: float, end: float, spacing: float) -> Float:
@@ -151,7 +151,7 @@ def _knot_numbers(begin: float, end: float, spacing: float) -> tuple[int, int]:
     return first, max(int(np.ceil(end / spacing)), first + 1)
 
 
-def _knots(track: Track | Way, times: Float) -> tuple[NDArray[np.intp], Float]:
+def _knots(track: Track | PointTrack, times: Float) -> tuple[NDArray[np.intp], Float]:
     """Return the knots before times (N,), and which share of the way to the next has passed."""
     knot = (times - track.begin) / track.spacing
     index = np.clip(knot.astype(np.intp), 0, track.position.shape[1] - 2)

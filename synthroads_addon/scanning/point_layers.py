@@ -58,9 +58,7 @@ def fill_layers(points: MeasuredPoints) -> dict[str, NDArray[Any]]:
     return {array: filler(points) for array, filler in FILLERS.items() if array in points.plan.wanted}
 
 
-def place_points(
-    origin: Float, direction: Float, pulse: NDArray[np.intp], distance: Float, map_origin: Float
-) -> Float:
+def place_points(origin: Float, direction: Float, pulse: NDArray[np.intp], distance: Float, map_origin: Float) -> Float:
     """Return the map coordinates (N, 3) of points at a distance (N,) along the beams (3, P) of their pulses, m."""
     result = np.empty((len(pulse), 3))
     for axis in range(3):
@@ -96,4 +94,4 @@ def _true_xyz(points: MeasuredPoints) -> NDArray[Any]:
 
 @fills("material")
 def _material(points: MeasuredPoints) -> NDArray[Any]:
-    return points.plan.target.of_faces("material", points.face)
+    return points.plan.target.face_values("material", points.face)

@@ -29,7 +29,7 @@ class Errors:
 
     Attributes:
         range: (2, P) float32 of the block, or as many as a pulse can have returns if these are more, in units of one
-            sigma; None without. See `of_range`.
+            sigma; None without. See `range_errors`.
         angle: (2, P) rad; None without.
         lost: (P, returns) bool; None without.
     """
@@ -39,7 +39,7 @@ class Errors:
     lost: NDArray[np.bool_] | None
 
     @classmethod
-    def drawn(cls, plan: ScanPlan, strip: Strip, count: int, key: int) -> Errors:
+    def draw(cls, plan: ScanPlan, strip: Strip, count: int, key: int) -> Errors:
         """Draw the errors of a block."""
 
         def source(purpose: str) -> np.random.Generator:
@@ -55,7 +55,7 @@ class Errors:
             source("dropouts").random(shape, dtype=np.float32) < dropout if dropout else None,
         )
 
-    def of_range(self, pulse: Index, number: NDArray[np.uint8], most: int) -> NDArray[np.float32]:
+    def range_errors(self, pulse: Index, number: NDArray[np.uint8], most: int) -> NDArray[np.float32]:
         """Return (N,) range errors of returns, in units of one sigma.
 
         First returns have a number each. Later ones, which are few, take theirs from a second row, the third and
@@ -103,12 +103,12 @@ class Poses:
             position, rotation = measured_pose(*plan.path.pose(strip, time), errors)
             return rotation, position, np.ones(len(time))
 
-        track = Track.of(true, begin, end, spacing)
+        track = Track.between(true, begin, end, spacing)
         noisy = plan.noise.position_sigma or plan.noise.attitude_sigma_deg or plan.noise.heading_sigma_deg
         return cls(
             track,
             # Linear between knots, errors would lose some of their spread if they changed much meanwhile.
-            Track.of(measured, begin, end, min(spacing, plan.noise.correlation_time / 50.0)) if noisy else track,
+            Track.between(measured, begin, end, min(spacing, plan.noise.correlation_time / 50.0)) if noisy else track,
             plan.target.motions(begin, end, min(spacing, _MOTION_KNOTS), track if plan.driven else None),
         )
 
@@ -119,7 +119,7 @@ class Pulses:
 
     Attributes:
         time: (P,) s since the first strip's start.
-        scan_angle: (P,) rad, see `shots.Shots`.
+        scan_angle: (P,) rad, see `patterns.base.PulseRays`.
         origin: (3, P) where each leaves the scanner, m.
         direction: (3, P) unit vectors of the beam's axis.
         in_plane: (3, P) unit vectors across the beam, in the scan plane; None for a single ray.
@@ -171,9 +171,7 @@ def make_pulses(plan: ScanPlan, strip: Strip, poses: Poses, angle: Float | None,
             believed /= np.sqrt(np.einsum("ij,ij->j", believed, believed))
         rotation, measured_origin, _ = poses.measured.at(time)
         measured_direction = _turn_vectors(rotation, believed)
-    return Pulses(
-        time, shot.scan_angle, origin, direction, in_plane, across, measured_origin, measured_direction
-    )
+    return Pulses(time, shot.scan_angle, origin, direction, in_plane, across, measured_origin, measured_direction)
 
 
 def _turn_vectors(rotation: Float, vectors: Float) -> Float:

@@ -152,14 +152,12 @@ def shift_along_normals(
     if points.normal is None or points.material is None:
         raise ValueError("the roughness adjustment needs the points' normals and materials")
     # Points in the air, whose number is beyond all materials', have none.
-    found = np.flatnonzero(np.take(np.append(relief.amplitude, 0.0), points.material, mode="clip"))
-    if len(found) == 0:
+    uneven = np.flatnonzero(np.take(np.append(relief.amplitude, 0.0), points.material, mode="clip"))
+    if len(uneven) == 0:
         return points
-    rough = found if len(found) < len(points) else slice(None)
+    rough = uneven if len(uneven) < len(points) else slice(None)
     material = points.material[rough]
-    height = heights(
-        position[rough], strength * relief.amplitude[material], relief.wavelength[material], seed, octaves
-    )
+    height = heights(position[rough], strength * relief.amplitude[material], relief.wavelength[material], seed, octaves)
     xyz, distance = points.xyz.copy(), points.range.copy()
     xyz[rough] += height[:, None] * points.normal[rough]
     before, cosine = distance[rough], np.cos(np.radians(points.incidence_deg[rough].astype(np.float64)))

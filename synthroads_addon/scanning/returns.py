@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+
+from .array_rows import ArrayRows
 
 Float = NDArray[np.float64]
 Index = NDArray[np.intp]
@@ -15,7 +17,7 @@ UNCOUNTED = 1e-6
 
 
 @dataclass(frozen=True)
-class Echoes:
+class Echoes(ArrayRows):
     """Returns of a block of pulses, ordered by pulse and range.
 
     Attributes:
@@ -35,7 +37,7 @@ class Echoes:
 
 
 @dataclass(frozen=True)
-class Marks:
+class Marks(ArrayRows):
     """Contributions of hits to returns; all arrays have one shape.
 
     Attributes:
@@ -144,21 +146,11 @@ def _strongest(energy: Float, group: Index, starts: Index) -> Index:
 
 def _merge_echoes(one: Echoes, several: Echoes) -> Echoes:
     """Return both in the order of pulses; no pulse is in both."""
-    pulse = np.concatenate([one.pulse, several.pulse])
-    order = np.argsort(pulse, kind="stable")
-    names = ("hit", "range", "intensity", "weight")
-    columns = (np.concatenate([getattr(one, name), getattr(several, name)]) for name in names)
-    return Echoes(pulse[order], *(column[order] for column in columns))
+    echoes = Echoes.join([one, several])
+    return echoes.select(np.argsort(echoes.pulse, kind="stable"))
 
 
-def chosen_echoes(echoes: Echoes, which: NDArray[np.bool_] | Index) -> Echoes:
-    """Return the echoes chosen by a mask or by indices."""
-    return Echoes(*(getattr(echoes, field.name)[which] for field in fields(Echoes)))
-
-
-def number_returns(
-    pulse: Index, maximum: int
-) -> tuple[NDArray[np.bool_], NDArray[np.uint8], NDArray[np.uint8]]:
+def number_returns(pulse: Index, maximum: int) -> tuple[NDArray[np.bool_], NDArray[np.uint8], NDArray[np.uint8]]:
     """Return which echoes are recorded, and for these the return number and the number of returns.
 
     Args:

@@ -11,15 +11,15 @@ from ..cloud.points import PointBlock, concatenate, make_block
 from ..materials.surfaces import brightness_of
 from ..materials.texture_spread import spread_factors
 from .apply_effects import BothMarks, apply_effects
-from .beam import conical, cylindrical_offsets
-from .colour.colour import Targets, joined_targets
+from .beam import conical_directions, cylindrical_offsets
+from .colour.colour import SeenPoints
 from .knots import Track
 from .plan import ScanPlan
 from .platforms.path import Strip
 from .point_layers import MeasuredPoints, fill_layers, place_points
 from .pulses import Errors, Poses, Pulses, make_pulses, reaching_scene
 from .radiometry import received_intensity, saturate
-from .returns import UNCOUNTED, Echoes, Marks, chosen_echoes, group_returns, number_returns
+from .returns import UNCOUNTED, Echoes, Marks, group_returns, number_returns
 from .trace import Hits, Rays, Traced, trace
 
 Float = NDArray[np.float64]
@@ -44,7 +44,7 @@ class BlockResult:
     """
 
     points: PointBlock
-    seen: Targets | None
+    seen: SeenPoints | None
     pulses: int
     rays: int
     below_threshold: int
@@ -62,7 +62,7 @@ def joined_results(results: list[BlockResult]) -> BlockResult:
 
     return BlockResult(
         points=concatenate([result.points for result in results]),
-        seen=joined_targets(seen) if seen else None,
+        seen=SeenPoints.join(seen) if seen else None,
         pulses=total("pulses"),
         rays=total("rays"),
         below_threshold=total("below_threshold"),
@@ -82,7 +82,7 @@ def scan_pulses(plan: ScanPlan, strip: Strip, first: int, count: int, key: int =
     A block isn't cut any smaller, though its arrays leave the processor's cache: blocks are scanned side by side in
     threads that take turns in Python, so that few long calls beat many short ones.
     """
-    errors = Errors.drawn(plan, strip, count, key)
+    errors = Errors.draw(plan, strip, count, key)
     poses = Poses.between(plan, strip, *(plan.cut.time(strip, i) for i in (first, first + count - 1)))
     pulses = make_pulses(plan, strip, poses, errors.angle, first, count)
     number = np.arange(count)  # of each pulse within the block
@@ -106,7 +106,7 @@ def scan_pulses(plan: ScanPlan, strip: Strip, first: int, count: int, key: int =
     strong = np.flatnonzero(echoes.intensity >= threshold)
     weak = len(echoes.pulse) - len(strong)
     if weak:
-        echoes = chosen_echoes(echoes, strong)
+        echoes = echoes.select(strong)
     if errors.lost is not None:
         echoes = _drop_lost_echoes(echoes, errors.lost[number])
     points, seen, clipped = _points(plan, strip, pulses, traced, echoes, errors, number, poses.motions)
@@ -122,7 +122,7 @@ def beam_rays(plan: ScanPlan, pulses: Pulses, motions: list[Track]) -> Rays:
     assert pulses.across is not None
     divergence = plan.setting.divergence
     if plan.beam == "conical":
-        direction = conical(pulses.direction, pulses.in_plane, pulses.across, plan.pattern, divergence)
+        direction = conical_directions(pulses.direction, pulses.in_plane, pulses.across, plan.pattern, divergence)
         return Rays(origin, direction, share, pulses.time)
     reach = plan.setting.maximum_range
     distance = plan.target.cast(pulses.origin, pulses.direction, reach, pulses.time, motions).distance
@@ -177,7 +177,7 @@ def _drop_lost_echoes(echoes: Echoes, lost: NDArray[np.bool_]) -> Echoes:
     keep, number, _ = number_returns(echoes.pulse, lost.shape[1])
     chosen = np.flatnonzero(keep)
     chosen = chosen[~lost[echoes.pulse[chosen], number - 1]]
-    return chosen_echoes(echoes, chosen)
+    return echoes.select(chosen)
 
 
 def _points(
@@ -189,16 +189,16 @@ def _points(
     errors: Errors,
     number_in_block: Index,
     motions: list[Track],
-) -> tuple[PointBlock, Targets | None, int]:
+) -> tuple[PointBlock, SeenPoints | None, int]:
     """Return the points of the echoes, where they were seen, and how many of them saturated the detector."""
     keep, number, returns = number_returns(echoes.pulse, plan.most_returns)
     if not keep.all():
-        echoes = chosen_echoes(echoes, keep)
+        echoes = echoes.select(keep)
     pulse, hit, target = echoes.pulse, echoes.hit, plan.target
     face, along = traced.pick("face", hit), traced.pick("along", hit)
     distance = echoes.range + plan.noise.range_bias
     if errors.range is not None:
-        own = errors.of_range(number_in_block[pulse], number, plan.most_returns)
+        own = errors.range_errors(number_in_block[pulse], number, plan.most_returns)
         distance = distance + plan.setting.range_sigma * own
     intensity, clipped = saturate(echoes.intensity, np.inf if plan.detects_later else plan.setting.saturation)
     normal = None
@@ -212,8 +212,8 @@ def _points(
         xyz=place_points(pulses.measured_origin, pulses.measured_direction, pulse, distance, target.origin),
         intensity=intensity,
         rgb=np.zeros((len(pulse), 3), dtype=np.uint16),
-        class_id=target.of_faces("class_id", face),
-        instance_id=target.of_faces("instance_id", face),
+        class_id=target.face_values("class_id", face),
+        instance_id=target.face_values("instance_id", face),
         return_number=number,
         number_of_returns=returns,
         gps_time=pulses.time[pulse],
@@ -232,7 +232,7 @@ def _points(
 
 def _seen_targets(
     plan: ScanPlan, rays: Rays, ray: Index, reach: Float, face: Index, normal: Float, motions: list[Track]
-) -> Targets:
+) -> SeenPoints:
     """Return where the points were seen, in the scene as it stands at the time 0: as it is rendered.
 
     That is on the surface that gave most of the return: the mean of all its hits may lie in the air between them.
@@ -242,10 +242,10 @@ def _seen_targets(
     if target.moving:
         begin, offset, normal = target.at_start(face, position, time, motions, (scanner - position, normal))
         position, scanner = begin, begin + offset
-    return Targets(
+    return SeenPoints(
         position=np.ascontiguousarray(position.T),
         scanner=np.ascontiguousarray(scanner.T),
         normal=np.ascontiguousarray(normal.T),
-        material=target.of_faces("material", face),
+        material=target.face_values("material", face),
         time=time,
     )

@@ -84,9 +84,9 @@ def reach(cut: Blocks, geometry: RoadGeometry, blocks: list[Block]) -> tuple[flo
     """Return the stations between which the rays of some blocks can meet anything."""
     stations = []
     for strip in {block[0].index: block[0] for block in blocks}.values():
-        own = [number for owner, number in blocks if owner.index == strip.index]
-        chosen = np.unique(np.linspace(0, len(own) - 1, _PLACES).astype(int))
-        rays = [_rays(cut, strip, own[i]) for i in chosen]
+        numbers = [number for owner, number in blocks if owner.index == strip.index]
+        chosen = np.unique(np.linspace(0, len(numbers) - 1, _PLACES).astype(int))
+        rays = [_rays(cut, strip, numbers[i]) for i in chosen]
         origin, direction = (np.concatenate(parts) for parts in zip(*rays, strict=True))
         stations.append(_reached_stations(cut, geometry, origin, direction))
     return min(low for low, _ in stations), max(high for _, high in stations)
@@ -100,7 +100,7 @@ def shadow_length(geometry: RoadGeometry) -> float:
 
 def _middles(cut: Blocks, geometry: RoadGeometry, strip: Strip) -> Float:
     """Return the stations (B,) of the scanner in the middle of a strip's blocks."""
-    borders = [cut.pulses_of(strip, block) for block in cut.of(strip)]
+    borders = [cut.pulses_of(strip, block) for block in cut.block_numbers(strip)]
     times = np.array([cut.time(strip, first + count // 2) for first, count in borders])
     return geometry.alignment.project(cut.path.pose(strip, times)[0][:, :2])[0]
 

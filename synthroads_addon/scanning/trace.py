@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..materials.surfaces import Surfaces
+from .array_rows import ArrayRows
 from .knots import Track
 from .scene.target import Target
 
@@ -42,7 +43,7 @@ class Rays:
 
 
 @dataclass(frozen=True)
-class Hits:
+class Hits(ArrayRows):
     """Surfaces that rays meet; all arrays have one shape.
 
     Attributes:
@@ -135,23 +136,22 @@ def trace(
         hit = np.flatnonzero(met.face >= 0)
         on, left, start = on[hit], left[hit], start[hit] + met.distance[hit]
         face = met.face[hit]
-        own = np.take(target.material, face).astype(np.intp)
-        through = np.take(surfaces.transmission, own)
-        layers.append(Hits(face, own, _within(start, nearest, farthest), met.along[hit], left * (1.0 - through)))
+        surface = np.take(target.material, face).astype(np.intp)
+        through = np.take(surfaces.transmission, surface)
+        layers.append(Hits(face, surface, _within(start, nearest, farthest), met.along[hit], left * (1.0 - through)))
         rays_on.append(on)
         left = left * through
     return _gather_hits(rays, first, layers, rays_on)
 
 
 def _gather_hits(rays: Rays, first: Hits, layers: list[Hits], on: list[NDArray[np.intp]]) -> Traced:
-    """Return everything; of what lies behind only what is within reach."""
+    """Return all hits; behind permeable surfaces only those within reach."""
     if not layers:
-        nothing = Hits(*(np.empty(0, dtype=getattr(first, field.name).dtype) for field in fields(Hits)))
-        return Traced(rays, first, nothing, np.empty(0, dtype=np.intp))
-    behind = Hits(*(np.concatenate([getattr(layer, field.name) for layer in layers]) for field in fields(Hits)))
+        none, nothing = np.empty(0, dtype=np.intp), np.empty(0)
+        return Traced(rays, first, Hits(none, none, nothing, nothing, nothing), none)
+    behind = Hits.join(layers)
     inside = np.flatnonzero(behind.distance < np.inf)
-    chosen = Hits(*(getattr(behind, field.name)[inside] for field in fields(Hits)))
-    return Traced(rays, first, chosen, np.concatenate(on)[inside])
+    return Traced(rays, first, behind.select(inside), np.concatenate(on)[inside])
 
 
 def _within(distance: Float, nearest: float, farthest: float) -> Float:

@@ -8,7 +8,7 @@ from pydantic import Field, model_validator
 
 from ..base.classes import ClassScheme, class_scheme
 from ..base.schema import ClosedModel, quantity
-from ..cloud.layers import DEFAULT_ATTRIBUTES, Attribute, arrays_of
+from ..cloud.layers import DEFAULT_ATTRIBUTES, LAYERS, Attribute
 
 CloudFormat = Literal["laz", "las", "ply", "e57", "npz"]
 Intensity = Literal["received", "range_corrected"]
@@ -59,7 +59,7 @@ class CloudScenario(ClosedModel):
 
     def arrays(self) -> frozenset[str]:
         """Return the names of the `PointBlock` arrays that the attributes are made of: no other need be computed."""
-        return frozenset[str]().union(*(arrays_of(name) for name in self.attributes))
+        return frozenset[str]().union(*(LAYERS[name].types for name in self.attributes))
 
     def scheme(self) -> ClassScheme:
         """Return the scheme of the classes; raise `InputError` if there is no such scheme."""

@@ -13,7 +13,7 @@ from headless.cli import main
 from synthroads_addon.base.errors import InputError, OutputError
 from synthroads_addon.base.noise import field
 from synthroads_addon.base.thresholds import otsu
-from synthroads_addon.calibration.classes import RealClass, by_label, read_real, seen_from
+from synthroads_addon.calibration.classes import RealClass, class_by_label, read_real, seen_from
 from synthroads_addon.calibration.expected import Expectation, Receiver, Views, chosen_views
 from synthroads_addon.calibration.fit import (
     BRIGHTEST,
@@ -22,18 +22,18 @@ from synthroads_addon.calibration.fit import (
     fitted_wavelength,
     gain_of,
 )
-from synthroads_addon.calibration.job import Calibration, CalibrationJob, Wanted, calibrate, save_fitted, steps
+from synthroads_addon.calibration.job import Calibration, CalibrationJob, MaterialTarget, calibrate, save_fitted, steps
 from synthroads_addon.calibration.pavement import RoadClasses, beside_axis, road_classes
 from synthroads_addon.calibration.plot import save_plot
 from synthroads_addon.calibration.texture import read_texture, texture_of
 from synthroads_addon.materials.reflectance import facet_terms
 from synthroads_addon.materials.table import Material, materials, read_material_table, write_material_table
-from synthroads_addon.scanning.radiometry import lambert_intensity, oren_nayar_intensity
 from synthroads_addon.scenario.scenario import Scenario
 from tests.helpers.clouds.calibration_cloud import labelled, striped
+from tests.helpers.laser_equation import intensity_of
 
 ASPHALT, PAINT = materials()["asphalt"], materials()["paint_white"]
-ASKED = (Wanted("asphalt", "40"), Wanted("paint_white", "60"))
+ASKED = (MaterialTarget("asphalt", "40"), MaterialTarget("paint_white", "60"))
 
 
 def even(**values: float) -> Material:
@@ -45,9 +45,7 @@ def test_expected_intensities_are_the_laser_equations(reflection) -> None:
     views = chosen_views((0.0, 30.0, 75.0), (20.0, 90.0))
     expectation = Expectation(views, Receiver(attenuation=0.002), reflection)
     args = (np.cos(expectation.incidence), expectation.distance)
-    wanted = lambert_intensity(ASPHALT.reflectivity, *args, 0.002)
-    if reflection == "oren_nayar":
-        wanted = oren_nayar_intensity(ASPHALT.reflectivity, *args, ASPHALT.slope, 0.002)
+    wanted = intensity_of(ASPHALT.reflectivity, *args, ASPHALT.slope if reflection == "oren_nayar" else 0.0, 0.002)
     assert expectation.linear(ASPHALT) == pytest.approx(wanted)
     assert len(np.unique(np.stack([expectation.incidence, expectation.distance]), axis=1).T) == 6
     leaves = materials()["leaves"]
@@ -84,10 +82,10 @@ def test_a_strip_narrower_than_the_footprint_is_mixed_with_what_lies_beside() ->
 
 def test_receiver_writes_linear_numbers_or_decibels_and_back() -> None:
     values = np.array([1e-6, 0.2, 5.0])
-    assert np.array_equal(Receiver().stored(values), values)
+    assert np.array_equal(Receiver().to_stored(values), values)
     decibels = Receiver(decibels=30.0)
-    assert decibels.stored(np.array([1.0, 10.0])) == pytest.approx([0.0, 65535.0 / 3.0])
-    assert decibels.linear(decibels.stored(values)) == pytest.approx(values)
+    assert decibels.to_stored(np.array([1.0, 10.0])) == pytest.approx([0.0, 65535.0 / 3.0])
+    assert decibels.to_linear(decibels.to_stored(values)) == pytest.approx(values)
 
 
 def test_a_texture_gives_the_spread_of_its_pixels_over_the_footprint(tmp_path: Path) -> None:
@@ -246,7 +244,7 @@ def test_ranges_and_angles_from_one_place_follow_the_ground() -> None:
 
 
 def run_job(**changes) -> Calibration:
-    return calibrate(CalibrationJob((Wanted("asphalt"),), **changes))
+    return calibrate(CalibrationJob((MaterialTarget("asphalt"),), **changes))
 
 
 @pytest.mark.parametrize(
@@ -260,16 +258,16 @@ def run_job(**changes) -> Calibration:
         ({"hold": "concrete"}, "--hold"),
         ({"gain": -1.0}, "--gain"),
         ({"device": "no-such"}, "scan.device"),
-        ({"wanted": ()}, "--material"),
-        ({"wanted": (Wanted("asfalt"),)}, "did you mean 'asphalt'"),
-        ({"wanted": (Wanted("asphalt", "40"),)}, "--material"),
-        ({"wanted": (Wanted("asphalt"), Wanted("asphalt"))}, "once"),
-        ({"wanted": (Wanted("asphalt", texture_width=0.0),)}, "--texture"),
+        ({"targets": ()}, "--material"),
+        ({"targets": (MaterialTarget("asfalt"),)}, "did you mean 'asphalt'"),
+        ({"targets": (MaterialTarget("asphalt", "40"),)}, "--material"),
+        ({"targets": (MaterialTarget("asphalt"), MaterialTarget("asphalt"))}, "once"),
+        ({"targets": (MaterialTarget("asphalt", texture_width=0.0),)}, "--texture"),
     ],
 )
 def test_bad_jobs_are_refused_before_any_work(changes, field: str) -> None:
     with pytest.raises(InputError, match=field):
-        next(steps(CalibrationJob(**({"wanted": (Wanted("asphalt"),)} | changes))))
+        next(steps(CalibrationJob(**({"targets": (MaterialTarget("asphalt"),)} | changes))))
 
 
 def test_classes_that_are_not_there_are_refused(tmp_path: Path) -> None:
@@ -277,7 +275,7 @@ def test_classes_that_are_not_there_are_refused(tmp_path: Path) -> None:
     real = read_real(cloud, "label")
     for code, message in (("41", "40, 60"), ("road", "a number")):
         with pytest.raises(InputError, match=message):
-            by_label(real, code)
+            class_by_label(real, code)
     with pytest.raises(InputError, match="did you mean 'label'"):
         read_real(cloud, "labels")
     striped(tmp_path / "s.laz", tmp_path / "a.csv", 40.0)

@@ -10,7 +10,7 @@ import pytest
 from headless.tradeoff_table import TABLES, better_row, markdown, time_noise
 from synthroads_addon.jobs.measure.tradeoff import KNOBS, row_scenario, rows
 from synthroads_addon.scanning.platforms.path import Strip
-from synthroads_addon.scanning.samples import middle, spread_stretches
+from synthroads_addon.scanning.platforms.stretches import middle_stretches, spread_stretches
 from synthroads_addon.scenario.scenario import load_scenario
 from tests.helpers.scenes.scan_scenes import Standing
 
@@ -111,5 +111,5 @@ def test_stretches_are_spread_over_each_strip(count: int, duration: float) -> No
 
 
 def test_the_middle_is_in_the_middle() -> None:
-    (strip,) = middle(Standing(), 0.2).strips
+    (strip,) = middle_stretches(Standing(), 0.2).strips
     assert (strip.start_time, strip.duration) == pytest.approx((30.0, 15.0))

@@ -37,7 +37,7 @@ def test_a_scan_gives_the_expected_percentiles(table: Path, tmp_path: Path) -> N
     for entry, allowed in ((asphalt, 0.02), (paint, 0.06)):
         errors = entry.errors()
         assert errors is not None
-        assert np.abs(errors).max() < allowed, entry.wanted.material
+        assert np.abs(errors).max() < allowed, entry.target.material
     assert paint.real is not None
     assert len(paint.real.intensity) > 2000
 

@@ -172,7 +172,7 @@ def test_casters_agree(demo) -> None:
     other = np.flatnonzero(~same)
     both = same & (a >= 0)
     planes = FacePlanes(mesh)
-    ranges = {n: planes.meet(h[both], origins[both].T, directions[both].T)[0] for n, h in hits.items()}
+    ranges = {n: planes.intersect(h[both], origins[both].T, directions[both].T)[0] for n, h in hits.items()}
     assert np.abs(ranges["bvhtree"] - ranges["embree"]).max() == 0.0  # one face, one plane: the same float64 range
     near = [
         min(edge_distance(mesh, face, origins[i], directions[i]) for face in (a[i], b[i]) if face >= 0) for i in other

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from synthroads_addon.base.errors import InputError
-from synthroads_addon.scanning.beam import RINGS, beam_pattern, beam_radii, conical, cylindrical_offsets
+from synthroads_addon.scanning.beam import RINGS, beam_pattern, beam_radii, conical_directions, cylindrical_offsets
 
 MINIVUX = (1.6e-3, 0.5e-3)
 ring_counts = st.lists(st.integers(3, 30), min_size=0, max_size=6).map(tuple)
@@ -94,7 +94,7 @@ def test_footprint_of_the_minivux_at_100_m(rays: int) -> None:
     """Its data sheet: 160 x 50 mm at 100 m. Four standard deviations of a Gaussian are its width at 1/e^2."""
     axis, in_plane, across = (np.eye(3)[i][:, None] for i in range(3))
     pattern = beam_pattern(RINGS[rays])
-    rays_out = conical(axis, in_plane, across, pattern, MINIVUX)[:, :, 0]
+    rays_out = conical_directions(axis, in_plane, across, pattern, MINIVUX)[:, :, 0]
     on_plane = rays_out / rays_out[0] * 100.0
     width, height = 4.0 * np.sqrt((pattern.weights * on_plane[1:] ** 2).sum(axis=1))
     assert width == pytest.approx(0.160, abs=1e-6)
@@ -106,7 +106,7 @@ def test_cone_ray_by_ray(pulses, first, second) -> None:
     """Unit vectors along axis + tan(D / 2) deflection, pulse by pulse, from no divergence to 100 mrad."""
     axis, in_plane, across = frames(pulses)
     pattern = beam_pattern((6, 12))
-    got = conical(axis, in_plane, across, pattern, (first, second))
+    got = conical_directions(axis, in_plane, across, pattern, (first, second))
     assert got.shape == (3, 19, pulses)
     np.testing.assert_allclose(np.linalg.norm(got, axis=0), 1.0, atol=1e-14)
     for pulse in range(pulses):
@@ -120,7 +120,7 @@ def test_without_divergence_or_with_one_ray_all_is_the_axis() -> None:
     axis, in_plane, across = frames(4)
     for rings, divergence in (((6, 12), (0.0, 0.0)), ((), (0.1, 0.1))):
         pattern = beam_pattern(rings)
-        got = conical(axis, in_plane, across, pattern, divergence)
+        got = conical_directions(axis, in_plane, across, pattern, divergence)
         assert np.array_equal(got, np.repeat(axis[:, None], len(pattern), axis=1))
         assert not cylindrical_offsets(in_plane, across, pattern, divergence, np.full(4, 50.0)).any()
 
@@ -128,11 +128,11 @@ def test_without_divergence_or_with_one_ray_all_is_the_axis() -> None:
 def test_a_pulses_rays_do_not_depend_on_its_neighbours() -> None:
     axis, in_plane, across = frames(1001)
     pattern, distance = beam_pattern((6, 12)), np.linspace(1.0, 150.0, 1001)
-    cone = conical(axis, in_plane, across, pattern, MINIVUX)
+    cone = conical_directions(axis, in_plane, across, pattern, MINIVUX)
     cylinder = cylindrical_offsets(in_plane, across, pattern, MINIVUX, distance)
     for part in (slice(0, 1), slice(17, 18), slice(333, 1000)):
         own = [np.ascontiguousarray(vectors[:, part]) for vectors in (axis, in_plane, across)]
-        assert np.array_equal(conical(*own, pattern, MINIVUX), cone[:, :, part])
+        assert np.array_equal(conical_directions(*own, pattern, MINIVUX), cone[:, :, part])
         assert np.array_equal(cylindrical_offsets(*own[1:], pattern, MINIVUX, distance[part]), cylinder[:, :, part])
 
 
@@ -141,7 +141,7 @@ def test_cone_and_cylinder_agree_at_the_first_hit_only(distance, divergence) -> 
     """A step behind the first hit: the cone's footprint has grown with the distance, the cylinder's has not."""
     axis, in_plane, across = frames(1)
     pattern = beam_pattern((6,))
-    cone = conical(axis, in_plane, across, pattern, (divergence, divergence / 2))[:, :, 0]
+    cone = conical_directions(axis, in_plane, across, pattern, (divergence, divergence / 2))[:, :, 0]
     reach = np.array([distance])
     cylinder = cylindrical_offsets(in_plane, across, pattern, (divergence, divergence / 2), reach)[:, :, 0]
     along = axis[:, 0] @ cone

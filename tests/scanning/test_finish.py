@@ -31,9 +31,9 @@ class Striped:
         self.material = MaterialLayers(surface_constants([materials()[material]]))
         self.dark, self.bright = dark, bright
 
-    def sample(self, position, scanner, normal, material, time, wanted):
-        values = self.material.sample(position, scanner, normal, material, time, wanted)
-        values.arrays["base_color"] *= np.where(position[:, :1] < 0.0, self.dark, self.bright).astype(np.float32)
+    def sample(self, points, wanted):
+        values = self.material.sample(points, wanted)
+        values.arrays["base_color"] *= np.where(points.position[:, :1] < 0.0, self.dark, self.bright).astype(np.float32)
         return values
 
 
@@ -127,10 +127,10 @@ def test_what_passes_is_numbered_anew(most: int) -> None:
     )
 
     class HighIsDark(Striped):
-        def sample(self, position, scanner, normal, material, time, wanted):
-            values = super().sample(position, scanner, normal, material, time, wanted)
+        def sample(self, points, wanted):
+            values = super().sample(points, wanted)
             for name in ("base_color", "specular"):
-                values.arrays[name][position[:, 2] > 1.0] = 0.0
+                values.arrays[name][points.position[:, 2] > 1.0] = 0.0
             return values
 
     raw = middle_pulses(scan, 300)

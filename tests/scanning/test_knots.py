@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from synthroads_addon.scanning.knots import KeptPoses, Track
+from synthroads_addon.scanning.knots import PoseCache, Track
 from tests.helpers.scenes.scan_scenes import upright
 
 Float = NDArray[np.float64]
@@ -40,19 +40,19 @@ def assert_same(found: Track, expected: Track) -> None:
     spacing=st.sampled_from([0.01, 0.0025, 0.1]),
 )
 def test_kept_poses_are_the_track_s(begin: float, duration: float, spacing: float) -> None:
-    kept = KeptPoses(Waltz().pose)
+    kept = PoseCache(Waltz().pose)
     for shift in (0.0, 0.37, -0.2, 0.0):
         times = (begin + shift, begin + shift + duration, spacing)
-        assert_same(kept.track(*times), Track.of(Waltz().pose, *times))
+        assert_same(kept.track(*times), Track.between(Waltz().pose, *times))
 
 
 def test_blocks_side_by_side_share_what_is_worked_out() -> None:
     body = Waltz()
-    kept = KeptPoses(body.pose)
+    kept = PoseCache(body.pose)
     blocks = [(0.31 * number, 0.31 * (number + 1), 0.01) for number in range(50)]
     kept.track(0.0, 15.5, 0.01)
     assert body.asked == 7  # 1,550 knots, 256 at once
     with ThreadPoolExecutor(4) as pool:
         for found, block in zip(pool.map(lambda block: kept.track(*block), blocks), blocks, strict=True):
-            assert_same(found, Track.of(Waltz().pose, *block))
+            assert_same(found, Track.between(Waltz().pose, *block))
     assert body.asked == 7

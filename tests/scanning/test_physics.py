@@ -290,7 +290,7 @@ def test_the_scanner_s_vehicle_takes_up_a_box_in_the_other_one_s_frame() -> None
     for own in source.uniform(-1.3, 1.3, (300, 3)) * room:
         body = Parked(source.uniform(0.0, 2.0 * np.pi), source.uniform(-50.0, 50.0, 3))
         scanner = body.rotation @ (own + (0.0, 0.0, 0.75)) + body.place
-        driven = Track.of(Parked(1.0, scanner).pose, 0.0, 0.1, 0.01)
+        driven = Track.between(Parked(1.0, scanner).pose, 0.0, 0.1, 0.01)
         target = scan_of(plane(), moving=[MovingMesh(box(14), body)]).target
         (track,) = target.motions(0.0, 0.1, 0.01, driven)
         assert (track.present == (np.abs(own) > room).any()).all()

@@ -8,13 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from synthroads_addon.materials.reflectance import EDGE_ON, facet_slope, facet_terms, reflectivity, returned_share
-from synthroads_addon.scanning.radiometry import (
-    NEAREST,
-    lambert_intensity,
-    oren_nayar_intensity,
-    received_intensity,
-    saturate,
-)
+from synthroads_addon.scanning.radiometry import NEAREST, received_intensity, saturate
+from tests.helpers.laser_equation import intensity_of
 
 RANGES = np.array([1.0, 1.7, 5.0, 20.0, 60.0, 123.4, 250.0, 500.0])
 ANGLES = np.deg2rad(np.append(np.arange(0.0, 90.0, 2.5), [88.0, 89.0, 89.9, 89.999, 90.0]))
@@ -22,26 +17,26 @@ SLOPES = np.array([0.0, 1e-6, 0.05, 0.2, 0.5, 1.0])
 ATTENUATIONS = [0.0, 1e-4, 0.01, 0.05, 0.2]
 
 
-def closed_form(reflectance, angle, distance, slope, attenuation, emitted):
-    """Return I0 R cos t (A + B sin t tan t) / d^2 exp(-a d) in extended precision; 0 at 90 degrees."""
+def closed_form(reflectance, angle, distance, slope, attenuation):
+    """Return R cos t (A + B sin t tan t) / d^2 exp(-a d) in extended precision; 0 at 90 degrees."""
     angle, distance, slope = (np.asarray(value, dtype=np.longdouble) for value in (angle, distance, slope))
     variance = slope**2
     a = 1 - variance / (2 * (variance + np.longdouble("0.33")))
     b = np.longdouble("0.45") * variance / (variance + np.longdouble("0.09"))
     bright = np.cos(angle) * (a + b * np.sin(angle) * np.tan(angle))
     bright = np.where(angle >= np.longdouble(np.pi / 2), 0, bright)
-    return emitted * reflectance * bright / distance**2 * np.exp(-np.longdouble(attenuation) * distance)
+    return reflectance * bright / distance**2 * np.exp(-np.longdouble(attenuation) * distance)
 
 
 @pytest.mark.parametrize("attenuation", ATTENUATIONS)
 def test_laser_equation_against_closed_form(attenuation) -> None:
     distance, angle, slope = np.meshgrid(RANGES, ANGLES, SLOPES, indexing="ij")
-    expected = closed_form(0.37, angle, distance, slope, attenuation, emitted=3.0)
-    got = oren_nayar_intensity(0.37, np.cos(angle), distance, slope, attenuation, emitted=3.0)
+    expected = closed_form(0.37, angle, distance, slope, attenuation)
+    got = intensity_of(0.37, np.cos(angle), distance, slope, attenuation)
     assert got.dtype == np.float64
     np.testing.assert_allclose(got, expected.astype(np.float64), rtol=1e-10)
-    flat = closed_form(0.37, angle, distance, 0.0, attenuation, emitted=3.0)
-    lambert = lambert_intensity(0.37, np.cos(angle), distance, attenuation, emitted=3.0)
+    flat = closed_form(0.37, angle, distance, 0.0, attenuation)
+    lambert = intensity_of(0.37, np.cos(angle), distance, attenuation=attenuation)
     np.testing.assert_allclose(lambert, flat.astype(np.float64), rtol=1e-10)
 
 
@@ -53,12 +48,12 @@ def test_oren_nayar_without_facets_is_lambert_to_the_bit() -> None:
     facets = returned_share(cosine, reflectance, np.ones(10_000), np.zeros(10_000))
     assert np.array_equal(facets, returned_share(cosine, reflectance))
     assert np.array_equal(facets, np.where(cosine > 0, cosine * reflectance, 0.0))
-    flat = lambert_intensity(reflectance, cosine, distance, 0.01)
-    assert np.array_equal(oren_nayar_intensity(reflectance, cosine, distance, np.zeros(10_000), 0.01), flat)
+    flat = intensity_of(reflectance, cosine, distance, 0.0, 0.01)
+    assert np.array_equal(intensity_of(reflectance, cosine, distance, np.zeros(10_000), 0.01), flat)
 
 
 def test_rough_surfaces_are_darker_from_above_and_brighter_at_a_slant() -> None:
-    smooth, rough = (oren_nayar_intensity(1.0, np.cos([0.0, 1.4]), 1.0, slope) for slope in (0.05, 0.5))
+    smooth, rough = (intensity_of(1.0, np.cos([0.0, 1.4]), 1.0, slope) for slope in (0.05, 0.5))
     assert rough[0] < smooth[0]
     assert rough[1] > smooth[1]
 
@@ -73,9 +68,9 @@ def test_facets_of_a_roughness() -> None:
 @pytest.mark.parametrize("slope", [0.0, 0.3, 1.0])
 def test_back_faces_and_faces_on_edge_are_dark(slope) -> None:
     for cosine in (0.0, math.cos(math.pi / 2), EDGE_ON, -1e-9, -0.5, -1.0, math.nan):
-        assert oren_nayar_intensity(1.0, cosine, 10.0, slope) == 0.0
+        assert intensity_of(1.0, cosine, 10.0, slope) == 0.0
         assert returned_share(cosine, 1.0, *facet_terms(slope), retro=300.0, inverse_lobe_squared=1.0) == 0.0
-    assert oren_nayar_intensity(1.0, 1e-9, 10.0, slope) > 0.0
+    assert intensity_of(1.0, 1e-9, 10.0, slope) > 0.0
 
 
 @given(st.floats(0, math.pi / 2 - 1e-6), st.floats(0, 1000), st.floats(0.1, 2.0))
@@ -108,7 +103,7 @@ def test_nothing_is_infinite_or_undefined(cosine, distance, slope, attenuation, 
     with np.errstate(divide="raise", invalid="raise"):
         share = returned_share(cosine, 1.5, *facet_terms(slope), retro, inverse_lobe_squared)
         intensity = received_intensity(share, distance, attenuation)
-    for value in (share, intensity, lambert_intensity(1.5, cosine, distance, attenuation)):
+    for value in (share, intensity, intensity_of(1.5, cosine, distance, 0.0, attenuation)):
         assert np.isfinite(value).all()
         assert (value >= 0.0).all()
     if not distance > 0.0 or distance == math.inf:
@@ -118,7 +113,7 @@ def test_nothing_is_infinite_or_undefined(cosine, distance, slope, attenuation, 
 def test_extremes_raise_no_floating_point_error() -> None:
     distance = np.array([0.0, 1e-300, 1e-9, 1.0, 1e3, 1e6, 1e300, np.inf])
     with np.errstate(all="raise"):
-        got = lambert_intensity(1.0, 1.0, distance, attenuation=0.2)
+        got = intensity_of(1.0, 1.0, distance, attenuation=0.2)
         assert received_intensity(np.array([1.0]), np.array([3600.0]), 0.2) < 1e-300
     assert got[[0, 5, 6, 7]].tolist() == [0.0] * 4
     assert got[[1, 2]] == pytest.approx(NEAREST**-2, rel=1e-3)
@@ -131,8 +126,8 @@ def test_the_light_is_not_stronger_nearer_than_a_millimetre() -> None:
 
 
 def test_a_white_target_at_one_metre_is_1() -> None:
-    assert lambert_intensity(1.0, 1.0, 1.0) == 1.0
-    assert lambert_intensity(1.0, 1.0, 2.0, attenuation=0.5) == pytest.approx(0.25 / math.e)
+    assert intensity_of(1.0, 1.0, 1.0) == 1.0
+    assert intensity_of(1.0, 1.0, 2.0, attenuation=0.5) == pytest.approx(0.25 / math.e)
 
 
 def test_the_detector_clips_and_counts() -> None:

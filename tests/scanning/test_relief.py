@@ -11,7 +11,6 @@ from hypothesis import strategies as st
 
 from synthroads_addon.base.errors import InputError
 from synthroads_addon.cloud.points import PointBlock, concatenate
-from synthroads_addon.cloud.tools.surface_variation import plane_residuals, surface_variation
 from synthroads_addon.materials.table import Material, materials
 from synthroads_addon.scanning.relief import (
     ASPHALT,
@@ -24,6 +23,7 @@ from synthroads_addon.scanning.relief import (
     shift_along_normals,
 )
 from tests.helpers.clouds.random_points import make_points
+from tools.surface_variation import plane_residuals, surface_variation
 
 REAL = sorted((Path(__file__).resolve().parents[2].parent / "shared" / "real").glob("als_*.laz"))
 ORIGIN = np.array([294_000.0, 5_628_000.0, 180.0])

@@ -9,7 +9,7 @@ import numpy as np
 from mathutils import Matrix
 from numpy.typing import NDArray
 
-from ...scanning.colour.colour import FROM_MATERIAL, FROM_RETURN, LayerValues, MaterialLayers, Targets
+from ...scanning.colour.colour import FROM_MATERIAL, FROM_RETURN, LayerValues, MaterialLayers, SeenPoints
 from .exr import write_image
 from .stage import SKY_GROUP, SUN_GROUP, RenderStage
 
@@ -70,17 +70,8 @@ class ReturnCamera:
         stage = self._stage
         return {"images": stage.images, "pixels": stage.pixels, "layers": list(stage.passes.channels)}
 
-    def sample(
-        self,
-        position: Float,
-        scanner: Float,
-        normal: NDArray[np.floating],
-        material: NDArray[np.uint16],
-        time: Float,
-        wanted: frozenset[str],
-    ) -> LayerValues:
+    def sample(self, points: SeenPoints, wanted: frozenset[str]) -> LayerValues:
         """Return the wanted layers of N points; see `LayerSource.sample`."""
-        points = Targets(position, scanner, normal, material, np.asarray(time, np.float64))
         parts = [
             self._block(points.select(slice(start, start + BLOCK)), wanted)
             for start in range(0, max(len(points), 1), BLOCK)
@@ -88,12 +79,12 @@ class ReturnCamera:
         arrays = {name: np.concatenate([part.arrays[name] for part in parts]) for name in parts[0].arrays}
         return LayerValues(arrays, np.concatenate([part.source for part in parts]))
 
-    def _block(self, points: Targets, wanted: frozenset[str]) -> LayerValues:
+    def _block(self, points: SeenPoints, wanted: frozenset[str]) -> LayerValues:
         channels, found = self._rendered(points) if len(points) else ({}, np.zeros(0, bool))
         source = np.where(found, FROM_RETURN, FROM_MATERIAL).astype(np.uint8)
-        return self.material.completed(points, channels, source, wanted)
+        return self.material.layer_values(points, channels, source, wanted)
 
-    def _rendered(self, points: Targets) -> tuple[dict[str, NDArray[np.float32]], NDArray[np.bool_]]:
+    def _rendered(self, points: SeenPoints) -> tuple[dict[str, NDArray[np.float32]], NDArray[np.bool_]]:
         """Return the channels (N, C) of points, and which of them are what their pixels show (N,)."""
         # A height that is a power of two divides without error, whichever way a version counts the rows.
         height = int(np.clip(1 << ((len(points) - 1).bit_length() // 2), _SMALLEST, _HEIGHT))
@@ -117,7 +108,7 @@ class ReturnCamera:
                 channels[name] = channels[name] * np.float32(self._exposure)
         return channels, found
 
-    def _aim(self, points: Targets, width: int, height: int) -> Float:
+    def _aim(self, points: SeenPoints, width: int, height: int) -> Float:
         """Give the camera the rays of points; return where it stands (3,)."""
         along = points.position - points.scanner
         along /= np.maximum(np.linalg.norm(along, axis=1, keepdims=True), 1e-9)

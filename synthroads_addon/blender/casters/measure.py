@@ -86,7 +86,7 @@ def agreement(mesh: SceneMesh, origins: Rays, directions: Rays, found: Faces, ex
     gaps, ranges = [], []
     for faces in (found[differ], expected[differ]):
         gaps.append(_edge_distances(mesh, start, along, faces))
-        ranges.append(np.where(faces >= 0, planes.meet(faces, start.T, along.T)[0], np.inf))
+        ranges.append(np.where(faces >= 0, planes.intersect(faces, start.T, along.T)[0], np.inf))
     with np.errstate(invalid="ignore"):
         gaps.append(np.abs(ranges[0] - ranges[1]))
     return Agreement(1.0 - len(differ) / len(origins), float(np.nanmin(gaps, axis=0).max()))

@@ -6,7 +6,7 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from ...calibration.texture import linear_of
+from ...scanning.colour.colour import decode_srgb
 
 
 def color_image_node(item: bpy.types.Material) -> bpy.types.Node | None:
@@ -32,4 +32,4 @@ def base_color_image(item: bpy.types.Material) -> NDArray[np.float64] | None:
     pixels = flat.reshape(image.size[1], image.size[0], image.channels)
     colors = pixels[:, :, :3] if image.channels >= 3 else np.repeat(pixels[:, :, :1], 3, axis=2)
     linear: NDArray[np.float64] = np.clip(colors, 0.0, 1.0).astype(np.float64)
-    return linear_of(linear) if not image.is_float and image.colorspace_settings.name == "sRGB" else linear
+    return decode_srgb(linear) if not image.is_float and image.colorspace_settings.name == "sRGB" else linear

@@ -6,10 +6,10 @@ import hashlib
 import json
 import re
 from abc import ABC, abstractmethod
-from collections.abc import Iterator
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from types import TracebackType
 from typing import Any, Self
 
 import numpy as np
@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from ...base.classes import ClassScheme, asprs_scheme, class_scheme, stored_scheme
 from ...base.crs import wkt
 from ...base.errors import InputError, OutputError
-from ..layers import ATTRIBUTES, DEFAULT_ATTRIBUTES, Attribute, Column, attributes_of, columns
+from ..layers import ATTRIBUTES, DEFAULT_ATTRIBUTES, LAYERS, Attribute, Column, attributes_of, columns
 from ..points import PointBlock
 
 
@@ -47,6 +47,8 @@ class CloudWriter(ABC):
 
     faults: tuple[type[Exception], ...] = (OSError,)
     """Errors that the library beneath raises where it can't write."""
+    _file: Any
+    """Open temporary file, or the library's handle of it."""
 
     def __init__(
         self,
@@ -80,9 +82,7 @@ class CloudWriter(ABC):
             raise self._unwritable(problem) from None
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
         done = False
         try:
             if kind is None:
@@ -116,6 +116,10 @@ class CloudWriter(ABC):
             "classes": self.scheme.to_dict(),
         }
 
+    def placed_notes(self) -> dict[str, Any]:
+        """Return `notes` with offset and coordinate system, for formats that have no fields for these."""
+        return {**self.notes(), "offset": self.offset.tolist(), "crs": self.crs_text}
+
     def integers(self, values: NDArray[Any], kind: str, name: str, scale: float | None = None) -> NDArray[Any]:
         """Return values (N,) as whole steps, rounded, in the integer type ``kind``.
 
@@ -143,15 +147,15 @@ class CloudWriter(ABC):
             raise self.refused(worst.tolist(), f"{name} must be finite")
         return values
 
-    def own_class_ids(self, block: PointBlock) -> NDArray[np.uint8]:
+    def file_class_ids(self, block: PointBlock) -> NDArray[np.uint8]:
         """Return the block's classes (N,) in the file's scheme."""
         return np.take(self.scheme.ids, self.integers(block.class_id, "uint8", "class_id"))
 
     def stored(self, column: Column, block: PointBlock) -> NDArray[Any]:
         """Return a column (N,) of a block as the integers that LAS and E57 store."""
         if column.array == "class_id":
-            return self.own_class_ids(block)
-        values = column.of(block)
+            return self.file_class_ids(block)
+        values = column.values(block)
         if column.local and column.component is not None:
             values = values - self.offset[column.component]
         return self.integers(values, column.dtype, column.name, column.scale)
@@ -173,9 +177,16 @@ class CloudWriter(ABC):
     def _finish(self) -> None:
         """Complete and close the temporary file."""
 
-    @abstractmethod
+    def _close(self) -> None:
+        """Close what is open, in whatever state; what it raises is ignored."""
+        self._file.close()
+
     def _abandon(self) -> None:
-        """Close and remove the temporary file, in whatever state; must not raise."""
+        """Close and remove the temporary file; doesn't raise."""
+        with suppress(Exception):
+            self._close()
+        with suppress(OSError):
+            self._temporary.unlink(missing_ok=True)
 
     def refused(self, value: object, allowed: str) -> OutputError:
         """Return the error of a value that the file can't hold."""
@@ -233,13 +244,13 @@ class CloudReader(ABC):
     """
 
     header: CloudHeader
+    _file: Any
+    """Open file, or the library's handle of it."""
 
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
     @abstractmethod
@@ -252,26 +263,49 @@ class CloudReader(ABC):
             InputError: the file is truncated or damaged.
         """
 
-    @abstractmethod
     def close(self) -> None:
         """Close the file; it may be closed already."""
+        self._file.close()
 
 
 def epsg_of(text: str | None) -> int | None:
     """Return the EPSG code that WKT 1 or 2 ends with, or None."""
-    found = re.search(r'(?:AUTHORITY|ID)\["EPSG",\s*"?(\d+)"?\](?:\]|\s)*$', text.rstrip("\0 \n")) if text else None
-    return int(found[1]) if found else None
+    match = re.search(r'(?:AUTHORITY|ID)\["EPSG",\s*"?(\d+)"?\](?:\]|\s)*$', text.rstrip("\0 \n")) if text else None
+    return int(match[1]) if match else None
 
 
-def header_from_notes(path: Path, kind: str, count: int, names: set[str], notes: Any) -> CloudHeader:
-    """Return the header of a file of the project's own: PLY, E57 or NPZ with notes as JSON data.
+def header_from_notes(
+    path: Path,
+    kind: str,
+    count: int,
+    stored: set[str],
+    notes: Any,
+    *,
+    name_of: Callable[[Column], str],
+    usual: set[str],
+    has_color: bool,
+) -> CloudHeader:
+    """Return the header of a file in PLY, E57 or NPZ.
 
     Args:
-        names: of what is stored of each point.
-        notes: `CloudWriter.notes` with ``offset`` and ``crs``; None for a file of others.
+        path: the file.
+        kind: of file.
+        count: number of points.
+        stored: names of what is stored of each point.
+        notes: `CloudWriter.placed_notes`; None for a file of others.
+        name_of: what the format calls a column.
+        usual: names of what is read in any case.
+        has_color: whether there are colours.
+
+    Raises:
+        InputError: the notes are damaged.
     """
+    names = {column.name for layer in LAYERS.values() for column in layer.columns if name_of(column) in stored}
+    attributes = attributes_of(names)
+    left_out = tuple(sorted(stored - usual - {name_of(column) for column in columns(attributes)}))
+    header = CloudHeader(path, kind, count, np.zeros(3), attributes=attributes, has_color=has_color, left_out=left_out)
     if not isinstance(notes, dict):
-        return CloudHeader(path, kind, count, np.zeros(3), attributes=attributes_of(names))
+        return header
     text = notes.get("crs")
     try:
         offset = np.array(notes["offset"], dtype=np.float64).reshape(3)
@@ -279,18 +313,14 @@ def header_from_notes(path: Path, kind: str, count: int, names: set[str], notes:
         offset = np.full(3, np.nan)
     if not np.isfinite(offset).all() or not isinstance(text, str | None):
         raise InputError(str(path), None, "its notes on offset and coordinate system are damaged")
-    return CloudHeader(
-        path,
-        kind,
-        count,
-        offset,
+    return replace(
+        header,
+        offset=offset,
         crs_text=text,
         epsg=epsg_of(text),
         intensity_scale=intensity_scale(path, notes),
         scheme=stored_scheme(notes.get("classes"), str(path)),
         labelled=True,
-        attributes=attributes_of(names),
-        has_color=True,
     )
 
 

@@ -7,7 +7,7 @@ Here coordinates are scaled integers of 0.1 mm about a pose that carries the off
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -16,9 +16,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...base.errors import InputError
-from ..layers import LAYERS, Column, columns, gather
-from ..points import PointBlock, make_block
-from .base import BLOCK, CloudHeader, CloudReader, CloudWriter, damage_error, finite_coordinates, header_from_notes
+from ...base.rotations import matrices
+from ..layers import Column, columns, make_points
+from ..points import PointBlock
+from .base import BLOCK, CloudReader, CloudWriter, damage_error, finite_coordinates, header_from_notes
 
 SCALE = 1e-4
 """Size of a coordinate's step, m."""
@@ -30,6 +31,7 @@ NORMALS = {"NormalX": "nor:normalX", "NormalY": "nor:normalY", "NormalZ": "nor:n
 _NORMALS_URI = "http://www.libe57.org/E57_EXT_surface_normals.txt"
 _CAPACITY = 65_536
 """Points that are handed to the library at a time."""
+_ENDS = ("Minimum", "Maximum")
 _FIXED = {
     **dict.fromkeys(("cartesianX", "cartesianY", "cartesianZ"), "i4"),
     "intensity": "f4",
@@ -68,7 +70,7 @@ class E57Writer(CloudWriter):
         self.faults = (OSError, e57.E57Exception)
         with self._temporary.open("wb"):
             pass  # the library's own complaint about a folder that can't be written says nothing
-        self._image = e57.ImageFile(str(self._temporary), "w")
+        self._file = e57.ImageFile(str(self._temporary), "w")
         self._low, self._high = np.full(3, np.inf), np.full(3, -np.inf)
         self._dimmest, self._brightest = np.inf, -np.inf
         self._held = 0
@@ -77,8 +79,8 @@ class E57Writer(CloudWriter):
         self._arrays = {name: np.zeros(_CAPACITY, dtype=_buffer_type(kind)) for name, kind in self._types.items()}
         self._buffers = e57.VectorSourceDestBuffer()
         for name, array in self._arrays.items():
-            self._buffers.append(e57.SourceDestBuffer(self._image, name, array, _CAPACITY, True, False))
-        points = e57.CompressedVectorNode(self._image, self._prototype(), e57.VectorNode(self._image, True))
+            self._buffers.append(e57.SourceDestBuffer(self._file, name, array, _CAPACITY, True, False))
+        points = e57.CompressedVectorNode(self._file, self._prototype(), e57.VectorNode(self._file, True))
         self._scan.set("points", points)
         self._points = points.writer(self._buffers)
 
@@ -106,35 +108,27 @@ class E57Writer(CloudWriter):
     def _finish(self) -> None:
         self._flush()
         self._points.close()
-        number = {True: self._e57.FloatNode, False: self._e57.IntegerNode}
-        bounds = self._e57.StructureNode(self._image)
+        real, whole = self._e57.FloatNode, self._e57.IntegerNode
         if self.count:
-            low, high = np.round(self._low - self.offset, 4), np.round(self._high - self.offset, 4)
-            for axis, name in enumerate("xyz"):
-                bounds.set(f"{name}Minimum", number[True](self._image, float(low[axis])))
-                bounds.set(f"{name}Maximum", number[True](self._image, float(high[axis])))
-            self._scan.set("cartesianBounds", bounds)
-            limits = self._e57.StructureNode(self._image)
-            limits.set("intensityMinimum", number[True](self._image, self._dimmest))
-            limits.set("intensityMaximum", number[True](self._image, self._brightest))
-            self._scan.set("intensityLimits", limits)
-        colors = self._e57.StructureNode(self._image)
-        for channel in ("Red", "Green", "Blue"):
-            colors.set(f"color{channel}Minimum", number[False](self._image, 0))
-            colors.set(f"color{channel}Maximum", number[False](self._image, 255))
-        self._scan.set("colorLimits", colors)
-        for node, what in ((self._scan, "scan"), (self._image.root(), "file")):
+            spans = np.round([self._low - self.offset, self._high - self.offset], 4).T.tolist()
+            axes = zip("xyz", spans, strict=True)
+            bounds = {f"{axis}{end}": at for axis, span in axes for end, at in zip(_ENDS, span, strict=True)}
+            self._scan.set("cartesianBounds", self._structure(real, bounds))
+            limits = {"intensityMinimum": self._dimmest, "intensityMaximum": self._brightest}
+            self._scan.set("intensityLimits", self._structure(real, limits))
+        channels = ("Red", "Green", "Blue")
+        colors = {f"color{name}{end}": at for name in channels for end, at in zip(_ENDS, (0, 255), strict=True)}
+        self._scan.set("colorLimits", self._structure(whole, colors))
+        for node, what in ((self._scan, "scan"), (self._file.root(), "file")):
             digits = self.content_id(what, self._low.tolist(), self._high.tolist())
             groups = (digits[:8], digits[8:12], digits[12:16], digits[16:20], digits[20:])
             node.set("guid", self._text("{" + "-".join(groups) + "}"))
-        self._image.close()
+        self._file.close()
 
-    def _abandon(self) -> None:
-        for open_thing in ("_points", "_image"):
-            with suppress(Exception):
-                getattr(self, open_thing).close()
-        with suppress(OSError):
-            self._temporary.unlink(missing_ok=True)
+    def _close(self) -> None:
+        with suppress(Exception):
+            self._points.close()
+        self._file.close()
 
     def _packed(self, part: PointBlock) -> dict[str, NDArray[Any]]:
         """Return what is stored of at most `_CAPACITY` points, by name."""
@@ -155,7 +149,7 @@ class E57Writer(CloudWriter):
 
     def _begin_root(self) -> None:
         """Write what a file and its one scan are described by."""
-        e57, image = self._e57, self._image
+        e57, image = self._e57, self._file
         image.extensionsAdd("", e57.E57_V1_0_URI)
         image.extensionsAdd(EXTENSION, _EXTENSION_URI)
         if "normal" in self.attributes:
@@ -166,7 +160,7 @@ class E57Writer(CloudWriter):
         root.set("versionMinor", e57.IntegerNode(image, e57.E57_FORMAT_MINOR))
         root.set("e57LibraryVersion", self._text(e57.E57_LIBRARY_ID))
         root.set("coordinateMetadata", self._text(self.crs_text or ""))
-        root.set(f"{EXTENSION}:notes", self._text(self._notes()))
+        root.set(f"{EXTENSION}:notes", self._text(json.dumps(self.placed_notes())))
         scans = e57.VectorNode(image, True)
         root.set("data3D", scans)
         root.set("images2D", e57.VectorNode(image, True))
@@ -174,46 +168,53 @@ class E57Writer(CloudWriter):
         scans.append(self._scan)
         self._scan.set("name", self._text("SynthRoads"))
         pose = e57.StructureNode(image)
-        for part, values in (("rotation", (1.0, 0.0, 0.0, 0.0)), ("translation", self.offset)):
-            node = e57.StructureNode(image)
-            for name, value in zip("wxyz"[-len(values) :], values, strict=True):
-                node.set(name, e57.FloatNode(image, float(value)))
-            pose.set(part, node)
+        pose.set("rotation", self._structure(e57.FloatNode, {"w": 1.0, "x": 0.0, "y": 0.0, "z": 0.0}))
+        place = dict(zip("xyz", self.offset.tolist(), strict=True))
+        pose.set("translation", self._structure(e57.FloatNode, place))
         self._scan.set("pose", pose)
+
+    def _structure(self, kind: Any, values: Mapping[str, float]) -> Any:
+        """Return a structure of numbers, each a node of a kind."""
+        structure = self._e57.StructureNode(self._file)
+        for name, value in values.items():
+            structure.set(name, kind(self._file, value))
+        return structure
 
     def _prototype(self) -> Any:
         """Return the description of one point."""
-        e57, image = self._e57, self._image
+        e57, image = self._e57, self._file
         prototype = e57.StructureNode(image)
         scales = {e57_name(column): (column.scale, self._shift(column)) for column in self.columns}
         scales |= {f"cartesian{axis}": (SCALE, 0.0) for axis in "XYZ"}
         for name, kind in self._types.items():
             scale, shift = scales.get(name, (None, 0.0))
-            if np.dtype(kind).kind == "f":
-                precision = e57.E57_SINGLE if kind == "f4" else e57.E57_DOUBLE
-                node = e57.FloatNode(image, 0.0, precision)
-                if kind == "f4":
-                    limit = float(np.finfo(np.float32).max)
-                    node = e57.FloatNode(image, 0.0, precision, -limit, limit)
+            if kind == "f8":
+                node = e57.FloatNode(image, 0.0, e57.E57_DOUBLE)
+            elif kind == "f4":
+                limit = float(np.finfo(np.float32).max)
+                node = e57.FloatNode(image, 0.0, e57.E57_SINGLE, -limit, limit)
+            elif scale is None:
+                node = e57.IntegerNode(image, 0, int(np.iinfo(kind).min), int(np.iinfo(kind).max))
             else:
-                low, high = int(np.iinfo(kind).min), int(np.iinfo(kind).max)
-                if scale is None:
-                    node = e57.IntegerNode(image, 0, low, high)
-                else:
-                    node = e57.ScaledIntegerNode(image, 0, low, high, scale, shift)
+                node = e57.ScaledIntegerNode(image, 0, int(np.iinfo(kind).min), int(np.iinfo(kind).max), scale, shift)
             prototype.set(name, node)
         return prototype
 
     def _shift(self, column: Column) -> float:
         return float(self.offset[column.component]) if column.local and column.component is not None else 0.0
 
-    def _notes(self) -> str:
-        return json.dumps({**self.notes(), "offset": self.offset.tolist(), "crs": self.crs_text})
-
     def _text(self, text: str) -> Any:
-        return self._e57.StringNode(self._image, text)
+        return self._e57.StringNode(self._file, text)
 
 
+_FIELDS = {
+    "intensity": "intensity",
+    "number_of_returns": "returnCount",
+    "gps_time": "timeStamp",
+    "scan_angle_deg": f"{EXTENSION}:scan_angle",
+    "strip": f"{EXTENSION}:strip",
+}
+"""Names of the arrays that every block has."""
 _STANDARD = {
     *("cartesianX", "cartesianY", "cartesianZ", "intensity", "colorRed", "colorGreen", "colorBlue", "timeStamp"),
     *("returnIndex", "returnCount", "cartesianInvalidState", f"{EXTENSION}:scan_angle", f"{EXTENSION}:strip"),
@@ -233,45 +234,38 @@ class E57Reader(CloudReader):
     def __init__(self, path: Path) -> None:
         self._e57 = e57 = library()
         try:
-            self._image = e57.ImageFile(str(path), "r")
+            self._file = e57.ImageFile(str(path), "r")
         except Exception as problem:
             raise InputError(str(path), None, f"is not an E57 file that can be read ({_short(problem)})") from None
         try:
-            root = self._image.root()
+            root = self._file.root()
             self._scans = [root["data3D"][i] for i in range(len(root["data3D"]))]
             self._fields = [_field_names(e57.StructureNode(scan["points"].prototype())) for scan in self._scans]
             counts = [int(scan["points"].childCount()) for scan in self._scans]
-            told = f"{EXTENSION}:notes" in _field_names(root)
-            notes = json.loads(root[f"{EXTENSION}:notes"].value()) if told else None
+            noted = f"{EXTENSION}:notes" in _field_names(root)
+            notes = json.loads(root[f"{EXTENSION}:notes"].value()) if noted else None
         except Exception as problem:
             self.close()
             raise InputError(str(path), None, f"is an E57 file that is damaged ({_short(problem)})") from None
-        names = set().union(*self._fields)
+        names: set[str] = set().union(*self._fields)
         if sum(counts) and not all({"cartesianX", "cartesianY", "cartesianZ"} <= fields for fields in self._fields):
             self.close()
             raise InputError(str(path), None, "has no Cartesian coordinates")
-        known = {column.name for layer in LAYERS.values() for column in layer.columns if e57_name(column) in names}
-        header = header_from_notes(path, "E57", sum(counts), known, notes)
-        read = _STANDARD | {e57_name(column) for column in columns(header.attributes)}
         self._counts = counts
-        self.header = CloudHeader(
-            **{
-                **header.__dict__,
-                "has_color": "colorRed" in names,
-                "left_out": tuple(sorted(names - read)),
-            }
+        self.header = header_from_notes(
+            path, "E57", sum(counts), names, notes, name_of=e57_name, usual=_STANDARD, has_color="colorRed" in names
         )
 
     def blocks(self, size: int = BLOCK) -> Iterator[PointBlock]:
-        """See `CloudReader`."""
+        """Yield all points in the file's order; see `CloudReader.blocks`."""
         done = 0
         for scan, fields, count in zip(self._scans, self._fields, self._counts, strict=True):
-            wanted = [name for name in sorted(_STANDARD | self._own()) if name in fields]
+            names = [name for name in sorted(_STANDARD | self._layer_names()) if name in fields]
             room = min(size, count)
-            arrays = {name: np.zeros(room) for name in wanted}
+            arrays = {name: np.zeros(room) for name in names}
             buffers = self._e57.VectorSourceDestBuffer()
             for name, array in arrays.items():
-                buffers.append(self._e57.SourceDestBuffer(self._image, name, array, room, True, True))
+                buffers.append(self._e57.SourceDestBuffer(self._file, name, array, room, True, True))
             left, reader = count, None
             while left:
                 try:
@@ -290,36 +284,23 @@ class E57Reader(CloudReader):
             if reader:
                 reader.close()
 
-    def close(self) -> None:
-        """Close the file."""
-        self._image.close()
-
-    def _own(self) -> set[str]:
+    def _layer_names(self) -> set[str]:
         return {e57_name(column) for column in columns(self.header.attributes)}
 
     def _block(
         self, arrays: dict[str, NDArray[Any]], count: int, pose: tuple[NDArray[Any], NDArray[Any]]
     ) -> PointBlock:
-        def values(name: str, kind: Any) -> NDArray[Any]:
-            return arrays[name].astype(kind) if name in arrays else np.zeros(count, dtype=kind)
-
         rotation, translation = pose
-        local = np.stack([arrays[f"cartesian{axis}"] for axis in "XYZ"], axis=1)
-        own = columns(self.header.attributes)
-        found = gather(
-            {c.name: arrays[e57_name(c)].copy() for c in own if e57_name(c) in arrays}, self.header.attributes, count
-        )
-        return make_block(
-            xyz=local @ rotation.T + translation,
-            intensity=values("intensity", np.float64),
-            rgb=np.stack([values(f"color{c}", np.uint16) * np.uint16(257) for c in ("Red", "Green", "Blue")], axis=1),
-            return_number=values("returnIndex", np.uint8) + np.uint8(1),
-            number_of_returns=values("returnCount", np.uint8),
-            gps_time=values("timeStamp", np.float64),
-            scan_angle_deg=values(f"{EXTENSION}:scan_angle", np.float32),
-            strip=values(f"{EXTENSION}:strip", np.uint16),
-            **found,
-        )
+        present = [column for column in columns(self.header.attributes) if e57_name(column) in arrays]
+        stored = {column.name: arrays[e57_name(column)].copy() for column in present}
+        stored |= {name: arrays[field].copy() for name, field in _FIELDS.items() if field in arrays}
+        stored["xyz"] = np.stack([arrays[f"cartesian{axis}"] for axis in "XYZ"], axis=1) @ rotation.T + translation
+        index = arrays.get("returnIndex", np.zeros(count))  # counts from 0
+        stored["return_number"] = index.astype(np.uint8) + np.uint8(1)
+        dark = np.zeros(count)
+        channels = [arrays.get(f"color{name}", dark).astype(np.uint16) for name in ("Red", "Green", "Blue")]
+        stored["rgb"] = np.stack(channels, axis=1) * np.uint16(257)
+        return make_points(stored, self.header.attributes, count)
 
 
 def _field_names(prototype: Any) -> set[str]:
@@ -333,14 +314,7 @@ def _pose(scan: Any) -> tuple[NDArray[Any], NDArray[Any]]:
     pose = scan["pose"]
     rotation, translation = np.eye(3), np.zeros(3)
     if pose.isDefined("rotation"):
-        w, x, y, z = (pose["rotation"][name].value() for name in "wxyz")
-        rotation = np.array(
-            [
-                [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
-                [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
-                [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
-            ]
-        )
+        rotation = matrices(np.array([[pose["rotation"][name].value() for name in "wxyz"]]))[0]
     if pose.isDefined("translation"):
         translation = np.array([pose["translation"][name].value() for name in "xyz"])
     return rotation, translation

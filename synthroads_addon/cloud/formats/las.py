@@ -10,7 +10,6 @@ from __future__ import annotations
 import json
 import struct
 from collections.abc import Iterator
-from contextlib import suppress
 from datetime import date
 from pathlib import Path
 from typing import Any, BinaryIO
@@ -24,8 +23,8 @@ from numpy.typing import NDArray
 from ...base.classes import asprs_scheme, class_scheme, stored_scheme
 from ...base.errors import InputError, OutputError
 from ...base.schema import canonical_json
-from ..layers import Column, attributes_of, columns, gather
-from ..points import PointBlock, make_block
+from ..layers import Column, attributes_of, columns, make_points
+from ..points import PointBlock
 from .base import BLOCK, CloudHeader, CloudReader, CloudWriter, damage_error, epsg_of, intensity_scale
 from .laz_chunks import check_chunks
 
@@ -83,12 +82,6 @@ class LasWriter(CloudWriter):
         header.number_of_points_by_return = self._by_return[1:].astype(np.uint64)
         self._writer.close()
         self._file.close()
-
-    def _abandon(self) -> None:
-        with suppress(AttributeError, OSError):
-            self._file.close()
-        with suppress(OSError):
-            self._temporary.unlink(missing_ok=True)
 
     def _flush(self) -> None:
         """Hand the packed points on. laspy's own bookkeeping sorts and searches them: ours is kept while packing."""
@@ -217,28 +210,24 @@ class LasReader(CloudReader):
             raise InputError(str(path), None, f"is not a LAS file that can be read ({problem})") from None
 
     def blocks(self, size: int = BLOCK) -> Iterator[PointBlock]:
-        """See `CloudReader`."""
+        """Yield all points in the file's order; see `CloudReader.blocks`."""
         done, path = 0, self.header.path
         if self._reader.points_read:
             self._reader.seek(0)
         while done < self.header.count:
-            wanted = min(size, self.header.count - done)
+            count = min(size, self.header.count - done)
             try:
-                record = self._reader.read_points(wanted)
+                record = self._reader.read_points(count)
             except _FAULTS:
                 raise damage_error(path, done, self.header.count) from None
             except BaseException as problem:
                 if type(problem).__name__ == "PanicException":  # the decompressor's own way to fail
                     raise damage_error(path, done, self.header.count) from None
                 raise
-            if len(record) != wanted:
+            if len(record) != count:
                 raise damage_error(path, done + len(record), self.header.count)
-            done += wanted
+            done += count
             yield self._block(record)
-
-    def close(self) -> None:
-        """Close the file."""
-        self._file.close()
 
     def _check_size(self, path: Path) -> None:
         """Refuse a file that ends before its points do (LAS), or whose chunks don't fill it (LAZ), before any work."""
@@ -252,29 +241,20 @@ class LasReader(CloudReader):
             check_chunks(path, start, header.vlrs.get("LasZipVlr")[0].record_data)
 
     def _block(self, record: Any) -> PointBlock:
-        header, count = self._reader.header, len(record)
+        header = self._reader.header
         names = set(record.point_format.dimension_names)
-        raw = record.array
-        steps = np.stack([raw["X"], raw["Y"], raw["Z"]], axis=1)
-
-        def values(name: str, kind: Any) -> NDArray[Any]:
-            return np.asarray(record[name]).astype(kind) if name in names else np.zeros(count, dtype=kind)
-
-        scale = self.header.intensity_scale or 1.0
-        labels = "class_id" if self.header.labelled else "classification"
-        found = {c.name: np.asarray(record[c.name]) for c in columns(self.header.attributes) if c.name in names}
-        arrays = gather(found | {"class_id": values(labels, np.uint8)}, self.header.attributes, count)
-        return make_block(
-            xyz=steps * header.scales + header.offsets,
-            intensity=values("intensity", np.float64) / scale,
-            rgb=np.stack([values(name, np.uint16) for name in ("red", "green", "blue")], axis=1),
-            return_number=values("return_number", np.uint8),
-            number_of_returns=values("number_of_returns", np.uint8),
-            gps_time=values("gps_time", np.float64),
-            scan_angle_deg=_scan_angle(values, names),
-            strip=values("point_source_id", np.uint16) - np.uint16(1),
-            **arrays,
-        )
+        present = [column.name for column in columns(self.header.attributes) if column.name in names]
+        fields = [name for name in ("return_number", "number_of_returns", "gps_time") if name in names]
+        stored = {name: np.array(record[name]) for name in (*present, *fields)}
+        stored["class_id"] = np.array(record["class_id" if self.header.labelled else "classification"])
+        steps = np.stack([record.array[axis] for axis in "XYZ"], axis=1)
+        stored["xyz"] = steps * header.scales + header.offsets
+        stored["intensity"] = np.asarray(record["intensity"]).astype(np.float64) / (self.header.intensity_scale or 1.0)
+        if self.header.has_color:
+            stored["rgb"] = np.stack([record[name] for name in ("red", "green", "blue")], axis=1)
+        stored["scan_angle_deg"] = _scan_angle(record, names)
+        stored["strip"] = np.asarray(record["point_source_id"]) - np.uint16(1)
+        return make_points(stored, self.header.attributes, len(record))
 
 
 def open_to_copy(path: Path) -> laspy.LasReader:
@@ -326,29 +306,30 @@ def _check_start(path: Path, file: BinaryIO) -> None:
         raise InputError(str(path), None, "is not a LAS file that can be read (its header is damaged or truncated)")
 
 
-def _scan_angle(values: Any, names: set[str]) -> NDArray[np.float32]:
+def _scan_angle(record: Any, names: set[str]) -> NDArray[Any]:
+    """Return scan angles (N,) in degrees."""
     if "scan_angle" in names:
-        return (values("scan_angle", np.float64) * SCAN_ANGLE_STEP).astype(np.float32)
-    return values("scan_angle_rank", np.float32)
+        return np.asarray(record["scan_angle"]).astype(np.float64) * SCAN_ANGLE_STEP
+    return np.asarray(record["scan_angle_rank"])
 
 
 def _header(path: Path, las: laspy.LasHeader) -> CloudHeader:
     names = set(las.point_format.dimension_names)
-    notes = next((v.record_data_bytes() for v in las.vlrs if v.user_id == "SynthRoads" and v.record_id == 1), None)
-    told = json.loads(notes) if notes else {}
-    if not isinstance(told, dict):
+    record = next((v.record_data_bytes() for v in las.vlrs if v.user_id == "SynthRoads" and v.record_id == 1), None)
+    notes = json.loads(record) if record else {}
+    if not isinstance(notes, dict):
         raise InputError(str(path), None, "its notes on intensity scale and classes are damaged")
     if not (np.isfinite(las.offsets).all() and np.isfinite(las.scales).all() and np.all(las.scales != 0.0)):
         scales = [*las.scales.tolist(), *las.offsets.tolist()]
         raise InputError(f"{path}: scales and offsets", scales, "must be finite numbers, the scales not 0")
-    labelled = bool(told) and "class_id" in names
-    attributes = attributes_of(names) if told else ()
+    labelled = bool(notes) and "class_id" in names
+    attributes = attributes_of(names) if notes else ()
     read = _READ | _FLAGS | {column.name for column in columns(attributes)}
     if not labelled:
         read -= {"class_id"}
     scheme = asprs_scheme(range(256))
     if labelled:
-        rows = told.get("classes")
+        rows = notes.get("classes")
         scheme = stored_scheme(rows, str(path)) if isinstance(rows, dict) else class_scheme("17")
     text = _crs_text(las)
     return CloudHeader(
@@ -358,7 +339,7 @@ def _header(path: Path, las: laspy.LasHeader) -> CloudHeader:
         np.array(las.offsets, dtype=np.float64),
         crs_text=text,
         epsg=epsg_of(text) or _geotiff_epsg(las),
-        intensity_scale=intensity_scale(path, told) if told else None,
+        intensity_scale=intensity_scale(path, notes) if notes else None,
         scheme=scheme,
         labelled=labelled,
         attributes=attributes,

@@ -23,22 +23,10 @@ from numpy.lib import format as npy
 from numpy.typing import NDArray
 
 from ...base.errors import InputError
-from ..layers import LAYERS, columns, gather, layer_arrays
-from ..points import PointBlock, make_block
-from .base import BLOCK, CloudHeader, CloudReader, CloudWriter, damage_error, finite_coordinates, header_from_notes
+from ..layers import columns, layer_arrays, make_points
+from ..points import POINT_TYPES, PointBlock
+from .base import BLOCK, CloudReader, CloudWriter, damage_error, finite_coordinates, header_from_notes
 
-_ALWAYS = {
-    "xyz": ("<f8", 3),
-    "intensity": ("<f8", 1),
-    "rgb": ("<u2", 3),
-    "class_id": ("|u1", 1),
-    "instance_id": ("<u4", 1),
-    "return_number": ("|u1", 1),
-    "number_of_returns": ("|u1", 1),
-    "gps_time": ("<f8", 1),
-    "scan_angle_deg": ("<f4", 1),
-    "strip": ("<u2", 1),
-}
 _ON_REQUEST = {name: (np.dtype(kind).str, width) for name, (kind, width) in layer_arrays().items()}
 ARCHIVE_FAULTS = (
     *(KeyError, ValueError, EOFError, OSError, RuntimeError, MemoryError, SyntaxError, OverflowError),
@@ -54,8 +42,8 @@ class NpzWriter(CloudWriter):
     """Writes point blocks to an NPZ file; see `CloudWriter`. Nothing is rounded or clipped."""
 
     def _open(self) -> None:
-        wanted = {column.array for column in self.columns}
-        self._arrays = _ALWAYS | {name: kind for name, kind in _ON_REQUEST.items() if name in wanted}
+        names = {column.array for column in self.columns}
+        self._arrays = POINT_TYPES | {name: kind for name, kind in _ON_REQUEST.items() if name in names}
         self._parts = self.path.with_name(f".{self.path.name}.parts")
         self._files: dict[str, IO[bytes]] = {}
         shutil.rmtree(self._parts, ignore_errors=True)
@@ -65,7 +53,7 @@ class NpzWriter(CloudWriter):
 
     def _append(self, block: PointBlock) -> None:
         for name, (kind, _) in self._arrays.items():
-            values = self.own_class_ids(block) if name == "class_id" else block.array(name)
+            values = self.file_class_ids(block) if name == "class_id" else block.array(name)
             if np.dtype(kind).kind == "u":
                 values = self.integers(values, kind, name)
             self._files[name].write(np.ascontiguousarray(self.finite(values, name), dtype=kind).data)
@@ -73,7 +61,6 @@ class NpzWriter(CloudWriter):
     def _finish(self) -> None:
         for file in self._files.values():
             file.close()
-        notes = {**self.notes(), "offset": self.offset.tolist(), "crs": self.crs_text}
         with zipfile.ZipFile(self._temporary, "w", zipfile.ZIP_STORED, allowZip64=True) as archive:
             for name, (kind, width) in self._arrays.items():
                 shape = (self.count, width) if width > 1 else (self.count,)
@@ -83,16 +70,14 @@ class NpzWriter(CloudWriter):
                         shutil.copyfileobj(part, member, 1 << 22)
                 (self._parts / name).unlink()
             with archive.open(zipfile.ZipInfo("notes.npy", _TIME), "w") as member:
-                npy.write_array(member, np.array(json.dumps(notes)), allow_pickle=False)
+                npy.write_array(member, np.array(json.dumps(self.placed_notes())), allow_pickle=False)
         self._parts.rmdir()
 
-    def _abandon(self) -> None:
-        for file in getattr(self, "_files", {}).values():
+    def _close(self) -> None:
+        for file in self._files.values():
             with suppress(OSError):
                 file.close()
-        shutil.rmtree(self.path.with_name(f".{self.path.name}.parts"), ignore_errors=True)
-        with suppress(OSError):
-            self._temporary.unlink(missing_ok=True)
+        shutil.rmtree(self._parts, ignore_errors=True)
 
 
 class NpzReader(CloudReader):
@@ -107,7 +92,7 @@ class NpzReader(CloudReader):
 
     def __init__(self, path: Path) -> None:
         try:
-            self._archive = zipfile.ZipFile(path)
+            self._file = zipfile.ZipFile(path)
         except ARCHIVE_FAULTS:
             raise InputError(str(path), None, "is not an NPZ file, or truncated") from None
         try:
@@ -120,81 +105,76 @@ class NpzReader(CloudReader):
             self.close()
             raise
         arrays = set(self._kinds)
-        names = {c.name for layer in LAYERS.values() for c in layer.columns if c.array in arrays}
-        header = header_from_notes(path, "NPZ", self._kinds["xyz"][0][0], names, notes)
-        others = {name.removesuffix(".npy") for name in self._archive.namelist()} - arrays - {"notes"}
-        self.header = CloudHeader(
-            **{**header.__dict__, "has_color": "rgb" in arrays, "left_out": tuple(sorted(others))}
+        stored = {name.removesuffix(".npy") for name in self._file.namelist()}
+        self.header = header_from_notes(
+            path,
+            "NPZ",
+            self._kinds["xyz"][0][0],
+            stored,
+            notes,
+            name_of=lambda column: column.array,
+            usual=arrays | {"notes"},
+            has_color="rgb" in arrays,
         )
 
     def blocks(self, size: int = BLOCK) -> Iterator[PointBlock]:
-        """See `CloudReader`."""
-        members = {name: self._archive.open(f"{name}.npy") for name in self._kinds}
+        """Yield all points in the file's order; see `CloudReader.blocks`."""
+        members = {name: self._file.open(f"{name}.npy") for name in self._kinds}
         try:
             for member in members.values():
                 _npy_header(member)
             for done in range(0, self.header.count, size):
-                wanted = min(size, self.header.count - done)
+                rows = min(size, self.header.count - done)
                 try:
-                    arrays = {name: self._rows(members[name], name, wanted) for name in members}
+                    arrays = {name: self._rows(members[name], name, rows) for name in members}
                 except ARCHIVE_FAULTS:
                     raise damage_error(self.header.path, done, self.header.count) from None
                 finite_coordinates(self.header.path, done, arrays["xyz"])
-                yield self._block(arrays, wanted)
+                yield self._block(arrays, rows)
         finally:
             for member in members.values():
                 member.close()
 
-    def close(self) -> None:
-        """Close the file."""
-        self._archive.close()
-
-    def _rows(self, member: IO[bytes], name: str, wanted: int) -> NDArray[Any]:
+    def _rows(self, member: IO[bytes], name: str, count: int) -> NDArray[Any]:
         shape, kind = self._kinds[name]
-        rows = (wanted, *shape[1:])
+        rows = (count, *shape[1:])
         data = np.frombuffer(member.read(int(np.prod(rows)) * kind.itemsize), dtype=kind)
-        return data.reshape(rows)
+        return data.reshape(rows).copy()
 
     def _block(self, arrays: dict[str, NDArray[Any]], count: int) -> PointBlock:
-        own = columns(self.header.attributes)
-        parts = {
+        stored = {
             c.name: arrays[c.array] if c.component is None else arrays[c.array][:, c.component]
-            for c in own
+            for c in columns(self.header.attributes)
             if c.array in arrays
         }
-        found = gather(parts, self.header.attributes, count)
-        for name, (kind, width) in _ALWAYS.items():
-            if name not in ("class_id", "instance_id"):
-                shape = (count, width) if width > 1 else (count,)
-                found[name] = arrays[name].astype(kind) if name in arrays else np.zeros(shape, dtype=kind)
-        return make_block(**found)
+        return make_points(arrays | stored, self.header.attributes, count)
 
     def _read_kinds(self, path: Path) -> dict[str, tuple[tuple[int, ...], np.dtype[Any]]]:
         """Return shape and type of each array that is known here."""
         kinds = {}
-        for name in _ALWAYS | _ON_REQUEST:
-            if f"{name}.npy" in self._archive.namelist():
-                with self._archive.open(f"{name}.npy") as member:
+        for name in POINT_TYPES | _ON_REQUEST:
+            if f"{name}.npy" in self._file.namelist():
+                with self._file.open(f"{name}.npy") as member:
                     kinds[name] = _npy_header(member)
         if "xyz" not in kinds:
             raise InputError(str(path), None, "has no array xyz")
         count = kinds["xyz"][0][0] if kinds["xyz"][0] else 0
         for name, (shape, kind) in kinds.items():
-            width = (_ALWAYS | _ON_REQUEST)[name][1]
+            width = (POINT_TYPES | _ON_REQUEST)[name][1]
             if shape != ((count, width) if width > 1 else (count,)) or kind.kind not in "fiub":
-                wanted = f"({count}, {width})" if width > 1 else f"({count},)"
-                raise InputError(f"{path}: {name}", shape, f"must be numbers of shape {wanted}")
+                expected = f"({count}, {width})" if width > 1 else f"({count},)"
+                raise InputError(f"{path}: {name}", shape, f"must be numbers of shape {expected}")
         return kinds
 
     def _read_notes(self) -> Any:
-        if "notes.npy" not in self._archive.namelist():
+        if "notes.npy" not in self._file.namelist():
             return None
-        if self._archive.getinfo("notes.npy").file_size > _LONGEST_NOTES:
+        if self._file.getinfo("notes.npy").file_size > _LONGEST_NOTES:
             raise ValueError("its notes are too long")
-        with self._archive.open("notes.npy") as member:
+        with self._file.open("notes.npy") as member:
             if math.prod(_npy_header(member)[0]) != 1:
                 raise ValueError("its notes are no text")
-        with self._archive.open("notes.npy") as member:
+        with self._file.open("notes.npy") as member:
             return json.loads(str(npy.read_array(member, allow_pickle=False)))
 
 

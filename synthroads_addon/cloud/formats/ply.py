@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator
-from contextlib import suppress
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -17,9 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...base.errors import InputError
-from ..layers import LAYERS, Column, columns, gather
-from ..points import PointBlock, make_block
-from .base import BLOCK, CloudHeader, CloudReader, CloudWriter, damage_error, finite_coordinates, header_from_notes
+from ..layers import Column, columns, make_points
+from ..points import PointBlock
+from .base import BLOCK, CloudReader, CloudWriter, damage_error, finite_coordinates, header_from_notes
 
 _NAMES = {"NormalX": "nx", "NormalY": "ny", "NormalZ": "nz"}
 """Columns that PLY has names of its own for."""
@@ -33,13 +32,18 @@ _WORDS = {
     "<f4": ("float", "float32"),
     "<f8": ("double", "float64"),
 }
-_TYPES = {word: kind for kind, words in _WORDS.items() for word in words}
+PLY_TYPES = {word: kind for kind, words in _WORDS.items() for word in words}
 """Types by their names in headers, of which there are two."""
 _FIXED = (
     *(("x", "<f8"), ("y", "<f8"), ("z", "<f8"), ("red", "u1"), ("green", "u1"), ("blue", "u1"), ("intensity", "<f4")),
     *(("return_number", "u1"), ("number_of_returns", "u1"), ("gps_time", "<f8"), ("scan_angle", "<f4")),
     ("strip", "<u2"),
 )
+_FIELDS = {
+    **{name: name for name in ("intensity", "return_number", "number_of_returns", "gps_time", "strip")},
+    "scan_angle_deg": "scan_angle",
+}
+"""Properties of the arrays that every block has."""
 _CLASS_NAMES = ("classification", "class", "label", "scalar_Classification", "scalar_Label")
 """Where others keep classes."""
 _PIECE = 160
@@ -80,28 +84,20 @@ class PlyWriter(CloudWriter):
         record["strip"] = self.integers(block.strip, "uint16", "strip")
         for column in self.columns:
             if column.array == "class_id":
-                record["class_id"] = self.own_class_ids(block)
+                record["class_id"] = self.file_class_ids(block)
             else:
-                values = self.finite(column.of(block), column.name)
+                values = self.finite(column.values(block), column.name)
                 record[ply_name(column)] = self.integers(values, column.dtype, column.name) if column.whole else values
-        self._file.write(record)  # type: ignore[arg-type]
+        self._file.write(record)
 
     def _finish(self) -> None:
         self._file.seek(0)
         self._file.write(self._header(self.count))
         self._file.close()
 
-    def _abandon(self) -> None:
-        with suppress(AttributeError, OSError):
-            self._file.close()
-        with suppress(OSError):
-            self._temporary.unlink(missing_ok=True)
-
     def _header(self, count: int) -> bytes:
         """Return the header, which has the same length for any number of points."""
-        notes = json.dumps(
-            {**self.notes(), "offset": self.offset.tolist(), "crs": self.crs_text}, separators=(",", ":")
-        )
+        notes = json.dumps(self.placed_notes(), separators=(",", ":"))
         lines = [
             "ply",
             "format binary_little_endian 1.0",
@@ -138,59 +134,34 @@ class PlyReader(CloudReader):
         except BaseException:
             self._file.close()
             raise
-        own = {column.name for layer in LAYERS.values() for column in layer.columns if ply_name(column) in self._names}
-        header = header_from_notes(path, "PLY", count, own, notes)
-        read = {name for name, _ in _FIXED} | {ply_name(c) for c in columns(header.attributes)} | {*_CLASS_NAMES}
-        self.header = CloudHeader(
-            **{
-                **header.__dict__,
-                "has_color": {"red", "green", "blue"} <= self._names,
-                "left_out": tuple(sorted(self._names - read)),
-            }
+        usual = {name for name, _ in _FIXED} | {*_CLASS_NAMES}
+        colored = {"red", "green", "blue"} <= self._names
+        self.header = header_from_notes(
+            path, "PLY", count, self._names, notes, name_of=ply_name, usual=usual, has_color=colored
         )
 
     def blocks(self, size: int = BLOCK) -> Iterator[PointBlock]:
-        """See `CloudReader`."""
+        """Yield all points in the file's order; see `CloudReader.blocks`."""
         self._file.seek(self._start)
         for done in range(0, self.header.count, size):
-            wanted = min(size, self.header.count - done)
-            data = self._file.read(wanted * self._type.itemsize)
-            if len(data) != wanted * self._type.itemsize:
+            rows = min(size, self.header.count - done)
+            data = self._file.read(rows * self._type.itemsize)
+            if len(data) != rows * self._type.itemsize:
                 raise damage_error(self.header.path, done, self.header.count)
             yield self._block(np.frombuffer(data, dtype=self._type), done)
 
-    def close(self) -> None:
-        """Close the file."""
-        self._file.close()
-
     def _block(self, record: NDArray[Any], done: int) -> PointBlock:
-        count = len(record)
-
-        def values(name: str, kind: Any) -> NDArray[Any]:
-            return record[name].astype(kind) if name in self._names else np.zeros(count, dtype=kind)
-
-        def channel(name: str) -> NDArray[np.uint16]:
-            return _sixteen_bits(record[name]) if name in self._names else np.zeros(count, dtype=np.uint16)
-
-        own = columns(self.header.attributes)
-        found = {c.name: record[ply_name(c)] for c in own if ply_name(c) in self._names}
+        stored = {c.name: record[ply_name(c)] for c in columns(self.header.attributes) if ply_name(c) in self._names}
+        stored |= {name: record[field].copy() for name, field in _FIELDS.items() if field in self._names}
         if not self.header.labelled:
-            name = next((name for name in _CLASS_NAMES if name in self._names), "")
-            found["class_id"] = values(name, np.uint8)
-        arrays = gather(found, self.header.attributes, count)
-        return make_block(
-            xyz=finite_coordinates(
-                self.header.path, done, np.stack([values(name, np.float64) for name in "xyz"], axis=1)
-            ),
-            intensity=values("intensity", np.float64),
-            rgb=np.stack([channel(name) for name in ("red", "green", "blue")], axis=1),
-            return_number=values("return_number", np.uint8),
-            number_of_returns=values("number_of_returns", np.uint8),
-            gps_time=values("gps_time", np.float64),
-            scan_angle_deg=values("scan_angle", np.float32),
-            strip=values("strip", np.uint16),
-            **arrays,
-        )
+            label = next((name for name in _CLASS_NAMES if name in self._names), None)
+            stored["class_id"] = record[label] if label else np.zeros(len(record))
+        xyz = np.stack([record[name].astype(np.float64) for name in "xyz"], axis=1)
+        stored["xyz"] = finite_coordinates(self.header.path, done, xyz)
+        dark = np.zeros(len(record), dtype=np.uint16)
+        channels = (_sixteen_bits(record[name]) if name in self._names else dark for name in ("red", "green", "blue"))
+        stored["rgb"] = np.stack(list(channels), axis=1)
+        return make_points(stored, self.header.attributes, len(record))
 
 
 def _sixteen_bits(channel: NDArray[Any]) -> NDArray[np.uint16]:
@@ -217,9 +188,9 @@ def _read_header(path: Path, file: BinaryIO) -> tuple[int, np.dtype[Any], Any]:
             if count < 0:
                 count = _number_of_points(path, words)
         elif words[:1] == ["property"] and element == "vertex":
-            if len(words) != 3 or words[1] not in _TYPES:
+            if len(words) != 3 or words[1] not in PLY_TYPES:
                 raise InputError(str(path), line, "properties of points must be numbers")
-            fields.append((words[2], _TYPES[words[1]]))
+            fields.append((words[2], PLY_TYPES[words[1]]))
     if count < 0 or not fields or len({name for name, _ in fields}) != len(fields):
         raise InputError(str(path), None, "is a PLY file without points")
     return count, np.dtype(fields), _notes(path, notes)

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import importlib.util
-from collections.abc import Iterator
+from importlib import import_module
 from pathlib import Path
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,10 +13,11 @@ from numpy.typing import NDArray
 from ...base.classes import ClassScheme
 from ...base.errors import InputError, MissingFileError, nearest_name
 from ..layers import DEFAULT_ATTRIBUTES, Attribute
-from ..points import PointBlock
-from .base import BLOCK, CloudReader, CloudWriter
+from .base import CloudReader, CloudWriter
 
-ENDINGS = (".laz", ".las", ".ply", ".e57", ".npz")
+_FORMATS = {".laz": "Las", ".las": "Las", ".ply": "Ply", ".e57": "E57", ".npz": "Npz"}
+"""Beginnings of the names of the classes, by ending; their module has the same name in small letters."""
+ENDINGS = tuple(_FORMATS)
 """Endings of the files that can be written and read."""
 _PACKAGES = {".e57": "pye57"}
 """Package that a format needs and that not every installation has, by ending."""
@@ -45,27 +47,14 @@ def open_writer(
     crs_text: str | None = None,
 ) -> CloudWriter:
     """Return the writer for a file's ending, yet to be entered; see `CloudWriter` for the arguments."""
-    ending = check_ending(path)
-    return _writer_class(ending)(path, epsg, offset, intensity_scale, attributes, scheme, crs_text)
+    make: type[CloudWriter] = _format_class(check_ending(path), "Writer")
+    return make(path, epsg, offset, intensity_scale, attributes, scheme, crs_text)
 
 
-def _writer_class(ending: str) -> type[CloudWriter]:
-    """Return the class that writes a kind of file; only its own library is loaded."""
-    if ending == ".ply":
-        from .ply import PlyWriter  # of all kinds only this one's library is loaded
-
-        return PlyWriter
-    if ending == ".e57":
-        from .e57 import E57Writer
-
-        return E57Writer
-    if ending == ".npz":
-        from .npz import NpzWriter
-
-        return NpzWriter
-    from .las import LasWriter
-
-    return LasWriter
+def _format_class(ending: str, role: Literal["Reader", "Writer"]) -> Any:
+    """Return the class that reads or writes a kind of file; only its own library is loaded."""
+    name = _FORMATS[ending]
+    return getattr(import_module(f".{name.lower()}", __package__), f"{name}{role}")
 
 
 def open_cloud(path: Path) -> CloudReader:
@@ -84,24 +73,5 @@ def open_cloud(path: Path) -> CloudReader:
                 raise InputError(str(path), None, "is empty, not a cloud")
     except OSError as problem:
         raise MissingFileError(str(path), None, f"cannot be read ({problem.strerror})") from None
-    if ending == ".ply":
-        from .ply import PlyReader  # of all kinds only this one's library is loaded
-
-        return PlyReader(path)
-    if ending == ".e57":
-        from .e57 import E57Reader
-
-        return E57Reader(path)
-    if ending == ".npz":
-        from .npz import NpzReader
-
-        return NpzReader(path)
-    from .las import LasReader
-
-    return LasReader(path)
-
-
-def read_cloud(path: Path, size: int = BLOCK) -> Iterator[PointBlock]:
-    """Yield the points of a cloud of any format, at most ``size`` at a time; see `open_cloud`."""
-    with open_cloud(path) as cloud:
-        yield from cloud.blocks(size)
+    reader: CloudReader = _format_class(ending, "Reader")(path)
+    return reader

@@ -71,7 +71,7 @@ def subsample(
         with _writer_like(cloud, output, scheme) as writer:
             for points in grid.blocks():
                 writer.write(points)
-        return _done(cloud, writer) | {"grid": cell, "points_read": grid.taken}
+        return _done(cloud, writer) | {"grid": cell, "points_read": grid.points_read}
 
 
 def map_intensity(
@@ -147,7 +147,7 @@ def draw_previews(
         section.add(cut)
         with output_folder(folder, PREVIEWS, overwrite) as temporary:
             paths = view.save(temporary, cloud.header.epsg, cloud.header.has_color)
-            paths.append(section.save(temporary / PREVIEWS[3], "cross-section"))
+            paths.append(section.save(temporary / PREVIEWS[3]))
             names = [path.name for path in paths]
     return {"file": source.name, "points": int(view.raster.count.sum()), "pictures": names, "section_points": len(cut)}
 
@@ -236,14 +236,14 @@ def _cross_cut(
     length = float(stations[-1])
     if length == 0:
         return extent.middle, np.array([0.0, -1.0]), reach
-    wanted = length / 2 if station is None else station
-    if not 0 <= wanted <= length:
+    station = length / 2 if station is None else station
+    if not 0 <= station <= length:
         raise InputError("--station", station, f"must be 0 to {length:.1f} m")
-    at = int(np.clip(np.searchsorted(stations, wanted, side="right") - 1, 0, len(steps) - 1))
+    at = int(np.clip(np.searchsorted(stations, station, side="right") - 1, 0, len(steps) - 1))
     while steps[at] == 0:
         at -= 1
     along = (path[at + 1] - path[at]) / steps[at]
-    return path[at] + along * (wanted - stations[at]), np.array([along[1], -along[0]]), reach
+    return path[at] + along * (station - stations[at]), np.array([along[1], -along[0]]), reach
 
 
 def _scheme_of(cloud: CloudReader, classes: str | None) -> ClassScheme:
@@ -305,5 +305,3 @@ def _pass_with_progress(
         yield block
         done += len(block)
         progress(stage, done / max(count, 1))
-
-

@@ -22,7 +22,7 @@ from ...base.random_streams import stream
 from ..formats.base import CloudHeader
 from ..formats.registry import open_cloud
 from .picture import gray
-from .previews import Brightness
+from .raster import Brightness
 
 ColourBy = Literal["class", "intensity", "rgb", "height"]
 COLOURINGS: tuple[ColourBy, ...] = get_args(ColourBy)
@@ -116,18 +116,18 @@ def height_colors() -> NDArray[np.uint8]:
     return np.column_stack([np.interp(at, np.arange(len(stops)), stops[:, i]) for i in range(3)]).astype(np.uint8)
 
 
-def chosen_points(count: int, budget: int, seed: int = 0) -> NDArray[np.int64]:
+def chosen_points(count: int, budget: int) -> NDArray[np.int64]:
     """Return the increasing indices (min(count, budget),) of the points that stay of ``count``."""
     if count <= budget:
         return np.arange(count, dtype=np.int64)
     edges = np.arange(budget + 1, dtype=np.int64) * count // budget
-    picks = stream(seed, "display", count, budget).random(budget)
+    picks = stream(0, "display", count, budget).random(budget)
     return edges[:-1] + (picks * np.diff(edges)).astype(np.int64)
 
 
-def drawing_places(count: int, seed: int = 0) -> NDArray[np.int64]:
+def drawing_places(count: int) -> NDArray[np.int64]:
     """Return for each of the chosen points (count,), in the file's order, where it stands in the drawing's."""
-    return stream(seed, "drawing order", count).permutation(count)
+    return stream(0, "drawing order", count).permutation(count)
 
 
 def read_display(
@@ -171,7 +171,7 @@ def read_display(
             result.xyz[into] = points.xyz[here] - origin
             result.class_id[into] = points.class_id[here]
             rgb[into] = points.rgb[here]
-            result.brightness[into] = np.nan_to_num(measure.of(points)[here])
+            result.brightness[into] = np.nan_to_num(measure.values(points)[here])
             done, kept = done + len(points), last
             progress(done / cloud.header.count)
         result.brightness_text = measure.text

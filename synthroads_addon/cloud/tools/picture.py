@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
 from ...base.classes import PointClass
+from .raster import Axes
 
 PAPER, INK = (226, 231, 238), (40, 40, 44)
 _MARGIN, _LINE, _SMALL = 14, 26, 15
@@ -32,19 +33,8 @@ class GrayBar:
     text: str
 
 
-@dataclass(frozen=True)
-class Axes:
-    """Coordinates along the picture's edges.
-
-    Attributes:
-        left, low: of the lower left corner, m.
-        across, up: of a pixel, m.
-    """
-
-    left: float
-    low: float
-    across: float
-    up: float
+Legend = Sequence[tuple[str, Color]] | GrayBar | None
+"""Names and colours, or values of grays, that stand below a picture."""
 
 
 def class_legend(rows: Sequence[PointClass], labels: NDArray[np.uint8]) -> list[tuple[str, Color]]:
@@ -63,7 +53,7 @@ def gray(values: NDArray[np.float64], filled: NDArray[np.bool_], text: str) -> t
 def add_frame(
     pixels: NDArray[np.uint8],
     title: str,
-    legend: Sequence[tuple[str, Color]] | GrayBar | None,
+    legend: Legend,
     axes: Axes,
     north: tuple[float, float] | None = None,
     ticks: bool = False,

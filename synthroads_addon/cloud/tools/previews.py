@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from ...base.classes import ClassScheme, class_scheme
 from ..points import PointBlock
-from .picture import PAPER, Axes, GrayBar, add_frame, class_legend, gray, nice_step
-from .raster import Raster
+from .picture import PAPER, Legend, add_frame, class_legend, gray, nice_step
+from .raster import Axes, Raster
 
 WIDTH = 1800
 """Width of the pictures, pixels."""
@@ -43,43 +43,38 @@ class TopView:
         length = max(float(np.hypot(*chord)), 1.0)
         self.along = chord / length if length > 1.0 else np.array([1.0, 0.0])
         self.start = np.asarray(start, dtype=np.float64)
-        self.scheme = scheme or class_scheme("17")
         border = 0.02 * length + 1.0
         pixel = max(length + 2 * border, high - low) / WIDTH
         size = (max(1, int(np.ceil((length + 2 * border) / pixel))), max(1, int(np.ceil((high - low) / pixel))))
-        self.raster = Raster(-border, low, size, pixel, pixel)
-        self.pixel = pixel
+        self.raster = Raster(Axes(-border, low, pixel, pixel), size)
+        self.scheme = scheme or class_scheme("17")
         # A line is thinner than a pixel: let it win over the pavement.
         self._lift = np.zeros(256)
         self._lift[[row.id for row in self.scheme.rows if row.name == "road_marking"]] = 0.3
-        self._measure = Brightness()
 
     def add(self, block: PointBlock) -> None:
         """Add a block's points."""
         relative = block.xyz[:, :2] - self.start
         across = relative @ np.array([-self.along[1], self.along[0]])
         height = block.xyz[:, 2] + self._lift[block.class_id]
-        self.raster.add(block, (relative @ self.along, across), height, self._measure.of(block))
+        self.raster.add(block, (relative @ self.along, across), height)
 
     def save(self, folder: Path, epsg: int | None, has_color: bool = True) -> list[Path]:
         """Write ``preview_class.png``, ``preview_intensity.png`` and ``preview_rgb.png``; return their paths."""
         raster = self.raster
-        filled = raster.count > 0
-        shades, bar = gray(raster.intensity(), filled, self._measure.text)
-        pictures: dict[str, tuple[NDArray[Any], list | GrayBar | None]] = {
-            "class": (self.scheme.colors()[raster.label], class_legend(self.scheme.rows, raster.label[filled])),
-            "intensity": (shades, bar),
+        pictures: dict[str, tuple[NDArray[Any], Legend]] = {
+            "class": _class_colors(raster, self.scheme),
+            "intensity": _grays(raster),
         }
         if has_color:
             pictures["rgb"] = (raster.rgb(), None)
         system = f"   EPSG:{epsg}" if epsg else ""
-        axes = Axes(raster.left, raster.low, self.pixel, self.pixel)
         north = (float(self.along[1]), float(self.along[0]))
         paths = []
         for name, (colors, legend) in pictures.items():
-            title = f"{name}   {int(raster.count.sum()):,} points{system}   pixel {self.pixel:.3g} m"
+            title = f"{name}   {int(raster.count.sum()):,} points{system}   pixel {raster.axes.across:.3g} m"
             paths.append(folder / f"preview_{name}.png")
-            add_frame(raster.picture(colors, PAPER), title, legend, axes, north).save(paths[-1])
+            add_frame(raster.picture(colors, PAPER), title, legend, raster.axes, north).save(paths[-1])
         return paths
 
 
@@ -109,16 +104,16 @@ class CrossSection:
         self.middle = np.asarray(middle, dtype=np.float64)
         self.right = np.asarray(right, dtype=np.float64) / np.hypot(*right)
         self.depth = depth
-        self.scheme = scheme or class_scheme("17")
         self.by_class = by_class
         pixel = 2 * reach / WIDTH
         low, high = heights[0] - 0.5, heights[1] + 0.5
-        wanted = _LOWEST * pixel / (high - low)
-        self.exaggeration = 1.0 if wanted <= 1 else min(10.0, nice_step(1.4 * wanted))
+        needed = _LOWEST * pixel / (high - low)
+        self.exaggeration = 1.0 if needed <= 1 else min(10.0, nice_step(1.4 * needed))
         up = max(pixel / self.exaggeration, (high - low) / _MOST_PIXELS)
         self.exaggeration = pixel / up
-        self.raster = Raster(-reach, low, (WIDTH, max(1, int(np.ceil((high - low) / up)))), pixel, up)
-        self._measure = Brightness()
+        size = (WIDTH, max(1, int(np.ceil((high - low) / up))))
+        self.raster = Raster(Axes(-reach, low, pixel, up), size)
+        self.scheme = scheme or class_scheme("17")
 
     def add(self, block: PointBlock) -> None:
         """Add a block's points; those outside the slab are left out."""
@@ -128,37 +123,24 @@ class CrossSection:
         if len(inside):
             part = block.select(inside)
             place = (relative[inside] @ self.right, part.xyz[:, 2])
-            self.raster.add(part, place, -away[inside], self._measure.of(part))
+            self.raster.add(part, place, -away[inside])
 
-    def save(self, path: Path, what: str = "cross-section") -> Path:
-        """Write the picture; ``what`` begins its title."""
+    def save(self, path: Path) -> Path:
+        """Write the picture."""
         raster = self.raster
-        filled = raster.count > 0
-        legend: list | GrayBar
-        colors: NDArray[Any]
-        if self.by_class:
-            colors, legend = self.scheme.colors()[raster.label], class_legend(self.scheme.rows, raster.label[filled])
-        else:
-            colors, legend = gray(raster.intensity(), filled, self._measure.text)
+        colors, legend = _class_colors(raster, self.scheme) if self.by_class else _grays(raster)
         scale = "" if abs(self.exaggeration - 1) < 0.01 else f"   heights x {self.exaggeration:.3g}"
-        title = f"{what}   {int(raster.count.sum()):,} points in {self.depth:g} m{scale}"
-        axes = Axes(raster.left, raster.low, raster.across, raster.up)
-        add_frame(raster.picture(colors, _SECTION_PAPER), title, legend, axes, ticks=True).save(path)
+        title = f"cross-section   {int(raster.count.sum()):,} points in {self.depth:g} m{scale}"
+        add_frame(raster.picture(colors, _SECTION_PAPER), title, legend, raster.axes, ticks=True).save(path)
         return path
 
 
-class Brightness:
-    """Values drawn as intensity: times the squared range where the points have one, so that nearness doesn't show.
+def _class_colors(raster: Raster, scheme: ClassScheme) -> tuple[NDArray[Any], Legend]:
+    """Return the colours (cells, 3) of the classes, and their legend."""
+    shown = raster.label[raster.count > 0]
+    return scheme.colors()[raster.label], class_legend(scheme.rows, shown)
 
-    Attributes:
-        text: what it is.
-    """
 
-    text = "intensity as stored"
-
-    def of(self, block: PointBlock) -> NDArray[np.float64]:
-        """Return a block's values (N,)."""
-        if not len(block) or np.isnan(block.range[0]):
-            return block.intensity
-        self.text = "intensity x squared range (white target = 1)"
-        return block.intensity * block.range**2
+def _grays(raster: Raster) -> tuple[NDArray[Any], Legend]:
+    """Return the grays (cells, 3) of the intensities, and their legend."""
+    return gray(raster.intensity(), raster.count > 0, raster.brightness.text)

@@ -106,8 +106,8 @@ class IntensityMapping:
     def __init__(self, source: CloudReader, target: CloudReader, per_class: bool = False) -> None:
         self._steps, self.scale = steps_per_unit(source), steps_per_unit(target)
         have, want = histograms(source, self._steps), histograms(target, self.scale)
-        for cloud, found in ((source, have), (target, want)):
-            if not found:
+        for cloud, counts in ((source, have), (target, want)):
+            if not counts:
                 raise InputError(str(cloud.header.path), None, "has no points")
         self._have, self._want = _total(have), _total(want)
         self.alone: list[str] = []
@@ -153,7 +153,7 @@ class IntensityMapping:
         names = source.header.scheme.names()
         pairs = {label: theirs.get(names.get(label, "")) for label in have}
         self._class_targets = {label: want[other] for label, other in pairs.items() if other is not None}
-        maps = {label: QuantileMap(have[label], wanted) for label, wanted in self._class_targets.items()}
+        maps = {label: QuantileMap(have[label], counts) for label, counts in self._class_targets.items()}
         rest = [label for label in have if label not in maps]
         self.alone = [names.get(label, str(label)) for label in rest]
         if rest:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -9,22 +10,56 @@ from numpy.typing import NDArray
 
 from ..points import PointBlock
 
+Float = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Axes:
+    """Coordinates along the picture's edges.
+
+    Attributes:
+        left, low: of the lower left corner, m.
+        across, up: of a pixel, m.
+    """
+
+    left: float
+    low: float
+    across: float
+    up: float
+
+
+class Brightness:
+    """Values drawn as intensity: times the squared range where the points have one, so that nearness doesn't show.
+
+    Attributes:
+        text: what it is.
+    """
+
+    text = "intensity as stored"
+
+    def values(self, block: PointBlock) -> Float:
+        """Return a block's values (N,)."""
+        if not len(block) or np.isnan(block.range[0]):
+            return block.intensity
+        self.text = "intensity x squared range (white target = 1)"
+        return block.intensity * block.range**2
+
 
 class Raster:
     """A picture's cells, row 0 at the top: mean intensity and colour of each, and the class of its foremost point.
 
     Args:
-        left, low: coordinates of the lower left corner, m.
-        width, height: number of cells.
-        across, up: size of a cell, m.
+        axes: coordinates of the cells.
+        size: number of cells across and up.
 
     Attributes:
         count: (cells,) points in each cell.
+        brightness: what the mean intensity is of.
         label: (cells,) class of the foremost point; 255 where there is none.
     """
 
-    def __init__(self, left: float, low: float, size: tuple[int, int], across: float, up: float) -> None:
-        self.left, self.low, self.across, self.up = left, low, across, up
+    def __init__(self, axes: Axes, size: tuple[int, int]) -> None:
+        self.axes, self.brightness = axes, Brightness()
         self.width, self.height = size
         cells = self.width * self.height
         self.count = np.zeros(cells)
@@ -33,23 +68,17 @@ class Raster:
         self._rgb = np.zeros((3, cells))
         self._front = np.full(cells, -np.inf)
 
-    def add(
-        self,
-        block: PointBlock,
-        place: tuple[NDArray[np.float64], NDArray[np.float64]],
-        depth: NDArray[np.float64],
-        brightness: NDArray[np.float64],
-    ) -> None:
+    def add(self, block: PointBlock, place: tuple[Float, Float], depth: Float) -> None:
         """Add a block's points.
 
         Args:
             block: N points.
             place: their two coordinates (N,) in the picture, m; what lies outside is left out.
             depth: (N,) the larger, the further in front.
-            brightness: (N,) what the mean intensity is of.
         """
-        column = np.floor((place[0] - self.left) / self.across)
-        row = self.height - 1 - np.floor((place[1] - self.low) / self.up)
+        brightness = self.brightness.values(block)
+        column = np.floor((place[0] - self.axes.left) / self.axes.across)
+        row = self.height - 1 - np.floor((place[1] - self.axes.low) / self.axes.up)
         inside = np.flatnonzero((column >= 0) & (column < self.width) & (row >= 0) & (row < self.height))
         if len(inside) == 0:
             return
@@ -62,11 +91,11 @@ class Raster:
             self._rgb[channel, window] += np.bincount(within, block.rgb[inside, channel], size)
         self._keep_foremost(cell, depth[inside], block.class_id[inside])
 
-    def intensity(self) -> NDArray[np.float64]:
+    def intensity(self) -> Float:
         """Return the mean intensity (cells,); 0 where there are no points."""
         return self._intensity / np.maximum(self.count, 1)
 
-    def rgb(self) -> NDArray[np.float64]:
+    def rgb(self) -> Float:
         """Return the mean colour (cells, 3), 0 to 255."""
         return (self._rgb / np.maximum(self.count, 1) / 257.0).T
 
@@ -87,7 +116,7 @@ class Raster:
         neighbours = float((used[:, 1:] & used[:, :-1]).sum() / max(1, used.sum())) if used.size else 1.0
         return 0 if share > 0.35 or neighbours > 0.8 else 1 if neighbours > 0.4 else 2
 
-    def _keep_foremost(self, cell: NDArray[np.intp], depth: NDArray[np.float64], label: NDArray[np.uint8]) -> None:
+    def _keep_foremost(self, cell: NDArray[np.intp], depth: Float, label: NDArray[np.uint8]) -> None:
         np.maximum.at(self._front, cell, depth)
         foremost = depth == self._front[cell]
         self.label[cell[foremost]] = label[foremost]

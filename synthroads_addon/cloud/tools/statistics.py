@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ...materials.reflectance import LUMINANCE
 from ..formats.base import CloudReader
 from ..points import PointBlock
 
@@ -24,7 +25,7 @@ _PAIRS_AT_ONCE = 4_000_000
 
 def luminance(rgb: NDArray[np.uint16]) -> NDArray[np.float64]:
     """Return 0.3 r + 0.59 g + 0.11 b (N,), 0 to 1, of colours (N, 3) as they are stored."""
-    return rgb @ np.array([0.30, 0.59, 0.11]) / 65535.0
+    return rgb @ LUMINANCE / 65535.0
 
 
 def cloud_statistics(cloud: CloudReader, radius: float = RADIUS, samples: int = SAMPLES) -> dict[str, Any]:
@@ -88,7 +89,7 @@ class Moments:
             self.mean[row] += step * count / together
         self.count += count
 
-    def of(self, row: int, labels: list[int]) -> tuple[float, float]:
+    def mean_and_deviation(self, row: int, labels: list[int]) -> tuple[float, float]:
         """Return mean and standard deviation of a quantity over the points of some labels."""
         count = self.count[labels]
         mean = float(np.average(self.mean[row, labels], weights=count))
@@ -133,7 +134,7 @@ class _FirstPass:
         """Return the figures of the points of some classes together."""
         count = int(self.moments.count[labels].sum())
         area = self._cells.area(labels)
-        height, intensity, light = (self.moments.of(row, labels) for row in range(3))
+        height, intensity, light = (self.moments.mean_and_deviation(row, labels) for row in range(3))
         colored = self.has_color and light != (0.0, 0.0)  # point formats with colours are used without them
         known = [label for label in labels if label in rough]
         weights = self.moments.count[known]
@@ -237,8 +238,8 @@ class _Roughness:
         inside = np.flatnonzero(np.all((column >= 0) & (column < 2**31), axis=1))
         key = column[inside, 0] << 31 | column[inside, 1]
         slot = np.minimum(np.searchsorted(self._keys, key), len(self._keys) - 1)
-        found = self._keys[slot] == key
-        inside, slot = inside[found], slot[found]
+        known = self._keys[slot] == key
+        inside, slot = inside[known], slot[known]
         for part in _parts(self._counts[slot]):
             counts = self._counts[slot[part]]
             point = np.repeat(inside[part], counts)

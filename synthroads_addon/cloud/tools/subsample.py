@@ -7,18 +7,16 @@ tile after tile is thinned out in memory.
 
 from __future__ import annotations
 
-import shutil
-import tempfile
 from collections.abc import Iterator
 from pathlib import Path
-from types import TracebackType
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...base.errors import InputError
-from ..points import PointBlock, make_block
+from ..points import PointBlock
+from .tile_files import TileFiles
 
 _CELLS_ACROSS_TILE = 512
 _SMALLEST_TILE = 20.0
@@ -26,7 +24,7 @@ _SMALLEST_TILE = 20.0
 _TIE_ORDER = ("gps_time", "return_number", "intensity", "range", "instance_id", "class_id", "scan_angle_deg", "strip")
 
 
-class GridSubsampler:
+class GridSubsampler(TileFiles):
     """Takes a cloud's blocks and gives back one point per occupied cell; a context manager.
 
     Args:
@@ -34,54 +32,29 @@ class GridSubsampler:
         folder: where the tiles are kept meanwhile, as large as the cloud; a folder in it is made and removed.
 
     Attributes:
-        taken: points handed in so far.
+        points_read: points handed in so far.
     """
 
     def __init__(self, cell: float, folder: Path) -> None:
         if not 0.0005 <= cell <= 1000:
             raise InputError("grid", cell, "must be 0.0005 to 1000 m")
+        super().__init__(folder)
         self.cell = float(cell)
-        self.taken = 0
+        self.points_read = 0
         self._tile = max(_CELLS_ACROSS_TILE, int(np.ceil(_SMALLEST_TILE / self.cell)))  # cells: none is cut in two
-        self._folder = folder
-        self._type: np.dtype[Any] | None = None
-        self._tiles: dict[tuple[int, int], Path] = {}
-
-    def __enter__(self) -> GridSubsampler:
-        self._made = Path(tempfile.mkdtemp(prefix=".tiles-", dir=self._folder))
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        shutil.rmtree(self._made, ignore_errors=True)
 
     def add(self, block: PointBlock) -> None:
         """Take a block; all blocks must have the same attributes. Thinning it at once saves room on the disk."""
         if len(block) == 0:
             return
-        self.taken += len(block)
+        self.points_read += len(block)
         block = block.select(keep_one_per_cell(block, self.cell))
-        record = _records(block)
-        if self._type is None:
-            self._type = record.dtype
-        tile = np.floor(block.xyz[:, :2] / self.cell).astype(np.int64) // self._tile
-        order = np.lexsort(tile.T)
-        tile, record = tile[order], record[order]
-        starts = np.flatnonzero(np.r_[True, np.any(tile[1:] != tile[:-1], axis=1)])
-        for first, last in zip(starts, np.r_[starts[1:], len(tile)], strict=True):
-            key = (int(tile[first, 0]), int(tile[first, 1]))
-            path = self._tiles.setdefault(key, self._made / f"{key[0]}_{key[1]}")
-            with path.open("ab") as file:
-                file.write(record[first:last].tobytes())
+        self.append(block, np.floor(block.xyz[:, :2] / self.cell).astype(np.int64) // self._tile)
 
     def blocks(self) -> Iterator[PointBlock]:
         """Yield what stays, tile by tile, by time within a tile (which LAZ packs best): the order handed in is lost."""
-        for key in sorted(self._tiles):
-            path = self._tiles[key]
-            points = _block(np.fromfile(path, dtype=self._type))
-            path.unlink()
-            points = points.select(keep_one_per_cell(points, self.cell))
+        for _, tile in self.by_tile():
+            points = tile.select(keep_one_per_cell(tile, self.cell))
             yield points.select(np.lexsort((points.return_number, points.gps_time)))
 
 
@@ -115,16 +88,3 @@ def _order(block: PointBlock, cells: NDArray[np.float64], nearness: NDArray[np.f
         return order
     ties = tuple(np.asarray(getattr(block, name)) for name in reversed(_TIE_ORDER))
     return np.lexsort((*ties, *block.xyz.T, *keys))
-
-
-def _records(block: PointBlock) -> NDArray[Any]:
-    """Return a block as an array (N,) of records, one field per attribute."""
-    arrays = block.attributes()
-    record = np.empty(len(block), dtype=[(name, a.dtype, a.shape[1:]) for name, a in arrays.items()])
-    for name, array in arrays.items():
-        record[name] = array
-    return record
-
-
-def _block(record: NDArray[Any]) -> PointBlock:
-    return make_block(**{name: np.ascontiguousarray(record[name]) for name in record.dtype.names or ()})

@@ -22,15 +22,15 @@ from ...blender.services import BlenderServices
 from ...cloud.points import PointBlock
 from ...scanning.beam import RINGS, beam_pattern
 from ...scanning.blocks import Blocks
-from ...scanning.colour.colour import LayerValues, Targets, sample_targets
+from ...scanning.colour.colour import LayerValues, SeenPoints, sample_points
 from ...scanning.colour.request import LayerRequest
 from ...scanning.colour.settings import ColourSettings
 from ...scanning.colour.views import View
 from ...scanning.noise import Noise
 from ...scanning.plan import ScanConditions, ScanPlan
 from ...scanning.platforms.path import Path as ScanPath
+from ...scanning.platforms.stretches import scatter_stretches
 from ...scanning.record import record_as_measured
-from ...scanning.samples import scatter_stretches
 from ...scanning.scan import BlockResult, joined_results
 from ...scanning.scene.motion import ScannedScene
 from ...scenario.scenario import Scenario
@@ -69,7 +69,7 @@ class Trial:
         scenario: the job, without noise.
         scene: what is scanned.
         plan: of the whole path.
-        phase: see `scanning.samples.scatter_stretches`: other phases are other stretches.
+        phase: see `scanning.platforms.stretches.scatter_stretches`: other phases are other stretches.
         lines: of these is the error taken.
         clock: measures seconds.
     """
@@ -99,7 +99,7 @@ class Trial:
         path = scatter_stretches(self.plan.path, lines or self.lines, PULSES / self.plan.setting.shot_rate, self.phase)
         results = iter(record_as_measured(replace(self.plan, path=path, rings=rings)))
         blocks = Blocks(self.plan.setting, path, len(beam_pattern(rings).weights))
-        return [joined_results([next(results) for _ in blocks.of(strip)]) for strip in path.strips]
+        return [joined_results([next(results) for _ in blocks.block_numbers(strip)]) for strip in path.strips]
 
     def points(self, rings: tuple[int, ...] = RINGS[CONVERGED]) -> list[PointBlock]:
         """Return the points of the stretches with a beam: the converged one, which is the truth, if none is given."""
@@ -144,14 +144,14 @@ class Trial:
         return replace(self.plan.request, settings=settings)
 
     def _layers(
-        self, settings: ColourSettings, lines: Sequence[Targets], wanted: frozenset[str]
+        self, settings: ColourSettings, lines: Sequence[SeenPoints], wanted: frozenset[str]
     ) -> list[LayerValues]:
         assert self.plan.request is not None
         request = replace(
             self.plan.request, settings=settings, wanted=wanted, pick=lambda views: views_near_lines(views, lines)
         )
         with layer_source(request) as source:
-            return [sample_targets(source, seen, wanted) for seen in lines]
+            return [sample_points(source, seen, wanted) for seen in lines]
 
     def count_images(self, changes: Mapping[str, Any]) -> tuple[int, float]:
         """Return how many images the whole path would have, and their megapixels; 0 where none are rendered."""
@@ -179,7 +179,7 @@ class Trial:
         return seconds / share, round(files.counts.points / share)
 
 
-def views_near_lines(views: Sequence[View], lines: Sequence[Targets]) -> list[View]:
+def views_near_lines(views: Sequence[View], lines: Sequence[SeenPoints]) -> list[View]:
     """Return what the nearest images show of each scan line: parts of them."""
     parts: list[View | None] = []
     for line in lines:

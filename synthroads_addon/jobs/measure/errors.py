@@ -23,7 +23,7 @@ from ...blender.cameras import HAS_RETURN_CAMERA
 from ...cloud.points import PointBlock
 from ...scanning.beam import RINGS
 from ...scanning.colour.colour import FROM_MATERIAL, MATERIAL_LAYERS, NEARBY, LayerValues
-from ...scanning.colour.difference import ciede2000, lab
+from ...scanning.colour.difference import cie_lab, ciede2000
 from ...scanning.colour.request import LayerRequest
 from ...scanning.colour.settings import ColourSettings
 from ...scanning.relief import MicroRelief, shift_along_normals
@@ -110,7 +110,7 @@ def known_rows(truth: LayerValues) -> NDArray[np.bool_]:
 
 def colour_difference(mine: LayerValues, truth: LayerValues, rows: NDArray[np.bool_]) -> Float:
     """Return CIEDE2000 between the colours of chosen points (N,)."""
-    return ciede2000(lab(mine.arrays["rgb"][rows]), lab(truth.arrays["rgb"][rows]))  # type: ignore[arg-type]
+    return ciede2000(cie_lab(mine.arrays["rgb"][rows]), cie_lab(truth.arrays["rgb"][rows]))  # type: ignore[arg-type]
 
 
 def squared_error(name: str, mine: LayerValues, truth: LayerValues, rows: NDArray[np.bool_]) -> Float:

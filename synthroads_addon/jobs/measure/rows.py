@@ -26,15 +26,15 @@ from ...scanning.colour.colour import (
     MATERIAL_LAYERS,
     LayerSource,
     LayerValues,
-    sample_targets,
+    sample_points,
     shares_by_source,
     source_name,
 )
 from ...scanning.colour.request import LayerRequest
 from ...scanning.plan import ScanPlan
+from ...scanning.platforms.stretches import middle_stretches, spread_stretches
 from ...scanning.record import RETURNS_AT_ONCE, record_as_measured
 from ...scanning.relief import micro_relief
-from ...scanning.samples import middle, spread_stretches
 from ...scanning.scan import BlockResult, joined_results
 from ...scanning.scene.motion import ScannedScene
 from ...scenario.scenario import Scenario, load_scenario
@@ -171,12 +171,12 @@ def _measure_stretches(
     start = time.process_time()
     with layer_source(request) as source:
         if coloured and result.seen is not None:
-            sample_targets(source, result.seen.select(slice(0, _FEW)), LAYERS)
+            sample_points(source, result.seen.select(slice(0, _FEW)), LAYERS)
         prepared, rendered = time.process_time(), dict(source.report)
         counts = _count_points_in_file(scenario, part, source)
         done = time.process_time()
         peak = peak_memory_mb()
-        values = sample_targets(source, result.seen, LAYERS) if coloured and result.seen is not None else None
+        values = sample_points(source, result.seen, LAYERS) if coloured and result.seen is not None else None
     seconds, images = done - prepared, prepared - start
     restarts = 0
     if coloured and takes_returns(request.settings):  # stretches are too few for the renderer to begin anew
@@ -265,14 +265,14 @@ def _true_colours(knob: Knob, sample: Sample) -> tuple[LayerValues, str, NDArray
         settings = replace(settings, lighting="path", samples=TRUE_SAMPLES)
         chosen, name = chosen[::_TENTH], f"a pixel per return with {TRUE_SAMPLES} samples of whole light paths"
     elif not HAS_RETURN_CAMERA:
-        part = middle(request.path, _MIDDLE)  # type: ignore[arg-type]
+        part = middle_stretches(request.path, _MIDDLE)
         request = replace(request, path=part)
         within = [(strip.start_time, strip.start_time + strip.duration) for strip in part.strips]
         chosen = np.flatnonzero(np.any([(low <= seen.time) & (seen.time <= high) for low, high in within], axis=0))
         pixel, spacing = settings.ground_sampling_distance, settings.image_spacing
         name = f"images of {pixel:g} m pixels every {spacing:g} m, of the points that these show"
     with layer_source(replace(request, settings=settings, wanted=LAYERS)) as source:
-        return sample_targets(source, seen.select(chosen), LAYERS), name, chosen
+        return sample_points(source, seen.select(chosen), LAYERS), name, chosen
 
 
 def _colour_errors(

@@ -27,8 +27,8 @@ from ...scanning.beam import RINGS, beam_pattern
 from ...scanning.blocks import Block, Blocks
 from ...scanning.plan import ScanConditions, ScanPlan
 from ...scanning.platforms.path import Strip
-from ...scanning.platforms.shifted import ShiftedMotion, ShiftedPath
-from ...scanning.scene.motion import LaneMotion, ScannedScene, lane_motions
+from ...scanning.platforms.stretches import PathStretches
+from ...scanning.scene.motion import LaneMotion, ScannedScene, ShiftedMotion, lane_motions
 from ...scanning.sections import Section, sections, shadow_length
 from ...scenario.scan import scanner_setting
 from ...scenario.scenario import Scenario
@@ -110,7 +110,7 @@ class SectionScan:
         """Build a section and return the plan of its blocks."""
         with timer.stage("model"):
             scene, frame = self._built(section)
-        path = ShiftedPath(self.cut.path, frame, self.cut.path.strips)
+        path = PathStretches(self.cut.path, self.cut.path.strips, frame)
         with timer.stage("caster"):
             plan = plan_scan(self.scenario, scene, path, BlenderServices(), ScanConditions.of(self.parameters))
         assert plan.request is not None

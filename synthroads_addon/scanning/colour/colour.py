@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field
 from typing import Any, Protocol
 
 import numpy as np
@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from ...cloud.points import NO_MATERIAL
 from ...materials.table import Material
+from ..array_rows import ArrayRows
 from .light import CloudShadows, SunAndSky
 from .settings import ColourMode
 
@@ -57,6 +58,28 @@ def shares_by_source(counts: NDArray[np.integer]) -> dict[str, float]:
     return {name: round(share, 6) for name, share in shares.items()}
 
 
+@dataclass(frozen=True)
+class SeenPoints(ArrayRows):
+    """N points as the scanner saw them: on the surface, without any error.
+
+    Attributes:
+        position: (N, 3) where the surface was hit, in the scene as it was rendered: local, m.
+        scanner: (N, 3) where the pulse came from, local, m.
+        normal: (N, 3) unit normals towards the scanner.
+        material: (N,) indices into the scene mesh's materials.
+        time: (N,) s since the scan's start.
+    """
+
+    position: Float
+    scanner: Float
+    normal: NDArray[np.floating]
+    material: NDArray[np.uint16]
+    time: Float
+
+    def __len__(self) -> int:
+        return len(self.position)
+
+
 class LayerSource(Protocol):
     """Gives points their layers.
 
@@ -70,23 +93,11 @@ class LayerSource(Protocol):
     def report(self) -> dict[str, Any]:
         """Return what was rendered, as JSON data; empty without."""
 
-    def sample(
-        self,
-        position: Float,
-        scanner: Float,
-        normal: NDArray[np.floating],
-        material: NDArray[np.uint16],
-        time: Float,
-        wanted: frozenset[str],
-    ) -> LayerValues:
+    def sample(self, points: SeenPoints, wanted: frozenset[str]) -> LayerValues:
         """Return the wanted layers of N points.
 
         Args:
-            position: (N, 3) where the surface was hit, without any error, in the scene as it was rendered: local, m.
-            scanner: (N, 3) where the pulse came from, local, m.
-            normal: (N, 3) unit normals towards the scanner.
-            material: (N,) indices into the scene mesh's materials.
-            time: (N,) s since the scan's start.
+            points: none of which lies in the air.
             wanted: ``rgb`` and layers of `MATERIAL_LAYERS`; none other is computed.
         """
         ...
@@ -109,9 +120,7 @@ class SurfaceConstants:
         return tuple(name for name in MATERIAL_LAYERS if name in wanted and bool(self.varies[name].any()))
 
 
-def surface_constants(
-    rows: Sequence[Material], varies: dict[str, NDArray[np.bool_]] | None = None
-) -> SurfaceConstants:
+def surface_constants(rows: Sequence[Material], varies: dict[str, NDArray[np.bool_]] | None = None) -> SurfaceConstants:
     """Return the constants of materials in the order of the scene mesh's; nothing varies if not said so."""
     values = {
         name: np.array([getattr(row, name) for row in rows], np.float32).reshape((-1, 3) if parts == 3 else (-1,))
@@ -129,7 +138,12 @@ def needed_layers(wanted: frozenset[str], mode: ColourMode) -> frozenset[str]:
     return frozenset(needed)
 
 
-def encode(linear: NDArray[np.floating]) -> NDArray[np.uint16]:
+def decode_srgb(stored: Float) -> Float:
+    """Return linear values of sRGB's (IEC 61966-2-1), 0 to 1."""
+    return np.where(stored <= 0.04045, stored / 12.92, ((stored + 0.055) / 1.055) ** 2.4)
+
+
+def encode_srgb(linear: NDArray[np.floating]) -> NDArray[np.uint16]:
     """Return linear colours as 16-bit sRGB (IEC 61966-2-1), clipped to what that can show."""
     linear = np.clip(np.asarray(linear, np.float32), 0.0, 1.0)
     curve = np.float32(1.055) * np.power(linear, np.float32(1 / 2.4)) - np.float32(0.055)
@@ -152,34 +166,11 @@ class Shading:
     clouds: CloudShadows | None = None
 
 
-@dataclass(frozen=True)
-class Targets:
-    """Points that layers are wanted of; arrays as of `LayerSource.sample`."""
-
-    position: Float
-    scanner: Float
-    normal: NDArray[np.floating]
-    material: NDArray[np.uint16]
-    time: Float
-
-    def __len__(self) -> int:
-        return len(self.position)
-
-    def select(self, rows: NDArray[np.bool_] | NDArray[np.intp] | slice) -> Targets:
-        """Return some of the points."""
-        return Targets(*(getattr(self, f.name)[rows] for f in fields(self)))
-
-
-def joined_targets(parts: Sequence[Targets]) -> Targets:
-    """Return the points of several parts, in order; at least one part is needed."""
-    return Targets(*(np.concatenate([getattr(part, f.name) for part in parts]) for f in fields(Targets)))
-
-
-def sample_targets(source: LayerSource, points: Targets, wanted: frozenset[str]) -> LayerValues:
+def sample_points(source: LayerSource, points: SeenPoints, wanted: frozenset[str]) -> LayerValues:
     """Return the wanted layers of points; 0, as if of a material, for those in the air."""
     solid = np.flatnonzero(points.material != NO_MATERIAL)
     on = points if len(solid) == len(points) else points.select(solid)
-    values = source.sample(on.position, on.scanner, on.normal, on.material, on.time, wanted)
+    values = source.sample(on, wanted)
     if on is points:
         return values
 
@@ -203,25 +194,16 @@ class MaterialLayers:
 
     @property
     def report(self) -> dict[str, Any]:
-        """Return that nothing was rendered."""
+        """Return an empty report: nothing was rendered."""
         return {}
 
-    def sample(
-        self,
-        position: Float,
-        scanner: Float,
-        normal: NDArray[np.floating],
-        material: NDArray[np.uint16],
-        time: Float,
-        wanted: frozenset[str],
-    ) -> LayerValues:
+    def sample(self, points: SeenPoints, wanted: frozenset[str]) -> LayerValues:
         """Return the wanted layers of N points; see `LayerSource.sample`."""
-        points = Targets(position, scanner, normal, material, time)
-        return self.completed(points, {}, np.full(len(points), FROM_MATERIAL, np.uint8), wanted)
+        return self.layer_values(points, {}, np.full(len(points), FROM_MATERIAL, np.uint8), wanted)
 
-    def completed(
+    def layer_values(
         self,
-        points: Targets,
+        points: SeenPoints,
         channels: dict[str, NDArray[np.float32]],
         source: NDArray[np.uint8],
         wanted: frozenset[str],
@@ -249,16 +231,16 @@ class MaterialLayers:
 
     def _rgb(
         self,
-        points: Targets,
+        points: SeenPoints,
         layers: dict[str, NDArray[np.float32]],
         channels: dict[str, NDArray[np.float32]],
         found: NDArray[np.bool_],
     ) -> NDArray[np.uint16]:
         if self.shading.mode == "false_colour":
-            return encode(np.stack([layers[name] for name in _FALSE_COLOUR], axis=1))
+            return encode_srgb(np.stack([layers[name] for name in _FALSE_COLOUR], axis=1))
         color = layers["base_color"]
         if self.shading.mode == "unlit":
-            return encode(color)
+            return encode_srgb(color)
         sun, sky = color * self.shading.light.sunlight(points.normal), color * self.shading.light.sky(points.normal)
         if "sun" in channels:
             sun[found] = channels["sun"][found]
@@ -266,4 +248,4 @@ class MaterialLayers:
             sky[found] = channels["sky"][found]
         if self.shading.clouds is not None:
             sun *= self.shading.clouds.transmission(points.position, points.time)[:, None]
-        return encode(sun + sky)
+        return encode_srgb(sun + sky)

@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from .colour import decode_srgb
+
 Float = NDArray[np.float64]
 
 _WHITE = np.array([0.95047, 1.0, 1.08883])
@@ -13,11 +15,9 @@ _TO_XYZ = np.array(
 )
 
 
-def lab(rgb: NDArray[np.uint16]) -> Float:
+def cie_lab(rgb: NDArray[np.uint16]) -> Float:
     """Return CIE L*a*b* (N, 3) under D65 of 16-bit sRGB (N, 3)."""
-    value = rgb.astype(np.float64) / 65535.0
-    linear = np.where(value <= 0.04045, value / 12.92, ((value + 0.055) / 1.055) ** 2.4)
-    ratio = linear @ _TO_XYZ.T / _WHITE
+    ratio = decode_srgb(rgb.astype(np.float64) / 65535.0) @ _TO_XYZ.T / _WHITE
     f = np.where(ratio > (6 / 29) ** 3, np.cbrt(ratio), ratio * (29 / 6) ** 2 / 3 + 4 / 29)
     return np.stack([116 * f[:, 1] - 16, 500 * (f[:, 0] - f[:, 1]), 200 * (f[:, 1] - f[:, 2])], axis=1)
 
@@ -34,7 +34,7 @@ def ciede2000(one: Float, other: Float) -> Float:
     turn = np.where(grey, 0.0, (h2 - h1 + 180.0) % 360.0 - 180.0)
     # Opposite hues: the sign follows Sharma's convention, +180 where h2 > h1.
     turn = np.where((np.abs(turn) == 180.0) & (h2 > h1), 180.0, turn)
-    apart = 2.0 * np.sqrt(c1 * c2) * np.sin(np.radians(turn / 2.0))
+    hue_difference = 2.0 * np.sqrt(c1 * c2) * np.sin(np.radians(turn / 2.0))
     lightness, chroma = (l1 + l2) / 2.0, (c1 + c2) / 2.0
     hue = np.where(np.abs(h1 - h2) <= 180.0, (h1 + h2) / 2.0, ((h1 + h2 + 360.0) / 2.0) % 360.0)
     hue = np.radians(np.where(grey, h1 + h2, hue))
@@ -49,5 +49,5 @@ def ciede2000(one: Float, other: Float) -> Float:
     s_c, s_h = 1.0 + 0.045 * chroma, 1.0 + 0.015 * chroma * t
     rotation = 60.0 * np.exp(-(((np.degrees(hue) - 275.0) / 25.0) ** 2))
     r_t = -np.sin(np.radians(rotation)) * 2.0 * np.sqrt(chroma**7 / (chroma**7 + 25.0**7))
-    dl, dc, dh = (l2 - l1) / s_l, (c2 - c1) / s_c, apart / s_h
+    dl, dc, dh = (l2 - l1) / s_l, (c2 - c1) / s_c, hue_difference / s_h
     return np.sqrt(dl * dl + dc * dc + dh * dh + r_t * dc * dh)

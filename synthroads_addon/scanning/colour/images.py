@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .colour import FROM_MATERIAL, NEARBY, LayerValues, MaterialLayers, Targets
+from .colour import FROM_MATERIAL, NEARBY, LayerValues, MaterialLayers, SeenPoints
 from .nearby import REACH, light_nearby, sample_nearby
 from .views import RenderedImage, View
 
 Float = NDArray[np.float64]
+Index = NDArray[np.intp]
 
 CANDIDATES = 8
 """Images nearest to the scanner that a point can take its values from; all of three places where that is more."""
@@ -60,95 +62,92 @@ class ImageLayers:
         self._locate()
 
     def _locate(self) -> None:
-        """Note where the images were taken."""
+        """Fill in the images' places, and how points are grouped by where their scanner stood."""
         self._places = np.array([image.view.position for image in self.images]).reshape(-1, 3)
         places, count = np.unique(self._places, axis=0, return_counts=True)
         most = int(count.max(initial=0))
         self._candidates, self._all = max(CANDIDATES, 3 * most), max(ALL_CANDIDATES, 9 * most)
         # Points whose scanner stood within one such cube share their candidates.
-        apart = np.linalg.norm(np.diff(places, axis=0), axis=1) if len(places) > 1 else np.ones(1)
-        self._cell = max(float(np.median(apart)) / 2.0, 0.5)
+        spacing = np.linalg.norm(np.diff(places, axis=0), axis=1) if len(places) > 1 else np.ones(1)
+        self._cell = max(float(np.median(spacing)) / 2.0, 0.5)
 
-    def sample(
-        self,
-        position: Float,
-        scanner: Float,
-        normal: NDArray[np.floating],
-        material: NDArray[np.uint16],
-        time: Float,
-        wanted: frozenset[str],
-    ) -> LayerValues:
+    def sample(self, points: SeenPoints, wanted: frozenset[str]) -> LayerValues:
         """Return the wanted layers of N points; see `LayerSource.sample`."""
-        points = Targets(position, scanner, normal, material, np.array(time, np.float64))
+        points = replace(points, time=np.array(points.time, np.float64))  # the images' times are written into it
         source = np.full(len(points), FROM_MATERIAL, np.uint8)
         taken = np.zeros((len(points), sum(part.stop - part.start for part in self.channels.values())), np.float32)
         if len(points) and self.images:
             self._take_all(points, taken, source)
-        return self.material.completed(
+        return self.material.layer_values(
             points, {name: taken[:, part] for name, part in self.channels.items()}, source, wanted
         )
 
-    def _take_all(self, points: Targets, taken: NDArray[np.float32], source: NDArray[np.uint8]) -> None:
+    def _take_all(self, points: SeenPoints, taken: NDArray[np.float32], source: NDArray[np.uint8]) -> None:
         """Fill in values, sources, and times of the points that an image shows."""
         cube = np.floor(points.scanner / self._cell).astype(np.int64)
         if (cube == cube[0]).all():
-            self._take(points, taken, source)
+            self._take(points, np.arange(len(points)), taken, source)
             return
         _, group = np.unique(cube @ np.array([1, 1 << 20, 1 << 40]), return_inverse=True)
         order = np.argsort(group, kind="stable")
         for rows in np.split(order, np.flatnonzero(np.diff(group[order])) + 1):
-            part, values, own = points.select(rows), taken[rows], source[rows]
-            self._take(part, values, own)
-            taken[rows], source[rows], points.time[rows] = values, own, part.time
+            self._take(points, rows, taken, source)
 
-    def _take(self, points: Targets, taken: NDArray[np.float32], source: NDArray[np.uint8]) -> None:
-        """Do so for points that the scanner saw from about one place."""
-        chosen, misfit = self._misfits(points, self._candidates)
+    def _take(self, points: SeenPoints, rows: Index, taken: NDArray[np.float32], source: NDArray[np.uint8]) -> None:
+        """Fill in rows of points that the scanner saw from about one place."""
+        seen = points.select(rows)
+        chosen, misfit = self._misfits(seen, self._candidates)
         order = np.argsort(misfit, axis=0, kind="stable")[:TRIES]
         best = np.where(np.take_along_axis(misfit, order, axis=0) >= _NOWHERE, -1, order)
+        hidden = np.ones(len(rows), bool)
         for rank in range(best.shape[0]):
-            left = np.flatnonzero((source == FROM_MATERIAL) & (best[rank] >= 0))
+            left = np.flatnonzero(hidden & (best[rank] >= 0))
             slots = best[rank, left]
             for slot in np.unique(slots):
-                rows = left[slots == slot]
+                part = left[slots == slot]
                 image = self.images[chosen[slot]]
-                values, shown = sample_image(image, points.position[rows], points.normal[rows], points.material[rows])
-                rows = rows[shown]
-                taken[rows], source[rows], points.time[rows] = values, rank + 1, image.view.time
-        hidden = np.flatnonzero(source == FROM_MATERIAL)
-        if len(hidden):
-            few, values, own = points.select(hidden), taken[hidden], source[hidden]
-            self._take_hidden(few, values, own)
-            taken[hidden], source[hidden], points.time[hidden] = values, own, few.time
+                values, shown = sample_image(image, seen.select(part))
+                part = part[shown]
+                into = rows[part]
+                taken[into], source[into], points.time[into] = values, rank + 1, image.view.time
+                hidden[part] = False
+        if hidden.any():
+            self._take_hidden(points, rows[hidden], taken, source)
 
-    def _take_hidden(self, points: Targets, taken: NDArray[np.float32], source: NDArray[np.uint8]) -> None:
+    def _take_hidden(
+        self, points: SeenPoints, rows: Index, taken: NDArray[np.float32], source: NDArray[np.uint8]
+    ) -> None:
         """Fill in what any image around shows of points that the best ones don't, and then what it shows close by.
 
         These are few: it is quicker to look at all of them in image by image than to go by their own order.
         """
-        chosen, misfit = self._misfits(points, self._all)
+        seen = points.select(rows)
+        chosen, misfit = self._misfits(seen, self._all)
         shows = (misfit < _NOWHERE).any(axis=1)
         chosen, misfit = chosen[shows], misfit[shows]
         rank = np.argsort(np.argsort(misfit, axis=0, kind="stable"), axis=0)
-        least = np.full(len(points), _NOWHERE)
+        least = np.full(len(rows), _NOWHERE)
         for slot, number in enumerate(chosen):
-            rows = np.flatnonzero(misfit[slot] < least)
+            part = np.flatnonzero(misfit[slot] < least)
             image = self.images[number]
-            values, shown = sample_image(image, points.position[rows], points.normal[rows], points.material[rows])
-            rows = rows[shown]
-            taken[rows], points.time[rows], least[rows] = values, image.view.time, misfit[slot, rows]
-            source[rows] = rank[slot, rows] + 1
-        away = np.where(source == FROM_MATERIAL, REACH, 0.0)
+            values, shown = sample_image(image, seen.select(part))
+            part = part[shown]
+            into = rows[part]
+            taken[into], source[into], points.time[into] = values, rank[slot, part] + 1, image.view.time
+            least[part] = misfit[slot, part]
+        away = np.where(source[rows] == FROM_MATERIAL, REACH, 0.0)
         for slot, number in enumerate(chosen):
-            rows = np.flatnonzero((away > 0.0) & (misfit[slot] < _NOWHERE))
+            part = np.flatnonzero((away > 0.0) & (misfit[slot] < _NOWHERE))
             image = self.images[number]
-            values, closer, distance = sample_nearby(image, points.position[rows], points.material[rows], away[rows])
-            rows = rows[closer]
-            taken[rows], points.time[rows], source[rows], away[rows] = values, image.view.time, NEARBY, distance
-        near = np.flatnonzero(source == NEARBY)
+            values, closer, distance = sample_nearby(image, seen.position[part], seen.material[part], away[part])
+            part = part[closer]
+            into = rows[part]
+            taken[into], source[into], points.time[into] = values, NEARBY, image.view.time
+            away[part] = distance
+        near = rows[source[rows] == NEARBY]
         taken[near] = light_nearby(self.material, points.select(near), taken[near], self.channels)
 
-    def _misfits(self, points: Targets, candidates: int) -> tuple[NDArray[np.intp], NDArray[np.float32]]:
+    def _misfits(self, points: SeenPoints, candidates: int) -> tuple[NDArray[np.intp], NDArray[np.float32]]:
         """Return the images (C,) nearest to the scanner and how badly they suit each point (C, N)."""
         away = np.linalg.norm(self._places - points.scanner.mean(axis=0), axis=1)
         chosen = np.argsort(away, kind="stable")[:candidates]
@@ -184,22 +183,20 @@ def _misfit(
     return np.where(inside, misfit, _NOWHERE)
 
 
-def sample_image(
-    image: RenderedImage, position: Float, normal: NDArray[np.floating], material: NDArray[np.uint16]
-) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
-    """Return an image's layers (n, C) of those n points (N, 3) that it shows, and which those are (N,).
+def sample_image(image: RenderedImage, points: SeenPoints) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
+    """Return an image's layers (n, C) of those n of N points that it shows, and which those are (N,).
 
     Bilinear over the pixels around a point that show its surface: the same material, at the depth of the plane
     through the point within `TOLERANCE` and half a pixel's width there.
     """
     view = image.view
-    x, y, depth = view.project(position)
+    x, y, depth = view.project(points.position)
     column, row = np.floor(x - 0.5), np.floor(y - 0.5)
-    plane = _plane(view, position, normal)
+    plane = _plane(view, points)
     slack = TOLERANCE + 0.5 * depth / view.focal
     width, height = view.size
-    values = np.zeros((len(position), image.layers.shape[2]), np.float32)
-    total = np.zeros(len(position), np.float32)
+    values = np.zeros((len(points), image.layers.shape[2]), np.float32)
+    total = np.zeros(len(points), np.float32)
     for dy in (0, 1):
         for dx in (0, 1):
             i, j = column + dx, row + dy
@@ -209,7 +206,7 @@ def sample_image(
             # Where the plane stands edge-on its depth has no meaning, and no pixel agrees with it.
             with np.errstate(divide="ignore", invalid="ignore"):
                 expected = plane(i, j)
-                good &= image.material[j, i] == material + 1
+                good &= image.material[j, i] == points.material + 1
                 good &= np.abs(image.depth[j, i] - expected) < slack
             part = np.where(good, weight, 0.0).astype(np.float32)
             values += part[:, None] * image.layers[j, i]
@@ -218,16 +215,14 @@ def sample_image(
     return values[shown] / total[shown, None], shown
 
 
-def _plane(
-    view: View, position: Float, normal: NDArray[np.floating]
-) -> Callable[[NDArray[np.intp], NDArray[np.intp]], Float]:
+def _plane(view: View, points: SeenPoints) -> Callable[[Index, Index], Float]:
     """Return the function that gives the depths (N,) at which pixels' rays meet the planes through the points."""
-    own = np.asarray(normal, np.float64) @ view.rotation
-    constant = np.einsum("nk,nk->n", own, (position - view.position) @ view.rotation)
+    normal = np.asarray(points.normal, np.float64) @ view.rotation
+    constant = np.einsum("nk,nk->n", normal, (points.position - view.position) @ view.rotation)
 
-    def depths(i: NDArray[np.intp], j: NDArray[np.intp]) -> Float:
+    def depths(i: Index, j: Index) -> Float:
         right, up = (i + 0.5 - view.centre[0]) / view.focal, (view.centre[1] - j - 0.5) / view.focal
-        return np.asarray(constant / (own[:, 0] * right + own[:, 1] * up - own[:, 2]))
+        return np.asarray(constant / (normal[:, 0] * right + normal[:, 1] * up - normal[:, 2]))
 
     return depths
 

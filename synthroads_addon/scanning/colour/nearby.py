@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from .colour import MaterialLayers, Targets
+from .colour import MaterialLayers, SeenPoints
 from .views import RenderedImage
 
 Float = NDArray[np.float64]
@@ -45,12 +45,12 @@ def sample_nearby(
     away = np.linalg.norm(view.place(i, j, image.depth[j, i]) - position[:, None, :], axis=2)
     away[~good] = np.inf
     best = np.arange(len(position)), away.argmin(axis=1)
-    found = away[best] < limit
-    return image.layers[j[best], i[best]][found].astype(np.float32), found, away[best][found]
+    near = away[best] < limit
+    return image.layers[j[best], i[best]][near].astype(np.float32), near, away[best][near]
 
 
 def light_nearby(
-    fallback: MaterialLayers, points: Targets, taken: NDArray[np.float32], channels: dict[str, slice]
+    fallback: MaterialLayers, points: SeenPoints, taken: NDArray[np.float32], channels: dict[str, slice]
 ) -> NDArray[np.float32]:
     """Return channels (N, C) taken at places close by, with the sun's light as the points' own slope has it.
 

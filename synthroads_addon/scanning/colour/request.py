@@ -6,11 +6,12 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from ...road.surroundings import Environment
+from ..platforms.path import Path
 from ..scene.mesh import SceneMesh
 from .colour import MaterialLayers, Shading, SurfaceConstants
 from .light import CloudShadows, SunAndSky
 from .settings import ColourSettings
-from .views import CameraPath, View
+from .views import View
 
 
 @dataclass(frozen=True)
@@ -33,7 +34,7 @@ class LayerRequest:
     wanted: frozenset[str]
     mesh: SceneMesh
     environment: Environment
-    path: CameraPath
+    path: Path
     field_of_view: float
     seed: int = 0
     frame: tuple[float, float, float] = (0.0, 0.0, 0.0)

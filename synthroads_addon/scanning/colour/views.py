@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..platforms.path import Path, Strip
 from ..scene.mesh import SceneMesh
 from .settings import ColourSettings
 
@@ -26,24 +26,6 @@ _SAMPLE = 40_000
 """Vertices, and as many places on faces, that the images are cut out by."""
 _NADIR = np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
 """Camera's axes (right, up, backwards) as columns in a level frame that looks forward (x), left (y) and up (z)."""
-
-
-class CameraPath(Protocol):
-    """Scanner's path as cameras need it: strips with ``start_time`` and ``duration``, and poses."""
-
-    @property
-    def strips(self) -> tuple[Any, ...]:
-        """Passes of the platform."""
-        ...
-
-    @property
-    def typical_range(self) -> float:
-        """Usual range, m."""
-        ...
-
-    def pose(self, strip: Any, time: Float) -> tuple[Float, Float]:
-        """Return positions (K, 3) and rotations (K, 3, 3) at times (K,) since the first strip's start."""
-        ...
 
 
 @dataclass(frozen=True)
@@ -120,9 +102,7 @@ class RenderedImage:
     material: NDArray[np.uint16]
 
 
-def views_along(
-    path: CameraPath, points: Float, settings: ColourSettings, field_of_view: float, largest: int
-) -> list[View]:
+def views_along(path: Path, points: Float, settings: ColourSettings, field_of_view: float, largest: int) -> list[View]:
     """Return the cameras along a path, each cut to what it can see of the scene.
 
     High platforms look straight down, with images as wide as the swath. Others look around: ahead, back, to both
@@ -163,7 +143,7 @@ def scene_sample(mesh: SceneMesh) -> Float:
     return np.concatenate([used.astype(np.float64), inside])
 
 
-def _times(path: CameraPath, strip: Any, spacing: float) -> Float:
+def _times(path: Path, strip: Strip, spacing: float) -> Float:
     """Return the times of a strip's images: evenly spaced, each in the middle of its share of the way."""
     knots = strip.start_time + np.linspace(0.0, strip.duration, 257)
     position, _ = path.pose(strip, knots)
@@ -174,7 +154,7 @@ def _times(path: CameraPath, strip: Any, spacing: float) -> Float:
     return np.interp((np.arange(count) + 0.5) / count * way[-1], way, knots)
 
 
-def _level(path: CameraPath, strip: Any, times: Float) -> tuple[Float, Float]:
+def _level(path: Path, strip: Strip, times: Float) -> tuple[Float, Float]:
     """Return positions (K, 3) and the horizontal directions (K, 2) of travel; of the scanner's axis where it stands."""
     position, rotation = path.pose(strip, times)
     step = min(0.05, strip.duration / 4.0)

@@ -269,17 +269,17 @@ def _mode(device: Device, pulse_rate_khz: float | None) -> PulseMode:
     raise InputError("scan.pulse_rate_khz", pulse_rate_khz, f"{device.title} fires at {rates} kHz")
 
 
-def _field_of_view(device: Device, mode: PulseMode, wanted: float | None) -> float:
+def _field_of_view(device: Device, mode: PulseMode, view: float | None) -> float:
     """Return the field of view in degrees."""
-    if wanted is None:
+    if view is None:
         return mode.field_of_view_deg
-    if device.pattern.fixed_view and not math.isclose(wanted, mode.field_of_view_deg):
+    if device.pattern.fixed_view and not math.isclose(view, mode.field_of_view_deg):
         allowed = f"{device.title} always sees {mode.field_of_view_deg:g} deg: its optics are fixed"
-        raise InputError("scan.field_of_view_deg", wanted, allowed)
-    if wanted > mode.field_of_view_deg:
+        raise InputError("scan.field_of_view_deg", view, allowed)
+    if view > mode.field_of_view_deg:
         allowed = f"{device.title} sees {mode.field_of_view_deg:g} deg at {mode.pulse_rate_khz:g} kHz"
-        raise InputError("scan.field_of_view_deg", wanted, allowed)
-    return wanted
+        raise InputError("scan.field_of_view_deg", view, allowed)
+    return view
 
 
 def _lines(device: Device, mode: PulseMode, view: float, scan: DeviceChoice) -> float:

@@ -44,14 +44,18 @@ class PulseTiming:
 
 @dataclass(frozen=True)
 class PulseRays:
-    """Directions of P pulses of a head.
+    """Directions of P pulses of a head, in its frame, or of a whole scanner, in the scanner's; see `devices.shots`.
 
     Attributes:
-        time: (P,) s since the head began to scan.
-        scan_angle: (P,) rad, see `devices.shots.Shots`.
-        direction: (3, P) unit vectors.
-        in_plane, across: (3, P) unit vectors across the beam; None if not asked for.
-        beam: (P,) number of the beam; None if there is only one.
+        time: (P,) s since the head, or the strip, began to be scanned.
+        scan_angle: (P,) rad: across the forward direction from the nadir, positive to the right; a rotating head's
+            azimuth from the forward direction, positive to the right. Of the head itself, however it is mounted.
+        direction: (3, P) unit vectors of the beam's axis.
+        in_plane: (3, P) unit vectors across the beam, in the scan plane (along a rotating head's turn; to the right
+            for a wedge prism); None if not asked for.
+        across: (3, P) unit vectors across the beam and `in_plane`; None if not asked for.
+        beam: (P,) number of the beam: on a head, None if it has only one; of a scanner, that of the beam on its head
+            + beams of a head x number of the head.
     """
 
     time: Float
@@ -59,7 +63,7 @@ class PulseRays:
     direction: Float
     in_plane: Float | None = None
     across: Float | None = None
-    beam: Numbers | None = None
+    beam: NDArray[np.integer] | None = None
 
 
 class Pattern(Model):

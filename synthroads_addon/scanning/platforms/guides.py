@@ -6,14 +6,16 @@ offsets count to the left.
 
 from __future__ import annotations
 
-from typing import Protocol
+from abc import ABC, abstractmethod
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from ...base.errors import InputError
+from ...road.alignment import Alignment
 from ...road.damage import damage_depth
 from ...road.geometry import RoadGeometry
+from ...road.profile import Profile
 from ...road.section_geometry import CarriagewaySection
 from ...road.surface import surface_elevation
 
@@ -23,83 +25,92 @@ _SAMPLES = 201  # stations at which a lane's place is looked up
 _FULL_LANE = 1.99  # m; what is narrower is a lane that begins or ends
 
 
-class Guide(Protocol):
-    """Line that a path follows."""
+class Guide(ABC):
+    """Line that a path follows.
 
-    @property
-    def length(self) -> float:
-        """Return the largest station, m; the first is 0."""
-        ...
+    Attributes:
+        length: the largest station, m; the first is 0.
+        origin: (3,) map coordinates of the local origin, m.
+        breaks: (B,) stations at which the curvature may jump or bend.
+    """
 
-    @property
-    def origin(self) -> Float:
-        """Return the map coordinates (3,) of the local origin, m."""
-        ...
+    length: float
+    origin: Float
+    breaks: Float
 
-    @property
-    def breaks(self) -> Float:
-        """Return the stations (B,) at which the curvature may jump or bend."""
-        ...
-
-    def at(self, station: Float) -> tuple[Float, Float]:
-        """Return local positions (K, 3), m, and headings (K,), rad, at stations (K,)."""
-        ...
-
+    @abstractmethod
     def frame(self, station: Float) -> tuple[Float, Float, Float, Float]:
         """Return plan position (K, 2), heading (K,), curvature (K,) 1/m, and plan length per station (K,)."""
-        ...
 
+    @abstractmethod
     def elevation(self, station: Float) -> Float:
         """Return the local elevation (K,) of the guide itself."""
-        ...
 
+    @abstractmethod
     def ground(self, station: Float, offset: Float, damaged: bool) -> Float:
         """Return the local elevation (K,) of what lies beneath, with or without ruts and potholes; NaN if unknown."""
-        ...
 
+    @abstractmethod
     def project(self, plan: Float) -> tuple[Float, Float]:
         """Return stations (K,) and offsets (K,) of local points (K, 2)."""
-        ...
 
+    @abstractmethod
     def driving_offsets(self) -> tuple[float, ...]:
         """Return the offset of the outermost lane's middle for each carriageway, m."""
-        ...
 
+    @abstractmethod
     def roadside_offsets(self, station: Float) -> Float:
         """Return the offsets (K,) at which a tripod stands at stations (K,), m."""
-        ...
 
 
-class RoadGuide:
-    """The centreline of a road."""
+class AlignmentGuide(Guide):
+    """An alignment with a profile; what lies beneath is level across and as high as the line.
 
-    def __init__(self, geometry: RoadGeometry) -> None:
-        self.geometry = geometry
-        self.origin = np.array(geometry.parameters.transform.translate, dtype=np.float64)
+    A vehicle drives along the line, and a tripod stands on it.
 
-    @property
-    def length(self) -> float:
-        """Return the length of the centreline, m."""
-        return self.geometry.length
+    Args:
+        alignment: the line in plan.
+        profile: its elevation.
+        origin: (3,) map coordinates of the local origin, m.
+    """
 
-    @property
-    def breaks(self) -> Float:
-        """Return the stations (B,) at which the curvature may jump or bend."""
-        return self.geometry.alignment.element_starts
-
-    def at(self, station: Float) -> tuple[Float, Float]:
-        """Return local positions (K, 3), m, and headings (K,), rad, at stations (K,)."""
-        plan, heading, _ = self.geometry.alignment.frame(station)
-        return np.column_stack([plan, self.elevation(station)]), heading
+    def __init__(self, alignment: Alignment, profile: Profile, origin: ArrayLike) -> None:
+        self.alignment, self.profile = alignment, profile
+        self.origin = np.array(origin, dtype=np.float64)
+        self.length, self.breaks = alignment.length, alignment.element_starts
 
     def frame(self, station: Float) -> tuple[Float, Float, Float, Float]:
         """Return plan position (K, 2), heading (K,), curvature (K,) 1/m, and plan length per station (K,): 1."""
-        plan, heading, curvature = self.geometry.alignment.frame(station)
+        plan, heading, curvature = self.alignment.frame(station)
         return plan, heading, curvature, np.ones(len(station))
 
     def elevation(self, station: Float) -> Float:
         """Return the profile's local elevation (K,)."""
-        return self.geometry.profile.elevation(station)
+        return self.profile.elevation(station)
+
+    def ground(self, station: Float, offset: Float, damaged: bool) -> Float:
+        """Return the local elevation (K,) of the line at the stations."""
+        return self.elevation(station)
+
+    def project(self, plan: Float) -> tuple[Float, Float]:
+        """Return stations (K,) and offsets (K,) of local points (K, 2)."""
+        return self.alignment.project(plan)
+
+    def driving_offsets(self) -> tuple[float, ...]:
+        """Return 0: a vehicle drives along the line itself."""
+        return (0.0,)
+
+    def roadside_offsets(self, station: Float) -> Float:
+        """Return zeros (K,): a tripod stands on the line itself."""
+        return np.zeros(len(station))
+
+
+class RoadGuide(AlignmentGuide):
+    """The centreline of a road."""
+
+    def __init__(self, geometry: RoadGeometry) -> None:
+        super().__init__(geometry.alignment, geometry.profile, geometry.parameters.transform.translate)
+        self.geometry = geometry
 
     def ground(self, station: Float, offset: Float, damaged: bool) -> Float:
         """Return the local elevation (K,) of the road, its batter or the ground; NaN beyond an elevation model."""
@@ -108,10 +119,6 @@ class RoadGuide:
             for section in self.geometry.sections.values():
                 height += damage_depth(section, station, offset)
         return height
-
-    def project(self, plan: Float) -> tuple[Float, Float]:
-        """Return stations (K,) and offsets (K,) of local points (K, 2)."""
-        return self.geometry.alignment.project(plan)
 
     def driving_offsets(self) -> tuple[float, ...]:
         """Return the offset of the outermost through lane's middle, right carriageway first, m.
@@ -128,14 +135,11 @@ class RoadGuide:
         return np.choose(np.arange(len(station)) % len(edges), edges)
 
 
-class SmoothedGuide:
+class SmoothedGuide(Guide):
     """Polynomials of the station fitted to a guide's x and y by least squares; elevations stay the guide's.
 
     They are Chebyshev sums of the station scaled to -1 ... 1, about the guide's mean, so that a high degree on a long
     road stays well conditioned.
-
-    Attributes:
-        deviation: largest horizontal distance of the polynomials from the guide, m.
 
     Args:
         guide: what to fit.
@@ -158,21 +162,15 @@ class SmoothedGuide:
         self._derivatives = [coefficients]
         for _ in range(2):
             self._derivatives.append(fit.chebder(self._derivatives[-1]) * (2.0 / self.length))
-        fitted, _, _, stretch = self.frame(station)
+        stretch = self.frame(station)[3]
         if stretch.min() < 0.02:
             at = float(station[stretch.argmin()])
             raise InputError(
                 "scan.platform.polynomial_degree", degree, f"the smoothed path turns back at station {at:.1f} m"
             )
-        self.deviation = float(np.abs(guide.project(fitted)[1]).max())
 
     def _scaled(self, station: Float) -> Float:
         return 2.0 * station / self.length - 1.0
-
-    def at(self, station: Float) -> tuple[Float, Float]:
-        """Return local positions (K, 3), m, and headings (K,), rad within half a turn, at stations (K,)."""
-        plan, heading, _, _ = self.frame(station)
-        return np.column_stack([plan, self.elevation(station)]), heading
 
     def frame(self, station: Float) -> tuple[Float, Float, Float, Float]:
         """Return plan position (K, 2), heading (K,), curvature (K,) 1/m, and plan length per station (K,)."""
@@ -197,11 +195,11 @@ class SmoothedGuide:
         return self._guide.project(plan)
 
     def driving_offsets(self) -> tuple[float, ...]:
-        """Return the guide's."""
+        """Return the driving offsets beside the guide, m."""
         return self._guide.driving_offsets()
 
     def roadside_offsets(self, station: Float) -> Float:
-        """Return the guide's."""
+        """Return the roadside offsets (K,) beside the guide, m."""
         return self._guide.roadside_offsets(station)
 
 

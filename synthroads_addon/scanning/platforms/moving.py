@@ -15,7 +15,7 @@ from ...base.schema import Finite, notes, quantity
 from .guides import Float, Guide, SmoothedGuide
 from .path import KNOT_RANGE, Strip, knots_for, strips_of
 from .platform import Platform
-from .strip_line import Eased, StripTrack, Sway
+from .strip_line import EasedFunction, StripTrack, Sway
 
 _HEIGHT_STEP = 1.0  # m
 _ATTITUDE_STEP = 5.0  # m
@@ -25,9 +25,7 @@ _TRACKS_KEPT = 4
 class MovingPlatform(Platform):
     """Platform that moves along a guide, in strips."""
 
-    height: float | None = quantity(
-        None, ge=0.1, le=5000, unit="m", description="Height above the road."
-    )
+    height: float | None = quantity(None, ge=0.1, le=5000, unit="m", description="Height above the road.")
     speed: float | None = quantity(None, ge=0.1, le=150, unit="m/s", description="Speed over ground.")
     lateral_offsets: tuple[Finite, ...] | None = Field(
         None,
@@ -62,7 +60,7 @@ class MovingPlatform(Platform):
         return MovingPath(self, guide)
 
     def runs_forward(self, strip: int, offset: float) -> bool:
-        """Return whether a strip, at an offset (m), is gone along with the stations."""
+        """Return whether the platform moves along a strip, at an offset (m), in the direction of the stations."""
         raise NotImplementedError
 
 
@@ -90,8 +88,6 @@ class MovingPath:
         height: of the scanner above what it follows, m.
         knot_spacing: s, see `Path`.
         typical_range: m, see `Path`.
-        deviation: largest horizontal distance of the path's form from the guide and its offsets, m: that of the
-            fitted polynomials, or the sway.
 
     Args:
         platform: what moves.
@@ -102,7 +98,7 @@ class MovingPath:
     """
 
     def __init__(self, platform: MovingPlatform, guide: Guide) -> None:
-        self._guide, self._sway, self.deviation = _form(platform, guide)
+        self._guide, self._sway = _form(platform, guide)
         self._offsets: tuple[float, ...] = platform.value("lateral_offsets") or self._guide.driving_offsets()
         self._forward = [platform.runs_forward(strip, offset) for strip, offset in enumerate(self._offsets)]
         self.height, self._speed = float(platform.value("height")), float(platform.value("speed"))
@@ -125,7 +121,7 @@ class MovingPath:
         plan, course, _, _ = track.place(within)
         beyond = (distance - within)[:, None]
         plan = plan + beyond * np.stack([np.cos(course), np.sin(course)], axis=1)
-        height, attitude = self._eased(track)
+        height, attitude = self._eased_functions(track)
         position = np.column_stack([plan, height(distance)])
         return position, rotation_matrix(*attitude(distance).T) @ self._mounting
 
@@ -133,12 +129,12 @@ class MovingPath:
         field = f"scan.platform.lateral_offsets[{index}]" if self._named else "scan.platform.lateral_offsets"
         return StripTrack(self._guide, self._offsets[index], self._sway, self._forward[index], field)
 
-    def _eased(self, track: StripTrack) -> tuple[Eased, Eased]:
+    def _eased_functions(self, track: StripTrack) -> tuple[EasedFunction, EasedFunction]:
         """Return height (K, 1) and heading, pitch, roll (K, 3) as functions of the distance travelled."""
         step = min(_ATTITUDE_STEP, self._sway.wavelength / 40.0) if self._sway else _ATTITUDE_STEP
         return (
-            Eased(lambda distance: self.heights(track, distance)[:, None], track.length, _HEIGHT_STEP, False),
-            Eased(lambda distance: self.attitudes(track, distance), track.length, step, True),
+            EasedFunction(lambda distance: self.heights(track, distance)[:, None], track.length, _HEIGHT_STEP, False),
+            EasedFunction(lambda distance: self.attitudes(track, distance), track.length, step, True),
         )
 
     def heights(self, track: StripTrack, distance: Float) -> Float:
@@ -168,7 +164,7 @@ class MovingPath:
 
     def _knots(self, index: int) -> float:
         track = self._strip_track(index)
-        height, attitude = self._eased(track)
+        height, attitude = self._eased_functions(track)
         rate, turn = attitude.bends()
         curvature, jump = track.bend
         # A rotation's second derivative is at most the angular velocity squared plus the angular acceleration.
@@ -177,14 +173,13 @@ class MovingPath:
         return knots_for(bend * self._speed**2, jump * self._speed)
 
 
-def _form(platform: MovingPlatform, guide: Guide) -> tuple[Guide, Sway | None, float]:
-    """Return what the strips lie beside, their sway, and how far this form leaves the guide."""
+def _form(platform: MovingPlatform, guide: Guide) -> tuple[Guide, Sway | None]:
+    """Return the guide that the strips lie beside, and their sway."""
     if platform.path == "smoothed":
-        smoothed = SmoothedGuide(guide, platform.polynomial_degree)
-        return smoothed, None, smoothed.deviation
+        return SmoothedGuide(guide, platform.polynomial_degree), None
     if platform.path == "direct" or platform.zigzag_amplitude == 0.0:
-        return guide, None, 0.0
+        return guide, None
     if platform.zigzag_wavelength < platform.zigzag_amplitude:
         allowed = f"at least the amplitude, {platform.zigzag_amplitude:g} m, is needed: a shorter sway runs across"
         raise InputError("scan.platform.zigzag_wavelength", platform.zigzag_wavelength, allowed)
-    return guide, Sway(platform.zigzag_amplitude, platform.zigzag_wavelength), platform.zigzag_amplitude
+    return guide, Sway(platform.zigzag_amplitude, platform.zigzag_wavelength)

@@ -62,11 +62,6 @@ class Path(Protocol):
         """Return the usual distance (m) to what is scanned, to which the scale of intensities refers."""
         ...
 
-    @property
-    def deviation(self) -> float:
-        """Return the largest horizontal distance (m) by which the path's form leaves what it follows."""
-        ...
-
     def pose(self, strip: Strip, time: Float) -> tuple[Float, Float]:
         """Return where the scanner is at times of a strip.
 

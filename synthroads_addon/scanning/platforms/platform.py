@@ -30,9 +30,7 @@ class Platform(ClosedModel):
     roll_deg: float = quantity(
         0.0, ge=-180, le=180, unit="deg", description="Mounting of the scanner: about the forward axis."
     )
-    pitch_deg: float = quantity(
-        0.0, ge=-90, le=90, unit="deg", description="Mounting of the scanner: nose up."
-    )
+    pitch_deg: float = quantity(0.0, ge=-90, le=90, unit="deg", description="Mounting of the scanner: nose up.")
     yaw_deg: float = quantity(
         0.0, ge=-180, le=180, unit="deg", description="Mounting of the scanner: counter-clockwise from above."
     )

@@ -13,8 +13,7 @@ from ...base.rotations import wrap_angle
 from ...road.alignment import CURVATURE_LIMIT, Alignment, Element, finite_array
 from ...road.centerline import read_axis
 from ...road.profile import IntersectionPoint, Profile
-
-Float = NDArray[np.float64]
+from .guides import AlignmentGuide, Float
 
 CORNER = 10.0
 """A corner is rounded from this far (m) before it on, or from nearly half way to the nearer neighbouring point."""
@@ -24,20 +23,18 @@ MEASURED = 0.05
 _REPEATED = 1e-3  # m
 
 
-class PolylineGuide:
+class PolylineGuide(AlignmentGuide):
     """A polyline whose corners are rounded in plan, so that its heading is continuous.
 
     Each corner is replaced by two clothoids that begin `CORNER` before it (or at 49 % of the way to the nearer
     neighbouring point) and end as far behind it; heading and curvature are continuous. In height it is straight
-    between the corners. What lies beneath is level across and as high as the polyline.
+    between the corners.
 
     A measured line that jitters by centimetres has bends of a few metres' radius at points half a metre apart, beside
     which there is no offset line. A tolerance leaves out the points that lie within it of the line through the others
     (Douglas and Peucker 1973).
 
     Attributes:
-        alignment: the rounded line in plan.
-        profile: its elevation.
         deviation: how far the rounded line is from any point at most, m, in plan.
 
     Args:
@@ -50,15 +47,12 @@ class PolylineGuide:
         InputError: points that aren't finite, fewer than two distinct ones, or a corner too sharp to be rounded.
     """
 
-    def __init__(
-        self, points: ArrayLike, origin: Sequence[float] = (0.0, 0.0, 0.0), tolerance: float = 0.0
-    ) -> None:
+    def __init__(self, points: ArrayLike, origin: Sequence[float] = (0.0, 0.0, 0.0), tolerance: float = 0.0) -> None:
         given = finite_array("points", points)
         if given.ndim != 2 or given.shape[1] not in (2, 3):
             raise InputError("points", given.shape, "an array of shape (N, 2) or (N, 3) is needed")
         kept = _thin_points(given, tolerance)
         line = given[kept]
-        self.origin = np.array(origin, dtype=np.float64)
         step = np.diff(line[:, :2], axis=0)
         span, heading = np.hypot(*step.T), np.arctan2(step[:, 1], step[:, 0])
         turn = wrap_angle(np.diff(heading))
@@ -66,14 +60,15 @@ class PolylineGuide:
         lengths = _clothoid_lengths(turn, reach)
         _refuse_sharp(given, kept, turn, lengths)
         x, y = line[0, :2].tolist()
-        self.alignment = Alignment(_elements(span, reach, turn, lengths), x, y, float(heading[0]))
-        self.deviation = float(np.abs(self.alignment.project(given[:, :2])[1]).max())
+        alignment = Alignment(_elements(span, reach, turn, lengths), x, y, float(heading[0]))
         straight = span - np.concatenate(([0.0], reach)) - np.concatenate((reach, [0.0]))
         station = np.cumsum(straight) + np.concatenate(([0.0], np.cumsum(2.0 * lengths)))
         station[:-1] += lengths
         station = np.concatenate(([0.0], station))
         height = line[:, 2] if line.shape[1] == 3 else np.zeros(len(line))
-        self.profile = Profile([IntersectionPoint(float(s), float(z)) for s, z in zip(station, height, strict=True)])
+        profile = Profile([IntersectionPoint(float(s), float(z)) for s, z in zip(station, height, strict=True)])
+        super().__init__(alignment, profile, origin)
+        self.deviation = float(np.abs(alignment.project(given[:, :2])[1]).max())
 
     @classmethod
     def read(
@@ -93,57 +88,17 @@ class PolylineGuide:
         base = np.round(points.mean(axis=0)) if origin is None else np.array(origin, dtype=np.float64)
         return cls(points - base, base.tolist(), tolerance)
 
-    @property
-    def length(self) -> float:
-        """Return the length of the rounded line, m."""
-        return self.alignment.length
-
-    @property
-    def breaks(self) -> Float:
-        """Return the stations (B,) at which the curvature may jump or bend."""
-        return self.alignment.element_starts
-
-    def at(self, station: Float) -> tuple[Float, Float]:
-        """Return local positions (K, 3), m, and headings (K,), rad, at stations (K,)."""
-        plan, heading, _ = self.alignment.frame(station)
-        return np.column_stack([plan, self.elevation(station)]), heading
-
-    def frame(self, station: Float) -> tuple[Float, Float, Float, Float]:
-        """Return plan position (K, 2), heading (K,), curvature (K,) 1/m, and plan length per station (K,): 1."""
-        plan, heading, curvature = self.alignment.frame(station)
-        return plan, heading, curvature, np.ones(len(station))
-
-    def elevation(self, station: Float) -> Float:
-        """Return the local elevation (K,) of the line."""
-        return self.profile.elevation(station)
-
-    def ground(self, station: Float, offset: Float, damaged: bool) -> Float:
-        """Return the local elevation (K,) of the line at the stations."""
-        return self.elevation(station)
-
-    def project(self, plan: Float) -> tuple[Float, Float]:
-        """Return stations (K,) and offsets (K,) of local points (K, 2)."""
-        return self.alignment.project(plan)
-
-    def driving_offsets(self) -> tuple[float, ...]:
-        """Return that a vehicle drives along the line."""
-        return (0.0,)
-
-    def roadside_offsets(self, station: Float) -> Float:
-        """Return that a tripod stands on the line."""
-        return np.zeros(len(station))
-
 
 def _thin_points(points: Float, tolerance: float) -> NDArray[np.intp]:
     """Return the indices of the points that make the line: without repetitions, and thinned in three dimensions."""
-    apart = np.concatenate(([True], np.hypot(*np.diff(points[:, :2], axis=0).T) > _REPEATED))[: len(points)]
-    kept = np.flatnonzero(apart)
+    distinct = np.concatenate(([True], np.hypot(*np.diff(points[:, :2], axis=0).T) > _REPEATED))[: len(points)]
+    kept = np.flatnonzero(distinct)
     if len(kept) < 2:
         raise InputError("points", len(points), "at least two points, more than 1 mm apart in plan, are needed")
     if tolerance <= 0.0:
         return kept
-    line, wanted = points[kept], np.zeros(len(kept), dtype=bool)
-    wanted[[0, -1]] = True
+    line, needed = points[kept], np.zeros(len(kept), dtype=bool)
+    needed[[0, -1]] = True
     stack = [(0, len(kept) - 1)]
     while stack:
         first, last = stack.pop()
@@ -155,9 +110,9 @@ def _thin_points(points: Float, tolerance: float) -> NDArray[np.intp]:
         farthest = int(distance.argmax())
         if distance[farthest] > tolerance:
             middle = first + 1 + farthest
-            wanted[middle] = True
+            needed[middle] = True
             stack += [(first, middle), (middle, last)]
-    return kept[wanted]
+    return kept[needed]
 
 
 def _clothoid_lengths(turn: Float, reach: Float) -> Float:

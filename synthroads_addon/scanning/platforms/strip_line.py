@@ -192,7 +192,7 @@ Function = Callable[[Float], Float]
 """Of distances (K,) from 0 to the length: values (K, C)."""
 
 
-class Eased:
+class EasedFunction:
     """Functions of the distance, taken at even steps and joined by Catmull-Rom cubics.
 
     What is quadratic in the distance (grades, parabolas, the heading along straights, arcs and clothoids) is kept

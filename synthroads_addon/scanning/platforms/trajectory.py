@@ -36,9 +36,7 @@ class RecordedTrajectory(Platform):
     order: ClassVar[int] = 4
 
     kind: Literal["trajectory"] = Field("trajectory", title="Platform", description="Platform.")
-    file: str | None = Field(
-        None, title="Trajectory", description="CSV with time, x, y, z, roll, pitch, heading."
-    )
+    file: str | None = Field(None, title="Trajectory", description="CSV with time, x, y, z, roll, pitch, heading.")
 
     def make_path(self, guide: Guide, origin: Sequence[float] | None = None) -> TrajectoryPath:
         """Return the file's strip; see `Platform.make_path`."""
@@ -53,7 +51,6 @@ class TrajectoryPath:
         knot_spacing: s, see `Path`. Where the file's times lie on an even grid, knots do too, and positions between
             them are exact; otherwise it is short enough for the corners of the trajectory.
         typical_range: median height above the guide, but `_NEAREST` at least, m.
-        deviation: 0.
 
     Args:
         platform: with a file and a mounting.
@@ -63,8 +60,6 @@ class TrajectoryPath:
     Raises:
         InputError: there is no file, it is wrong, or two rows are turned too far to know the way between them.
     """
-
-    deviation = 0.0
 
     def __init__(self, platform: RecordedTrajectory, guide: Guide, origin: Sequence[float] | None = None) -> None:
         if platform.file is None:
@@ -87,9 +82,9 @@ class TrajectoryPath:
 
         Beyond the ends positions go on straight, and the attitude is that of the end.
         """
-        wanted = np.asarray(time, dtype=np.float64)
-        row = np.clip(np.searchsorted(self._time, wanted, side="right") - 1, 0, len(self._time) - 2)
-        share = (wanted - self._time[row]) / (self._time[row + 1] - self._time[row])
+        time = np.asarray(time, dtype=np.float64)
+        row = np.clip(np.searchsorted(self._time, time, side="right") - 1, 0, len(self._time) - 2)
+        share = (time - self._time[row]) / (self._time[row + 1] - self._time[row])
         step = self._position[row + 1] - self._position[row]
         position = self._position[row] + share[:, None] * step
         turned = slerp(self._attitude[row], self._attitude[row + 1], np.clip(share, 0.0, 1.0))
@@ -186,13 +181,13 @@ def _text(name: str) -> str:
 
 def _columns(place: str, head: list[str]) -> list[int]:
     names = [entry.lower() for entry in head]
-    for wanted in COLUMNS:
-        if names.count(wanted) != 1:
-            often = "is missing" if wanted not in names else f"is there {names.count(wanted)} times"
-            hint = nearest_name(wanted, set(names) - set(COLUMNS)) if wanted not in names else ""
-            allowed = f"a header with the columns {', '.join(COLUMNS)} is needed: {wanted} {often}{hint}"
+    for column in COLUMNS:
+        if names.count(column) != 1:
+            often = "is missing" if column not in names else f"is there {names.count(column)} times"
+            hint = nearest_name(column, set(names) - set(COLUMNS)) if column not in names else ""
+            allowed = f"a header with the columns {', '.join(COLUMNS)} is needed: {column} {often}{hint}"
             raise InputError(place, ", ".join(head), allowed)
-    return [names.index(wanted) for wanted in COLUMNS]
+    return [names.index(column) for column in COLUMNS]
 
 
 def _row(place: str, entries: list[str], places: list[int]) -> list[float]:

@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar, Literal
 
 import numpy as np
+from numpy.typing import ArrayLike
 from pydantic import Field
 
 from ...base.errors import InputError
@@ -66,8 +67,28 @@ class Tripod(Platform):
     )
 
     def make_path(self, guide: Guide, origin: Sequence[float] | None = None) -> TripodPath:
-        """Return the positions; see `Platform.make_path`."""
-        return TripodPath(self, guide)
+        """Return the positions along the guide, in the order of the stations; see `Platform.make_path`.
+
+        The scanner begins facing along the guide. Without stations, positions are a spacing apart, and what is left of
+        the length is shared between both ends.
+
+        Raises:
+            InputError: a station isn't on the guide, or the ground there isn't known.
+        """
+        station = _stations(self, guide.length)
+        if self.lateral_offsets is None:
+            offset = guide.roadside_offsets(station)
+        else:
+            offset = np.resize(np.array(self.lateral_offsets, dtype=np.float64), len(station))
+        plan, heading, _, _ = guide.frame(station)
+        left = np.stack([-np.sin(heading), np.cos(heading)], axis=1)
+        ground = guide.ground(station, offset, True)
+        if not np.isfinite(ground).all():
+            place = int(np.argmin(np.isfinite(ground)))
+            allowed = f"there is no ground known at station {station[place]:.1f} m; a smaller one is needed"
+            raise InputError("scan.platform.lateral_offsets", float(offset[place]), allowed)
+        positions = np.column_stack([plan + offset[:, None] * left, ground + self.value("height")])
+        return TripodPath(self, positions, heading)
 
     def turn_rate(self) -> float:
         """Return the rate at which the scanner is turned, counter-clockwise, rad/s."""
@@ -75,41 +96,26 @@ class Tripod(Platform):
 
 
 class TripodPath:
-    """Positions along a guide, one strip each; the scanner stands upright and turns counter-clockwise at an even rate.
-
-    It begins facing along the guide. Without stations, positions are a spacing apart, and what is left of the length
-    is shared between both ends.
+    """One strip at each position; the scanner stands upright and turns counter-clockwise at an even rate.
 
     Attributes:
-        strips: in the order of the stations given.
-        positions: (S, 3) local positions, m.
+        strips: in the order of the positions.
+        positions: (S, 3) local positions of the scanner, m.
         knot_spacing: s, see `Path`.
         typical_range: m, see `Path`.
-        deviation: 0.
 
-    Raises:
-        InputError: a station isn't on the guide, or the ground there isn't known.
+    Args:
+        platform: its turning and mounting.
+        positions: (S, 3) of the scanner itself, local, m; at least one.
+        headings: (S,) in which it begins, rad; along x if not given.
     """
 
-    deviation = 0.0
-
-    def __init__(self, platform: Tripod, guide: Guide) -> None:
-        station = _stations(platform, guide.length)
-        if platform.lateral_offsets is None:
-            offset = guide.roadside_offsets(station)
-        else:
-            offset = np.resize(np.array(platform.lateral_offsets, dtype=np.float64), len(station))
-        plan, self._headings, _, _ = guide.frame(station)
-        left = np.stack([-np.sin(self._headings), np.cos(self._headings)], axis=1)
-        ground = guide.ground(station, offset, True)
-        if not np.isfinite(ground).all():
-            place = int(np.argmin(np.isfinite(ground)))
-            allowed = f"there is no ground known at station {station[place]:.1f} m; a smaller one is needed"
-            raise InputError("scan.platform.lateral_offsets", float(offset[place]), allowed)
-        self.positions = np.column_stack([plan + offset[:, None] * left, ground + platform.value("height")])
+    def __init__(self, platform: Tripod, positions: ArrayLike, headings: Float | None = None) -> None:
+        self.positions = np.array(positions, dtype=np.float64).reshape(-1, 3)
+        self._headings = np.zeros(len(self.positions)) if headings is None else headings
         self._turning = platform.turn_rate()
         self._mounting = platform.mounting()
-        self.strips = strips_of([platform.turn_seconds] * len(station))
+        self.strips = strips_of([platform.turn_seconds] * len(self.positions))
         self.knot_spacing = knots_for(KNOT_RANGE * self._turning**2)
         self.typical_range = _USUAL_RANGE
 
@@ -132,35 +138,3 @@ def _stations(platform: Tripod, length: float) -> Float:
         field = f"scan.platform.stations[{outside[0]}]"
         raise InputError(field, float(station[outside[0]]), f"from 0 to {length:g} m, the length of the road")
     return station
-
-
-class PositionsPath:
-    """One strip at each position; the scanner stands upright, begins facing along x and turns counter-clockwise.
-
-    Attributes:
-        strips: in the order of the positions.
-        positions: (S, 3) local positions of the scanner, m.
-        knot_spacing: s, see `Path`.
-        typical_range: m, see `Path`.
-        deviation: 0.
-
-    Args:
-        platform: its turning and mounting.
-        positions: of the scanner itself, local, m; at least one.
-    """
-
-    deviation = 0.0
-
-    def __init__(self, platform: Tripod, positions: Sequence[Sequence[float]]) -> None:
-        self.positions = np.array(positions, dtype=np.float64).reshape(-1, 3)
-        self._turning = platform.turn_rate()
-        self._mounting = platform.mounting()
-        self.strips = strips_of([platform.turn_seconds] * len(self.positions))
-        self.knot_spacing = knots_for(KNOT_RANGE * self._turning**2)
-        self.typical_range = _USUAL_RANGE
-
-    def pose(self, strip: Strip, time: Float) -> tuple[Float, Float]:
-        """Return local positions (K, 3), m, and rotations (K, 3, 3) at times (K,) since the first strip's start."""
-        time = np.asarray(time, dtype=np.float64)
-        position = np.repeat(self.positions[strip.index][None], len(time), axis=0)
-        return position, rotation_matrix((time - strip.start_time) * self._turning) @ self._mounting

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..knots import Track, Way
+from ..knots import PointTrack, Track
 
 Float = NDArray[np.float64]
 Index = NDArray[np.intp]
@@ -45,7 +45,7 @@ class Bundles:
     farthest: Float
 
     @classmethod
-    def of(cls, origins: Float, directions: Float, times: Float, reach: Float) -> Bundles:
+    def gather(cls, origins: Float, directions: Float, times: Float, reach: Float) -> Bundles:
         """Gather rays."""
         starts = np.arange(0, len(times), RAYS)
         time, delay = _box(times[None], starts)
@@ -56,11 +56,9 @@ class Bundles:
         angle = np.where(spread < length, np.arcsin(np.minimum(spread / np.maximum(length, 1e-300), 1.0)), np.pi)
         axis /= np.maximum(length, 1e-300)
         farthest = np.maximum.reduceat(reach, starts)
-        return cls(
-            origins, directions, times, reach, time[0], delay, apex, ball, axis, angle + _SLACK, farthest
-        )
+        return cls(origins, directions, times, reach, time[0], delay, apex, ball, axis, angle + _SLACK, farthest)
 
-    def near(self, track: Track, centre: Float, radius: float) -> Index:
+    def rays_near(self, track: Track, centre: Float, radius: float) -> Index:
         """Return the rays that come nearer to a moving ball than its radius before the end of their reach.
 
         Args:
@@ -68,7 +66,7 @@ class Bundles:
             centre: (3,) of the ball, own frame, m.
             radius: m.
         """
-        way = track.way(centre)
+        way = track.point_track(centre)
         bundles = self._bundles_near(way, radius)
         rays = (bundles[:, None] * RAYS + np.arange(RAYS)).ravel()
         rays = rays[rays < len(self.times)]
@@ -78,7 +76,7 @@ class Bundles:
         towards -= np.clip(ahead, 0.0, self.reach[rays]) * direction
         return rays[np.einsum("in,in->n", towards, towards) <= radius**2]
 
-    def _bundles_near(self, way: Way, radius: float) -> Index:
+    def _bundles_near(self, way: PointTrack, radius: float) -> Index:
         """Return the bundles whose cone touches the ball while they are cast."""
         towards = way.at(self.time) - self.apex
         away = np.sqrt(np.einsum("ib,ib->b", towards, towards))

@@ -59,7 +59,7 @@ class FacePlanes:
         normal /= np.where(length > 0.0, length, 1.0)
         self.planes[3, block] = np.einsum("ij,ij->j", normal, a)
 
-    def meet(self, faces: NDArray[np.intp], origins: Float, directions: Float) -> tuple[Float, Float]:
+    def intersect(self, faces: NDArray[np.intp], origins: Float, directions: Float) -> tuple[Float, Float]:
         """Return where rays meet the planes of ``faces``: range (m) and n . d, whose size is the cosine of incidence.
 
         Args:

@@ -49,12 +49,10 @@ class SceneMesh:
     def __post_init__(self) -> None:
         for name, (dtype, shape) in _SHAPES.items():
             array = np.asarray(getattr(self, name))
-            fits = array.ndim == len(shape) and all(
-                n in (None, m) for n, m in zip(shape, array.shape, strict=True)
-            )
+            fits = array.ndim == len(shape) and all(n in (None, m) for n, m in zip(shape, array.shape, strict=True))
             if not fits or array.dtype != dtype:
-                wanted = f"must be {np.dtype(dtype)} of shape {shape} with None for any length"
-                raise InputError(f"scene mesh: {name}", f"{array.dtype} {array.shape}", wanted)
+                allowed = f"must be {np.dtype(dtype)} of shape {shape} with None for any length"
+                raise InputError(f"scene mesh: {name}", f"{array.dtype} {array.shape}", allowed)
         for name in ("class_id", "instance_id", "material"):
             if len(getattr(self, name)) != len(self.triangles):
                 raise InputError(
@@ -80,6 +78,12 @@ class SceneMesh:
     def nbytes(self) -> int:
         """Return the size of all arrays, bytes."""
         return sum(value.nbytes for f in fields(self) if hasattr(value := getattr(self, f.name), "nbytes"))
+
+    def vertex_bounds(self) -> NDArray[np.float64] | None:
+        """Return the smallest and the largest local coordinates (2, 3) of the vertices, m; None without any."""
+        if not len(self.vertices):
+            return None
+        return np.array([self.vertices.min(axis=0), self.vertices.max(axis=0)], dtype=np.float64)
 
     def normals(self) -> NDArray[np.float64]:
         """Return (T, 3) unit normals; triangles without area have the zero vector."""

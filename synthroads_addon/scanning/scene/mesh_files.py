@@ -17,17 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...base.errors import InputError
+from ...cloud.formats.ply import PLY_TYPES
 
-_PLY_TYPES = {
-    **dict.fromkeys(("char", "int8"), "i1"),
-    **dict.fromkeys(("uchar", "uint8"), "u1"),
-    **dict.fromkeys(("short", "int16"), "i2"),
-    **dict.fromkeys(("ushort", "uint16"), "u2"),
-    **dict.fromkeys(("int", "int32"), "i4"),
-    **dict.fromkeys(("uint", "uint32"), "u4"),
-    **dict.fromkeys(("float", "float32"), "f4"),
-    **dict.fromkeys(("double", "float64"), "f8"),
-}
 _GLB, _JSON = 0x46546C67, 0x4E4F534A  # "glTF", "JSON"
 _COMPONENTS = {5120: 1, 5121: 1, 5122: 2, 5123: 2, 5125: 4, 5126: 4}
 _WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT2": 4, "MAT3": 9, "MAT4": 16}
@@ -95,12 +86,17 @@ def _ply_header(file: BinaryIO) -> tuple[str, list[tuple[str, int, list[_Propert
         elif words[:1] == ["element"]:
             elements.append((words[1], int(words[2]), []))
         elif words[:2] == ["property", "list"]:
-            elements[-1][2].append((_PLY_TYPES[words[2]], _PLY_TYPES[words[3]], words[4]))
+            elements[-1][2].append((_ply_type(words[2]), _ply_type(words[3]), words[4]))
         elif words[:1] == ["property"]:
-            elements[-1][2].append(("", _PLY_TYPES[words[1]], words[2]))
+            elements[-1][2].append(("", _ply_type(words[1]), words[2]))
         elif words[:1] == ["end_header"]:
             return kind, elements
     raise ValueError("it ends within its header")
+
+
+def _ply_type(word: str) -> str:
+    """Return a type of numbers, without the order of its bytes, by its name in the header."""
+    return PLY_TYPES[word].lstrip("<")
 
 
 def _ply_text(file: BinaryIO, elements: list[tuple[str, int, list[_Property]]]) -> Iterator[NDArray[Any]]:

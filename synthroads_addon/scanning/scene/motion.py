@@ -16,7 +16,7 @@ from ...road.parameters import Vehicle
 from ...road.things.chassis import CHASSIS, wheel_base
 from ...road.things.vehicles import VEHICLE_TYPES
 from .mesh import SceneMesh
-from .passes import VehiclePasses, passes
+from .passes import VehiclePasses, lane_passes
 
 Float = NDArray[np.float64]
 Pose = tuple[Float, Float, NDArray[np.bool_]]
@@ -80,14 +80,32 @@ class LinearMotion:
         return rotation, self.place + time[:, None] * self.velocity, np.ones(len(time), dtype=bool)
 
 
+@dataclass(frozen=True)
+class ShiftedMotion:
+    """A motion in a frame that begins elsewhere; see `Motion`.
+
+    Attributes:
+        whole: the motion in the road's local frame.
+        origin: (3,) where the frame begins in the road's, m.
+    """
+
+    whole: Motion
+    origin: Float
+
+    def pose(self, time: Float) -> Pose:
+        """Return the motion's pose in this frame."""
+        rotation, place, present = self.whole.pose(time)
+        return rotation, place - self.origin, present
+
+
 class LaneMotion:
     """A vehicle in its lane, with its carriageway's traffic.
 
     Its middle keeps to the lane's centre, at its speed along that line in plan. It looks along the line (where lanes
     widen or narrow, along the chord between its axles' places) and stands on the road with its axles' wheels, so that
     grade and crossfall pitch and roll it as the model's nodes do. At its lane's end, which is the road's or where the
-    lane becomes too narrow to drive on, it leaves and comes in again where the lane begins: see `passes`. While a part
-    of it would stick out there it is not there at all.
+    lane becomes too narrow to drive on, it leaves and comes in again where the lane begins: see `lane_passes`. While a
+    part of it would stick out there it is not there at all.
 
     The own frame has its origin on the road below the vehicle's middle, x forward, y left, z up.
 
@@ -230,7 +248,7 @@ def _ways(vehicles: list[Vehicle], line: LaneLine) -> list[VehiclePasses]:
     middle = line.distance(np.array([vehicle.station for vehicle in vehicles]))
     start = middle - low if line.carriageway.traffic > 0 else high - middle
     lengths = [VEHICLE_TYPES[vehicle.model].length for vehicle in vehicles]
-    return passes(start.tolist(), [vehicle.speed for vehicle in vehicles], lengths, high - low)
+    return lane_passes(start.tolist(), [vehicle.speed for vehicle in vehicles], lengths, high - low)
 
 
 def _unit(vectors: Float) -> Float:

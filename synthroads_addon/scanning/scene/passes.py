@@ -59,7 +59,7 @@ class VehiclePasses:
         return replace(moved, entry=self.entry + max(0.0, moved.leave - self.leave))
 
 
-def passes(
+def lane_passes(
     start: Sequence[float], speed: Sequence[float], length: Sequence[float], whole: float
 ) -> list[VehiclePasses]:
     """Return the passes of all vehicles of one lane, in their order.
@@ -79,9 +79,9 @@ def passes(
 
     def behind(ahead: int, entry: float, follower: int) -> float:
         """Return when the follower may come in behind one whose middle came in at ``entry``."""
-        apart = (length[ahead] + length[follower]) / 2.0 + VEHICLE_GAP
-        at_end = whole / speed[ahead] - (whole - apart) / speed[follower]
-        return entry + max(apart / speed[ahead], at_end)
+        gap = (length[ahead] + length[follower]) / 2.0 + VEHICLE_GAP
+        at_end = whole / speed[ahead] - (whole - gap) / speed[follower]
+        return entry + max(gap / speed[ahead], at_end)
 
     entry = [0.0] * len(start)
     ahead, came_in = order[-1], -start[order[-1]] / speed[order[-1]]

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ...base.classes import UNLABELLED
 from ...cloud.points import NO_MATERIAL
-from ..knots import KeptPoses, Track, track_knots
+from ..knots import PoseCache, Track, track_knots
 from .bundles import Bundles
 from .caster import Caster, FacePlanes
 from .mesh import SceneMesh
@@ -23,7 +23,7 @@ Faces = NDArray[np.intp]
 CLEARANCE = np.array([2.5, 1.0, 3.0])
 """Room that a vehicle which carries the scanner takes around it: half its length and width, and its height, m."""
 
-_OF_NO_FACE = {"class_id": UNLABELLED, "instance_id": 0, "material": NO_MATERIAL}
+_NO_FACE = {"class_id": UNLABELLED, "instance_id": 0, "material": NO_MATERIAL}
 
 
 @dataclass(frozen=True)
@@ -46,7 +46,7 @@ class _TargetPart:
 
 
 @dataclass(frozen=True)
-class Met:
+class FirstHits:
     """First hits of rays; one value per ray, in the shape of the rays.
 
     Attributes:
@@ -81,7 +81,7 @@ class Target:
         self.materials = static.materials
         self.origin = static.origin
         self.moving: tuple[MovingMesh, ...] = scene.moving
-        self._poses = [KeptPoses(part.motion.pose) for part in scene.moving]
+        self._poses = [PoseCache(part.motion.pose) for part in scene.moving]
         meshes = [static, *(part.mesh for part in scene.moving)]
         self.class_id = _join_arrays([mesh.class_id for mesh in meshes])
         self.instance_id = _join_arrays([mesh.instance_id for mesh in meshes])
@@ -93,19 +93,15 @@ class Target:
             _part(mesh, make_caster(mesh), int(first)) for mesh, first in zip(meshes, firsts[:-1], strict=True)
         ]
         self.caster = self._parts[0].caster
-        self.bounds = (
-            np.array([static.vertices.min(axis=0), static.vertices.max(axis=0)], dtype=np.float64)
-            if len(static.vertices)
-            else None
-        )
+        self.bounds = static.vertex_bounds()
 
-    def of_faces(self, name: str, faces: Faces) -> NDArray[Any]:
+    def face_values(self, name: str, faces: Faces) -> NDArray[Any]:
         """Return ``class_id``, ``instance_id`` or ``material`` of faces (H,); of -1 what stands for none."""
         values = getattr(self, name)
         if not len(faces) or faces.min() >= 0:
             return np.asarray(values[faces])
         result = values[np.maximum(faces, 0)]
-        result[faces < 0] = _OF_NO_FACE[name]
+        result[faces < 0] = _NO_FACE[name]
         return np.asarray(result)
 
     def motions(self, begin: float, end: float, spacing: float, driven: Track | None = None) -> list[Track]:
@@ -119,16 +115,17 @@ class Target:
         if driven is None or not tracks:
             return tracks
         _, scanner, _ = driven.at(track_knots(begin, end, spacing))
-        return [_out_of_the_way(track, part, scanner) for track, part in zip(tracks, self._parts[1:], strict=True)]
+        return [_clear_scanner(track, part, scanner) for track, part in zip(tracks, self._parts[1:], strict=True)]
 
     def moving_bounds(self, motions: list[Track]) -> list[Float]:
         """Return (2, 3) smallest and largest corner that each moving part reaches on its way, if it is there."""
-        boxes = (track.swept(part.centre, part.radius) for part, track in zip(self._parts[1:], motions, strict=True))
-        return [np.array(box) for box in boxes if box is not None]
+        moving = zip(self._parts[1:], motions, strict=True)
+        boxes = (track.swept_box(part.centre, part.radius) for part, track in moving)
+        return [box for box in boxes if box is not None]
 
     def cast(
         self, origins: Float, directions: Float, maximum_range: float, times: Float, motions: list[Track]
-    ) -> Met:
+    ) -> FirstHits:
         """Return what each ray meets first.
 
         Args:
@@ -144,12 +141,12 @@ class Target:
         shape = directions.shape
         flat_origins = np.broadcast_to(origins, shape).reshape(3, -1)
         flat_directions, flat_times = directions.reshape(3, -1), np.broadcast_to(times, shape[1:]).ravel()
-        nearest = Met(*(getattr(met, name).ravel() for name in ("face", "distance", "along")))
-        rays = Bundles.of(flat_origins, flat_directions, flat_times, np.minimum(nearest.distance, maximum_range))
+        nearest = FirstHits(*(getattr(met, name).ravel() for name in ("face", "distance", "along")))
+        rays = Bundles.gather(flat_origins, flat_directions, flat_times, np.minimum(nearest.distance, maximum_range))
         for part, track in zip(self._parts[1:], motions, strict=True):
             if track.present.any():
                 _cast_moving(part, track, rays, maximum_range, nearest)
-        return Met(*(getattr(nearest, name).reshape(shape[1:]) for name in ("face", "distance", "along")))
+        return FirstHits(*(getattr(nearest, name).reshape(shape[1:]) for name in ("face", "distance", "along")))
 
     def at_start(
         self, faces: Faces, places: Float, times: Float, motions: list[Track], vectors: tuple[Float, ...] = ()
@@ -170,8 +167,8 @@ class Target:
                 continue
             rotation, place, _ = track.at(times[mine])
             begin_rotation, begin_place, _ = moving.motion.pose(np.zeros(1))
-            own = _inverse(rotation, places[:, mine] - place)
-            results[0][:, mine] = begin_rotation[0] @ own + begin_place[0][:, None]
+            local = _inverse(rotation, places[:, mine] - place)
+            results[0][:, mine] = begin_rotation[0] @ local + begin_place[0][:, None]
             for result, vector in zip(results[1:], vectors, strict=True):
                 result[:, mine] = begin_rotation[0] @ _inverse(rotation, vector[:, mine])
         return results
@@ -196,33 +193,31 @@ def _join_arrays(arrays: list[NDArray[Any]]) -> NDArray[Any]:
 
 
 def _part(mesh: SceneMesh, caster: Caster, first: int) -> _TargetPart:
-    if len(mesh.vertices):
-        low, high = mesh.vertices.min(axis=0).astype(np.float64), mesh.vertices.max(axis=0).astype(np.float64)
-    else:
-        low = high = np.zeros(3)
+    bounds = mesh.vertex_bounds()
+    low, high = np.zeros((2, 3)) if bounds is None else bounds
     centre = (low + high) / 2.0
     half = (high - low) / 2.0
     radius = float(np.linalg.norm(half)) + 1e-3
     return _TargetPart(caster, FacePlanes(mesh), first, len(mesh.triangles), centre, half, radius)
 
 
-def _out_of_the_way(track: Track, part: _TargetPart, scanner: Float) -> Track:
+def _clear_scanner(track: Track, part: _TargetPart, scanner: Float) -> Track:
     """Return a part's track on which it isn't there where the scanner's vehicle is; places (3, K) at its knots."""
-    own = _inverse(track.rotation, scanner - track.position)
-    away = (np.abs(own.T - part.centre) > part.half + CLEARANCE).any(axis=1)
+    offset = _inverse(track.rotation, scanner - track.position)
+    away = (np.abs(offset.T - part.centre) > part.half + CLEARANCE).any(axis=1)
     return replace(track, present=track.present & away)
 
 
-def _cast(part: _TargetPart, origins: Float, directions: Float, maximum_range: float) -> Met:
+def _cast(part: _TargetPart, origins: Float, directions: Float, maximum_range: float) -> FirstHits:
     """Cast rays at one part in its own frame; face numbers are those of all parts."""
     shape = directions.shape[1:]
     begin, towards = (np.broadcast_to(_rows(array), (*shape, 3)).reshape(-1, 3) for array in (origins, directions))
     found = part.caster.cast(begin, towards, maximum_range)
     face = found.reshape(shape).astype(np.intp)
     if not part.count:
-        return Met(face, np.full(shape, np.inf), np.zeros(shape))
+        return FirstHits(face, np.full(shape, np.inf), np.zeros(shape))
     # A miss is worked out with some face and then forgotten: that is less work than to sort them out before.
-    distance, along = part.planes.meet(face, origins, directions)
+    distance, along = part.planes.intersect(face, origins, directions)
     missed = face < 0
     edge_on = not along.all()  # in the face's plane, or a face without area
     if edge_on:
@@ -231,7 +226,7 @@ def _cast(part: _TargetPart, origins: Float, directions: Float, maximum_range: f
     face += part.first
     if part.first or edge_on:
         face[missed] = -1
-    return Met(face, distance, along)
+    return FirstHits(face, distance, along)
 
 
 def _rows(vectors: Float) -> NDArray[np.float32]:
@@ -242,18 +237,18 @@ def _rows(vectors: Float) -> NDArray[np.float32]:
     return result
 
 
-def _cast_moving(part: _TargetPart, track: Track, rays: Bundles, maximum_range: float, nearest: Met) -> None:
+def _cast_moving(part: _TargetPart, track: Track, rays: Bundles, maximum_range: float, nearest: FirstHits) -> None:
     """Put a moving part's hits in place of farther ones; all arrays are flat."""
-    near = rays.near(track, part.centre, part.radius)
+    near = rays.rays_near(track, part.centre, part.radius)
     if not len(near):
         return
     rotation, place, present = track.at(rays.times[near])
     near, rotation, place = near[present], rotation[:, present], place[:, present]
     begin, towards = rays.origins[:, near] - place, rays.directions[:, near]
-    own = _cast(part, _inverse(rotation, begin), _inverse(rotation, towards), maximum_range)
-    closer = np.flatnonzero(own.distance < nearest.distance[near])
+    met = _cast(part, _inverse(rotation, begin), _inverse(rotation, towards), maximum_range)
+    closer = np.flatnonzero(met.distance < nearest.distance[near])
     for name in ("face", "distance", "along"):
-        getattr(nearest, name)[near[closer]] = getattr(own, name)[closer]
+        getattr(nearest, name)[near[closer]] = getattr(met, name)[closer]
 
 
 def _inverse(rotation: Float, vectors: Float) -> Float:

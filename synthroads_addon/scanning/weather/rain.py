@@ -20,13 +20,8 @@ class Rain(Precipitation):
     condition: Literal["rain"] = Field("rain", description="Weather.")
 
     def rate_extinction(self, rate_mm_h: float, wavelength_nm: float) -> float:
-        """Return the extinction at any wavelength, 1/m."""
-        return rain_extinction(rate_mm_h)
+        """Return the extinction at any wavelength, 1/m: 1.076 R^0.67 dB/km of Carbonneau and Wisely, R in mm/h.
 
-
-def rain_extinction(rate_mm_h: float) -> float:
-    """Return the extinction of rain, 1/m: 1.076 R^0.67 dB/km of Carbonneau and Wisely, R in mm/h, at any wavelength.
-
-    (1.076 R)^(2/3), which is in use as well, gives 2.4 % less.
-    """
-    return per_metre(1.076 * rate_mm_h**0.67)
+        (1.076 R)^(2/3), which is in use as well, gives 2.4 % less.
+        """
+        return per_metre(1.076 * rate_mm_h**0.67)

@@ -225,7 +225,7 @@ def lines_of(entry: Compared) -> list[str]:
     before, after = entry.before.reflectivity, entry.after.reflectivity
     changed = f"{before:.3f} → {after:.3f}" if before != after else f"{after:.3f}"
     data = entry.to_dict()
-    lines = [f"{entry.wanted.material}: reflectivity {changed}"]
+    lines = [f"{entry.target.material}: reflectivity {changed}"]
     names = [f"{100 * share:g}" for share in FITTED]
     if entry.real is not None:
         lines.append(f"{data['points']:,} points, {data['zeros_left_out']:,} zeros left out")
@@ -240,7 +240,7 @@ def lines_of(entry: Compared) -> list[str]:
 def _sentence(result: Calibration) -> str:
     if result.job.real is None:
         return "Expected intensities computed"
-    shown = (f"{entry.wanted.material} {entry.to_dict()['largest_error']:.1%}" for entry in result.compared)
+    shown = (f"{entry.target.material} {entry.to_dict()['largest_error']:.1%}" for entry in result.compared)
     return f"Largest error as a share of the interquartile range: {', '.join(shown)}"
 
 

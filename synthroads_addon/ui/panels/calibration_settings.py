@@ -14,7 +14,7 @@ import bpy
 from ...base.errors import InputError
 from ...blender.materials import constants, table_name
 from ...blender.materials.image import base_color_image, color_image_node
-from ...calibration.job import CalibrationJob, Part, Wanted, check
+from ...calibration.job import CalibrationJob, MaterialTarget, Part, check
 from ...calibration.pavement import RoadClasses
 from ...calibration.texture import texture_of
 from ...materials.surfaces import Reflection
@@ -123,7 +123,7 @@ class SYNTHROADS_PG_calibration(bpy.types.PropertyGroup):
         names = [row.material for row in self.classes]
         here = _of_scene(names)
         job = CalibrationJob(
-            wanted=tuple(_material_target(row, here, bool(self.real)) for row in self.classes),
+            targets=tuple(_material_target(row, here, bool(self.real)) for row in self.classes),
             table=table if table is not None and table.exists() else None,
             real=file_of(self.real),
             class_field=self.class_field or None,
@@ -155,15 +155,16 @@ def _of_scene(names: list[str]) -> dict[str, Material]:
     return dict(constants(name for name in names if name in there))
 
 
-def _material_target(row: Any, here: dict[str, Material], compared: bool) -> Wanted:
-    told = row.told if compared else None
+def _material_target(row: Any, here: dict[str, Material], compared: bool) -> MaterialTarget:
+    real_class = row.told if compared else None
     if not row.texture:
-        return Wanted(row.material, told)
+        return MaterialTarget(row.material, real_class)
     item = next((item for item in bpy.data.materials if table_name(item) == row.material), None)
     pixels = None if item is None else base_color_image(item)
     if pixels is None:
         raise InputError("Texture", row.material, "the scene's material has no image as its base colour")
-    return Wanted(row.material, told, texture_of(pixels, row.texture_width, here[row.material]), row.texture_width)
+    texture = texture_of(pixels, row.texture_width, here[row.material])
+    return MaterialTarget(row.material, real_class, texture, row.texture_width)
 
 
 def file_of(text: str) -> Path | None:

@@ -12,7 +12,7 @@ from synthroads_addon.blender.cameras.images import aim
 from synthroads_addon.blender.cameras.light import daylight
 from synthroads_addon.blender.cameras.stage import Passes, stage
 from synthroads_addon.blender.materials import material as table_material
-from synthroads_addon.scanning.colour.colour import FROM_MATERIAL, FROM_RETURN, MATERIAL_LAYERS, NEARBY
+from synthroads_addon.scanning.colour.colour import FROM_MATERIAL, FROM_RETURN, MATERIAL_LAYERS, NEARBY, SeenPoints
 from synthroads_addon.scanning.colour.nearby import REACH
 from synthroads_addon.scanning.colour.settings import ColourSettings
 from synthroads_addon.scanning.colour.views import scene_sample, views_along
@@ -42,7 +42,7 @@ def test_points_have_the_surfaces_own_values(source: str) -> None:
     mesh = build_coded_scene()
     ground = points_on(mesh, 3000, LOW, HIGH, "Coded")
     with layer_source(job(mesh, LAYERS, source=source)) as layers:
-        values = layers.sample(**ground, wanted=frozenset(LAYERS))
+        values = layers.sample(SeenPoints(**ground), frozenset(LAYERS))
     expected = ground_values(ground["position"])
     # The width of a pixel and a bit, from the checkerboard's edges.
     away = edge_distance(ground["position"]) > 0.06
@@ -62,7 +62,7 @@ def test_points_below_a_plate_never_take_its_colour(source: str) -> None:
     # Wholly below, and around the plate's edges.
     ground = points_on(mesh, 4000, (-SIDE, PLATE[0] - 1.0, 0.0), (SIDE, PLATE[1] + 3.0, 0.0), "Coded")
     with layer_source(job(mesh, {"base_color"}, source=source)) as layers:
-        values = layers.sample(**ground, wanted=frozenset({"base_color"}))
+        values = layers.sample(SeenPoints(**ground), frozenset({"base_color"}))
     error = np.abs(values.arrays["base_color"] - ground_values(ground["position"])["base_color"])[:, 1:]
     seen = ~np.isin(values.source, (FROM_MATERIAL, NEARBY))
     assert error[seen].max() < ACCURACY[source]
@@ -83,7 +83,7 @@ def test_a_wall_is_seen_in_its_own_colours() -> None:
     wall = points_on(mesh, 1000, (-9.0, 8.0, 1.0), (9.0, 8.0, 5.0), "soil")
     wall["normal"][:] = [0.0, -1.0, 0.0]
     with layer_source(job(mesh, {"base_color"}, source="images")) as layers:
-        values = layers.sample(**wall, wanted=frozenset({"base_color"}))
+        values = layers.sample(SeenPoints(**wall), frozenset({"base_color"}))
     assert (values.source != FROM_MATERIAL).mean() > 0.95
     mean = layers.material.constants.values["base_color"][wall["material"][0]]
     # The pattern varies by half of the mean at most, and the ground is far brighter.
@@ -126,7 +126,7 @@ def test_images_around_a_low_platform_show_the_ground() -> None:
     ground["scanner"][:, 1:] = [-3.0, 3.0]
     task = job(mesh, LAYERS, source="images", ground_sampling_distance=0.04)
     with layer_source(task.__class__(**{**task.__dict__, "path": Low()})) as layers:
-        values = layers.sample(**ground, wanted=frozenset(LAYERS))
+        values = layers.sample(SeenPoints(**ground), frozenset(LAYERS))
     assert (values.source != FROM_MATERIAL).mean() > 0.95
     away = (edge_distance(ground["position"]) > 0.15) & (values.source != FROM_MATERIAL)
     for name, wanted in ground_values(ground["position"]).items():
@@ -140,7 +140,7 @@ def test_pixels_of_returns_lie_at_the_returns() -> None:
     for count in (1, 7, 1500):
         ground = points_on(mesh, count, LOW, HIGH, "Coded")
         with layer_source(job(mesh, {"base_color"}, source="returns")) as layers:
-            values = layers.sample(**ground, wanted=frozenset({"base_color"}))
+            values = layers.sample(SeenPoints(**ground), frozenset({"base_color"}))
             assert isinstance(layers, ReturnCamera)
             assert (values.source == FROM_RETURN).all()
             assert layers.worst < 1e-4
@@ -151,13 +151,13 @@ def test_a_return_from_something_else_takes_its_materials_mean() -> None:
     mesh = build_coded_scene()
     ground = points_on(mesh, 300, LOW, HIGH, "Plate")
     with layer_source(job(mesh, {"base_color"}, source="returns")) as layers:
-        values = layers.sample(**ground, wanted=frozenset({"base_color"}))
+        values = layers.sample(SeenPoints(**ground), frozenset({"base_color"}))
     assert (values.source == FROM_MATERIAL).all()
     assert np.ptp(values.arrays["base_color"], axis=0).max() == 0.0
 
 
 def _linear(values: np.ndarray) -> np.ndarray:
-    """Return what `encode` made of values above its linear part."""
+    """Return what `encode_srgb` made of values above its linear part."""
     return ((values / 65535.0 + 0.055) / 1.055) ** 2.4
 
 
@@ -177,7 +177,7 @@ def test_lit_colours_have_sun_sky_and_shadow(source: str, lighting: str, toleran
     wanted = frozenset({"rgb"})
     with layer_source(job(mesh, {"rgb"}, source=source, lighting=lighting, **COARSE, **extra)) as layers:
         day = layers.material.shading.light
-        in_shadow, in_sun = layers.sample(**shadow, wanted=wanted), layers.sample(**sunny, wanted=wanted)
+        in_shadow, in_sun = layers.sample(SeenPoints(**shadow), wanted), layers.sample(SeenPoints(**sunny), wanted)
     up = np.array([[0.0, 0.0, 1.0]])
     sky, sun = np.array(GREY) * day.sky(up), np.array(GREY) * day.sunlight(up)
     assert (in_sun.source != FROM_MATERIAL).all()
@@ -226,7 +226,7 @@ def test_materials_alone_render_nothing() -> None:
     scenes = len(bpy.data.scenes)
     with layer_source(job(mesh, {"rgb"}, source="material")) as layers:
         assert len(bpy.data.scenes) == scenes
-        assert (layers.sample(**ground, wanted=frozenset({"rgb"})).source == FROM_MATERIAL).all()
+        assert (layers.sample(SeenPoints(**ground), frozenset({"rgb"})).source == FROM_MATERIAL).all()
 
 
 def _state() -> dict[str, object]:
@@ -267,7 +267,7 @@ def test_the_scene_is_left_as_it_was(source: str, fails: bool) -> None:
     wanted = frozenset({"rgb", *LAYERS})
     try:
         with layer_source(job(mesh, set(wanted), source=source, lighting="path", samples=1, **COARSE)) as layers:
-            layers.sample(**ground, wanted=wanted)
+            layers.sample(SeenPoints(**ground), wanted)
             # Images are all rendered by now.
             assert (_state() == before) == isinstance(layers, RenderedLayers)
             if fails:
@@ -282,7 +282,7 @@ def test_hidden_objects_are_not_rendered() -> None:
     bpy.data.objects["Plate"].hide_set(True)
     ground = points_on(mesh, 200, (-9.0, PLATE[0] + 0.5, 0.0), (9.0, PLATE[1] - 0.5, 0.0), "Coded")
     with layer_source(job(mesh, {"base_color"}, source="images")) as layers:
-        values = layers.sample(**ground, wanted=frozenset({"base_color"}))
+        values = layers.sample(SeenPoints(**ground), frozenset({"base_color"}))
     assert (values.source != FROM_MATERIAL).all()
 
 
@@ -306,7 +306,7 @@ def test_an_image_has_the_clouds_of_its_own_time() -> None:
     ground = points_on(mesh, 2000, (-9.0, -9.0, 0.0), (9.0, 9.0, 0.0), "Matt")
     x = ground["position"][:, 0]
     with layer_source(job(mesh, {"rgb"}, cloudy, source="images", **COARSE)) as layers:
-        red = _linear(layers.sample(**ground, wanted=frozenset({"rgb"})).arrays["rgb"][:, 0])
+        red = _linear(layers.sample(SeenPoints(**ground), frozenset({"rgb"})).arrays["rgb"][:, 0])
         shading = layers.material.shading
     up = np.array([[0.0, 0.0, 1.0]])
     share = (red - GREY[0] * shading.light.sky(up)[0, 0]) / (GREY[0] * shading.light.sunlight(up)[0, 0])
@@ -325,7 +325,7 @@ def test_eevee_and_cycles_agree() -> None:
     values = {}
     for engine in ("cycles", "eevee"):
         with layer_source(job(mesh, LAYERS, source="images", engine=engine, **COARSE)) as layers:
-            values[engine] = layers.sample(**ground, wanted=frozenset(LAYERS))
+            values[engine] = layers.sample(SeenPoints(**ground), frozenset(LAYERS))
     away = edge_distance(ground["position"]) > 0.11
     both = away & (values["cycles"].source == 1) & (values["eevee"].source == 1)
     assert both.sum() > 0.95 * (away & (values["cycles"].source == 1)).sum()

@@ -122,7 +122,7 @@ def test_nothing_is_hit_beyond_the_range(name: str) -> None:
 
     found = far >= 0
     ranges = np.full(len(far), np.inf)
-    ranges[found] = FacePlanes(mesh).meet(
+    ranges[found] = FacePlanes(mesh).intersect(
         far[found], origins[found].T.astype(np.float64), directions[found].T.astype(np.float64)
     )[0]
     clear = np.abs(ranges - 31.0) > 1e-4

@@ -18,8 +18,8 @@ from hypothesis import strategies as st
 from synthroads_addon.base.classes import class_scheme
 from synthroads_addon.base.errors import InputError, MissingFileError, OutputError
 from synthroads_addon.cloud.formats.base import CloudWriter
-from synthroads_addon.cloud.formats.registry import ENDINGS, open_cloud, open_writer, read_cloud
-from synthroads_addon.cloud.layers import ATTRIBUTES, DEFAULT_ATTRIBUTES, LAYERS, arrays_of, layer_arrays
+from synthroads_addon.cloud.formats.registry import ENDINGS, open_cloud, open_writer
+from synthroads_addon.cloud.layers import ATTRIBUTES, DEFAULT_ATTRIBUTES, LAYERS, layer_arrays
 from synthroads_addon.cloud.points import PointBlock, concatenate
 from synthroads_addon.cloud.tools.convert import convert
 from tests.helpers.clouds.cloud_points import with_every_attribute
@@ -61,7 +61,8 @@ def write(path: Path, *blocks: PointBlock, attributes=ATTRIBUTES, epsg: int | No
 
 
 def read(path: Path, size: int = 3_000) -> PointBlock:
-    return concatenate(list(read_cloud(path, size)))
+    with open_cloud(path) as cloud:
+        return concatenate(list(cloud.blocks(size)))
 
 
 def assert_kept(found: PointBlock, given: PointBlock, ending: str, arrays: set[str] | None = None) -> None:
@@ -150,9 +151,9 @@ def test_only_what_is_asked_for_is_stored(tmp_path: Path, points, ending: str) -
 
 
 def test_needs_names_arrays_of_points() -> None:
-    assert arrays_of("noise_free") == {"true_range", "true_xyz"}
-    assert arrays_of("normal") == {"normal"}
-    assert set().union(*map(arrays_of, ATTRIBUTES)) == set(layer_arrays())
+    assert set(LAYERS["noise_free"].types) == {"true_range", "true_xyz"}
+    assert set(LAYERS["normal"].types) == {"normal"}
+    assert set().union(*(layer.types for layer in LAYERS.values())) == set(layer_arrays())
 
 
 def test_empty_cloud(tmp_path: Path, points, ending: str) -> None:
@@ -295,7 +296,8 @@ def test_ply_is_read_by_an_independent_reader(tmp_path: Path, points) -> None:
 def test_ply_header_is_right_for_any_number(tmp_path: Path, count: int) -> None:
     write(tmp_path / "cloud.ply", make_points(count), attributes=())
     assert f"element vertex {count}\n".encode() in (tmp_path / "cloud.ply").read_bytes()
-    assert sum(len(block) for block in read_cloud(tmp_path / "cloud.ply")) == count
+    with open_cloud(tmp_path / "cloud.ply") as cloud:
+        assert sum(len(block) for block in cloud.blocks()) == count
 
 
 def test_foreign_ply(tmp_path: Path) -> None:

@@ -191,7 +191,7 @@ def test_an_independent_reader_reads_every_attribute(tmp_path: Path, points) -> 
     np.testing.assert_array_equal(las.gps_time, block.gps_time)
     for attribute in ATTRIBUTES:
         for column in LAYERS[attribute].columns:
-            error = np.abs(np.asarray(las[column.name]) - column.of(block)).max()
+            error = np.abs(np.asarray(las[column.name]) - column.values(block)).max()
             rounding = 8e-6  # of angles in single precision
             assert error <= (0 if column.whole else column.scale / 2 + rounding), column.name
 

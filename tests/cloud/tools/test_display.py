@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from synthroads_addon.base.classes import class_scheme
 from synthroads_addon.base.errors import Cancelled, InputError, MissingFileError
-from synthroads_addon.cloud.formats.registry import ENDINGS, open_writer, read_cloud
+from synthroads_addon.cloud.formats.registry import ENDINGS, open_cloud, open_writer
 from synthroads_addon.cloud.points import PointBlock, concatenate
 from synthroads_addon.cloud.tools.display import chosen_points, drawing_places, height_colors, read_display
 from tests.helpers.clouds.random_points import make_points
@@ -29,7 +29,8 @@ def write(path: Path, block: PointBlock, classes: str = "17") -> Path:
 
 def stored(path: Path, shown: int) -> PointBlock:
     """Return the points of a file that are to be shown, in the drawing's order."""
-    every = concatenate(list(read_cloud(path)))
+    with open_cloud(path) as cloud:
+        every = concatenate(list(cloud.blocks()))
     return every.select(chosen_points(len(every), shown)[np.argsort(drawing_places(min(shown, len(every))))])
 
 

@@ -168,7 +168,7 @@ def test_moments_in_parts_are_those_of_all(values, cut) -> None:
     for part in np.array_split(np.arange(len(values)), cut):
         moments.add(label[part], [values[part] + 5e6])
     present = np.unique(label).tolist()
-    mean, deviation = moments.of(0, present)
+    mean, deviation = moments.mean_and_deviation(0, present)
     assert mean == pytest.approx((values + 5e6).mean(), rel=1e-12)
     assert deviation == pytest.approx(values.std(), rel=1e-6, abs=1e-3)
 
@@ -288,7 +288,7 @@ def test_top_view_shows_classes_where_they_are(tmp_path: Path) -> None:
     found = dots(paths[0], tuple(colors[class_id("barrier")]), area)
     road = dots(paths[0], tuple(colors[class_id("road")]), area)
     assert len(found) > 10_000
-    assert found[:, 1].max() < road[:, 1].min() + 12 / view.pixel
+    assert found[:, 1].max() < road[:, 1].min() + 12 / view.raster.axes.across
 
 
 def test_cross_section_is_to_scale(tmp_path: Path) -> None:
@@ -310,8 +310,8 @@ def test_cross_section_is_to_scale(tmp_path: Path) -> None:
     found = dots(tmp_path / "section.png", tuple(colors[class_id("pole")]), slice(0, 14 + raster.height))
     assert raster.count.sum() == 2_400
     left = found[:, 0].mean() - 66  # the margin and the heights beside the picture
-    assert raster.left + left * raster.across == pytest.approx(10.0, abs=0.1)
-    height = (found[:, 1].max() - found[:, 1].min()) * raster.up
+    assert raster.axes.left + left * raster.axes.across == pytest.approx(10.0, abs=0.1)
+    height = (found[:, 1].max() - found[:, 1].min()) * raster.axes.up
     assert height == pytest.approx(6.0, abs=0.2)
     assert len(dots(tmp_path / "section.png", tuple(colors[class_id("barrier")]), slice(0, 14 + raster.height))) == 0
 

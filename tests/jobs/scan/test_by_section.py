@@ -28,7 +28,7 @@ from synthroads_addon.sampling.road import sample_road
 from synthroads_addon.scanning.beam import RINGS
 from synthroads_addon.scanning.blocks import Blocks
 from synthroads_addon.scanning.colour.colour import FROM_MATERIAL
-from synthroads_addon.scanning.colour.difference import ciede2000, lab
+from synthroads_addon.scanning.colour.difference import cie_lab, ciede2000
 from synthroads_addon.scanning.sections import reach, sections
 from synthroads_addon.scenario.road import RoadScenario
 from synthroads_addon.scenario.scan import scanner_setting
@@ -142,7 +142,7 @@ def test_rendered_colours_don_t_depend_on_the_sections(
     seen = [np.mean(points["color_source"] != FROM_MATERIAL) for points in clouds]
     assert min(seen) > 0.9
     assert seen[1] == pytest.approx(seen[0], abs=0.01)
-    rgb = [lab(np.stack([points[name] for name in ("red", "green", "blue")], axis=1)) for points in clouds]
+    rgb = [cie_lab(np.stack([points[name] for name in ("red", "green", "blue")], axis=1)) for points in clouds]
     apart = ciede2000(*rgb)
     assert np.median(apart) < median
     assert np.quantile(apart, 0.95) < most

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from synthroads_addon.scanning.colour.difference import ciede2000, lab
+from synthroads_addon.scanning.colour.difference import cie_lab, ciede2000
 
 PAIRS = [
     ((50.0, 2.6772, -79.7751), (50.0, 0.0, -82.7485), 2.0425),
@@ -26,4 +26,4 @@ def test_differences_are_the_published_ones(one: tuple, other: tuple, difference
 
 
 def test_white_is_white() -> None:
-    np.testing.assert_allclose(lab(np.full((1, 3), 65535, np.uint16)), [[100.0, 0.0, 0.0]], atol=0.01)
+    np.testing.assert_allclose(cie_lab(np.full((1, 3), 65535, np.uint16)), [[100.0, 0.0, 0.0]], atol=0.01)

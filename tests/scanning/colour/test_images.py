@@ -15,8 +15,9 @@ from synthroads_addon.scanning.colour.colour import (
     MATERIAL_LAYERS,
     NEARBY,
     MaterialLayers,
+    SeenPoints,
     Shading,
-    encode,
+    encode_srgb,
     surface_constants,
 )
 from synthroads_addon.scanning.colour.images import ImageLayers, sample_image
@@ -58,13 +59,14 @@ def _layers(images: list[RenderedImage], mode: str = "unlit") -> ImageLayers:
     return ImageLayers(images, {"base_color": 3}, material)
 
 
-def _sampled(layers: ImageLayers, places: np.ndarray, normal: np.ndarray | None = None, material: int = 0):
+def _seen(places: np.ndarray, normal: np.ndarray | None = None, material: int = 0) -> SeenPoints:
     count = len(places)
     up = np.tile([0.0, 0.0, 1.0], (count, 1)) if normal is None else normal
-    scanner = places + [0.0, 0.0, 50.0]
-    return layers.sample(
-        places, scanner, up, np.full(count, material, np.uint16), np.zeros(count), frozenset({"base_color"})
-    )
+    return SeenPoints(places, places + [0.0, 0.0, 50.0], up, np.full(count, material, np.uint16), np.zeros(count))
+
+
+def _sampled(layers: ImageLayers, places: np.ndarray, normal: np.ndarray | None = None, material: int = 0):
+    return layers.sample(_seen(places, normal, material), frozenset({"base_color"}))
 
 
 @given(st.floats(-15.0, 15.0), st.floats(-15.0, 15.0), st.floats(-5.0, 30.0))
@@ -100,7 +102,7 @@ def test_an_occluder_is_never_taken() -> None:
     image.depth[:, 100:233] -= np.float32(0.3)
     image.layers[:, 100:233] = 1.0
     places = np.random.default_rng(1).uniform(-12.0, 12.0, (4000, 3)) * [1.0, 1.0, 0.0]
-    values, shown = sample_image(image, places, np.tile([0.0, 0.0, 1.0], (4000, 1)), np.zeros(4000, np.uint16))
+    values, shown = sample_image(image, _seen(places))
     column, _, _ = image.view.project(places)
     assert not shown[(column > 101.0) & (column < 232.0)].any()
     assert shown[(column < 99.0) | (column > 234.0)].all()
@@ -112,7 +114,7 @@ def test_values_stay_on_their_material() -> None:
     image = _ground_image(_view())
     image.material[:, 200:202], image.layers[:, 200:202] = 2, 1.0
     places = np.random.default_rng(1).uniform(-1.0, 1.0, (1000, 3)) * [1.0, 1.0, 0.0]
-    values, _ = sample_image(image, places, np.tile([0.0, 0.0, 1.0], (1000, 1)), np.zeros(1000, np.uint16))
+    values, _ = sample_image(image, _seen(places))
     assert values.max() < 0.6
 
 
@@ -201,12 +203,10 @@ def test_light_from_close_by_is_that_of_the_points_own_slope(lit: bool) -> None:
     constants = surface_constants(ROWS, varies)
     layers = ImageLayers([image], {"base_color": 3, "sun": 3}, MaterialLayers(constants, Shading("lit", light)))
     places, normal = np.array([[0.0, -0.15, 0.0]]), own[None]
-    values = layers.sample(
-        places, places + [0.0, 0.0, 50.0], normal, np.zeros(1, np.uint16), np.zeros(1), frozenset({"rgb"})
-    )
+    values = layers.sample(_seen(places, normal), frozenset({"rgb"}))
     assert values.source.tolist() == [NEARBY]
     expected = color * (light.sunlight(normal) * lit + light.sky(normal))
-    np.testing.assert_allclose(values.arrays["rgb"] / 65535.0, encode(expected) / 65535.0, atol=1e-3)
+    np.testing.assert_allclose(values.arrays["rgb"] / 65535.0, encode_srgb(expected) / 65535.0, atol=1e-3)
 
 
 def test_points_of_a_whole_strip_find_the_images_along_it() -> None:

@@ -17,8 +17,9 @@ from synthroads_addon.scanning.colour.colour import (
     FROM_MATERIAL,
     MATERIAL_LAYERS,
     MaterialLayers,
+    SeenPoints,
     Shading,
-    encode,
+    encode_srgb,
     needed_layers,
     shares_by_source,
     surface_constants,
@@ -52,7 +53,7 @@ def _points(count: int = 50) -> dict[str, np.ndarray]:
 
 def test_materials_give_their_means_under_a_usual_sun_and_sky() -> None:
     points = _points()
-    values = MaterialLayers(surface_constants(ROWS)).sample(**points, wanted=ALL)
+    values = MaterialLayers(surface_constants(ROWS)).sample(SeenPoints(**points), ALL)
     for name in MATERIAL_LAYERS:
         expected = np.array([getattr(ROWS[i], name) for i in points["material"]])
         np.testing.assert_allclose(values.arrays[name], expected, atol=1e-7)
@@ -72,12 +73,12 @@ def test_shares_name_every_source() -> None:
 
 
 def test_only_wanted_layers_are_given() -> None:
-    values = MaterialLayers(surface_constants(ROWS)).sample(**_points(), wanted=frozenset({"metallic"}))
+    values = MaterialLayers(surface_constants(ROWS)).sample(SeenPoints(**_points()), frozenset({"metallic"}))
     assert set(values.arrays) == {"metallic"}
 
 
 def test_no_points_are_no_values() -> None:
-    values = MaterialLayers(surface_constants(ROWS)).sample(**_points(0), wanted=ALL)
+    values = MaterialLayers(surface_constants(ROWS)).sample(SeenPoints(**_points(0)), ALL)
     assert values.arrays["rgb"].shape == (0, 3)
 
 
@@ -91,17 +92,17 @@ def test_a_mode_of_rgb_needs_its_layers(mode: str, needed: set[str]) -> None:
 
 def test_unlit_and_false_colours_are_layers() -> None:
     points, constants = _points(), surface_constants(ROWS)
-    unlit = MaterialLayers(constants, Shading("unlit")).sample(**points, wanted=ALL).arrays
-    np.testing.assert_array_equal(unlit["rgb"], encode(unlit["base_color"]))
-    false = MaterialLayers(constants, Shading("false_colour")).sample(**points, wanted=ALL).arrays
-    np.testing.assert_array_equal(false["rgb"][:, 1], encode(false["metallic"]))
+    unlit = MaterialLayers(constants, Shading("unlit")).sample(SeenPoints(**points), ALL).arrays
+    np.testing.assert_array_equal(unlit["rgb"], encode_srgb(unlit["base_color"]))
+    false = MaterialLayers(constants, Shading("false_colour")).sample(SeenPoints(**points), ALL).arrays
+    np.testing.assert_array_equal(false["rgb"][:, 1], encode_srgb(false["metallic"]))
 
 
 @given(st.floats(0.0, 1.0), st.floats(0.0, 1.0))
 def test_encoding_keeps_order_and_ends(a: float, b: float) -> None:
     low, high = sorted([a, b])
-    assert encode(np.array([low]))[0] <= encode(np.array([high]))[0]
-    assert encode(np.array([0.0, 1.0, 2.0])).tolist() == [0, 65535, 65535]
+    assert encode_srgb(np.array([low]))[0] <= encode_srgb(np.array([high]))[0]
+    assert encode_srgb(np.array([0.0, 1.0, 2.0])).tolist() == [0, 65535, 65535]
 
 
 @given(st.floats(0.0, 360.0), st.floats(0.0, 90.0))
@@ -168,10 +169,8 @@ def test_the_drift_can_be_measured_in_the_colours() -> None:
         "normal": np.tile([0.0, 0.0, 1.0], (len(x), 1)),
         "material": np.zeros(len(x), np.uint16),
     }
-    first, second = (
-        layers.sample(**line, time=np.full(len(x), time), wanted=frozenset({"rgb"})).arrays["rgb"][:, 0].astype(float)
-        for time in (0.0, 30.0)
-    )
+    passes = (SeenPoints(**line, time=np.full(len(x), time)) for time in (0.0, 30.0))
+    first, second = (layers.sample(seen, frozenset({"rgb"})).arrays["rgb"][:, 0].astype(float) for seen in passes)
     errors = [np.abs(second[k:] - first[: len(x) - k]).mean() for k in range(200)]
     assert np.argmin(errors) * 2.0 == 8.0 * 30.0
     assert errors[0] > 20.0 * max(errors[120], 1.0)

@@ -13,7 +13,8 @@ from hypothesis import strategies as st
 
 from synthroads_addon.base.rotations import rotation_matrix
 from synthroads_addon.scanning.devices.device import Device, PulseMode, ScannerSetting, device_names, load_device
-from synthroads_addon.scanning.devices.shots import Shots, _table, shot_count, shots
+from synthroads_addon.scanning.devices.shots import _table, shot_count, shots
+from synthroads_addon.scanning.patterns.base import PulseRays
 from tests.helpers.scenes.scanners import custom, mode, preset, wedges
 
 MODES = [(name, m) for name in device_names() for m in load_device(name).modes]
@@ -31,9 +32,9 @@ def off_nadir(direction: np.ndarray) -> np.ndarray:
     return np.arctan2(-direction[1], -direction[2])
 
 
-def of_head(shot: Shots, device: Device, head: int) -> tuple[np.ndarray, np.ndarray]:
+def of_head(shot: PulseRays, device: Device, head: int) -> tuple[np.ndarray, np.ndarray]:
     """Return times and directions of one head, in that head's own frame."""
-    mine = shot.channel // device.pattern.beams == head
+    mine = shot.beam // device.pattern.beams == head
     h = device.heads[head]
     turn = rotation_matrix(*np.deg2rad([h.yaw_deg, h.pitch_deg, h.roll_deg]))
     return shot.time[mine], turn.T @ shot.direction[:, mine]
@@ -87,7 +88,7 @@ def test_rotating_heads_against_their_data_sheets(name: str, m: PulseMode) -> No
         shot = shots(s, 0, shot_count(s, 2.0 / turns))
         assert shot_count(s, 2.0 / turns) / (2.0 / turns) == pytest.approx(m.pulse_rate_khz * 1e3, rel=1e-3)
         for channel, elevation in enumerate(beams):
-            mine = shot.channel == channel
+            mine = shot.beam == channel
             x, y, z = shot.direction[:, mine]
             np.testing.assert_allclose(np.rad2deg(np.arcsin(z)), elevation, atol=1e-10)
             azimuth, time = np.arctan2(-y, x), shot.time[mine]
@@ -103,14 +104,14 @@ def test_rotating_heads_against_their_data_sheets(name: str, m: PulseMode) -> No
 def test_beams_fire_at_their_times_while_the_head_turns() -> None:
     s = preset("velodyne-vlp-16", lines_per_second=20.0)
     shot = shots(s, 0, 48)
-    np.testing.assert_array_equal(shot.channel, np.tile(np.arange(16), 3))
+    np.testing.assert_array_equal(shot.beam, np.tile(np.arange(16), 3))
     np.testing.assert_allclose(shot.time[:16] - shot.time[0], np.arange(16) * 2.304e-6, atol=1e-15)
     azimuth = np.arctan2(-shot.direction[1], shot.direction[0])
     np.testing.assert_allclose(azimuth - azimuth[0], 2 * np.pi * 20 * shot.time, atol=1e-9)
     np.testing.assert_allclose(shot.scan_angle, azimuth, atol=1e-12)
     # One laser of each block at a time.
     pairs = shots(preset("velodyne-hdl-64e"), 0, 64)
-    np.testing.assert_array_equal(pairs.channel.reshape(-1, 2), np.stack([np.arange(32), np.arange(32, 64)], axis=1))
+    np.testing.assert_array_equal(pairs.beam.reshape(-1, 2), np.stack([np.arange(32), np.arange(32, 64)], axis=1))
     np.testing.assert_array_equal(pairs.time[::2], pairs.time[1::2])
     # Without times: one after the other, at the pulse rate.
     even = custom({"type": "rotating_head", "elevations_deg": [1.0, -5.0, 3.0]})
@@ -210,7 +211,7 @@ def test_slices_equal_the_whole(name: str, data: st.DataObject) -> None:
     framed = data.draw(st.booleans(), label="with_frame")
     whole = shots(s, begin, size, framed)
     parts = [shots(s, begin, cut, framed), shots(s, begin + cut, size - cut, framed)]
-    for field in ("time", "scan_angle", "direction", "in_plane", "across", "channel"):
+    for field in ("time", "scan_angle", "direction", "in_plane", "across", "beam"):
         value = getattr(whole, field)
         if value is None:
             assert not framed
@@ -250,8 +251,7 @@ def test_axes_are_orthonormal_and_times_increase(name: str) -> None:
     steps = np.diff(shot.time)
     # Only the two blocks of one head fire at the same time.
     assert (steps >= 0).all() if name == "velodyne-hdl-64e" else (steps > 0).all()
-    assert shot.channel.dtype == np.uint8
-    assert set(shot.channel) == set(range(s.device.channels))
+    assert set(shot.beam) == set(range(s.device.channels))
 
 
 @pytest.mark.parametrize("name", ["riegl-minivux-3uav", "riegl-vz-600i", "generic-grid", "velodyne-vlp-16"])
@@ -260,9 +260,9 @@ def test_in_plane_is_where_the_beam_goes(name: str) -> None:
     beams = s.device.pattern.beams
     shot = shots(s, 100 * beams, 3 * beams, True)
     for channel in range(0, beams, 5):
-        d = shot.direction[:, shot.channel == channel]
+        d = shot.direction[:, shot.beam == channel]
         travel = d[:, 2] - d[:, 0]
-        towards = shot.in_plane[:, shot.channel == channel][:, 1]
+        towards = shot.in_plane[:, shot.beam == channel][:, 1]
         assert travel @ towards == pytest.approx(np.linalg.norm(travel), rel=1e-9)
 
 
@@ -284,7 +284,7 @@ def test_positive_scan_angles_look_to_the_right(name: str) -> None:
     shot = shots(s, 0, min(200_000, shot_count(s, 2 / s.lines_per_second)))
     d = s.device
     for head in range(len(d.heads)):
-        mine = shot.channel // d.pattern.beams == head
+        mine = shot.beam // d.pattern.beams == head
         _, direction = of_head(shot, d, head)
         side = np.sin(shot.scan_angle[mine])
         clear = np.abs(side) > 1e-6
@@ -294,7 +294,7 @@ def test_positive_scan_angles_look_to_the_right(name: str) -> None:
 def test_two_heads_cross_their_lines() -> None:
     s = preset("riegl-vq-450")
     shot = shots(s, 0, 4 * s.pulses_per_line)
-    np.testing.assert_array_equal(shot.channel, np.tile([0, 1], 2 * s.pulses_per_line))
+    np.testing.assert_array_equal(shot.beam, np.tile([0, 1], 2 * s.pulses_per_line))
     for head, forward in enumerate(([1, 1, 0], [1, -1, 0])):
         d = shot.direction[:, head::2]
         np.testing.assert_allclose(np.array(forward) @ d, 0, atol=1e-12)

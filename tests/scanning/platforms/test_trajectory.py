@@ -100,7 +100,6 @@ def test_the_mounting_and_the_typical_range(tmp_path) -> None:
     assert path.typical_range == pytest.approx(60.0, abs=1.0)
     rows[:, 3] = ORIGIN[2]
     assert trajectory(tmp_path, rows).typical_range == 8.0
-    assert path.deviation == 0.0
 
 
 @pytest.mark.parametrize("separator", [",", ";", "\t", "  "])

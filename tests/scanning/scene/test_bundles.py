@@ -22,7 +22,7 @@ def turning(place: Float, velocity: Float) -> Track:
     def pose(time: Float) -> tuple[Float, Float, NDArray[np.bool_]]:
         return upright(time), place + time[:, None] * velocity, np.ones(len(time), dtype=bool)
 
-    return Track.of(pose, 0.0, 2.0, 0.01)
+    return Track.between(pose, 0.0, 2.0, 0.01)
 
 
 def lines(count: int, speed: float) -> Bundles:
@@ -33,7 +33,7 @@ def lines(count: int, speed: float) -> Bundles:
     down /= np.linalg.norm(down, axis=0)
     origin = np.stack([speed * 2.0 * once, 0.0 * once, 60.0 + 0.0 * once])
     origin, down = np.tile(origin, (1, 2)), np.tile(down, (1, 2))
-    return Bundles.of(origin, down, np.tile(2.0 * once, 2), np.full(2 * len(once), 400.0))
+    return Bundles.gather(origin, down, np.tile(2.0 * once, 2), np.full(2 * len(once), 400.0))
 
 
 def anyhow(count: int, seed: int) -> Bundles:
@@ -42,7 +42,7 @@ def anyhow(count: int, seed: int) -> Bundles:
     towards = source.normal(size=(3, count))
     towards /= np.linalg.norm(towards, axis=0)
     origins, times = source.uniform(-50.0, 50.0, (3, count)), source.uniform(0.0, 2.0, count)
-    return Bundles.of(origins, towards, times, source.uniform(1.0, 80.0, count))
+    return Bundles.gather(origins, towards, times, source.uniform(1.0, 80.0, count))
 
 
 def narrow(seed: int) -> Bundles:
@@ -56,7 +56,7 @@ def narrow(seed: int) -> Bundles:
     origins = origin + apart * source.normal(size=(3, count, RAYS))
     times = np.clip(source.uniform(0.0, 2.0, (count, 1)) + late * source.normal(size=(count, RAYS)), 0.0, 2.0)
     reach = np.broadcast_to(far, (count, RAYS))
-    return Bundles.of(origins.reshape(3, -1), towards.reshape(3, -1), times.ravel(), reach.ravel())
+    return Bundles.gather(origins.reshape(3, -1), towards.reshape(3, -1), times.ravel(), reach.ravel())
 
 
 def by_each(rays: Bundles, track: Track) -> NDArray[np.intp]:
@@ -77,34 +77,34 @@ def test_a_scanner_s_lines_meet_what_each_ray_meets(
 ) -> None:
     track = turning(np.array([*place, 0.0]), np.array([*velocity, 0.0]))
     rays = lines(20_000, speed)
-    np.testing.assert_array_equal(rays.near(track, CENTRE, RADIUS), by_each(rays, track))
+    np.testing.assert_array_equal(rays.rays_near(track, CENTRE, RADIUS), by_each(rays, track))
 
 
 @given(seed=st.integers(0, 10_000), fast=st.floats(-60.0, 60.0))
 @settings(max_examples=300)
 def test_narrow_bundles_meet_what_each_ray_meets(seed: int, fast: float) -> None:
     track, rays = turning(np.zeros(3), np.array([fast, 0.0, 0.0])), narrow(seed)
-    np.testing.assert_array_equal(rays.near(track, CENTRE, RADIUS), by_each(rays, track))
+    np.testing.assert_array_equal(rays.rays_near(track, CENTRE, RADIUS), by_each(rays, track))
 
 
 @given(seed=st.integers(0, 1000), count=st.integers(1, 3 * RAYS))
 def test_rays_from_anywhere_meet_what_each_ray_meets(seed: int, count: int) -> None:
     track, rays = turning(np.zeros(3), np.array([10.0, 0.0, 0.0])), anyhow(count, seed)
-    np.testing.assert_array_equal(rays.near(track, CENTRE, RADIUS), by_each(rays, track))
+    np.testing.assert_array_equal(rays.rays_near(track, CENTRE, RADIUS), by_each(rays, track))
 
 
 def test_most_bundles_of_a_scanner_s_lines_are_ruled_out() -> None:
     rays, track = lines(200_000, 8.0), turning(np.array([10.0, 12.0, 0.0]), np.array([-20.0, 0.0, 0.0]))
-    near = rays.near(track, CENTRE, RADIUS)
-    looked_at = len(rays._bundles_near(track.way(CENTRE), RADIUS)) * RAYS
+    near = rays.rays_near(track, CENTRE, RADIUS)
+    looked_at = len(rays._bundles_near(track.point_track(CENTRE), RADIUS)) * RAYS
     assert len(near) > 500
     assert looked_at < 10 * len(near) < 10_000
 
 
 def test_no_rays_are_near_nothing() -> None:
     none = np.empty((3, 0))
-    rays = Bundles.of(none, none, np.empty(0), np.empty(0))
-    assert len(rays.near(turning(np.zeros(3), np.zeros(3)), CENTRE, RADIUS)) == 0
+    rays = Bundles.gather(none, none, np.empty(0), np.empty(0))
+    assert len(rays.rays_near(turning(np.zeros(3), np.zeros(3)), CENTRE, RADIUS)) == 0
 
 
 @pytest.mark.parametrize("way", [(0.0, 0.0, 0.0), (100.0, 0.0, 0.0)])
@@ -113,5 +113,5 @@ def test_a_way_is_that_of_its_point(way: tuple[float, float, float]) -> None:
     time = np.linspace(0.0, 2.0, 777)
     rotation, place, _ = track.at(time)
     expected = np.einsum("ijn,j->in", rotation.reshape(3, 3, -1), CENTRE) + place
-    np.testing.assert_allclose(track.way(CENTRE).at(time), expected, atol=1e-12)
-    assert track.way(CENTRE).fastest == pytest.approx(np.hypot(*way[:2]), abs=1.0)
+    np.testing.assert_allclose(track.point_track(CENTRE).at(time), expected, atol=1e-12)
+    assert track.point_track(CENTRE).fastest == pytest.approx(np.hypot(*way[:2]), abs=1.0)

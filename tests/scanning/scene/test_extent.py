@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from synthroads_addon.scanning.platforms.polyline import PolylineGuide
 from synthroads_addon.scanning.platforms.registry import make_platform
-from synthroads_addon.scanning.platforms.tripod import PositionsPath, TripodPath
+from synthroads_addon.scanning.platforms.tripod import TripodPath
 from synthroads_addon.scanning.scene.extent import bounds, elevation_at, median_elevation, middle_line
 from synthroads_addon.scanning.scene.mesh import SceneMesh
 
@@ -86,8 +86,8 @@ def test_a_tripod_put_down_turns_as_one_beside_a_line_does() -> None:
     platform = make_platform(
         kind="tripod", turn_seconds=7.0, height=2.0, stations=(3.0,), lateral_offsets=(0.0,), yaw_deg=20.0
     )
-    beside = TripodPath(platform, PolylineGuide([[0.0, 0.0, 1.0], [10.0, 0.0, 1.0]]))
-    put = PositionsPath(platform, [(3.0, 0.0, 3.0)])
+    beside = platform.make_path(PolylineGuide([[0.0, 0.0, 1.0], [10.0, 0.0, 1.0]]))
+    put = TripodPath(platform, [(3.0, 0.0, 3.0)])
     time = np.linspace(0.0, 7.0, 50)
     for mine, theirs in zip(put.pose(put.strips[0], time), beside.pose(beside.strips[0], time), strict=True):
         assert np.allclose(mine, theirs, atol=1e-12)
@@ -97,7 +97,7 @@ def test_a_tripod_put_down_turns_as_one_beside_a_line_does() -> None:
 
 
 def test_each_position_is_a_strip_of_its_own() -> None:
-    path = PositionsPath(make_platform(kind="tripod", turn_seconds=5.0), [(0, 0, 0), (1, 2, 3)])
+    path = TripodPath(make_platform(kind="tripod", turn_seconds=5.0), [(0, 0, 0), (1, 2, 3)])
     assert [strip.index for strip in path.strips] == [0, 1]
     position, rotation = path.pose(path.strips[1], np.array([path.strips[1].start_time]))
     assert position.tolist() == [[1.0, 2.0, 3.0]]

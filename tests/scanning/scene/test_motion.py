@@ -19,7 +19,7 @@ from synthroads_addon.road.things.chassis import CHASSIS
 from synthroads_addon.road.things.vehicles import VEHICLE_GAP, VEHICLE_LANE_WIDTH, VEHICLE_TYPES
 from synthroads_addon.sampling.road import sample_road
 from synthroads_addon.scanning.scene.motion import LaneMotion, LinearMotion, lane_motions
-from synthroads_addon.scanning.scene.passes import OVERHANG, passes
+from synthroads_addon.scanning.scene.passes import OVERHANG, lane_passes
 from synthroads_addon.scenario.road import RoadScenario
 
 Float = NDArray[np.float64]
@@ -300,7 +300,7 @@ class TestInAgain:
         assert np.diff(motion.station(time)).min() < -300.0
 
     def test_on_a_road_shorter_than_itself_it_never_is(self) -> None:
-        (way,) = passes([2.0], [20.0], [16.5], 5.0)
+        (way,) = lane_passes([2.0], [20.0], [16.5], 5.0)
         assert not way.at(np.linspace(0.0, 100.0, 1000))[1].any()
 
     @given(
@@ -319,7 +319,7 @@ class TestInAgain:
             start.append(place)
         length = [row[2] for row in cars]
         whole = place + length[-1] / 2.0 + 20.0
-        ways = passes(start, speed, length, whole)
+        ways = lane_passes(start, speed, length, whole)
         time = np.linspace(0.0, 20.0 * whole / speed[0], 4001)
         found = [way.at(time) for way in ways]
         for i, (a, here) in enumerate(found):

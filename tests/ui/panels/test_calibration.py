@@ -12,7 +12,7 @@ import synthroads_addon
 from synthroads_addon.base.errors import Cancelled
 from synthroads_addon.blender.materials import material
 from synthroads_addon.blender.materials.image import base_color_image
-from synthroads_addon.calibration.job import CalibrationJob, Wanted, calibrate, save_fitted
+from synthroads_addon.calibration.job import CalibrationJob, MaterialTarget, calibrate, save_fitted
 from synthroads_addon.materials.table import materials
 from synthroads_addon.ui.panels import calibration
 from synthroads_addon.ui.work import calibration_run
@@ -43,7 +43,7 @@ def test_buttons_fit_and_save_what_the_library_does(settings: Any, tmp_path: Pat
     assert bpy.ops.synthroads.fit_materials() == {"FINISHED"}
     assert bpy.ops.synthroads.save_materials() == {"FINISHED"}
     job = CalibrationJob(
-        (Wanted("asphalt", "40"), Wanted("paint_white", "60")),
+        (MaterialTarget("asphalt", "40"), MaterialTarget("paint_white", "60")),
         real=cloud,
         class_field="label",
         incidence_deg=(0.0, 20.0, 40.0, 60.0),
@@ -67,7 +67,7 @@ def test_buttons_fit_and_save_what_the_library_does(settings: Any, tmp_path: Pat
 def test_comparing_again_draws_anew_and_saves_nothing(settings: Any, tmp_path: Path) -> None:
     labels(settings, labelled(tmp_path / "real.laz", 30.0, 40.0))
     assert bpy.ops.synthroads.compare_intensities() == {"FINISHED"}
-    before = {entry.wanted.material: entry.after for entry in calibration_run.latest.compared}
+    before = {entry.target.material: entry.after for entry in calibration_run.latest.compared}
     assert before == {name: materials()[name] for name in ("asphalt", "paint_white")}
     assert not bpy.ops.synthroads.save_materials.poll()
     settings.real = ""

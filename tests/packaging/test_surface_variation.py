@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from synthroads_addon.cloud.tools import surface_variation as module
-from synthroads_addon.cloud.tools.surface_variation import plane_residuals, surface_variation
+from tools import surface_variation as module
+from tools.surface_variation import plane_residuals, surface_variation
 
 
 def rough_plane(count: int, sigma: float, size: float = 10.0, slope: float = 0.0) -> np.ndarray:

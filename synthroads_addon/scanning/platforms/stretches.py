@@ -1,58 +1,54 @@
-"""Short stretches of a path, to scan or to colour a sample of a job in place of all of it."""
+"""Stretches of a path: a sample in place of all of it, or what a section of the road is scanned from."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .platforms.path import Path, Strip
+from .path import Path, Strip
 
 Float = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class Stretches:
-    """A path of which only stretches are flown; see `platforms.base.Path`.
+class PathStretches:
+    """A path of which only stretches are taken, or that is told in another local frame; see `platforms.path.Path`.
 
     Attributes:
         whole: the path.
         strips: its stretches: each has the index of the strip that it is of.
+        origin: (3,) where the local frame begins in the path's, m.
     """
 
     whole: Path
     strips: tuple[Strip, ...]
+    origin: Float = field(default_factory=lambda: np.zeros(3))
 
     @property
     def knot_spacing(self) -> float:
-        """Return the whole path's."""
+        """Return the whole path's time between knots, s."""
         return self.whole.knot_spacing
 
     @property
     def typical_range(self) -> float:
-        """Return the whole path's."""
+        """Return the whole path's usual range, m."""
         return self.whole.typical_range
-
-    @property
-    def deviation(self) -> float:
-        """Return the whole path's."""
-        return self.whole.deviation
-
-    def pose(self, strip: Strip, time: Float) -> tuple[Float, Float]:
-        """Return the whole path's pose."""
-        return self.whole.pose(self._of(strip), time)
 
     @property
     def share(self) -> float:
         """Return how much of the path's duration the stretches are."""
         return sum(strip.duration for strip in self.strips) / sum(strip.duration for strip in self.whole.strips)
 
-    def _of(self, stretch: Strip) -> Strip:
-        return next(strip for strip in self.whole.strips if strip.index == stretch.index)
+    def pose(self, strip: Strip, time: Float) -> tuple[Float, Float]:
+        """Return the whole path's pose in the local frame."""
+        of = next(whole for whole in self.whole.strips if whole.index == strip.index)
+        position, rotation = self.whole.pose(of, time)
+        return position - self.origin, rotation
 
 
-def spread_stretches(path: Path, count: int, duration: float) -> Stretches:
+def spread_stretches(path: Path, count: int, duration: float) -> PathStretches:
     """Return stretches of a duration (s) spread evenly over each strip, from its start to its end.
 
     A strip that is shorter than all its stretches together is taken whole.
@@ -64,21 +60,19 @@ def spread_stretches(path: Path, count: int, duration: float) -> Stretches:
             continue
         starts = strip.start_time + np.linspace(0.0, strip.duration - duration, count)
         strips += [Strip(strip.index, float(start), duration) for start in starts]
-    return Stretches(path, tuple(strips))
+    return PathStretches(path, tuple(strips))
 
 
-def middle(path: Path, share: float) -> Stretches:
+def middle_stretches(path: Path, share: float) -> PathStretches:
     """Return the middle of each strip, a share of its duration long."""
-    return Stretches(
-        path,
-        tuple(
-            Strip(strip.index, strip.start_time + strip.duration * (1.0 - share) / 2.0, strip.duration * share)
-            for strip in path.strips
-        ),
+    strips = (
+        Strip(strip.index, strip.start_time + strip.duration * (1.0 - share) / 2.0, strip.duration * share)
+        for strip in path.strips
     )
+    return PathStretches(path, tuple(strips))
 
 
-def scatter_stretches(path: Path, count: int, duration: float, phase: float = 0.5, most: float = 0.25) -> Stretches:
+def scatter_stretches(path: Path, count: int, duration: float, phase: float = 0.5, most: float = 0.25) -> PathStretches:
     """Return stretches of a duration (s) scattered evenly over all strips together, however many there are.
 
     Args:
@@ -98,4 +92,4 @@ def scatter_stretches(path: Path, count: int, duration: float, phase: float = 0.
         into = float(place - (ends[number] - strip.duration))
         start = strip.start_time + min(max(into - length / 2.0, 0.0), strip.duration - length)
         strips.append(Strip(strip.index, start, length))
-    return Stretches(path, tuple(strips))
+    return PathStretches(path, tuple(strips))
