@@ -82,9 +82,7 @@ class Surfaces:
             object.__setattr__(self, name, value)
 
 
-def surfaces_of(
-    rows: Iterable[Material], reflection: Reflection = "lambert", spread: bool = True
-) -> Surfaces:
+def surfaces_of(rows: Iterable[Material], reflection: Reflection = "lambert", spread: bool = True) -> Surfaces:
     """Return the constants of materials; with Lambert's model no surface has facets, without spread none varies."""
     rows = list(rows)
 

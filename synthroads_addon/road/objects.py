@@ -16,9 +16,14 @@ StrictFinite = Annotated[float, Field(strict=True, ge=-1e8, le=1e8)]
 
 
 class RoadObject(Model):
-    """Base of everything in ``objects``: each has a type and a number that its points carry."""
+    """Base of everything in ``objects``: each has a type, and a number that its points carry.
+
+    Attributes:
+        points_class: semantic class of its points; empty for what has none, or chooses it itself.
+    """
 
     conditions: ClassVar[Sequence[dict[str, Any]]] = ({"required": ["type"]},)
+    points_class: ClassVar[str] = ""
 
     instance: int = quantity(
         ge=1, le=2**32 - 1, unit="1", description="Number that the object's faces and points carry."

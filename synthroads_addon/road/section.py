@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import ClassVar, Literal
 
 from pydantic import Field, model_validator
 
@@ -65,6 +65,7 @@ class Pavement(Model):
 class Carriageway(RoadObject):
     """One direction's paved surface with its verge. Every width is a number, or points of it along the road."""
 
+    points_class: ClassVar = "road"
     type: Literal["Carriageway"] = "Carriageway"
     side: Literal["left", "right"] = Field(description="Side of the centreline.")
     inner_offset: Width = Field(
@@ -104,6 +105,7 @@ class Carriageway(RoadObject):
 class Median(RoadObject):
     """The strip between the carriageways' inner edges, straight from one to the other."""
 
+    points_class: ClassVar = "roadside"
     type: Literal["Median"] = "Median"
 
 
@@ -139,6 +141,7 @@ class Turnout(RoadObject):
         )
         for kind in ("emergency_bay", "exit", "entry")
     )
+    points_class: ClassVar = "road"
     type: Literal["Turnout"] = "Turnout"
     carriageway: str = Field(description="Id of the carriageway that it widens.")
     kind: Literal["emergency_bay", "exit", "entry"] = Field(description="What it is for.")
@@ -208,6 +211,7 @@ class LineMarking(Marking, RoadObject):
             otherwise={"turnout": {"type": "null"}},
         ),
     )
+    points_class: ClassVar = "road_marking"
     type: Literal["LineMarking"] = "LineMarking"
     carriageway: str = Field(description="Id of the carriageway that it lies on.")
     kind: Literal["outer_edge", "lane", "inner_edge", "block", "turnout_edge", "gore_edge", "free"] = Field(
@@ -242,6 +246,7 @@ class LineMarking(Marking, RoadObject):
 class Hatching(Marking, RoadObject):
     """The hatched area of a gore (Sperrflaeche): stripes across the pavement between main road and ramp."""
 
+    points_class: ClassVar = "road_marking"
     type: Literal["Hatching"] = "Hatching"
     turnout: str = Field(description="Id of the turnout whose gore it fills.")
     stripe_width: float = quantity(1.0, ge=0.2, le=3, unit="m", description="Width of a stripe along the road.")
@@ -252,6 +257,7 @@ class Hatching(Marking, RoadObject):
 class Arrow(Marking, PointObject):
     """An arrow on a lane. Its rotation is 0 where it points with the stations."""
 
+    points_class: ClassVar = "road_marking"
     type: Literal["Arrow"] = "Arrow"
     carriageway: str = Field(description="Id of the carriageway that it lies on.")
     kind: Literal["straight", "left", "right", "straight_left", "straight_right", "merge_left", "merge_right"] = Field(

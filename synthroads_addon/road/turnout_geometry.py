@@ -159,5 +159,3 @@ class TurnoutShape:
 
     def _x(self, station: Float) -> Float:
         return self._w(station) - self._taper - self.turnout.lane_length
-
-

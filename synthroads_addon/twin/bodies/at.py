@@ -168,9 +168,7 @@ def _pole(place: Place, item: Pole) -> list[Faces]:
 
 def _traffic_light(place: Place, item: TrafficLight) -> list[Faces]:
     wide, deep, tall = 1.3 * item.light_diameter, 0.7 * item.light_diameter, 1.25 * item.light_diameter * item.lights
-    head = place.box(
-        (wide, deep, tall), (0.0, -(shapes.TRAFFIC_LIGHT_POST + deep) / 2.0, item.height - tall / 2.0)
-    )
+    head = place.box((wide, deep, tall), (0.0, -(shapes.TRAFFIC_LIGHT_POST + deep) / 2.0, item.height - tall / 2.0))
     return [place.post(shapes.TRAFFIC_LIGHT_POST, -item.elevation, item.height), head]
 
 

@@ -55,9 +55,7 @@ def _deck(place: Place, bridge: Overpass, ends: tuple[float, float], low: float,
     return loft(place.local(np.stack(sections)))
 
 
-def _block(
-    place: Place, x: tuple[float, float], y: tuple[float, float], z: tuple[float, float], shear: float
-) -> Faces:
+def _block(place: Place, x: tuple[float, float], y: tuple[float, float], z: tuple[float, float], shear: float) -> Faces:
     """Return the body between two x, two y and two z, sheared along y."""
     outline = [(u, v + u * shear) for u, v in ((x[0], y[0]), (x[1], y[0]), (x[1], y[1]), (x[0], y[1]))]
     return place.prism(outline, *z)

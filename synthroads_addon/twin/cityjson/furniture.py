@@ -27,9 +27,7 @@ def furniture_objects(geometry: RoadGeometry, tolerance: float) -> Iterator[City
         tolerance: chord error of what runs along the road, m.
     """
     objects = geometry.parameters.objects
-    standing = {
-        name: item for name, item in objects.items() if isinstance(item, PointObject) and not _is_painted(item)
-    }
+    standing = {name: item for name, item in objects.items() if isinstance(item, PointObject) and not _is_painted(item)}
     places = dict(zip(standing, places_of(geometry, list(standing.values())), strict=True))
     for name, item in objects.items():
         if isinstance(item, Overpass):

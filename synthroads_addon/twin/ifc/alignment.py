@@ -303,9 +303,7 @@ def _write_referents(ifc: IfcFile, geometry: RoadGeometry, axis: Axis) -> None:
     inside = [item for item in found if 0.0 <= item.station <= geometry.length]
     for item in sorted(inside, key=lambda item: item.station):
         place = linear_placement(ifc, geometry, axis, item.station)
-        referent = ifc.rooted(
-            "IfcReferent", item.name, Name=item.name, ObjectPlacement=place, PredefinedType=item.kind
-        )
+        referent = ifc.rooted("IfcReferent", item.name, Name=item.name, ObjectPlacement=place, PredefinedType=item.kind)
         ifc.properties(referent, item.properties, item.values)
         if item.kind != "STATION":
             ifc.properties(referent, "Pset_Stationing", {"Station": ifc.value(item.station, "m")})

@@ -27,7 +27,7 @@ from ...road.things.body_shapes import (
     TEMPORARY_GAP,
 )
 from .entities import Entity, Float
-from .scene import IfcPlace, Scene, grid_triangles
+from .scene import Scene, grid_triangles
 
 _Mesh = tuple[Float, NDArray[np.intp]]
 
@@ -60,7 +60,7 @@ def write_barriers(scene: Scene) -> None:
 
 def _railing(scene: Scene, name: str, item: Any, meshes: list[_Mesh], material: str) -> None:
     """Add a vehicle restraint system."""
-    railing = _element(scene, "IfcRailing", name, item, meshes, PredefinedType="GUARDRAIL")
+    railing = _element(scene, "IfcRailing", name, item, meshes, "GUARDRAIL")
     scene.ifc.made_of(railing, material)
     common = {
         "Status": ["TEMPORARY" if isinstance(item, TemporaryBarrier) else "EXISTING"],
@@ -72,33 +72,22 @@ def _railing(scene: Scene, name: str, item: Any, meshes: list[_Mesh], material: 
 
 def _wall(scene: Scene, name: str, item: NoiseBarrier) -> None:
     """Add a noise barrier: IFC has a wall for it, but no type of wall."""
-    wall = _element(scene, "IfcWall", name, item, _noise_barrier(scene, item), PredefinedType="USERDEFINED")
+    wall = _element(scene, "IfcWall", name, item, _noise_barrier(scene, item), "USERDEFINED")
     scene.ifc.made_of(wall, _PANELS[item.panel])
     scene.ifc.properties(wall, "Pset_WallCommon", {"Status": ["EXISTING"], "IsExternal": scene.ifc.value(True)})
 
 
-def _element(scene: Scene, entity: str, name: str, item: Any, meshes: list[_Mesh], **named: Any) -> Entity:
+def _element(scene: Scene, entity: str, name: str, item: Any, meshes: list[_Mesh], kind: str) -> Entity:
     """Add an element that is placed at its beginning."""
     ifc, geometry = scene.ifc, scene.geometry
     start = min(max(item.start_station, 0.0), geometry.length)
     place = scene.place(start, item.offset)
-    made = ifc.rooted(
-        entity,
-        name,
-        Name=name,
-        ObjectType=item.type,
-        ObjectPlacement=place.placement,
-        Representation=ifc.shape([_solid(scene, place, mesh) for mesh in meshes], "Tessellation"),
-        **named,
-    )
+    solids = [ifc.mesh(place.inside(points), triangles, True) for points, triangles in meshes]
+    shape = ifc.shape(solids, "Tessellation")
+    made = ifc.product(entity, name, kind, item.type, place.placement, Representation=shape)
     scene.describe(made, item)
     scene.stand(made, scene.container(start, item.offset))
     return made
-
-
-def _solid(scene: Scene, place: IfcPlace, mesh: _Mesh) -> Entity | None:
-    points, triangles = mesh
-    return scene.ifc.mesh(place.inside(points), triangles, True)
 
 
 # --- bodies ---------------------------------------------------------------------------------------------------------

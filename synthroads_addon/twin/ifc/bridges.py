@@ -45,14 +45,8 @@ class _Bridge:
     def write(self) -> None:
         """Add the bridge, its parts and their elements."""
         ifc, item = self.ifc, self.item
-        self.bridge = ifc.rooted(
-            "IfcBridge",
-            self.name,
-            Name=self.name,
-            ObjectType="Overpass",
-            ObjectPlacement=self.place.placement,
-            CompositionType="ELEMENT",
-            PredefinedType="NOTDEFINED",
+        self.bridge = ifc.product(
+            "IfcBridge", self.name, "NOTDEFINED", item.type, self.place.placement, CompositionType="ELEMENT"
         )
         ifc.gather("IfcRelAggregates", self.scene.site, [self.bridge])
         ifc.gather("IfcRelPositions", self.scene.axis.alignment, [self.bridge])
@@ -68,21 +62,10 @@ class _Bridge:
             self._support(below, "IfcWall", f"abutment-{name}", "RETAININGWALL", middle, size)
 
     def _part(self, kind: str) -> Entity:
-        name = f"{self.name}/{kind}"
-        part = self.ifc.rooted(
-            "IfcBridgePart",
-            name,
-            Name=name,
-            ObjectPlacement=self._frame(),
-            CompositionType="PARTIAL",
-            UsageType="VERTICAL",
-            PredefinedType=kind.upper(),
+        usage = {"CompositionType": "PARTIAL", "UsageType": "VERTICAL"}
+        return self.scene.add_part(
+            self.bridge, self.place, "IfcBridgePart", f"{self.name}/{kind}", kind.upper(), **usage
         )
-        self.ifc.gather("IfcRelAggregates", self.bridge, [part])
-        return part
-
-    def _frame(self) -> Entity:
-        return self.ifc.add("IfcLocalPlacement", self.place.placement, self.ifc.flat_axes)
 
     def _deck(self, part: Entity) -> None:
         item, left, right = self.item, self.left + BRIDGE_SEAT, self.right - BRIDGE_SEAT
@@ -120,17 +103,9 @@ class _Bridge:
     def _element(
         self, part: Entity, entity: str, name: str, body: Entity, kind: str, material: str, about: str | None = None
     ) -> None:
-        ifc, key = self.ifc, f"{self.name}/{name}"
-        made = ifc.rooted(
-            entity,
-            key,
-            Name=key,
-            ObjectType=about,
-            ObjectPlacement=self._frame(),
-            Representation=ifc.shape([body], "SweptSolid"),
-            PredefinedType=kind,
-        )
+        ifc = self.ifc
+        frame, shape = self.place.frame(ifc), ifc.shape([body], "SweptSolid")
+        made = ifc.product(entity, f"{self.name}/{name}", kind, about, frame, Representation=shape)
         ifc.gather("IfcRelContainedInSpatialStructure", part, [made])
         ifc.made_of(made, material)
-        values = {"instance": ifc.value(self.item.instance), "class": ifc.value("bridge")}
-        ifc.properties(made, "SynthRoads", values)
+        ifc.label(made, self.item.instance, self.item.points_class)

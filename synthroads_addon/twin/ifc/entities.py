@@ -95,6 +95,17 @@ class IfcFile:
         """Add an entity that has a GlobalId, which follows from its class and key."""
         return self.add(entity, GlobalId=self.guid(f"{entity}/{key}"), **named)
 
+    def product(
+        self, entity: str, name: str, kind: str, about: str | None = None, placement: Entity = None, **named: Any
+    ) -> Entity:
+        """Add what has a place: `kind` is its predefined type, `about` its object type.
+
+        Without a placement its coordinates are local. Its key is its name.
+        """
+        placement = self.local_frame if placement is None else placement
+        named = {"Name": name, "ObjectType": about, "ObjectPlacement": placement, "PredefinedType": kind} | named
+        return self.rooted(entity, name, **named)
+
     # --- geometry -------------------------------------------------------------------------------------------------
 
     def point(self, *coordinates: float) -> Entity:
@@ -174,6 +185,11 @@ class IfcFile:
         Those of different groups become relations of their own.
         """
         self._gathered.setdefault((relation, of.id(), group), (of, []))[1].extend(members)
+
+    def label(self, item: Entity, instance: int, class_name: str, model: Model | None = None) -> None:
+        """Give an object its instance number and the class of its points, and all that a model says, as properties."""
+        values = {"instance": self.value(instance), "class": self.value(class_name)}
+        self.properties(item, "SynthRoads", values | (self.parameters_of(model) if model else {}))
 
     def properties(self, item: Entity, name: str, values: Values) -> None:
         """Give an object a property set: of values of IFC's simple types, and of lists of labels that are chosen."""

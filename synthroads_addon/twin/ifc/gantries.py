@@ -9,7 +9,6 @@ from ...road.things.body_shapes import GANTRY_BOARD, GANTRY_DISPLAY, GANTRY_HANG
 from ...road.things.furniture import GantrySign
 from .clearance import pavement_below
 from .entities import Entity
-from .furniture import part_of
 from .scene import IfcPlace, Scene
 from .solids import Solids
 
@@ -45,14 +44,9 @@ class _IfcGantry:
     def write(self) -> None:
         """Add the assembly and its parts."""
         item, scene = self.item, self.scene
-        self.assembly = self.ifc.rooted(
-            "IfcElementAssembly",
-            self.name,
-            Name=self.name,
-            ObjectType=f"Gantry {item.kind}",
-            ObjectPlacement=self.place.placement,
-            AssemblyPlace="SITE",
-            PredefinedType="SIGNALASSEMBLY",
+        about, placement = f"Gantry {item.kind}", self.place.placement
+        self.assembly = self.ifc.product(
+            "IfcElementAssembly", self.name, "SIGNALASSEMBLY", about, placement, AssemblyPlace="SITE"
         )
         scene.describe(self.assembly, item)
         scene.stand(self.assembly, scene.parts[f"roadside-{item.post_side}"])
@@ -101,11 +95,10 @@ class _IfcGantry:
 
     def _part(self, entity: str, name: str, solid: Entity, material: str, kind: str) -> Entity:
         ifc = self.ifc
-        part = part_of(self.scene, self.assembly, self.place, entity, f"{self.name}/{name}", PredefinedType=kind)
+        part = self.scene.add_part(self.assembly, self.place, entity, f"{self.name}/{name}", kind)
         part.Representation = ifc.shape([solid], "SweptSolid")
         ifc.made_of(part, material)
-        values = {"instance": ifc.value(self.item.instance), "class": ifc.value("shield_gantry")}
-        ifc.properties(part, "SynthRoads", values)
+        ifc.label(part, self.item.instance, self.item.points_class)
         return part
 
 

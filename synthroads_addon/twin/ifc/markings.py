@@ -9,7 +9,7 @@ from ...road.parameters import Arrow, Carriageway, Hatching, LineMarking, Turnou
 from ...road.section import Marking
 from ..faces import Faces
 from ..surfaces import dash_surfaces, painted_surface
-from .entities import Entity, Float
+from .entities import Float
 from .scene import Scene
 
 _Mesh = tuple[Float, NDArray[np.intp]]
@@ -38,16 +38,9 @@ def _write(scene: Scene, name: str, item: Marking, kind: str, faces: Faces, carr
     assert isinstance(bearer, Carriageway)
     mesh = _triangles(faces)
     shape = ifc.shape([ifc.mesh(*mesh, False)], "Tessellation") if mesh else None
-    feature = ifc.rooted(
-        "IfcSurfaceFeature",
-        name,
-        Name=name,
-        ObjectType=str(getattr(item, "kind", "hatching")),
-        ObjectPlacement=ifc.local_frame,
-        Representation=shape,
-        PredefinedType=kind,
-    )
-    ifc.gather("IfcRelAdheresToElement", _pavement(scene, bearer), [feature])
+    about = str(getattr(item, "kind", "hatching"))
+    feature = ifc.product("IfcSurfaceFeature", name, kind, about, Representation=shape)
+    ifc.gather("IfcRelAdheresToElement", scene.parts[f"pavement-{bearer.side}"], [feature])
     ifc.made_of(feature, f"paint_{item.color}")
     scene.describe(feature, item)  # type: ignore[arg-type]
     common = {
@@ -55,10 +48,6 @@ def _write(scene: Scene, name: str, item: Marking, kind: str, faces: Faces, carr
         "MaterialThickness": ifc.add("IfcPositiveLengthMeasure", item.film_thickness),
     }
     ifc.properties(feature, "Pset_RoadMarkingCommon", common)
-
-
-def _pavement(scene: Scene, carriageway: Carriageway) -> Entity:
-    return scene.parts[f"pavement-{carriageway.side}"]
 
 
 def _triangles(faces: Faces) -> _Mesh | None:

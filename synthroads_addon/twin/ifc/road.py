@@ -72,18 +72,11 @@ def write_carriageways(scene: Scene) -> None:
     _write_median(scene)
 
 
-def _part(scene: Scene, whole: Entity, name: str, kind: str, usage: str = "LATERAL", about: str = "") -> Entity:
+def _part(
+    scene: Scene, whole: Entity, name: str, kind: str, usage: str = "LATERAL", about: str | None = None
+) -> Entity:
     """Add a part of the road, or of one of its parts."""
-    part = scene.ifc.rooted(
-        "IfcRoadPart",
-        name,
-        Name=name,
-        ObjectType=about or None,
-        ObjectPlacement=scene.ifc.local_frame,
-        CompositionType="PARTIAL",
-        UsageType=usage,
-        PredefinedType=kind,
-    )
+    part = scene.ifc.product("IfcRoadPart", name, kind, about, CompositionType="PARTIAL", UsageType=usage)
     scene.ifc.gather("IfcRelAggregates", whole, [part])
     return part
 
@@ -135,20 +128,10 @@ class _Direction:
         scene.parts[f"carriageway-{carriageway.side}"] = self.part
         scene.describe(self.part, carriageway)
         pieces = list(self._pieces())
-        self.pavement = self.ifc.rooted(
-            "IfcPavement",
-            self.name,
-            Name=f"{self.name}/pavement",
-            ObjectPlacement=self.ifc.local_frame,
-            PredefinedType=_PAVEMENTS[carriageway.pavement.kind],
-        )
+        kind = _PAVEMENTS[carriageway.pavement.kind]
+        self.pavement = self.ifc.product("IfcPavement", self.name, kind, Name=f"{self.name}/pavement")
         self.ifc.gather("IfcRelContainedInSpatialStructure", self.part, [self.pavement])
-        self.ifc.properties(
-            self.pavement,
-            "SynthRoads",
-            {"instance": self.ifc.value(carriageway.instance), "class": self.ifc.value("road")}
-            | self.ifc.parameters_of(carriageway.pavement),
-        )
+        self.ifc.label(self.pavement, carriageway.instance, carriageway.points_class, carriageway.pavement)
         scene.parts[f"pavement-{carriageway.side}"] = self.pavement
         for piece in pieces:
             self._write_piece(piece)
@@ -202,15 +185,9 @@ class _Direction:
         kind = _PART_TYPES.get(piece.kind, "USERDEFINED")
         part = _part(self.scene, piece.whole, piece.name, kind, about=piece.kind)
         items = [ifc.mesh(*mesh, False) for mesh in self._meshes(piece, station)]
-        surface = ifc.rooted(
-            "IfcCourse" if paved else "IfcEarthworksFill",
-            piece.name,
-            Name=piece.name,
-            ObjectType=piece.kind,
-            ObjectPlacement=ifc.local_frame,
-            Representation=ifc.shape(items, "Tessellation"),
-            PredefinedType="PAVEMENT" if paved else "USERDEFINED",
-        )
+        entity, kind = ("IfcCourse", "PAVEMENT") if paved else ("IfcEarthworksFill", "USERDEFINED")
+        shape = ifc.shape(items, "Tessellation")
+        surface = ifc.product(entity, piece.name, kind, piece.kind, Representation=shape)
         if paved:
             ifc.gather("IfcRelAggregates", self.pavement, [surface])
             ifc.gather("IfcRelReferencedInSpatialStructure", part, [surface])
@@ -288,16 +265,9 @@ class _Direction:
         found += [("pothole", hole, hole.station, hole.offset) for hole in pavement.potholes]
         for number, (kind, damage, station, offset) in enumerate(found):
             name = f"{self.name}/{kind}-{number}"
-            defect = ifc.rooted(
-                "IfcSurfaceFeature",
-                name,
-                Name=name,
-                ObjectType=kind,
-                ObjectPlacement=self.scene.place(station, offset).placement,
-                PredefinedType="DEFECT",
-            )
-            values = {"instance": ifc.value(self.carriageway.instance), "class": ifc.value("road")}
-            ifc.properties(defect, "SynthRoads", values | ifc.parameters_of(damage))
+            placement = self.scene.place(station, offset).placement
+            defect = ifc.product("IfcSurfaceFeature", name, "DEFECT", kind, placement)
+            ifc.label(defect, self.carriageway.instance, self.carriageway.points_class, damage)
             ifc.gather("IfcRelAdheresToElement", self.pavement, [defect])
 
     def _rut_offset(self, rut: Rut) -> float:
@@ -357,16 +327,9 @@ def _write_median_surface(scene: Scene, index: int, name: str, part: Entity) -> 
     position, heading, _ = geometry.alignment.frame(np.repeat(station, 2))
     left = np.column_stack([-np.sin(heading), np.cos(heading)])
     points = np.column_stack([position + sides.reshape(-1, 1) * left, heights.ravel()])
-    fill = ifc.rooted(
-        "IfcEarthworksFill",
-        name,
-        Name=f"{name}/surface",
-        ObjectType="median",
-        ObjectPlacement=ifc.local_frame,
-        Representation=ifc.shape([ifc.mesh(points, grid_triangles(len(station), 2), False)], "Tessellation"),
-        PredefinedType="USERDEFINED",
-    )
+    shape = ifc.shape([ifc.mesh(points, grid_triangles(len(station), 2), False)], "Tessellation")
+    surface = {"Name": f"{name}/surface", "Representation": shape}
+    fill = ifc.product("IfcEarthworksFill", name, "USERDEFINED", "median", **surface)
     ifc.gather("IfcRelContainedInSpatialStructure", part, [fill])
     ifc.made_of(fill, strip.material)
-    values = {"instance": ifc.value(strip.instance), "class": ifc.value(strip.class_name)}
-    ifc.properties(fill, "SynthRoads", values)
+    ifc.label(fill, strip.instance, strip.class_name)

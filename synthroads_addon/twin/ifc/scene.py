@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -12,35 +12,10 @@ from numpy.typing import NDArray
 
 from ...road.geometry import RoadGeometry
 from ...road.objects import PointObject, RoadObject
+from ...road.things.furniture import Asset
 from ..surfaces import on_ground
 from .alignment import Axis, linear_placement
 from .entities import Entity, Float, IfcFile
-
-CLASSES = {
-    "Guardrail": "guardrail",
-    "ConcreteBarrier": "barrier",
-    "NoiseBarrier": "noise_barrier",
-    "TemporaryBarrier": "construction_barrier",
-    "ConstructionBeacon": "construction_barrier",
-    "Delineator": "warning_post",
-    "TrafficSign": "road_sign",
-    "KilometreBoard": "road_sign",
-    "Gantry": "shield_gantry",
-    "Pole": "pole",
-    "TrafficLight": "traffic_light",
-    "Cabinet": "utility",
-    "Overpass": "bridge",
-    "LineMarking": "road_marking",
-    "Hatching": "road_marking",
-    "Arrow": "road_marking",
-    "Carriageway": "road",
-    "Turnout": "road",
-    "Median": "roadside",
-    "Terrain": "ground",
-    "Vegetation": "vegetation",
-    "Vehicle": "vehicle",
-}
-"""Type of an object of the parameter set -> class of its points in a cloud."""
 
 
 @dataclass(frozen=True)
@@ -56,6 +31,10 @@ class IfcPlace:
     placement: Entity
     origin: Float
     heading: float
+
+    def frame(self, ifc: IfcFile) -> Entity:
+        """Add a placement in this frame, at its origin."""
+        return ifc.add("IfcLocalPlacement", self.placement, ifc.flat_axes)
 
     def inside(self, points: Float) -> Float:
         """Return local points (..., 3) in this frame."""
@@ -143,11 +122,16 @@ class Scene:
             return self.parts[f"carriageway-{strip.side}"]
         return self.parts["roadside-left" if offset > 0.0 else "roadside-right"]
 
-    def describe(self, entity: Entity, item: RoadObject, more: Mapping[str, Any] | None = None) -> None:
+    def describe(self, entity: Entity, item: RoadObject) -> None:
         """Give an entity what the parameter set says of its object, under the same names, and its class."""
-        label = getattr(item, "class_name", None) or CLASSES.get(getattr(item, "type", ""), "")
-        values = self.ifc.parameters_of(item) | ({"class": self.ifc.value(label)} if label else {})
-        self.ifc.properties(entity, "SynthRoads", values | dict(more or {}))
+        label = item.class_name if isinstance(item, Asset) else item.points_class
+        self.ifc.properties(entity, "SynthRoads", self.ifc.parameters_of(item) | {"class": self.ifc.value(label)})
+
+    def add_part(self, whole: Entity, place: IfcPlace, entity: str, name: str, kind: str, **named: Any) -> Entity:
+        """Add an element of a predefined type that is part of another one, in its frame."""
+        part = self.ifc.product(entity, name, kind, placement=place.frame(self.ifc), **named)
+        self.ifc.gather("IfcRelAggregates", whole, [part])
+        return part
 
     def stand(self, entity: Entity, container: Entity) -> None:
         """Put an element that is placed along the alignment into its container."""

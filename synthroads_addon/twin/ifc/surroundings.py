@@ -32,17 +32,8 @@ def write_surroundings(scene: Scene) -> None:
 
 
 def _geographic(scene: Scene, name: str, kind: str, shape: Entity | None, about: str | None = None) -> Entity:
-    ifc = scene.ifc
-    made = ifc.rooted(
-        "IfcGeographicElement",
-        name,
-        Name=name,
-        ObjectType=about,
-        ObjectPlacement=ifc.local_frame,
-        Representation=shape,
-        PredefinedType=kind,
-    )
-    ifc.gather("IfcRelContainedInSpatialStructure", scene.site, [made])
+    made = scene.ifc.product("IfcGeographicElement", name, kind, about, Representation=shape)
+    scene.ifc.gather("IfcRelContainedInSpatialStructure", scene.site, [made])
     return made
 
 
@@ -92,15 +83,8 @@ def _vehicles(scene: Scene) -> None:
 def _vehicle(scene: Scene, name: str, item: Vehicle, offset: float, turn: float) -> None:
     ifc, kind = scene.ifc, VEHICLE_TYPES[item.model]
     body = Solids(ifc, turn).box((kind.length, kind.width, kind.height), (0.0, 0.0, 0.0))
-    made = ifc.rooted(
-        "IfcVehicle",
-        name,
-        Name=name,
-        ObjectType=item.model,
-        ObjectPlacement=scene.place(item.station, offset).placement,
-        Representation=ifc.shape([body], "SweptSolid"),
-        PredefinedType="VEHICLEWHEELED",
-    )
+    placement, shape = scene.place(item.station, offset).placement, ifc.shape([body], "SweptSolid")
+    made = ifc.product("IfcVehicle", name, "VEHICLEWHEELED", item.model, placement, Representation=shape)
     scene.describe(made, item)
     scene.stand(made, scene.container(item.station, offset))
     ifc.made_of(made, "car_paint")
