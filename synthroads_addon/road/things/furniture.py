@@ -8,6 +8,7 @@ from pydantic import Field, model_validator
 
 from ...base.schema import Model, quantity
 from ..objects import LineObject, PointObject
+from .body_shapes import GANTRY_BOARD, GANTRY_DISPLAY, GANTRY_HANGER, GANTRY_OVERHANG
 
 Side = Literal["left", "right"]
 Color = Annotated[
@@ -108,6 +109,16 @@ class GantrySign(Model):
     kind: Literal["destination", "display"] = Field("destination", description="Painted sign, or variable display.")
     text: tuple[str, ...] = Field((), max_length=6, description="Lines of writing on its face.")
 
+    @property
+    def depth(self) -> float:
+        """Return the depth of its body along the road, m."""
+        return GANTRY_DISPLAY if self.kind == "display" else GANTRY_BOARD
+
+    @property
+    def facing(self) -> float:
+        """Return 1 for a sign that faces traffic with the stations: on the right of the centreline; else -1."""
+        return 1.0 if self.offset < 0.0 else -1.0
+
 
 class Gantry(PointObject):
     """A shield gantry across one carriageway (one_sided), across both (two_sided), or on one post (cantilever).
@@ -140,6 +151,20 @@ class Gantry(PointObject):
         if self.left_offset <= self.right_offset:
             raise ValueError("left_offset must be greater than right_offset")
         return self
+
+    def reach(self, facing: float) -> float:
+        """Return how far the beam, and the signs on one side of it (1 or -1), reach along the road from its middle."""
+        signs = [GANTRY_HANGER + sign.depth for sign in self.signs if sign.facing == facing]
+        return self.beam_depth / 2.0 + max(signs, default=0.0)
+
+    def beam_bottom(self, low: float) -> float:
+        """Return the height (m) of the beam's lower edge, from that of the lowest part: taller signs hang below it."""
+        tallest = max((sign.height for sign in self.signs), default=0.0)
+        return low + max(tallest - self.beam_height, 0.0) * GANTRY_OVERHANG
+
+    def ends_in_beam(self, sign: GantrySign, low: float) -> bool:
+        """Return whether a sign whose lower edge is at the lowest part (m) would end below the beam's top."""
+        return low + sign.height < self.beam_bottom(low) + self.beam_height
 
 
 class Pole(PointObject):

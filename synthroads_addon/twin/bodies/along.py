@@ -9,7 +9,7 @@ from ...road.objects import LineObject
 from ...road.parameters import ConcreteBarrier, Guardrail, NoiseBarrier, TemporaryBarrier
 from ...road.things import body_shapes as shapes
 from ..faces import Faces, Float, loft
-from ..surfaces import line_stations, needed_rows, on_ground
+from ..surfaces import height_share, line_stations, needed_rows, on_ground, ramp_length
 
 _PLAY = 0.005  # m, between a noise barrier's panel and its posts
 
@@ -41,18 +41,10 @@ def _feet(geometry: RoadGeometry, station: Float, offset: Float) -> tuple[Float,
     return on_ground(geometry, station, offset), left
 
 
-def _ramped_height_share(item: Guardrail | ConcreteBarrier, end: float, station: Float) -> Float:
-    """Return the share (N,) of its height that a barrier with ramped ends has at stations."""
-    ramp = min(item.terminal_length, (end - item.start_station) / 2.0)
-    if ramp <= 1e-3:
-        return np.ones(station.shape)
-    return np.clip(np.minimum(station - item.start_station, end - station) / ramp, 0.0, 1.0)
-
-
 def _swept_rows(geometry: RoadGeometry, item: Guardrail | ConcreteBarrier, tolerance: float) -> tuple[Float, float]:
     """Return the stations (N,) that a swept section needs, and the end station on the road."""
     end = min(item.end_station, geometry.length)
-    ramp = min(item.terminal_length, (end - item.start_station) / 2.0)
+    ramp = ramp_length(item, end)
     kinks = [item.start_station + ramp, end - ramp]
     station = np.unique(np.concatenate([line_stations(geometry, item), kinks]))
     feet, _ = _feet(geometry, station, np.full(len(station), item.offset))
@@ -62,7 +54,7 @@ def _swept_rows(geometry: RoadGeometry, item: Guardrail | ConcreteBarrier, toler
 def _guardrail(geometry: RoadGeometry, rail: Guardrail, tolerance: float) -> list[Faces]:
     station, end = _swept_rows(geometry, rail, tolerance)
     feet, left = _feet(geometry, station, np.full(len(station), rail.offset))
-    share = _ramped_height_share(rail, end, station)
+    share = height_share(rail, end, station)
     top = rail.height * share + shapes.GUARDRAIL_TIP * (1.0 - share)
     profile = np.array(shapes.GUARDRAIL_BEAM)
     back = shapes.GUARDRAIL_POST[0] / 2.0 + shapes.GUARDRAIL_SPACER[rail.faces]
@@ -86,7 +78,7 @@ def _posts(geometry: RoadGeometry, rail: Guardrail, end: float) -> list[Faces]:
     count = int((rail.end_station - rail.start_station) / rail.post_spacing + 1e-4) + 1
     station = rail.start_station + np.arange(count) * rail.post_spacing
     station = station[station <= end + 1e-9]
-    share = _ramped_height_share(rail, end, station)
+    share = height_share(rail, end, station)
     tall = rail.height * share + shapes.GUARDRAIL_TIP * (1.0 - share)
     station, tall = station[tall >= shapes.GUARDRAIL_LOWEST_POST], tall[tall >= shapes.GUARDRAIL_LOWEST_POST]
     feet, left = _feet(geometry, station, np.full(len(station), rail.offset))
@@ -107,7 +99,7 @@ def _boxes(feet: Float, left: Float, size: Float, tall: Float) -> list[Faces]:
 def _concrete(geometry: RoadGeometry, barrier: ConcreteBarrier, tolerance: float) -> Faces:
     station, end = _swept_rows(geometry, barrier, tolerance)
     feet, left = _feet(geometry, station, np.full(len(station), barrier.offset))
-    tall = np.maximum(barrier.height * _ramped_height_share(barrier, end, station), shapes.CONCRETE_TIP)
+    tall = np.maximum(barrier.height * height_share(barrier, end, station), shapes.CONCRETE_TIP)
     return loft(_symmetric_sections(feet, left, shapes.CONCRETE_FLANKS[barrier.profile], barrier.base_width, tall))
 
 

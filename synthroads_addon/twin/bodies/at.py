@@ -185,52 +185,36 @@ def _beacon(place: Place, item: ConstructionBeacon) -> list[Faces]:
 
 def _gantry(place: Place, item: Gantry) -> list[Faces]:
     left, right = item.offset - item.left_offset, item.offset - item.right_offset
-    front, rear = _reach(item)
-    low = pavement_below(place, (left, right), (-front, rear)) + item.clearance - float(place.origin[2])
-    hangs = max([sign.height - item.beam_height for sign in item.signs] + [0.0]) * shapes.GANTRY_OVERHANG
-    bottom = low + hangs
+    pavement = pavement_below(place, (left, right), (-item.reach(1.0), item.reach(-1.0)))
+    low = pavement + item.clearance - float(place.origin[2])
+    bottom = item.beam_bottom(low)
     beam = place.box(
         (right - left, item.beam_depth, item.beam_height), ((left + right) / 2.0, 0.0, bottom + item.beam_height / 2.0)
     )
-    boards = [_board(place, item, sign, low, bottom) for sign in item.signs]
+    boards = [_board(place, item, sign, low) for sign in item.signs]
     return [beam, *_gantry_posts(place, item, (left, right), bottom), *boards]
 
 
-def _reach(item: Gantry) -> tuple[float, float]:
-    """Return how far a gantry with its signs reaches towards -y and +y."""
-    front = rear = item.beam_depth / 2.0
-    for sign in item.signs:
-        beyond = item.beam_depth / 2.0 + shapes.GANTRY_HANGER + _board_depth(sign)
-        front, rear = (max(front, beyond), rear) if sign.offset < 0.0 else (front, max(rear, beyond))
-    return front, rear
-
-
-def _board_depth(sign: GantrySign) -> float:
-    return shapes.GANTRY_DISPLAY if sign.kind == "display" else shapes.GANTRY_BOARD
-
-
 def _gantry_posts(place: Place, item: Gantry, ends: tuple[float, float], bottom: float) -> list[Faces]:
-    wanted = {"left": ends[0], "right": ends[1], "middle": item.offset}
+    posts = {"left": ends[0], "right": ends[1], "middle": item.offset}
     if item.kind == "cantilever":
-        wanted = {item.post_side: wanted[item.post_side]}
+        posts = {item.post_side: posts[item.post_side]}
     elif item.kind == "one_sided":
-        del wanted["middle"]
-    feet = place.ground(list(wanted.values()), 0.0) + item.elevation
+        del posts["middle"]
+    feet = place.ground(list(posts.values()), 0.0) + item.elevation
     bodies = []
-    for (side, x), foot in zip(wanted.items(), feet.tolist(), strict=True):
+    for (side, x), foot in zip(posts.items(), feet.tolist(), strict=True):
         top = bottom if side == "middle" else bottom + item.beam_height
         size = (item.post_width, item.beam_depth, top - foot)
         bodies.append(place.box(size, (x, 0.0, (top + foot) / 2.0)))
     return bodies
 
 
-def _board(place: Place, item: Gantry, sign: GantrySign, low: float, bottom: float) -> Faces:
+def _board(place: Place, item: Gantry, sign: GantrySign, low: float) -> Faces:
     """Return a board's body, in front of the beam as the traffic below it sees it."""
-    behind = low + sign.height < bottom + item.beam_height
-    z = low + sign.height / 2.0 if behind else bottom + item.beam_height / 2.0
-    deep = _board_depth(sign)
-    y = item.beam_depth / 2.0 + shapes.GANTRY_HANGER + deep / 2.0
-    return place.box((sign.width, deep, sign.height), (item.offset - sign.offset, -y if sign.offset < 0.0 else y, z))
+    z = low + sign.height / 2.0 if item.ends_in_beam(sign, low) else item.beam_bottom(low) + item.beam_height / 2.0
+    y = -sign.facing * (item.beam_depth / 2.0 + shapes.GANTRY_HANGER + sign.depth / 2.0)
+    return place.box((sign.width, sign.depth, sign.height), (item.offset - sign.offset, y, z))
 
 
 _MAKERS: dict[type[PointObject], Callable[[Place, Any], list[Faces]]] = {

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ...road.objects import LineObject
 from ...road.parameters import ConcreteBarrier, Guardrail, NoiseBarrier, TemporaryBarrier
 from ...road.things.body_shapes import (
     CONCRETE_FLANKS,
@@ -26,6 +27,7 @@ from ...road.things.body_shapes import (
     TEMPORARY_FLANKS,
     TEMPORARY_GAP,
 )
+from ..surfaces import height_share, ramp_length
 from .entities import Entity, Float
 from .scene import Scene, grid_triangles
 
@@ -95,7 +97,7 @@ def _element(scene: Scene, entity: str, name: str, item: Any, meshes: list[_Mesh
 
 def _guardrail(scene: Scene, item: Guardrail) -> list[_Mesh]:
     """Return beams, posts and spacers."""
-    station = _rows(scene, item, item.terminal_length)
+    station = _rows(scene, item)
     offset = np.full(station.shape, item.offset)
     spacer, sides = GUARDRAIL_SPACER[item.faces], {"left": [1.0], "right": [-1.0], "both": [1.0, -1.0]}[item.faces]
     front = np.array(GUARDRAIL_BEAM)
@@ -131,7 +133,7 @@ def _posts(scene: Scene, item: Guardrail, sides: list[float], spacer: float) -> 
 
 
 def _concrete(scene: Scene, item: ConcreteBarrier) -> list[_Mesh]:
-    station = _rows(scene, item, item.terminal_length)
+    station = _rows(scene, item)
     tall = np.maximum(_ramped_height(item, station, 0.0), CONCRETE_TIP)
     flank = np.array(CONCRETE_FLANKS[item.profile])
     across, height = _both_flanks(flank, item.base_width / 2.0, tall, _CONCRETE_BURIED)
@@ -156,7 +158,7 @@ def _temporary(scene: Scene, item: TemporaryBarrier) -> list[_Mesh]:
 
 def _noise_barrier(scene: Scene, item: NoiseBarrier) -> list[_Mesh]:
     """Return the wall of panels, and its posts."""
-    station = _rows(scene, item, 0.0)
+    station = _rows(scene, item)
     across = np.array([-1.0, -1.0, 1.0, 1.0]) * item.thickness / 2.0
     height = np.broadcast_to([-_WALL_BURIED, item.height, item.height, -_WALL_BURIED], (len(station), 4))
     panels = _swept(scene, station, np.full(station.shape, item.offset), across, height)
@@ -178,12 +180,12 @@ def _span(scene: Scene, item: Any) -> tuple[float, float]:
     return max(item.start_station, 0.0), min(item.end_station, scene.geometry.length)
 
 
-def _rows(scene: Scene, item: Any, terminal: float) -> Float:
+def _rows(scene: Scene, item: LineObject) -> Float:
     """Return the stations (N,) of rows along something, one of them at the end of either ramp."""
     start, end = _span(scene, item)
     if end - start < _SHORTEST:
         return np.array([start])
-    ramp = min(terminal, (item.end_station - item.start_station) / 2.0)
+    ramp = ramp_length(item, item.end_station)
     return scene.rows(start, end, item.start_station + ramp, item.end_station - ramp)
 
 
@@ -200,10 +202,7 @@ def _bays(scene: Scene, item: Any, length: float) -> list[tuple[float, float]]:
 
 def _ramped_height(item: Any, station: Float, tip: float) -> Float:
     """Return the height (N,) of what is ramped down at both ends, m."""
-    ramp = min(item.terminal_length, (item.end_station - item.start_station) / 2.0)
-    inside = np.minimum(station - item.start_station, item.end_station - station)
-    share = np.clip(inside / ramp, 0.0, 1.0) if ramp > _SHORTEST else np.ones(station.shape)
-    return tip + (item.height - tip) * share
+    return tip + (item.height - tip) * height_share(item, item.end_station, station)
 
 
 def _both_flanks(flank: Float, half: float, tall: Float, buried: float) -> tuple[Float, Float]:

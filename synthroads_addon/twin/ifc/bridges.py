@@ -14,7 +14,6 @@ from ...road.things.body_shapes import (
     BRIDGE_PIER_LENGTH,
     BRIDGE_SEAT,
 )
-from .clearance import pavement_below
 from .entities import Entity
 from .scene import IfcPlace, Scene
 from .solids import Point2, Solids
@@ -38,7 +37,7 @@ class _Bridge:
         self.shear = math.tan(math.radians(item.rotation_deg))
         self.left, self.right = item.left_abutment - item.offset, item.right_abutment - item.offset
         along, across = (-item.width / 2.0, item.width / 2.0), (self.left, self.right)
-        pavement = pavement_below(scene.geometry, self.place, along, across, self.shear)
+        pavement = scene.pavement_below(self.place, along, across, self.shear)
         self.low = pavement + item.clearance - float(self.place.origin[2])
         self.solids = Solids(scene.ifc)
 
@@ -86,19 +85,12 @@ class _Bridge:
     def _support(self, part: Entity, entity: str, name: str, kind: str, y: float, size: Point2) -> None:
         """Add what the deck rests on, from below the ground up to its bearings."""
         x = -self.shear * y
-        ground = self._ground(x, y)
+        station, offset = self.scene.geometry.alignment.project(self.place.plan(np.array([x]), np.array([y])))
+        ground, _ = self.scene.at(float(station[0]), float(offset[0]))
         foot = ground - float(self.place.origin[2]) - BRIDGE_BURIED
         height = max(self.low - BRIDGE_BEARING - foot, BRIDGE_BEARING)
         body = self.solids.box((*size, height), (x, y, foot))
         self._element(part, entity, name, body, kind, "bridge_concrete")
-
-    def _ground(self, x: float, y: float) -> float:
-        """Return the local elevation of the ground at a point of the bridge's frame, m."""
-        heading, (east, north, _) = self.place.heading, self.place.origin
-        cosine, sine = math.cos(heading), math.sin(heading)
-        plan = (east + x * cosine - y * sine, north + x * sine + y * cosine)
-        station, offset = self.scene.geometry.alignment.project(np.array([plan]))
-        return self.scene.at(float(station[0]), float(offset[0]))[0]
 
     def _element(
         self, part: Entity, entity: str, name: str, body: Entity, kind: str, material: str, about: str | None = None

@@ -5,15 +5,16 @@ from __future__ import annotations
 import math
 
 from ...road.parameters import Gantry
-from ...road.things.body_shapes import GANTRY_BOARD, GANTRY_DISPLAY, GANTRY_HANGER, GANTRY_OVERHANG
+from ...road.things.body_shapes import GANTRY_HANGER
 from ...road.things.furniture import GantrySign
-from .clearance import pavement_below
 from .entities import Entity
 from .scene import IfcPlace, Scene
 from .solids import Solids
 
 _BURIED = 0.6
 """Depth of the posts' foundations below the surface, m."""
+_SIGNS = {"display": ("IfcSignal", "display", "VISUAL"), "destination": ("IfcSign", "sheeting_blue", "PICTORAL")}
+"""Kind of a sign -> its entity, material and predefined type."""
 
 
 def write_gantries(scene: Scene) -> None:
@@ -30,16 +31,10 @@ class _IfcGantry:
         self.place: IfcPlace = scene.place_of(item)
         self.solids = Solids(scene.ifc, math.radians(item.rotation_deg))
         across = (item.left_offset - item.offset, item.right_offset - item.offset)
-        along = (-self._reach(1.0), self._reach(-1.0))
-        pavement = pavement_below(scene.geometry, self.place, along, across)
+        along = (-item.reach(1.0), item.reach(-1.0))
+        pavement = scene.pavement_below(self.place, along, across)
         self.low = pavement + item.clearance - float(self.place.origin[2])
-        tallest = max((sign.height for sign in item.signs), default=0.0)
-        self.bottom = self.low + max(tallest - item.beam_height, 0.0) * GANTRY_OVERHANG
-
-    def _reach(self, facing: float) -> float:
-        """Return how far the beam, and the signs on one side of it, reach along the road, m."""
-        signs = [GANTRY_HANGER + _depth(sign) for sign in self.item.signs if _facing(sign) == facing]
-        return self.item.beam_depth / 2.0 + max(signs, default=0.0)
+        self.bottom = item.beam_bottom(self.low)
 
     def write(self) -> None:
         """Add the assembly and its parts."""
@@ -77,20 +72,14 @@ class _IfcGantry:
         """Add a sign, or a display, which is a signal; it faces the traffic of the carriageway below it."""
         item = self.item
         # Lower edges are in line; what is smaller than the beam hangs before its middle.
-        small = self.low + sign.height < self.bottom + item.beam_height
-        z = self.bottom + item.beam_height / 2.0 if small else self.low + sign.height / 2.0
-        facing, depth = _facing(sign), _depth(sign)
+        small = item.ends_in_beam(sign, self.low)
+        middle = self.bottom + item.beam_height / 2.0 if small else self.low + sign.height / 2.0
+        z = middle - sign.height / 2.0
         # The middle of the board, before the beam as its traffic sees it.
-        x = -facing * (item.beam_depth / 2.0 + GANTRY_HANGER + depth / 2.0)
-        solid = self.solids.box((depth, sign.width, sign.height), (x, sign.offset - item.offset, z - sign.height / 2.0))
-        display = sign.kind == "display"
-        part = self._part(
-            "IfcSignal" if display else "IfcSign",
-            f"sign-{number}",
-            solid,
-            "display" if display else "sheeting_blue",
-            "VISUAL" if display else "PICTORAL",
-        )
+        x = -sign.facing * (item.beam_depth / 2.0 + GANTRY_HANGER + sign.depth / 2.0)
+        solid = self.solids.box((sign.depth, sign.width, sign.height), (x, sign.offset - item.offset, z))
+        entity, material, kind = _SIGNS[sign.kind]
+        part = self._part(entity, f"sign-{number}", solid, material, kind)
         self.ifc.properties(part, "SynthRoads sign", self.ifc.parameters_of(sign))
 
     def _part(self, entity: str, name: str, solid: Entity, material: str, kind: str) -> Entity:
@@ -100,12 +89,3 @@ class _IfcGantry:
         ifc.made_of(part, material)
         ifc.label(part, self.item.instance, self.item.points_class)
         return part
-
-
-def _depth(sign: GantrySign) -> float:
-    return GANTRY_DISPLAY if sign.kind == "display" else GANTRY_BOARD
-
-
-def _facing(sign: GantrySign) -> float:
-    """Return 1 for a sign that faces traffic with the stations: on the right of the centreline; else -1."""
-    return 1.0 if sign.offset < 0.0 else -1.0

@@ -12,10 +12,15 @@ from numpy.typing import NDArray
 
 from ...road.geometry import RoadGeometry
 from ...road.objects import PointObject, RoadObject
+from ...road.surface import highest_pavement
 from ...road.things.furniture import Asset
 from ..surfaces import on_ground
 from .alignment import Axis, linear_placement
 from .entities import Entity, Float, IfcFile
+
+_ACROSS, _ROWS = 0.05, 7
+"""Distance (m) of the points across the road at which the pavement is looked at (3.5 mm at 7 % crossfall), and their
+rows along it."""
 
 
 @dataclass(frozen=True)
@@ -35,6 +40,11 @@ class IfcPlace:
     def frame(self, ifc: IfcFile) -> Entity:
         """Add a placement in this frame, at its origin."""
         return ifc.add("IfcLocalPlacement", self.placement, ifc.flat_axes)
+
+    def plan(self, x: Float, y: Float) -> Float:
+        """Return local points (N, 2) at places (N,) of this frame."""
+        cosine, sine = math.cos(self.heading), math.sin(self.heading)
+        return self.origin[:2] + np.column_stack([cosine * x - sine * y, sine * x + cosine * y])
 
     def inside(self, points: Float) -> Float:
         """Return local points (..., 3) in this frame."""
@@ -111,6 +121,24 @@ class Scene:
     def place_of(self, item: PointObject) -> IfcPlace:
         """Return the frame at a point object's foot; its rotation isn't in it."""
         return self.place(item.station, item.offset, item.elevation)
+
+    def pavement_below(
+        self, place: IfcPlace, along: tuple[float, float], across: tuple[float, float], shear: float = 0.0
+    ) -> float:
+        """Return the local elevation (m) of the pavement's highest point below something; without any, the place's.
+
+        Args:
+            place: frame of what spans the road.
+            along: its rear and front end in the frame, m.
+            across: its left and right end there, m.
+            shear: by how much it lies farther back per metre to the left (m/m): a skew bridge.
+        """
+        left, right = across
+        count = max(2, math.ceil((left - right) / _ACROSS) + 1)
+        beside, ahead = np.meshgrid(np.linspace(left, right, count), np.linspace(*along, _ROWS))
+        plan = place.plan((ahead - shear * beside).ravel(), beside.ravel())
+        highest = highest_pavement(self.geometry, *self.geometry.alignment.project(plan))
+        return float(place.origin[2]) if highest is None else highest
 
     def container(self, station: float, offset: float) -> Entity:
         """Return the part of the road that something stands in: a carriageway, the median, or beside the road."""

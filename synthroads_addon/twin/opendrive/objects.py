@@ -32,13 +32,11 @@ from ...road.parameters import (
 )
 from ...road.things.body_shapes import BEACON_REACH, BEAM_REACH, DELINEATOR_REACH, POST_REACH
 from .pieces import CLOSE, Float
-from .places import Ground, ramp_share
+from .places import Ground
 from .xml import Element, Value, element, notes
 
 LIGHT_POST, BOARD_POST = 0.12, 0.06
 """Diameters of a traffic light's and a kilometre board's post, m."""
-OVERHANG = 0.3
-"""Share of what a gantry's tallest sign is taller than the beam that hangs below it."""
 _ABUTMENT = 1.0  # m, thickness of the walls that an overpass ends at
 
 Corners = Iterable[tuple[float, float]]
@@ -70,8 +68,7 @@ class Objects:
 
     def barrier(self, name: str, item: LineObject) -> None:
         """Add what runs along the road: repeats with distance 0, linear from one to the next."""
-        share, kinks = ramp_share(item, self.ground.geometry.length)
-        rows = self.ground.along(item, share, kinks)
+        rows = self.ground.along(item)
         if not len(rows):
             return
         subtype, width, beside = _cross_section(item)
@@ -265,8 +262,7 @@ def gantry_levels(ground: Ground, item: Gantry) -> tuple[float, float]:
     deep = item.beam_depth / 2.0
     span = (item.station - deep, item.station + deep)
     low = ground.pavement_below(span, (item.right_offset, item.left_offset)) + item.clearance
-    taller = max([sign.height - item.beam_height for sign in item.signs] + [0.0])
-    return low, low + OVERHANG * taller
+    return low, item.beam_bottom(low)
 
 
 def _fine(value: float) -> float:
