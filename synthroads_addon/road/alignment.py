@@ -199,6 +199,11 @@ class Alignment:
         """Return the map position (..., 2), m."""
         return self.frame(station)[0]
 
+    def place(self, station: FloatArray, offset: FloatArray) -> FloatArray:
+        """Return the map positions (N, 2) of stations and offsets (N,), m."""
+        position, heading, _ = self.frame(station)
+        return position + offset[:, None] * left_vectors(heading)
+
     def heading(self, station: ArrayLike) -> FloatArray:
         """Return the heading (...), rad, counter-clockwise from +x."""
         return self.frame(station)[1]
@@ -358,6 +363,11 @@ def _rivals(x: FloatArray, y: FloatArray, node_x: FloatArray, node_y: FloatArray
     least[:, :-1] &= ~falls
     owner, column = np.divmod(np.flatnonzero(least), least.shape[1])
     return owner, column
+
+
+def left_vectors(heading: FloatArray) -> FloatArray:
+    """Return the unit vectors (..., 2) to the left of headings (...), rad."""
+    return np.stack([-np.sin(heading), np.cos(heading)], axis=-1)
 
 
 def clip_offset(offset: ArrayLike, curvature: ArrayLike, share: float = 0.98) -> FloatArray:

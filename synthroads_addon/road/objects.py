@@ -76,6 +76,7 @@ def _form(width: object) -> str | None:
 
 
 _FORM = Discriminator(_form, "width_type", "must be a number or points {station, width}")
+_METRES = Field(json_schema_extra={"unit": "m"})
 WidthPoints = Annotated[
     tuple[WidthPoint, ...],
     Field(min_length=2, description="Linear in between, constant before the first point and after the last."),
@@ -84,10 +85,10 @@ WidthPoints = Annotated[
 ]
 AnyWidth = float | tuple[WidthPoint, ...]
 """A width (m), or points of it along the road."""
-Width = Annotated[Annotated[float, Field(strict=True, ge=0, le=50), Tag("number")] | WidthPoints, _FORM]
-LaneWidth = Annotated[Annotated[float, Field(strict=True, ge=2, le=6), Tag("number")] | WidthPoints, _FORM]
-ShoulderWidth = Annotated[Annotated[float, Field(strict=True, ge=0, le=6), Tag("number")] | WidthPoints, _FORM]
-StripWidth = Annotated[Annotated[float, Field(strict=True, ge=0, le=2), Tag("number")] | WidthPoints, _FORM]
+Width = Annotated[Annotated[float, Field(strict=True, ge=0, le=50), Tag("number")] | WidthPoints, _FORM, _METRES]
+LaneWidth = Annotated[Annotated[float, Field(strict=True, ge=2, le=6), Tag("number")] | WidthPoints, _FORM, _METRES]
+ShoulderWidth = Annotated[Annotated[float, Field(strict=True, ge=0, le=6), Tag("number")] | WidthPoints, _FORM, _METRES]
+StripWidth = Annotated[Annotated[float, Field(strict=True, ge=0, le=2), Tag("number")] | WidthPoints, _FORM, _METRES]
 
 
 def width_at(width: AnyWidth, station: ArrayLike) -> NDArray[np.float64]:

@@ -13,9 +13,7 @@ from .objects import LaneWidth, PointObject, RoadObject, ShoulderWidth, StripWid
 class Lane(Model):
     """One lane. A width of 0 along a stretch is a lane that isn't there: dropped, or not gained yet."""
 
-    width: LaneWidth = Field(
-        description="Width between the lane's boundaries, or points of it.", json_schema_extra={"unit": "m"}
-    )
+    width: LaneWidth = Field(description="Width between the lane's boundaries, or points of it.")
     kind: Literal["through", "climbing"] = Field("through", description="Use of the lane.")
 
 
@@ -68,20 +66,12 @@ class Carriageway(RoadObject):
     points_class: ClassVar = "road"
     type: Literal["Carriageway"] = "Carriageway"
     side: Literal["left", "right"] = Field(description="Side of the centreline.")
-    inner_offset: Width = Field(
-        description="Distance of the inner paved edge from the centreline.", json_schema_extra={"unit": "m"}
-    )
-    hard_shoulder_width: ShoulderWidth = Field(description="0 where there is none.", json_schema_extra={"unit": "m"})
-    outer_edge_strip_width: StripWidth = Field(
-        description="Outside the outermost lane.", json_schema_extra={"unit": "m"}
-    )
+    inner_offset: Width = Field(description="Distance of the inner paved edge from the centreline.")
+    hard_shoulder_width: ShoulderWidth = Field(description="0 where there is none.")
+    outer_edge_strip_width: StripWidth = Field(description="Outside the outermost lane.")
     lanes: tuple[Lane, ...] = Field(min_length=1, max_length=8, description="Lanes from outside to inside.")
-    inner_edge_strip_width: StripWidth = Field(
-        description="Inside the innermost lane.", json_schema_extra={"unit": "m"}
-    )
-    verge_width: ShoulderWidth = Field(
-        description="Unpaved strip outside the pavement.", json_schema_extra={"unit": "m"}
-    )
+    inner_edge_strip_width: StripWidth = Field(description="Inside the innermost lane.")
+    verge_width: ShoulderWidth = Field(description="Unpaved strip outside the pavement.")
     verge_slope_percent: float = quantity(
         8.0, ge=0, le=15, unit="%", description="Fall of the verge away from the pavement."
     )
@@ -221,11 +211,7 @@ class LineMarking(Marking, RoadObject):
         0, ge=0, le=8, unit="1", description="Lane boundary, counted from the outer edge of the outermost lane."
     )
     turnout: str | None = Field(None, description="Id of the turnout, for turnout_edge and gore_edge.")
-    offset: Width = Field(
-        0.0,
-        description="Distance of the line's axis from the centreline, for free lines only.",
-        json_schema_extra={"unit": "m"},
-    )
+    offset: Width = Field(0.0, description="Distance of the line's axis from the centreline, for free lines only.")
     width: float = quantity(ge=0.05, le=1.0, unit="m", description="Width of the line.")
     dash_length: float = quantity(ge=0, le=100, unit="m", description="Length of a dash; 0 for a solid line.")
     gap_length: float = quantity(ge=0, le=100, unit="m", description="Length of a gap; 0 for a solid line.")

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ..road.alignment import left_vectors
 from ..road.damage import damage_columns, damage_depth, damaged_strips, space_shares
 from ..road.geometry import RoadGeometry, SurfaceStrip
 from ..road.parameters import Pavement, Pothole, Rut
@@ -89,12 +90,11 @@ def strip_surfaces(geometry: RoadGeometry, stations: Float, tolerance: float) ->
     """
     offsets, heights = geometry.offsets(stations), geometry.boundary_elevations(stations)
     plan, heading, _ = geometry.alignment.frame(stations)
-    left = np.stack([-np.sin(heading), np.cos(heading)], axis=1)
     middle = (stations[:-1] + stations[1:]) / 2.0
     damages, lanes = _damages(geometry, tolerance), _lane_numbers(geometry)
     for number, strip in enumerate(geometry.strips):
         two = slice(number, number + 2)
-        edges = _Edges(geometry, stations, plan, left, offsets[:, two], heights[:, two])
+        edges = _Edges(geometry, stations, plan, left_vectors(heading), offsets[:, two], heights[:, two])
         width = offsets[:, number] - offsets[:, number + 1]
         owners = geometry.instances(strip, middle)
         for owner in np.unique(owners).tolist():

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from ..road.alignment import left_vectors
 from ..road.geometry import RoadGeometry
 from ..road.objects import LineObject
 from ..road.paint import arrow_outlines, hatching_outlines, pieces
@@ -29,9 +30,12 @@ def on_ground(geometry: RoadGeometry, station: Float, offset: Float) -> Float:
 
     Where an elevation model doesn't reach, the road's edge goes on level.
     """
-    plan, heading, _ = geometry.alignment.frame(station)
-    left = np.stack([-np.sin(heading), np.cos(heading)], axis=1)
-    return np.column_stack([plan + offset[:, None] * left, known_elevation(geometry, station, offset)])
+    return np.column_stack([geometry.alignment.place(station, offset), known_elevation(geometry, station, offset)])
+
+
+def left_of(geometry: RoadGeometry, station: Float) -> Float:
+    """Return the level unit vectors (N, 3) to the left of the road at stations (N,)."""
+    return np.column_stack([left_vectors(geometry.alignment.heading(station)), np.zeros(len(station))])
 
 
 # --- markings ---------------------------------------------------------------------------------------------------

@@ -9,7 +9,7 @@ from ...road.objects import LineObject
 from ...road.parameters import ConcreteBarrier, Guardrail, NoiseBarrier, TemporaryBarrier
 from ...road.things import body_shapes as shapes
 from ..faces import Faces, Float, loft
-from ..surfaces import height_share, line_stations, needed_rows, on_ground, ramp_length
+from ..surfaces import height_share, left_of, line_stations, needed_rows, on_ground, ramp_length
 
 _PLAY = 0.005  # m, between a noise barrier's panel and its posts
 
@@ -36,9 +36,7 @@ def bodies_along(geometry: RoadGeometry, item: LineObject, tolerance: float) -> 
 
 def _feet(geometry: RoadGeometry, station: Float, offset: Float) -> tuple[Float, Float]:
     """Return the points (N, 3) on the surface, and the unit vectors (N, 3) to the left."""
-    heading = geometry.alignment.heading(station)
-    left = np.stack([-np.sin(heading), np.cos(heading), np.zeros(len(heading))], axis=1)
-    return on_ground(geometry, station, offset), left
+    return on_ground(geometry, station, offset), left_of(geometry, station)
 
 
 def _swept_rows(geometry: RoadGeometry, item: Guardrail | ConcreteBarrier, tolerance: float) -> tuple[Float, float]:

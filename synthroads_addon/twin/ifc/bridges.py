@@ -7,13 +7,7 @@ import math
 import numpy as np
 
 from ...road.parameters import Overpass
-from ...road.things.body_shapes import (
-    BRIDGE_ABUTMENT,
-    BRIDGE_BEARING,
-    BRIDGE_BURIED,
-    BRIDGE_PIER_LENGTH,
-    BRIDGE_SEAT,
-)
+from ...road.things import body_shapes as shapes
 from .entities import Entity
 from .scene import IfcPlace, Scene
 from .solids import Point2, Solids
@@ -53,11 +47,11 @@ class _Bridge:
         above, below = self._part("superstructure"), self._part("substructure")
         self._deck(above)
         for number, offset in enumerate(item.pier_offsets, 1):
-            size = (item.width * BRIDGE_PIER_LENGTH, item.pier_width)
+            size = (item.width * shapes.BRIDGE_PIER_LENGTH, item.pier_width)
             self._support(below, "IfcColumn", f"pier-{number}", "PIERSTEM", offset - item.offset, size)
         for name, face, behind in (("left", self.left, 1.0), ("right", self.right, -1.0)):
-            size = (item.width, BRIDGE_ABUTMENT)
-            middle = face + behind * BRIDGE_ABUTMENT / 2.0
+            size = (item.width, shapes.BRIDGE_ABUTMENT)
+            middle = face + behind * shapes.BRIDGE_ABUTMENT / 2.0
             self._support(below, "IfcWall", f"abutment-{name}", "RETAININGWALL", middle, size)
 
     def _part(self, kind: str) -> Entity:
@@ -67,7 +61,7 @@ class _Bridge:
         )
 
     def _deck(self, part: Entity) -> None:
-        item, left, right = self.item, self.left + BRIDGE_SEAT, self.right - BRIDGE_SEAT
+        item, left, right = self.item, self.left + shapes.BRIDGE_SEAT, self.right - shapes.BRIDGE_SEAT
         half = item.width / 2.0
         deck = self.solids.prism(self._strip(left, right, -half, half), (0.0, 0.0, self.low), item.deck_thickness)
         self._element(part, "IfcSlab", "deck", deck, "USERDEFINED", "bridge_concrete", "BRIDGEDECK")
@@ -87,8 +81,8 @@ class _Bridge:
         x = -self.shear * y
         station, offset = self.scene.geometry.alignment.project(self.place.plan(np.array([x]), np.array([y])))
         ground, _ = self.scene.at(float(station[0]), float(offset[0]))
-        foot = ground - float(self.place.origin[2]) - BRIDGE_BURIED
-        height = max(self.low - BRIDGE_BEARING - foot, BRIDGE_BEARING)
+        foot = ground - float(self.place.origin[2]) - shapes.BRIDGE_BURIED
+        height = max(self.low - shapes.BRIDGE_BEARING - foot, shapes.BRIDGE_BEARING)
         body = self.solids.box((*size, height), (x, y, foot))
         self._element(part, entity, name, body, kind, "bridge_concrete")
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from ...road.parameters import Gantry
-from ...road.things.body_shapes import GANTRY_HANGER
+from ...road.things import body_shapes as shapes
 from ...road.things.furniture import GantrySign
 from .entities import Entity
 from .scene import IfcPlace, Scene
@@ -76,7 +76,7 @@ class _IfcGantry:
         middle = self.bottom + item.beam_height / 2.0 if small else self.low + sign.height / 2.0
         z = middle - sign.height / 2.0
         # The middle of the board, before the beam as its traffic sees it.
-        x = -sign.facing * (item.beam_depth / 2.0 + GANTRY_HANGER + sign.depth / 2.0)
+        x = -sign.facing * (item.beam_depth / 2.0 + shapes.GANTRY_HANGER + sign.depth / 2.0)
         solid = self.solids.box((sign.depth, sign.width, sign.height), (x, sign.offset - item.offset, z))
         entity, material, kind = _SIGNS[sign.kind]
         part = self._part(entity, f"sign-{number}", solid, material, kind)

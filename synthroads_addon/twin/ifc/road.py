@@ -240,10 +240,8 @@ class _Direction:
         distance = inner[:, None] + (outer - inner)[:, None] * shares
         height = geometry.profile.elevation(station)[:, None] + low[:, None] + (high - low)[:, None] * shares
         every, offset = np.repeat(station, len(shares)), self.carriageway.sign * distance.ravel()
-        position, heading, _ = geometry.alignment.frame(every)
-        left = np.column_stack([-np.sin(heading), np.cos(heading)])
         z = height.ravel() - damage_depth(section, every, offset)
-        points = np.column_stack([position + offset[:, None] * left, z])
+        points = np.column_stack([geometry.alignment.place(every, offset), z])
         # On the left carriageway a row runs from right to left, on the right one from left to right.
         return points, grid_triangles(len(station), len(shares), flip=self.carriageway.sign < 0)
 
@@ -324,9 +322,8 @@ def _write_median_surface(scene: Scene, index: int, name: str, part: Entity) -> 
     station = scene.stations
     sides = geometry.offsets(station)[:, index : index + 2][:, ::-1]
     heights = geometry.boundary_elevations(station)[:, index : index + 2][:, ::-1]
-    position, heading, _ = geometry.alignment.frame(np.repeat(station, 2))
-    left = np.column_stack([-np.sin(heading), np.cos(heading)])
-    points = np.column_stack([position + sides.reshape(-1, 1) * left, heights.ravel()])
+    plan = geometry.alignment.place(np.repeat(station, 2), sides.ravel())
+    points = np.column_stack([plan, heights.ravel()])
     shape = ifc.shape([ifc.mesh(points, grid_triangles(len(station), 2), False)], "Tessellation")
     surface = {"Name": f"{name}/surface", "Representation": shape}
     fill = ifc.product("IfcEarthworksFill", name, "USERDEFINED", "median", **surface)

@@ -9,8 +9,7 @@ import numpy as np
 from ...road.alignment import clip_offset
 from ...road.lane_lines import lane_of
 from ...road.parameters import Terrain, Vegetation, Vehicle
-from ...road.things.chassis import wheel_base
-from ...road.things.vehicles import VEHICLE_TYPES
+from ...road.things.vehicles import CHASSIS, VEHICLE_TYPES
 from .entities import Entity
 from .scene import Scene, grid_triangles
 from .solids import Solids
@@ -72,7 +71,7 @@ def _vehicles(scene: Scene) -> None:
     places = {}
     for name, item in vehicles.items():
         line, station = lane_of(scene.geometry, item), np.array([item.station])
-        turn = float(line.turn(station, wheel_base(item.model) / 2.0)[0])
+        turn = float(line.turn(station, CHASSIS[item.model].wheel_base / 2.0)[0])
         facing = turn if line.carriageway.traffic > 0 else math.pi + turn
         places[name] = (float(line.offset(station)[0]), facing)
     scene.look_up((item.station, places[name][0]) for name, item in vehicles.items())

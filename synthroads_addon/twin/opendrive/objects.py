@@ -30,7 +30,7 @@ from ...road.parameters import (
     TrafficLight,
     TrafficSign,
 )
-from ...road.things.body_shapes import BEACON_REACH, BEAM_REACH, DELINEATOR_REACH, POST_REACH
+from ...road.things import body_shapes as shapes
 from .pieces import CLOSE, Float
 from .places import Ground
 from .xml import Element, Value, element, notes
@@ -283,9 +283,9 @@ def _cross_section(item: LineObject) -> tuple[str, float, float]:
     """Return a barrier's subtype, its width, and how far its middle lies to the left of its axis, m."""
     if isinstance(item, Guardrail):
         if item.faces == "both":
-            return "guardRail", 2.0 * BEAM_REACH, 0.0
-        beside = (BEAM_REACH - POST_REACH) / 2.0
-        return "guardRail", BEAM_REACH + POST_REACH, beside if item.faces == "left" else -beside
+            return "guardRail", 2.0 * shapes.BEAM_REACH, 0.0
+        beside = (shapes.BEAM_REACH - shapes.POST_REACH) / 2.0
+        return "guardRail", shapes.BEAM_REACH + shapes.POST_REACH, beside if item.faces == "left" else -beside
     if isinstance(item, NoiseBarrier):
         return "noiseBarrier", max(item.thickness, item.post_width), 0.0
     subtype = "concreteBarrier" if isinstance(item, ConcreteBarrier) else "temporaryBarrier"
@@ -297,7 +297,7 @@ _SIZES: dict[type[RoadObject], Callable[[Any], _Size]] = {
     Delineator: lambda item: (
         "pole",
         "delineator",
-        {"length": 2.0 * DELINEATOR_REACH, "width": 2.0 * DELINEATOR_REACH, "height": item.height},
+        {"length": 2.0 * shapes.DELINEATOR_REACH, "width": 2.0 * shapes.DELINEATOR_REACH, "height": item.height},
     ),
     Pole: lambda item: ("pole", item.kind, {"radius": item.diameter / 2.0, "height": item.height}),
     Cabinet: lambda item: (
@@ -308,7 +308,7 @@ _SIZES: dict[type[RoadObject], Callable[[Any], _Size]] = {
     ConstructionBeacon: lambda item: (
         "obstacle",
         "constructionBeacon",
-        {"length": 2.0 * BEACON_REACH, "width": item.width, "height": item.height},
+        {"length": 2.0 * shapes.BEACON_REACH, "width": item.width, "height": item.height},
     ),
     Asset: lambda item: ("none", item.name, {}),
 }

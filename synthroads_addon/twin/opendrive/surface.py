@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...road.geometry import RoadGeometry
 from ...road.things.furniture import Side
@@ -176,9 +175,7 @@ def lateral_profile(road: Element, shape: LateralShape) -> None:
 def bounds(geometry: RoadGeometry) -> dict[str, float]:
     """Return the largest and smallest x and y of the road, to the metre, as the header has them."""
     stations = np.linspace(0.0, geometry.length, max(2, int(geometry.length / 10.0) + 2))
-    position, heading, _ = geometry.alignment.frame(stations)
-    left: NDArray[np.float64] = np.stack([-np.sin(heading), np.cos(heading)], axis=1)
-    edges = geometry.offsets(stations)[:, [0, -1]]
-    points = np.concatenate([position + edges[:, i, None] * left for i in (0, 1)])
+    edges = geometry.offsets(stations)
+    points = np.concatenate([geometry.alignment.place(stations, edges[:, i]) for i in (0, -1)])
     low, high = np.floor(points.min(axis=0)) - 1.0, np.ceil(points.max(axis=0)) + 1.0
     return {"north": float(high[1]), "south": float(low[1]), "east": float(high[0]), "west": float(low[0])}
