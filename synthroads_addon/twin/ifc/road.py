@@ -1,8 +1,9 @@
-"""The road in IFC 4.3: its lateral parts, and what they are paved with.
+"""The road in IFC 4.3: its lateral parts, what they are paved with, and the markings on it.
 
 Spatially an IfcRoad has a ROADWAYPLATEAU per direction (CARRIAGEWAY with its TRAFFICLANEs, HARDSHOULDER, SOFTSHOULDER,
 turnouts), a CENTRALRESERVE, and a ROADSIDE on either side. Physically each direction has one IfcPavement, an aggregate
-of one IfcCourse per strip, which its part refers to; verge and median are IfcEarthworksFills.
+of one IfcCourse per strip, which its part refers to; verge and median are IfcEarthworksFills. Markings are
+IfcSurfaceFeatures that adhere to their carriageway's pavement, not contained in any part.
 """
 
 from __future__ import annotations
@@ -18,9 +19,11 @@ from ...road.damage import damage_columns, damage_depth, damaged_strips
 from ...road.geometry import SurfaceStrip
 from ...road.guidelines import LIMITS
 from ...road.objects import AnyWidth
-from ...road.parameters import Carriageway, Median, Pothole, RoadParameters, Rut, Turnout
+from ...road.parameters import Arrow, Carriageway, Hatching, LineMarking, Median, Pothole, RoadParameters, Rut, Turnout
 from ...road.section_geometry import CarriagewaySection
 from ...road.turnout_geometry import TURNOUT_STRIPS, TurnoutShape
+from ..faces import Faces
+from ..surfaces import dash_surfaces, painted_surface
 from .entities import Entity, Float, IfcFile, short
 from .scene import Scene, grid_triangles
 
@@ -330,3 +333,52 @@ def _write_median_surface(scene: Scene, index: int, name: str, part: Entity) -> 
     ifc.gather("IfcRelContainedInSpatialStructure", part, [fill])
     ifc.made_of(fill, strip.material)
     ifc.label(fill, strip.instance, strip.class_name)
+
+
+# --- markings -------------------------------------------------------------------------------------------------------
+
+_MARKINGS: dict[type, str] = {LineMarking: "LINEMARKING", Hatching: "HATCHMARKING", Arrow: "SYMBOLMARKING"}
+"""Class of a marking -> its predefined type."""
+
+
+def write_markings(scene: Scene) -> None:
+    """Add every line, hatching and arrow with the surface of its film."""
+    objects = scene.geometry.parameters.objects
+    for name, item in objects.items():
+        if isinstance(item, LineMarking | Hatching | Arrow):
+            if isinstance(item, LineMarking):
+                _, faces, _ = dash_surfaces(scene.geometry, item, scene.stations)
+            else:
+                faces = painted_surface(scene.geometry, item, scene.stations)
+            bearer = objects[item.turnout] if isinstance(item, Hatching) else item
+            carriageway = objects[bearer.carriageway]  # type: ignore[union-attr]
+            assert isinstance(carriageway, Carriageway)
+            _write_marking(scene, name, item, faces, scene.parts[f"pavement-{carriageway.side}"])
+
+
+def _write_marking(scene: Scene, name: str, item: LineMarking | Hatching | Arrow, faces: Faces, bearer: Entity) -> None:
+    ifc = scene.ifc
+    mesh = _triangles(faces)
+    shape = ifc.shape([ifc.mesh(*mesh, False)], "Tessellation") if mesh else None
+    about = "hatching" if isinstance(item, Hatching) else item.kind
+    feature = ifc.product("IfcSurfaceFeature", name, _MARKINGS[type(item)], about, Representation=shape)
+    ifc.gather("IfcRelAdheresToElement", bearer, [feature])
+    ifc.made_of(feature, f"paint_{item.color}")
+    scene.describe(feature, item)
+    common = {
+        "MaterialColour": ifc.add("IfcLabel", item.color),
+        "MaterialThickness": ifc.add("IfcPositiveLengthMeasure", item.film_thickness),
+    }
+    ifc.properties(feature, "Pset_RoadMarkingCommon", common)
+
+
+def _triangles(faces: Faces) -> tuple[Float, NDArray[np.intp]] | None:
+    """Return convex polygons as points and triangles."""
+    if not len(faces):
+        return None
+    starts = np.cumsum(faces.sizes) - faces.sizes
+    counts = faces.sizes - 2
+    first = np.repeat(starts, counts)
+    number = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
+    fans = np.column_stack([first, first + number + 1, first + number + 2])
+    return faces.points, faces.corners[fans]
