@@ -96,13 +96,13 @@ def brightness_of(surfaces: Surfaces, material: Index, cosine: Float) -> Float:
     result = returned_share(cosine, reflectance, *facets)
     if surfaces.retroreflective:
         shining = np.flatnonzero(np.take(surfaces.shining, material))
-        own = material[shining]
+        indices = material[shining]
         result[shining] = returned_share(
             cosine[shining],
             reflectance[shining],
-            surfaces.facet_a[own],
-            surfaces.facet_b[own],
-            surfaces.retro[own],
-            surfaces.inverse_lobe_squared[own],
+            surfaces.facet_a[indices],
+            surfaces.facet_b[indices],
+            surfaces.retro[indices],
+            surfaces.inverse_lobe_squared[indices],
         )
     return result

@@ -152,8 +152,7 @@ class RoadGeometry:
         A line between lanes is centred on the boundary; an edge line lies on the edge strip, so that the lane keeps
         its full width (RMS).
         """
-        carriageway = self.parameters.objects[line.carriageway]
-        assert isinstance(carriageway, Carriageway)
+        carriageway = self.parameters.carriageway_of(line)
         section = self.sections[carriageway.side]
         outwards = {"outer_edge": 0.5, "block": 0.5, "turnout_edge": 0.5, "inner_edge": -0.5, "gore_edge": -0.5}
         if line.kind == "free":

@@ -159,8 +159,8 @@ class Turnout(RoadObject):
     @property
     def length(self) -> float:
         """Return its whole length along the centreline, m."""
-        own = self.taper_in_length + self.lane_length + self.taper_out_length
-        return own + (self.ramp.length if self.ramp else 0.0)
+        along = self.taper_in_length + self.lane_length + self.taper_out_length
+        return along + (self.ramp.length if self.ramp else 0.0)
 
     @property
     def end_station(self) -> float:

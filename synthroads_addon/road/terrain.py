@@ -77,8 +77,8 @@ def road_elevation_model(
     Raises:
         InputError: as `read_elevation_model`.
     """
-    found = stamp(path, "an elevation model is needed here")
-    return _read_model(path, found, epsg, axis, origin, half_width + GROUND_MARGIN)
+    file_stamp = stamp(path, "an elevation model is needed here")
+    return _read_model(path, file_stamp, epsg, axis, origin, half_width + GROUND_MARGIN)
 
 
 @lru_cache(maxsize=2)

@@ -69,8 +69,8 @@ class TurnoutShape:
         self.nose = np.inf
         if turnout.ramp:
             full = float(width_at(carriageway.hard_shoulder_width, self.station(self._taper + turnout.lane_length)))
-            apart = 6.0 * turnout.ramp.clothoid_parameter**2 * (full + NOSE_WIDTH)
-            self.nose = max(min(apart ** (1.0 / 3.0), turnout.ramp.length - NOSE_BEFORE_END), STEP)
+            cubed = 6.0 * turnout.ramp.clothoid_parameter**2 * (full + NOSE_WIDTH)
+            self.nose = max(min(cubed ** (1.0 / 3.0), turnout.ramp.length - NOSE_BEFORE_END), STEP)
 
     def station(self, w: float) -> float:
         """Return the station of a w (both m)."""
@@ -88,8 +88,8 @@ class TurnoutShape:
 
     def steps(self) -> list[tuple[float, float]]:
         """Return lowest and highest station of each `STEP` along which the pavement changes at once."""
-        found = [sorted(map(self.station, step)) for step in self._steps()]
-        return [(low, high) for low, high in found]
+        steps = [sorted(map(self.station, step)) for step in self._steps()]
+        return [(low, high) for low, high in steps]
 
     def _steps(self) -> list[tuple[float, float]]:
         """Return the w of each step's two ends."""

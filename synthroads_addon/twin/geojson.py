@@ -104,8 +104,7 @@ class _Writer:
             yield from self._lanes(about | of_lane, item, (boundaries[:, number + 1], boundaries[:, number]))
 
     def _turnout(self, name: str, item: Turnout) -> Iterator[Feature]:
-        carriageway = self.geometry.parameters.objects[item.carriageway]
-        assert isinstance(carriageway, Carriageway)
+        carriageway = self.geometry.parameters.carriageway_of(item)
         section = self.geometry.sections[carriageway.side]
         shape = next(shape for shape in section.turnouts if shape.turnout.instance == item.instance)
         kind = "bay" if item.ramp is None else "turnout_lane"

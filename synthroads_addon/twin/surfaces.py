@@ -74,13 +74,13 @@ def dash_surfaces(geometry: RoadGeometry, line: LineMarking, stations: Float) ->
 def painted_surface(geometry: RoadGeometry, item: Hatching | Arrow, stations: Float) -> Faces:
     """Return the polygons of a hatched area or an arrow, cut at the stations at which the road is sampled."""
     outlines = hatching_outlines(geometry, item) if isinstance(item, Hatching) else arrow_outlines(item)
-    found = [piece for outline in outlines for piece in pieces(outline, _inside(stations, outline))]
-    if not found:
+    parts = [piece for outline in outlines for piece in pieces(outline, _inside(stations, outline))]
+    if not parts:
         return join_polygons([])
-    places = np.concatenate(found)
+    places = np.concatenate(parts)
     points = on_ground(geometry, places[:, 0], places[:, 1])
     points[:, 2] += item.film_thickness
-    sizes = np.array([len(piece) for piece in found], dtype=np.int64)
+    sizes = np.array([len(piece) for piece in parts], dtype=np.int64)
     return cut_into_triangles(Faces(points, np.arange(len(points)), sizes))
 
 

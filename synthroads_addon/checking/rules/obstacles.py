@@ -117,12 +117,12 @@ class Around:
         distance = np.full(len(station), np.inf)
         for name, edges in sides.items():
             across, span = edges.at(station), edges.distances(low, high)
-            own = across.clearance(*span)
-            self.clearance[name] = _least(own, index, count)
+            clearance = across.clearance(*span)
+            self.clearance[name] = _least(clearance, index, count)
             at = 0.5 * (span[0] + span[1])[:count]
             self.outer[name] = at > across.middle[:count]
             self.bare[name] = (at > across.gap_low[:count]) & (at < across.gap_high[:count])
-            distance = np.minimum(distance, own)
+            distance = np.minimum(distance, clearance)
         self.nearest = _least(distance, index, count)
         order = np.argsort(-station, kind="stable")
         order = order[distance[order] <= self.nearest[index[order]]]
@@ -200,10 +200,10 @@ class Signs:
         numbers = [(item.station, item.rotation_deg) for item in items]
         self.station, rotation = np.array(numbers, dtype=np.float64).reshape(-1, 2).T
         self.turned = np.abs((rotation + 180.0) % 360.0 - 180.0)
-        outer = {name: own[index] for name, own in around.outer.items()}
+        outer = {name: values[index] for name, values in around.outer.items()}
         anyone = np.any(list(outer.values()), axis=0)
-        self.of: dict[str, Bool] = {name: own | ~anyone for name, own in outer.items()}
-        self.bare = {name: own[index] for name, own in around.bare.items()}
+        self.of: dict[str, Bool] = {name: values | ~anyone for name, values in outer.items()}
+        self.bare = {name: values[index] for name, values in around.bare.items()}
 
     def away(self, edges: Edges) -> Float:
         """Return by how much (S,) the signs are turned away from a carriageway's traffic, degrees."""
@@ -212,7 +212,7 @@ class Signs:
     def seen(self, edges: Edges, code: str, room: float) -> NDArray[np.intp]:
         """Return the indices of the signs of a code that a carriageway's traffic sees, turned by `room` at most."""
         seen = self.of[edges.name] & (self.away(edges) <= room)
-        return np.array([i for i, own in enumerate(self.codes) if own == code and seen[i]], dtype=np.intp)
+        return np.array([i for i, sign_code in enumerate(self.codes) if sign_code == code and seen[i]], dtype=np.intp)
 
 
 def _upright(name: str, item: Any, half: float, top: float) -> Body:

@@ -164,10 +164,10 @@ class IfcFile:
         """
         if key is not None and key in self._shapes:
             return self._shapes[key]
-        found = [item for item in items if item is not None]
-        if not found:
+        bodies = [item for item in items if item is not None]
+        if not bodies:
             return None
-        body = self.add("IfcShapeRepresentation", self.contexts["Body"], "Body", kind, found)
+        body = self.add("IfcShapeRepresentation", self.contexts["Body"], "Body", kind, bodies)
         made = self.add("IfcProductDefinitionShape", None, None, [body])
         if key is not None:
             self._shapes[key] = made
@@ -197,8 +197,8 @@ class IfcFile:
         if not made:
             return
         key = f"{item.GlobalId}/{name}"
-        found = self.rooted("IfcPropertySet", key, Name=name, HasProperties=made)
-        self.rooted("IfcRelDefinesByProperties", key, RelatedObjects=[item], RelatingPropertyDefinition=found)
+        definition = self.rooted("IfcPropertySet", key, Name=name, HasProperties=made)
+        self.rooted("IfcRelDefinesByProperties", key, RelatedObjects=[item], RelatingPropertyDefinition=definition)
 
     def _property(self, name: str, value: Entity | list[str]) -> Entity:
         if isinstance(value, list):
@@ -220,8 +220,8 @@ class IfcFile:
     def parameters_of(self, model: Model) -> dict[str, Entity]:
         """Return all that a parameter set says of an object, under the same names, as IFC values."""
         fields = type(model).model_fields
-        found = {name: (getattr(model, name), unit_of(field)) for name, field in fields.items()}
-        return {name: self.value(value, unit) for name, (value, unit) in found.items() if value is not None}
+        values = {name: (getattr(model, name), unit_of(field)) for name, field in fields.items()}
+        return {name: self.value(value, unit) for name, (value, unit) in values.items() if value is not None}
 
     def made_of(self, item: Entity, name: str) -> None:
         """Give an object its material, by its name in the material table."""

@@ -251,8 +251,8 @@ class _Direction:
     def _blocks(self, piece: _Piece, station: Float) -> Iterator[tuple[int, int, bool]]:
         """Yield the first and last row of every stretch along which the same damage lies, and whether there is any."""
         ranges = _damage_ranges(self.section) if piece.index in self._damaged_strips else []
-        found = [(station[1:] > low) & (station[:-1] < high) for low, high in ranges]
-        damage = np.array([np.zeros(len(station) - 1, dtype=bool), *found])
+        masks = [(station[1:] > low) & (station[:-1] < high) for low, high in ranges]
+        damage = np.array([np.zeros(len(station) - 1, dtype=bool), *masks])
         borders = [0, *(np.flatnonzero(np.diff(damage, axis=1).any(axis=0)) + 1).tolist(), len(station) - 1]
         for first, last in pairwise(borders):
             yield first, last, bool(damage[:, first].any())
@@ -260,11 +260,11 @@ class _Direction:
     def _write_damage(self) -> None:
         """Add a DEFECT for every rut and pothole; their shapes are in the courses' surfaces."""
         ifc, pavement = self.ifc, self.carriageway.pavement
-        found: list[tuple[str, Rut | Pothole, float, float]] = [
+        damages: list[tuple[str, Rut | Pothole, float, float]] = [
             ("rut", rut, rut.start_station, self._rut_offset(rut)) for rut in pavement.ruts
         ]
-        found += [("pothole", hole, hole.station, hole.offset) for hole in pavement.potholes]
-        for number, (kind, damage, station, offset) in enumerate(found):
+        damages += [("pothole", hole, hole.station, hole.offset) for hole in pavement.potholes]
+        for number, (kind, damage, station, offset) in enumerate(damages):
             name = f"{self.name}/{kind}-{number}"
             placement = self.scene.place(station, offset).placement
             defect = ifc.product("IfcSurfaceFeature", name, "DEFECT", kind, placement)
@@ -306,16 +306,16 @@ def _write_median(scene: Scene) -> None:
     """Add the strip between the carriageways; beside a single one a median is named, and has no surface."""
     geometry = scene.geometry
     index = next((i for i, strip in enumerate(geometry.strips) if strip.kind == "median"), None)
-    found = next(iter(geometry.parameters.of_type(Median).items()), None)
-    if index is None and found is None:
+    median = next(iter(geometry.parameters.of_type(Median).items()), None)
+    if index is None and median is None:
         return
-    name = found[0] if found else "road/median"
+    name = median[0] if median else "road/median"
     part = _part(scene, scene.road, name, "CENTRALRESERVE")
     scene.parts["median"] = part
     if index is not None:
         _write_median_surface(scene, index, name, part)
-    if found:
-        scene.describe(part, found[1])
+    if median:
+        scene.describe(part, median[1])
 
 
 def _write_median_surface(scene: Scene, index: int, name: str, part: Entity) -> None:
@@ -343,17 +343,14 @@ _MARKINGS: dict[type, str] = {LineMarking: "LINEMARKING", Hatching: "HATCHMARKIN
 
 def write_markings(scene: Scene) -> None:
     """Add every line, hatching and arrow with the surface of its film."""
-    objects = scene.geometry.parameters.objects
-    for name, item in objects.items():
+    for name, item in scene.geometry.parameters.objects.items():
         if isinstance(item, LineMarking | Hatching | Arrow):
             if isinstance(item, LineMarking):
                 _, faces, _ = dash_surfaces(scene.geometry, item, scene.stations)
             else:
                 faces = painted_surface(scene.geometry, item, scene.stations)
-            bearer = objects[item.turnout] if isinstance(item, Hatching) else item
-            carriageway = objects[bearer.carriageway]  # type: ignore[union-attr]
-            assert isinstance(carriageway, Carriageway)
-            _write_marking(scene, name, item, faces, scene.parts[f"pavement-{carriageway.side}"])
+            side = scene.geometry.parameters.carriageway_of(item).side
+            _write_marking(scene, name, item, faces, scene.parts[f"pavement-{side}"])
 
 
 def _write_marking(scene: Scene, name: str, item: LineMarking | Hatching | Arrow, faces: Faces, bearer: Entity) -> None:

@@ -78,13 +78,13 @@ class Scene:
 
     def look_up(self, places: Iterable[tuple[float, float]]) -> None:
         """Find surface and strip at stations and offsets (m) at once: one by one it takes a hundred times longer."""
-        wanted = [place for place in dict.fromkeys(places) if place not in self._known]
-        if not wanted:
+        unknown = [place for place in dict.fromkeys(places) if place not in self._known]
+        if not unknown:
             return
-        station, offset = np.array(wanted).T
+        station, offset = np.array(unknown).T
         station = np.clip(station, 0.0, self.geometry.length)
         heights, strips = self.surface(station, offset), self.geometry.strip_index(station, offset)
-        self._known.update(zip(wanted, zip(heights.tolist(), strips.tolist(), strict=True), strict=True))
+        self._known.update(zip(unknown, zip(heights.tolist(), strips.tolist(), strict=True), strict=True))
 
     def at(self, station: float, offset: float) -> tuple[float, int]:
         """Return the surface's local elevation (m) and the strip's index, -1 beside the road."""
@@ -153,7 +153,8 @@ class Scene:
     def describe(self, entity: Entity, item: RoadObject) -> None:
         """Give an entity what the parameter set says of its object, under the same names, and its class."""
         label = item.class_name if isinstance(item, Asset) else item.points_class
-        self.ifc.properties(entity, "SynthRoads", self.ifc.parameters_of(item) | {"class": self.ifc.value(label)})
+        values = self.ifc.parameters_of(item) | ({"class": self.ifc.value(label)} if label else {})
+        self.ifc.properties(entity, "SynthRoads", values)
 
     def add_part(self, whole: Entity, place: IfcPlace, entity: str, name: str, kind: str, **named: Any) -> Entity:
         """Add an element of a predefined type that is part of another one, in its frame."""

@@ -57,12 +57,12 @@ def _terrain(scene: Scene, name: str, item: Terrain) -> None:
 
 def _columns(half_width: float) -> np.ndarray:
     """Return the shares (K,), from 0 to 1, of the way from the road's edge outwards at which the terrain is sampled."""
-    distance, found = 0.0, [0.0]
+    distance, distances = 0.0, [0.0]
     while distance < half_width:
         spacing = next(spacing for limit, spacing in _SPACINGS if distance < limit)
         distance = min(distance + spacing, half_width)
-        found.append(distance)
-    return np.array(found) / half_width
+        distances.append(distance)
+    return np.array(distances) / half_width
 
 
 def _vehicles(scene: Scene) -> None:

@@ -147,5 +147,5 @@ def _georeference(ifc: IfcFile, parameters: RoadParameters, model: Entity, metre
 
 def _quoted_name(text: str, key: str) -> str | None:
     """Return the name that stands behind a keyword of well-known text."""
-    found = re.search(rf'\b{key}\["([^"]*)"', text)
-    return found[1] if found else None
+    match = re.search(rf'\b{key}\["([^"]*)"', text)
+    return match[1] if match else None

@@ -253,8 +253,8 @@ class Objects:
             assert isinstance(item, PointObject)
             place = (item.station, item.offset, self.ground.foot(name))
         s, t, z = (float(value) for value in place)
-        own: dict[str, Value] = {"id": f"{item.instance}{suffix}", "name": name, "s": s, "t": t, "zOffset": _fine(z)}
-        return element(self.parent, "object", {**own, "orientation": "none", "dynamic": "no", **attributes})
+        about: dict[str, Value] = {"id": f"{item.instance}{suffix}", "name": name, "s": s, "t": t, "zOffset": _fine(z)}
+        return element(self.parent, "object", {**about, "orientation": "none", "dynamic": "no", **attributes})
 
 
 def gantry_levels(ground: Ground, item: Gantry) -> tuple[float, float]:
