@@ -53,6 +53,10 @@ class LineObject(RoadObject):
     end_station: float = quantity(ge=0, unit="m", description="End, terminal included.")
     offset: float = quantity(ge=-100, le=100, unit="m", description="Offset of its axis.")
 
+    def offset_at(self, station: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the offsets (N,) of its axis at stations (N,), m."""
+        return np.full(station.shape, self.offset)
+
 
 class WidthPoint(Model):
     """A width at a station."""

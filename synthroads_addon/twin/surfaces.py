@@ -9,7 +9,7 @@ from ..road.alignment import left_vectors
 from ..road.geometry import RoadGeometry
 from ..road.objects import LineObject
 from ..road.paint import arrow_outlines, hatching_outlines, pieces
-from ..road.parameters import Arrow, Hatching, LineMarking, Pothole, TemporaryBarrier
+from ..road.parameters import Arrow, Hatching, LineMarking, Pothole
 from ..road.surface import known_elevation
 from ..road.tessellation import sample_stations
 from .faces import FLAT, Faces, Int, compact, grid_corners, join_polygons, quads, twist
@@ -171,11 +171,7 @@ def height_share(item: LineObject, end: float, station: Float) -> Float:
 def line_points(geometry: RoadGeometry, item: LineObject, tolerance: float) -> Float:
     """Return points (N, 3) of the surface below a line object's axis, so many that chords keep the tolerance (m)."""
     station = line_stations(geometry, item)
-    offset = np.full(len(station), item.offset)
-    if isinstance(item, TemporaryBarrier):
-        share = (station - item.start_station) / max(item.end_station - item.start_station, 1e-3)
-        offset = item.offset + (item.end_offset - item.offset) * share
-    points = on_ground(geometry, station, offset)
+    points = on_ground(geometry, station, item.offset_at(station))
     return points[needed_rows(points, tolerance)]
 
 

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import Annotated, ClassVar, Literal
 
+import numpy as np
+from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
 from ...base.schema import Model, quantity
@@ -70,6 +72,11 @@ class TemporaryBarrier(LineObject):
     height: float = quantity(0.55, ge=0.2, le=1.2, unit="m", description="Top above the surface.")
     base_width: float = quantity(0.4, ge=0.1, le=1.0, unit="m", description="Width of its foot.")
     segment_length: float = quantity(4.0, ge=1, le=12, unit="m", description="Length of one element.")
+
+    def offset_at(self, station: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the offsets of its axis at stations of any shape, m."""
+        share = (station - self.start_station) / max(self.end_station - self.start_station, 1e-3)
+        return self.offset + (self.end_offset - self.offset) * share
 
 
 # --- at one place -----------------------------------------------------------------------------------------------

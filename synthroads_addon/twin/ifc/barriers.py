@@ -85,7 +85,6 @@ def _element(scene: Scene, entity: str, name: str, item: Any, meshes: list[_Mesh
 def _guardrail(scene: Scene, item: Guardrail) -> list[_Mesh]:
     """Return beams, posts and spacers."""
     station = _rows(scene, item)
-    offset = np.full(station.shape, item.offset)
     spacer, sides = (
         shapes.GUARDRAIL_SPACER[item.faces],
         {"left": [1.0], "right": [-1.0], "both": [1.0, -1.0]}[item.faces],
@@ -99,7 +98,7 @@ def _guardrail(scene: Scene, item: Guardrail) -> list[_Mesh]:
         ring = np.concatenate([up[::-1], down])
         across = side * (ring[:, 0] + spacer + _POST_REACH)
         height = _ramped_height(item, station, shapes.GUARDRAIL_TIP)[:, None] + ring[:, 1]
-        meshes.append(_swept(scene, station, offset, across, height))
+        meshes.append(_swept(scene, item, station, across, height))
     return [*meshes, *_posts(scene, item, sides, spacer)]
 
 
@@ -129,22 +128,19 @@ def _concrete(scene: Scene, item: ConcreteBarrier) -> list[_Mesh]:
     tall = np.maximum(_ramped_height(item, station, 0.0), shapes.CONCRETE_TIP)
     flank = np.array(shapes.CONCRETE_FLANKS[item.profile])
     across, height = _both_flanks(flank, item.base_width / 2.0, tall, _CONCRETE_BURIED)
-    return [_swept(scene, station, np.full(station.shape, item.offset), across, height)]
+    return [_swept(scene, item, station, across, height)]
 
 
 def _temporary(scene: Scene, item: TemporaryBarrier) -> list[_Mesh]:
     """Return the elements of a movable barrier, each straight between its ends."""
     flank = np.array(shapes.TEMPORARY_FLANKS["plastic" if item.segment_length <= shapes.LONGEST_PLASTIC else "steel"])
-    length = item.end_station - item.start_station
     meshes = []
     for start, end in _bays(scene, item, item.segment_length):
         station = np.clip([start + shapes.TEMPORARY_GAP / 2.0, end - shapes.TEMPORARY_GAP / 2.0], *_span(scene, item))
         if station[1] - station[0] < _SHORTEST:
             continue
-        share = (station - item.start_station) / length
-        offset = item.offset + (item.end_offset - item.offset) * share
         across, height = _both_flanks(flank, item.base_width / 2.0, np.full(2, item.height), 0.0)
-        meshes.append(_swept(scene, station, offset, across, height))
+        meshes.append(_swept(scene, item, station, across, height))
     return meshes
 
 
@@ -153,7 +149,7 @@ def _noise_barrier(scene: Scene, item: NoiseBarrier) -> list[_Mesh]:
     station = _rows(scene, item)
     across = np.array([-1.0, -1.0, 1.0, 1.0]) * item.thickness / 2.0
     height = np.broadcast_to([-_WALL_BURIED, item.height, item.height, -_WALL_BURIED], (len(station), 4))
-    panels = _swept(scene, station, np.full(station.shape, item.offset), across, height)
+    panels = _swept(scene, item, station, across, height)
     low, high = _span(scene, item)
     post = np.array([item.start_station, *(end for _, end in _bays(scene, item, item.post_spacing))])
     post = post[(post >= low) & (post <= high)]
@@ -205,11 +201,11 @@ def _both_flanks(flank: Float, half: float, tall: Float, buried: float) -> tuple
     return half * ring[:, 0], np.where(np.isnan(height), -buried, height)
 
 
-def _swept(scene: Scene, station: Float, offset: Float, across: Float, height: Float) -> _Mesh:
-    """Return a closed cross-section swept along the road.
+def _swept(scene: Scene, item: LineObject, station: Float, across: Float, height: Float) -> _Mesh:
+    """Return a closed cross-section swept along the axis of something that runs along the road.
 
     Args:
-        station, offset: (N,) axis, m.
+        station: (N,) where, m.
         across: (P,) offsets of the section's points from the axis, m: seen along the road they run against the clock,
             and the second half mirrors the first point by point.
         height: (N, P) above the surface under the axis, m.
@@ -217,7 +213,10 @@ def _swept(scene: Scene, station: Float, offset: Float, across: Float, height: F
     if len(station) < 2:
         return np.empty((0, 3)), np.empty((0, 3), dtype=np.intp)
     rows, count = len(station), len(across)
-    points = scene.points(station, offset)[:, None, :] + across[:, None] * left_of(scene.geometry, station)[:, None, :]
+    points = (
+        scene.points(station, item.offset_at(station))[:, None, :]
+        + across[:, None] * left_of(scene.geometry, station)[:, None, :]
+    )
     points[:, :, 2] += height
     caps = [(i, i + 1, count - 1 - i) for i in range(count // 2 - 1)]
     caps += [(i + 1, count - 2 - i, count - 1 - i) for i in range(count // 2 - 1)]

@@ -58,12 +58,10 @@ class Ground:
         bends = [s for section in sections for s in section.kinks()]
         bends += [point.station for section in sections for point in section.carriageway.crossfall]
         bends += [start + ramp_length(item, end), end - ramp_length(item, end)]
-        last = getattr(item, "end_offset", item.offset)
         tall: Any = getattr(item, "height", 0.0)
-        length = max(item.end_station - item.start_station, CLOSE)
 
         def rows(station: Float) -> Float:
-            offset = item.offset + (last - item.offset) * (station - item.start_station) / length
+            offset = item.offset_at(station)
             return np.column_stack([offset, self.height(station, offset), tall * height_share(item, end, station)])
 
         stations = chords(rows, merged_stations(bends, start, end), self.tolerance, shortest=0.05)
