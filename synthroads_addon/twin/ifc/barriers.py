@@ -213,10 +213,8 @@ def _swept(scene: Scene, item: LineObject, station: Float, across: Float, height
     if len(station) < 2:
         return np.empty((0, 3)), np.empty((0, 3), dtype=np.intp)
     rows, count = len(station), len(across)
-    points = (
-        scene.points(station, item.offset_at(station))[:, None, :]
-        + across[:, None] * left_of(scene.geometry, station)[:, None, :]
-    )
+    left = left_of(scene.geometry, station)[:, None, :]
+    points = scene.points(station, item.offset_at(station))[:, None, :] + across[:, None] * left
     points[:, :, 2] += height
     caps = [(i, i + 1, count - 1 - i) for i in range(count // 2 - 1)]
     caps += [(i + 1, count - 2 - i, count - 1 - i) for i in range(count // 2 - 1)]
