@@ -1,4 +1,4 @@
-"""What spans the road in IFC 4.3: gantries as assemblies of posts, a beam, signs and displays; bridges over it."""
+"""Structures across the road in IFC 4.3: gantries as assemblies of posts, a beam, signs and displays; bridges."""
 
 from __future__ import annotations
 
