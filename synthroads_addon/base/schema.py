@@ -186,6 +186,11 @@ def canonical_json(data: object) -> str:
     return json.dumps(data, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
 
 
+def compact_json(data: object) -> str:
+    """Serialise without spaces and line ends."""
+    return json.dumps(data, ensure_ascii=False, separators=(",", ":"), allow_nan=False)
+
+
 def round_value(value: float, digits: int = 9) -> float:
     """Round a sampled value so that its text is short and the same on every machine (-0.0 becomes 0.0)."""
     return round(float(value), digits) + 0.0

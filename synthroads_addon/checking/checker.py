@@ -32,11 +32,11 @@ def check(parameters: RoadParameters) -> list[Violation]:
     with np.errstate(all="ignore"):
         road = Road(parameters)
         for rule in RULES.values():
-            found = [
+            findings = [
                 Violation(rule.id, name, _finite(station), _finite(value), _finite(limit), rule.unit, text)
                 for name, station, value, limit, text in rule.find(road)
             ]
-            violations += sorted(found, key=lambda violation: violation.station)
+            violations += sorted(findings, key=lambda violation: violation.station)
     return violations
 
 

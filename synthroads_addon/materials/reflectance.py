@@ -99,11 +99,11 @@ def _is_zero(value: Number) -> bool:
 
 def _add_retroreflection(result: Float, cosine: Float, retro: Number, inverse_lobe_squared: Number) -> None:
     """Add the retro-reflection to (N,) brightnesses; only where there is one, as few surfaces have it."""
-    own = np.broadcast_to(np.asarray(retro, dtype=np.float64), result.shape)
-    which = np.flatnonzero(own)
+    strength = np.broadcast_to(np.asarray(retro, dtype=np.float64), result.shape)
+    which = np.flatnonzero(strength)
     if not len(which):
         return
     angle = np.arccos(np.clip(cosine[which], -1.0, 1.0))
     lobe = np.broadcast_to(np.asarray(inverse_lobe_squared, dtype=np.float64), result.shape)[which]
     with np.errstate(under="ignore"):
-        result[which] += own[which] * np.exp(-angle * angle * lobe)
+        result[which] += strength[which] * np.exp(-angle * angle * lobe)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
@@ -18,7 +18,7 @@ Index = NDArray[np.integer]
 Reflection = Literal["lambert", "oren_nayar"]
 
 
-@dataclass(frozen=True)
+@dataclass
 class Surfaces:
     """Materials in the order of the scene mesh's: (M,) arrays, ``base_color`` (M, 3).
 
@@ -48,43 +48,19 @@ class Surfaces:
     spread_below: Float
     spread_above: Float
     spread_wavelength: Float
-    reflectivity: Float = field(init=False)
-    facet_a: Float = field(init=False)
-    facet_b: Float = field(init=False)
-    inverse_lobe_squared: Float = field(init=False)
-    shining: NDArray[np.bool_] = field(init=False)
-    pervious: NDArray[np.bool_] = field(init=False)
-    permeable: bool = field(init=False)
-    retroreflective: bool = field(init=False)
-    rough: bool = field(init=False)
-    uneven: NDArray[np.bool_] = field(init=False)
-    spread_scale: Float = field(init=False)
-    varying: bool = field(init=False)
 
     def __post_init__(self) -> None:
-        a, b = facet_terms(self.slope)
-        uneven = (self.spread_below > 0.0) | (self.spread_above > 0.0)
-        derived = {
-            "reflectivity": reflectivity(self.base_color, self.metallic, self.specular),
-            "facet_a": a,
-            "facet_b": b,
-            "inverse_lobe_squared": 1.0 / np.maximum(self.lobe, 1e-3) ** 2,
-            "shining": self.retro > 0.0,
-            "pervious": self.transmission > 0.0,
-            "permeable": bool((self.transmission > 0.0).any()),
-            "rough": bool((np.asarray(self.slope) > 0.0).any()),
-            "retroreflective": bool((self.retro > 0.0).any()),
-            "uneven": uneven,
-            "spread_scale": 1.0 / mean_over_median(self.spread_below, self.spread_above),
-            "varying": bool(uneven.any()),
-        }
-        for name, value in derived.items():
-            object.__setattr__(self, name, value)
+        self.reflectivity = reflectivity(self.base_color, self.metallic, self.specular)
+        self.facet_a, self.facet_b = facet_terms(self.slope)
+        self.inverse_lobe_squared: Float = 1.0 / np.maximum(self.lobe, 1e-3) ** 2
+        self.shining, self.pervious = self.retro > 0.0, self.transmission > 0.0
+        self.uneven = (self.spread_below > 0.0) | (self.spread_above > 0.0)
+        self.spread_scale: Float = 1.0 / mean_over_median(self.spread_below, self.spread_above)
+        self.permeable, self.retroreflective = bool(self.pervious.any()), bool(self.shining.any())
+        self.rough, self.varying = bool((self.slope > 0.0).any()), bool(self.uneven.any())
 
 
-def surfaces_of(
-    rows: Iterable[Material], reflection: Reflection = "lambert", spread: bool = True
-) -> Surfaces:
+def surfaces_of(rows: Iterable[Material], reflection: Reflection = "lambert", spread: bool = True) -> Surfaces:
     """Return the constants of materials; with Lambert's model no surface has facets, without spread none varies."""
     rows = list(rows)
 
@@ -120,13 +96,13 @@ def brightness_of(surfaces: Surfaces, material: Index, cosine: Float) -> Float:
     result = returned_share(cosine, reflectance, *facets)
     if surfaces.retroreflective:
         shining = np.flatnonzero(np.take(surfaces.shining, material))
-        own = material[shining]
+        indices = material[shining]
         result[shining] = returned_share(
             cosine[shining],
             reflectance[shining],
-            surfaces.facet_a[own],
-            surfaces.facet_b[own],
-            surfaces.retro[own],
-            surfaces.inverse_lobe_squared[own],
+            surfaces.facet_a[indices],
+            surfaces.facet_b[indices],
+            surfaces.retro[indices],
+            surfaces.inverse_lobe_squared[indices],
         )
     return result

@@ -138,9 +138,9 @@ def write_material_table(path: Path, rows: Mapping[str, Material], overwrite: bo
 
 def _line(row: Material) -> str:
     """Return a material as one line: what it must have, and what differs from the defaults."""
-    told = {
+    given = {
         name: value
         for name, value in row.to_dict().items()
         if name not in Material.model_fields or value != Material.model_fields[name].default
     }
-    return json.dumps(told)
+    return json.dumps(given)

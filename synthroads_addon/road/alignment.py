@@ -186,18 +186,23 @@ class Alignment:
 
         The heading is not wrapped: it goes on counting through full turns. InputError for stations that aren't finite.
         """
-        wanted = finite_array("station", station)
-        flat = wanted.ravel()
+        stations = finite_array("station", station)
+        flat = stations.ravel()
         out = np.empty((4, flat.size))
         for start in range(0, flat.size, _BLOCK):
             block = slice(start, start + _BLOCK)
             out[:, block] = self._evaluate(flat[block])
-        position = np.stack((out[0] + self.x, out[1] + self.y), axis=-1).reshape(*wanted.shape, 2)
-        return position, out[2].reshape(wanted.shape)[()], out[3].reshape(wanted.shape)[()]
+        position = np.stack((out[0] + self.x, out[1] + self.y), axis=-1).reshape(*stations.shape, 2)
+        return position, out[2].reshape(stations.shape)[()], out[3].reshape(stations.shape)[()]
 
     def position(self, station: ArrayLike) -> FloatArray:
         """Return the map position (..., 2), m."""
         return self.frame(station)[0]
+
+    def place(self, station: FloatArray, offset: FloatArray) -> FloatArray:
+        """Return the map positions (N, 2) of stations and offsets (N,), m."""
+        position, heading, _ = self.frame(station)
+        return position + offset[:, None] * left_vectors(heading)
 
     def heading(self, station: ArrayLike) -> FloatArray:
         """Return the heading (...), rad, counter-clockwise from +x."""
@@ -215,11 +220,11 @@ class Alignment:
         prolongation is measured on the road.
         Memory beyond the result is bounded. InputError for a wrong shape or points that aren't finite.
         """
-        wanted = finite_array("points", points)
-        if wanted.ndim != 2 or wanted.shape[1] != 2:
-            raise InputError("points", wanted.shape, "an array of shape (N, 2) is needed")
-        station, offset = np.empty(len(wanted)), np.empty(len(wanted))
-        for chosen, x, y, nodes in self._leaves(wanted[:, 0] - self.x, wanted[:, 1] - self.y):
+        places = finite_array("points", points)
+        if places.ndim != 2 or places.shape[1] != 2:
+            raise InputError("points", places.shape, "an array of shape (N, 2) is needed")
+        station, offset = np.empty(len(places)), np.empty(len(places))
+        for chosen, x, y, nodes in self._leaves(places[:, 0] - self.x, places[:, 1] - self.y):
             station[chosen], offset[chosen] = self._project_leaf(x, y, nodes)
         return station, offset
 
@@ -229,12 +234,12 @@ class Alignment:
         Faster than `project`, it cannot stray to another branch of a road that crosses itself, and it takes the
         tangents beyond the ends like the road. A foot farther away is replaced by the end of the reach.
         """
-        guess, wanted = finite_array("station", station), finite_array("points", points)
-        if wanted.shape != (*guess.shape, 2) or guess.ndim != 1:
-            raise InputError("points", wanted.shape, f"the shape ({guess.size}, 2) is needed, one point per station")
-        x, y = wanted[:, 0] - self.x, wanted[:, 1] - self.y
-        found, _, offset = self._find_feet(x, y, guess, guess - reach, guess + reach)
-        return found, offset
+        guess, places = finite_array("station", station), finite_array("points", points)
+        if places.shape != (*guess.shape, 2) or guess.ndim != 1:
+            raise InputError("points", places.shape, f"the shape ({guess.size}, 2) is needed, one point per station")
+        x, y = places[:, 0] - self.x, places[:, 1] - self.y
+        foot, _, offset = self._find_feet(x, y, guess, guess - reach, guess + reach)
+        return foot, offset
 
     def _leaves(self, x: FloatArray, y: FloatArray) -> Iterator[tuple[IntArray, FloatArray, FloatArray, IntArray]]:
         """Halve the points along their longer extent until few are left, near few nodes; yield both.
@@ -350,14 +355,19 @@ def _rivals(x: FloatArray, y: FloatArray, node_x: FloatArray, node_y: FloatArray
     q = np.stack((node_x - centre_x, node_y - centre_y))
     # Squared distance less the point's own part, which is the same for all nodes.
     square = p @ (-2.0 * q) + (q**2).sum(axis=0)
-    own = p[:, 0] ** 2 + p[:, 1] ** 2
-    bound = (np.sqrt(np.maximum(square.min(axis=1) + own, 0.0)) + _NODE_SPACING) ** 2 - own
+    squared_length = p[:, 0] ** 2 + p[:, 1] ** 2
+    bound = (np.sqrt(np.maximum(square.min(axis=1) + squared_length, 0.0)) + _NODE_SPACING) ** 2 - squared_length
     least = square <= bound[:, None]
     falls = square[:, 1:] < square[:, :-1]
     least[:, 1:] &= falls
     least[:, :-1] &= ~falls
     owner, column = np.divmod(np.flatnonzero(least), least.shape[1])
     return owner, column
+
+
+def left_vectors(heading: FloatArray) -> FloatArray:
+    """Return the unit vectors (..., 2) to the left of headings (...), rad."""
+    return np.stack([-np.sin(heading), np.cos(heading)], axis=-1)
 
 
 def clip_offset(offset: ArrayLike, curvature: ArrayLike, share: float = 0.98) -> FloatArray:
@@ -373,9 +383,9 @@ def clip_offset(offset: ArrayLike, curvature: ArrayLike, share: float = 0.98) ->
     """
     if not 0.0 <= share < 1.0:
         raise InputError("share", share, "from 0 up to but not including 1")
-    wanted, bend = np.broadcast_arrays(finite_array("offset", offset), finite_array("curvature", curvature))
-    folds = wanted * bend > share
-    return np.where(folds, share / np.where(folds, bend, 1.0), wanted)[()]
+    offsets, bend = np.broadcast_arrays(finite_array("offset", offset), finite_array("curvature", curvature))
+    folds = offsets * bend > share
+    return np.where(folds, share / np.where(folds, bend, 1.0), offsets)[()]
 
 
 def running_sum(values: Sequence[float]) -> FloatArray:

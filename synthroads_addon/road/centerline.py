@@ -117,13 +117,13 @@ def _is_number(entry: str) -> bool:
 def _columns(place: str, head: list[str]) -> list[int]:
     """Return the places of x, y and, where there is one, z."""
     names = [entry.lower() for entry in head]
-    for wanted in ("x", "y"):
-        if wanted not in names:
-            raise InputError(place, ", ".join(head), f"a header with columns x, y (z optional): {wanted} is missing")
-    for wanted in ("x", "y", "z"):
-        if names.count(wanted) > 1:
-            raise InputError(place, ", ".join(head), f"each column once: {wanted} is there {names.count(wanted)} times")
-    return [names.index(wanted) for wanted in ("x", "y", "z") if wanted in names]
+    for axis in ("x", "y"):
+        if axis not in names:
+            raise InputError(place, ", ".join(head), f"a header with columns x, y (z optional): {axis} is missing")
+    for axis in ("x", "y", "z"):
+        if names.count(axis) > 1:
+            raise InputError(place, ", ".join(head), f"each column once: {axis} is there {names.count(axis)} times")
+    return [names.index(axis) for axis in ("x", "y", "z") if axis in names]
 
 
 def _row(place: str, entries: list[str], columns: list[int]) -> tuple[float, float, float]:
@@ -190,10 +190,10 @@ def _line_strings(name: str, node: object) -> Iterator[dict[str, Any]]:
 def _refuse_degrees(name: str, document: dict[str, Any], rows: list[tuple[float, float, float]]) -> None:
     """Refuse geographic coordinates: by the file's own word, or where it says nothing, by their size and extent."""
     system = json.dumps(document.get("crs")) if document.get("crs") else ""
-    said = any(word in system for word in ("CRS84", "4326", "4258"))
+    named = any(word in system for word in ("CRS84", "4326", "4258"))
     plan = np.array(rows).reshape(-1, 3)[:, :2]
     seems = len(plan) > 0 and bool((np.abs(plan) <= (180.0, 90.0)).all()) and np.ptp(plan, axis=0).max() < 2.0
-    if said or (not system and seems):
+    if named or (not system and seems):
         first = list(rows[0][:2]) if rows else None
         raise InputError(f"{name} coordinates", first, "metres of a projected system are needed, not degrees")
 

@@ -50,12 +50,12 @@ def _pothole_depth(pothole: Pothole, station: Float, offset: Float) -> Float:
 def damaged_strips(section: CarriagewaySection) -> list[int]:
     """Return the indices (into ``section.kinds``) of the strips that damage lies in, in order."""
     first, lanes = section.kinds.index("lane"), len(section.carriageway.lanes)
-    found = {first + lanes - 1 - rut.lane for rut in section.carriageway.pavement.ruts if rut.lane < lanes}
+    strips = {first + lanes - 1 - rut.lane for rut in section.carriageway.pavement.ruts if rut.lane < lanes}
     for pothole in section.carriageway.pavement.potholes:
         low, high = _across(section, pothole)
         distances = section.distances(pothole.station)[0]
-        found |= set(np.flatnonzero((distances[:-1] < high) & (distances[1:] > low)).tolist())
-    return sorted(found)
+        strips |= set(np.flatnonzero((distances[:-1] < high) & (distances[1:] > low)).tolist())
+    return sorted(strips)
 
 
 def damage_rows(section: CarriagewaySection, tolerance: float) -> list[float]:

@@ -183,15 +183,15 @@ class ElevationModel:
         """
         from rasterio.windows import Window  # the package is optional
 
-        wanted = np.ones(self._number.shape, dtype=bool) if cells is None else np.zeros(self._number.shape, dtype=bool)
+        needed = np.ones(self._number.shape, dtype=bool) if cells is None else np.zeros(self._number.shape, dtype=bool)
         if cells is not None:
-            wanted[tuple(cells // _TILE)] = True
-        tiles = np.argwhere(wanted)
+            needed[tuple(cells // _TILE)] = True
+        tiles = np.argwhere(needed)
         if len(tiles) > _MOST_TILES:
             raise _too_fine(self.path)
         scale, offset = dataset.scales[0], dataset.offsets[0]
         self._tiles = np.full((len(tiles) + 1, _TILE, _TILE), np.nan)
-        self._number[wanted] = np.arange(1, len(tiles) + 1)
+        self._number[needed] = np.arange(1, len(tiles) + 1)
         for number, (row, column) in enumerate((tiles * _TILE).tolist(), 1):
             height, width = min(_TILE, self.grid.rows - row), min(_TILE, self.grid.columns - column)
             values = dataset.read(1, window=Window(column, row, width, height), masked=True)
@@ -233,8 +233,8 @@ def read_elevation_model(path: str | os.PathLike[str], epsg: int, corridor: Corr
         from rasterio.errors import CRSError, RasterioError
     except ImportError as error:
         missing = isinstance(error, ModuleNotFoundError)
-        wanted = "in Blender install the extension SynthRoads Elevation Models" if missing else "it doesn't load here"
-        raise InputError(name, None, f"an elevation model needs rasterio: {wanted} ({error})") from None
+        advice = "in Blender install the extension SynthRoads Elevation Models" if missing else "it doesn't load here"
+        raise InputError(name, None, f"an elevation model needs rasterio: {advice} ({error})") from None
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # what it warns of is refused below
@@ -292,16 +292,16 @@ def _check_system(name: str, dataset: DatasetReader, epsg: int) -> None:
     if dataset.crs is None:
         what = f"{described.name} isn't understood" if described.exists() else "the file names none"
         raise InputError(f"{name}: coordinate system", None, f"{what}; EPSG:{epsg} is needed")
-    own, unit = _horizontal(dataset.crs)
+    horizontal, unit = _horizontal(dataset.crs)
     try:
         needed, _ = _horizontal(CRS.from_epsg(epsg))
     except CRSError:
         raise InputError("road.epsg", epsg, "must be the EPSG code of a coordinate system") from None
-    code = own.to_epsg()
+    code = horizontal.to_epsg()
     if code is None or code != needed.to_epsg():
-        shown = f"EPSG:{code}" if code else own.to_dict(projjson=True).get("name", "unknown")
+        shown = f"EPSG:{code}" if code else horizontal.to_dict(projjson=True).get("name", "unknown")
         raise InputError(f"{name}: coordinate system", shown, f"EPSG:{epsg} is needed, the road's own (road.epsg)")
-    _check_unit(name, "coordinates", own.linear_units)
+    _check_unit(name, "coordinates", horizontal.linear_units)
     _check_unit(name, "heights", unit)
 
 

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from .alignment import Alignment, Element
 from .damage import damage_depth
 from .objects import width_at
-from .parameters import Carriageway, LineMarking, Median, RoadParameters, Turnout
+from .parameters import AlignmentObject, Carriageway, LineMarking, Median, RoadParameters, Turnout
 from .profile import IntersectionPoint, Profile
 from .section_geometry import CarriagewaySection
 from .things.furniture import Side
@@ -59,14 +59,8 @@ class RoadGeometry:
 
     def __init__(self, parameters: RoadParameters) -> None:
         self.parameters = parameters
-        axis = parameters.alignment
-        self.alignment = Alignment(
-            [Element(e.length, e.curvature_start, e.curvature_end) for e in axis.horizontal],
-            axis.start_x,
-            axis.start_y,
-            np.deg2rad(axis.start_heading_deg),
-        )
-        self.profile = Profile([IntersectionPoint(p.station, p.elevation, p.radius) for p in axis.vertical])
+        self.alignment = alignment_of(parameters.alignment)
+        self.profile = profile_of(parameters.alignment)
         self.sections = sections_of(parameters)
         left, right = self.sections.get("left"), self.sections.get("right")
         strips: list[SurfaceStrip] = []
@@ -150,9 +144,7 @@ class RoadGeometry:
     def point(self, station: ArrayLike, offset: ArrayLike) -> Float:
         """Return local points (N, 3) of the surface; z is NaN outside the road."""
         station, offset = _pairs(station, offset)
-        position, heading, _ = self.alignment.frame(station)
-        left = np.stack([-np.sin(heading), np.cos(heading)], axis=1)
-        return np.column_stack([position + offset[:, None] * left, self.elevation(station, offset)])
+        return np.column_stack([self.alignment.place(station, offset), self.elevation(station, offset)])
 
     def marking_edges(self, line: LineMarking, station: ArrayLike) -> tuple[Float, Float]:
         """Return the left and right edge offsets (N,) of a line marking at stations (N,).
@@ -160,8 +152,7 @@ class RoadGeometry:
         A line between lanes is centred on the boundary; an edge line lies on the edge strip, so that the lane keeps
         its full width (RMS).
         """
-        carriageway = self.parameters.objects[line.carriageway]
-        assert isinstance(carriageway, Carriageway)
+        carriageway = self.parameters.carriageway_of(line)
         section = self.sections[carriageway.side]
         outwards = {"outer_edge": 0.5, "block": 0.5, "turnout_edge": 0.5, "inner_edge": -0.5, "gore_edge": -0.5}
         if line.kind == "free":
@@ -191,6 +182,17 @@ class RoadGeometry:
                 values = by_side[side] * (self.sections[side].carriageway.sign if signed else 1.0)
                 parts.append(values[:, ::-1] if side == "left" else values)
         return np.hstack(parts)
+
+
+def alignment_of(axis: AlignmentObject) -> Alignment:
+    """Return the horizontal alignment of a parameter set's axis, in the local frame."""
+    elements = [Element(e.length, e.curvature_start, e.curvature_end) for e in axis.horizontal]
+    return Alignment(elements, axis.start_x, axis.start_y, np.deg2rad(axis.start_heading_deg))
+
+
+def profile_of(axis: AlignmentObject) -> Profile:
+    """Return the vertical profile of a parameter set's axis, in local elevation."""
+    return Profile([IntersectionPoint(p.station, p.elevation, p.radius) for p in axis.vertical])
 
 
 def sections_of(parameters: RoadParameters) -> dict[Side, CarriagewaySection]:

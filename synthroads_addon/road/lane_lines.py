@@ -162,8 +162,7 @@ def lane_of(geometry: RoadGeometry, vehicle: Vehicle) -> LaneLine:
     Raises:
         InputError: its carriageway has no such lane.
     """
-    carriageway = geometry.parameters.objects[vehicle.carriageway]
-    assert isinstance(carriageway, Carriageway)
+    carriageway = geometry.parameters.carriageway_of(vehicle)
     if vehicle.lane >= len(carriageway.lanes):
         raise InputError("vehicle: lane", vehicle.lane, f"must be less than {len(carriageway.lanes)}")
     return LaneLine(geometry, carriageway, vehicle.lane)

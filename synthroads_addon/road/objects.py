@@ -16,9 +16,14 @@ StrictFinite = Annotated[float, Field(strict=True, ge=-1e8, le=1e8)]
 
 
 class RoadObject(Model):
-    """Base of everything in ``objects``: each has a type and a number that its points carry."""
+    """Base of everything in ``objects``: each has a type, and a number that its points carry.
+
+    Attributes:
+        points_class: semantic class of its points; empty for what has none, or chooses it itself.
+    """
 
     conditions: ClassVar[Sequence[dict[str, Any]]] = ({"required": ["type"]},)
+    points_class: ClassVar[str] = ""
 
     instance: int = quantity(
         ge=1, le=2**32 - 1, unit="1", description="Number that the object's faces and points carry."
@@ -48,6 +53,10 @@ class LineObject(RoadObject):
     end_station: float = quantity(ge=0, unit="m", description="End, terminal included.")
     offset: float = quantity(ge=-100, le=100, unit="m", description="Offset of its axis.")
 
+    def offset_at(self, station: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the offsets (N,) of its axis at stations (N,), m."""
+        return np.full(station.shape, self.offset)
+
 
 class WidthPoint(Model):
     """A width at a station."""
@@ -71,6 +80,7 @@ def _form(width: object) -> str | None:
 
 
 _FORM = Discriminator(_form, "width_type", "must be a number or points {station, width}")
+_METRES = Field(json_schema_extra={"unit": "m"})
 WidthPoints = Annotated[
     tuple[WidthPoint, ...],
     Field(min_length=2, description="Linear in between, constant before the first point and after the last."),
@@ -79,10 +89,10 @@ WidthPoints = Annotated[
 ]
 AnyWidth = float | tuple[WidthPoint, ...]
 """A width (m), or points of it along the road."""
-Width = Annotated[Annotated[float, Field(strict=True, ge=0, le=50), Tag("number")] | WidthPoints, _FORM]
-LaneWidth = Annotated[Annotated[float, Field(strict=True, ge=2, le=6), Tag("number")] | WidthPoints, _FORM]
-ShoulderWidth = Annotated[Annotated[float, Field(strict=True, ge=0, le=6), Tag("number")] | WidthPoints, _FORM]
-StripWidth = Annotated[Annotated[float, Field(strict=True, ge=0, le=2), Tag("number")] | WidthPoints, _FORM]
+Width = Annotated[Annotated[float, Field(strict=True, ge=0, le=50), Tag("number")] | WidthPoints, _FORM, _METRES]
+LaneWidth = Annotated[Annotated[float, Field(strict=True, ge=2, le=6), Tag("number")] | WidthPoints, _FORM, _METRES]
+ShoulderWidth = Annotated[Annotated[float, Field(strict=True, ge=0, le=6), Tag("number")] | WidthPoints, _FORM, _METRES]
+StripWidth = Annotated[Annotated[float, Field(strict=True, ge=0, le=2), Tag("number")] | WidthPoints, _FORM, _METRES]
 
 
 def width_at(width: AnyWidth, station: ArrayLike) -> NDArray[np.float64]:

@@ -290,6 +290,11 @@ class RoadParameters(Model):
         """Return the objects of one class by id, in the order of the file."""
         return {name: item for name, item in self.objects.items() if isinstance(item, kind)}
 
+    def carriageway_of(self, item: LineMarking | Arrow | Hatching | Turnout | Vehicle) -> Carriageway:
+        """Return the carriageway that a marking, turnout or vehicle is on; a hatching's is its turnout's."""
+        carriageway: Any = self.objects[item.turnout if isinstance(item, Hatching) else item.carriageway]
+        return self.carriageway_of(carriageway) if isinstance(item, Hatching) else carriageway
+
     @property
     def alignment(self) -> AlignmentObject:
         """Return the alignment object."""

@@ -113,9 +113,9 @@ class Profile:
         self._curvatures = interleaved(0.0, curvature, np.zeros_like(curvature))
 
     def _evaluate(self, station: ArrayLike) -> tuple[FloatArray, FloatArray, FloatArray]:
-        wanted = finite_array("station", station)
-        piece = np.searchsorted(self._borders, wanted, side="right")
-        u, grade, curvature = wanted - self._bases[piece], self._grades[piece], self._curvatures[piece]
+        stations = finite_array("station", station)
+        piece = np.searchsorted(self._borders, stations, side="right")
+        u, grade, curvature = stations - self._bases[piece], self._grades[piece], self._curvatures[piece]
         elevation = self._elevations[piece] + u * (grade + 0.5 * curvature * u)
         return elevation[()], (grade + curvature * u)[()], curvature[()]
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import ClassVar, Literal
 
 from pydantic import Field, model_validator
 
@@ -13,9 +13,7 @@ from .objects import LaneWidth, PointObject, RoadObject, ShoulderWidth, StripWid
 class Lane(Model):
     """One lane. A width of 0 along a stretch is a lane that isn't there: dropped, or not gained yet."""
 
-    width: LaneWidth = Field(
-        description="Width between the lane's boundaries, or points of it.", json_schema_extra={"unit": "m"}
-    )
+    width: LaneWidth = Field(description="Width between the lane's boundaries, or points of it.")
     kind: Literal["through", "climbing"] = Field("through", description="Use of the lane.")
 
 
@@ -65,22 +63,15 @@ class Pavement(Model):
 class Carriageway(RoadObject):
     """One direction's paved surface with its verge. Every width is a number, or points of it along the road."""
 
+    points_class: ClassVar = "road"
     type: Literal["Carriageway"] = "Carriageway"
     side: Literal["left", "right"] = Field(description="Side of the centreline.")
-    inner_offset: Width = Field(
-        description="Distance of the inner paved edge from the centreline.", json_schema_extra={"unit": "m"}
-    )
-    hard_shoulder_width: ShoulderWidth = Field(description="0 where there is none.", json_schema_extra={"unit": "m"})
-    outer_edge_strip_width: StripWidth = Field(
-        description="Outside the outermost lane.", json_schema_extra={"unit": "m"}
-    )
+    inner_offset: Width = Field(description="Distance of the inner paved edge from the centreline.")
+    hard_shoulder_width: ShoulderWidth = Field(description="0 where there is none.")
+    outer_edge_strip_width: StripWidth = Field(description="Outside the outermost lane.")
     lanes: tuple[Lane, ...] = Field(min_length=1, max_length=8, description="Lanes from outside to inside.")
-    inner_edge_strip_width: StripWidth = Field(
-        description="Inside the innermost lane.", json_schema_extra={"unit": "m"}
-    )
-    verge_width: ShoulderWidth = Field(
-        description="Unpaved strip outside the pavement.", json_schema_extra={"unit": "m"}
-    )
+    inner_edge_strip_width: StripWidth = Field(description="Inside the innermost lane.")
+    verge_width: ShoulderWidth = Field(description="Unpaved strip outside the pavement.")
     verge_slope_percent: float = quantity(
         8.0, ge=0, le=15, unit="%", description="Fall of the verge away from the pavement."
     )
@@ -104,6 +95,7 @@ class Carriageway(RoadObject):
 class Median(RoadObject):
     """The strip between the carriageways' inner edges, straight from one to the other."""
 
+    points_class: ClassVar = "roadside"
     type: Literal["Median"] = "Median"
 
 
@@ -139,6 +131,7 @@ class Turnout(RoadObject):
         )
         for kind in ("emergency_bay", "exit", "entry")
     )
+    points_class: ClassVar = "road"
     type: Literal["Turnout"] = "Turnout"
     carriageway: str = Field(description="Id of the carriageway that it widens.")
     kind: Literal["emergency_bay", "exit", "entry"] = Field(description="What it is for.")
@@ -166,8 +159,8 @@ class Turnout(RoadObject):
     @property
     def length(self) -> float:
         """Return its whole length along the centreline, m."""
-        own = self.taper_in_length + self.lane_length + self.taper_out_length
-        return own + (self.ramp.length if self.ramp else 0.0)
+        along = self.taper_in_length + self.lane_length + self.taper_out_length
+        return along + (self.ramp.length if self.ramp else 0.0)
 
     @property
     def end_station(self) -> float:
@@ -208,6 +201,7 @@ class LineMarking(Marking, RoadObject):
             otherwise={"turnout": {"type": "null"}},
         ),
     )
+    points_class: ClassVar = "road_marking"
     type: Literal["LineMarking"] = "LineMarking"
     carriageway: str = Field(description="Id of the carriageway that it lies on.")
     kind: Literal["outer_edge", "lane", "inner_edge", "block", "turnout_edge", "gore_edge", "free"] = Field(
@@ -217,11 +211,7 @@ class LineMarking(Marking, RoadObject):
         0, ge=0, le=8, unit="1", description="Lane boundary, counted from the outer edge of the outermost lane."
     )
     turnout: str | None = Field(None, description="Id of the turnout, for turnout_edge and gore_edge.")
-    offset: Width = Field(
-        0.0,
-        description="Distance of the line's axis from the centreline, for free lines only.",
-        json_schema_extra={"unit": "m"},
-    )
+    offset: Width = Field(0.0, description="Distance of the line's axis from the centreline, for free lines only.")
     width: float = quantity(ge=0.05, le=1.0, unit="m", description="Width of the line.")
     dash_length: float = quantity(ge=0, le=100, unit="m", description="Length of a dash; 0 for a solid line.")
     gap_length: float = quantity(ge=0, le=100, unit="m", description="Length of a gap; 0 for a solid line.")
@@ -242,6 +232,7 @@ class LineMarking(Marking, RoadObject):
 class Hatching(Marking, RoadObject):
     """The hatched area of a gore (Sperrflaeche): stripes across the pavement between main road and ramp."""
 
+    points_class: ClassVar = "road_marking"
     type: Literal["Hatching"] = "Hatching"
     turnout: str = Field(description="Id of the turnout whose gore it fills.")
     stripe_width: float = quantity(1.0, ge=0.2, le=3, unit="m", description="Width of a stripe along the road.")
@@ -252,6 +243,7 @@ class Hatching(Marking, RoadObject):
 class Arrow(Marking, PointObject):
     """An arrow on a lane. Its rotation is 0 where it points with the stations."""
 
+    points_class: ClassVar = "road_marking"
     type: Literal["Arrow"] = "Arrow"
     carriageway: str = Field(description="Id of the carriageway that it lies on.")
     kind: Literal["straight", "left", "right", "straight_left", "straight_right", "merge_left", "merge_right"] = Field(

@@ -28,7 +28,7 @@ class CarriagewaySection:
     def __init__(self, carriageway: Carriageway, turnouts: Iterable[Turnout] = ()) -> None:
         self.carriageway = carriageway
         self.turnouts = tuple(TurnoutShape(turnout, carriageway) for turnout in turnouts)
-        own = [
+        widths = [
             ("inner_edge_strip", carriageway.inner_edge_strip_width),
             *(("lane", lane.width) for lane in reversed(carriageway.lanes)),
             ("outer_edge_strip", carriageway.outer_edge_strip_width),
@@ -36,7 +36,7 @@ class CarriagewaySection:
             *((kind, 1.0 if self.turnouts else 0.0) for kind in TURNOUT_STRIPS),
             ("verge", carriageway.verge_width),
         ]
-        self._widths = [(kind, width) for kind, width in own if nominal_width(width) > 0.0 or kind == "verge"]
+        self._widths = [(kind, width) for kind, width in widths if nominal_width(width) > 0.0 or kind == "verge"]
         self.kinds = tuple(kind for kind, _ in self._widths)
         self._varies = bool(self.turnouts or self.kinks())
         self._constant = None if self._varies else self._distances(np.zeros(1))
@@ -60,8 +60,8 @@ class CarriagewaySection:
         """Return the (N,) distances of the outer edge of the main road's pavement, as if it had no turnouts, m."""
         station = np.atleast_1d(np.asarray(station, dtype=np.float64))
         inner = width_at(self.carriageway.inner_offset, station)
-        own = [width for kind, width in self._widths if kind not in TURNOUT_STRIPS and kind != "verge"]
-        return inner + sum(width_at(width, station) for width in own)
+        widths = [width for kind, width in self._widths if kind not in TURNOUT_STRIPS and kind != "verge"]
+        return inner + sum(width_at(width, station) for width in widths)
 
     def pivot(self, station: ArrayLike) -> Float:
         """Return the (N,) distances of the line about which the crossfall turns, m."""
@@ -105,8 +105,8 @@ class CarriagewaySection:
 
     def kinks(self) -> list[float]:
         """Return the stations at which a width's change changes."""
-        own = [width_kinks(width) for width in (self.carriageway.inner_offset, *(w for _, w in self._widths))]
-        return [s for stations in (*own, *(shape.kinks() for shape in self.turnouts)) for s in stations]
+        kinks = [width_kinks(width) for width in (self.carriageway.inner_offset, *(w for _, w in self._widths))]
+        return [s for stations in (*kinks, *(shape.kinks() for shape in self.turnouts)) for s in stations]
 
     def steps(self) -> list[tuple[float, float]]:
         """Return lowest and highest station of the centimetres along which the pavement changes at once."""
@@ -123,10 +123,10 @@ class CarriagewaySection:
             if kind in TURNOUT_STRIPS:
                 columns.append(sum((shape.strips[kind] for shape in shapes), np.zeros(station.shape)))
                 continue
-            own = width_at(width, station)
+            column = width_at(width, station)
             if kind == "hard_shoulder":
-                own = np.minimum.reduce([own, *(shape.hard_shoulder for shape in shapes)])
+                column = np.minimum.reduce([column, *(shape.hard_shoulder for shape in shapes)])
             elif kind == "verge":
-                own = sum((shape.verge_extra for shape in shapes), own)
-            columns.append(own)
+                column = sum((shape.verge_extra for shape in shapes), column)
+            columns.append(column)
         return np.cumsum(np.column_stack(columns), axis=1)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import ClassVar, Literal
 
 from pydantic import Field, model_validator
 
@@ -20,6 +20,7 @@ SPECIES = {"tree": TREES, "shrub": SHRUBS, "grass": GRASSES}
 class Terrain(RoadObject):
     """The ground beside the road, which the batter meets: generated undulation, or a digital elevation model."""
 
+    points_class: ClassVar = "ground"
     type: Literal["Terrain"] = "Terrain"
     half_width: float = quantity(ge=5, le=1000, unit="m", description="Reach to either side of the centreline.")
     embankment_height: float = quantity(
@@ -43,6 +44,7 @@ class Vegetation(RoadObject):
 
     conditions = tuple(when({"kind": {"const": k}}, {"species": {"enum": list(s)}}) for k, s in SPECIES.items())
 
+    points_class: ClassVar = "vegetation"
     type: Literal["Vegetation"] = "Vegetation"
     kind: Literal["grass", "shrub", "tree"] = Field(description="What grows.")
     species: Literal[
@@ -77,6 +79,7 @@ class Vegetation(RoadObject):
 class Vehicle(RoadObject):
     """A vehicle on the centre of a lane. It drives with its carriageway's traffic."""
 
+    points_class: ClassVar = "vehicle"
     type: Literal["Vehicle"] = "Vehicle"
     model: Literal["car", "estate", "van", "truck", "semitrailer", "bus", "motorcycle"] = Field(
         description="Type of vehicle."

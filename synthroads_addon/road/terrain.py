@@ -10,11 +10,9 @@ from numpy.typing import NDArray
 from ..base.files import stamp
 from ..base.random_streams import stream
 from ..base.schema import round_value
-from .alignment import Alignment, Element
 from .elevation_model import Corridor, ElevationModel, read_elevation_model
-from .geometry import RoadGeometry
+from .geometry import RoadGeometry, alignment_of, profile_of
 from .parameters import AlignmentObject, Terrain
-from .profile import IntersectionPoint, Profile
 
 Float = NDArray[np.float64]
 
@@ -35,9 +33,7 @@ def ground_elevation(geometry: RoadGeometry, terrain: Terrain, station: Float, o
     Raises:
         InputError: the elevation model is missing, unreadable or unfit for this road.
     """
-    position, heading, _ = geometry.alignment.frame(station)
-    left = np.stack([-np.sin(heading), np.cos(heading)], axis=-1)
-    plan = position + offset[:, None] * left
+    plan = geometry.alignment.place(station, offset)
     if terrain.elevation_model is None:
         return geometry.profile.elevation(station) - terrain.embankment_height + undulation(terrain, plan)
     parameters = geometry.parameters
@@ -81,15 +77,15 @@ def road_elevation_model(
     Raises:
         InputError: as `read_elevation_model`.
     """
-    found = stamp(path, "an elevation model is needed here")
-    return _read_model(path, found, epsg, axis, origin, half_width + GROUND_MARGIN)
+    file_stamp = stamp(path, "an elevation model is needed here")
+    return _read_model(path, file_stamp, epsg, axis, origin, half_width + GROUND_MARGIN)
 
 
 @lru_cache(maxsize=2)
 def _read_model(
     path: str, _stamp: tuple[int, int], epsg: int, axis: AlignmentObject, origin: tuple[float, float], reach: float
 ) -> ElevationModel:
-    return read_elevation_model(path, epsg, Corridor(_alignment(axis), *origin, reach))
+    return read_elevation_model(path, epsg, Corridor(alignment_of(axis), *origin, reach))
 
 
 def fit_to_ground(
@@ -103,15 +99,9 @@ def fit_to_ground(
         model: the ground, all along the centreline.
         embankment_height: mean height (m) of the centreline above the ground, which the third coordinate gives it.
     """
-    alignment, (east, north) = _alignment(axis), origin
+    alignment, (east, north) = alignment_of(axis), origin
     count = int(np.ceil(alignment.length / _FIT_SPACING))
     station = (np.arange(count) + 0.5) * (alignment.length / count)
     plan = alignment.position(station)
-    profile = Profile([IntersectionPoint(p.station, p.elevation, p.radius) for p in axis.vertical])
-    above = profile.elevation(station) - model.elevation(plan[:, 0] + east, plan[:, 1] + north)
+    above = profile_of(axis).elevation(station) - model.elevation(plan[:, 0] + east, plan[:, 1] + north)
     return east, north, round_value(embankment_height - float(np.mean(above)))
-
-
-def _alignment(axis: AlignmentObject) -> Alignment:
-    elements = [Element(e.length, e.curvature_start, e.curvature_end) for e in axis.horizontal]
-    return Alignment(elements, axis.start_x, axis.start_y, np.deg2rad(axis.start_heading_deg))

@@ -66,11 +66,12 @@ class TurnoutShape:
         self.carriageway = carriageway
         self._forward = (carriageway.traffic > 0) != (turnout.kind == "entry")
         self._taper = turnout.taper_out_length if turnout.kind == "entry" else turnout.taper_in_length
+        self._tip = self._taper + turnout.lane_length
         self.nose = np.inf
         if turnout.ramp:
-            full = float(width_at(carriageway.hard_shoulder_width, self.station(self._taper + turnout.lane_length)))
-            apart = 6.0 * turnout.ramp.clothoid_parameter**2 * (full + NOSE_WIDTH)
-            self.nose = max(min(apart ** (1.0 / 3.0), turnout.ramp.length - NOSE_BEFORE_END), STEP)
+            full = float(width_at(carriageway.hard_shoulder_width, self.station(self._tip)))
+            cubed = 6.0 * turnout.ramp.clothoid_parameter**2 * (full + NOSE_WIDTH)
+            self.nose = max(min(cubed ** (1.0 / 3.0), turnout.ramp.length - NOSE_BEFORE_END), STEP)
 
     def station(self, w: float) -> float:
         """Return the station of a w (both m)."""
@@ -78,7 +79,7 @@ class TurnoutShape:
 
     def kinks(self) -> list[float]:
         """Return the stations at which a width bends or steps, in no order."""
-        turnout, taper, tip = self.turnout, self._taper, self._taper + self.turnout.lane_length
+        turnout, taper, tip = self.turnout, self._taper, self._tip
         if turnout.ramp is None:
             marks = [0.0, taper, tip, turnout.length]
         else:
@@ -88,15 +89,14 @@ class TurnoutShape:
 
     def steps(self) -> list[tuple[float, float]]:
         """Return lowest and highest station of each `STEP` along which the pavement changes at once."""
-        found = [sorted(map(self.station, step)) for step in self._steps()]
-        return [(low, high) for low, high in found]
+        steps = [sorted(map(self.station, step)) for step in self._steps()]
+        return [(low, high) for low, high in steps]
 
     def _steps(self) -> list[tuple[float, float]]:
         """Return the w of each step's two ends."""
         if self.turnout.ramp is None:
             return []
-        tip = self._taper + self.turnout.lane_length
-        return [(tip + x, tip + x + STEP) for x in (self.nose, self.turnout.ramp.length)]
+        return [(self._tip + x, self._tip + x + STEP) for x in (self.nose, self.turnout.ramp.length)]
 
     def range(self) -> tuple[float, float]:
         """Return the lowest and the highest station at which it changes anything."""
@@ -105,11 +105,11 @@ class TurnoutShape:
 
     def gore_tip(self) -> float:
         """Return the station of the gore's tip; only exits and entries have one."""
-        return self.station(self._taper + self.turnout.lane_length)
+        return self.station(self._tip)
 
     def nose_station(self) -> float:
         """Return the station of the nose; only exits and entries have one."""
-        return self.station(self._taper + self.turnout.lane_length + self.nose)
+        return self.station(self._tip + self.nose)
 
     def bend(self, station: Float) -> Float:
         """Return the second derivative (1/m) of the ramp's offset by station (N,)."""
@@ -159,5 +159,3 @@ class TurnoutShape:
 
     def _x(self, station: Float) -> Float:
         return self._w(station) - self._taper - self.turnout.lane_length
-
-

@@ -138,8 +138,8 @@ def next_corner(sizes: Int) -> Int:
 
 def without_collapsed(corners: Int, sizes: Int) -> tuple[Int, Int, NDArray[np.bool_]]:
     """Return corners, sizes and which (F,) polygons are left when neighbouring equal corners become one."""
-    apart = corners != corners[next_corner(sizes)]
+    distinct = corners != corners[next_corner(sizes)]
     polygon = np.repeat(np.arange(len(sizes)), sizes)
-    left = np.bincount(polygon[apart], minlength=len(sizes))
+    left = np.bincount(polygon[distinct], minlength=len(sizes))
     kept = left >= 3
-    return corners[apart & kept[polygon]], left[kept], kept
+    return corners[distinct & kept[polygon]], left[kept], kept

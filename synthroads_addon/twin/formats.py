@@ -112,9 +112,7 @@ def check_formats(formats: Iterable[str]) -> None:
             raise InputError("twin", name, f"needs the package {package}: pip install 'synthroads[twin]'")
 
 
-def write_twin(
-    parameters: RoadParameters, folder: Path, formats: Sequence[str], tolerance: float = TOLERANCE
-) -> None:
+def write_twin(parameters: RoadParameters, folder: Path, formats: Sequence[str], tolerance: float = TOLERANCE) -> None:
     """Write a road's geometric-semantic model into a folder, one file per format (`twin_file_names`).
 
     Args:

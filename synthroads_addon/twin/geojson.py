@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -10,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..base.schema import compact_json
 from ..road.centerline import centerline_geojson
 from ..road.geometry import RoadGeometry
 from ..road.objects import LineObject, PointObject, RoadObject
@@ -44,10 +44,10 @@ def write_geojson(parameters: RoadParameters, path: Path, tolerance: float) -> N
     for feature in features:
         feature["properties"] = {"feature": "centerline", "object_type": "Alignment"} | feature["properties"]
     with path.open("w", encoding="utf-8", newline="\n") as file:
-        file.write(_text(collection)[:-1] + ',"features":[')
+        file.write(compact_json(collection)[:-1] + ',"features":[')
         before = "\n"
         for feature in (*features, *_Writer(geometry, stations, tolerance).features()):
-            file.write(before + _text(feature))
+            file.write(before + compact_json(feature))
             before = ",\n"
         file.write("\n]}\n")
 
@@ -104,8 +104,7 @@ class _Writer:
             yield from self._lanes(about | of_lane, item, (boundaries[:, number + 1], boundaries[:, number]))
 
     def _turnout(self, name: str, item: Turnout) -> Iterator[Feature]:
-        carriageway = self.geometry.parameters.objects[item.carriageway]
-        assert isinstance(carriageway, Carriageway)
+        carriageway = self.geometry.parameters.carriageway_of(item)
         section = self.geometry.sections[carriageway.side]
         shape = next(shape for shape in section.turnouts if shape.turnout.instance == item.instance)
         kind = "bay" if item.ramp is None else "turnout_lane"
@@ -171,7 +170,3 @@ class _Writer:
 
 def _feature(properties: Feature, kind: str, coordinates: list[Any]) -> Feature:
     return {"type": "Feature", "properties": properties, "geometry": {"type": kind, "coordinates": coordinates}}
-
-
-def _text(data: Any) -> str:
-    return json.dumps(data, ensure_ascii=False, separators=(",", ":"), allow_nan=False)

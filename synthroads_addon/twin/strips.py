@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ..road.alignment import left_vectors
 from ..road.damage import damage_columns, damage_depth, damaged_strips, space_shares
 from ..road.geometry import RoadGeometry, SurfaceStrip
 from ..road.parameters import Pavement, Pothole, Rut
@@ -89,12 +90,11 @@ def strip_surfaces(geometry: RoadGeometry, stations: Float, tolerance: float) ->
     """
     offsets, heights = geometry.offsets(stations), geometry.boundary_elevations(stations)
     plan, heading, _ = geometry.alignment.frame(stations)
-    left = np.stack([-np.sin(heading), np.cos(heading)], axis=1)
     middle = (stations[:-1] + stations[1:]) / 2.0
     damages, lanes = _damages(geometry, tolerance), _lane_numbers(geometry)
     for number, strip in enumerate(geometry.strips):
         two = slice(number, number + 2)
-        edges = _Edges(geometry, stations, plan, left, offsets[:, two], heights[:, two])
+        edges = _Edges(geometry, stations, plan, left_vectors(heading), offsets[:, two], heights[:, two])
         width = offsets[:, number] - offsets[:, number + 1]
         owners = geometry.instances(strip, middle)
         for owner in np.unique(owners).tolist():
@@ -105,11 +105,11 @@ def strip_surfaces(geometry: RoadGeometry, stations: Float, tolerance: float) ->
 
 def _lane_numbers(geometry: RoadGeometry) -> dict[int, int]:
     """Return the lane of each strip that is one, counted from outside."""
-    found: dict[int, int] = {}
+    numbers: dict[int, int] = {}
     for side in geometry.sections:
-        own = [n for n, strip in enumerate(geometry.strips) if strip.side == side and strip.kind == "lane"]
-        found |= {number: lane for lane, number in enumerate(own if side == "left" else own[::-1])}
-    return found
+        lanes = [n for n, strip in enumerate(geometry.strips) if strip.side == side and strip.kind == "lane"]
+        numbers |= {number: lane for lane, number in enumerate(lanes if side == "left" else lanes[::-1])}
+    return numbers
 
 
 # --- damage -----------------------------------------------------------------------------------------------------
@@ -117,10 +117,10 @@ def _lane_numbers(geometry: RoadGeometry) -> dict[int, int]:
 
 def _damages(geometry: RoadGeometry, tolerance: float) -> dict[int, list[_Damage]]:
     """Return what damages each strip, by the strip's number."""
-    found: dict[int, list[_Damage]] = {}
+    damages: dict[int, list[_Damage]] = {}
     for side, section in geometry.sections.items():
-        own = [number for number, strip in enumerate(geometry.strips) if strip.side == side]
-        outwards = own[::-1] if side == "left" else own
+        strips = [number for number, strip in enumerate(geometry.strips) if strip.side == side]
+        outwards = strips[::-1] if side == "left" else strips
         pavement = section.carriageway.pavement
         items: list[Rut | Pothole] = [*pavement.ruts, *pavement.potholes]
         for item in items:
@@ -128,8 +128,8 @@ def _damages(geometry: RoadGeometry, tolerance: float) -> dict[int, list[_Damage
             for index in damaged_strips(alone):
                 shares = damage_columns(alone, index, tolerance)
                 shares = 1.0 - shares[::-1] if side == "left" else shares
-                found.setdefault(outwards[index], []).append(_Damage(*_range(item), shares))
-    return found
+                damages.setdefault(outwards[index], []).append(_Damage(*_range(item), shares))
+    return damages
 
 
 def _only(section: CarriagewaySection, item: Rut | Pothole) -> CarriagewaySection:
@@ -158,25 +158,25 @@ def _row_masks(stations: Float, damages: list[_Damage]) -> Mask:
 
 def _shares(damages: list[_Damage], mask: Mask) -> Float:
     """Return where across (C,), from 0 at the left to 1 at the right edge, a row needs points."""
-    wanted = [damage.shares for damage, there in zip(damages, mask.tolist(), strict=True) if there]
-    return space_shares(np.unique(np.concatenate([[0.0, 1.0], *wanted])))
+    inside = [damage.shares for damage, there in zip(damages, mask.tolist(), strict=True) if there]
+    return space_shares(np.unique(np.concatenate([[0.0, 1.0], *inside])))
 
 
 # --- polygons ---------------------------------------------------------------------------------------------------
 
 
-def _faces(edges: _Edges, damages: list[_Damage], wanted: Mask) -> Faces:
-    """Return a strip's polygons between those rows that are wanted (N - 1,), row by row.
+def _faces(edges: _Edges, damages: list[_Damage], chosen: Mask) -> Faces:
+    """Return a strip's polygons between those rows that are chosen (N - 1,), row by row.
 
     From edge to edge there is one polygon, but where the strip is damaged. Rows with different numbers of points are
     joined by triangles, so that all points are corners on both sides.
     """
-    if not wanted.any():
+    if not chosen.any():
         return join_polygons([])
     masks = _row_masks(edges.stations, damages) if damages else np.zeros((len(edges.stations), 1), dtype=bool)
     even = np.all(masks[:-1] == masks[1:], axis=1)
     parts = []
-    for first, last in _runs(even & wanted, wanted):
+    for first, last in _runs(even & chosen, chosen):
         shares, others = (_shares(damages, masks[row]) if damages else np.array([0.0, 1.0]) for row in (first, last))
         if even[first]:
             points = edges.points(first, last, shares)
@@ -187,9 +187,9 @@ def _faces(edges: _Edges, damages: list[_Damage], wanted: Mask) -> Faces:
     return compact(join_polygons(parts))
 
 
-def _runs(even: Mask, wanted: Mask) -> Iterator[tuple[int, int]]:
+def _runs(even: Mask, chosen: Mask) -> Iterator[tuple[int, int]]:
     """Yield (first, last) rows: as many as have the same damages, or two that differ."""
-    number = np.flatnonzero(wanted)
+    number = np.flatnonzero(chosen)
     breaks = np.ones(len(number), dtype=bool)
     breaks[1:] = (np.diff(number) > 1) | ~even[number[1:]] | ~even[number[:-1]]
     starts = number[breaks]

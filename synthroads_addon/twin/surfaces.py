@@ -5,10 +5,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from ..road.alignment import left_vectors
 from ..road.geometry import RoadGeometry
 from ..road.objects import LineObject
 from ..road.paint import arrow_outlines, hatching_outlines, pieces
-from ..road.parameters import Arrow, Hatching, LineMarking, Pothole, TemporaryBarrier
+from ..road.parameters import Arrow, Hatching, LineMarking, Pothole
 from ..road.surface import known_elevation
 from ..road.tessellation import sample_stations
 from .faces import FLAT, Faces, Int, compact, grid_corners, join_polygons, quads, twist
@@ -29,9 +30,12 @@ def on_ground(geometry: RoadGeometry, station: Float, offset: Float) -> Float:
 
     Where an elevation model doesn't reach, the road's edge goes on level.
     """
-    plan, heading, _ = geometry.alignment.frame(station)
-    left = np.stack([-np.sin(heading), np.cos(heading)], axis=1)
-    return np.column_stack([plan + offset[:, None] * left, known_elevation(geometry, station, offset)])
+    return np.column_stack([geometry.alignment.place(station, offset), known_elevation(geometry, station, offset)])
+
+
+def left_of(geometry: RoadGeometry, station: Float) -> Float:
+    """Return the level unit vectors (N, 3) to the left of the road at stations (N,)."""
+    return np.column_stack([left_vectors(geometry.alignment.heading(station)), np.zeros(len(station))])
 
 
 # --- markings ---------------------------------------------------------------------------------------------------
@@ -70,13 +74,13 @@ def dash_surfaces(geometry: RoadGeometry, line: LineMarking, stations: Float) ->
 def painted_surface(geometry: RoadGeometry, item: Hatching | Arrow, stations: Float) -> Faces:
     """Return the polygons of a hatched area or an arrow, cut at the stations at which the road is sampled."""
     outlines = hatching_outlines(geometry, item) if isinstance(item, Hatching) else arrow_outlines(item)
-    found = [piece for outline in outlines for piece in pieces(outline, _inside(stations, outline))]
-    if not found:
+    parts = [piece for outline in outlines for piece in pieces(outline, _inside(stations, outline))]
+    if not parts:
         return join_polygons([])
-    places = np.concatenate(found)
+    places = np.concatenate(parts)
     points = on_ground(geometry, places[:, 0], places[:, 1])
     points[:, 2] += item.film_thickness
-    sizes = np.array([len(piece) for piece in found], dtype=np.int64)
+    sizes = np.array([len(piece) for piece in parts], dtype=np.int64)
     return cut_into_triangles(Faces(points, np.arange(len(points)), sizes))
 
 
@@ -141,6 +145,8 @@ def pothole_surface(geometry: RoadGeometry, pothole: Pothole, tolerance: float) 
 
 # --- along the road ---------------------------------------------------------------------------------------------
 
+_SHORTEST_RAMP = 1e-3  # m
+
 
 def line_stations(geometry: RoadGeometry, item: LineObject, step: float = 1.0) -> Float:
     """Return the (N,) stations, closely spaced, of what runs along the road, clipped to the road; at least two."""
@@ -148,14 +154,24 @@ def line_stations(geometry: RoadGeometry, item: LineObject, step: float = 1.0) -
     return np.linspace(start, max(end, start + 1e-3), max(2, int(np.ceil((end - start) / step)) + 1))
 
 
+def ramp_length(item: LineObject, end: float) -> float:
+    """Return over which length (m) a barrier that ends at a station (m) is ramped at either end; 0 if it isn't."""
+    ramp = min(float(getattr(item, "terminal_length", 0.0)), (end - item.start_station) / 2.0)
+    return ramp if ramp > _SHORTEST_RAMP else 0.0
+
+
+def height_share(item: LineObject, end: float, station: Float) -> Float:
+    """Return the share (N,) of its height that a barrier that ends at a station (m) has at others (N,)."""
+    ramp = ramp_length(item, end)
+    if not ramp:
+        return np.ones(station.shape)
+    return np.clip(np.minimum(station - item.start_station, end - station) / ramp, 0.0, 1.0)
+
+
 def line_points(geometry: RoadGeometry, item: LineObject, tolerance: float) -> Float:
     """Return points (N, 3) of the surface below a line object's axis, so many that chords keep the tolerance (m)."""
     station = line_stations(geometry, item)
-    offset = np.full(len(station), item.offset)
-    if isinstance(item, TemporaryBarrier):
-        share = (station - item.start_station) / max(item.end_station - item.start_station, 1e-3)
-        offset = item.offset + (item.end_offset - item.offset) * share
-    points = on_ground(geometry, station, offset)
+    points = on_ground(geometry, station, item.offset_at(station))
     return points[needed_rows(points, tolerance)]
 
 

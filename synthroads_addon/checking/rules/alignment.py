@@ -200,7 +200,7 @@ def _grade(road: Road) -> Iterator[Finding]:
     profile, steepest = road.vertical, road.limits.grade_percent
     begin = np.concatenate(([-np.inf], profile.station + profile.tangents))
     end = np.concatenate((profile.station - profile.tangents, [np.inf]))
-    found = [
+    grades = [
         (max(float(begin[i]), 0.0), float(grade))
         for i, grade in enumerate(profile.grades)
         if begin[i] < road.length and end[i] > 0.0 and begin[i] <= end[i]
@@ -209,9 +209,9 @@ def _grade(road: Road) -> Iterator[Finding]:
     for at in (0.0, road.length):
         for i in np.flatnonzero(np.abs(profile.station - at) < profile.tangents).tolist():
             share = (at - end[i]) / (2.0 * profile.tangents[i])
-            found.append((at, float(profile.grades[i] + share * (profile.grades[i + 1] - profile.grades[i]))))
+            grades.append((at, float(profile.grades[i] + share * (profile.grades[i + 1] - profile.grades[i]))))
     reported = set()
-    for station, grade in found:
+    for station, grade in grades:
         if above(100.0 * abs(grade), steepest) and (station, grade) not in reported:
             reported.add((station, grade))
             text = f"The grade of {100.0 * grade:.2f} % is steeper than {steepest} % ({road.guideline})."

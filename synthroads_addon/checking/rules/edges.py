@@ -200,8 +200,8 @@ class Edges:
     def at(self, station: Float) -> Across:
         """Return the edges at N stations."""
         count = len(station)
-        own = self._own(station) if self._constant is None else [np.repeat(x, count, axis=0) for x in self._constant]
-        inner, lanes, base, full = own
+        parts = self._own(station) if self._constant is None else [np.repeat(x, count, axis=0) for x in self._constant]
+        inner, lanes, base, full = parts
         if not self.turnouts:
             main = base + full
             return Across(inner, lanes, main, main, main, main)

@@ -85,8 +85,8 @@ def _delineator_distance(road: Road) -> Iterator[Finding]:
 def _by_side(road: Road, items: dict[str, KilometreBoard] | dict[str, Cabinet]) -> Iterator[list[tuple[str, float]]]:
     """Yield the ids and stations of objects on either side of the centreline, in order."""
     for sign in (1.0, -1.0):
-        own = [(name, item.station) for name, item in items.items() if sign * item.offset > 0.0]
-        yield sorted(own, key=lambda pair: pair[1])
+        places = [(name, item.station) for name, item in items.items() if sign * item.offset > 0.0]
+        yield sorted(places, key=lambda pair: pair[1])
 
 
 def _apart(road: Road, items: dict[str, KilometreBoard] | dict[str, Cabinet], limit: float) -> Iterator[Finding]:
@@ -112,9 +112,9 @@ def _kilometre_text(road: Road) -> Iterator[Finding]:
     if not boards:
         return
     names, station = list(boards), np.array([board.station for board in boards.values()])
-    told = np.array([_metres(board.text) for board in boards.values()])
-    known = np.isfinite(told)
-    begins = [told - station, told + station] if known.any() else [told]
+    kilometre = np.array([_metres(board.text) for board in boards.values()])
+    known = np.isfinite(kilometre)
+    begins = [kilometre - station, kilometre + station] if known.any() else [kilometre]
     off = min((_off(begin, known) for begin in begins), key=lambda far: int(np.sum(far > KILOMETRE_ROOM)))
     for i in np.flatnonzero(~(off <= KILOMETRE_ROOM)).tolist():
         board = boards[names[i]]
@@ -166,12 +166,12 @@ def _object_on_pavement(road: Road) -> Iterator[Finding]:
         body = road.bodies.items[i]
         if body.part in ("foot", "barrier", "wall") and body.name not in allowed:
             worst[body.name] = min(worst.get(body.name, (0.0, 0.0)), (float(clearance[i]), float(where[i])))
-    found = [(name, station, distance) for name, (distance, station) in worst.items()]
+    places = [(name, station, distance) for name, (distance, station) in worst.items()]
     for name, plants in road.of(Vegetation).items():
         verge = min(edges.verge for edges in road.sides.values())
         if plants.density > 0.0 and verge + plants.band_start < -TOLERANCE:
-            found.append((name, 0.0, verge + plants.band_start))
-    for name, station, distance in found:
+            places.append((name, 0.0, verge + plants.band_start))
+    for name, station, distance in places:
         yield Finding(name, station, distance, 0.0, f"The object reaches {-distance:.2f} m over the pavement.")
 
 
@@ -181,13 +181,13 @@ def _object_overlap(road: Road) -> Iterator[Finding]:
     depth = np.full(len(first), np.inf)
     for low, high in ((bodies.start, bodies.end), (bodies.low, bodies.high), (bodies.bottom, bodies.top)):
         depth = np.minimum(depth, np.minimum(high[first], high[second]) - np.maximum(low[first], low[second]))
-    told = set()
+    reported = set()
     for i in np.flatnonzero(depth > OVERLAP_ROOM).tolist():
         a, b = bodies.items[first[i]], bodies.items[second[i]]
         pair = (a.name, b.name)
-        if a.name == b.name or pair in told:
+        if a.name == b.name or pair in reported:
             continue
-        told.add(pair)
+        reported.add(pair)
         text = f"The object and {a.name} reach {depth[i]:.2f} m into each other."
         yield Finding(b.name, max(a.start, b.start), float(depth[i]), 0.0, text)
 

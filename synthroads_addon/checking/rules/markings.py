@@ -41,9 +41,9 @@ def _own_lines(road: Road, edges: Edges) -> _Lines:
     return [(name, line) for name, line in road.of(LineMarking).items() if line.carriageway == edges.name]
 
 
-def _lines(own: _Lines, kinds: Iterable[str], boundary: int) -> _Lines:
+def _lines(lines: _Lines, kinds: Iterable[str], boundary: int) -> _Lines:
     """Return those of some kinds on a lane boundary out of a carriageway's lines."""
-    return [(name, line) for name, line in own if line.boundary == boundary and line.kind in kinds]
+    return [(name, line) for name, line in lines if line.boundary == boundary and line.kind in kinds]
 
 
 def _turnout_lines(road: Road, turnout: TurnoutEdges, kind: str) -> _Lines:
@@ -69,14 +69,14 @@ def _spans(marks: Float, where: Bool) -> _Spans:
 
 def _required_lines(road: Road, edges: Edges) -> Iterator[tuple[str, int, _Spans, _Lines]]:
     """Yield (kind, boundary, where it must run, its lines) of every line along a carriageway's lanes."""
-    own, whole, last = _own_lines(road, edges), [(0.0, road.length)], len(edges.lane_widths)
-    yield "outer_edge", 0, whole, _lines(own, ("outer_edge", "block"), 0)
+    lines, whole, last = _own_lines(road, edges), [(0.0, road.length)], len(edges.lane_widths)
+    yield "outer_edge", 0, whole, _lines(lines, ("outer_edge", "block"), 0)
     for boundary in range(1, last):
         spans = whole
         if not (edges.lane_widths[boundary - 1].constant and edges.lane_widths[boundary].constant):
             spans = _spans(edges.marks, _both_lanes(road, edges, boundary)[0])
-        yield "lane", boundary, spans, _lines(own, ("lane",), boundary)
-    yield "inner_edge", last, whole, _lines(own, ("inner_edge",), last)
+        yield "lane", boundary, spans, _lines(lines, ("lane",), boundary)
+    yield "inner_edge", last, whole, _lines(lines, ("inner_edge",), last)
 
 
 def _needed_at(road: Road, turnout: TurnoutEdges) -> Iterator[tuple[str, tuple[float, float], _Lines]]:
@@ -157,8 +157,8 @@ def _marking_width(road: Road) -> Iterator[Finding]:
 
 def _marking_pattern(road: Road) -> Iterator[Finding]:
     for name, line in _regulated_lines(road):
-        wanted = PATTERNS.get(line.kind, (0.0, 0.0))
-        for part, value, limit in zip(("dash", "gap"), (line.dash_length, line.gap_length), wanted, strict=True):
+        pattern = PATTERNS.get(line.kind, (0.0, 0.0))
+        for part, value, limit in zip(("dash", "gap"), (line.dash_length, line.gap_length), pattern, strict=True):
             if below(value, limit) or above(value, limit):
                 text = f"The line's {part} is {value:g} m instead of {limit:g} m ({_words(line.kind)}, RMS)."
                 yield Finding(name, line.start_station, value, limit, text)
@@ -168,8 +168,8 @@ def _marking_pattern(road: Road) -> Iterator[Finding]:
 def _marking_pavement(road: Road) -> Iterator[Finding]:
     lines = {name: line for name, line in road.of(LineMarking).items() if line.kind == "free"}
     for side, edges in road.sides.items():
-        own = {name: line for name, line in lines.items() if line.carriageway == side}
-        places = [(name, *_course(edges, line)) for name, line in own.items()]
+        side_lines = {name: line for name, line in lines.items() if line.carriageway == side}
+        places = [(name, *_course(edges, line)) for name, line in side_lines.items()]
         for name, arrow in road.of(Arrow).items():
             if arrow.carriageway == side:
                 places.append((name, np.array([arrow.station]), np.array([edges.sign * arrow.offset])))

@@ -9,14 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...road.parameters import RoadParameters
-from ...road.things.body_shapes import (
-    BEACON_REACH,
-    BEAM_REACH,
-    BOARD_POST_REACH,
-    DELINEATOR_REACH,
-    FACE_REACH,
-    POST_REACH,
-)
+from ...road.things import body_shapes as shapes
 from ...road.things.furniture import (
     Asset,
     Cabinet,
@@ -124,12 +117,12 @@ class Around:
         distance = np.full(len(station), np.inf)
         for name, edges in sides.items():
             across, span = edges.at(station), edges.distances(low, high)
-            own = across.clearance(*span)
-            self.clearance[name] = _least(own, index, count)
+            clearance = across.clearance(*span)
+            self.clearance[name] = _least(clearance, index, count)
             at = 0.5 * (span[0] + span[1])[:count]
             self.outer[name] = at > across.middle[:count]
             self.bare[name] = (at > across.gap_low[:count]) & (at < across.gap_high[:count])
-            distance = np.minimum(distance, own)
+            distance = np.minimum(distance, clearance)
         self.nearest = _least(distance, index, count)
         order = np.argsort(-station, kind="stable")
         order = order[distance[order] <= self.nearest[index[order]]]
@@ -207,10 +200,10 @@ class Signs:
         numbers = [(item.station, item.rotation_deg) for item in items]
         self.station, rotation = np.array(numbers, dtype=np.float64).reshape(-1, 2).T
         self.turned = np.abs((rotation + 180.0) % 360.0 - 180.0)
-        outer = {name: own[index] for name, own in around.outer.items()}
+        outer = {name: values[index] for name, values in around.outer.items()}
         anyone = np.any(list(outer.values()), axis=0)
-        self.of: dict[str, Bool] = {name: own | ~anyone for name, own in outer.items()}
-        self.bare = {name: own[index] for name, own in around.bare.items()}
+        self.of: dict[str, Bool] = {name: values | ~anyone for name, values in outer.items()}
+        self.bare = {name: values[index] for name, values in around.bare.items()}
 
     def away(self, edges: Edges) -> Float:
         """Return by how much (S,) the signs are turned away from a carriageway's traffic, degrees."""
@@ -219,7 +212,7 @@ class Signs:
     def seen(self, edges: Edges, code: str, room: float) -> NDArray[np.intp]:
         """Return the indices of the signs of a code that a carriageway's traffic sees, turned by `room` at most."""
         seen = self.of[edges.name] & (self.away(edges) <= room)
-        return np.array([i for i, own in enumerate(self.codes) if own == code and seen[i]], dtype=np.intp)
+        return np.array([i for i, sign_code in enumerate(self.codes) if sign_code == code and seen[i]], dtype=np.intp)
 
 
 def _upright(name: str, item: Any, half: float, top: float) -> Body:
@@ -228,36 +221,16 @@ def _upright(name: str, item: Any, half: float, top: float) -> Body:
     return Body(name, "foot", s - half, s + half, d - half, d + half, z, z + top)
 
 
-def _delineator(name: str, item: Delineator) -> Iterator[Body]:
-    yield _upright(name, item, DELINEATOR_REACH, item.height)
-
-
-def _pole(name: str, item: Pole) -> Iterator[Body]:
-    yield _upright(name, item, item.diameter / 2.0, item.height)
-
-
-def _light(name: str, item: TrafficLight) -> Iterator[Body]:
-    yield _upright(name, item, item.light_diameter / 2.0, item.height)
-
-
-def _cabinet(name: str, item: Cabinet) -> Iterator[Body]:
-    yield _upright(name, item, max(item.width, item.depth) / 2.0, item.height)
-
-
-def _asset(name: str, item: Asset) -> Iterator[Body]:
-    yield _upright(name, item, 0.0, 0.0)
-
-
 def _beacon(name: str, item: ConstructionBeacon) -> Iterator[Body]:
     body = _upright(name, item, item.width / 2.0, item.height)
-    yield body._replace(start=item.station - BEACON_REACH, end=item.station + BEACON_REACH)
+    yield body._replace(start=item.station - shapes.BEACON_REACH, end=item.station + shapes.BEACON_REACH)
 
 
 def _face(name: str, item: TrafficSign | KilometreBoard) -> Body:
     """Return the face of a sign or board, turned as it stands."""
     turn = np.radians(item.rotation_deg)
-    across = float(abs(np.cos(turn))) * item.width / 2.0 + FACE_REACH * float(abs(np.sin(turn)))
-    along = float(abs(np.sin(turn))) * item.width / 2.0 + FACE_REACH * float(abs(np.cos(turn)))
+    across = float(abs(np.cos(turn))) * item.width / 2.0 + shapes.FACE_REACH * float(abs(np.sin(turn)))
+    along = float(abs(np.sin(turn))) * item.width / 2.0 + shapes.FACE_REACH * float(abs(np.cos(turn)))
     s, d, z = item.station, item.offset, item.elevation + item.lower_edge
     return Body(name, "face", s - along, s + along, d - across, d + across, z, z + item.height)
 
@@ -275,7 +248,7 @@ def _sign(name: str, item: TrafficSign) -> Iterator[Body]:
 
 def _board(name: str, item: KilometreBoard) -> Iterator[Body]:
     face = _face(name, item)
-    yield _upright(name, item, BOARD_POST_REACH, item.lower_edge + item.height)
+    yield _upright(name, item, shapes.BOARD_POST_REACH, item.lower_edge + item.height)
     yield face
 
 
@@ -303,18 +276,9 @@ def _overpass(name: str, item: Overpass) -> Iterator[Body]:
 
 
 def _guardrail(name: str, item: Guardrail) -> Iterator[Body]:
-    left = BEAM_REACH if item.faces in ("left", "both") else POST_REACH
-    right = BEAM_REACH if item.faces in ("right", "both") else POST_REACH
+    left = shapes.BEAM_REACH if item.faces in ("left", "both") else shapes.POST_REACH
+    right = shapes.BEAM_REACH if item.faces in ("right", "both") else shapes.POST_REACH
     yield _along(name, item, right, left)
-
-
-def _concrete(name: str, item: ConcreteBarrier) -> Iterator[Body]:
-    yield _along(name, item, item.base_width / 2.0, item.base_width / 2.0)
-
-
-def _noise(name: str, item: NoiseBarrier) -> Iterator[Body]:
-    half = max(item.thickness, item.post_width) / 2.0
-    yield _along(name, item, half, half)
 
 
 def _along(name: str, item: Any, right: float, left: float) -> Body:
@@ -322,18 +286,26 @@ def _along(name: str, item: Any, right: float, left: float) -> Body:
     return Body(name, "barrier", start, end, item.offset - right, item.offset + left, 0.0, item.height)
 
 
+def _on_foot(half_width: Callable[[Any], float]) -> Callable[[str, Any], list[Body]]:
+    return lambda name, item: [_upright(name, item, half_width(item), item.height)]
+
+
+def _symmetric(half_width: Callable[[Any], float]) -> Callable[[str, Any], list[Body]]:
+    return lambda name, item: [_along(name, item, half_width(item), half_width(item))]
+
+
 _MAKERS: dict[type, Callable[[str, Any], Iterable[Body]]] = {
-    Asset: _asset,
-    Cabinet: _cabinet,
-    ConcreteBarrier: _concrete,
+    Asset: lambda name, item: [_upright(name, item, 0.0, 0.0)],
+    Cabinet: _on_foot(lambda item: max(item.width, item.depth) / 2.0),
+    ConcreteBarrier: _symmetric(lambda item: item.base_width / 2.0),
     ConstructionBeacon: _beacon,
-    Delineator: _delineator,
+    Delineator: _on_foot(lambda _: shapes.DELINEATOR_REACH),
     Gantry: _gantry,
     Guardrail: _guardrail,
     KilometreBoard: _board,
-    NoiseBarrier: _noise,
+    NoiseBarrier: _symmetric(lambda item: max(item.thickness, item.post_width) / 2.0),
     Overpass: _overpass,
-    Pole: _pole,
-    TrafficLight: _light,
+    Pole: _on_foot(lambda item: item.diameter / 2.0),
+    TrafficLight: _on_foot(lambda item: item.light_diameter / 2.0),
     TrafficSign: _sign,
 }

@@ -160,8 +160,8 @@ class Road:
         turnouts = self.of(Turnout)
         self.sides: dict[str, Edges] = {}
         for name, carriageway in self.of(Carriageway).items():
-            own = {key: turnout for key, turnout in turnouts.items() if turnout.carriageway == name}
-            self.sides[name] = Edges(name, carriageway, own, self.length)
+            widenings = {key: turnout for key, turnout in turnouts.items() if turnout.carriageway == name}
+            self.sides[name] = Edges(name, carriageway, widenings, self.length)
         self.marks = np.unique(np.concatenate([edges.marks for edges in self.sides.values()]))
 
     def of(self, kind: builtins.type[ObjectT]) -> dict[str, ObjectT]:

@@ -92,13 +92,13 @@ def _gore_sign(road: Road) -> Iterator[Finding]:
 
 
 def _clearance(road: Road) -> Iterator[Finding]:
-    found = [(name, item.station, item.clearance) for name, item in road.of(Gantry).items()]
-    found += [(name, item.station, item.clearance) for name, item in road.of(Overpass).items()]
+    spans = [(name, item.station, item.clearance) for name, item in road.of(Gantry).items()]
+    spans += [(name, item.station, item.clearance) for name, item in road.of(Overpass).items()]
     for i in np.flatnonzero(road.around.nearest < 0.0).tolist():
         body = road.bodies.items[i]
         if body.part == "face":
-            found.append((body.name, 0.5 * (body.start + body.end), body.bottom))
-    for name, station, value in found:
+            spans.append((body.name, 0.5 * (body.start + body.end), body.bottom))
+    for name, station, value in spans:
         if below(value, CLEARANCE):
             text = f"{value:.2f} m are clear below it; {CLEARANCE:.2f} m are needed over the pavement (RAA)."
             yield Finding(name, station, value, CLEARANCE, text)

@@ -156,12 +156,12 @@ def _between(road: Road, edges: Edges, row: Float) -> Iterator[tuple[str, float,
 
 def _vehicle_closed(road: Road) -> Iterator[Finding]:
     vehicles = road.of(Vehicle)
-    found: list[tuple[str, float, float]] = []
+    overlaps: list[tuple[str, float, float]] = []
     for edges, beacons in _zones(road):
         row = np.array([(place.station, place.distance) for place in beacons])
         for name, station, middle, line in _between(road, edges, row):
             free = middle - line if _outwards(edges, beacons[0]) else line - middle
-            found.append((name, station, VEHICLE_SIZES[vehicles[name].model][1] / 2.0 - free))
+            overlaps.append((name, station, VEHICLE_SIZES[vehicles[name].model][1] / 2.0 - free))
     for barrier in road.of(TemporaryBarrier).values():
         side = _side_of(road, barrier.offset)
         places = [(barrier.start_station, barrier.offset), (barrier.end_station, barrier.end_offset)]
@@ -170,8 +170,8 @@ def _vehicle_closed(road: Road) -> Iterator[Finding]:
         row = np.array([(station, side.sign * offset) for station, offset in places])
         for name, station, middle, line in _between(road, side, row):
             reach = VEHICLE_SIZES[vehicles[name].model][1] / 2.0 + barrier.base_width / 2.0
-            found.append((name, station, reach - abs(middle - line)))
-    for name, station, over in found:
+            overlaps.append((name, station, reach - abs(middle - line)))
+    for name, station, over in overlaps:
         if over > TOLERANCE:
             text = f"The vehicle reaches {over:.2f} m over the beacons or barriers that close its lane."
             yield Finding(name, station, over, 0.0, text)

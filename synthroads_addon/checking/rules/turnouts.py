@@ -27,41 +27,33 @@ def _place(road: Road, turnout: Turnout) -> float:
     return float(min(max(turnout.start_station, 0.0), road.length))
 
 
-def _turnouts_of_kind(road: Road, with_ramp: bool) -> Iterator[tuple[str, Turnout]]:
-    """Yield the exits and entries, or the emergency bays, with their ids."""
+def _too_small(road: Road, with_ramp: bool, field: str, least: float, text: str) -> Iterator[Finding]:
+    """Yield the exits and entries, or the emergency bays, of which a length or width falls short of the least (m)."""
     for name, turnout in road.of(Turnout).items():
-        if (turnout.ramp is not None) == with_ramp:
-            yield name, turnout
+        value = getattr(turnout, field)
+        if (turnout.ramp is not None) == with_ramp and below(value, least):
+            sentence = text.format(kind=_NAMES[turnout.kind], value=value, least=least)
+            yield Finding(name, _place(road, turnout), value, least, sentence)
 
 
 def _lane_length(road: Road) -> Iterator[Finding]:
-    least = TURNOUT_LANE_LENGTH[road.design_class]
-    for name, turnout in _turnouts_of_kind(road, True):
-        if below(turnout.lane_length, least):
-            text = f"The {turnout.kind}'s lane is {turnout.lane_length:.1f} m long; {least:.0f} m are needed (RAA)."
-            yield Finding(name, _place(road, turnout), turnout.lane_length, least, text)
+    text = "The {kind}'s lane is {value:.1f} m long; {least:.0f} m are needed (RAA)."
+    yield from _too_small(road, True, "lane_length", TURNOUT_LANE_LENGTH[road.design_class], text)
 
 
 def _lane_width(road: Road) -> Iterator[Finding]:
-    for name, turnout in _turnouts_of_kind(road, True):
-        if below(turnout.lane_width, TURNOUT_LANE_WIDTH):
-            width, least = turnout.lane_width, TURNOUT_LANE_WIDTH
-            text = f"The {turnout.kind}'s lane is {width:.2f} m wide; {least} m are needed (RAA)."
-            yield Finding(name, _place(road, turnout), width, least, text)
+    text = "The {kind}'s lane is {value:.2f} m wide; {least} m are needed (RAA)."
+    yield from _too_small(road, True, "lane_width", TURNOUT_LANE_WIDTH, text)
 
 
 def _bay_width(road: Road) -> Iterator[Finding]:
-    for name, bay in _turnouts_of_kind(road, False):
-        if below(bay.lane_width, EMERGENCY_BAY_WIDTH):
-            text = f"The emergency bay is {bay.lane_width:.2f} m wide; {EMERGENCY_BAY_WIDTH} m are needed (RAA)."
-            yield Finding(name, _place(road, bay), bay.lane_width, EMERGENCY_BAY_WIDTH, text)
+    text = "The {kind} is {value:.2f} m wide; {least} m are needed (RAA)."
+    yield from _too_small(road, False, "lane_width", EMERGENCY_BAY_WIDTH, text)
 
 
 def _bay_length(road: Road) -> Iterator[Finding]:
-    for name, bay in _turnouts_of_kind(road, False):
-        if below(bay.lane_length, EMERGENCY_BAY_LENGTH):
-            text = f"The emergency bay is {bay.lane_length:.1f} m long; {EMERGENCY_BAY_LENGTH:.0f} m are needed (RAA)."
-            yield Finding(name, _place(road, bay), bay.lane_length, EMERGENCY_BAY_LENGTH, text)
+    text = "The {kind} is {value:.1f} m long; {least:.0f} m are needed (RAA)."
+    yield from _too_small(road, False, "lane_length", EMERGENCY_BAY_LENGTH, text)
 
 
 def _taper(road: Road) -> Iterator[Finding]:

@@ -1,8 +1,9 @@
-"""The types of vehicles: their sizes, how often they occur, and in what colours."""
+"""The types of vehicles: their sizes, where they stand on the road, how often they occur, and in what colours."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 
 @dataclass(frozen=True)
@@ -33,6 +34,37 @@ VEHICLE_TYPES = {
 }
 """Model of a `Vehicle` -> its type. The widths of heavy ones, and the semitrailer's length and height, are the EU's
 limits (directive 96/53/EC)."""
+
+
+class Chassis(NamedTuple):
+    """Where a vehicle stands on the road, m.
+
+    Attributes:
+        front, rear: places along it, from its middle to the front, of the middles of its front axles (a tractor's are
+            all such) and of its hind ones.
+        half_track: half the distance between its left and right wheels.
+    """
+
+    front: float
+    rear: float
+    half_track: float
+
+    @property
+    def wheel_base(self) -> float:
+        """Return the distance between its front and hind axles, m."""
+        return self.front - self.rear
+
+
+CHASSIS = {
+    "car": Chassis(1.29, -1.34, 0.78),
+    "estate": Chassis(1.505, -1.285, 0.79),
+    "van": Chassis(1.955, -1.71, 0.86),
+    "truck": Chassis(3.40, -1.65, 1.0),
+    "semitrailer": Chassis(5.0, -3.95, 1.02),
+    "bus": Chassis(3.80, -2.975, 1.05),
+    "motorcycle": Chassis(0.79, -0.73, 0.3),
+}
+"""Model of vehicle -> where it stands."""
 
 HEAVY_SPEED = 25.0
 """Heavy vehicles drive at most so fast, m/s: their limiters act at 90 km/h."""

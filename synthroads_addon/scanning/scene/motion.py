@@ -13,8 +13,7 @@ from ...road.alignment import finite_array
 from ...road.geometry import RoadGeometry
 from ...road.lane_lines import LaneLine, lane_of
 from ...road.parameters import Vehicle
-from ...road.things.chassis import CHASSIS, wheel_base
-from ...road.things.vehicles import VEHICLE_TYPES
+from ...road.things.vehicles import CHASSIS, VEHICLE_TYPES
 from .mesh import SceneMesh
 from .passes import VehiclePasses, lane_passes
 
@@ -178,7 +177,7 @@ class LaneMotion:
         position, axis, bend = self._alignment.frame(station)
         offset = self.line.offset(station)
         middle = np.stack([position[:, 0] - offset * np.sin(axis), position[:, 1] + offset * np.cos(axis)])
-        turn = self.line.turn(station, wheel_base(self.vehicle.model) / 2.0)
+        turn = self.line.turn(station, CHASSIS[self.vehicle.model].wheel_base / 2.0)
         heading = axis + turn + (0.0 if self._traffic > 0 else np.pi)
         ahead = np.stack([np.cos(heading), np.sin(heading)])
         left = np.stack([-ahead[1], ahead[0]])

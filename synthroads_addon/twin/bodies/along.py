@@ -9,7 +9,7 @@ from ...road.objects import LineObject
 from ...road.parameters import ConcreteBarrier, Guardrail, NoiseBarrier, TemporaryBarrier
 from ...road.things import body_shapes as shapes
 from ..faces import Faces, Float, loft
-from ..surfaces import line_stations, needed_rows, on_ground
+from ..surfaces import height_share, left_of, line_stations, needed_rows, on_ground, ramp_length
 
 _PLAY = 0.005  # m, between a noise barrier's panel and its posts
 
@@ -34,35 +34,25 @@ def bodies_along(geometry: RoadGeometry, item: LineObject, tolerance: float) -> 
     return _elements(geometry, item)
 
 
-def _feet(geometry: RoadGeometry, station: Float, offset: Float) -> tuple[Float, Float]:
-    """Return the points (N, 3) on the surface, and the unit vectors (N, 3) to the left."""
-    heading = geometry.alignment.heading(station)
-    left = np.stack([-np.sin(heading), np.cos(heading), np.zeros(len(heading))], axis=1)
-    return on_ground(geometry, station, offset), left
-
-
-def _ramped_height_share(item: Guardrail | ConcreteBarrier, end: float, station: Float) -> Float:
-    """Return the share (N,) of its height that a barrier with ramped ends has at stations."""
-    ramp = min(item.terminal_length, (end - item.start_station) / 2.0)
-    if ramp <= 1e-3:
-        return np.ones(station.shape)
-    return np.clip(np.minimum(station - item.start_station, end - station) / ramp, 0.0, 1.0)
+def _feet(geometry: RoadGeometry, item: LineObject, station: Float) -> tuple[Float, Float]:
+    """Return the points (N, 3) on the surface below an object's axis, and the unit vectors (N, 3) to the left."""
+    return on_ground(geometry, station, item.offset_at(station)), left_of(geometry, station)
 
 
 def _swept_rows(geometry: RoadGeometry, item: Guardrail | ConcreteBarrier, tolerance: float) -> tuple[Float, float]:
     """Return the stations (N,) that a swept section needs, and the end station on the road."""
     end = min(item.end_station, geometry.length)
-    ramp = min(item.terminal_length, (end - item.start_station) / 2.0)
+    ramp = ramp_length(item, end)
     kinks = [item.start_station + ramp, end - ramp]
     station = np.unique(np.concatenate([line_stations(geometry, item), kinks]))
-    feet, _ = _feet(geometry, station, np.full(len(station), item.offset))
+    feet, _ = _feet(geometry, item, station)
     return station[needed_rows(feet, tolerance, np.isin(station, kinks))], end
 
 
 def _guardrail(geometry: RoadGeometry, rail: Guardrail, tolerance: float) -> list[Faces]:
     station, end = _swept_rows(geometry, rail, tolerance)
-    feet, left = _feet(geometry, station, np.full(len(station), rail.offset))
-    share = _ramped_height_share(rail, end, station)
+    feet, left = _feet(geometry, rail, station)
+    share = height_share(rail, end, station)
     top = rail.height * share + shapes.GUARDRAIL_TIP * (1.0 - share)
     profile = np.array(shapes.GUARDRAIL_BEAM)
     back = shapes.GUARDRAIL_POST[0] / 2.0 + shapes.GUARDRAIL_SPACER[rail.faces]
@@ -86,10 +76,10 @@ def _posts(geometry: RoadGeometry, rail: Guardrail, end: float) -> list[Faces]:
     count = int((rail.end_station - rail.start_station) / rail.post_spacing + 1e-4) + 1
     station = rail.start_station + np.arange(count) * rail.post_spacing
     station = station[station <= end + 1e-9]
-    share = _ramped_height_share(rail, end, station)
+    share = height_share(rail, end, station)
     tall = rail.height * share + shapes.GUARDRAIL_TIP * (1.0 - share)
     station, tall = station[tall >= shapes.GUARDRAIL_LOWEST_POST], tall[tall >= shapes.GUARDRAIL_LOWEST_POST]
-    feet, left = _feet(geometry, station, np.full(len(station), rail.offset))
+    feet, left = _feet(geometry, rail, station)
     sizes = np.tile(shapes.GUARDRAIL_POST, (len(feet), 1))
     return _boxes(feet, left, sizes, tall - shapes.GUARDRAIL_POST_TOP)
 
@@ -106,8 +96,8 @@ def _boxes(feet: Float, left: Float, size: Float, tall: Float) -> list[Faces]:
 
 def _concrete(geometry: RoadGeometry, barrier: ConcreteBarrier, tolerance: float) -> Faces:
     station, end = _swept_rows(geometry, barrier, tolerance)
-    feet, left = _feet(geometry, station, np.full(len(station), barrier.offset))
-    tall = np.maximum(barrier.height * _ramped_height_share(barrier, end, station), shapes.CONCRETE_TIP)
+    feet, left = _feet(geometry, barrier, station)
+    tall = np.maximum(barrier.height * height_share(barrier, end, station), shapes.CONCRETE_TIP)
     return loft(_symmetric_sections(feet, left, shapes.CONCRETE_FLANKS[barrier.profile], barrier.base_width, tall))
 
 
@@ -126,7 +116,7 @@ def _noise_barrier(geometry: RoadGeometry, wall: NoiseBarrier) -> list[Faces]:
     end = min(wall.end_station, geometry.length)
     count = max(1, int(np.ceil((end - wall.start_station) / wall.post_spacing - shapes.SHORTEST_ELEMENT)))
     station = np.append(wall.start_station + np.arange(count) * wall.post_spacing, end)
-    feet, left = _feet(geometry, station, np.full(count + 1, wall.offset))
+    feet, left = _feet(geometry, wall, station)
     posts = _boxes(feet, left, np.full((count + 1, 2), wall.post_width), np.full(count + 1, wall.height))
     low = np.minimum(feet[:-1, 2], feet[1:, 2])
     along = feet[1:] - feet[:-1]
@@ -149,10 +139,7 @@ def _elements(geometry: RoadGeometry, barrier: TemporaryBarrier) -> list[Faces]:
     gap = shapes.TEMPORARY_GAP / 2.0
     ends = np.stack([start + gap, np.minimum(stop - gap, end)], axis=1)
     ends = ends[ends[:, 1] - ends[:, 0] > 0.05]
-    share = (ends - barrier.start_station) / max(span, 1e-3)
-    offset = barrier.offset + (barrier.end_offset - barrier.offset) * share
-    feet, _ = _feet(geometry, ends.ravel(), offset.ravel())
-    feet = feet.reshape(-1, 2, 3)
+    feet = _feet(geometry, barrier, ends.ravel())[0].reshape(-1, 2, 3)
     along = feet[:, 1] - feet[:, 0]
     left = np.stack([-along[:, 1], along[:, 0], np.zeros(len(along))], axis=1)
     left /= np.linalg.norm(left, axis=1)[:, None]

@@ -1,4 +1,4 @@
-"""Bodies of what stands at one place, in true dimensions: posts, faces, boxes; without fittings."""
+"""Bodies of what stands at one place, in true dimensions (posts, faces, boxes, without fittings), and of overpasses."""
 
 from __future__ import annotations
 
@@ -168,9 +168,7 @@ def _pole(place: Place, item: Pole) -> list[Faces]:
 
 def _traffic_light(place: Place, item: TrafficLight) -> list[Faces]:
     wide, deep, tall = 1.3 * item.light_diameter, 0.7 * item.light_diameter, 1.25 * item.light_diameter * item.lights
-    head = place.box(
-        (wide, deep, tall), (0.0, -(shapes.TRAFFIC_LIGHT_POST + deep) / 2.0, item.height - tall / 2.0)
-    )
+    head = place.box((wide, deep, tall), (0.0, -(shapes.TRAFFIC_LIGHT_POST + deep) / 2.0, item.height - tall / 2.0))
     return [place.post(shapes.TRAFFIC_LIGHT_POST, -item.elevation, item.height), head]
 
 
@@ -187,52 +185,36 @@ def _beacon(place: Place, item: ConstructionBeacon) -> list[Faces]:
 
 def _gantry(place: Place, item: Gantry) -> list[Faces]:
     left, right = item.offset - item.left_offset, item.offset - item.right_offset
-    front, rear = _reach(item)
-    low = pavement_below(place, (left, right), (-front, rear)) + item.clearance - float(place.origin[2])
-    hangs = max([sign.height - item.beam_height for sign in item.signs] + [0.0]) * shapes.GANTRY_OVERHANG
-    bottom = low + hangs
+    pavement = pavement_below(place, (left, right), (-item.reach(1.0), item.reach(-1.0)))
+    low = pavement + item.clearance - float(place.origin[2])
+    bottom = item.beam_bottom(low)
     beam = place.box(
         (right - left, item.beam_depth, item.beam_height), ((left + right) / 2.0, 0.0, bottom + item.beam_height / 2.0)
     )
-    boards = [_board(place, item, sign, low, bottom) for sign in item.signs]
+    boards = [_board(place, item, sign, low) for sign in item.signs]
     return [beam, *_gantry_posts(place, item, (left, right), bottom), *boards]
 
 
-def _reach(item: Gantry) -> tuple[float, float]:
-    """Return how far a gantry with its signs reaches towards -y and +y."""
-    front = rear = item.beam_depth / 2.0
-    for sign in item.signs:
-        beyond = item.beam_depth / 2.0 + shapes.GANTRY_HANGER + _board_depth(sign)
-        front, rear = (max(front, beyond), rear) if sign.offset < 0.0 else (front, max(rear, beyond))
-    return front, rear
-
-
-def _board_depth(sign: GantrySign) -> float:
-    return shapes.GANTRY_DISPLAY if sign.kind == "display" else shapes.GANTRY_BOARD
-
-
 def _gantry_posts(place: Place, item: Gantry, ends: tuple[float, float], bottom: float) -> list[Faces]:
-    wanted = {"left": ends[0], "right": ends[1], "middle": item.offset}
+    posts = {"left": ends[0], "right": ends[1], "middle": item.offset}
     if item.kind == "cantilever":
-        wanted = {item.post_side: wanted[item.post_side]}
+        posts = {item.post_side: posts[item.post_side]}
     elif item.kind == "one_sided":
-        del wanted["middle"]
-    feet = place.ground(list(wanted.values()), 0.0) + item.elevation
+        del posts["middle"]
+    feet = place.ground(list(posts.values()), 0.0) + item.elevation
     bodies = []
-    for (side, x), foot in zip(wanted.items(), feet.tolist(), strict=True):
+    for (side, x), foot in zip(posts.items(), feet.tolist(), strict=True):
         top = bottom if side == "middle" else bottom + item.beam_height
         size = (item.post_width, item.beam_depth, top - foot)
         bodies.append(place.box(size, (x, 0.0, (top + foot) / 2.0)))
     return bodies
 
 
-def _board(place: Place, item: Gantry, sign: GantrySign, low: float, bottom: float) -> Faces:
+def _board(place: Place, item: Gantry, sign: GantrySign, low: float) -> Faces:
     """Return a board's body, in front of the beam as the traffic below it sees it."""
-    behind = low + sign.height < bottom + item.beam_height
-    z = low + sign.height / 2.0 if behind else bottom + item.beam_height / 2.0
-    deep = _board_depth(sign)
-    y = item.beam_depth / 2.0 + shapes.GANTRY_HANGER + deep / 2.0
-    return place.box((sign.width, deep, sign.height), (item.offset - sign.offset, -y if sign.offset < 0.0 else y, z))
+    z = low + sign.height / 2.0 if item.ends_in_beam(sign, low) else item.beam_bottom(low) + item.beam_height / 2.0
+    y = -sign.facing * (item.beam_depth / 2.0 + shapes.GANTRY_HANGER + sign.depth / 2.0)
+    return place.box((sign.width, sign.depth, sign.height), (item.offset - sign.offset, y, z))
 
 
 _MAKERS: dict[type[PointObject], Callable[[Place, Any], list[Faces]]] = {
@@ -245,3 +227,55 @@ _MAKERS: dict[type[PointObject], Callable[[Place, Any], list[Faces]]] = {
     ConstructionBeacon: _beacon,
     Gantry: _gantry,
 }
+
+
+_PARAPET = 0.25
+"""Thickness of the parapets' bodies, m."""
+
+
+def bridge_bodies(place: Place, bridge: Overpass) -> dict[str, Faces]:
+    """Return the closed bodies of an overpass by name.
+
+    The deck is level, its underside `clearance` above the pavement's highest point below it. A skewed bridge is
+    sheared: its faces stay parallel to the road, as its piers do.
+    """
+    shear = float(np.tan(np.deg2rad(bridge.rotation_deg)))
+    left, right = bridge.offset - bridge.left_abutment, bridge.offset - bridge.right_abutment
+    half = bridge.width / 2.0
+    low = pavement_below(place, (left, right), (-half, half), shear) + bridge.clearance - float(place.origin[2])
+    high = low + bridge.deck_thickness
+    bodies = {"deck": _deck(place, bridge, (left - shapes.BRIDGE_SEAT, right + shapes.BRIDGE_SEAT), low, shear)}
+    if bridge.parapet_height > 0.0:
+        for name, side in (("parapet-1", -1.0), ("parapet-2", 1.0)):
+            y = (half - _PARAPET, half) if side > 0.0 else (-half, _PARAPET - half)
+            ends = (left - shapes.BRIDGE_SEAT, right + shapes.BRIDGE_SEAT)
+            bodies[name] = _block(place, ends, y, (high, high + bridge.parapet_height), shear)
+    top = low - shapes.BRIDGE_BEARING
+    for number, offset in enumerate(bridge.pier_offsets, 1):
+        bodies[f"pier-{number}"] = _pier(place, bridge, bridge.offset - offset, top, shear)
+    for name, face, side in (("abutment-1", left, -1.0), ("abutment-2", right, 1.0)):
+        foot = float(place.ground(face, np.array([half, -half]) + face * shear).min()) - shapes.BRIDGE_BURIED
+        back = face + side * shapes.BRIDGE_ABUTMENT
+        bodies[name] = _block(place, (min(face, back), max(face, back)), (-half, half), (foot, top), shear)
+    return bodies
+
+
+def _pier(place: Place, bridge: Overpass, x: float, top: float, shear: float) -> Faces:
+    foot = float(place.ground(x, x * shear)[0]) - shapes.BRIDGE_BURIED
+    long = max(bridge.width * shapes.BRIDGE_PIER_LENGTH, bridge.pier_width * 1.02)
+    return place.box((bridge.pier_width, long, top - foot), (x, x * shear, (top + foot) / 2.0))
+
+
+def _deck(place: Place, bridge: Overpass, ends: tuple[float, float], low: float, shear: float) -> Faces:
+    half = np.array(shapes.BRIDGE_DECK) * (bridge.width / 2.0, bridge.deck_thickness)
+    outline = np.concatenate([half, half[::-1] * (-1.0, 1.0)])
+    sections = [
+        np.column_stack([np.full(len(outline), x), outline[:, 0] + x * shear, outline[:, 1] + low]) for x in ends
+    ]
+    return loft(place.local(np.stack(sections)))
+
+
+def _block(place: Place, x: tuple[float, float], y: tuple[float, float], z: tuple[float, float], shear: float) -> Faces:
+    """Return the body between two x, two y and two z, sheared along y."""
+    outline = [(u, v + u * shear) for u, v in ((x[0], y[0]), (x[1], y[0]), (x[1], y[1]), (x[0], y[1]))]
+    return place.prism(outline, *z)

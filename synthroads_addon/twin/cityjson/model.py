@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field, replace
 from itertools import chain
@@ -12,6 +11,7 @@ from typing import Any, Literal, TextIO
 import numpy as np
 from numpy.typing import NDArray
 
+from ...base.schema import compact_json
 from ..faces import Faces, Float, Int, without_collapsed
 
 SCALE = 1e-4
@@ -112,15 +112,15 @@ class CityModel:
             "transform": {"scale": [SCALE] * 3, "translate": list(self.translate)},
         }
         with path.open("w", encoding="utf-8", newline="\n") as file:
-            file.write(_text(head)[:-1] + ',\n"CityObjects":{')
+            file.write(compact_json(head)[:-1] + ',\n"CityObjects":{')
             before = "\n"
             for item, shapes in self._objects:
-                file.write(f"{before}{_text(item.id)}:")
+                file.write(f"{before}{compact_json(item.id)}:")
                 _write_object(file, item, shapes)
                 before = ",\n"
             file.write('},\n"vertices":[')
             for first in range(0, len(vertices), _LINE):
-                file.write("," * bool(first) + "\n" + _text(vertices[first : first + _LINE].tolist())[1:-1])
+                file.write("," * bool(first) + "\n" + compact_json(vertices[first : first + _LINE].tolist())[1:-1])
             file.write("]}\n")
 
     def _share(self) -> Int:
@@ -178,9 +178,9 @@ def _write_object(file: TextIO, item: CityObject, shapes: list[list[_Shell]]) ->
         if any(len(shell.sizes) for shell in shells)
     ]
     if not there:
-        file.write(_text(head))
+        file.write(compact_json(head))
         return
-    file.write(_text(head)[:-1] + ',"geometry":[')
+    file.write(compact_json(head)[:-1] + ',"geometry":[')
     for number, (shape, shells) in enumerate(there):
         file.write("," * bool(number))
         _write_geometry(file, shape, [shell for shell in shells if len(shell.sizes)])
@@ -188,23 +188,23 @@ def _write_object(file: TextIO, item: CityObject, shapes: list[list[_Shell]]) ->
 
 
 def _write_geometry(file: TextIO, shape: CityGeometry, shells: list[_Shell]) -> None:
-    file.write(_text({"type": shape.type, "lod": shape.lod})[:-1] + ',"boundaries":')
+    file.write(compact_json({"type": shape.type, "lod": shape.lod})[:-1] + ',"boundaries":')
     if shape.type == "MultiSolid":
         file.write("[")
         for number, shell in enumerate(shells):
-            file.write(("," * bool(number)) + "[" + _text(_rings(shell, 0, len(shell.sizes), True)) + "]")
+            file.write(("," * bool(number)) + "[" + compact_json(_rings(shell, 0, len(shell.sizes), True)) + "]")
         file.write("]")
     elif shape.type == "Solid":
-        file.write("[" + _text(_rings(shells[0], 0, len(shells[0].sizes), True)) + "]")
+        file.write("[" + compact_json(_rings(shells[0], 0, len(shells[0].sizes), True)) + "]")
     elif shape.type == "MultiPoint":
-        file.write(_text(shells[0].corners.tolist()))
+        file.write(compact_json(shells[0].corners.tolist()))
     else:
         _write_many(file, shells[0], shape.type == "MultiSurface")
     if shape.values is not None:
         values = shape.values[shells[0].kept]
         used, numbers = np.unique(values, return_inverse=True)
         surfaces = [shape.semantics[index] for index in used.tolist()]
-        file.write(',"semantics":' + _text({"surfaces": surfaces, "values": numbers.tolist()}))
+        file.write(',"semantics":' + compact_json({"surfaces": surfaces, "values": numbers.tolist()}))
     file.write("}")
 
 
@@ -212,7 +212,7 @@ def _write_many(file: TextIO, shell: _Shell, surfaces: bool) -> None:
     """Write many polygons (or lines) a few thousand at a time: as lists of Python's they take much memory."""
     file.write("[")
     for first in range(0, len(shell.sizes), _LINE):
-        text = _text(_rings(shell, first, first + _LINE, surfaces))[1:-1]
+        text = compact_json(_rings(shell, first, first + _LINE, surfaces))[1:-1]
         file.write("," * bool(first) + text)
     file.write("]")
 
@@ -224,10 +224,6 @@ def _rings(shell: _Shell, first: int, last: int, surfaces: bool) -> list[Any]:
     corners = shell.corners[start : ends[-1] if ends else start].tolist()
     rings = [corners[a - start : b - start] for a, b in zip([start, *ends[:-1]], ends, strict=True)]
     return [[ring] for ring in rings] if surfaces else rings
-
-
-def _text(data: Any) -> str:
-    return json.dumps(data, ensure_ascii=False, separators=(",", ":"), allow_nan=False)
 
 
 def lines(points: Iterable[Float]) -> Faces:

@@ -84,19 +84,19 @@ def _road(name: str, item: RoadObject, surfaces: list[Surface]) -> CityObject:
 
 def _surfaces(geometry: RoadGeometry, stations: Float, tolerance: float) -> dict[int, list[Surface]]:
     """Return the surfaces of every Road by its instance number: strips, then markings, then potholes."""
-    found: dict[int, list[Surface]] = {}
+    by_road: dict[int, list[Surface]] = {}
     for surface in strip_surfaces(geometry, stations, tolerance):
-        found.setdefault(surface.instance, []).append((_area(geometry, surface), surface.faces))
+        by_road.setdefault(surface.instance, []).append((_area(geometry, surface), surface.faces))
     for name, item in geometry.parameters.objects.items():
         if isinstance(item, LineMarking | Hatching | Arrow):
             owner = geometry.parameters.objects[item.turnout if isinstance(item, Hatching) else item.carriageway]
-            found.setdefault(owner.instance, []).extend(_marking(geometry, name, item, stations))
+            by_road.setdefault(owner.instance, []).extend(_marking(geometry, name, item, stations))
     for section in geometry.sections.values():
-        own = found.setdefault(section.carriageway.instance, [])
+        surfaces = by_road.setdefault(section.carriageway.instance, [])
         for pothole in section.carriageway.pavement.potholes:
             about = {"type": "TransportationHole", "function": "pothole"} | pothole.model_dump()
-            own.append((about, pothole_surface(geometry, pothole, tolerance)))
-    return {instance: [pair for pair in pairs if len(pair[1])] for instance, pairs in found.items()}
+            surfaces.append((about, pothole_surface(geometry, pothole, tolerance)))
+    return {instance: [pair for pair in pairs if len(pair[1])] for instance, pairs in by_road.items()}
 
 
 def _area(geometry: RoadGeometry, surface: StripSurface) -> dict[str, Any]:
@@ -135,9 +135,9 @@ def _marking(
     dashes, faces, owner = dash_surfaces(geometry, item, stations)
     starts = np.cumsum(faces.sizes) - faces.sizes
     for number, (start, end) in enumerate(dashes.tolist()):
-        own = np.flatnonzero(owner == number)
+        polygons = np.flatnonzero(owner == number)
         dash = {"start_station": round(start, 6), "end_station": round(end, 6)}
-        yield about | dash, _part(faces, starts, own)
+        yield about | dash, _part(faces, starts, polygons)
 
 
 def _part(faces: Faces, starts: Int, chosen: Int) -> Faces:

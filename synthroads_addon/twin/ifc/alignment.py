@@ -81,14 +81,14 @@ def plan_segments(alignment: Alignment) -> list[PlanSegment]:
     """Return the plan's elements; a clothoid so flat that readers of IFC fail on it is an arc or a line."""
     starts = alignment.element_starts[:-1]
     position, heading, _ = alignment.frame(starts)
-    found = []
+    segments = []
     for element, (x, y), angle in zip(alignment.elements, position.tolist(), heading.tolist(), strict=True):
         kind, mean = element.kind, element.mean_curvature
         first, last = (element.curvature_start, element.curvature_end) if kind == "clothoid" else (mean, mean)
         if kind == "line":
             first = last = 0.0
-        found.append(PlanSegment(_HORIZONTAL[kind], x, y, angle, element.length, first, last))
-    return found
+        segments.append(PlanSegment(_HORIZONTAL[kind], x, y, angle, element.length, first, last))
+    return segments
 
 
 def profile_segments(profile: Profile, length: float) -> list[ProfileSegment]:
@@ -124,8 +124,8 @@ def write_alignment(ifc: IfcFile, geometry: RoadGeometry) -> Axis:
     )
     ifc.gather("IfcRelAggregates", ifc.project, [alignment])
     ifc.gather("IfcRelNests", alignment, [plan.layout, gradient.layout])
-    own = {key: value for key, value in ifc.parameters_of(item).items() if key not in ("horizontal", "vertical")}
-    ifc.properties(alignment, "SynthRoads", own | {"length": ifc.value(geometry.length, "m")})
+    values = {key: value for key, value in ifc.parameters_of(item).items() if key not in ("horizontal", "vertical")}
+    ifc.properties(alignment, "SynthRoads", values | {"length": ifc.value(geometry.length, "m")})
     axis = Axis(alignment, plan_curve)
     _write_referents(ifc, geometry, axis)
     return axis
@@ -295,17 +295,15 @@ class _Referent:
 def _write_referents(ifc: IfcFile, geometry: RoadGeometry, axis: Axis) -> None:
     """Nest the beginning of the stationing, and the points of crossfall and of changing widths, by station."""
     zero = {"Station": ifc.add("IfcLengthMeasure", 0.0)}
-    found = [_Referent(0.0, "station-0", "STATION", "Pset_Stationing", zero)]
+    referents = [_Referent(0.0, "station-0", "STATION", "Pset_Stationing", zero)]
     for name, carriageway in geometry.parameters.of_type(Carriageway).items():
-        found += _superelevation(ifc, name, carriageway)
-        found += _widths(ifc, geometry, name, carriageway)
+        referents += _superelevation(ifc, name, carriageway)
+        referents += _widths(ifc, geometry, name, carriageway)
     # What lies before or behind the road isn't on the curve.
-    inside = [item for item in found if 0.0 <= item.station <= geometry.length]
+    inside = [item for item in referents if 0.0 <= item.station <= geometry.length]
     for item in sorted(inside, key=lambda item: item.station):
         place = linear_placement(ifc, geometry, axis, item.station)
-        referent = ifc.rooted(
-            "IfcReferent", item.name, Name=item.name, ObjectPlacement=place, PredefinedType=item.kind
-        )
+        referent = ifc.rooted("IfcReferent", item.name, Name=item.name, ObjectPlacement=place, PredefinedType=item.kind)
         ifc.properties(referent, item.properties, item.values)
         if item.kind != "STATION":
             ifc.properties(referent, "Pset_Stationing", {"Station": ifc.value(item.station, "m")})

@@ -11,23 +11,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ...road.objects import LineObject
 from ...road.parameters import ConcreteBarrier, Guardrail, NoiseBarrier, TemporaryBarrier
-from ...road.things.body_shapes import (
-    CONCRETE_FLANKS,
-    CONCRETE_TIP,
-    GUARDRAIL_BEAM,
-    GUARDRAIL_LOWEST_POST,
-    GUARDRAIL_POST,
-    GUARDRAIL_POST_TOP,
-    GUARDRAIL_SPACER,
-    GUARDRAIL_TIP,
-    LONGEST_PLASTIC,
-    SHORTEST_ELEMENT,
-    TEMPORARY_FLANKS,
-    TEMPORARY_GAP,
-)
+from ...road.things import body_shapes as shapes
+from ..surfaces import height_share, left_of, ramp_length
 from .entities import Entity, Float
-from .scene import IfcPlace, Scene, grid_triangles
+from .scene import Scene, grid_triangles
 
 _Mesh = tuple[Float, NDArray[np.intp]]
 
@@ -35,7 +24,7 @@ _WALL_BURIED = 0.4
 """Depth of a noise barrier's posts and plinth below the surface, m."""
 _CONCRETE_BURIED, _POST_BURIED = 0.1, 0.35
 """Depth of a concrete barrier and of a guardrail's posts below the surface, m."""
-_POST_REACH = GUARDRAIL_POST[0] / 2.0
+_POST_REACH = shapes.GUARDRAIL_POST[0] / 2.0
 _SHEET = 0.003
 """Thickness of a guardrail's beam, m."""
 _SPACER_HALF = (0.05, 0.11)
@@ -60,7 +49,7 @@ def write_barriers(scene: Scene) -> None:
 
 def _railing(scene: Scene, name: str, item: Any, meshes: list[_Mesh], material: str) -> None:
     """Add a vehicle restraint system."""
-    railing = _element(scene, "IfcRailing", name, item, meshes, PredefinedType="GUARDRAIL")
+    railing = _element(scene, "IfcRailing", name, item, meshes, "GUARDRAIL")
     scene.ifc.made_of(railing, material)
     common = {
         "Status": ["TEMPORARY" if isinstance(item, TemporaryBarrier) else "EXISTING"],
@@ -72,33 +61,22 @@ def _railing(scene: Scene, name: str, item: Any, meshes: list[_Mesh], material: 
 
 def _wall(scene: Scene, name: str, item: NoiseBarrier) -> None:
     """Add a noise barrier: IFC has a wall for it, but no type of wall."""
-    wall = _element(scene, "IfcWall", name, item, _noise_barrier(scene, item), PredefinedType="USERDEFINED")
+    wall = _element(scene, "IfcWall", name, item, _noise_barrier(scene, item), "USERDEFINED")
     scene.ifc.made_of(wall, _PANELS[item.panel])
     scene.ifc.properties(wall, "Pset_WallCommon", {"Status": ["EXISTING"], "IsExternal": scene.ifc.value(True)})
 
 
-def _element(scene: Scene, entity: str, name: str, item: Any, meshes: list[_Mesh], **named: Any) -> Entity:
+def _element(scene: Scene, entity: str, name: str, item: Any, meshes: list[_Mesh], kind: str) -> Entity:
     """Add an element that is placed at its beginning."""
     ifc, geometry = scene.ifc, scene.geometry
     start = min(max(item.start_station, 0.0), geometry.length)
     place = scene.place(start, item.offset)
-    made = ifc.rooted(
-        entity,
-        name,
-        Name=name,
-        ObjectType=item.type,
-        ObjectPlacement=place.placement,
-        Representation=ifc.shape([_solid(scene, place, mesh) for mesh in meshes], "Tessellation"),
-        **named,
-    )
+    solids = [ifc.mesh(place.inside(points), triangles, True) for points, triangles in meshes]
+    shape = ifc.shape(solids, "Tessellation")
+    made = ifc.product(entity, name, kind, item.type, place.placement, Representation=shape)
     scene.describe(made, item)
     scene.stand(made, scene.container(start, item.offset))
     return made
-
-
-def _solid(scene: Scene, place: IfcPlace, mesh: _Mesh) -> Entity | None:
-    points, triangles = mesh
-    return scene.ifc.mesh(place.inside(points), triangles, True)
 
 
 # --- bodies ---------------------------------------------------------------------------------------------------------
@@ -106,10 +84,12 @@ def _solid(scene: Scene, place: IfcPlace, mesh: _Mesh) -> Entity | None:
 
 def _guardrail(scene: Scene, item: Guardrail) -> list[_Mesh]:
     """Return beams, posts and spacers."""
-    station = _rows(scene, item, item.terminal_length)
-    offset = np.full(station.shape, item.offset)
-    spacer, sides = GUARDRAIL_SPACER[item.faces], {"left": [1.0], "right": [-1.0], "both": [1.0, -1.0]}[item.faces]
-    front = np.array(GUARDRAIL_BEAM)
+    station = _rows(scene, item)
+    spacer, sides = (
+        shapes.GUARDRAIL_SPACER[item.faces],
+        {"left": [1.0], "right": [-1.0], "both": [1.0, -1.0]}[item.faces],
+    )
+    front = np.array(shapes.GUARDRAIL_BEAM)
     rear = front - (_SHEET, 0.0)
     meshes = []
     for side in sides:
@@ -117,8 +97,8 @@ def _guardrail(scene: Scene, item: Guardrail) -> list[_Mesh]:
         up, down = (rear, front) if side > 0.0 else (front, rear)
         ring = np.concatenate([up[::-1], down])
         across = side * (ring[:, 0] + spacer + _POST_REACH)
-        height = _ramped_height(item, station, GUARDRAIL_TIP)[:, None] + ring[:, 1]
-        meshes.append(_swept(scene, station, offset, across, height))
+        height = _ramped_height(item, station, shapes.GUARDRAIL_TIP)[:, None] + ring[:, 1]
+        meshes.append(_swept(scene, item, station, across, height))
     return [*meshes, *_posts(scene, item, sides, spacer)]
 
 
@@ -127,12 +107,14 @@ def _posts(scene: Scene, item: Guardrail, sides: list[float], spacer: float) -> 
     low, high = ((station - item.start_station) / item.post_spacing for station in _span(scene, item))
     numbers = np.arange(np.ceil(low - 1e-4), np.floor(high + 1e-4) + 1.0)
     station = item.start_station + item.post_spacing * numbers
-    top = _ramped_height(item, station, GUARDRAIL_TIP)
-    station, top = station[top >= GUARDRAIL_LOWEST_POST], top[top >= GUARDRAIL_LOWEST_POST]
+    top = _ramped_height(item, station, shapes.GUARDRAIL_TIP)
+    station, top = station[top >= shapes.GUARDRAIL_LOWEST_POST], top[top >= shapes.GUARDRAIL_LOWEST_POST]
     if not len(station):
         return []
-    offset, half = np.full(station.shape, item.offset), (_POST_REACH, GUARDRAIL_POST[1] / 2.0)
-    meshes = [_boxes(scene, station, offset, half, (np.full(station.shape, -_POST_BURIED), top - GUARDRAIL_POST_TOP))]
+    offset, half = np.full(station.shape, item.offset), (_POST_REACH, shapes.GUARDRAIL_POST[1] / 2.0)
+    meshes = [
+        _boxes(scene, station, offset, half, (np.full(station.shape, -_POST_BURIED), top - shapes.GUARDRAIL_POST_TOP))
+    ]
     along, tall = _SPACER_HALF
     levels = (top - _BEAM_MIDDLE - tall, top - _BEAM_MIDDLE + tall)
     for side in sides:
@@ -142,35 +124,32 @@ def _posts(scene: Scene, item: Guardrail, sides: list[float], spacer: float) -> 
 
 
 def _concrete(scene: Scene, item: ConcreteBarrier) -> list[_Mesh]:
-    station = _rows(scene, item, item.terminal_length)
-    tall = np.maximum(_ramped_height(item, station, 0.0), CONCRETE_TIP)
-    flank = np.array(CONCRETE_FLANKS[item.profile])
+    station = _rows(scene, item)
+    tall = np.maximum(_ramped_height(item, station, 0.0), shapes.CONCRETE_TIP)
+    flank = np.array(shapes.CONCRETE_FLANKS[item.profile])
     across, height = _both_flanks(flank, item.base_width / 2.0, tall, _CONCRETE_BURIED)
-    return [_swept(scene, station, np.full(station.shape, item.offset), across, height)]
+    return [_swept(scene, item, station, across, height)]
 
 
 def _temporary(scene: Scene, item: TemporaryBarrier) -> list[_Mesh]:
     """Return the elements of a movable barrier, each straight between its ends."""
-    flank = np.array(TEMPORARY_FLANKS["plastic" if item.segment_length <= LONGEST_PLASTIC else "steel"])
-    length = item.end_station - item.start_station
+    flank = np.array(shapes.TEMPORARY_FLANKS["plastic" if item.segment_length <= shapes.LONGEST_PLASTIC else "steel"])
     meshes = []
     for start, end in _bays(scene, item, item.segment_length):
-        station = np.clip([start + TEMPORARY_GAP / 2.0, end - TEMPORARY_GAP / 2.0], *_span(scene, item))
+        station = np.clip([start + shapes.TEMPORARY_GAP / 2.0, end - shapes.TEMPORARY_GAP / 2.0], *_span(scene, item))
         if station[1] - station[0] < _SHORTEST:
             continue
-        share = (station - item.start_station) / length
-        offset = item.offset + (item.end_offset - item.offset) * share
         across, height = _both_flanks(flank, item.base_width / 2.0, np.full(2, item.height), 0.0)
-        meshes.append(_swept(scene, station, offset, across, height))
+        meshes.append(_swept(scene, item, station, across, height))
     return meshes
 
 
 def _noise_barrier(scene: Scene, item: NoiseBarrier) -> list[_Mesh]:
     """Return the wall of panels, and its posts."""
-    station = _rows(scene, item, 0.0)
+    station = _rows(scene, item)
     across = np.array([-1.0, -1.0, 1.0, 1.0]) * item.thickness / 2.0
     height = np.broadcast_to([-_WALL_BURIED, item.height, item.height, -_WALL_BURIED], (len(station), 4))
-    panels = _swept(scene, station, np.full(station.shape, item.offset), across, height)
+    panels = _swept(scene, item, station, across, height)
     low, high = _span(scene, item)
     post = np.array([item.start_station, *(end for _, end in _bays(scene, item, item.post_spacing))])
     post = post[(post >= low) & (post <= high)]
@@ -189,18 +168,18 @@ def _span(scene: Scene, item: Any) -> tuple[float, float]:
     return max(item.start_station, 0.0), min(item.end_station, scene.geometry.length)
 
 
-def _rows(scene: Scene, item: Any, terminal: float) -> Float:
+def _rows(scene: Scene, item: LineObject) -> Float:
     """Return the stations (N,) of rows along something, one of them at the end of either ramp."""
     start, end = _span(scene, item)
     if end - start < _SHORTEST:
         return np.array([start])
-    ramp = min(terminal, (item.end_station - item.start_station) / 2.0)
+    ramp = ramp_length(item, item.end_station)
     return scene.rows(start, end, item.start_station + ramp, item.end_station - ramp)
 
 
 def _bays(scene: Scene, item: Any, length: float) -> list[tuple[float, float]]:
     """Return the stations (m) of elements, or between posts, on the road: the last one of all takes the rest."""
-    whole = (item.end_station - item.start_station) / length - SHORTEST_ELEMENT
+    whole = (item.end_station - item.start_station) / length - shapes.SHORTEST_ELEMENT
     count = max(1.0, np.ceil(whole))
     low, high = ((station - item.start_station) / length for station in _span(scene, item))
     numbers = np.arange(max(np.floor(low), 0.0), min(np.ceil(high) + 1.0, count))
@@ -211,10 +190,7 @@ def _bays(scene: Scene, item: Any, length: float) -> list[tuple[float, float]]:
 
 def _ramped_height(item: Any, station: Float, tip: float) -> Float:
     """Return the height (N,) of what is ramped down at both ends, m."""
-    ramp = min(item.terminal_length, (item.end_station - item.start_station) / 2.0)
-    inside = np.minimum(station - item.start_station, item.end_station - station)
-    share = np.clip(inside / ramp, 0.0, 1.0) if ramp > _SHORTEST else np.ones(station.shape)
-    return tip + (item.height - tip) * share
+    return tip + (item.height - tip) * height_share(item, item.end_station, station)
 
 
 def _both_flanks(flank: Float, half: float, tall: Float, buried: float) -> tuple[Float, Float]:
@@ -225,11 +201,11 @@ def _both_flanks(flank: Float, half: float, tall: Float, buried: float) -> tuple
     return half * ring[:, 0], np.where(np.isnan(height), -buried, height)
 
 
-def _swept(scene: Scene, station: Float, offset: Float, across: Float, height: Float) -> _Mesh:
-    """Return a closed cross-section swept along the road.
+def _swept(scene: Scene, item: LineObject, station: Float, across: Float, height: Float) -> _Mesh:
+    """Return a closed cross-section swept along the axis of something that runs along the road.
 
     Args:
-        station, offset: (N,) axis, m.
+        station: (N,) where, m.
         across: (P,) offsets of the section's points from the axis, m: seen along the road they run against the clock,
             and the second half mirrors the first point by point.
         height: (N, P) above the surface under the axis, m.
@@ -237,7 +213,8 @@ def _swept(scene: Scene, station: Float, offset: Float, across: Float, height: F
     if len(station) < 2:
         return np.empty((0, 3)), np.empty((0, 3), dtype=np.intp)
     rows, count = len(station), len(across)
-    points = scene.points(station, offset)[:, None, :] + across[:, None] * _left_vectors(scene, station)[:, None, :]
+    left = left_of(scene.geometry, station)[:, None, :]
+    points = scene.points(station, item.offset_at(station))[:, None, :] + across[:, None] * left
     points[:, :, 2] += height
     caps = [(i, i + 1, count - 1 - i) for i in range(count // 2 - 1)]
     caps += [(i + 1, count - 2 - i, count - 1 - i) for i in range(count // 2 - 1)]
@@ -262,7 +239,7 @@ def _boxes(
         foot: (N,) offsets where the surface is looked up, m; their own if None.
     """
     middle = scene.points(station, offset if foot is None else foot)
-    left = _left_vectors(scene, station)
+    left = left_of(scene.geometry, station)
     middle = middle + (0.0 if foot is None else (offset - foot)[:, None] * left)
     ahead = np.column_stack([left[:, 1], -left[:, 0], np.zeros(len(station))])
     corners = [(-1.0, -1.0), (-1.0, 1.0), (1.0, 1.0), (1.0, -1.0)]
@@ -273,11 +250,6 @@ def _boxes(
             points[:, 4 * level + corner] = place + np.column_stack([np.zeros((len(station), 2)), z])
     first = 8 * np.arange(len(station))[:, None, None]
     return points.reshape(-1, 3), (_BOX[None] + first).reshape(-1, 3)
-
-
-def _left_vectors(scene: Scene, station: Float) -> Float:
-    heading = scene.geometry.alignment.heading(station)
-    return np.column_stack([-np.sin(heading), np.cos(heading), np.zeros(len(station))])
 
 
 # Corners 0 to 3 are the bottom's, 4 to 7 the top's, both against the clock from above.

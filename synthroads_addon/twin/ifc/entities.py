@@ -95,6 +95,17 @@ class IfcFile:
         """Add an entity that has a GlobalId, which follows from its class and key."""
         return self.add(entity, GlobalId=self.guid(f"{entity}/{key}"), **named)
 
+    def product(
+        self, entity: str, name: str, kind: str, about: str | None = None, placement: Entity = None, **named: Any
+    ) -> Entity:
+        """Add what has a place: `kind` is its predefined type, `about` its object type.
+
+        Without a placement its coordinates are local. Its key is its name.
+        """
+        placement = self.local_frame if placement is None else placement
+        named = {"Name": name, "ObjectType": about, "ObjectPlacement": placement, "PredefinedType": kind} | named
+        return self.rooted(entity, name, **named)
+
     # --- geometry -------------------------------------------------------------------------------------------------
 
     def point(self, *coordinates: float) -> Entity:
@@ -153,10 +164,10 @@ class IfcFile:
         """
         if key is not None and key in self._shapes:
             return self._shapes[key]
-        found = [item for item in items if item is not None]
-        if not found:
+        bodies = [item for item in items if item is not None]
+        if not bodies:
             return None
-        body = self.add("IfcShapeRepresentation", self.contexts["Body"], "Body", kind, found)
+        body = self.add("IfcShapeRepresentation", self.contexts["Body"], "Body", kind, bodies)
         made = self.add("IfcProductDefinitionShape", None, None, [body])
         if key is not None:
             self._shapes[key] = made
@@ -175,14 +186,19 @@ class IfcFile:
         """
         self._gathered.setdefault((relation, of.id(), group), (of, []))[1].extend(members)
 
+    def label(self, item: Entity, instance: int, class_name: str, model: Model | None = None) -> None:
+        """Give an object its instance number and the class of its points, and all that a model says, as properties."""
+        values = {"instance": self.value(instance), "class": self.value(class_name)}
+        self.properties(item, "SynthRoads", values | (self.parameters_of(model) if model else {}))
+
     def properties(self, item: Entity, name: str, values: Values) -> None:
         """Give an object a property set: of values of IFC's simple types, and of lists of labels that are chosen."""
         made = [self._property(key, value) for key, value in values.items()]
         if not made:
             return
         key = f"{item.GlobalId}/{name}"
-        found = self.rooted("IfcPropertySet", key, Name=name, HasProperties=made)
-        self.rooted("IfcRelDefinesByProperties", key, RelatedObjects=[item], RelatingPropertyDefinition=found)
+        definition = self.rooted("IfcPropertySet", key, Name=name, HasProperties=made)
+        self.rooted("IfcRelDefinesByProperties", key, RelatedObjects=[item], RelatingPropertyDefinition=definition)
 
     def _property(self, name: str, value: Entity | list[str]) -> Entity:
         if isinstance(value, list):
@@ -204,8 +220,8 @@ class IfcFile:
     def parameters_of(self, model: Model) -> dict[str, Entity]:
         """Return all that a parameter set says of an object, under the same names, as IFC values."""
         fields = type(model).model_fields
-        found = {name: (getattr(model, name), unit_of(field)) for name, field in fields.items()}
-        return {name: self.value(value, unit) for name, (value, unit) in found.items() if value is not None}
+        values = {name: (getattr(model, name), unit_of(field)) for name, field in fields.items()}
+        return {name: self.value(value, unit) for name, (value, unit) in values.items() if value is not None}
 
     def made_of(self, item: Entity, name: str) -> None:
         """Give an object its material, by its name in the material table."""

@@ -21,17 +21,9 @@ from ...road.parameters import (
     TrafficLight,
     TrafficSign,
 )
-from ...road.things.body_shapes import (
-    BEACON_BLADE,
-    BEACON_BLADE_BOTTOM,
-    BEACON_FOOT,
-    DELINEATOR,
-    KILOMETRE_POST,
-    SIGN_RAIL,
-    TRAFFIC_LIGHT_POST,
-)
+from ...road.things import body_shapes as shapes
 from .entities import Entity
-from .scene import IfcPlace, Scene
+from .scene import Scene
 from .solids import Solids
 
 BURIED = 0.3
@@ -48,6 +40,16 @@ _CAMERA = (0.4, 0.13, 0.12)
 _ARM = 0.06
 """Thickness of a pole's arm, m."""
 _ARM_RISE = 0.12
+_CABINETS = {
+    "emergency_phone": ("IfcCommunicationsAppliance", "USERDEFINED", "plastic_orange"),
+    "utility": ("IfcElectricDistributionBoard", "DISTRIBUTIONBOARD", "cabinet_grey"),
+}
+"""Kind of cabinet -> its entity, predefined type and material."""
+_POLE_HEADS = {
+    "lighting": ("IfcLightFixture", "light", "POINTSOURCE"),
+    "surveillance": ("IfcAudioVisualAppliance", "camera", "CAMERA"),
+}
+"""Kind of pole -> entity, name and predefined type of what it carries."""
 
 
 def write_furniture(scene: Scene) -> None:
@@ -72,19 +74,19 @@ def _key(item: PointObject) -> object:
 
 
 def _stand(
-    scene: Scene, entity: str, name: str, item: PointObject, body: Callable[[Solids], list[Entity]], **named: Any
+    scene: Scene,
+    entity: str,
+    name: str,
+    item: PointObject,
+    body: Callable[[Solids], list[Entity]],
+    kind: str,
+    about: str = "",
 ) -> Entity:
     """Add an element with its body at its place."""
     ifc, key = scene.ifc, _key(item)
     items = [] if ifc.has_shape(key) else body(Solids(ifc, _turn(item)))
-    made = ifc.rooted(
-        entity,
-        name,
-        Name=name,
-        ObjectPlacement=scene.place_of(item).placement,
-        Representation=ifc.shape(items, "SweptSolid", key),
-        **named,
-    )
+    placement, shape = scene.place_of(item).placement, ifc.shape(items, "SweptSolid", key)
+    made = ifc.product(entity, name, kind, about or type(item).__name__, placement, Representation=shape)
     scene.describe(made, item)
     scene.stand(made, scene.container(item.station, item.offset))
     return made
@@ -98,47 +100,47 @@ def _sign(scene: Scene, name: str, item: TrafficSign) -> None:
         height = item.lower_edge + item.height * _POST_TOP[item.shape] + BURIED
         beside = [((number + 0.5) / item.posts - 0.5) * item.width for number in range(item.posts)]
         posts = [solids.cylinder(item.post_diameter, (0.0, y, -BURIED), height) for y in beside]
-        middle = (-item.post_diameter / 2.0 - SIGN_RAIL, 0.0, item.lower_edge + item.height / 2.0)
+        middle = (-item.post_diameter / 2.0 - shapes.SIGN_RAIL, 0.0, item.lower_edge + item.height / 2.0)
         return [solids.plate(item.shape, item.width, item.height, middle, _FACE), *posts]
 
-    sign = _stand(scene, "IfcSign", name, item, body, ObjectType=item.type, PredefinedType="PICTORAL")
-    _about_sign(scene, sign, item.code, "TrafficSign", "galvanised_steel")
+    sign = _stand(scene, "IfcSign", name, item, body, "PICTORAL")
+    _about_sign(scene, sign, item, "galvanised_steel", item.code)
 
 
 def _board(scene: Scene, name: str, item: KilometreBoard) -> None:
     def body(solids: Solids) -> list[Entity]:
         middle = (_FACE, 0.0, item.lower_edge + item.height / 2.0)
-        post = solids.cylinder(KILOMETRE_POST, (0.0, 0.0, -BURIED), item.lower_edge + item.height / 2.0 + BURIED)
+        post = solids.cylinder(shapes.KILOMETRE_POST, (0.0, 0.0, -BURIED), item.lower_edge + item.height / 2.0 + BURIED)
         return [solids.plate("rectangle", item.width, item.height, middle, 2.0 * _FACE), post]
 
-    sign = _stand(scene, "IfcSign", name, item, body, ObjectType=item.type, PredefinedType="MARKER")
-    _about_sign(scene, sign, item.text, "KilometreBoard", "sheeting_blue")
+    sign = _stand(scene, "IfcSign", name, item, body, "MARKER")
+    _about_sign(scene, sign, item, "sheeting_blue", item.text)
 
 
 def _delineator(scene: Scene, name: str, item: Delineator) -> None:
     def body(solids: Solids) -> list[Entity]:
-        outline = [(along, -away) for away, along in DELINEATOR]
+        outline = [(along, -away) for away, along in shapes.DELINEATOR]
         return [solids.prism(outline, (0.0, 0.0, -BURIED), item.height + BURIED)]
 
-    sign = _stand(scene, "IfcSign", name, item, body, ObjectType=item.type, PredefinedType="MARKER")
-    _about_sign(scene, sign, "", "Delineator", "plastic_white")
+    sign = _stand(scene, "IfcSign", name, item, body, "MARKER")
+    _about_sign(scene, sign, item, "plastic_white")
 
 
 def _beacon(scene: Scene, name: str, item: ConstructionBeacon) -> None:
     def body(solids: Solids) -> list[Entity]:
-        middle = (BEACON_BLADE / 2.0, 0.0, BEACON_BLADE_BOTTOM + item.height / 2.0)
-        blade = solids.plate("rectangle", item.width, item.height, middle, BEACON_BLADE)
-        wide, long, high = BEACON_FOOT
+        middle = (shapes.BEACON_BLADE / 2.0, 0.0, shapes.BEACON_BLADE_BOTTOM + item.height / 2.0)
+        blade = solids.plate("rectangle", item.width, item.height, middle, shapes.BEACON_BLADE)
+        wide, long, high = shapes.BEACON_FOOT
         tenon = solids.box((0.05, 0.07, 0.1), (0.0, 0.0, 0.07))
         return [blade, tenon, solids.box((long, wide, high), (0.0, 0.0, 0.0))]
 
-    sign = _stand(scene, "IfcSign", name, item, body, ObjectType=item.type, PredefinedType="MARKER")
-    _about_sign(scene, sign, "", "ConstructionBeacon", "sheeting_red")
+    sign = _stand(scene, "IfcSign", name, item, body, "MARKER")
+    _about_sign(scene, sign, item, "sheeting_red")
 
 
-def _about_sign(scene: Scene, sign: Entity, reference: str, category: str, material: str) -> None:
+def _about_sign(scene: Scene, sign: Entity, item: PointObject, material: str, reference: str = "") -> None:
     ifc = scene.ifc
-    values = {"IsExternal": ifc.value(True), "Category": ifc.add("IfcLabel", category)}
+    values = {"IsExternal": ifc.value(True), "Category": ifc.add("IfcLabel", type(item).__name__)}
     if reference:
         values["Reference"] = ifc.add("IfcIdentifier", reference)
     ifc.properties(sign, "Pset_SignCommon", values)
@@ -151,17 +153,17 @@ def _about_sign(scene: Scene, sign: Entity, reference: str, category: str, mater
 def _light(scene: Scene, name: str, item: TrafficLight) -> None:
     def body(solids: Solids) -> list[Entity]:
         tall = item.lights * item.light_diameter * _CHAMBER_HEIGHT + 2.0 * _LIGHT_MARGIN
-        post = solids.cylinder(TRAFFIC_LIGHT_POST, (0.0, 0.0, -BURIED), item.height + BURIED - 0.03)
-        middle = (-TRAFFIC_LIGHT_POST / 2.0, 0.0, item.height - tall / 2.0)
+        post = solids.cylinder(shapes.TRAFFIC_LIGHT_POST, (0.0, 0.0, -BURIED), item.height + BURIED - 0.03)
+        middle = (-shapes.TRAFFIC_LIGHT_POST / 2.0, 0.0, item.height - tall / 2.0)
         board = solids.plate("rectangle", _LIGHT_BOARD * item.light_diameter, tall, middle, 0.01)
         lamps = []
         for number in range(item.lights):
             level = item.height - _LIGHT_MARGIN - (number + 0.5) * item.light_diameter * _CHAMBER_HEIGHT
-            place = (-TRAFFIC_LIGHT_POST / 2.0 - 0.01, 0.0, level)
+            place = (-shapes.TRAFFIC_LIGHT_POST / 2.0 - 0.01, 0.0, level)
             lamps.append(solids.plate("round", item.light_diameter, item.light_diameter, place, 0.14))
         return [post, board, *lamps]
 
-    signal = _stand(scene, "IfcSignal", name, item, body, ObjectType=item.type, PredefinedType="VISUAL")
+    signal = _stand(scene, "IfcSignal", name, item, body, "VISUAL")
     scene.ifc.made_of(signal, "plastic_black")
 
 
@@ -169,43 +171,24 @@ def _cabinet(scene: Scene, name: str, item: Cabinet) -> None:
     def body(solids: Solids) -> list[Entity]:
         return [solids.box((item.depth, item.width, item.height + BURIED), (0.0, 0.0, -BURIED))]
 
-    if item.kind == "emergency_phone":
-        entity, named = "IfcCommunicationsAppliance", {"ObjectType": item.kind, "PredefinedType": "USERDEFINED"}
-    else:
-        entity, named = "IfcElectricDistributionBoard", {"ObjectType": item.kind, "PredefinedType": "DISTRIBUTIONBOARD"}
-    cabinet = _stand(scene, entity, name, item, body, **named)
-    scene.ifc.made_of(cabinet, "plastic_orange" if item.kind == "emergency_phone" else "cabinet_grey")
+    entity, kind, material = _CABINETS[item.kind]
+    scene.ifc.made_of(_stand(scene, entity, name, item, body, kind, item.kind), material)
 
 
 def _asset(scene: Scene, name: str, item: Asset) -> None:
     """Add a free asset: its shape is in its library's file."""
-    _stand(scene, "IfcBuildingElementProxy", name, item, lambda _: [], ObjectType=item.name, PredefinedType="ELEMENT")
+    _stand(scene, "IfcBuildingElementProxy", name, item, lambda _: [], "ELEMENT", item.name)
 
 
 def _pole(scene: Scene, name: str, item: Pole) -> None:
     """Add a mast with what it carries: an assembly of the column and a street light, or a camera."""
     ifc, place = scene.ifc, scene.place_of(item)
-    assembly = ifc.rooted(
-        "IfcElementAssembly",
-        name,
-        Name=name,
-        ObjectType=item.kind,
-        ObjectPlacement=place.placement,
-        AssemblyPlace="FACTORY",
-        PredefinedType="MAST",
-    )
+    assembly = ifc.product("IfcElementAssembly", name, "MAST", item.kind, place.placement, AssemblyPlace="FACTORY")
     scene.describe(assembly, item)
     scene.stand(assembly, scene.container(item.station, item.offset))
-    column = part_of(scene, assembly, place, "IfcColumn", f"{name}/column", PredefinedType="COLUMN")
-    lighting = item.kind == "lighting"
-    head = part_of(
-        scene,
-        assembly,
-        place,
-        "IfcLightFixture" if lighting else "IfcAudioVisualAppliance",
-        f"{name}/{'light' if lighting else 'camera'}",
-        PredefinedType="POINTSOURCE" if lighting else "CAMERA",
-    )
+    column = scene.add_part(assembly, place, "IfcColumn", f"{name}/column", "COLUMN")
+    entity, part, kind = _POLE_HEADS[item.kind]
+    head = scene.add_part(assembly, place, entity, f"{name}/{part}", kind)
     key = _key(item)
     solids = Solids(ifc, _turn(item))
     known = ifc.has_shape((key, "column"))
@@ -213,8 +196,8 @@ def _pole(scene: Scene, name: str, item: Pole) -> None:
     head.Representation = ifc.shape([] if known else [_head(solids, item)], "SweptSolid", (key, "head"))
     ifc.made_of(column, "galvanised_steel")
     ifc.made_of(head, "cabinet_grey")
-    for entity in (column, head):
-        ifc.properties(entity, "SynthRoads", {"instance": ifc.value(item.instance), "class": ifc.value("pole")})
+    for made in (column, head):
+        ifc.label(made, item.instance, item.points_class)
 
 
 def _mast(solids: Solids, item: Pole) -> list[Entity]:
@@ -236,15 +219,6 @@ def _head(solids: Solids, item: Pole) -> Entity:
 def _mount(item: Pole) -> float:
     """Return the height of a pole's arm, m."""
     return item.height - (0.0 if item.kind == "lighting" else 0.35)
-
-
-def part_of(scene: Scene, whole: Entity, place: IfcPlace, entity: str, name: str, **named: Any) -> Entity:
-    """Add an element that is part of another one, in its frame."""
-    ifc = scene.ifc
-    frame = ifc.add("IfcLocalPlacement", place.placement, ifc.flat_axes)
-    part = ifc.rooted(entity, name, Name=name, ObjectPlacement=frame, **named)
-    ifc.gather("IfcRelAggregates", whole, [part])
-    return part
 
 
 _WRITERS: dict[type, Callable[[Scene, str, Any], None]] = {

@@ -1,8 +1,9 @@
-"""The road in IFC 4.3: its lateral parts, and what they are paved with.
+"""The road in IFC 4.3: its lateral parts, what they are paved with, and the markings on it.
 
 Spatially an IfcRoad has a ROADWAYPLATEAU per direction (CARRIAGEWAY with its TRAFFICLANEs, HARDSHOULDER, SOFTSHOULDER,
 turnouts), a CENTRALRESERVE, and a ROADSIDE on either side. Physically each direction has one IfcPavement, an aggregate
-of one IfcCourse per strip, which its part refers to; verge and median are IfcEarthworksFills.
+of one IfcCourse per strip, which its part refers to; verge and median are IfcEarthworksFills. Markings are
+IfcSurfaceFeatures that adhere to their carriageway's pavement, not contained in any part.
 """
 
 from __future__ import annotations
@@ -18,9 +19,11 @@ from ...road.damage import damage_columns, damage_depth, damaged_strips
 from ...road.geometry import SurfaceStrip
 from ...road.guidelines import LIMITS
 from ...road.objects import AnyWidth
-from ...road.parameters import Carriageway, Median, Pothole, RoadParameters, Rut, Turnout
+from ...road.parameters import Arrow, Carriageway, Hatching, LineMarking, Median, Pothole, RoadParameters, Rut, Turnout
 from ...road.section_geometry import CarriagewaySection
 from ...road.turnout_geometry import TURNOUT_STRIPS, TurnoutShape
+from ..faces import Faces
+from ..surfaces import dash_surfaces, painted_surface
 from .entities import Entity, Float, IfcFile, short
 from .scene import Scene, grid_triangles
 
@@ -72,18 +75,11 @@ def write_carriageways(scene: Scene) -> None:
     _write_median(scene)
 
 
-def _part(scene: Scene, whole: Entity, name: str, kind: str, usage: str = "LATERAL", about: str = "") -> Entity:
+def _part(
+    scene: Scene, whole: Entity, name: str, kind: str, usage: str = "LATERAL", about: str | None = None
+) -> Entity:
     """Add a part of the road, or of one of its parts."""
-    part = scene.ifc.rooted(
-        "IfcRoadPart",
-        name,
-        Name=name,
-        ObjectType=about or None,
-        ObjectPlacement=scene.ifc.local_frame,
-        CompositionType="PARTIAL",
-        UsageType=usage,
-        PredefinedType=kind,
-    )
+    part = scene.ifc.product("IfcRoadPart", name, kind, about, CompositionType="PARTIAL", UsageType=usage)
     scene.ifc.gather("IfcRelAggregates", whole, [part])
     return part
 
@@ -135,20 +131,10 @@ class _Direction:
         scene.parts[f"carriageway-{carriageway.side}"] = self.part
         scene.describe(self.part, carriageway)
         pieces = list(self._pieces())
-        self.pavement = self.ifc.rooted(
-            "IfcPavement",
-            self.name,
-            Name=f"{self.name}/pavement",
-            ObjectPlacement=self.ifc.local_frame,
-            PredefinedType=_PAVEMENTS[carriageway.pavement.kind],
-        )
+        kind = _PAVEMENTS[carriageway.pavement.kind]
+        self.pavement = self.ifc.product("IfcPavement", self.name, kind, Name=f"{self.name}/pavement")
         self.ifc.gather("IfcRelContainedInSpatialStructure", self.part, [self.pavement])
-        self.ifc.properties(
-            self.pavement,
-            "SynthRoads",
-            {"instance": self.ifc.value(carriageway.instance), "class": self.ifc.value("road")}
-            | self.ifc.parameters_of(carriageway.pavement),
-        )
+        self.ifc.label(self.pavement, carriageway.instance, carriageway.points_class, carriageway.pavement)
         scene.parts[f"pavement-{carriageway.side}"] = self.pavement
         for piece in pieces:
             self._write_piece(piece)
@@ -202,15 +188,9 @@ class _Direction:
         kind = _PART_TYPES.get(piece.kind, "USERDEFINED")
         part = _part(self.scene, piece.whole, piece.name, kind, about=piece.kind)
         items = [ifc.mesh(*mesh, False) for mesh in self._meshes(piece, station)]
-        surface = ifc.rooted(
-            "IfcCourse" if paved else "IfcEarthworksFill",
-            piece.name,
-            Name=piece.name,
-            ObjectType=piece.kind,
-            ObjectPlacement=ifc.local_frame,
-            Representation=ifc.shape(items, "Tessellation"),
-            PredefinedType="PAVEMENT" if paved else "USERDEFINED",
-        )
+        entity, kind = ("IfcCourse", "PAVEMENT") if paved else ("IfcEarthworksFill", "USERDEFINED")
+        shape = ifc.shape(items, "Tessellation")
+        surface = ifc.product(entity, piece.name, kind, piece.kind, Representation=shape)
         if paved:
             ifc.gather("IfcRelAggregates", self.pavement, [surface])
             ifc.gather("IfcRelReferencedInSpatialStructure", part, [surface])
@@ -263,18 +243,16 @@ class _Direction:
         distance = inner[:, None] + (outer - inner)[:, None] * shares
         height = geometry.profile.elevation(station)[:, None] + low[:, None] + (high - low)[:, None] * shares
         every, offset = np.repeat(station, len(shares)), self.carriageway.sign * distance.ravel()
-        position, heading, _ = geometry.alignment.frame(every)
-        left = np.column_stack([-np.sin(heading), np.cos(heading)])
         z = height.ravel() - damage_depth(section, every, offset)
-        points = np.column_stack([position + offset[:, None] * left, z])
+        points = np.column_stack([geometry.alignment.place(every, offset), z])
         # On the left carriageway a row runs from right to left, on the right one from left to right.
         return points, grid_triangles(len(station), len(shares), flip=self.carriageway.sign < 0)
 
     def _blocks(self, piece: _Piece, station: Float) -> Iterator[tuple[int, int, bool]]:
         """Yield the first and last row of every stretch along which the same damage lies, and whether there is any."""
         ranges = _damage_ranges(self.section) if piece.index in self._damaged_strips else []
-        found = [(station[1:] > low) & (station[:-1] < high) for low, high in ranges]
-        damage = np.array([np.zeros(len(station) - 1, dtype=bool), *found])
+        masks = [(station[1:] > low) & (station[:-1] < high) for low, high in ranges]
+        damage = np.array([np.zeros(len(station) - 1, dtype=bool), *masks])
         borders = [0, *(np.flatnonzero(np.diff(damage, axis=1).any(axis=0)) + 1).tolist(), len(station) - 1]
         for first, last in pairwise(borders):
             yield first, last, bool(damage[:, first].any())
@@ -282,22 +260,15 @@ class _Direction:
     def _write_damage(self) -> None:
         """Add a DEFECT for every rut and pothole; their shapes are in the courses' surfaces."""
         ifc, pavement = self.ifc, self.carriageway.pavement
-        found: list[tuple[str, Rut | Pothole, float, float]] = [
+        damages: list[tuple[str, Rut | Pothole, float, float]] = [
             ("rut", rut, rut.start_station, self._rut_offset(rut)) for rut in pavement.ruts
         ]
-        found += [("pothole", hole, hole.station, hole.offset) for hole in pavement.potholes]
-        for number, (kind, damage, station, offset) in enumerate(found):
+        damages += [("pothole", hole, hole.station, hole.offset) for hole in pavement.potholes]
+        for number, (kind, damage, station, offset) in enumerate(damages):
             name = f"{self.name}/{kind}-{number}"
-            defect = ifc.rooted(
-                "IfcSurfaceFeature",
-                name,
-                Name=name,
-                ObjectType=kind,
-                ObjectPlacement=self.scene.place(station, offset).placement,
-                PredefinedType="DEFECT",
-            )
-            values = {"instance": ifc.value(self.carriageway.instance), "class": ifc.value("road")}
-            ifc.properties(defect, "SynthRoads", values | ifc.parameters_of(damage))
+            placement = self.scene.place(station, offset).placement
+            defect = ifc.product("IfcSurfaceFeature", name, "DEFECT", kind, placement)
+            ifc.label(defect, self.carriageway.instance, self.carriageway.points_class, damage)
             ifc.gather("IfcRelAdheresToElement", self.pavement, [defect])
 
     def _rut_offset(self, rut: Rut) -> float:
@@ -335,16 +306,16 @@ def _write_median(scene: Scene) -> None:
     """Add the strip between the carriageways; beside a single one a median is named, and has no surface."""
     geometry = scene.geometry
     index = next((i for i, strip in enumerate(geometry.strips) if strip.kind == "median"), None)
-    found = next(iter(geometry.parameters.of_type(Median).items()), None)
-    if index is None and found is None:
+    median = next(iter(geometry.parameters.of_type(Median).items()), None)
+    if index is None and median is None:
         return
-    name = found[0] if found else "road/median"
+    name = median[0] if median else "road/median"
     part = _part(scene, scene.road, name, "CENTRALRESERVE")
     scene.parts["median"] = part
     if index is not None:
         _write_median_surface(scene, index, name, part)
-    if found:
-        scene.describe(part, found[1])
+    if median:
+        scene.describe(part, median[1])
 
 
 def _write_median_surface(scene: Scene, index: int, name: str, part: Entity) -> None:
@@ -354,19 +325,57 @@ def _write_median_surface(scene: Scene, index: int, name: str, part: Entity) -> 
     station = scene.stations
     sides = geometry.offsets(station)[:, index : index + 2][:, ::-1]
     heights = geometry.boundary_elevations(station)[:, index : index + 2][:, ::-1]
-    position, heading, _ = geometry.alignment.frame(np.repeat(station, 2))
-    left = np.column_stack([-np.sin(heading), np.cos(heading)])
-    points = np.column_stack([position + sides.reshape(-1, 1) * left, heights.ravel()])
-    fill = ifc.rooted(
-        "IfcEarthworksFill",
-        name,
-        Name=f"{name}/surface",
-        ObjectType="median",
-        ObjectPlacement=ifc.local_frame,
-        Representation=ifc.shape([ifc.mesh(points, grid_triangles(len(station), 2), False)], "Tessellation"),
-        PredefinedType="USERDEFINED",
-    )
+    plan = geometry.alignment.place(np.repeat(station, 2), sides.ravel())
+    points = np.column_stack([plan, heights.ravel()])
+    shape = ifc.shape([ifc.mesh(points, grid_triangles(len(station), 2), False)], "Tessellation")
+    surface = {"Name": f"{name}/surface", "Representation": shape}
+    fill = ifc.product("IfcEarthworksFill", name, "USERDEFINED", "median", **surface)
     ifc.gather("IfcRelContainedInSpatialStructure", part, [fill])
     ifc.made_of(fill, strip.material)
-    values = {"instance": ifc.value(strip.instance), "class": ifc.value(strip.class_name)}
-    ifc.properties(fill, "SynthRoads", values)
+    ifc.label(fill, strip.instance, strip.class_name)
+
+
+# --- markings -------------------------------------------------------------------------------------------------------
+
+_MARKINGS: dict[type, str] = {LineMarking: "LINEMARKING", Hatching: "HATCHMARKING", Arrow: "SYMBOLMARKING"}
+"""Class of a marking -> its predefined type."""
+
+
+def write_markings(scene: Scene) -> None:
+    """Add every line, hatching and arrow with the surface of its film."""
+    for name, item in scene.geometry.parameters.objects.items():
+        if isinstance(item, LineMarking | Hatching | Arrow):
+            if isinstance(item, LineMarking):
+                _, faces, _ = dash_surfaces(scene.geometry, item, scene.stations)
+            else:
+                faces = painted_surface(scene.geometry, item, scene.stations)
+            side = scene.geometry.parameters.carriageway_of(item).side
+            _write_marking(scene, name, item, faces, scene.parts[f"pavement-{side}"])
+
+
+def _write_marking(scene: Scene, name: str, item: LineMarking | Hatching | Arrow, faces: Faces, bearer: Entity) -> None:
+    ifc = scene.ifc
+    mesh = _triangles(faces)
+    shape = ifc.shape([ifc.mesh(*mesh, False)], "Tessellation") if mesh else None
+    about = "hatching" if isinstance(item, Hatching) else item.kind
+    feature = ifc.product("IfcSurfaceFeature", name, _MARKINGS[type(item)], about, Representation=shape)
+    ifc.gather("IfcRelAdheresToElement", bearer, [feature])
+    ifc.made_of(feature, f"paint_{item.color}")
+    scene.describe(feature, item)
+    common = {
+        "MaterialColour": ifc.add("IfcLabel", item.color),
+        "MaterialThickness": ifc.add("IfcPositiveLengthMeasure", item.film_thickness),
+    }
+    ifc.properties(feature, "Pset_RoadMarkingCommon", common)
+
+
+def _triangles(faces: Faces) -> tuple[Float, NDArray[np.intp]] | None:
+    """Return convex polygons as points and triangles."""
+    if not len(faces):
+        return None
+    starts = np.cumsum(faces.sizes) - faces.sizes
+    counts = faces.sizes - 2
+    first = np.repeat(starts, counts)
+    number = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
+    fans = np.column_stack([first, first + number + 1, first + number + 2])
+    return faces.points, faces.corners[fans]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -12,35 +12,15 @@ from numpy.typing import NDArray
 
 from ...road.geometry import RoadGeometry
 from ...road.objects import PointObject, RoadObject
+from ...road.surface import highest_pavement
+from ...road.things.furniture import Asset
 from ..surfaces import on_ground
 from .alignment import Axis, linear_placement
 from .entities import Entity, Float, IfcFile
 
-CLASSES = {
-    "Guardrail": "guardrail",
-    "ConcreteBarrier": "barrier",
-    "NoiseBarrier": "noise_barrier",
-    "TemporaryBarrier": "construction_barrier",
-    "ConstructionBeacon": "construction_barrier",
-    "Delineator": "warning_post",
-    "TrafficSign": "road_sign",
-    "KilometreBoard": "road_sign",
-    "Gantry": "shield_gantry",
-    "Pole": "pole",
-    "TrafficLight": "traffic_light",
-    "Cabinet": "utility",
-    "Overpass": "bridge",
-    "LineMarking": "road_marking",
-    "Hatching": "road_marking",
-    "Arrow": "road_marking",
-    "Carriageway": "road",
-    "Turnout": "road",
-    "Median": "roadside",
-    "Terrain": "ground",
-    "Vegetation": "vegetation",
-    "Vehicle": "vehicle",
-}
-"""Type of an object of the parameter set -> class of its points in a cloud."""
+_ACROSS, _ROWS = 0.05, 7
+"""Distance (m) of the points across the road at which the pavement is looked at (3.5 mm at 7 % crossfall), and their
+rows along it."""
 
 
 @dataclass(frozen=True)
@@ -56,6 +36,15 @@ class IfcPlace:
     placement: Entity
     origin: Float
     heading: float
+
+    def frame(self, ifc: IfcFile) -> Entity:
+        """Add a placement in this frame, at its origin."""
+        return ifc.add("IfcLocalPlacement", self.placement, ifc.flat_axes)
+
+    def plan(self, x: Float, y: Float) -> Float:
+        """Return local points (N, 2) at places (N,) of this frame."""
+        cosine, sine = math.cos(self.heading), math.sin(self.heading)
+        return self.origin[:2] + np.column_stack([cosine * x - sine * y, sine * x + cosine * y])
 
     def inside(self, points: Float) -> Float:
         """Return local points (..., 3) in this frame."""
@@ -89,13 +78,13 @@ class Scene:
 
     def look_up(self, places: Iterable[tuple[float, float]]) -> None:
         """Find surface and strip at stations and offsets (m) at once: one by one it takes a hundred times longer."""
-        wanted = [place for place in dict.fromkeys(places) if place not in self._known]
-        if not wanted:
+        unknown = [place for place in dict.fromkeys(places) if place not in self._known]
+        if not unknown:
             return
-        station, offset = np.array(wanted).T
+        station, offset = np.array(unknown).T
         station = np.clip(station, 0.0, self.geometry.length)
         heights, strips = self.surface(station, offset), self.geometry.strip_index(station, offset)
-        self._known.update(zip(wanted, zip(heights.tolist(), strips.tolist(), strict=True), strict=True))
+        self._known.update(zip(unknown, zip(heights.tolist(), strips.tolist(), strict=True), strict=True))
 
     def at(self, station: float, offset: float) -> tuple[float, int]:
         """Return the surface's local elevation (m) and the strip's index, -1 beside the road."""
@@ -133,6 +122,24 @@ class Scene:
         """Return the frame at a point object's foot; its rotation isn't in it."""
         return self.place(item.station, item.offset, item.elevation)
 
+    def pavement_below(
+        self, place: IfcPlace, along: tuple[float, float], across: tuple[float, float], shear: float = 0.0
+    ) -> float:
+        """Return the local elevation (m) of the pavement's highest point below something; without any, the place's.
+
+        Args:
+            place: frame of what spans the road.
+            along: its rear and front end in the frame, m.
+            across: its left and right end there, m.
+            shear: by how much it lies farther back per metre to the left (m/m): a skew bridge.
+        """
+        left, right = across
+        count = max(2, math.ceil((left - right) / _ACROSS) + 1)
+        beside, ahead = np.meshgrid(np.linspace(left, right, count), np.linspace(*along, _ROWS))
+        plan = place.plan((ahead - shear * beside).ravel(), beside.ravel())
+        highest = highest_pavement(self.geometry, *self.geometry.alignment.project(plan))
+        return float(place.origin[2]) if highest is None else highest
+
     def container(self, station: float, offset: float) -> Entity:
         """Return the part of the road that something stands in: a carriageway, the median, or beside the road."""
         _, index = self.at(station, offset)
@@ -143,11 +150,17 @@ class Scene:
             return self.parts[f"carriageway-{strip.side}"]
         return self.parts["roadside-left" if offset > 0.0 else "roadside-right"]
 
-    def describe(self, entity: Entity, item: RoadObject, more: Mapping[str, Any] | None = None) -> None:
+    def describe(self, entity: Entity, item: RoadObject) -> None:
         """Give an entity what the parameter set says of its object, under the same names, and its class."""
-        label = getattr(item, "class_name", None) or CLASSES.get(getattr(item, "type", ""), "")
+        label = item.class_name if isinstance(item, Asset) else item.points_class
         values = self.ifc.parameters_of(item) | ({"class": self.ifc.value(label)} if label else {})
-        self.ifc.properties(entity, "SynthRoads", values | dict(more or {}))
+        self.ifc.properties(entity, "SynthRoads", values)
+
+    def add_part(self, whole: Entity, place: IfcPlace, entity: str, name: str, kind: str, **named: Any) -> Entity:
+        """Add an element of a predefined type that is part of another one, in its frame."""
+        part = self.ifc.product(entity, name, kind, placement=place.frame(self.ifc), **named)
+        self.ifc.gather("IfcRelAggregates", whole, [part])
+        return part
 
     def stand(self, entity: Entity, container: Entity) -> None:
         """Put an element that is placed along the alignment into its container."""

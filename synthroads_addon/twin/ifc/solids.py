@@ -84,9 +84,7 @@ class Solids:
         """Extrude a profile along the first of two axes; the second is the profile's x."""
         x, y, z = place
         position = self.ifc.add("IfcAxis2Placement3D", self.ifc.point(*self._turned(x, y), z), *axes)
-        return self.ifc.add(
-            "IfcExtrudedAreaSolid", profile, position, self.ifc.direction(0.0, 0.0, 1.0), short(depth)
-        )
+        return self.ifc.add("IfcExtrudedAreaSolid", profile, position, self.ifc.direction(0.0, 0.0, 1.0), short(depth))
 
 
 def _flat(*lengths: float) -> bool:

@@ -9,8 +9,7 @@ import numpy as np
 from ...road.alignment import clip_offset
 from ...road.lane_lines import lane_of
 from ...road.parameters import Terrain, Vegetation, Vehicle
-from ...road.things.chassis import wheel_base
-from ...road.things.vehicles import VEHICLE_TYPES
+from ...road.things.vehicles import CHASSIS, VEHICLE_TYPES
 from .entities import Entity
 from .scene import Scene, grid_triangles
 from .solids import Solids
@@ -32,17 +31,8 @@ def write_surroundings(scene: Scene) -> None:
 
 
 def _geographic(scene: Scene, name: str, kind: str, shape: Entity | None, about: str | None = None) -> Entity:
-    ifc = scene.ifc
-    made = ifc.rooted(
-        "IfcGeographicElement",
-        name,
-        Name=name,
-        ObjectType=about,
-        ObjectPlacement=ifc.local_frame,
-        Representation=shape,
-        PredefinedType=kind,
-    )
-    ifc.gather("IfcRelContainedInSpatialStructure", scene.site, [made])
+    made = scene.ifc.product("IfcGeographicElement", name, kind, about, Representation=shape)
+    scene.ifc.gather("IfcRelContainedInSpatialStructure", scene.site, [made])
     return made
 
 
@@ -67,12 +57,12 @@ def _terrain(scene: Scene, name: str, item: Terrain) -> None:
 
 def _columns(half_width: float) -> np.ndarray:
     """Return the shares (K,), from 0 to 1, of the way from the road's edge outwards at which the terrain is sampled."""
-    distance, found = 0.0, [0.0]
+    distance, distances = 0.0, [0.0]
     while distance < half_width:
         spacing = next(spacing for limit, spacing in _SPACINGS if distance < limit)
         distance = min(distance + spacing, half_width)
-        found.append(distance)
-    return np.array(found) / half_width
+        distances.append(distance)
+    return np.array(distances) / half_width
 
 
 def _vehicles(scene: Scene) -> None:
@@ -81,7 +71,7 @@ def _vehicles(scene: Scene) -> None:
     places = {}
     for name, item in vehicles.items():
         line, station = lane_of(scene.geometry, item), np.array([item.station])
-        turn = float(line.turn(station, wheel_base(item.model) / 2.0)[0])
+        turn = float(line.turn(station, CHASSIS[item.model].wheel_base / 2.0)[0])
         facing = turn if line.carriageway.traffic > 0 else math.pi + turn
         places[name] = (float(line.offset(station)[0]), facing)
     scene.look_up((item.station, places[name][0]) for name, item in vehicles.items())
@@ -92,15 +82,8 @@ def _vehicles(scene: Scene) -> None:
 def _vehicle(scene: Scene, name: str, item: Vehicle, offset: float, turn: float) -> None:
     ifc, kind = scene.ifc, VEHICLE_TYPES[item.model]
     body = Solids(ifc, turn).box((kind.length, kind.width, kind.height), (0.0, 0.0, 0.0))
-    made = ifc.rooted(
-        "IfcVehicle",
-        name,
-        Name=name,
-        ObjectType=item.model,
-        ObjectPlacement=scene.place(item.station, offset).placement,
-        Representation=ifc.shape([body], "SweptSolid"),
-        PredefinedType="VEHICLEWHEELED",
-    )
+    placement, shape = scene.place(item.station, offset).placement, ifc.shape([body], "SweptSolid")
+    made = ifc.product("IfcVehicle", name, "VEHICLEWHEELED", item.model, placement, Representation=shape)
     scene.describe(made, item)
     scene.stand(made, scene.container(item.station, offset))
     ifc.made_of(made, "car_paint")

@@ -47,11 +47,11 @@ def _side(parent: Element, plan: LanePlan, shape: LateralShape, marks: RoadMarks
     group = element(parent, side)
     sign = 1 if side == "left" else -1
     numbered = list(enumerate(section.lanes[side], 1))
-    for own, strip in reversed(numbered) if sign > 0 else numbered:
-        lane = element(group, "lane", {"id": sign * own, "type": strip.type, "level": False})
+    for lane_number, strip in reversed(numbered) if sign > 0 else numbered:
+        lane = element(group, "lane", {"id": sign * lane_number, "type": strip.type, "level": False})
         _links(lane, plan, number, side, strip)
         _widths(lane, plan, section, strip)
-        marks.write(lane, number, sign * own)
+        marks.write(lane, number, sign * lane_number)
         if strip.kind == "verge":
             _heights(lane, plan, shape, section, side)
         _notes(lane, plan, side, strip)
@@ -59,13 +59,13 @@ def _side(parent: Element, plan: LanePlan, shape: LateralShape, marks: RoadMarks
 
 def _links(lane: Element, plan: LanePlan, number: int, side: Side, strip: LaneStrip) -> None:
     sign = 1 if side == "left" else -1
-    found = {
+    links = {
         tag: plan.linked(number, other, side, strip.column)
         for tag, other in (("predecessor", number - 1), ("successor", number + 1))
     }
-    if any(found.values()):
+    if any(links.values()):
         link = element(lane, "link")
-        for tag, other in found.items():
+        for tag, other in links.items():
             if other is not None:
                 element(link, tag, {"id": sign * other})
 
@@ -73,8 +73,8 @@ def _links(lane: Element, plan: LanePlan, number: int, side: Side, strip: LaneSt
 def _widths(lane: Element, plan: LanePlan, section: LaneSection, strip: LaneStrip) -> None:
     first, last = section.pieces
     borders = plan.widths.borders[first : last + 1]
-    own = plan.widths.coefficients[first:last, strip.column]
-    for start, coefficients in runs(borders, own):
+    pieces = plan.widths.coefficients[first:last, strip.column]
+    for start, coefficients in runs(borders, pieces):
         cubic(lane, "width", {"sOffset": start - section.start}, coefficients)
 
 
@@ -107,6 +107,6 @@ def _notes(lane: Element, plan: LanePlan, side: Side, strip: LaneStrip) -> None:
     if strip.kind == "lane":
         section = plan.geometry.sections[side]
         index = len(section.carriageway.lanes) - 1 - (strip.index - section.kinds.index("lane"))
-        own: Lane = section.carriageway.lanes[index]
+        carriageway_lane: Lane = section.carriageway.lanes[index]
         note(lane, "lane", index)
-        note(lane, "kind", own.kind)
+        note(lane, "kind", carriageway_lane.kind)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from ...road.geometry import RoadGeometry
-from ...road.parameters import Carriageway, LineMarking
+from ...road.parameters import LineMarking
 from ...road.things.furniture import Side
 from .pieces import CLOSE
 from .sections import LanePlan, LaneSection
@@ -64,24 +64,23 @@ class RoadMarks:
         start, end = line.start_station, min(line.end_station, self._plan.geometry.length)
         if end - start <= CLOSE:
             return
-        carriageway = self._plan.geometry.parameters.objects[line.carriageway]
-        assert isinstance(carriageway, Carriageway)
-        index = _border(self._plan.geometry, carriageway.side, line)
+        side = self._plan.geometry.parameters.carriageway_of(line).side
+        index = _border(self._plan.geometry, side, line)
         for number, section in enumerate(self._plan.sections):
             low, high = max(start, section.start), min(end, section.end)
             if high - low <= CLOSE:
                 continue
-            if index is None or not self._on_border(_Stretch(name, line, low, high, carriageway.side), number, index):
+            if index is None or not self._on_border(_Stretch(name, line, low, high, side), number, index):
                 self._let_loose(name, line, low, high)
 
     def _on_border(self, stretch: _Stretch, number: int, index: int) -> bool:
         """Put a stretch on the border outside of a strip; return whether it is free."""
         section: LaneSection = self._plan.sections[number]
         sign = 1 if stretch.side == "left" else -1
-        own = self._of.setdefault((number, sign * section.number(stretch.side, index)), [])
-        if any(stretch.start < other.end - CLOSE and other.start < stretch.end - CLOSE for other in own):
+        stretches = self._of.setdefault((number, sign * section.number(stretch.side, index)), [])
+        if any(stretch.start < other.end - CLOSE and other.start < stretch.end - CLOSE for other in stretches):
             return False
-        own.append(stretch)
+        stretches.append(stretch)
         return True
 
     def _let_loose(self, name: str, line: LineMarking, start: float, end: float) -> None:

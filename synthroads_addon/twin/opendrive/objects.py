@@ -30,15 +30,13 @@ from ...road.parameters import (
     TrafficLight,
     TrafficSign,
 )
-from ...road.things.body_shapes import BEACON_REACH, BEAM_REACH, DELINEATOR_REACH, POST_REACH
+from ...road.things import body_shapes as shapes
 from .pieces import CLOSE, Float
-from .places import Ground, ramp_share
+from .places import Ground
 from .xml import Element, Value, element, notes
 
 LIGHT_POST, BOARD_POST = 0.12, 0.06
 """Diameters of a traffic light's and a kilometre board's post, m."""
-OVERHANG = 0.3
-"""Share of what a gantry's tallest sign is taller than the beam that hangs below it."""
 _ABUTMENT = 1.0  # m, thickness of the walls that an overpass ends at
 
 Corners = Iterable[tuple[float, float]]
@@ -70,8 +68,7 @@ class Objects:
 
     def barrier(self, name: str, item: LineObject) -> None:
         """Add what runs along the road: repeats with distance 0, linear from one to the next."""
-        share, kinks = ramp_share(item, self.ground.geometry.length)
-        rows = self.ground.along(item, share, kinks)
+        rows = self.ground.along(item)
         if not len(rows):
             return
         subtype, width, beside = _cross_section(item)
@@ -256,8 +253,8 @@ class Objects:
             assert isinstance(item, PointObject)
             place = (item.station, item.offset, self.ground.foot(name))
         s, t, z = (float(value) for value in place)
-        own: dict[str, Value] = {"id": f"{item.instance}{suffix}", "name": name, "s": s, "t": t, "zOffset": _fine(z)}
-        return element(self.parent, "object", {**own, "orientation": "none", "dynamic": "no", **attributes})
+        about: dict[str, Value] = {"id": f"{item.instance}{suffix}", "name": name, "s": s, "t": t, "zOffset": _fine(z)}
+        return element(self.parent, "object", {**about, "orientation": "none", "dynamic": "no", **attributes})
 
 
 def gantry_levels(ground: Ground, item: Gantry) -> tuple[float, float]:
@@ -265,8 +262,7 @@ def gantry_levels(ground: Ground, item: Gantry) -> tuple[float, float]:
     deep = item.beam_depth / 2.0
     span = (item.station - deep, item.station + deep)
     low = ground.pavement_below(span, (item.right_offset, item.left_offset)) + item.clearance
-    taller = max([sign.height - item.beam_height for sign in item.signs] + [0.0])
-    return low, low + OVERHANG * taller
+    return low, item.beam_bottom(low)
 
 
 def _fine(value: float) -> float:
@@ -287,9 +283,9 @@ def _cross_section(item: LineObject) -> tuple[str, float, float]:
     """Return a barrier's subtype, its width, and how far its middle lies to the left of its axis, m."""
     if isinstance(item, Guardrail):
         if item.faces == "both":
-            return "guardRail", 2.0 * BEAM_REACH, 0.0
-        beside = (BEAM_REACH - POST_REACH) / 2.0
-        return "guardRail", BEAM_REACH + POST_REACH, beside if item.faces == "left" else -beside
+            return "guardRail", 2.0 * shapes.BEAM_REACH, 0.0
+        beside = (shapes.BEAM_REACH - shapes.POST_REACH) / 2.0
+        return "guardRail", shapes.BEAM_REACH + shapes.POST_REACH, beside if item.faces == "left" else -beside
     if isinstance(item, NoiseBarrier):
         return "noiseBarrier", max(item.thickness, item.post_width), 0.0
     subtype = "concreteBarrier" if isinstance(item, ConcreteBarrier) else "temporaryBarrier"
@@ -301,7 +297,7 @@ _SIZES: dict[type[RoadObject], Callable[[Any], _Size]] = {
     Delineator: lambda item: (
         "pole",
         "delineator",
-        {"length": 2.0 * DELINEATOR_REACH, "width": 2.0 * DELINEATOR_REACH, "height": item.height},
+        {"length": 2.0 * shapes.DELINEATOR_REACH, "width": 2.0 * shapes.DELINEATOR_REACH, "height": item.height},
     ),
     Pole: lambda item: ("pole", item.kind, {"radius": item.diameter / 2.0, "height": item.height}),
     Cabinet: lambda item: (
@@ -312,7 +308,7 @@ _SIZES: dict[type[RoadObject], Callable[[Any], _Size]] = {
     ConstructionBeacon: lambda item: (
         "obstacle",
         "constructionBeacon",
-        {"length": 2.0 * BEACON_REACH, "width": item.width, "height": item.height},
+        {"length": 2.0 * shapes.BEACON_REACH, "width": item.width, "height": item.height},
     ),
     Asset: lambda item: ("none", item.name, {}),
 }

@@ -42,11 +42,11 @@ class Cubics:
 def merged_stations(stations: Iterable[float], start: float, end: float) -> Float:
     """Return both ends and the stations between them, sorted, none closer than `CLOSE` to another."""
     inside = sorted(s for s in stations if start + CLOSE < s < end - CLOSE)
-    found = [start]
+    merged = [start]
     for station in inside:
-        if station - found[-1] > CLOSE:
-            found.append(station)
-    return np.array([*found, end])
+        if station - merged[-1] > CLOSE:
+            merged.append(station)
+    return np.array([*merged, end])
 
 
 def cubics(function: Function, borders: Float) -> Cubics:
@@ -60,11 +60,11 @@ def cubics(function: Function, borders: Float) -> Cubics:
         length = np.diff(borders)
         values = function((borders[:-1, None] + length[:, None] * _SHARES).ravel())
         values = values.reshape(len(length), len(_SHARES), -1)
-        found = _through(values, length)
-        wrong = np.abs(_sample_cubics(found, length) - values).max(axis=(1, 2)) > _EXACT
+        coefficients = _through(values, length)
+        wrong = np.abs(_sample_cubics(coefficients, length) - values).max(axis=(1, 2)) > _EXACT
         wrong &= length > _SHORTEST
         if not wrong.any():
-            return Cubics(borders, found)
+            return Cubics(borders, coefficients)
         borders = np.sort(np.append(borders, (borders[:-1] + length / 2.0)[wrong]))
 
 
@@ -117,30 +117,30 @@ def runs(borders: Float, coefficients: Float) -> list[tuple[float, list[float]]]
     A run has the coefficients of its longest piece: those of a short one are known to few digits.
     """
     length = np.diff(borders)
-    found: list[tuple[float, list[float]]] = []
+    joined: list[tuple[float, list[float]]] = []
     first = 0
     while first < len(length):
         last = first + 1
-        own = coefficients[first]
+        run = coefficients[first]
         while last < len(length):
             longest = first + int(np.argmax(length[first : last + 1]))
             trial = _shift_cubic(coefficients[longest], borders[first] - borders[longest])
             if not _goes_on(trial, borders, coefficients, (first, last + 1)):
                 break
-            own, last = trial, last + 1
+            run, last = trial, last + 1
         whole = np.array([borders[last] - borders[first]])
-        found.append((float(borders[first]), _round_coefficients(own[None, None], whole)[0, 0].tolist()))
+        joined.append((float(borders[first]), _round_coefficients(run[None, None], whole)[0, 0].tolist()))
         first = last
-    return found
+    return joined
 
 
 def _goes_on(cubic: Float, borders: Float, coefficients: Float, pieces: tuple[int, int]) -> bool:
     """Return whether a cubic from the first of some pieces on is what they all are."""
     first, end = pieces
     within = np.diff(borders[first : end + 1])[:, None] * np.array([0.0, 0.3, 0.7, 1.0])
-    wanted = _value(coefficients[first:end, None], within)
+    values = _value(coefficients[first:end, None], within)
     ahead = borders[first:end, None] - borders[first] + within
-    return bool(np.abs(_value(cubic, ahead) - wanted).max() <= _SAME)
+    return bool(np.abs(_value(cubic, ahead) - values).max() <= _SAME)
 
 
 def _shift_cubic(cubic: Float, by: float) -> Float:
@@ -160,16 +160,16 @@ def chords(function: Function, borders: Float, tolerance: float, shortest: float
     """
     shares = np.array([0.0, 0.23, 0.5, 0.71, 1.0])
     borders = _no_longer(borders, _LONGEST)
-    found, begin, length = [borders], borders[:-1], np.diff(borders)
+    stations_so_far, begin, length = [borders], borders[:-1], np.diff(borders)
     while len(begin):
         values = function((begin[:, None] + length[:, None] * shares).ravel()).reshape(len(begin), 5, -1)
-        wanted = values[:, :1] + shares[:, None] * (values[:, -1:] - values[:, :1])
-        wrong = (np.abs(values - wanted).max(axis=(1, 2)) > tolerance) & (length > 2.0 * shortest)
+        on_chord = values[:, :1] + shares[:, None] * (values[:, -1:] - values[:, :1])
+        wrong = (np.abs(values - on_chord).max(axis=(1, 2)) > tolerance) & (length > 2.0 * shortest)
         half = length[wrong] / 2.0
         begin = np.concatenate([begin[wrong], begin[wrong] + half])
         length = np.concatenate([half, half])
-        found.append(begin[len(half) :])
-    stations = np.sort(np.concatenate(found))
+        stations_so_far.append(begin[len(half) :])
+    stations = np.sort(np.concatenate(stations_so_far))
     return _drop_straight_stations(stations, function(stations))
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -11,6 +10,7 @@ from ...base.errors import InputError
 from ...road.geometry import RoadGeometry
 from ...road.parameters import LineObject, PointObject
 from ...road.surface import highest_pavement, known_elevation
+from ..surfaces import height_share, ramp_length
 from .pieces import CLOSE, Float, chords, merged_stations
 
 _COLUMNS, _ROWS = 240, 7
@@ -46,15 +46,10 @@ class Ground:
         along = np.clip(station, 0.0, self.geometry.length)
         return known_elevation(self.geometry, along, offset) - self.geometry.profile.elevation(along)
 
-    def along(self, item: LineObject, share: Callable[[Float], Float], kinks: list[float]) -> Float:
-        """Return rows (N, 4) of station, offset, height of the ground and height of the object, m.
+    def along(self, item: LineObject) -> Float:
+        """Return rows (N, 4) of station, offset, height of the ground and height of an object along the road, m.
 
         Between two of them all is linear within the tolerance.
-
-        Args:
-            item: the object.
-            share: stations (N,) -> share (N,) of its height that it has there.
-            kinks: stations at which that bends.
         """
         start, end = item.start_station, min(item.end_station, self.geometry.length)
         if end - start <= CLOSE:
@@ -62,15 +57,14 @@ class Ground:
         sections = self.geometry.sections.values()
         bends = [s for section in sections for s in section.kinks()]
         bends += [point.station for section in sections for point in section.carriageway.crossfall]
-        last = getattr(item, "end_offset", item.offset)
+        bends += [start + ramp_length(item, end), end - ramp_length(item, end)]
         tall: Any = getattr(item, "height", 0.0)
-        length = max(item.end_station - item.start_station, CLOSE)
 
         def rows(station: Float) -> Float:
-            offset = item.offset + (last - item.offset) * (station - item.start_station) / length
-            return np.column_stack([offset, self.height(station, offset), tall * share(station)])
+            offset = item.offset_at(station)
+            return np.column_stack([offset, self.height(station, offset), tall * height_share(item, end, station)])
 
-        stations = chords(rows, merged_stations([*bends, *kinks], start, end), self.tolerance, shortest=0.05)
+        stations = chords(rows, merged_stations(bends, start, end), self.tolerance, shortest=0.05)
         return np.column_stack([stations, rows(stations)])
 
     def pavement_below(self, stations: tuple[float, float], offsets: tuple[float, float], lean: float = 0.0) -> float:
@@ -84,15 +78,3 @@ class Ground:
         s = s + lean * (t - across)
         highest = highest_pavement(geometry, s, t)
         return 0.0 if highest is None else highest - float(geometry.profile.elevation(middle))
-
-
-def ramp_share(item: LineObject, length: float) -> tuple[Callable[[Float], Float], list[float]]:
-    """Return the share of its height that a barrier with ramped ends has at stations, and where that bends."""
-    start, end = item.start_station, min(item.end_station, length)
-    ramp = min(float(getattr(item, "terminal_length", 0.0)), (end - start) / 2.0)
-    if ramp <= 1e-3:
-        return lambda station: np.ones(station.shape), []
-    return (
-        lambda station: np.clip(np.minimum(station - start, end - station) / ramp, 0.0, 1.0),
-        [start + ramp, end - ramp],
-    )

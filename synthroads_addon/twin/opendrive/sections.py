@@ -118,14 +118,14 @@ class LanePlan:
         """Return the sections: a new one where a strip begins, ends, becomes something else or has no width."""
         borders = self.widths.borders
         rows = [self._lanes(piece) for piece in range(len(borders) - 1)]
-        found: list[LaneSection] = []
+        sections: list[LaneSection] = []
         first = 0
         for piece in range(1, len(rows) + 1):
             if piece < len(rows) and rows[piece] == rows[piece - 1] and not self._pinched(piece, rows[piece]):
                 continue
-            found.append(LaneSection(float(borders[first]), float(borders[piece]), (first, piece), rows[first]))
+            sections.append(LaneSection(float(borders[first]), float(borders[piece]), (first, piece), rows[first]))
             first = piece
-        return found
+        return sections
 
     def _pinched(self, piece: int, lanes: dict[Side, tuple[LaneStrip, ...]]) -> bool:
         widths = self.width_at_start(piece)
@@ -140,7 +140,7 @@ class LanePlan:
         for column, (side, *_) in enumerate(self._columns):
             if there[column]:
                 lanes[side].append(self._lane(column, middle))
-        return {side: tuple(own) for side, own in lanes.items()}
+        return {side: tuple(strips) for side, strips in lanes.items()}
 
     def _lane(self, column: int, station: float) -> LaneStrip:
         side, index, kind = self._columns[column]
@@ -164,12 +164,12 @@ class LanePlan:
 
     def _turnout(self, side: Side, station: float) -> TurnoutShape | None:
         """Return the turnout that makes a side's strips at a station; the last, as `RoadGeometry.instances` has it."""
-        found = None
+        last = None
         for shape in self.geometry.sections[side].turnouts:
             low, high = shape.range()
             if low <= station <= high:
-                found = shape
-        return found
+                last = shape
+        return last
 
     def linked(self, section: int, other: int, side: Side, column: int) -> int | None:
         """Return the number (without sign) of the lane that one of a section goes on as in its neighbour, or None.

@@ -62,9 +62,9 @@ def _signal(
     """Add the signal of an object: its face's lower edge above the foot, width and height (m)."""
     name, item = named
     low, width, height = face
-    own = {"id": str(item.instance), "name": name, **_place(item, item.offset, ground.foot(name) + low)}
-    own |= {"dynamic": "no", "width": width, "height": height, **attributes}
-    made = element(parent, "signal", own)
+    about = {"id": str(item.instance), "name": name, **_place(item, item.offset, ground.foot(name) + low)}
+    about |= {"dynamic": "no", "width": width, "height": height, **attributes}
+    made = element(parent, "signal", about)
     element(made, "reference", {"elementType": "object", "elementId": f"{item.instance}-posts", "type": "posts"})
     return made
 
@@ -80,14 +80,13 @@ def _hung(
 ) -> None:
     """Add a sign on a gantry; it faces the traffic that drives below it, and hangs before its beam."""
     (name, item), (number, sign), (low, bottom) = named, numbered, levels
-    behind = low + sign.height < bottom + item.beam_height
-    lower = low if behind else bottom + (item.beam_height - sign.height) / 2.0
+    lower = low if item.ends_in_beam(sign, low) else bottom + (item.beam_height - sign.height) / 2.0
     turned = item.model_copy(update={"rotation_deg": item.rotation_deg + (180.0 if sign.offset > 0.0 else 0.0)})
-    own: dict[str, Value] = {"id": f"{item.instance}-{number}", "name": f"{name}-{number}"}
-    own |= _place(turned, sign.offset, lower)
-    own |= {"dynamic": "yes" if sign.kind == "display" else "no", "country": "DE", "type": sign.kind, "subtype": "-1"}
-    own |= {"width": sign.width, "height": sign.height, "text": "\n".join(sign.text) if sign.text else None}
-    made = element(parent, "signal", own)
+    about: dict[str, Value] = {"id": f"{item.instance}-{number}", "name": f"{name}-{number}"}
+    about |= _place(turned, sign.offset, lower)
+    about |= {"dynamic": "yes" if sign.kind == "display" else "no", "country": "DE", "type": sign.kind, "subtype": "-1"}
+    about |= {"width": sign.width, "height": sign.height, "text": "\n".join(sign.text) if sign.text else None}
+    made = element(parent, "signal", about)
     element(made, "reference", {"elementType": "object", "elementId": str(item.instance), "type": "gantry"})
     notes(made, name, item.instance, object_type="GantrySign")
 

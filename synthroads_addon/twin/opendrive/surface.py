@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...road.geometry import RoadGeometry
 from ...road.things.furniture import Side
@@ -57,17 +56,17 @@ def _curvature(value: float) -> str:
 
 def _joined_lines(geometry: RoadGeometry, position: Float, heading: Float) -> list[tuple[int, int]]:
     """Return the first and last element of each geometry: lines that go on straight are one."""
-    found: list[tuple[int, int]] = []
+    joined: list[tuple[int, int]] = []
     for number, item in enumerate(geometry.alignment.elements):
-        if found and item.kind == "line" and geometry.alignment.elements[found[-1][0]].kind == "line":
-            first = found[-1][0]
+        if joined and item.kind == "line" and geometry.alignment.elements[joined[-1][0]].kind == "line":
+            first = joined[-1][0]
             forth = position[number + 1] - position[first]
             aside = abs(forth[1] * np.cos(heading[first]) - forth[0] * np.sin(heading[first]))
             if abs(heading[number] - heading[first]) < _LINE_TURN and aside < _LINE_APART:
-                found[-1] = (first, number)
+                joined[-1] = (first, number)
                 continue
-        found.append((number, number))
-    return found
+        joined.append((number, number))
+    return joined
 
 
 def elevation_profile(road: Element, geometry: RoadGeometry) -> None:
@@ -81,8 +80,8 @@ def elevation_profile(road: Element, geometry: RoadGeometry) -> None:
     start = grade_there - bend * half
     level = profile.elevation(middle) - half * (start + bend * half / 2.0)
     coefficients = np.stack([level, start, bend / 2.0, np.zeros(len(half))], axis=1)
-    for begin, own in runs(borders, coefficients):
-        cubic(parent, "elevation", {"s": begin}, own)
+    for begin, parabola in runs(borders, coefficients):
+        cubic(parent, "elevation", {"s": begin}, parabola)
 
 
 class LateralShape:
@@ -112,8 +111,8 @@ class LateralShape:
             if section is None:
                 continue
             inner = section.carriageway.sign * section.distances(station)[:, 0]
-            own = [np.full(station.shape, section.carriageway.sign * self.reach), inner]
-            for offset in own if side == "right" else own[::-1]:
+            edges = [np.full(station.shape, section.carriageway.sign * self.reach), inner]
+            for offset in edges if side == "right" else edges[::-1]:
                 offsets.append(offset)
                 heights.append(self.plane(side, station, offset))
         return np.stack(offsets, axis=1), np.stack(heights, axis=1)
@@ -121,14 +120,14 @@ class LateralShape:
     def stations(self) -> list[float]:
         """Return the stations between which the shape may be interpolated at any offset, as few as will do."""
         borders = self._kinks().tolist()
-        found = borders[:1]
+        stations = borders[:1]
         for end in borders[1:]:
-            found += self._split(found[-1], end, _HALVINGS)
-        kept = found[:1]
-        for i in range(1, len(found) - 1):
-            if self._off(kept[-1], found[i + 1], [found[i]]) > SHAPE_TOLERANCE / 100.0:
-                kept.append(found[i])
-        return [*kept, found[-1]]
+            stations += self._split(stations[-1], end, _HALVINGS)
+        kept = stations[:1]
+        for i in range(1, len(stations) - 1):
+            if self._off(kept[-1], stations[i + 1], [stations[i]]) > SHAPE_TOLERANCE / 100.0:
+                kept.append(stations[i])
+        return [*kept, stations[-1]]
 
     def _split(self, start: float, end: float, halvings: int) -> list[float]:
         """Return the stations after a start up to an end that are needed."""
@@ -147,9 +146,9 @@ class LateralShape:
         for row, station in enumerate(samples, 2):
             share = (station - start) / (end - start)
             offset = np.concatenate([t[0], t[1], t[row]])
-            first, last, own = (np.interp(offset, t[i], z[i]) for i in (0, 1, row))
+            first, last, exact = (np.interp(offset, t[i], z[i]) for i in (0, 1, row))
             within = (offset >= t[:, 0].max()) & (offset <= t[:, -1].min())
-            worst = max(worst, float(np.abs(first + share * (last - first) - own)[within].max()))
+            worst = max(worst, float(np.abs(first + share * (last - first) - exact)[within].max()))
         return worst
 
     def _kinks(self) -> Float:
@@ -176,9 +175,7 @@ def lateral_profile(road: Element, shape: LateralShape) -> None:
 def bounds(geometry: RoadGeometry) -> dict[str, float]:
     """Return the largest and smallest x and y of the road, to the metre, as the header has them."""
     stations = np.linspace(0.0, geometry.length, max(2, int(geometry.length / 10.0) + 2))
-    position, heading, _ = geometry.alignment.frame(stations)
-    left: NDArray[np.float64] = np.stack([-np.sin(heading), np.cos(heading)], axis=1)
-    edges = geometry.offsets(stations)[:, [0, -1]]
-    points = np.concatenate([position + edges[:, i, None] * left for i in (0, 1)])
+    edges = geometry.offsets(stations)
+    points = np.concatenate([geometry.alignment.place(stations, edges[:, i]) for i in (0, -1)])
     low, high = np.floor(points.min(axis=0)) - 1.0, np.ceil(points.max(axis=0)) + 1.0
     return {"north": float(high[1]), "south": float(low[1]), "east": float(high[0]), "west": float(low[0])}

@@ -70,6 +70,6 @@ def write(root: Element, path: Path) -> None:
     path.write_text(f'<?xml version="1.0" encoding="UTF-8"?>\n{content}\n', encoding="utf-8", newline="\n")
 
 
-def _as_cdata(found: re.Match[str]) -> str:
-    content = found[1].replace("&lt;", "<").replace("&gt;", ">").replace("&amp;", "&").replace("]]>", "]]]]><![CDATA[>")
+def _as_cdata(match: re.Match[str]) -> str:
+    content = match[1].replace("&lt;", "<").replace("&gt;", ">").replace("&amp;", "&").replace("]]>", "]]]]><![CDATA[>")
     return f"><![CDATA[{content}]]><"

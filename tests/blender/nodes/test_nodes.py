@@ -26,7 +26,7 @@ from synthroads_addon.blender.things.road.carriageway import carriageway_marking
 from synthroads_addon.blender.things.road.layout import MarkingLayout, SideLayout
 from synthroads_addon.blender.things.road.road import road_group
 from synthroads_addon.blender.things.vehicle.vehicle import vehicle_group
-from synthroads_addon.road.things.chassis import CHASSIS
+from synthroads_addon.road.things.vehicles import CHASSIS
 from tests.helpers.scenes.kept_groups import KeptGroups
 
 LAYOUT = (

@@ -16,8 +16,7 @@ from synthroads_addon.blender.things.vehicle.models import model_group
 from synthroads_addon.materials.table import materials
 from synthroads_addon.road.parameters import Carriageway, Vehicle
 from synthroads_addon.road.tessellation import sample_stations
-from synthroads_addon.road.things.chassis import CHASSIS
-from synthroads_addon.road.things.vehicles import COLORS, VEHICLE_TYPES
+from synthroads_addon.road.things.vehicles import CHASSIS, COLORS, VEHICLE_TYPES
 from synthroads_addon.scanning.scene.mesh import SceneMesh
 from tests.helpers.scenes.furnished_road import (
     MEASURE,

@@ -15,8 +15,7 @@ from synthroads_addon.base.errors import InputError
 from synthroads_addon.road.geometry import RoadGeometry
 from synthroads_addon.road.lane_lines import LaneLine
 from synthroads_addon.road.parameters import Carriageway, RoadParameters, Vehicle
-from synthroads_addon.road.things.chassis import CHASSIS
-from synthroads_addon.road.things.vehicles import VEHICLE_GAP, VEHICLE_LANE_WIDTH, VEHICLE_TYPES
+from synthroads_addon.road.things.vehicles import CHASSIS, VEHICLE_GAP, VEHICLE_LANE_WIDTH, VEHICLE_TYPES
 from synthroads_addon.sampling.road import sample_road
 from synthroads_addon.scanning.scene.motion import LaneMotion, LinearMotion, lane_motions
 from synthroads_addon.scanning.scene.passes import OVERHANG, lane_passes

@@ -41,8 +41,7 @@ from synthroads_addon.road.surface import surface_elevation
 from synthroads_addon.sampling.road import sample_road
 from synthroads_addon.twin.ifc.alignment import plan_segments, write_alignment
 from synthroads_addon.twin.ifc.entities import IfcFile
-from synthroads_addon.twin.ifc.project import write_project
-from synthroads_addon.twin.ifc.writer import write_ifc
+from synthroads_addon.twin.ifc.writer import write_ifc, write_project
 from tests.helpers.files.ifc_reading import (
     along,
     body,

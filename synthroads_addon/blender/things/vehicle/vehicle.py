@@ -5,7 +5,7 @@ from __future__ import annotations
 import bpy
 
 from ....base.classes import class_id
-from ....road.things.chassis import CHASSIS
+from ....road.things.vehicles import CHASSIS
 from ...materials.vehicles import COLOR
 from ...nodes import operations as op
 from ...nodes.builder import Tree, Value, node_group
