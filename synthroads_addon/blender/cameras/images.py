@@ -50,8 +50,7 @@ class RenderedLayers(ImageLayers):
     def _kept(self, number: int, view: View, rendered: Rendered) -> RenderedImage:
         light = ("sun", "sky")
         parts = [
-            values * np.float32(self._exposure) if name in light else values
-            for name, values in rendered.layers.items()
+            values * np.float32(self._exposure) if name in light else values for name, values in rendered.layers.items()
         ]
         height, width = rendered.material.shape
         joined = np.concatenate(parts, axis=2) if parts else np.zeros((height, width, 0), np.float32)

@@ -43,9 +43,7 @@ def material(name: str) -> bpy.types.Material:
     return made
 
 
-def vary(
-    variation: MaterialVariation, environment: Environment, own: Mapping[str, Material] | None = None
-) -> None:
+def vary(variation: MaterialVariation, environment: Environment, own: Mapping[str, Material] | None = None) -> None:
     """Give the materials that the file has their means on a road with this variation and weather.
 
     Args:
@@ -91,9 +89,7 @@ def _principled(name: str) -> Material:
     if node is None:
         colour, rough, metal = item.diffuse_color, item.roughness, item.metallic
     else:
-        colour, rough, metal = (
-            node.inputs[key].default_value for key in ("Base Color", "Roughness", "Metallic")
-        )
+        colour, rough, metal = (node.inputs[key].default_value for key in ("Base Color", "Roughness", "Metallic"))
     # A renderer's default specular of 0.5 would drown the contrast of the base colours.
     specular = min(0.2, node.inputs["Specular IOR Level"].default_value) if node else 0.2
 

@@ -35,9 +35,7 @@ class Shade:
     roughness: Value | None = None
     transparency: float = 0.0
 
-    def noise(
-        self, wavelength: float, detail: float = 2.0, stretch: tuple[float, float, float] = (1, 1, 1)
-    ) -> Value:
+    def noise(self, wavelength: float, detail: float = 2.0, stretch: tuple[float, float, float] = (1, 1, 1)) -> Value:
         """Return a noise from -1 to 1 of mean 0 whose features are about `wavelength` (m) large."""
         place = self.tree.node("ShaderNodeVectorMath", self.place, stretch, operation="MULTIPLY").value
         node = self.tree.node("ShaderNodeTexNoise", place, scale=1.0 / wavelength, detail=detail)
@@ -74,9 +72,7 @@ def shade(item: bpy.types.Material, mean: Material, build: Callable[[Shade], Non
         )
         color: Operand = mean.base_color
         if varied.factor is not None:
-            color = tree.node(
-                "ShaderNodeVectorMath", mean.base_color, varied.factor, operation="MULTIPLY"
-            ).value
+            color = tree.node("ShaderNodeVectorMath", mean.base_color, varied.factor, operation="MULTIPLY").value
             tree.group.links.new(color.source(), surface.raw.inputs["Base Color"])
         if varied.roughness is not None:
             tree.group.links.new(varied.roughness.source(), surface.raw.inputs["Roughness"])

@@ -110,8 +110,7 @@ def _road(parameters: RoadParameters, modifier: bpy.types.NodesModifier) -> Iter
         yield name, edited.model_copy(update={"pavement": pavement})
     for name, line in parameters.of_type(LineMarking).items():
         fields = {
-            field: _value(getattr(line, field), modifier, f"{name} {label}")
-            for label, field in _MARKING_FIELDS.items()
+            field: _value(getattr(line, field), modifier, f"{name} {label}") for label, field in _MARKING_FIELDS.items()
         }
         yield name, line.model_copy(update=fields)
 
@@ -170,9 +169,7 @@ def _width(width: AnyWidth, nominal: float) -> AnyWidth:
     before = nominal_width(width)
     if nominal == before:
         return width
-    return tuple(
-        WidthPoint(station=point.station, width=nominal * point.width / max(before, 1e-9)) for point in width
-    )
+    return tuple(WidthPoint(station=point.station, width=nominal * point.width / max(before, 1e-9)) for point in width)
 
 
 def _value(before: float, modifier: bpy.types.NodesModifier, name: str) -> float:

@@ -48,9 +48,7 @@ class Value:
         kinds = {_kind(operand) for operand in operands}
         if "VECTOR" in kinds:
             if operation == "MULTIPLY" and "VECTOR" not in {_kind(operands[1])}:
-                return self.tree.node(
-                    "ShaderNodeVectorMath", operands[0], scale=operands[1], operation="SCALE"
-                ).value
+                return self.tree.node("ShaderNodeVectorMath", operands[0], scale=operands[1], operation="SCALE").value
             return self.tree.node("ShaderNodeVectorMath", *operands, operation=operation).value
         if kinds == {"INT"} and operation != "DIVIDE":
             return self.tree.node("FunctionNodeIntegerMath", *operands, operation=operation).value

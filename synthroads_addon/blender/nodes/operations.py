@@ -75,9 +75,7 @@ def switch(condition: Value, false: Operand, true: Operand) -> Value:
 
 def only_if(condition: Value, geometry: Value) -> Value:
     """Return the geometry if the (single) condition holds, else nothing."""
-    return condition.tree.node(
-        "GeometryNodeSwitch", input_type="GEOMETRY", switch=condition, true=geometry
-    ).value
+    return condition.tree.node("GeometryNodeSwitch", input_type="GEOMETRY", switch=condition, true=geometry).value
 
 
 def choose(index: Value, items: list[tuple[float, float, float]]) -> Value:
@@ -109,9 +107,7 @@ def point_count(geometry: Value) -> Value:
 def sample_index(geometry: Value, value: Value, index: Operand) -> Value:
     """Return `value`, evaluated on the points of another geometry, at `index`."""
     kind = _DATA_TYPES[value.kind]
-    return geometry.tree.node(
-        "GeometryNodeSampleIndex", geometry, value, index, data_type=kind, clamp=True
-    ).value
+    return geometry.tree.node("GeometryNodeSampleIndex", geometry, value, index, data_type=kind, clamp=True).value
 
 
 def sample_surface(mesh: Value, value: Value, place: Value) -> Value:
@@ -147,11 +143,7 @@ def set_position(geometry: Value, place: Value) -> Value:
 
 def store(geometry: Value, name: str, value: Operand, domain: str = "POINT") -> Value:
     """Store a named attribute."""
-    kind = (
-        _DATA_TYPES[value.kind]
-        if isinstance(value, Value)
-        else ("INT" if isinstance(value, int) else "FLOAT")
-    )
+    kind = _DATA_TYPES[value.kind] if isinstance(value, Value) else ("INT" if isinstance(value, int) else "FLOAT")
     return geometry.tree.node(
         "GeometryNodeStoreNamedAttribute", geometry, data_type=kind, domain=domain, name=name, value=value
     ).value
@@ -159,16 +151,12 @@ def store(geometry: Value, name: str, value: Operand, domain: str = "POINT") -> 
 
 def delete_faces(geometry: Value, selection: Value) -> Value:
     """Delete faces, and the points that only they used."""
-    return geometry.tree.node(
-        "GeometryNodeDeleteGeometry", geometry, selection, domain="FACE", mode="ALL"
-    ).value
+    return geometry.tree.node("GeometryNodeDeleteGeometry", geometry, selection, domain="FACE", mode="ALL").value
 
 
 def delete_points(geometry: Value, selection: Value) -> Value:
     """Delete points."""
-    return geometry.tree.node(
-        "GeometryNodeDeleteGeometry", geometry, selection, domain="POINT", mode="ALL"
-    ).value
+    return geometry.tree.node("GeometryNodeDeleteGeometry", geometry, selection, domain="POINT", mode="ALL").value
 
 
 def separate(geometry: Value, selection: Value, domain: str = "POINT") -> Value:
@@ -207,8 +195,6 @@ def turn(tree: Tree, x: Operand = 0.0, y: Operand = 0.0, z: Operand = 0.0) -> Va
     return tree.node("FunctionNodeEulerToRotation", vector(tree, x, y, z)).value
 
 
-def random_turn(
-    tree: Tree, low: tuple[float, float, float], high: tuple[float, float, float], seed: Operand
-) -> Value:
+def random_turn(tree: Tree, low: tuple[float, float, float], high: tuple[float, float, float], seed: Operand) -> Value:
     """Return a random rotation whose Euler angles (rad) lie between `low` and `high`."""
     return tree.node("FunctionNodeEulerToRotation", random(tree, low, high, seed)).value

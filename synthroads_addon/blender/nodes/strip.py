@@ -32,16 +32,10 @@ def _build(tree: Tree) -> None:
     Offsets and heights may be fields on the backbone's points.
     """
     backbone = tree.input("Backbone", "Geometry", description="Polyline along the axis with its attributes")
-    left = tree.number(
-        "Left Offset", 1.0, FAR, unit="m", description="Offset of the left edge, positive to the left"
-    )
+    left = tree.number("Left Offset", 1.0, FAR, unit="m", description="Offset of the left edge, positive to the left")
     right = tree.number("Right Offset", -1.0, FAR, unit="m", description="Offset of the right edge")
-    left_height = tree.number(
-        "Left Height", 0.0, FAR, unit="m", description="Left edge above the axis, per row"
-    )
-    right_height = tree.number(
-        "Right Height", 0.0, FAR, unit="m", description="Right edge above the axis, per row"
-    )
+    left_height = tree.number("Left Height", 0.0, FAR, unit="m", description="Left edge above the axis, per row")
+    right_height = tree.number("Right Height", 0.0, FAR, unit="m", description="Right edge above the axis, per row")
     class_id = tree.integer("Class", 0, (0, 255), description="Semantic class of the faces")
     instance = tree.integer("Instance", 0, INSTANCES, description="Instance number of the faces")
     material = tree.input("Material", "Material", description="Material of the faces")

@@ -38,9 +38,7 @@ def _build(tree: Tree) -> None:
     road = tree.input("Road", "Object", description="Surface that the posts stand on")
     terrain = tree.input("Terrain", "Object", description="Surface beside the road")
     names = ("White Material", "Black Material", "Reflector Material")
-    white, black, glass = (
-        tree.input(name, "Material", description="Material of this part") for name in names
-    )
+    white, black, glass = (tree.input(name, "Material", description="Material of this part") for name in names)
 
     with tree.frame("Body: white, with a slanted black band"):
         body = _body(tree, white, black)

@@ -184,15 +184,11 @@ def _beam(tree: Tree, line: Value, side: float, spacer: Value) -> Value:
 def _instances(tree: Tree, posts: Value, spacer: Value, beams: dict[float, Value]) -> list[Value]:
     """Put a post on every point, and beside it the spacers of the beams that there are."""
     left, tall = op.named_attribute(tree, "left", "FLOAT_VECTOR"), op.named_attribute(tree, "tall")
-    upright = tree.node(
-        "FunctionNodeAxesToRotation", (0.0, 0.0, 1.0), left, primary_axis="Z", secondary_axis="X"
-    ).value
+    upright = tree.node("FunctionNodeAxesToRotation", (0.0, 0.0, 1.0), left, primary_axis="Z", secondary_axis="X").value
 
     def on_posts(body: Value, height: Operand, scale: Operand) -> Value:
         points = tree.node("GeometryNodeSetPosition", posts, offset=op.vector(tree, 0.0, 0.0, height)).value
-        return tree.node(
-            "GeometryNodeInstanceOnPoints", points, instance=body, rotation=upright, scale=scale
-        ).value
+        return tree.node("GeometryNodeInstanceOnPoints", points, instance=body, rotation=upright, scale=scale).value
 
     parts = [on_posts(_post(tree), -BURIED, op.vector(tree, 1.0, 1.0, tall + (BURIED - GUARDRAIL_POST_TOP)))]
     for side, wanted in beams.items():

@@ -96,9 +96,7 @@ class ModelBuilder:
         """Return a station as the nodes count it."""
         return station - self.zero
 
-    def points(
-        self, name: str, items: Sequence[PointObject], attributes: Mapping[str, NDArray[Any]]
-    ) -> bpy.types.Mesh:
+    def points(self, name: str, items: Sequence[PointObject], attributes: Mapping[str, NDArray[Any]]) -> bpy.types.Mesh:
         """Return a mesh with one vertex per point object, see `meshes.points_mesh`."""
         return points_mesh(name, self.geometry, items, attributes, self.origin)
 

@@ -36,15 +36,9 @@ def _build(tree: Tree) -> None:
     backbone = tree.input("Backbone", "Object", description="Polyline along the axis with its attributes")
     road = tree.input("Road", "Object", description="The road, whose outermost edges the terrain begins at")
     ground = tree.input("Ground", "Object", description="Surface of the ground before the road was built")
-    reach = tree.number(
-        "Half Width", 60.0, (5.0, 1000.0), unit="m", description="Reach to either side of the axis"
-    )
-    batter = tree.number(
-        "Batter Slope", 1.5, (0.5, 10.0), description="Run of the batter per metre of height (m/m)"
-    )
-    columns = tree.integer(
-        "Columns", 40, (3, 500), description="Points across each side, closer near the road"
-    )
+    reach = tree.number("Half Width", 60.0, (5.0, 1000.0), unit="m", description="Reach to either side of the axis")
+    batter = tree.number("Batter Slope", 1.5, (0.5, 10.0), description="Run of the batter per metre of height (m/m)")
+    columns = tree.integer("Columns", 40, (3, 500), description="Points across each side, closer near the road")
     instance = tree.integer("Instance", 0, INSTANCES, description="Instance number of the faces")
     cover = tree.input("Material", "Material", description="Material of the ground")
 
@@ -78,15 +72,11 @@ def _side_group() -> bpy.types.NodeTree:
 def _build_side(tree: Tree) -> None:
     """Terrain on one side: from the road's edge outwards, between the batter's two planes."""
     backbone = tree.input("Backbone", "Geometry", description="Polyline along the axis with its attributes")
-    edge = tree.input(
-        "Edge", "Geometry", description="Points of the road's edge, one per row of the backbone"
-    )
+    edge = tree.input("Edge", "Geometry", description="Points of the road's edge, one per row of the backbone")
     ground = tree.input("Ground", "Geometry", description="Surface of the ground before the road was built")
     side = tree.number("Side", 1.0, (-1.0, 1.0), description="+1 for the left, -1 for the right side")
     reach = tree.number("Half Width", 60.0, (5.0, 1000.0), unit="m", description="Reach from the axis")
-    batter = tree.number(
-        "Batter Slope", 1.5, (0.5, 10.0), description="Run of the batter per metre of height (m/m)"
-    )
+    batter = tree.number("Batter Slope", 1.5, (0.5, 10.0), description="Run of the batter per metre of height (m/m)")
     columns = tree.integer("Columns", 40, (3, 500), description="Points from the edge outwards")
 
     with tree.frame("Columns from left to right, rows as the backbone's"):

@@ -27,9 +27,7 @@ def backbone_mesh(geometry: RoadGeometry, station: Float, origin: Float, zero: f
     values = {"station": station - zero, "curvature": curvature}
     for side in ("left", "right"):
         carriageway = geometry.parameters.carriageway(side)
-        values[f"crossfall_{side}"] = (
-            geometry.crossfall(carriageway, station) if carriageway else 0.0 * station
-        )
+        values[f"crossfall_{side}"] = geometry.crossfall(carriageway, station) if carriageway else 0.0 * station
     values |= varying_widths(geometry, station)
     mesh = bpy.data.meshes.new("SR Backbone")
     first = np.arange(len(station) - 1)

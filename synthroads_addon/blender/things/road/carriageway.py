@@ -22,9 +22,7 @@ def carriageway_marking_group() -> bpy.types.NodeTree:
 def _declare_section(tree: Tree) -> dict[str, Value]:
     widths = (0.0, 1000.0)
     return {
-        "side": tree.number(
-            "Side", 1.0, (-1.0, 1.0), description="+1 for the left, -1 for the right carriageway"
-        ),
+        "side": tree.number("Side", 1.0, (-1.0, 1.0), description="+1 for the left, -1 for the right carriageway"),
         "distance": tree.number("Distance", 5.0, widths, unit="m", description="Distance from the axis"),
         "paved_edge": tree.number("Paved Edge", 14.0, widths, unit="m", description="Where the verge begins"),
         "pivot": tree.number("Pivot", 8.0, widths, unit="m", description="Line that keeps the axis's height"),
@@ -34,9 +32,7 @@ def _declare_section(tree: Tree) -> dict[str, Value]:
             (-0.12, 0.12),
             description="Positive where the surface falls to the right (m/m), per row",
         ),
-        "verge_slope": tree.number(
-            "Verge Slope", 0.08, (0.0, 0.15), description="Fall of the verge outwards (m/m)"
-        ),
+        "verge_slope": tree.number("Verge Slope", 0.08, (0.0, 0.15), description="Fall of the verge outwards (m/m)"),
     }
 
 

@@ -25,13 +25,9 @@ def _build(tree: Tree) -> None:
     Offsets and heights may be fields on the backbone's points.
     """
     backbone = tree.input("Backbone", "Geometry", description="Polyline along the axis with its attributes")
-    left = tree.number(
-        "Left Offset", 0.1, FAR, unit="m", description="Offset of the left edge, positive to the left"
-    )
+    left = tree.number("Left Offset", 0.1, FAR, unit="m", description="Offset of the left edge, positive to the left")
     right = tree.number("Right Offset", -0.1, FAR, unit="m", description="Offset of the right edge")
-    left_height = tree.number(
-        "Left Height", 0.0, FAR, unit="m", description="Pavement at the left edge above the axis"
-    )
+    left_height = tree.number("Left Height", 0.0, FAR, unit="m", description="Pavement at the left edge above the axis")
     right_height = tree.number("Right Height", 0.0, FAR, unit="m", description="Pavement at the right edge")
     given = declare_marking(tree)
     first, last = given["start_station"], given["end_station"]
@@ -73,9 +69,7 @@ def declare_marking(tree: Tree) -> dict[str, Value]:
             "Start Station", 0.0, stations, unit="m", description="Beginning of the first dash"
         ),
         "end_station": tree.number("End Station", 1e6, stations, unit="m", description="End of the line"),
-        "dash": tree.number(
-            "Dash", 6.0, lengths, unit="m", description="Length of a dash; 0 for a solid line"
-        ),
+        "dash": tree.number("Dash", 6.0, lengths, unit="m", description="Length of a dash; 0 for a solid line"),
         "gap": tree.number("Gap", 12.0, lengths, unit="m", description="Length of a gap"),
         "film_thickness": tree.number(
             "Film Thickness", 0.003, (0.0, 0.01), unit="m", description="Height above the pavement"
