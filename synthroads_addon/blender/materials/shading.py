@@ -37,7 +37,7 @@ class Shade:
 
     def noise(self, wavelength: float, detail: float = 2.0, stretch: tuple[float, float, float] = (1, 1, 1)) -> Value:
         """Return a noise from -1 to 1 of mean 0 whose features are about `wavelength` (m) large."""
-        place = self.tree.node("ShaderNodeVectorMath", self.place, stretch, operation="MULTIPLY").value
+        place = self.place * stretch
         node = self.tree.node("ShaderNodeTexNoise", place, scale=1.0 / wavelength, detail=detail)
         return node.value * 2.0 - 1.0
 

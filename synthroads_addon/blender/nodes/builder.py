@@ -1,12 +1,16 @@
-"""A small builder of Geometry Nodes: a node group is a function that reads top to bottom.
+"""A small builder of Geometry Nodes: a node group is a class of inputs and a function that reads top to bottom.
 
-    def build(tree: Tree) -> None:
-        width = tree.number("Width", 3.5, (2.0, 6.0), unit="m", description="Width of the lane")
+    class Lane(Inputs):
+        width = metres(3.5, (2.0, 6.0), "Width of the lane")
+
+    @makes_group("SR Lane")
+    def lane_group(tree: Tree) -> None:
+        lane = Lane(tree)
         with tree.frame("Pavement"):
-            grid = tree.node("GeometryNodeMeshGrid", size_x=width, size_y=2.0 * width + 1.0)
+            grid = tree.node("GeometryNodeMeshGrid", size_x=lane.width, size_y=2.0 * lane.width + 1.0)
         tree.output("Mesh", grid.value)
 
-    group = node_group("SR Lane", build)
+    group = lane_group()
 
 Sockets are `Value`s: they can be added, multiplied, compared and handed to other nodes. Places of nodes are
 worked out from the frames and the links. A group that is in the file already, in the same version, is used
@@ -18,7 +22,7 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from functools import cache
+from functools import cache, wraps
 from pathlib import Path
 from typing import Any
 
@@ -308,14 +312,12 @@ def remove_unused_groups() -> None:
             bpy.data.node_groups.remove(group)
 
 
-def node_group(
-    name: str, build: Callable[[Tree], None], *arguments: object, description: str = ""
-) -> bpy.types.NodeTree:
+def node_group(name: str, build: Callable[..., None], *arguments: object, description: str = "") -> bpy.types.NodeTree:
     """Return the node group `name`, from this file if it holds the same version, else built anew.
 
     Args:
         name: as shown in Blender; an older version of that name is renamed.
-        build: declares inputs, adds nodes, declares outputs.
+        build: declares inputs, adds nodes, declares outputs; is called with the tree and the arguments.
         arguments: what `build` depends on apart from its source (a number of lanes, say).
         description: shown as a tooltip.
     """
@@ -329,6 +331,19 @@ def node_group(
     group[KEY] = key
     group.is_modifier = True
     group.description = description or (build.__doc__ or "").strip().partition("\n")[0]
-    build(Tree(group))
+    build(Tree(group), *arguments)
     arrange(group)
     return group
+
+
+def makes_group(name: str) -> Callable[[Callable[[Tree], None]], Callable[[], bpy.types.NodeTree]]:
+    """Turn a function that builds a node group into one that returns the node group `name`, see `node_group`."""
+
+    def decorate(build: Callable[[Tree], None]) -> Callable[[], bpy.types.NodeTree]:
+        @wraps(build)
+        def make() -> bpy.types.NodeTree:
+            return node_group(name, build)
+
+        return make
+
+    return decorate

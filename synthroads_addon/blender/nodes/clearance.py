@@ -17,7 +17,7 @@ def pavement_near(road: Value, reach: Value) -> Value:
     tree = road.tree
     place = op.position(tree)
     flat = op.vector(tree, op.component(place, "X"), op.component(place, "Y"))
-    near = tree.node("ShaderNodeVectorMath", flat, operation="LENGTH")["Value"] < reach
+    near = op.length(flat) < reach
     paved = op.named_attribute(tree, "class_id", "INT").equals(class_id("road"))
     return op.separate(road, paved & near, "FACE")
 

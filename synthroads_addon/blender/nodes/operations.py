@@ -36,6 +36,11 @@ def maximum(a: Value, b: Operand) -> Value:
     return a.tree.node("ShaderNodeMath", a, b, operation="MAXIMUM").value
 
 
+def clip(a: Value, low: Operand, high: Operand) -> Value:
+    """Return the number, at least `low` and at most `high`."""
+    return minimum(maximum(a, low), high)
+
+
 def unary(operation: str, a: Value) -> Value:
     """Return a function of one number: ``ABSOLUTE``, ``CEIL``, ``FLOOR``, ``SQRT``, ``SINE``, ..."""
     return a.tree.node("ShaderNodeMath", a, operation=operation).value
@@ -54,6 +59,18 @@ def rounded_up(a: Value) -> Value:
 def dot(a: Value, b: Operand) -> Value:
     """Return the dot product of two vectors."""
     return a.tree.node("ShaderNodeVectorMath", a, b, operation="DOT_PRODUCT").value
+
+
+def length(a: Value) -> Value:
+    """Return the length of a vector."""
+    return a.tree.node("ShaderNodeVectorMath", a, operation="LENGTH")["Value"]
+
+
+def upright(along: Value) -> Value:
+    """Return the rotation whose z points up and whose x points along a vector in plan."""
+    return along.tree.node(
+        "FunctionNodeAxesToRotation", (0.0, 0.0, 1.0), along, primary_axis="Z", secondary_axis="X"
+    ).value
 
 
 def vector(tree: Tree, x: Operand = 0.0, y: Operand = 0.0, z: Operand = 0.0) -> Value:
@@ -178,11 +195,18 @@ def join(*geometries: Value) -> Value:
     return node.value
 
 
-def label(geometry: Value, class_id: Operand, instance: Operand, material: Value) -> Value:
-    """Give every face its class, its instance and its material."""
+def label(geometry: Value, class_id: Operand, instance: Operand, material: Value | None = None) -> Value:
+    """Give every face its class, its instance and, if given, its material."""
     labelled = store(geometry, "class_id", class_id, "FACE")
     labelled = store(labelled, "instance_id", instance, "FACE")
+    if material is None:
+        return labelled
     return geometry.tree.node("GeometryNodeSetMaterial", labelled, material=material).value
+
+
+def transform(geometry: Value, **changes: Operand) -> Value:
+    """Return the geometry scaled (``scale``), turned (``rotation``) and moved (``translation``) as a whole."""
+    return geometry.tree.node("GeometryNodeTransform", geometry, **changes).value
 
 
 def realize(geometry: Value) -> Value:

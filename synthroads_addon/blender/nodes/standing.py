@@ -52,7 +52,7 @@ def on_surface(points: Value, road: Value, terrain: Value) -> Value:
     tree = points.tree
     place = op.position(tree)
     height = height_on(op.object_geometry(road), op.object_geometry(terrain), place)
-    flat = tree.node("ShaderNodeVectorMath", place, (1.0, 1.0, 0.0), operation="MULTIPLY").value
+    flat = place * (1.0, 1.0, 0.0)
     return op.set_position(points, raise_place(flat, height + op.named_attribute(tree, "elevation")))
 
 

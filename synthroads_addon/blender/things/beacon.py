@@ -14,7 +14,7 @@ from ..materials import material
 from ..nodes import operations as op
 from ..nodes.backbone import height_on
 from ..nodes.builder import Tree, Value, node_group
-from ..nodes.solids import box, flip_faces, move_geometry, paint_faces, prism, put_on_points
+from ..nodes.solids import box, flip_faces, move_geometry, paint_faces, prism, put_on_points, row_of_points
 from .model_builder import ModelBuilder
 
 CELLS = (2, 8)
@@ -48,7 +48,7 @@ def _build(tree: Tree) -> None:
     with tree.frame("On the surface"):
         place = op.position(tree)
         height = height_on(op.object_geometry(road), op.object_geometry(terrain), place)
-        flat = tree.node("ShaderNodeVectorMath", place, (1.0, 1.0, 0.0), operation="MULTIPLY").value
+        flat = place * (1.0, 1.0, 0.0)
         points = op.set_position(
             points, flat + op.vector(tree, 0.0, 0.0, height + op.named_attribute(tree, "elevation"))
         )
@@ -94,13 +94,11 @@ def _blade(tree: Tree, red: Value, white: Value, side: int) -> Value:
         # Seen from the front they rise to the right. A mirror turns the faces round.
         y = -BEACON_BLADE / 2 - 0.002
         scale = (float(side), 1.0, 1.0)
-        face = tree.node(
-            "GeometryNodeTransform", stripes, translation=(0.0, y if front else -y, 0.0), scale=scale
-        ).value
+        face = op.transform(stripes, translation=(0.0, y if front else -y, 0.0), scale=scale)
         faces.append(face if (side > 0) == front else flip_faces(face))
     mesh = paint_faces(op.join(*faces), white)
     first = (op.named_attribute(tree, "stripe", "INT") % 2).equals(0)
-    mesh = tree.node("GeometryNodeSetMaterial", mesh, first, material=red).value
+    mesh = paint_faces(mesh, red, first)
     plate = box(tree, (1.0, BEACON_BLADE, 1.0), (0.0, 0.0, 0.5))
     return op.join(paint_faces(plate, white), mesh)
 
@@ -115,7 +113,7 @@ def _blade_face(tree: Tree) -> Value:
             corners = [(0.0, 0.0, 0.0), (1.0, 0.0, 1.0), (0.0, 0.0, 1.0)]
         half = tree.node("GeometryNodeMeshCircle", vertices=3, fill_type="NGON").value
         half = op.set_position(half, op.choose(op.index(tree), corners))
-        cells = tree.node("GeometryNodeMeshLine", count=columns * rows).value
+        cells = row_of_points(tree, columns * rows)
         column, row = op.index(tree) % columns, op.index(tree) // columns
         cells = op.store(cells, "stripe", row - column + upper + columns)
         place = op.vector(tree, column / float(columns) - 0.5, 0.0, row / float(rows))
@@ -131,9 +129,7 @@ def _lamp(tree: Tree, housing: Value, lens: Value) -> Value:
     drum = tree.node("GeometryNodeMeshCylinder", vertices=_HEXADECAGON, radius=radius, depth=deep).value
     glass = tree.node("GeometryNodeMeshCylinder", vertices=_HEXADECAGON, radius=radius * 0.85, depth=deep + 0.03).value
     lying = op.turn(tree, x=1.5707963)
-    parts = [
-        tree.node("GeometryNodeTransform", mesh, translation=middle, rotation=lying).value for mesh in (drum, glass)
-    ]
+    parts = [op.transform(mesh, translation=middle, rotation=lying) for mesh in (drum, glass)]
     return op.join(body, paint_faces(parts[0], housing), paint_faces(parts[1], lens))
 
 

@@ -14,7 +14,7 @@ from ..nodes import operations as op
 from ..nodes.backbone import first_station, last_station
 from ..nodes.builder import Tree, Value, node_group
 from ..nodes.foot import foot_at
-from ..nodes.solids import loft
+from ..nodes.solids import loft, row_of_points
 from ..nodes.strip import INSTANCES
 from .model_builder import ModelBuilder
 
@@ -99,7 +99,7 @@ def _rows(tree: Tree, barrier: _Barrier, begin: Value, end: Value, ramp: Value) 
     """
     first, last = barrier.first, barrier.last
     count = op.rounded_up(op.maximum(last - first, 0.01) / barrier.step - 1e-4) + 1
-    line = tree.node("GeometryNodeMeshLine", count=count).value
+    line = row_of_points(tree, count)
     station = op.minimum(first + op.index(tree) * barrier.step, last)
     for kink in (first + ramp, last - ramp):
         near = op.unary("ABSOLUTE", station - kink) < barrier.step * 0.499

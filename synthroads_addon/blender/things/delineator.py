@@ -11,6 +11,7 @@ from ...road.things.body_shapes import DELINEATOR
 from ..materials import material
 from ..nodes import operations as op
 from ..nodes.builder import Tree, Value, node_group
+from ..nodes.solids import paint_faces
 from ..nodes.standing import on_surface, put_on
 from .model_builder import ModelBuilder
 
@@ -55,7 +56,7 @@ def _build(tree: Tree) -> None:
 
 
 def _set_material(mesh: Value, material: Value, selection: Value | bool = True) -> Value:
-    return mesh.tree.node("GeometryNodeSetMaterial", mesh, selection, material=material).value
+    return paint_faces(mesh, material, selection)
 
 
 def _body(tree: Tree, white: Value, black: Value) -> Value:

@@ -108,7 +108,7 @@ def _writing(tree: Tree, phone: _Phone) -> Value:
             op.vector(tree, wide * 0.36, phone.height * _LETTERS[1]),
         )
         letters = tree.call(sign_writing_group(), line_1="SOS", low_corner=low, high_corner=high).value
-        upright = tree.node("GeometryNodeTransform", letters, rotation=(math.pi / 2, 0.0, 0.0)).value
+        upright = op.transform(letters, rotation=(math.pi / 2, 0.0, 0.0))
         upright = move_geometry(upright, op.vector(tree, 0.0, deep * (-0.5 * _BODY_WIDTH) - 0.001))
-        sides.append(tree.node("GeometryNodeTransform", upright, rotation=(0.0, 0.0, turns * math.pi / 2)).value)
+        sides.append(op.transform(upright, rotation=(0.0, 0.0, turns * math.pi / 2)))
     return op.join(*sides)

@@ -20,6 +20,7 @@ from ..materials import material
 from ..nodes import operations as op
 from ..nodes.backbone import first_station, height_on, last_station, look_up, raise_place, station_ribbon
 from ..nodes.builder import Operand, Tree, Value, node_group
+from ..nodes.solids import row_of_points
 from ..nodes.strip import INSTANCES
 from .model_builder import ModelBuilder
 
@@ -142,7 +143,7 @@ def _post_rows(tree: Tree, rail: Rail) -> Value:
     """Return one point per post with its station."""
     number = (rail.last - rail.first) / rail.spacing + 1e-4
     count = tree.node("FunctionNodeFloatToInt", number, rounding_mode="FLOOR").value + 1
-    posts = tree.node("GeometryNodeMeshLine", count=count).value
+    posts = row_of_points(tree, count)
     return op.store(posts, "station", rail.first + op.index(tree) * rail.spacing)
 
 
@@ -158,7 +159,7 @@ def _rows(tree: Tree, rail: Rail, ramp: Value) -> Value:
     middle = op.maximum(op.rounded_up((last - first - ramp) / step - 1e-4) - skipped, 0)
     middle = tree.node("FunctionNodeFloatToInt", middle, rounding_mode="ROUND").value
     # Those that lie on a ramp are left out; where it ends there is a row of its own.
-    line = tree.node("GeometryNodeMeshLine", count=outer * 2 + middle + 2).value
+    line = row_of_points(tree, outer * 2 + middle + 2)
     number = op.index(tree)
     into = first + ramp * (number / op.maximum(outer, 1))
     within = first + (number - outer + skipped - 1) * step
@@ -195,9 +196,7 @@ def _instances(tree: Tree, posts: Value, spacer: Value, beams: dict[float, Value
         # A little shorter than the gap: faces that coincide with the post's or the beam's have no first hit.
         box = tree.node("GeometryNodeMeshCube", size=(0.96, 0.1, 0.22)).value
         middle = op.vector(tree, (spacer * 0.5 + POST_DEPTH) * side, 0.0, -0.155)
-        body = tree.node(
-            "GeometryNodeTransform", box, translation=middle, scale=op.vector(tree, spacer, 1.0, 1.0)
-        ).value
+        body = op.transform(box, translation=middle, scale=op.vector(tree, spacer, 1.0, 1.0))
         parts.append(op.only_if(wanted & (spacer > 1e-3), on_posts(body, tall, 1.0)))
     return parts
 

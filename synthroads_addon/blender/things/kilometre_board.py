@@ -41,7 +41,7 @@ def _build(tree: Tree) -> None:
     with tree.frame("Two faces back to back around the post"):
         plate = tree.call(sign_face_group(), instance=standing.instance, **face).value
         front = move_geometry(plate, op.vector(tree, 0.0, -face["thickness"]))
-        behind = tree.node("GeometryNodeTransform", front, rotation=(0.0, 0.0, math.pi)).value
+        behind = op.transform(front, rotation=(0.0, 0.0, math.pi))
         middle = lower_edge + face["height"] * 0.5
         board = move_geometry(op.join(front, behind), op.vector(tree, 0.0, 0.0, middle))
     with tree.frame("Put onto the points"):

@@ -146,7 +146,7 @@ def _build(tree: Tree) -> None:
 
 def _posts(tree: Tree, wall: _Wall, count: Value, axis: Value, surfaces: tuple[Value, Value]) -> Value:
     """Return the posts as instances; those beyond the backbone, and on an end that the wall passes, are left out."""
-    posts = tree.node("GeometryNodeMeshLine", count=count + 1).value
+    posts = row_of_points(tree, count + 1)
     number = op.index(tree)
     posts = op.store(posts, "station", op.switch(number < count, wall.last, wall.first + number * wall.spacing))
     station, end = op.named_attribute(tree, "station"), last_station(axis)
@@ -168,7 +168,7 @@ def _post(tree: Tree) -> Value:
 
 def _bays(tree: Tree, wall: _Wall, count: Value, axis: Value, surfaces: tuple[Value, Value]) -> Value:
     """Return one point per bay with its number and the ``start`` and ``end`` of its foot, cut with the backbone."""
-    bays = tree.node("GeometryNodeMeshLine", count=count).value
+    bays = row_of_points(tree, count)
     number = op.index(tree)
     start = wall.first + number * wall.spacing
     end = op.switch(number < count - 1, wall.last, start + wall.spacing)
@@ -188,8 +188,8 @@ def _fill_bays(tree: Tree, wall: _Wall, bays: Value, sizes: tuple[Value, Value],
     (gap, plinth), (panel, block) = sizes, bodies
     start, end = (op.named_attribute(tree, name, "FLOAT_VECTOR") for name in ("start", "end"))
     low = op.minimum(op.component(start, "Z"), op.component(end, "Z"))
-    along = tree.node("ShaderNodeVectorMath", end - start, (1.0, 1.0, 0.0), operation="MULTIPLY").value
-    length = op.maximum(tree.node("ShaderNodeVectorMath", along, operation="LENGTH")["Value"] - gap * 2.0, 0.02)
+    along = (end - start) * (1.0, 1.0, 0.0)
+    length = op.maximum(op.length(along) - gap * 2.0, 0.02)
     middle = (start + end) * 0.5
     level = op.vector(tree, op.component(middle, "X"), op.component(middle, "Y"), low + plinth)
     turned = tree.node("FunctionNodeAxesToRotation", (0.0, 0.0, 1.0), along, primary_axis="Z", secondary_axis="X").value
@@ -276,7 +276,7 @@ def _glass_pane(tree: Tree, panel: _Panel) -> Value:
     upright = box(tree, op.vector(tree, _RAIL, deep, tall - 2.0 * _RAIL))
     side = panel.length * 0.5 - _RAIL / 2
     frame = [
-        tree.node("GeometryNodeTransform", part, translation=op.vector(tree, x, 0.0, z)).value
+        op.transform(part, translation=op.vector(tree, x, 0.0, z))
         for part, x, z in (
             (level, 0.0, _RAIL / 2),
             (level, 0.0, tall - _RAIL / 2),

@@ -16,6 +16,7 @@ from ..materials import material
 from ..nodes import operations as op
 from ..nodes.backbone import height_on, look_up, station_ribbon
 from ..nodes.builder import Tree, node_group
+from ..nodes.solids import paint_faces
 from .meshes import attribute, fill_polygons, signed_instance
 from .model_builder import ModelBuilder
 
@@ -46,12 +47,12 @@ def _build(tree: Tree) -> None:
     with tree.frame("On the pavement"):
         surface = op.object_geometry(road)
         height = height_on(surface, surface, plan) + op.named_attribute(tree, "film")
-        flat = tree.node("ShaderNodeVectorMath", plan, (1.0, 1.0, 0.0), operation="MULTIPLY").value
+        flat = plan * (1.0, 1.0, 0.0)
         mesh = op.set_position(outlines, flat + op.vector(tree, 0.0, 0.0, height))
     with tree.frame("Labels"):
         mesh = op.label(mesh, class_id("road_marking"), op.named_attribute(tree, "instance", "INT"), white)
         temporary = op.named_attribute(tree, "yellow") > 0.5
-        mesh = tree.node("GeometryNodeSetMaterial", mesh, temporary, material=yellow).value
+        mesh = paint_faces(mesh, yellow, temporary)
     tree.output("Mesh", mesh, description="Paint whose faces look up")
 
 

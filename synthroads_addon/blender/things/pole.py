@@ -12,7 +12,7 @@ from ...road.parameters import Pole
 from ..materials import material
 from ..nodes import operations as op
 from ..nodes.builder import Tree, Value, node_group
-from ..nodes.solids import box, move_geometry, paint_faces, prism
+from ..nodes.solids import box, move_geometry, paint_faces, prism, row_of_points
 from ..nodes.standing import BURIED, declare_standing, put_on
 from ..nodes.tubes import cone, tube
 from .model_builder import ModelBuilder
@@ -88,7 +88,7 @@ def _mast(tree: Tree, pole: _Pole, top: Value) -> Value:
 
 def _arm(tree: Tree, pole: _Pole, end: Value) -> Value:
     """Return a quarter of an ellipse from the mast's axis to the left and up to its end's height."""
-    line = tree.node("GeometryNodeMeshLine", count=9).value
+    line = row_of_points(tree, 9)
     turn = op.index(tree) * (math.pi / 16.0)
     across = (op.unary("COSINE", turn) - 1.0) * pole.arm
     above = end - _rise(pole) * (1.0 - op.unary("SINE", turn))
@@ -111,7 +111,7 @@ def _luminaire(tree: Tree, pole: _Pole) -> Value:
 def _cameras(tree: Tree, pole: _Pole, mount: Value) -> Value:
     """Return a camera along the road either way, a dome camera at the end of the arm, and a cabinet on the mast."""
     front = move_geometry(_camera(tree, pole), op.vector(tree, 0.0, (pole.diameter + _CAMERA[1]) * -0.5))
-    behind = tree.node("GeometryNodeTransform", front, rotation=(0.0, 0.0, math.pi)).value
+    behind = op.transform(front, rotation=(0.0, 0.0, math.pi))
     pair = move_geometry(op.join(front, behind), op.vector(tree, 0.0, 0.0, mount - 0.3))
     cap = paint_faces(move_geometry(tube(tree, _DOME, 0.14), (0.0, 0.0, -0.17)), pole.housing)
     ball = tree.node("GeometryNodeMeshUVSphere", segments=12, rings=6, radius=_DOME * 0.9).value
@@ -133,7 +133,7 @@ def _camera(tree: Tree, pole: _Pole) -> Value:
         rotation=(math.pi / 2, 0.0, 0.0),
     ).value
     camera = op.join(paint_faces(op.join(box(tree, _CAMERA), shield), pole.housing), paint_faces(lens, pole.glass))
-    return tree.node("GeometryNodeTransform", camera, rotation=(math.radians(8.0), 0.0, 0.0)).value
+    return op.transform(camera, rotation=(math.radians(8.0), 0.0, 0.0))
 
 
 def build_poles(builder: ModelBuilder) -> None:

@@ -14,7 +14,7 @@ from ..nodes import operations as op
 from ..nodes.backbone import first_station, last_station
 from ..nodes.builder import Tree, Value, node_group
 from ..nodes.foot import foot_at
-from ..nodes.solids import box, loft, paint_faces, put_on_points
+from ..nodes.solids import box, loft, paint_faces, put_on_points, row_of_points
 from ..nodes.strip import INSTANCES
 from .model_builder import ModelBuilder
 
@@ -96,7 +96,7 @@ def _elements(tree: Tree, barrier: _TemporaryBarrier, begin: Value, end: Value) 
     """Return one point per element with its number and the stations that it lies between."""
     whole = (barrier.last - barrier.first) / barrier.length - SHORTEST_ELEMENT
     count = op.rounded_up(op.maximum(whole, 1.0))
-    points = op.store(tree.node("GeometryNodeMeshLine", count=count).value, "number", op.index(tree))
+    points = op.store(row_of_points(tree, count), "number", op.index(tree))
     start = barrier.first + op.index(tree) * barrier.length
     stop = op.switch(op.index(tree) < count - 1, barrier.last, start + barrier.length)
     for name, station in {"from": start + TEMPORARY_GAP / 2, "to": stop - TEMPORARY_GAP / 2}.items():
@@ -141,7 +141,7 @@ def _put_on_elements(tree: Tree, points: Value, body: Value, whole: bool) -> Val
     turned = tree.node("FunctionNodeAxesToRotation", end - start, (0.0, 0.0, 1.0), primary_axis="X", secondary_axis="Z")
     if not whole:
         return put_on_points(points, body, (start + end) * 0.5, 1.0, turned.value)
-    length = tree.node("ShaderNodeVectorMath", end - start, operation="LENGTH")["Value"]
+    length = op.length(end - start)
     return put_on_points(points, body, start, op.vector(tree, length, 1.0, 1.0), turned.value)
 
 

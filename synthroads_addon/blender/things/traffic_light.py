@@ -116,7 +116,7 @@ def _lamps(tree: Tree, light: _Light) -> Value:
     """Return the domed glasses."""
     wide = light.diameter
     dome = cone(tree, wide * 0.5, wide * 0.22, wide * 0.12)
-    dome = tree.node("GeometryNodeTransform", dome, rotation=(math.pi / 2, 0.0, 0.0)).value
+    dome = op.transform(dome, rotation=(math.pi / 2, 0.0, 0.0))
     number = op.index(tree)
     points = op.store(row_of_points(tree, light.count), "number", number)
     lamps = op.realize(put_on_points(points, dome, op.vector(tree, 0.0, _front(light), light.level(number))))
@@ -124,7 +124,7 @@ def _lamps(tree: Tree, light: _Light) -> Value:
     red, yellow, green = light.lamps
     is_green = (number > 0) & number.equals(op.rounded_up(op.minimum(light.count, 3.0)) - 1)
     for glass, chosen in ((yellow, True), (red, number.equals(0)), (green, is_green)):
-        lamps = tree.node("GeometryNodeSetMaterial", lamps, chosen, material=glass).value
+        lamps = paint_faces(lamps, glass, chosen)
     return lamps
 
 
@@ -138,7 +138,7 @@ def _visor(tree: Tree, diameter: Value) -> Value:
     def outline(number: Value) -> Value:
         point = op.choose(number, outer + inner)
         radius = diameter * 0.56 - op.component(point, "Y") * _VISOR_THICKNESS
-        flat = tree.node("ShaderNodeVectorMath", point, (1.0, 0.0, 1.0), operation="MULTIPLY").value
+        flat = point * (1.0, 0.0, 1.0)
         return flat * radius
 
     def place(point: Value, row: Value) -> Value:

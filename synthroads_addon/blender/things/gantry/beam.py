@@ -43,9 +43,9 @@ def _build(tree: Tree) -> None:
         lattice = op.join(_chords(tree, length, height, depth), _lattice(tree, length, height, depth))
     with tree.frame("Tube"):
         round_ = tree.node("GeometryNodeMeshCylinder", vertices=_TUBE_SIDES, radius=0.5, depth=1.0).value
-        lying = tree.node("GeometryNodeTransform", round_, rotation=op.turn(tree, y=math.pi / 2)).value
+        lying = op.transform(round_, rotation=op.turn(tree, y=math.pi / 2))
         size = op.vector(tree, length, depth, height)
-        tube = tree.node("GeometryNodeTransform", lying, translation=middle, scale=size).value
+        tube = op.transform(lying, translation=middle, scale=size)
     with tree.frame("Bolted joints of box and tube"):
         joints = _joints(tree, kind, length, height, depth)
     with tree.frame("The chosen one"):
@@ -98,7 +98,7 @@ def _joints(tree: Tree, kind: Value, length: Value, height: Value, depth: Value)
     place = op.vector(tree, (op.index(tree) + 1) * (length / pieces), 0.0, height * 0.5)
     plate = box(tree, op.vector(tree, 0.08, depth + 0.06, height * 0.97))
     ring = tree.node("GeometryNodeMeshCylinder", vertices=_TUBE_SIDES, radius=0.5, depth=0.08).value
-    ring = tree.node("GeometryNodeTransform", ring, rotation=op.turn(tree, y=math.pi / 2)).value
-    ring = tree.node("GeometryNodeTransform", ring, scale=op.vector(tree, 1.0, depth + 0.08, height * 0.995)).value
+    ring = op.transform(ring, rotation=op.turn(tree, y=math.pi / 2))
+    ring = op.transform(ring, scale=op.vector(tree, 1.0, depth + 0.08, height * 0.995))
     flange = op.join(op.only_if(kind.equals(0), plate), op.only_if(kind.equals(2), ring))
     return put_on_points(points, flange, place)

@@ -53,7 +53,7 @@ def _build(tree: Tree) -> None:
         deck = paint_faces(_deck(tree, ends, width, height), concrete)
     with tree.frame("Edge beam"):
         beam = paint_faces(_edge_beam(tree, (start, end), width, height), edge)
-        beams = op.join(beam, flip_faces(tree.node("GeometryNodeTransform", beam, scale=(1.0, -1.0, 1.0)).value))
+        beams = op.join(beam, flip_faces(op.transform(beam, scale=(1.0, -1.0, 1.0))))
     with tree.frame("Pavement between the edge beams"):
         size = op.vector(tree, end - start, width * (1.0 - 1.96 * EDGE), PAVEMENT)
         road = box(tree, size, op.vector(tree, (start + end) * 0.5, 0.0, height - PAVEMENT / 2))

@@ -109,7 +109,7 @@ def _crown(tree: Tree, bank: _Bank, asphalt: Value, grass: Value) -> Value:
     ground = tree.node("FunctionNodeInputInt", integer=class_id("ground")).value
     label = op.switch(middle, ground, class_id("bridge"))
     mesh = op.store(paint_faces(mesh, grass), "class_id", label, "FACE")
-    return tree.node("GeometryNodeSetMaterial", mesh, middle, material=asphalt).value
+    return paint_faces(mesh, asphalt, middle)
 
 
 def _slope(tree: Tree, bank: _Bank, across: float) -> Value:
@@ -128,7 +128,7 @@ def _slope(tree: Tree, bank: _Bank, across: float) -> Value:
         ray_length=200.0,
     )
     nearest = op.component(op.sample_surface(bank.ground, op.position(tree), crown), "Z")
-    run = tree.node("ShaderNodeVectorMath", down, operation="LENGTH")["Value"]
+    run = op.length(down)
     fall = op.switch(
         ray["Is Hit"],
         op.minimum(op.maximum(op.component(crown, "Z") - nearest, 0.3), 30.0),

@@ -157,7 +157,7 @@ def _abutment(bridge: _Overpass, low: Value, feet: dict[float, Value], wings: di
         steel_material=bridge.materials["Steel"],
     ).value
     if side < 0.0:
-        made = flip_faces(tree.node("GeometryNodeTransform", made, scale=(-1.0, 1.0, 1.0)).value)
+        made = flip_faces(op.transform(made, scale=(-1.0, 1.0, 1.0)))
     return move_geometry(made, op.vector(tree, bridge.faces[side], 0.0, low))
 
 

@@ -7,6 +7,7 @@ import bpy
 from ...nodes import operations as op
 from ...nodes.backbone import last_station, look_up, station_ribbon
 from ...nodes.builder import Tree, Value, node_group
+from ...nodes.solids import row_of_points
 from ...nodes.strip import FAR, INSTANCES, strip_group
 
 _EDGES = ("edge_left", "edge_right", "edge_left_height", "edge_right_height")
@@ -85,7 +86,7 @@ def _with_ends(tree: Tree, backbone: Value, dashes: tuple[Value, Value, Value, V
     first, end, length, period, count = dashes
     ribbon = station_ribbon(backbone, _EDGES)
     with tree.frame("Ends of the dashes as rows of their own"):
-        points = tree.node("GeometryNodeMeshLine", count=count * 2).value
+        points = row_of_points(tree, count * 2)
         number = op.index(tree)
         wanted = op.minimum(first + (number // 2) * period + (number % 2) * length, end)
         near = tree.node("GeometryNodeSampleNearest", ribbon, op.vector(tree, wanted), domain="POINT").value

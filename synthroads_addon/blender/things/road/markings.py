@@ -20,7 +20,7 @@ def markings_group(layout: SideLayout) -> bpy.types.NodeTree:
     """Return the group SR Left Markings or SR Right Markings for these lines."""
     return node_group(
         f"SR {layout.side} Markings",
-        lambda tree: _build(tree, layout),
+        _build,
         layout,
         description="Line markings of one side, each on its boundary",
     )

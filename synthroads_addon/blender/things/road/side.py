@@ -23,7 +23,7 @@ def side_group(layout: SideLayout) -> bpy.types.NodeTree:
     """Return the group SR Left Carriageway or SR Right Carriageway for these lanes and turnouts."""
     return node_group(
         f"SR {layout.side} Carriageway",
-        lambda tree: _build(tree, layout),
+        _build,
         layout,
         description="Pavement and verge of one side, live from their widths",
     )

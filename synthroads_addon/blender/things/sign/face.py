@@ -116,9 +116,7 @@ def _build(tree: Tree) -> None:
     with tree.frame("Writing and pictogram"):
         drawn = [move_geometry(part, (0.0, 0.0, RAISED)) for part in _draw_writing(tree, face)]
     with tree.frame("Upright, and labelled"):
-        mesh = tree.node(
-            "GeometryNodeTransform", op.join(back, *front, *drawn), rotation=(math.pi / 2.0, 0.0, 0.0)
-        ).value
+        mesh = op.transform(op.join(back, *front, *drawn), rotation=(math.pi / 2.0, 0.0, 0.0))
         mesh = op.store(op.store(mesh, "class_id", class_id("road_sign"), "FACE"), "instance_id", instance, "FACE")
     tree.output("Mesh", mesh, description="Plate; its front is at y = 0")
 

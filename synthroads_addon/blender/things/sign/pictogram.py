@@ -31,7 +31,7 @@ def _build(tree: Tree) -> None:
     with tree.frame("Corners of its polygons out of the table of all"):
         first, count, others = (op.rounded_up(op.component(op.choose(wanted, ranges), axis)) for axis in "XYZ")
         corner = op.choose(op.index(tree) + first, corners)
-        place = tree.node("ShaderNodeVectorMath", corner, (1.0, 1.0, 0.0), operation="MULTIPLY").value
+        place = corner * (1.0, 1.0, 0.0)
         points = tree.node("GeometryNodePoints", count=count, position=place).value
         polygon = op.rounded_up(op.component(corner, "Z"))
         curves = tree.node("GeometryNodePointsToCurves", points, curve_group_id=polygon).value
@@ -50,9 +50,7 @@ def _build(tree: Tree) -> None:
             op.component(room, "Y") / op.maximum(op.component(size, "Y"), 1e-3),
         )
         middle = (low + high) * 0.5 - (extent["Max"] + extent["Min"]) * (scale * 0.5)
-        mesh = tree.node(
-            "GeometryNodeTransform", mesh, translation=middle, scale=op.vector(tree, scale, scale, 1.0)
-        ).value
+        mesh = op.transform(mesh, translation=middle, scale=op.vector(tree, scale, scale, 1.0))
     tree.output("Mesh", mesh, description="Pictogram, facing +z")
 
 

@@ -74,7 +74,5 @@ def _lattice(tree: Tree, radius: Value, height: Value) -> Value:
     start = corner(side + odd) + op.vector(tree, 0.0, 0.0, panel * _PANEL)
     end = corner(side + 1 - odd) + op.vector(tree, 0.0, 0.0, (panel + 1) * _PANEL)
     diagonals = bars(row_of_points(tree, panels * 3), start, end, _DIAGONAL)
-    squeezed = tree.node(
-        "GeometryNodeTransform", diagonals, scale=op.vector(tree, 1.0, 1.0, 1.0 / (panels * _PANEL))
-    ).value
+    squeezed = op.transform(diagonals, scale=op.vector(tree, 1.0, 1.0, 1.0 / (panels * _PANEL)))
     return op.join(chords, squeezed)

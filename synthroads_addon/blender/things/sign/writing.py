@@ -57,7 +57,7 @@ def _build(tree: Tree) -> None:
             left = op.component(low, "X") + op.switch(flush, (room - line["Length"] * size) * 0.5, 0.0)
             base = op.component(high, "Y") - pitch * (above[number] + 0.5) - size * (CAPITAL / 2.0)
             place, scale = op.vector(tree, left, base), op.vector(tree, size, size, 1.0)
-            placed.append(tree.node("GeometryNodeTransform", line.value, translation=place, scale=scale).value)
+            placed.append(op.transform(line.value, translation=place, scale=scale))
     with tree.frame("Filled"):
         mesh = op.realize(tree.node("GeometryNodeFillCurve", op.join(*placed)).value)
         mesh = op.only_if(size * CAPITAL > _SMALLEST, mesh)

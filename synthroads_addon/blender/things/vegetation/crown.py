@@ -6,6 +6,7 @@ import bpy
 
 from ...nodes import operations as op
 from ...nodes.builder import Tree, Value, node_group
+from ...nodes.solids import paint_faces
 from .plants import one_high
 
 _GOLDEN_ANGLE = 2.4
@@ -83,8 +84,8 @@ def _build(tree: Tree) -> None:
     with tree.frame("Leaves around the outer parts of the branches"):
         leaves = _leaves(tree, points, shape, seed, plant["detail"])
     with tree.frame("Materials"):
-        wood = tree.node("GeometryNodeSetMaterial", wood, material=plant["bark_material"]).value
-        leaves = tree.node("GeometryNodeSetMaterial", leaves, material=plant["leaves_material"]).value
+        wood = paint_faces(wood, plant["bark_material"])
+        leaves = paint_faces(leaves, plant["leaves_material"])
     tree.output("Mesh", op.join(wood, leaves), description="Branches and leaves, upright on the origin")
 
 
@@ -111,8 +112,8 @@ def _log(value: float, base: Value) -> Value:
 
 def _beginnings(tree: Tree, shape: dict[str, Value], ground: Value, end: Value, seed: Value) -> Value:
     height = op.component(end, "Z")
-    flat = tree.node("ShaderNodeVectorMath", end, (1.0, 1.0, 0.0), operation="MULTIPLY").value
-    reach = tree.node("ShaderNodeVectorMath", flat, operation="LENGTH")["Value"]
+    flat = end * (1.0, 1.0, 0.0)
+    reach = op.length(flat)
     lowest = shape["crown_bottom"] * 0.9
     on_stem = op.minimum(op.maximum(height - reach * shape["branch_rise"], lowest), 0.95)
     below = flat * 0.18 + op.vector(tree, 0.0, 0.0, -0.02)
@@ -121,7 +122,7 @@ def _beginnings(tree: Tree, shape: dict[str, Value], ground: Value, end: Value, 
 
 def _branches(tree: Tree, points: Value, thick: Value) -> Value:
     along = op.named_attribute(tree, "end", "FLOAT_VECTOR") - op.position(tree)
-    length = tree.node("ShaderNodeVectorMath", along, operation="LENGTH")["Value"]
+    length = op.length(along)
     width = thick * (1.0 - op.named_attribute(tree, "share") * 0.6)
     cone = tree.node(
         "GeometryNodeMeshCone",
@@ -174,7 +175,7 @@ def _leaf(tree: Tree, length: Value, width: Value) -> Value:
     face = tree.node("GeometryNodeMeshCircle", vertices=3, fill_type="NGON").value
     outline = op.choose(op.index(tree), _LEAF)
     size = op.vector(tree, width, length, 1.0)
-    return op.set_position(face, tree.node("ShaderNodeVectorMath", outline, size, operation="MULTIPLY").value)
+    return op.set_position(face, outline * size)
 
 
 def _in_ball(tree: Tree, seed: Value, identifier: Value) -> Value:
@@ -189,5 +190,5 @@ def bend_stems(tree: Tree, plant: Value, seed: Value) -> Value:
     place = op.position(tree)
     bent = tree.node("ShaderNodeTexNoise", place, noise_dimensions="4D", w=seed, scale=2.5, detail=1.0)
     aside = (bent["Color"] - (0.5, 0.5, 0.5)) * (op.minimum(op.component(place, "Z") * 4.0, 1.0) * (2.0 * _CROOKED))
-    flat = tree.node("ShaderNodeVectorMath", aside, (1.0, 1.0, 0.0), operation="MULTIPLY").value
+    flat = aside * (1.0, 1.0, 0.0)
     return one_high(tree.node("GeometryNodeSetPosition", plant, offset=flat).value)

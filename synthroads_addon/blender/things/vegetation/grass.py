@@ -92,7 +92,7 @@ def _build_tuft(tree: Tree) -> None:
         stalks = _around(tree, stalk, shape["stalks"], shape["spread"] * 0.6, shape["lean"] * 0.3, seed + 50)
     with tree.frame("Blades of their height, all 1 high"):
         low = op.vector(tree, 1.0, 1.0, shape["blade_height"])
-        place = tree.node("ShaderNodeVectorMath", op.position(tree), low, operation="MULTIPLY").value
+        place = op.position(tree) * low
         blades = op.set_position(blades, place)
         tuft = one_high(op.join(blades, stalks))
     tree.output("Mesh", tuft, description="The tuft's blades")
@@ -101,7 +101,7 @@ def _build_tuft(tree: Tree) -> None:
 def _shape_blade(face: Value, outline: list[tuple[float, float, float]], width: Value) -> Value:
     tree = face.tree
     size = op.vector(tree, 1.0, width, 1.0)
-    place = tree.node("ShaderNodeVectorMath", op.choose(op.index(tree), outline), size, operation="MULTIPLY").value
+    place = op.choose(op.index(tree), outline) * size
     return op.set_position(face, place)
 
 

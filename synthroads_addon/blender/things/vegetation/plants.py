@@ -154,5 +154,5 @@ def one_high(plant: Value) -> Value:
     tree = plant.tree
     top = op.component(tree.node("GeometryNodeBoundBox", plant)["Max"], "Z")
     size = op.vector(tree, 1.0, 1.0, 1.0 / top)
-    place = tree.node("ShaderNodeVectorMath", op.position(tree), size, operation="MULTIPLY").value
+    place = op.position(tree) * size
     return op.set_position(plant, place)

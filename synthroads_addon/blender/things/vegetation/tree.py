@@ -7,6 +7,7 @@ import bpy
 from ....base.classes import class_id
 from ...nodes import operations as op
 from ...nodes.builder import Tree, Value, node_group
+from ...nodes.solids import paint_faces
 from .crown import bend_stems, crown_group, declare_crown, declare_materials, declare_plant
 from .plants import declare_stand, plant_points, points_in_band
 
@@ -66,7 +67,7 @@ def _build_shape(tree: Tree) -> None:
     plant = declare_plant(tree)
     with tree.frame("Trunk, with a wider foot"):
         trunk = _trunk(tree, radius)
-        trunk = tree.node("GeometryNodeSetMaterial", trunk, material=plant["bark_material"]).value
+        trunk = paint_faces(trunk, plant["bark_material"])
     with tree.frame("Crown"):
         crown = tree.call(crown_group(), **shape, **plant, branch_radius=radius * 0.4).value
     with tree.frame("Crooked, and 1 high"):
@@ -88,5 +89,5 @@ def _trunk(tree: Tree, radius: Value) -> Value:
     height = op.component(place, "Z")
     wider = 1.0 + 0.45 * op.maximum(1.0 - height * 12.0, 0.0)
     size = op.vector(tree, wider, wider, 1.0)
-    place = tree.node("ShaderNodeVectorMath", place, size, operation="MULTIPLY").value
+    place = place * size
     return op.set_position(trunk, place - (0.0, 0.0, _FOOT))

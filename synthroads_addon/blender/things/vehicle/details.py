@@ -9,7 +9,7 @@ import bpy
 
 from ...nodes import operations as op
 from ...nodes.builder import Tree, Value, node_group
-from ...nodes.solids import Point, box, move_geometry, paint_faces, put_on_points
+from ...nodes.solids import Point, box, move_geometry, paint_faces, put_on_points, row_of_points
 
 MATERIALS = {
     "paint": "Paint, in the vehicle's colour",
@@ -48,7 +48,7 @@ def wheels(
     inputs = {"rubber_material": materials["rubber"], "chrome_material": materials["chrome"]}
     wheel = tree.call(_wheel_group(), radius=radius, wheel_width=width, **inputs).value
     stands = [(x, y, radius) for x, y in places]
-    points = tree.node("GeometryNodeMeshLine", count=len(stands)).value
+    points = row_of_points(tree, len(stands))
     place = op.choose(op.index(tree), stands)
     turned = op.switch(op.component(place, "X") < 0.0, math.pi, 0.0)
     return op.realize(put_on_points(points, wheel, place, rotation=op.turn(tree, z=turned)))
@@ -90,7 +90,7 @@ def rod(
 def ball(tree: Tree, middle: Point, size: Point, material: Value) -> Value:
     """Return an ellipsoid of half axes `size`."""
     sphere = tree.node("GeometryNodeMeshUVSphere", segments=12, rings=8, radius=1.0).value
-    return paint_faces(tree.node("GeometryNodeTransform", sphere, translation=middle, scale=size).value, material)
+    return paint_faces(op.transform(sphere, translation=middle, scale=size), material)
 
 
 def smooth(vehicle: Value) -> Value:
@@ -123,7 +123,7 @@ def _build_wheel(tree: Tree) -> None:
     with tree.frame("Tyre and rim"):
         wheel = paint_faces(wheel, rubber)
         rim = (op.index(tree) % (len(_WHEEL) - 1)) < _RIM_FACES
-        wheel = tree.node("GeometryNodeSetMaterial", wheel, rim, material=chrome).value
+        wheel = paint_faces(wheel, chrome, rim)
     tree.output("Mesh", wheel, description="The wheel")
 
 
@@ -158,7 +158,7 @@ def _build_rod(tree: Tree) -> None:
 
     def between(first: Value, last: Value) -> Value:
         way = last - first
-        length = tree.node("ShaderNodeVectorMath", way, operation="LENGTH")["Value"]
+        length = op.length(way)
         cone = tree.node(
             "GeometryNodeMeshCone",
             fill_type="NGON",
@@ -168,7 +168,7 @@ def _build_rod(tree: Tree) -> None:
             depth=length,
         ).value
         turned = tree.node("FunctionNodeAlignRotationToVector", vector=way, axis="Z").value
-        body = tree.node("GeometryNodeTransform", cone, translation=first, rotation=turned).value
+        body = op.transform(cone, translation=first, rotation=turned)
         return paint_faces(body, material)
 
     with tree.frame("Rod"):
@@ -184,4 +184,4 @@ def _declare_sides(tree: Tree) -> tuple[Value, Value]:
 
 
 def _mirror(place: Value) -> Value:
-    return place.tree.node("ShaderNodeVectorMath", place, (-1.0, 1.0, 1.0), operation="MULTIPLY").value
+    return place * (-1.0, 1.0, 1.0)

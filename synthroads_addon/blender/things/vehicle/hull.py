@@ -101,7 +101,7 @@ def hull(tree: Tree, shape: Hull, materials: Mapping[str, Value]) -> Value:
     band = op.switch(face_column > _BANDS - 1, face_column, 2 * _BANDS - 1 - face_column)
     for patch in shape.patches:
         chosen = _in_patch(patch, table[:, 9], face_row, band)
-        mesh = tree.node("GeometryNodeSetMaterial", mesh, chosen, material=materials[patch.material]).value
+        mesh = paint_faces(mesh, materials[patch.material], chosen)
     return op.without_degenerate(mesh)
 
 

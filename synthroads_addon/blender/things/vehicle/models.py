@@ -19,7 +19,7 @@ Materials = Mapping[str, Value]
 def model_group(model: str) -> bpy.types.NodeTree:
     """Return the group of a model of vehicle, e.g. SR Car."""
     description = f"A {model}, its wheels on the ground, facing along +y"
-    return node_group(f"SR {model.title()}", lambda tree: _build(tree, model), model, description=description)
+    return node_group(f"SR {model.title()}", _build, model, description=description)
 
 
 def _build(tree: Tree, model: str) -> None:

@@ -21,7 +21,7 @@ _POINTS = (
 def vehicle_group(model: str) -> bpy.types.NodeTree:
     """Return the group that places vehicles of a model, e.g. SR Vehicles Car."""
     description = f"A {model} on each point; points carry heading (rad), {COLOR} and instance"
-    return node_group(f"SR Vehicles {model.title()}", lambda tree: _build(tree, model), model, description=description)
+    return node_group(f"SR Vehicles {model.title()}", _build, model, description=description)
 
 
 def _build(tree: Tree, model: str) -> None:
@@ -102,5 +102,5 @@ def _on_road(road: Value, place: Value, way: Value) -> Value:
     nearest = op.sample_surface(road, op.position(tree), place)
     beyond = op.component(nearest, "Z") + op.dot(place - nearest, way) * op.named_attribute(tree, "grade")
     height = op.switch(ray["Is Hit"], beyond, op.component(ray["Hit Position"], "Z"))
-    flat = tree.node("ShaderNodeVectorMath", place, (1.0, 1.0, 0.0), operation="MULTIPLY").value
+    flat = place * (1.0, 1.0, 0.0)
     return flat + op.vector(tree, 0.0, 0.0, height)
