@@ -2,18 +2,11 @@
 
 from __future__ import annotations
 
-import bpy
-
 from . import operations as op
 from .backbone import height_on, look_up, raise_place, station_ribbon
-from .builder import Operand, Tree, Value, node_group
+from .builder import Operand, Tree, Value, makes_group
 
 FAR = (-1000.0, 1000.0)
-
-
-def foot_group() -> bpy.types.NodeTree:
-    """Return the group SR Foot."""
-    return node_group("SR Foot", _build)
 
 
 def foot_at(backbone: Value, surfaces: tuple[Value, Value], station: Value, offset: Operand) -> tuple[Value, Value]:
@@ -30,7 +23,8 @@ def foot_at(backbone: Value, surfaces: tuple[Value, Value], station: Value, offs
     return node["Foot"], node["Left"]
 
 
-def _build(tree: Tree) -> None:
+@makes_group("SR Foot")
+def foot_group(tree: Tree) -> None:
     """The point on the surface at a station and an offset, both of which may be fields."""
     backbone = tree.input("Backbone", "Geometry", description="Polyline along the axis with its attributes")
     road = tree.input("Road", "Geometry", description="Surface of the road")

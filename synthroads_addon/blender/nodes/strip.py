@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import bpy
-
 from . import operations as op
 from .backbone import limit_offset, row
-from .builder import Tree, node_group
+from .builder import Tree, makes_group
 
 _DETAIL = (
     "Finer columns: a point per column and row (row by row within a column, from the left), with the attributes share "
@@ -21,12 +19,8 @@ INSTANCES = (-(2**31), 2**31 - 1)
 """Limits of instance numbers: 32 bits, with a sign in the nodes and without one elsewhere."""
 
 
-def strip_group() -> bpy.types.NodeTree:
-    """Return the group SR Strip."""
-    return node_group("SR Strip", _build)
-
-
-def _build(tree: Tree) -> None:
+@makes_group("SR Strip")
+def strip_group(tree: Tree) -> None:
     """A ribbon along a backbone between two offsets, each at its own height above the axis.
 
     Offsets and heights may be fields on the backbone's points.

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 
-import bpy
 import numpy as np
 
 from ...base.classes import class_id
@@ -13,7 +12,7 @@ from ...road.things.body_shapes import BEACON_BLADE, BEACON_BLADE_BOTTOM, BEACON
 from ..materials import material
 from ..nodes import operations as op
 from ..nodes.backbone import height_on
-from ..nodes.builder import Tree, Value, node_group
+from ..nodes.builder import Tree, Value, makes_group
 from ..nodes.solids import box, flip_faces, move_geometry, paint_faces, prism, put_on_points, row_of_points
 from .model_builder import ModelBuilder
 
@@ -23,12 +22,8 @@ _LENS = (0.095, 0.075)
 _HEXADECAGON = 16
 
 
-def beacon_group() -> bpy.types.NodeTree:
-    """Return the group SR Beacon."""
-    return node_group("SR Beacon", _build)
-
-
-def _build(tree: Tree) -> None:
+@makes_group("SR Beacon")
+def beacon_group(tree: Tree) -> None:
     """A beacon on each point; points carry ``heading`` (rad), ``elevation``, ``width``, ``height``, ``pass_side``."""
     points = tree.input("Points", "Geometry", description="One point per beacon, at any height; pass_side +1 is left")
     road = tree.input("Road", "Object", description="Surface that the beacons stand on")

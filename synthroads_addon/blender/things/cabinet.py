@@ -4,13 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import bpy
-
 from ...base.classes import class_id
 from ...road.parameters import Cabinet
 from ..materials import material
 from ..nodes import operations as op
-from ..nodes.builder import Tree, Value, node_group
+from ..nodes.builder import Tree, Value, makes_group
 from ..nodes.solids import box, paint_faces, put_on_points, row_of_points
 from ..nodes.standing import declare_standing, put_on
 from .emergency_phone import emergency_phone_group
@@ -44,12 +42,8 @@ class _Cabinet:
     height: Value
 
 
-def cabinet_group() -> bpy.types.NodeTree:
-    """Return the group SR Cabinet."""
-    return node_group("SR Cabinet", _build)
-
-
-def _build(tree: Tree) -> None:
+@makes_group("SR Cabinet")
+def cabinet_group(tree: Tree) -> None:
     """A utility cabinet, its doors towards those who drive along +y; points carry ``heading`` and ``elevation``."""
     standing = declare_standing(tree)
     cabinet = _Cabinet(

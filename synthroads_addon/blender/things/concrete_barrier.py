@@ -12,7 +12,7 @@ from ...road.things.body_shapes import CONCRETE_FLANKS, CONCRETE_TIP
 from ..materials import material
 from ..nodes import operations as op
 from ..nodes.backbone import first_station, last_station
-from ..nodes.builder import Tree, Value, node_group
+from ..nodes.builder import Tree, Value, makes_group
 from ..nodes.foot import foot_at
 from ..nodes.solids import loft, row_of_points
 from ..nodes.strip import INSTANCES
@@ -20,11 +20,6 @@ from .model_builder import ModelBuilder
 
 BURIED = 0.1
 """Depth of the foot below the surface, m."""
-
-
-def concrete_barrier_group() -> bpy.types.NodeTree:
-    """Return the group SR Concrete Barrier."""
-    return node_group("SR Concrete Barrier", _build)
 
 
 def _outline(profile: str) -> list[tuple[float, float, float]]:
@@ -61,7 +56,8 @@ def _declare(tree: Tree) -> _Barrier:
     )
 
 
-def _build(tree: Tree) -> None:
+@makes_group("SR Concrete Barrier")
+def concrete_barrier_group(tree: Tree) -> None:
     """A concrete barrier along the road, symmetric about its axis, with ramped ends."""
     backbone = tree.input("Backbone", "Object", description="Polyline along the axis with its attributes")
     road = tree.input("Road", "Object", description="Surface that the barrier stands on")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import bpy
 import numpy as np
 
 from ...base.classes import class_id
@@ -10,7 +9,7 @@ from ...road.parameters import Delineator
 from ...road.things.body_shapes import DELINEATOR
 from ..materials import material
 from ..nodes import operations as op
-from ..nodes.builder import Tree, Value, node_group
+from ..nodes.builder import Tree, Value, makes_group
 from ..nodes.solids import paint_faces
 from ..nodes.standing import on_surface, put_on
 from .model_builder import ModelBuilder
@@ -28,12 +27,8 @@ _UNDER, _PROUD = 0.001, 0.004
 """How far reflectors reach into the post, and out of it, m."""
 
 
-def delineator_group() -> bpy.types.NodeTree:
-    """Return the group SR Delineator."""
-    return node_group("SR Delineator", _build)
-
-
-def _build(tree: Tree) -> None:
+@makes_group("SR Delineator")
+def delineator_group(tree: Tree) -> None:
     """A delineator post on each point; points carry ``heading``, ``elevation``, ``height`` and ``instance``."""
     points = tree.input("Points", "Geometry", description="One point per post, at any height")
     road = tree.input("Road", "Object", description="Surface that the posts stand on")

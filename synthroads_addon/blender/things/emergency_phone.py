@@ -5,11 +5,9 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-import bpy
-
 from ...base.classes import class_id
 from ..nodes import operations as op
-from ..nodes.builder import Tree, Value, node_group
+from ..nodes.builder import Tree, Value, makes_group
 from ..nodes.solids import Point, box, loft, move_geometry, paint_faces
 from ..nodes.standing import BURIED, declare_standing, put_on
 from ..nodes.tubes import tube
@@ -34,12 +32,8 @@ class _Phone:
     height: Value
 
 
-def emergency_phone_group() -> bpy.types.NodeTree:
-    """Return the group SR Emergency Phone."""
-    return node_group("SR Emergency Phone", _build)
-
-
-def _build(tree: Tree) -> None:
+@makes_group("SR Emergency Phone")
+def emergency_phone_group(tree: Tree) -> None:
     """An emergency telephone, its front towards those who drive along +y; points carry ``heading``, ``elevation``."""
     standing = declare_standing(tree)
     phone = _Phone(

@@ -19,7 +19,7 @@ from ...road.things.body_shapes import (
 from ..materials import material
 from ..nodes import operations as op
 from ..nodes.backbone import first_station, height_on, last_station, look_up, raise_place, station_ribbon
-from ..nodes.builder import Operand, Tree, Value, node_group
+from ..nodes.builder import Operand, Tree, Value, makes_group
 from ..nodes.solids import row_of_points
 from ..nodes.strip import INSTANCES
 from .model_builder import ModelBuilder
@@ -36,11 +36,6 @@ POST_DEPTH = _HALF
 """From a post's axis to the back of a beam that is bolted to it, m."""
 BURIED = 0.35
 """Depth to which posts are modelled below the surface, m."""
-
-
-def guardrail_group() -> bpy.types.NodeTree:
-    """Return the group SR Guardrail."""
-    return node_group("SR Guardrail", _build)
 
 
 @dataclass(frozen=True)
@@ -97,7 +92,8 @@ def _declare(tree: Tree) -> Rail:
     )
 
 
-def _build(tree: Tree) -> None:
+@makes_group("SR Guardrail")
+def guardrail_group(tree: Tree) -> None:
     """A steel guardrail along the road: W-beams, posts and spacers, with ramped terminals."""
     backbone = tree.input("Backbone", "Object", description="Polyline along the axis with its attributes")
     road = tree.input("Road", "Object", description="Surface that the guardrail stands on")

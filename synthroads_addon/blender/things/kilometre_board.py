@@ -4,14 +4,12 @@ from __future__ import annotations
 
 import math
 
-import bpy
-
 from ...base.classes import class_id
 from ...road.parameters import KilometreBoard
 from ...road.things.body_shapes import KILOMETRE_POST
 from ..materials import material
 from ..nodes import operations as op
-from ..nodes.builder import Tree, node_group
+from ..nodes.builder import Tree, makes_group
 from ..nodes.solids import move_geometry
 from ..nodes.standing import declare_standing, put_on
 from .model_builder import ModelBuilder
@@ -24,12 +22,8 @@ _THICKNESS = 0.024
 """Thickness of either half of a board, m."""
 
 
-def kilometre_board_group() -> bpy.types.NodeTree:
-    """Return the group SR Kilometre Board."""
-    return node_group("SR Kilometre Board", _build)
-
-
-def _build(tree: Tree) -> None:
+@makes_group("SR Kilometre Board")
+def kilometre_board_group(tree: Tree) -> None:
     """A board on a post, read from both sides; points carry ``heading`` (rad) and ``elevation`` (m)."""
     standing = declare_standing(tree)
     face = declare_face(tree)

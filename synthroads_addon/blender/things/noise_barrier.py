@@ -13,7 +13,7 @@ from ...road.things.body_shapes import SHORTEST_ELEMENT
 from ..materials import material
 from ..nodes import operations as op
 from ..nodes.backbone import first_station, last_station
-from ..nodes.builder import Tree, Value, node_group
+from ..nodes.builder import Tree, Value, makes_group
 from ..nodes.foot import foot_at
 from ..nodes.solids import box, paint_faces, prism, put_on_points, row_of_points
 from ..nodes.strip import INSTANCES
@@ -67,11 +67,6 @@ _RELIEFS = {
 }
 
 
-def noise_barrier_group() -> bpy.types.NodeTree:
-    """Return the group SR Noise Barrier."""
-    return node_group("SR Noise Barrier", _build)
-
-
 @dataclass(frozen=True)
 class _Wall:
     first: Value
@@ -101,7 +96,8 @@ def _declare(tree: Tree) -> _Wall:
     )
 
 
-def _build(tree: Tree) -> None:
+@makes_group("SR Noise Barrier")
+def noise_barrier_group(tree: Tree) -> None:
     """A noise barrier along the road: posts, and between them level panels on a plinth."""
     backbone = tree.input("Backbone", "Object", description="Polyline along the axis with its attributes")
     road = tree.input("Road", "Object", description="Surface that the wall stands on")
@@ -208,11 +204,6 @@ def _fill_bays(tree: Tree, wall: _Wall, bays: Value, sizes: tuple[Value, Value],
     )
 
 
-def _panel_group() -> bpy.types.NodeTree:
-    """Return the group SR Noise Panel."""
-    return node_group("SR Noise Panel", _build_panel)
-
-
 @dataclass(frozen=True)
 class _Panel:
     length: Value
@@ -222,7 +213,8 @@ class _Panel:
     frame: Value
 
 
-def _build_panel(tree: Tree) -> None:
+@makes_group("SR Noise Panel")
+def _panel_group(tree: Tree) -> None:
     """A panel of a noise barrier, upright on the origin along x; its face looks to -y."""
     kind = tree.integer("Panel", 0, (0, 3), description="Kind: 0 aluminium, 1 concrete, 2 wood, 3 glass")
     panel = _Panel(

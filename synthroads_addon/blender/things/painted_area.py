@@ -15,7 +15,7 @@ from ...road.parameters import Arrow, Hatching
 from ..materials import material
 from ..nodes import operations as op
 from ..nodes.backbone import height_on, look_up, station_ribbon
-from ..nodes.builder import Tree, node_group
+from ..nodes.builder import Tree, makes_group
 from ..nodes.solids import paint_faces
 from .meshes import attribute, fill_polygons, signed_instance
 from .model_builder import ModelBuilder
@@ -24,12 +24,8 @@ _LONGEST = 1.0
 """Outlines are cut into pieces no longer than this (m), so that they follow the road's curves and its crossfall."""
 
 
-def painted_area_group() -> bpy.types.NodeTree:
-    """Return the group SR Painted Area."""
-    return node_group("SR Painted Area", _build)
-
-
-def _build(tree: Tree) -> None:
+@makes_group("SR Painted Area")
+def painted_area_group(tree: Tree) -> None:
     """Faces given by stations and offsets, laid on the pavement.
 
     Their points carry ``film`` (m), ``instance`` and ``yellow`` (0 or 1).

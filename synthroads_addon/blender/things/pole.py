@@ -5,13 +5,11 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-import bpy
-
 from ...base.classes import class_id
 from ...road.parameters import Pole
 from ..materials import material
 from ..nodes import operations as op
-from ..nodes.builder import Tree, Value, node_group
+from ..nodes.builder import Tree, Value, makes_group
 from ..nodes.solids import box, move_geometry, paint_faces, prism, row_of_points
 from ..nodes.standing import BURIED, declare_standing, put_on
 from ..nodes.tubes import cone, tube
@@ -43,12 +41,8 @@ class _Pole:
     glass: Value
 
 
-def pole_group() -> bpy.types.NodeTree:
-    """Return the group SR Pole."""
-    return node_group("SR Pole", _build)
-
-
-def _build(tree: Tree) -> None:
+@makes_group("SR Pole")
+def pole_group(tree: Tree) -> None:
     """A pole, its arm to the left of those who drive along +y; points carry ``heading`` (rad) and ``elevation`` (m)."""
     standing = declare_standing(tree)
     cameras = tree.boolean("Surveillance", False, description="Carries cameras instead of a street light")

@@ -12,7 +12,7 @@ from ...road.things.body_shapes import LONGEST_PLASTIC, SHORTEST_ELEMENT, TEMPOR
 from ..materials import material
 from ..nodes import operations as op
 from ..nodes.backbone import first_station, last_station
-from ..nodes.builder import Tree, Value, node_group
+from ..nodes.builder import Tree, Value, makes_group
 from ..nodes.foot import foot_at
 from ..nodes.solids import box, loft, paint_faces, put_on_points, row_of_points
 from ..nodes.strip import INSTANCES
@@ -20,11 +20,6 @@ from .model_builder import ModelBuilder
 
 _STEEL, _PLASTIC = TEMPORARY_FLANKS["steel"], TEMPORARY_FLANKS["plastic"]
 _REFLECTOR = (0.12, 0.02, 0.06)
-
-
-def temporary_barrier_group() -> bpy.types.NodeTree:
-    """Return the group SR Temporary Barrier."""
-    return node_group("SR Temporary Barrier", _build)
 
 
 @dataclass(frozen=True)
@@ -55,7 +50,8 @@ def _declare(tree: Tree) -> _TemporaryBarrier:
     )
 
 
-def _build(tree: Tree) -> None:
+@makes_group("SR Temporary Barrier")
+def temporary_barrier_group(tree: Tree) -> None:
     """Movable barrier elements along the road, from one offset to another, every second one in another colour."""
     backbone = tree.input("Backbone", "Object", description="Polyline along the axis with its attributes")
     road = tree.input("Road", "Object", description="Surface that the elements stand on")

@@ -15,7 +15,7 @@ from ...road.terrain import GROUND_MARGIN, ground_elevation
 from ..materials import material
 from ..nodes import operations as op
 from ..nodes.backbone import limit_offset, row
-from ..nodes.builder import Tree, Value, node_group
+from ..nodes.builder import Tree, Value, makes_group
 from ..nodes.strip import INSTANCES
 from .meshes import fill
 from .model_builder import ModelBuilder
@@ -26,12 +26,8 @@ _FINE = 0.12
 """Share of even spacing among the columns; the rest grows away from the road."""
 
 
-def terrain_group() -> bpy.types.NodeTree:
-    """Return the group SR Terrain."""
-    return node_group("SR Terrain", _build)
-
-
-def _build(tree: Tree) -> None:
+@makes_group("SR Terrain")
+def terrain_group(tree: Tree) -> None:
     """Ground on both sides of the road, joined to it by batters of a given slope."""
     backbone = tree.input("Backbone", "Object", description="Polyline along the axis with its attributes")
     road = tree.input("Road", "Object", description="The road, whose outermost edges the terrain begins at")
@@ -65,11 +61,8 @@ def _build(tree: Tree) -> None:
     tree.output("Mesh", mesh, description="Terrain; its points carry their distance from the road")
 
 
-def _side_group() -> bpy.types.NodeTree:
-    return node_group("SR Terrain Side", _build_side)
-
-
-def _build_side(tree: Tree) -> None:
+@makes_group("SR Terrain Side")
+def _side_group(tree: Tree) -> None:
     """Terrain on one side: from the road's edge outwards, between the batter's two planes."""
     backbone = tree.input("Backbone", "Geometry", description="Polyline along the axis with its attributes")
     edge = tree.input("Edge", "Geometry", description="Points of the road's edge, one per row of the backbone")

@@ -5,14 +5,12 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-import bpy
-
 from ...base.classes import class_id
 from ...road.parameters import TrafficLight
 from ...road.things.body_shapes import TRAFFIC_LIGHT_POST
 from ..materials import material
 from ..nodes import operations as op
-from ..nodes.builder import Tree, Value, node_group
+from ..nodes.builder import Tree, Value, makes_group
 from ..nodes.solids import box, loft, move_geometry, paint_faces, put_on_points, row_of_points
 from ..nodes.standing import BURIED, declare_standing, put_on
 from ..nodes.tubes import cone, tube
@@ -42,11 +40,6 @@ class _Light:
         return self.height - _MARGIN - (number + 0.5) * self.diameter * _CHAMBER[2]
 
 
-def traffic_light_group() -> bpy.types.NodeTree:
-    """Return the group SR Traffic Light."""
-    return node_group("SR Traffic Light", _build)
-
-
 def _declare(tree: Tree) -> _Light:
     def metres(name: str, default: float, limits: tuple[float, float], description: str) -> Value:
         return tree.number(name, default, limits, unit="m", description=description)
@@ -69,7 +62,8 @@ def _declare(tree: Tree) -> _Light:
     )
 
 
-def _build(tree: Tree) -> None:
+@makes_group("SR Traffic Light")
+def traffic_light_group(tree: Tree) -> None:
     """A traffic light, seen by those who drive along +y; points carry ``heading`` (rad) and ``elevation`` (m)."""
     standing = declare_standing(tree)
     light = _declare(tree)

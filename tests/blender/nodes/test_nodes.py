@@ -53,7 +53,7 @@ def all_groups() -> list[bpy.types.NodeTree]:
         loaded = import_module(module.name)
         for name, make in vars(loaded).items():
             own = getattr(make, "__module__", "") == loaded.__name__
-            if name.endswith("_group") and own and not signature(make).parameters:
+            if name.endswith("_group") and own and not signature(make, follow_wrapped=False).parameters:
                 make()
     for model in CHASSIS:
         vehicle_group(model)

@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import math
 
-import bpy
-
 from ...nodes import operations as op
-from ...nodes.builder import Tree, Value, node_group
+from ...nodes.builder import Tree, Value, makes_group
 from ...nodes.solids import bars, box, move_geometry, put_on_points, row_of_points
 
 KINDS = ("box", "truss", "tube")
@@ -25,12 +23,8 @@ _JOINT_SPACING = 9.0  # m, between the bolted joints of a box or tube
 _TUBE_SIDES = 20
 
 
-def gantry_beam_group() -> bpy.types.NodeTree:
-    """Return the group SR Gantry Beam."""
-    return node_group("SR Gantry Beam", _build)
-
-
-def _build(tree: Tree) -> None:
+@makes_group("SR Gantry Beam")
+def gantry_beam_group(tree: Tree) -> None:
     """A beam from x = 0 on along x, in the middle of y, its lower edge on z = 0."""
     kind = tree.integer("Beam", 0, (0, 2), description="Shape: 0 box, 1 truss, 2 tube")
     length = tree.number("Length", 15.0, (0.5, 200.0), unit="m", description="Length")

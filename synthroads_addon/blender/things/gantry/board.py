@@ -4,11 +4,9 @@ from __future__ import annotations
 
 import math
 
-import bpy
-
 from ....base.classes import class_id
 from ...nodes import operations as op
-from ...nodes.builder import Tree, node_group
+from ...nodes.builder import Tree, makes_group
 from ...nodes.solids import move_geometry, put_on_points
 from ...nodes.strip import INSTANCES
 from ..sign.face import declare_face, sign_face_group
@@ -17,12 +15,8 @@ _BEFORE = 0.002
 """Distance between a board and the back of its face, m."""
 
 
-def gantry_sign_group() -> bpy.types.NodeTree:
-    """Return the group SR Gantry Sign."""
-    return node_group("SR Gantry Sign", _build)
-
-
-def _build(tree: Tree) -> None:
+@makes_group("SR Gantry Sign")
+def gantry_sign_group(tree: Tree) -> None:
     """The face of one sign of a gantry, before its board."""
     gantry = tree.input("Gantry", "Object", description="The gantry, whose points tell where its signs are")
     number = tree.integer("Number", 1, (1, 100), description="Which of its signs, from 1 on")

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import bpy
-
 from ...nodes import operations as op
-from ...nodes.builder import Tree, node_group
+from ...nodes.builder import Tree, makes_group
 from ...nodes.solids import box, move_geometry, put_on_points, row_of_points
 
 _SPACING = 2.0  # m, between the railings' posts
@@ -15,12 +13,8 @@ _NARROWEST = 0.7
 _SUPPORT, _GRATING = 0.06, 0.04
 
 
-def gantry_catwalk_group() -> bpy.types.NodeTree:
-    """Return the group SR Gantry Catwalk."""
-    return node_group("SR Gantry Catwalk", _build)
-
-
-def _build(tree: Tree) -> None:
+@makes_group("SR Gantry Catwalk")
+def gantry_catwalk_group(tree: Tree) -> None:
     """A catwalk from x = 0 on along x, in the middle of y, standing on z = 0: grating, supports, railings."""
     length = tree.number("Length", 15.0, (0.5, 200.0), unit="m", description="Length")
     beam = tree.number("Beam Depth", 0.6, (0.2, 3.0), unit="m", description="Depth of the beam that it stands on")

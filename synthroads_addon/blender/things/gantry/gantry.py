@@ -5,13 +5,11 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-import bpy
-
 from ....base.classes import class_id
 from ....road.things.body_shapes import GANTRY_BOARD, GANTRY_DISPLAY, GANTRY_HANGER, GANTRY_OVERHANG
 from ...nodes import operations as op
 from ...nodes.backbone import height_on
-from ...nodes.builder import Tree, Value, node_group
+from ...nodes.builder import Tree, Value, makes_group
 from ...nodes.clearance import highest_below, pavement_near
 from ...nodes.solids import box, move_geometry, paint_faces, put_on_points, row_of_points
 from ...nodes.strip import INSTANCES
@@ -22,11 +20,6 @@ from .post import gantry_post_group
 _LADDER_FOOT, _RUNG = 2.3, 0.3  # m
 _ENCLOSED = 0.02
 """The posts at the ends of the beam enclose it by so much, m."""
-
-
-def gantry_group() -> bpy.types.NodeTree:
-    """Return the group SR Gantry."""
-    return node_group("SR Gantry", _build)
 
 
 @dataclass(frozen=True)
@@ -78,7 +71,8 @@ def _declare(tree: Tree) -> _Gantry:
     )
 
 
-def _build(tree: Tree) -> None:
+@makes_group("SR Gantry")
+def gantry_group(tree: Tree) -> None:
     """A gantry around the origin, its beam along x (right), level, so high that its clearance is kept.
 
     Signs are points with ``width``, ``height``, ``display`` (1 or 0), ``number`` (from 1 on), and ``facing``: 1 towards

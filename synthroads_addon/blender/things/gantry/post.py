@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import bpy
-
 from ...nodes import operations as op
-from ...nodes.builder import Tree, Value, node_group
+from ...nodes.builder import Tree, Value, makes_group
 from ...nodes.solids import box, paint_faces, prism, put_on_points, row_of_points
 
 PLINTH = 0.3
@@ -17,12 +15,8 @@ _BOLT = [(0.025, 0.0), (0.0125, 0.0217), (-0.0125, 0.0217), (-0.025, 0.0), (-0.0
 _BOLTS = [(x, y, 0.0) for x in (-1.0, 0.0, 1.0) for y in (-1.0, 0.0, 1.0) if x or y]
 
 
-def gantry_post_group() -> bpy.types.NodeTree:
-    """Return the group SR Gantry Post."""
-    return node_group("SR Gantry Post", _build)
-
-
-def _build(tree: Tree) -> None:
+@makes_group("SR Gantry Post")
+def gantry_post_group(tree: Tree) -> None:
     """A post on the origin, which lies on the surface."""
     width = tree.number("Width", 0.5, (0.1, 1.5), unit="m", description="Width across the road")
     depth = tree.number("Depth", 0.6, (0.1, 3.5), unit="m", description="Depth along the road")

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import bpy
-
 from ....road.things.body_shapes import BRIDGE_ABUTMENT, BRIDGE_BEARING, BRIDGE_SEAT
 from ...nodes import operations as op
-from ...nodes.builder import Operand, Tree, Value, node_group
+from ...nodes.builder import Operand, Tree, Value, makes_group
 from ...nodes.solids import box, paint_faces
 from .deck import PAVEMENT, WEB
 
@@ -15,12 +13,8 @@ _WALL = 0.5
 _INSIDE = 0.06  # m from the deck's edge to the wing walls
 
 
-def bridge_abutment_group() -> bpy.types.NodeTree:
-    """Return the group SR Bridge Abutment."""
-    return node_group("SR Bridge Abutment", _build)
-
-
-def _build(tree: Tree) -> None:
+@makes_group("SR Bridge Abutment")
+def bridge_abutment_group(tree: Tree) -> None:
     """An abutment whose face looks to -x and stands on x = 0; the deck's underside is z = 0."""
 
     def metres(name: str, default: float, limits: tuple[float, float], description: str) -> Value:

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import bpy
-
 from ....road.things.body_shapes import BRIDGE_DECK
 from ...nodes import operations as op
-from ...nodes.builder import Tree, Value, node_group
+from ...nodes.builder import Tree, Value, makes_group
 from ...nodes.solids import box, flip_faces, loft, move_geometry, paint_faces
 from .railing import bridge_railing_group
 
@@ -25,12 +23,8 @@ _NOSE = (0.3, 0.45)
 _LOWEST_PARAPET = 0.5
 
 
-def bridge_deck_group() -> bpy.types.NodeTree:
-    """Return the group SR Bridge Deck."""
-    return node_group("SR Bridge Deck", _build)
-
-
-def _build(tree: Tree) -> None:
+@makes_group("SR Bridge Deck")
+def bridge_deck_group(tree: Tree) -> None:
     """A deck along x with its underside on z = 0; edge beams, pavement and railings go on over the wing walls."""
 
     def metres(name: str, default: float, limits: tuple[float, float], description: str) -> Value:

@@ -5,11 +5,9 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-import bpy
-
 from ....base.classes import class_id
 from ...nodes import operations as op
-from ...nodes.builder import Tree, Value, node_group
+from ...nodes.builder import Tree, Value, makes_group
 from ...nodes.solids import flip_faces, paint_faces
 
 _GRADE = 0.05
@@ -19,11 +17,6 @@ _CONE, _EDGE = 7, 24
 """Columns of a cone, and along the embankment's edge."""
 _BELOW = 0.4  # m that a slope goes on below the ground
 _UNDER_WALL = 0.3  # m that it begins before the wing walls' end
-
-
-def bridge_embankment_group() -> bpy.types.NodeTree:
-    """Return the group SR Bridge Embankment."""
-    return node_group("SR Bridge Embankment", _build)
 
 
 @dataclass(frozen=True)
@@ -60,7 +53,8 @@ class _Bank:
         return turned + along * (self.shear * across * share)
 
 
-def _build(tree: Tree) -> None:
+@makes_group("SR Bridge Embankment")
+def bridge_embankment_group(tree: Tree) -> None:
     """An embankment from an abutment outwards, falling from the deck's level, with slopes down to the ground."""
 
     def metres(name: str, default: float, limits: tuple[float, float], description: str) -> Value:

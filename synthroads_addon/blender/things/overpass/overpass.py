@@ -4,13 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import bpy
-
 from ....base.classes import class_id
 from ....road.things.body_shapes import BRIDGE_BEARING, BRIDGE_BURIED, BRIDGE_SEAT
 from ...nodes import operations as op
 from ...nodes.backbone import height_on
-from ...nodes.builder import Tree, Value, node_group
+from ...nodes.builder import Tree, Value, makes_group
 from ...nodes.clearance import highest_below, pavement_near
 from ...nodes.solids import flip_faces, move_geometry, put_on_points
 from ...nodes.strip import INSTANCES
@@ -21,11 +19,6 @@ from .pier import bridge_pier_group
 
 _WINGS = (3.0, 12.0)
 """Shortest and longest wing walls, m."""
-
-
-def overpass_group() -> bpy.types.NodeTree:
-    """Return the group SR Overpass."""
-    return node_group("SR Overpass", _build)
 
 
 @dataclass(frozen=True)
@@ -75,7 +68,8 @@ def _declare(tree: Tree) -> _Overpass:
     )
 
 
-def _build(tree: Tree) -> None:
+@makes_group("SR Overpass")
+def overpass_group(tree: Tree) -> None:
     """A level bridge around the origin, which crosses along x; the road that it spans runs along y.
 
     Piers are points, of which only x counts. The bridge is skewed by moving it along y: its faces stay parallel to y.

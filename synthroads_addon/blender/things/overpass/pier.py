@@ -4,11 +4,9 @@ from __future__ import annotations
 
 import math
 
-import bpy
-
 from ....road.things.body_shapes import BRIDGE_BEARING, BRIDGE_PIER_LENGTH
 from ...nodes import operations as op
-from ...nodes.builder import Tree, Value, node_group
+from ...nodes.builder import Tree, Value, makes_group
 from ...nodes.solids import box, loft, paint_faces
 from .deck import WEB
 
@@ -16,12 +14,8 @@ _ROUND = 8
 """Points of a rounded end."""
 
 
-def bridge_pier_group() -> bpy.types.NodeTree:
-    """Return the group SR Bridge Pier."""
-    return node_group("SR Bridge Pier", _build)
-
-
-def _build(tree: Tree) -> None:
+@makes_group("SR Bridge Pier")
+def bridge_pier_group(tree: Tree) -> None:
     """A pier along y whose bearings carry a deck with its underside on z = 0; its body is 1 high, to be stretched."""
     width = tree.number("Pier Width", 1.0, (0.2, 4.0), unit="m", description="Width along x")
     deck = tree.number("Width", 10.0, (2.0, 60.0), unit="m", description="Width of the deck")

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import bpy
-
 from ...nodes import operations as op
-from ...nodes.builder import Tree, node_group
+from ...nodes.builder import Tree, makes_group
 from ...nodes.solids import box, move_geometry, put_on_points, row_of_points
 
 _POST_SPACING, _BAR_SPACING = 2.0, 0.14  # m
@@ -14,12 +12,8 @@ _LOWER = 0.1
 """Lower rail above the deck, m."""
 
 
-def bridge_railing_group() -> bpy.types.NodeTree:
-    """Return the group SR Bridge Railing."""
-    return node_group("SR Bridge Railing", _build)
-
-
-def _build(tree: Tree) -> None:
+@makes_group("SR Bridge Railing")
+def bridge_railing_group(tree: Tree) -> None:
     """A railing from x = 0 on along x, standing on z = 0."""
     length = tree.number("Length", 20.0, (0.5, 300.0), unit="m", description="Length")
     height = tree.number("Height", 1.0, (0.3, 3.0), unit="m", description="Top of the handrail")

@@ -2,21 +2,9 @@
 
 from __future__ import annotations
 
-import bpy
-
 from ...nodes import operations as op
-from ...nodes.builder import Tree, Value, node_group
+from ...nodes.builder import Tree, Value, makes_group
 from .line import declare_marking, marking_group
-
-
-def height_group() -> bpy.types.NodeTree:
-    """Return the group SR Carriageway Height."""
-    return node_group("SR Carriageway Height", _build_height)
-
-
-def carriageway_marking_group() -> bpy.types.NodeTree:
-    """Return the group SR Carriageway Marking."""
-    return node_group("SR Carriageway Marking", _build_marking)
 
 
 def _declare_section(tree: Tree) -> dict[str, Value]:
@@ -36,7 +24,8 @@ def _declare_section(tree: Tree) -> dict[str, Value]:
     }
 
 
-def _build_height(tree: Tree) -> None:
+@makes_group("SR Carriageway Height")
+def height_group(tree: Tree) -> None:
     """Offset and height above the axis of a line at a distance from it."""
     section = _declare_section(tree)
     side, distance, paved = section["side"], section["distance"], section["paved_edge"]
@@ -49,7 +38,8 @@ def _build_height(tree: Tree) -> None:
     tree.output("Offset", distance * side, description="Offset, positive to the left (m)")
 
 
-def _build_marking(tree: Tree) -> None:
+@makes_group("SR Carriageway Marking")
+def carriageway_marking_group(tree: Tree) -> None:
     """A line marking centred on a line at a distance from the axis."""
     backbone = tree.input("Backbone", "Geometry", description="Polyline along the axis with its attributes")
     section = _declare_section(tree)

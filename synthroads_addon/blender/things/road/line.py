@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import bpy
-
 from ...nodes import operations as op
 from ...nodes.backbone import last_station, look_up, station_ribbon
-from ...nodes.builder import Tree, Value, node_group
+from ...nodes.builder import Tree, Value, makes_group
 from ...nodes.solids import row_of_points
 from ...nodes.strip import FAR, INSTANCES, strip_group
 
@@ -15,12 +13,8 @@ SNAP = 1e-3
 """End of a dash this near (m) to a row of the backbone: it is that row."""
 
 
-def marking_group() -> bpy.types.NodeTree:
-    """Return the group SR Line Marking."""
-    return node_group("SR Line Marking", _build)
-
-
-def _build(tree: Tree) -> None:
+@makes_group("SR Line Marking")
+def marking_group(tree: Tree) -> None:
     """A line between two offsets, dashed or solid, raised above the pavement by its film.
 
     Offsets and heights may be fields on the backbone's points.

@@ -4,11 +4,9 @@ from __future__ import annotations
 
 import math
 
-import bpy
-
 from ....base.classes import class_id
 from ...nodes import operations as op
-from ...nodes.builder import Tree, Value, node_group
+from ...nodes.builder import Tree, Value, makes_group
 from ...nodes.solids import flip_faces, move_geometry, paint_faces
 from ...nodes.strip import INSTANCES
 from .outline import SHAPES, sign_outline_group
@@ -27,11 +25,6 @@ FACE_INPUTS = (
     "Ground Material", "Border Material", "Edge Material", "Writing Material", "Back Material",
 )  # fmt: skip
 """Inputs of a group that has a face, as `declare_face` names them."""
-
-
-def sign_face_group() -> bpy.types.NodeTree:
-    """Return the group SR Sign Face."""
-    return node_group("SR Sign Face", _build)
 
 
 def declare_face(tree: Tree) -> dict[str, Value]:
@@ -88,7 +81,8 @@ def _declare_box(tree: Tree, prefix: str, what: str) -> list[Value]:
     ]
 
 
-def _build(tree: Tree) -> None:
+@makes_group("SR Sign Face")
+def sign_face_group(tree: Tree) -> None:
     """The plate of a traffic sign around the origin, seen by those who look along +y; x is right, z up."""
     face = declare_face(tree)
     instance = tree.integer("Instance", 0, INSTANCES, description="Instance number of the faces")

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import bpy
-
 from ....road.things.body_shapes import SIGN_OUTLINES
 from ...nodes import operations as op
-from ...nodes.builder import Tree, Value, node_group
+from ...nodes.builder import Tree, Value, makes_group
 
 SHAPES = ("round", "triangle", "rectangle", "octagon", "arrow")
 """Shapes by their number in the group's input."""
@@ -16,12 +14,8 @@ _SHARPEST = 0.35
 """Share of its radius that a corner keeps, however far inside."""
 
 
-def sign_outline_group() -> bpy.types.NodeTree:
-    """Return the group SR Sign Outline."""
-    return node_group("SR Sign Outline", _build)
-
-
-def _build(tree: Tree) -> None:
+@makes_group("SR Sign Outline")
+def sign_outline_group(tree: Tree) -> None:
     """A closed curve in the xy plane around the origin: the outline of a sign, or one inside of it."""
     names = ", ".join(f"{i} {name}" for i, name in enumerate(SHAPES))
 

@@ -2,22 +2,16 @@
 
 from __future__ import annotations
 
-import bpy
-
 from ...nodes import operations as op
-from ...nodes.builder import Tree, Value, node_group
+from ...nodes.builder import Tree, Value, makes_group
 from ...nodes.solids import paint_faces
 from .pictograms import NAMES, PICTOGRAMS, RED
 
 Row = tuple[float, float, float]
 
 
-def pictogram_group() -> bpy.types.NodeTree:
-    """Return the group SR Pictogram."""
-    return node_group("SR Pictogram", _build)
-
-
-def _build(tree: Tree) -> None:
+@makes_group("SR Pictogram")
+def pictogram_group(tree: Tree) -> None:
     """A pictogram in the xy plane, as large as fits into a box."""
     wanted = tree.integer(
         "Pictogram", 0, (0, len(NAMES) - 1), description=", ".join(f"{i} {name}" for i, name in enumerate(NAMES))

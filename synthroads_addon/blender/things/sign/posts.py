@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import math
 
-import bpy
-
 from ...nodes import operations as op
-from ...nodes.builder import Tree, Value, node_group
+from ...nodes.builder import Tree, Value, makes_group
 from ...nodes.solids import bars, paint_faces, row_of_points
 from ...nodes.standing import BURIED, on_surface, put_on
 from ...nodes.tubes import tube
@@ -19,12 +17,8 @@ _CHORD, _DIAGONAL = 0.045, 0.02
 """Thickness of a lattice post's chords and diagonals, m."""
 
 
-def sign_posts_group() -> bpy.types.NodeTree:
-    """Return the group SR Sign Posts."""
-    return node_group("SR Sign Posts", _build)
-
-
-def _build(tree: Tree) -> None:
+@makes_group("SR Sign Posts")
+def sign_posts_group(tree: Tree) -> None:
     """The posts of signs, side by side; points carry ``heading`` (rad), ``elevation`` (m) and stand on the surface."""
     points = tree.input("Points", "Geometry", description="Places of the signs on the surface")
     road = tree.input("Road", "Object", description="Surface that the posts stand on")

@@ -4,12 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import bpy
-
 from ....base.classes import class_id
 from ....road.things.body_shapes import SIGN_RAIL
 from ...nodes import operations as op
-from ...nodes.builder import Tree, Value, node_group
+from ...nodes.builder import Tree, Value, makes_group
 from ...nodes.solids import box, move_geometry, paint_faces, put_on_points, row_of_points
 from ...nodes.standing import declare_standing, put_on
 from ...nodes.tubes import tube
@@ -29,11 +27,6 @@ _BEHIND = {
 _RAIL_SPACING = 0.9  # m
 _PLAY = 0.0005  # m between rails and what is before and behind them
 _CLAMP = (0.006, 0.05)  # m beyond the post, and in height
-
-
-def sign_group() -> bpy.types.NodeTree:
-    """Return the group SR Sign."""
-    return node_group("SR Sign", _build)
 
 
 @dataclass(frozen=True)
@@ -60,7 +53,8 @@ def _declare(tree: Tree) -> _Sign:
     )
 
 
-def _build(tree: Tree) -> None:
+@makes_group("SR Sign")
+def sign_group(tree: Tree) -> None:
     """A traffic sign on its posts, facing those who drive along +y; points carry ``heading`` and ``elevation``."""
     standing = declare_standing(tree)
     sign = _declare(tree)

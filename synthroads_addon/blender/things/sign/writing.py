@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import bpy
-
 from ...nodes import operations as op
-from ...nodes.builder import Tree, node_group
+from ...nodes.builder import Tree, makes_group
 from ...nodes.solids import move_geometry
 
 LINES = 6
@@ -19,17 +17,8 @@ _SMALLEST = 0.02
 """Letters lower than this (m) can't be read and are left out."""
 
 
-def sign_writing_group() -> bpy.types.NodeTree:
-    """Return the group SR Sign Writing."""
-    return node_group("SR Sign Writing", _build)
-
-
-def sign_line_group() -> bpy.types.NodeTree:
-    """Return the group SR Sign Line."""
-    return node_group("SR Sign Line", _build_line)
-
-
-def _build(tree: Tree) -> None:
+@makes_group("SR Sign Writing")
+def sign_writing_group(tree: Tree) -> None:
     """Lines of writing in the xy plane, one below the other, all of one size: as large as fits into the box."""
     lines = [
         tree.input(f"Line {number}", "String", description="Writing; empty lines take no room")
@@ -64,7 +53,8 @@ def _build(tree: Tree) -> None:
     tree.output("Mesh", mesh, description="Letters, facing +z")
 
 
-def _build_line(tree: Tree) -> None:
+@makes_group("SR Sign Line")
+def sign_line_group(tree: Tree) -> None:
     """The outlines of one line's letters of size 1 in the xy plane, from x = 0 on."""
     writing = tree.input("Writing", "String", description="What is written")
     with tree.frame("Letters"):

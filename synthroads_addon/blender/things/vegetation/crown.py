@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import bpy
-
 from ...nodes import operations as op
-from ...nodes.builder import Tree, Value, node_group
+from ...nodes.builder import Tree, Value, makes_group
 from ...nodes.solids import paint_faces
 from .plants import one_high
 
@@ -60,12 +58,8 @@ def declare_materials(tree: Tree) -> dict[str, Value]:
     }
 
 
-def crown_group() -> bpy.types.NodeTree:
-    """Return the group SR Crown."""
-    return node_group("SR Crown", _build)
-
-
-def _build(tree: Tree) -> None:
+@makes_group("SR Crown")
+def crown_group(tree: Tree) -> None:
     """Branches from a stem, or from the ground, to the crown's outline, and clusters of leaves on them."""
     shape = declare_crown(tree)
     thick = tree.number("Branch Radius", 0.008, (0.0005, 0.2), unit="m", description="Radius of the thickest branch")

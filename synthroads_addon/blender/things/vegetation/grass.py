@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import bpy
-
 from ....base.classes import class_id
 from ...nodes import operations as op
-from ...nodes.builder import Tree, Value, node_group
+from ...nodes.builder import Tree, Value, makes_group
 from .plants import declare_stand, one_high, plant_points, points_in_band, points_on
 
 _VARIANTS = 4
@@ -17,12 +15,8 @@ _BLADE = [(0.0, -0.5, -0.04), (0.0, 0.5, -0.04), (0.0, 0.0, 1.0)]
 _STALK = [(0.0, 0.0, -0.04), (0.10, -0.5, 0.78), (0.10, 0.5, 0.78), (0.2, 0.0, 1.0)]
 
 
-def grass_group() -> bpy.types.NodeTree:
-    """Return the group SR Grass."""
-    return node_group("SR Grass", _build)
-
-
-def _build(tree: Tree) -> None:
+@makes_group("SR Grass")
+def grass_group(tree: Tree) -> None:
     """Tufts of grass in a band beside the road, and shorter ones on its verges and median."""
     stand = declare_stand(tree, 1.0, (0.1, 0.45), (0.0, 60.0))
     beside = tree.number("Roadside Density", 1.0, (0.0, 50.0), description="Tufts per area of verge and median (1/m2)")
@@ -71,12 +65,8 @@ def _declare_tuft(tree: Tree) -> dict[str, Value]:
     }
 
 
-def tuft_group() -> bpy.types.NodeTree:
-    """Return the group SR Grass Tuft."""
-    return node_group("SR Grass Tuft", _build_tuft)
-
-
-def _build_tuft(tree: Tree) -> None:
+@makes_group("SR Grass Tuft")
+def tuft_group(tree: Tree) -> None:
     """One tuft of height 1: blades all around, and some stalks in the middle."""
     shape = _declare_tuft(tree)
     seed = tree.integer("Seed", 0, (0, 2**30), description="Seed of the blades")

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import bpy
-
 from ....base.classes import class_id
 from ...nodes import operations as op
-from ...nodes.builder import Tree, Value, node_group
+from ...nodes.builder import Tree, Value, makes_group
 from .crown import bend_stems, crown_group, declare_crown, declare_materials, declare_plant
 from .plants import declare_stand, plant_points, points_in_band
 
@@ -26,12 +24,8 @@ _DEFAULTS = {
 }
 
 
-def shrub_group() -> bpy.types.NodeTree:
-    """Return the group SR Shrub."""
-    return node_group("SR Shrub", _build)
-
-
-def _build(tree: Tree) -> None:
+@makes_group("SR Shrub")
+def shrub_group(tree: Tree) -> None:
     """Shrubs of one species in a band beside the road, of three kinds, with gaps between their leaves."""
     stand = declare_stand(tree, 0.006, (0.5, 3.0), (2.0, 60.0))
     with tree.panel("Shape at height 1"):
@@ -60,12 +54,8 @@ def _kind(tree: Tree, inputs: dict[str, Value], seed: int, wider: float) -> Valu
     return tree.call(shape_group(), **inputs | {"crown_radius": inputs["crown_radius"] * wider}, seed=seed).value
 
 
-def shape_group() -> bpy.types.NodeTree:
-    """Return the group SR Shrub Shape."""
-    return node_group("SR Shrub Shape", _build_shape)
-
-
-def _build_shape(tree: Tree) -> None:
+@makes_group("SR Shrub Shape")
+def shape_group(tree: Tree) -> None:
     """One shrub of height 1: stems and leaves."""
     shape = declare_crown(tree, **_DEFAULTS)
     radius = _stem_radius(tree)

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import bpy
-
 from ....base.classes import class_id
 from ...nodes import operations as op
-from ...nodes.builder import Tree, Value, node_group
+from ...nodes.builder import Tree, Value, makes_group
 from ...nodes.solids import paint_faces
 from .crown import bend_stems, crown_group, declare_crown, declare_materials, declare_plant
 from .plants import declare_stand, plant_points, points_in_band
@@ -19,12 +17,8 @@ _FOOT = 0.02
 _LEAN = 0.04
 
 
-def tree_group() -> bpy.types.NodeTree:
-    """Return the group SR Tree."""
-    return node_group("SR Tree", _build)
-
-
-def _build(tree: Tree) -> None:
+@makes_group("SR Tree")
+def tree_group(tree: Tree) -> None:
     """Trees of one species in a band beside the road, of three kinds, with gaps between their leaves."""
     stand = declare_stand(tree, 0.005, (5.0, 14.0), (12.0, 60.0))
     with tree.panel("Shape at height 1"):
@@ -55,12 +49,8 @@ def _kind(tree: Tree, inputs: dict[str, Value], seed: int, lower: float, wider: 
     return tree.call(shape_group(), **inputs | own, seed=seed).value
 
 
-def shape_group() -> bpy.types.NodeTree:
-    """Return the group SR Tree Shape."""
-    return node_group("SR Tree Shape", _build_shape)
-
-
-def _build_shape(tree: Tree) -> None:
+@makes_group("SR Tree Shape")
+def shape_group(tree: Tree) -> None:
     """One tree of height 1: trunk, branches and leaves."""
     shape = declare_crown(tree)
     radius = _trunk_radius(tree)

@@ -5,10 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping
 
-import bpy
-
 from ...nodes import operations as op
-from ...nodes.builder import Tree, Value, node_group
+from ...nodes.builder import Tree, Value, makes_group
 from ...nodes.solids import Point, box, move_geometry, paint_faces, put_on_points, row_of_points
 
 MATERIALS = {
@@ -101,11 +99,8 @@ def smooth(vehicle: Value) -> Value:
     return tree.node("GeometryNodeSetShadeSmooth", rounded, angle > _SHARP, False, domain="EDGE").value
 
 
-def _wheel_group() -> bpy.types.NodeTree:
-    return node_group("SR Wheel", _build_wheel)
-
-
-def _build_wheel(tree: Tree) -> None:
+@makes_group("SR Wheel")
+def _wheel_group(tree: Tree) -> None:
     """A wheel around the origin, its axle along x, whose outer side looks to -x."""
     radius = tree.number("Radius", 0.32, (0.05, 2.0), unit="m", description="Radius of the tyre")
     width = tree.number("Wheel Width", 0.21, (0.02, 2.0), unit="m", description="Width of the tyre")
@@ -127,11 +122,8 @@ def _build_wheel(tree: Tree) -> None:
     tree.output("Mesh", wheel, description="The wheel")
 
 
-def _box_group() -> bpy.types.NodeTree:
-    return node_group("SR Vehicle Box", _build_box)
-
-
-def _build_box(tree: Tree) -> None:
+@makes_group("SR Vehicle Box")
+def _box_group(tree: Tree) -> None:
     """A box, or one on each side of a vehicle."""
     middle = tree.input("Middle", "Vector", description="Middle of the box (m)")
     size = tree.input("Size", "Vector", description="Its size (m)")
@@ -144,11 +136,8 @@ def _build_box(tree: Tree) -> None:
     tree.output("Mesh", body, description="The box")
 
 
-def _rod_group() -> bpy.types.NodeTree:
-    return node_group("SR Vehicle Rod", _build_rod)
-
-
-def _build_rod(tree: Tree) -> None:
+@makes_group("SR Vehicle Rod")
+def _rod_group(tree: Tree) -> None:
     """A round, tapered rod between two places, or one on each side of a vehicle."""
     start = tree.input("Start", "Vector", description="Middle of its first end (m)")
     end = tree.input("End", "Vector", description="Middle of its other end (m)")

@@ -8,7 +8,7 @@ from ....base.classes import class_id
 from ....road.things.vehicles import CHASSIS
 from ...materials.vehicles import COLOR
 from ...nodes import operations as op
-from ...nodes.builder import Tree, Value, node_group
+from ...nodes.builder import Tree, Value, makes_group, node_group
 from .details import declare_materials
 from .models import model_group
 
@@ -44,11 +44,8 @@ def _build(tree: Tree, model: str) -> None:
     tree.output("Mesh", vehicles, description="Vehicles; each face has its own vehicle's instance number")
 
 
-def _on_wheels_group() -> bpy.types.NodeTree:
-    return node_group("SR On Wheels", _build_on_wheels)
-
-
-def _build_on_wheels(tree: Tree) -> None:
+@makes_group("SR On Wheels")
+def _on_wheels_group(tree: Tree) -> None:
     """A vehicle on each point, pitched and rolled as the road below its axles."""
     points = tree.input("Points", "Geometry", description=_POINTS)
     vehicle = tree.input("Vehicle", "Geometry", description="The vehicle, its wheels on z = 0, facing along +y")
