@@ -21,12 +21,11 @@ from ...road.parameters import (
 )
 from ...road.section_geometry import CarriagewaySection
 from ..compat import modifier_input
+from ..things.model_builder import named_fields
 from ..things.road.layout import input_name, own_widths
 
 _ROLES = {"Terrain": "terrain"}
 """Roles of objects that are not the ids of what they show."""
-_RENAMED = {"Smallest Height": "height_min", "Largest Height": "height_max"}
-"""Inputs that are not named as their fields."""
 _BEAM_OF_SIDE = ("Left Beam", "Right Beam")
 _BEAMS = frozenset(_BEAM_OF_SIDE)
 _MARKING_FIELDS = {
@@ -71,7 +70,7 @@ def carried_inputs(parameters: RoadParameters, role: str, modifier: bpy.types.No
     item = parameters.objects.get(_ROLES.get(role, role))
     if item is None:
         return frozenset()
-    return frozenset(_named_fields(item, modifier)) | (_BEAMS if isinstance(item, Guardrail) else frozenset())
+    return frozenset(_numbers(item, modifier)) | (_BEAMS if isinstance(item, Guardrail) else frozenset())
 
 
 def _road_inputs(parameters: RoadParameters) -> Iterator[str]:
@@ -83,17 +82,16 @@ def _road_inputs(parameters: RoadParameters) -> Iterator[str]:
         yield from (f"{name} {label}" for label in _MARKING_FIELDS)
 
 
-def _named_fields(item: RoadObject, modifier: bpy.types.NodesModifier) -> dict[str, str]:
-    """Return the inputs that are named as fields of an object, and those fields."""
-    pairs = ((name, _RENAMED.get(name, name.lower().replace(" ", "_"))) for name in _input_names(modifier))
-    fields = type(item).model_fields
-    return {name: field for name, field in pairs if field in fields and isinstance(getattr(item, field), float)}
+def _numbers(item: RoadObject, modifier: bpy.types.NodesModifier) -> dict[str, str]:
+    """Return the inputs that are named as numbers of an object, and those fields."""
+    fields = named_fields(item, modifier.node_group)
+    return {name: field for name, field in fields.items() if isinstance(getattr(item, field), float)}
 
 
 def _plain(item: RoadObject, modifier: bpy.types.NodesModifier) -> RoadObject:
     """Return an object with the inputs that are named as its fields."""
     update: dict[str, Any] = {
-        field: _value(getattr(item, field), modifier, name) for name, field in _named_fields(item, modifier).items()
+        field: _value(getattr(item, field), modifier, name) for name, field in _numbers(item, modifier).items()
     }
     if isinstance(item, Guardrail):
         left, right = (bool(modifier_input(modifier, name)) for name in _BEAM_OF_SIDE)
@@ -176,9 +174,3 @@ def _value(before: float, modifier: bpy.types.NodesModifier, name: str) -> float
     """Return an input's value: the one from before where it is the same in 32 bits, else its shortest decimal."""
     now = np.float32(modifier_input(modifier, name))
     return before if now == np.float32(before) else float(str(now))
-
-
-def _input_names(modifier: bpy.types.NodesModifier) -> Iterator[str]:
-    for item in modifier.node_group.interface.items_tree:
-        if item.item_type == "SOCKET" and item.in_out == "INPUT" and item.socket_type == "NodeSocketFloat":
-            yield item.name

@@ -103,7 +103,7 @@ def socket(kind: str, description: str, *, panel: str = "") -> Input:
     return Input(Tree.input, panel, kind=kind, description=description)
 
 
-def made_of(what: str, *, panel: str = "") -> Input:
+def material_of(what: str, *, panel: str = "") -> Input:
     """Return the field of a part's material."""
     return socket("Material", f"Material of {what}", panel=panel)
 
@@ -113,6 +113,6 @@ def instance_number() -> Input:
     return integer(0, INSTANCES, "Instance number of the faces")
 
 
-def backbone(kind: str = "Geometry") -> Input:
+def backbone_socket(kind: str = "Geometry") -> Input:
     """Return the field of the backbone, as geometry or as an object."""
     return socket(kind, "Polyline along the axis with its attributes")

@@ -64,7 +64,7 @@ def _own_frame(model: str) -> SceneMesh:
         modifier = item.modifiers.new("SynthRoads", "NODES")
         modifier.node_group = model_group(model)
         for key, entry in MATERIALS.items():
-            set_modifier_input(modifier, f"{key} Material", material(entry))
+            set_modifier_input(modifier, key, material(entry))
         bpy.context.view_layer.update()
         mesh = scene_mesh(objects=[item])
     finally:

@@ -9,11 +9,11 @@ import numpy as np
 from ...base.classes import class_id
 from ...road.parameters import ConstructionBeacon
 from ...road.things.body_shapes import BEACON_BLADE, BEACON_BLADE_BOTTOM, BEACON_FOOT
-from ..materials import material
 from ..nodes import operations as op
-from ..nodes.backbone import height_on
 from ..nodes.builder import Tree, Value, makes_group
+from ..nodes.inputs import material_of, socket
 from ..nodes.solids import box, flip_faces, move_geometry, paint_faces, prism, put_on_points, row_of_points
+from ..nodes.standing import OnSurface
 from .model_builder import ModelBuilder
 
 CELLS = (2, 8)
@@ -22,31 +22,29 @@ _LENS = (0.095, 0.075)
 _HEXADECAGON = 16
 
 
+class _Beacon(OnSurface):
+    points = socket("Geometry", "One point per beacon, at any height; pass_side +1 is left")
+    road = socket("Object", "Surface that the beacons stand on")
+    red_material = material_of("the red stripes")
+    white_material = material_of("the white stripes")
+    rubber_material = material_of("the foot")
+    housing_material = material_of("the lamp")
+    lens_material = material_of("the lamp's lens")
+
+
 @makes_group("SR Beacon")
 def beacon_group(tree: Tree) -> None:
     """A beacon on each point; points carry ``heading`` (rad), ``elevation``, ``width``, ``height``, ``pass_side``."""
-    points = tree.input("Points", "Geometry", description="One point per beacon, at any height; pass_side +1 is left")
-    road = tree.input("Road", "Object", description="Surface that the beacons stand on")
-    terrain = tree.input("Terrain", "Object", description="Surface beside the road")
-    names = {"Red": "red stripes", "White": "white stripes", "Rubber": "foot", "Housing": "lamp", "Lens": "lamp's lens"}
-    red, white, rubber, housing, lens = (
-        tree.input(f"{name} Material", "Material", description=f"Material of the {what}")
-        for name, what in names.items()
-    )
+    beacon = _Beacon(tree)
 
     with tree.frame("Foot and its tenon"):
-        foot = paint_faces(op.join(_foot(tree), box(tree, (0.07, 0.05, 0.1), (0.0, 0.0, 0.12))), rubber)
+        foot = paint_faces(op.join(_foot(tree), box(tree, (0.07, 0.05, 0.1), (0.0, 0.0, 0.12))), beacon.rubber_material)
     with tree.frame("Blades of size 1: stripes fall to the left or to the right"):
-        blades = [_blade(tree, red, white, side) for side in (1, -1)]
+        blades = [_blade(tree, beacon.red_material, beacon.white_material, side) for side in (1, -1)]
     with tree.frame("Lamp"):
-        lamp = _lamp(tree, housing, lens)
+        lamp = _lamp(tree, beacon.housing_material, beacon.lens_material)
     with tree.frame("On the surface"):
-        place = op.position(tree)
-        height = height_on(op.object_geometry(road), op.object_geometry(terrain), place)
-        flat = place * (1.0, 1.0, 0.0)
-        points = op.set_position(
-            points, flat + op.vector(tree, 0.0, 0.0, height + op.named_attribute(tree, "elevation"))
-        )
+        points = beacon.places()
     with tree.frame("Beacons"):
         turned = op.turn(tree, z=op.named_attribute(tree, "heading"))
         place, tall = op.position(tree), op.named_attribute(tree, "height")
@@ -133,23 +131,22 @@ def build_beacons(builder: ModelBuilder) -> None:
     beacons = list(builder.parameters.of_type(ConstructionBeacon).values())
     if not beacons:
         return
-    inputs = {
-        **builder.surfaces(),
-        "Red Material": material("sheeting_red"),
-        "White Material": material("sheeting_white"),
-        "Rubber Material": material("rubber"),
-        "Housing Material": material("plastic_black"),
-        "Lens Material": material("lamp_yellow"),
+    materials = {
+        "Red Material": "sheeting_red",
+        "White Material": "sheeting_white",
+        "Rubber Material": "rubber",
+        "Housing Material": "plastic_black",
+        "Lens Material": "lamp_yellow",
     }
     attributes = {
         "width": np.array([beacon.width for beacon in beacons]),
         "height": np.array([beacon.height for beacon in beacons]),
-        "pass_side": np.array([_own_side(beacon) for beacon in beacons]),
+        "pass_side": np.array([_passing_side(beacon) for beacon in beacons]),
     }
-    builder.add("Beacons", builder.points("Beacons", beacons, attributes), beacon_group(), inputs)
+    builder.add("Beacons", builder.points("Beacons", beacons, attributes), beacon_group(), materials)
 
 
-def _own_side(beacon: ConstructionBeacon) -> int:
+def _passing_side(beacon: ConstructionBeacon) -> int:
     """Return +1 where traffic passes a beacon on its own left, -1 on its right: one turned round has them swapped."""
     with_stations = math.cos(math.radians(beacon.rotation_deg)) > 0.0
     return 1 if (beacon.pass_side == "left") == with_stations else -1

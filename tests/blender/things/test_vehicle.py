@@ -55,7 +55,7 @@ def alone(model: str) -> SceneMesh:
     modifier = item.modifiers.new("Nodes", "NODES")
     modifier.node_group = model_group(model)
     for key, entry in MATERIALS.items():
-        set_modifier_input(modifier, f"{key} Material", material(entry))
+        set_modifier_input(modifier, key, material(entry))
     bpy.context.view_layer.update()
     return scene_mesh(objects=[item])
 

@@ -6,6 +6,7 @@ import math
 
 from ...nodes import operations as op
 from ...nodes.builder import Tree, Value, makes_group
+from ...nodes.inputs import Inputs, integer, metres
 from ...nodes.solids import bars, box, move_geometry, put_on_points, row_of_points
 
 KINDS = ("box", "truss", "tube")
@@ -23,13 +24,18 @@ _JOINT_SPACING = 9.0  # m, between the bolted joints of a box or tube
 _TUBE_SIDES = 20
 
 
+class _Beam(Inputs):
+    beam = integer(0, (0, 2), "Shape: 0 box, 1 truss, 2 tube")
+    length = metres(15.0, (0.5, 200.0), "Length")
+    height = metres(0.8, (0.2, 3.0), "Height")
+    depth = metres(0.6, (0.2, 3.0), "Depth along the road")
+
+
 @makes_group("SR Gantry Beam")
 def gantry_beam_group(tree: Tree) -> None:
     """A beam from x = 0 on along x, in the middle of y, its lower edge on z = 0."""
-    kind = tree.integer("Beam", 0, (0, 2), description="Shape: 0 box, 1 truss, 2 tube")
-    length = tree.number("Length", 15.0, (0.5, 200.0), unit="m", description="Length")
-    height = tree.number("Height", 0.8, (0.2, 3.0), unit="m", description="Height")
-    depth = tree.number("Depth", 0.6, (0.2, 3.0), unit="m", description="Depth along the road")
+    inputs = _Beam(tree)
+    kind, length, height, depth = inputs.beam, inputs.length, inputs.height, inputs.depth
     middle = op.vector(tree, length * 0.5, 0.0, height * 0.5)
     with tree.frame("Box"):
         solid = box(tree, op.vector(tree, length, depth, height), middle)

@@ -20,36 +20,34 @@ from .gantry import gantry_group
 
 _LIT = 0.9
 """Share of a display's sides that lights up."""
+_MATERIALS = {
+    "steel_material": "gantry_steel",
+    "concrete_material": "bridge_concrete",
+    "board_material": "board_back",
+    "display_material": "display",
+}
 
 
 def build_gantries(builder: ModelBuilder) -> None:
     """Make one object per gantry, and one per face of its signs."""
     for name, gantry in builder.parameters.of_type(Gantry).items():
         cantilever = gantry.kind == "cantilever"
-        inputs = {
-            **builder.surfaces(),
-            "Left End": gantry.left_offset - gantry.offset,
-            "Right End": gantry.right_offset - gantry.offset,
-            "Left Post": not cantilever or gantry.post_side == "left",
-            "Right Post": not cantilever or gantry.post_side == "right",
-            "Middle Post": gantry.kind == "two_sided",
-            "Middle Post Place": -gantry.offset,
-            "Elevation": gantry.elevation,
-            "Clearance": gantry.clearance,
-            "Beam": KINDS.index(gantry.beam),
-            "Beam Height": gantry.beam_height,
-            "Beam Depth": gantry.beam_depth,
-            "Post Width": gantry.post_width,
+        builder.add_thing(
+            name,
+            gantry,
+            gantry_group(),
+            _signs_mesh(gantry),
+            left_end=gantry.left_offset - gantry.offset,
+            right_end=gantry.right_offset - gantry.offset,
+            left_post=not cantilever or gantry.post_side == "left",
+            right_post=not cantilever or gantry.post_side == "right",
+            middle_post=gantry.kind == "two_sided",
+            middle_post_place=-gantry.offset,
+            beam=KINDS.index(gantry.beam),
             # Displays are looked after from above; boards are not.
-            "Catwalk": any(sign.kind == "display" for sign in gantry.signs),
-            "Shade": gantry.shade,
-            "Instance": gantry.instance,
-            "Steel Material": material("gantry_steel"),
-            "Concrete Material": material("bridge_concrete"),
-            "Board Material": material("board_back"),
-            "Display Material": material("display"),
-        }
-        builder.add(name, _signs_mesh(gantry), gantry_group(), inputs)
+            catwalk=any(sign.kind == "display" for sign in gantry.signs),
+            **_MATERIALS,
+        )
         stand(builder, name, gantry, gantry.rotation_deg)
         for number, sign in enumerate(gantry.signs, 1):
             _add_face(builder, name, gantry, number, sign)
@@ -67,7 +65,7 @@ def _add_face(builder: ModelBuilder, name: str, gantry: Gantry, number: int, sig
         **(_display_inputs(sign) if sign.kind == "display" else _board_inputs(sign)),
     }
     role = f"{name}/sign-{number}"
-    builder.add(role, bpy.data.meshes.new("SR Gantry Sign"), gantry_sign_group(), inputs)
+    builder.add(role, None, gantry_sign_group(), inputs)
     stand(builder, role, gantry, gantry.rotation_deg)
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from ...nodes import operations as op
 from ...nodes.builder import Tree, makes_group
+from ...nodes.inputs import Inputs, metres
 from ...nodes.solids import box, move_geometry, put_on_points, row_of_points
 
 _SPACING = 2.0  # m, between the railings' posts
@@ -13,12 +14,16 @@ _NARROWEST = 0.7
 _SUPPORT, _GRATING = 0.06, 0.04
 
 
+class _Catwalk(Inputs):
+    length = metres(15.0, (0.5, 200.0), "Length")
+    beam_depth = metres(0.6, (0.2, 3.0), "Depth of the beam that it stands on")
+
+
 @makes_group("SR Gantry Catwalk")
 def gantry_catwalk_group(tree: Tree) -> None:
     """A catwalk from x = 0 on along x, in the middle of y, standing on z = 0: grating, supports, railings."""
-    length = tree.number("Length", 15.0, (0.5, 200.0), unit="m", description="Length")
-    beam = tree.number("Beam Depth", 0.6, (0.2, 3.0), unit="m", description="Depth of the beam that it stands on")
-    width = op.maximum(beam, _NARROWEST)
+    catwalk = _Catwalk(tree)
+    length, width = catwalk.length, op.maximum(catwalk.beam_depth, _NARROWEST)
     with tree.frame("Grating and toe boards"):
         level = _SUPPORT + _GRATING / 2
         grating = box(tree, op.vector(tree, length, width, _GRATING), op.vector(tree, length * 0.5, 0.0, level))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from ...nodes import operations as op
 from ...nodes.builder import Tree, Value, makes_group
+from ...nodes.inputs import Inputs, material_of, metres
 from ...nodes.solids import box, paint_faces, prism, put_on_points, row_of_points
 
 PLINTH = 0.3
@@ -15,18 +16,23 @@ _BOLT = [(0.025, 0.0), (0.0125, 0.0217), (-0.0125, 0.0217), (-0.025, 0.0), (-0.0
 _BOLTS = [(x, y, 0.0) for x in (-1.0, 0.0, 1.0) for y in (-1.0, 0.0, 1.0) if x or y]
 
 
+class _Post(Inputs):
+    width = metres(0.5, (0.1, 1.5), "Width across the road")
+    depth = metres(0.6, (0.1, 3.5), "Depth along the road")
+    height = metres(6.0, (0.5, 20.0), "Top above the surface")
+    steel_material = material_of("the post")
+    concrete_material = material_of("the plinth")
+
+
 @makes_group("SR Gantry Post")
 def gantry_post_group(tree: Tree) -> None:
     """A post on the origin, which lies on the surface."""
-    width = tree.number("Width", 0.5, (0.1, 1.5), unit="m", description="Width across the road")
-    depth = tree.number("Depth", 0.6, (0.1, 3.5), unit="m", description="Depth along the road")
-    height = tree.number("Height", 6.0, (0.5, 20.0), unit="m", description="Top above the surface")
-    steel = tree.input("Steel Material", "Material", description="Material of the post")
-    concrete = tree.input("Concrete Material", "Material", description="Material of the plinth")
+    inputs = _Post(tree)
+    width, depth, height = inputs.width, inputs.depth, inputs.height
     with tree.frame("Plinth"):
         margin = 2.0 * _PLINTH_MARGIN
         size = op.vector(tree, width + margin, depth + margin, PLINTH + BURIED)
-        plinth = paint_faces(box(tree, size, (0.0, 0.0, (PLINTH - BURIED) / 2)), concrete)
+        plinth = paint_faces(box(tree, size, (0.0, 0.0, (PLINTH - BURIED) / 2)), inputs.concrete_material)
     with tree.frame("Base plate"):
         margin = 2.0 * _PLATE_MARGIN
         plate = box(tree, op.vector(tree, width + margin, depth + margin, _PLATE + 0.01), (0.0, 0.0, PLINTH + 0.015))
@@ -40,7 +46,7 @@ def gantry_post_group(tree: Tree) -> None:
     with tree.frame("Bolts"):
         bolts = _bolts(tree, width, depth)
     with tree.frame("All of steel"):
-        mesh = op.join(plinth, paint_faces(op.join(plate, post, op.realize(bolts)), steel))
+        mesh = op.join(plinth, paint_faces(op.join(plate, post, op.realize(bolts)), inputs.steel_material))
     tree.output("Mesh", mesh, description="The post")
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from ....road.things.body_shapes import BRIDGE_ABUTMENT, BRIDGE_BEARING, BRIDGE_SEAT
 from ...nodes import operations as op
 from ...nodes.builder import Operand, Tree, Value, makes_group
+from ...nodes.inputs import Inputs, material_of, metres
 from ...nodes.solids import box, paint_faces
 from .deck import PAVEMENT, WEB
 
@@ -13,23 +14,24 @@ _WALL = 0.5
 _INSIDE = 0.06  # m from the deck's edge to the wing walls
 
 
+class _Abutment(Inputs):
+    width = metres(10.0, (2.0, 60.0), "Width of the deck")
+    thickness = metres(1.2, (0.3, 5.0), "Height of the deck")
+    foot = metres(-6.0, (-50.0, 50.0), "z of the walls' lower edge")
+    wing_length = metres(8.0, (1.6, 50.0), "Length of the wing walls, from the face")
+    concrete_material = material_of("the walls")
+    steel_material = material_of("the bearings")
+
+
 @makes_group("SR Bridge Abutment")
 def bridge_abutment_group(tree: Tree) -> None:
     """An abutment whose face looks to -x and stands on x = 0; the deck's underside is z = 0."""
-
-    def metres(name: str, default: float, limits: tuple[float, float], description: str) -> Value:
-        return tree.number(name, default, limits, unit="m", description=description)
-
-    width = metres("Width", 10.0, (2.0, 60.0), "Width of the deck")
-    height = metres("Thickness", 1.2, (0.3, 5.0), "Height of the deck")
-    foot = metres("Foot", -6.0, (-50.0, 50.0), "z of the walls' lower edge")
-    wing = metres("Wing Length", 8.0, (1.6, 50.0), "Length of the wing walls, from the face")
-    concrete = tree.input("Concrete Material", "Material", description="Material of the walls")
-    steel = tree.input("Steel Material", "Material", description="Material of the bearings")
+    abutment = _Abutment(tree)
+    width, height = abutment.width, abutment.thickness
     wide = width - 2.0 * _INSIDE
 
     def wall(start: float, end: Operand, top: Value, size: Operand, middle: Operand = 0.0) -> Value:
-        corner = op.vector(tree, start, middle, foot)
+        corner = op.vector(tree, start, middle, abutment.foot)
         length = op.vector(tree, end, middle, top) - corner
         return box(tree, length + op.vector(tree, 0.0, size), corner + length * 0.5)
 
@@ -40,7 +42,7 @@ def bridge_abutment_group(tree: Tree) -> None:
     with tree.frame("Wing walls"):
         for side in (1.0, -1.0):
             beside = (wide * 0.5 - _WALL / 2) * side
-            walls.append(wall(BRIDGE_ABUTMENT - 0.02, wing, height - PAVEMENT * 0.6, _WALL, beside))
+            walls.append(wall(BRIDGE_ABUTMENT - 0.02, abutment.wing_length, height - PAVEMENT * 0.6, _WALL, beside))
     with tree.frame("Bearings below the webs"):
         beside, below = width * (0.25 * sum(WEB)), -BRIDGE_BEARING / 2
         pads = [
@@ -48,5 +50,8 @@ def bridge_abutment_group(tree: Tree) -> None:
             for side in (1.0, -1.0)
         ]
     with tree.frame("All"):
-        mesh = op.join(paint_faces(op.join(*walls), concrete), paint_faces(op.join(*pads), steel))
+        mesh = op.join(
+            paint_faces(op.join(*walls), abutment.concrete_material),
+            paint_faces(op.join(*pads), abutment.steel_material),
+        )
     tree.output("Mesh", mesh, description="The abutment")

@@ -6,7 +6,6 @@ import bpy
 import numpy as np
 
 from ....road.parameters import Overpass
-from ...materials import material
 from ..frames import stand
 from ..meshes import fill
 from ..model_builder import ModelBuilder
@@ -15,6 +14,13 @@ from .overpass import overpass_group
 _LONGEST_APPROACH = 150.0
 _APPROACH_ALONE = 20.0
 """Length (m) of the embankments where there is no terrain."""
+_MATERIALS = {
+    "concrete_material": "bridge_concrete",
+    "edge_material": "barrier_concrete",
+    "steel_material": "galvanised_steel",
+    "pavement_material": "asphalt",
+    "ground_material": "grass_ground",
+}
 
 
 def build_overpasses(builder: ModelBuilder) -> None:
@@ -22,31 +28,23 @@ def build_overpasses(builder: ModelBuilder) -> None:
     terrain = builder.parameters.terrain
     for name, bridge in builder.parameters.of_type(Overpass).items():
         approaches = {}
-        for side, face in (("Left", bridge.left_abutment), ("Right", -bridge.right_abutment)):
+        for side, face in (("left", bridge.left_abutment), ("right", -bridge.right_abutment)):
             # As far as there is ground.
             reach = terrain.half_width - face if terrain else _APPROACH_ALONE
-            approaches[f"{side} Approach Length"] = float(np.clip(reach, 1.0, _LONGEST_APPROACH))
-        inputs = {
-            **builder.surfaces(),
-            **approaches,
-            "Left Abutment": bridge.left_abutment - bridge.offset,
-            "Right Abutment": bridge.right_abutment - bridge.offset,
-            "Skew": float(np.deg2rad(bridge.rotation_deg)),
-            "Width": bridge.width,
-            "Clearance": bridge.clearance,
-            "Deck Thickness": bridge.deck_thickness,
-            "Parapet Height": bridge.parapet_height,
-            "Pier Width": bridge.pier_width,
-            "Slope": terrain.batter_slope if terrain else 1.5,
-            "Instance": bridge.instance,
-            "Concrete Material": material("bridge_concrete"),
-            "Edge Material": material("barrier_concrete"),
-            "Steel Material": material("galvanised_steel"),
-            "Pavement Material": material("asphalt"),
-            "Ground Material": material("grass_ground"),
-        }
+            approaches[f"{side}_approach_length"] = float(np.clip(reach, 1.0, _LONGEST_APPROACH))
         mesh = bpy.data.meshes.new("SR Overpass")
         across = np.array([bridge.offset - offset for offset in bridge.pier_offsets])
         fill(mesh, np.column_stack([across, np.zeros((len(across), 2))]))
-        builder.add(name, mesh, overpass_group(), inputs)
+        builder.add_thing(
+            name,
+            bridge,
+            overpass_group(),
+            mesh,
+            **approaches,
+            left_abutment=bridge.left_abutment - bridge.offset,
+            right_abutment=bridge.right_abutment - bridge.offset,
+            skew=float(np.deg2rad(bridge.rotation_deg)),
+            slope=terrain.batter_slope if terrain else 1.5,
+            **_MATERIALS,
+        )
         stand(builder, name, bridge)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from ...nodes import operations as op
 from ...nodes.builder import Tree, makes_group
+from ...nodes.inputs import Inputs, metres
 from ...nodes.solids import box, move_geometry, put_on_points, row_of_points
 
 _POST_SPACING, _BAR_SPACING = 2.0, 0.14  # m
@@ -12,11 +13,16 @@ _LOWER = 0.1
 """Lower rail above the deck, m."""
 
 
+class _Railing(Inputs):
+    length = metres(20.0, (0.5, 300.0), "Length")
+    height = metres(1.0, (0.3, 3.0), "Top of the handrail")
+
+
 @makes_group("SR Bridge Railing")
 def bridge_railing_group(tree: Tree) -> None:
     """A railing from x = 0 on along x, standing on z = 0."""
-    length = tree.number("Length", 20.0, (0.5, 300.0), unit="m", description="Length")
-    height = tree.number("Height", 1.0, (0.3, 3.0), unit="m", description="Top of the handrail")
+    railing = _Railing(tree)
+    length, height = railing.length, railing.height
     with tree.frame("Rails"):
         wide, high = _HANDRAIL
         rail = box(tree, op.vector(tree, length, _RAIL, _RAIL), op.vector(tree, length * 0.5, 0.0, _LOWER))

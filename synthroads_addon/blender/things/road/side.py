@@ -10,7 +10,8 @@ import bpy
 from ....base.classes import class_id
 from ...nodes import operations as op
 from ...nodes.builder import Operand, Tree, Value, node_group
-from ...nodes.strip import INSTANCES, strip_group
+from ...nodes.inputs import INSTANCES
+from ...nodes.strip import strip_group
 from .carriageway import height_group
 from .layout import TURNOUT_NAMES, SideLayout, attribute_name, input_name
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from ....road.parameters import TrafficSign
-from ...materials import material
 from ..model_builder import ModelBuilder
 from .looks import sign_face_inputs
 from .sign import sign_group
@@ -17,17 +16,14 @@ _LARGE_POST, _MOST_LATTICES = 0.15, 2
 def build_signs(builder: ModelBuilder) -> None:
     """Make one object per traffic sign."""
     for name, sign in builder.parameters.of_type(TrafficSign).items():
-        inputs = {
-            **builder.surfaces(),
+        builder.add_thing(
+            name,
+            sign,
+            sign_group(),
             **sign_face_inputs(sign),
-            "Lower Edge": sign.lower_edge,
-            "Posts": sign.posts,
-            "Post Diameter": sign.post_diameter,
-            "Lattice": _stands_on_lattices(sign),
-            "Post Material": material("galvanised_steel"),
-            "Instance": sign.instance,
-        }
-        builder.add(name, builder.points(name, [sign], {}), sign_group(), inputs)
+            lattice=_stands_on_lattices(sign),
+            post_material="galvanised_steel",
+        )
 
 
 def _stands_on_lattices(sign: TrafficSign) -> bool:

@@ -4,26 +4,30 @@ from __future__ import annotations
 
 from ...nodes import operations as op
 from ...nodes.builder import Tree, Value, makes_group
+from ...nodes.inputs import Inputs, integer, material_of, socket
 from ...nodes.solids import paint_faces
 from .pictograms import NAMES, PICTOGRAMS, RED
 
 Row = tuple[float, float, float]
 
 
+class _Pictogram(Inputs):
+    pictogram = integer(0, (0, len(NAMES) - 1), ", ".join(f"{i} {name}" for i, name in enumerate(NAMES)))
+    low_corner = socket("Vector", "Lower left corner of the box (m)")
+    high_corner = socket("Vector", "Upper right corner of the box (m)")
+    writing_material = material_of("pictograms")
+    border_material = material_of("those parts that are red")
+
+
 @makes_group("SR Pictogram")
 def pictogram_group(tree: Tree) -> None:
     """A pictogram in the xy plane, as large as fits into a box."""
-    wanted = tree.integer(
-        "Pictogram", 0, (0, len(NAMES) - 1), description=", ".join(f"{i} {name}" for i, name in enumerate(NAMES))
-    )
-    low = tree.input("Low Corner", "Vector", description="Lower left corner of the box (m)")
-    high = tree.input("High Corner", "Vector", description="Upper right corner of the box (m)")
-    color = tree.input("Writing Material", "Material", description="Material of pictograms")
-    border = tree.input("Border Material", "Material", description="Material of those parts that are red")
+    drawn = _Pictogram(tree)
+    low, high = drawn.low_corner, drawn.high_corner
 
     ranges, corners = _tables()
     with tree.frame("Corners of its polygons out of the table of all"):
-        first, count, others = (op.rounded_up(op.component(op.choose(wanted, ranges), axis)) for axis in "XYZ")
+        first, count, others = (op.rounded_up(op.component(op.choose(drawn.pictogram, ranges), axis)) for axis in "XYZ")
         corner = op.choose(op.index(tree) + first, corners)
         place = corner * (1.0, 1.0, 0.0)
         points = tree.node("GeometryNodePoints", count=count, position=place).value
@@ -33,8 +37,8 @@ def pictogram_group(tree: Tree) -> None:
     with tree.frame("Filled one by one: the red ones come first"):
         red = op.index(tree) < others
         mesh = op.join(
-            paint_faces(_fill_curves(op.separate(curves, red, "CURVE")), border),
-            paint_faces(_fill_curves(op.separate(curves, ~red, "CURVE")), color),
+            paint_faces(_fill_curves(op.separate(curves, red, "CURVE")), drawn.border_material),
+            paint_faces(_fill_curves(op.separate(curves, ~red, "CURVE")), drawn.writing_material),
         )
     with tree.frame("Fitted into the box"):
         extent = tree.node("GeometryNodeBoundBox", mesh)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from ...nodes import operations as op
 from ...nodes.builder import Tree, makes_group
+from ...nodes.inputs import Inputs, boolean, socket
 from ...nodes.solids import move_geometry
 
 LINES = 6
@@ -17,19 +18,32 @@ _SMALLEST = 0.02
 """Letters lower than this (m) can't be read and are left out."""
 
 
+_LINE = "Writing; empty lines take no room"
+
+
+class _Writing(Inputs):
+    line_1 = socket("String", _LINE)
+    line_2 = socket("String", _LINE)
+    line_3 = socket("String", _LINE)
+    line_4 = socket("String", _LINE)
+    line_5 = socket("String", _LINE)
+    line_6 = socket("String", _LINE)
+    low_corner = socket("Vector", "Lower left corner of the box (m)")
+    high_corner = socket("Vector", "Upper right corner of the box (m)")
+    flush_left = boolean(False, "Lines begin on the left, else they are centred")
+
+
 @makes_group("SR Sign Writing")
 def sign_writing_group(tree: Tree) -> None:
     """Lines of writing in the xy plane, one below the other, all of one size: as large as fits into the box."""
-    lines = [
-        tree.input(f"Line {number}", "String", description="Writing; empty lines take no room")
-        for number in range(1, LINES + 1)
-    ]
-    low = tree.input("Low Corner", "Vector", description="Lower left corner of the box (m)")
-    high = tree.input("High Corner", "Vector", description="Upper right corner of the box (m)")
-    flush = tree.boolean("Flush Left", False, description="Lines begin on the left, else they are centred")
+    writing = _Writing(tree)
+    low, high = writing.low_corner, writing.high_corner
 
     with tree.frame("Letters of size 1, and the length of each line"):
-        written = [tree.call(sign_line_group(), writing=line) for line in lines]
+        written = [
+            tree.call(sign_line_group(), writing=line)
+            for line in (writing.values[f"line_{number}"] for number in range(1, LINES + 1))
+        ]
         longest = written[0]["Length"]
         for line in written[1:]:
             longest = op.maximum(longest, line["Length"])
@@ -43,7 +57,7 @@ def sign_writing_group(tree: Tree) -> None:
     placed = []
     for number, line in enumerate(written):
         with tree.frame(f"Line {number + 1} in its place"):
-            left = op.component(low, "X") + op.switch(flush, (room - line["Length"] * size) * 0.5, 0.0)
+            left = op.component(low, "X") + op.switch(writing.flush_left, (room - line["Length"] * size) * 0.5, 0.0)
             base = op.component(high, "Y") - pitch * (above[number] + 0.5) - size * (CAPITAL / 2.0)
             place, scale = op.vector(tree, left, base), op.vector(tree, size, size, 1.0)
             placed.append(op.transform(line.value, translation=place, scale=scale))

@@ -2,30 +2,27 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from ....road.lane_lines import LaneLine, lane_of
 from ....road.parameters import PointObject, Vehicle
 from ....road.things.vehicles import CHASSIS
-from ...materials import material
 from ...materials.vehicles import COLOR
 from ..model_builder import ModelBuilder
 from .vehicle import vehicle_group
 
 MATERIALS = {
-    "Paint": "car_paint",
-    "Glass": "glass",
-    "Rubber": "rubber",
-    "Chrome": "chrome",
-    "Black": "plastic_black",
-    "White Light": "lamp_glass",
-    "Red Light": "lamp_red",
-    "Plate": "number_plate",
-    "Cover": "tarpaulin",
+    "Paint Material": "car_paint",
+    "Glass Material": "glass",
+    "Rubber Material": "rubber",
+    "Chrome Material": "chrome",
+    "Black Material": "plastic_black",
+    "White Light Material": "lamp_glass",
+    "Red Light Material": "lamp_red",
+    "Plate Material": "number_plate",
+    "Cover Material": "tarpaulin",
 }
-"""Material inputs of the groups (their names go on with "Material") -> entries of the material table."""
+"""Material inputs of the groups -> entries of the material table."""
 
 
 def build_vehicles(builder: ModelBuilder) -> None:
@@ -38,9 +35,7 @@ def build_vehicles(builder: ModelBuilder) -> None:
         grade = lines[lane].carriageway.traffic * builder.geometry.profile.grade(np.array([vehicle.station]))
         place = vehicle_place(lines[lane], vehicle)
         mesh = builder.points("Vehicle", [place], {COLOR: np.array([vehicle.color]), "grade": grade})
-        inputs: dict[str, Any] = {f"{key} Material": material(entry) for key, entry in MATERIALS.items()}
-        inputs["Road"] = builder.objects["Road"]
-        builder.add(name, mesh, vehicle_group(vehicle.model), inputs)
+        builder.add(name, mesh, vehicle_group(vehicle.model), MATERIALS)
 
 
 def vehicle_place(line: LaneLine, vehicle: Vehicle) -> PointObject:
