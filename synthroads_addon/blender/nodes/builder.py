@@ -299,7 +299,7 @@ def _kind(operand: Operand) -> str:
 def _sources() -> bytes:
     """Return a digest of the sources of all node groups: a change to any of them makes new groups."""
     digest, blender = hashlib.sha256(), Path(__file__).parents[1]
-    names = ("nodes/*.py", "things/**/*.py", "materials/vehicles.py")  # the last has the colour's attribute
+    names = ("nodes/*.py", "things/**/*.py", "materials/looks.py")  # the last has the colour's attribute
     for path in sorted(path for name in names for path in blender.glob(name)):
         digest.update(path.read_bytes())
     return digest.digest()

@@ -9,7 +9,7 @@ import pytest
 from synthroads_addon.base.classes import class_id
 from synthroads_addon.blender.compat import set_modifier_input
 from synthroads_addon.blender.materials import material
-from synthroads_addon.blender.materials.vehicles import COLOR
+from synthroads_addon.blender.materials.looks import COLOR
 from synthroads_addon.blender.scene.evaluated import scene_mesh
 from synthroads_addon.blender.things.vehicle.build import MATERIALS
 from synthroads_addon.blender.things.vehicle.models import model_group

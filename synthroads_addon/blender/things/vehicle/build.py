@@ -7,7 +7,7 @@ import numpy as np
 from ....road.lane_lines import LaneLine, lane_of
 from ....road.parameters import PointObject, Vehicle
 from ....road.things.vehicles import CHASSIS
-from ...materials.vehicles import COLOR
+from ...materials.looks import COLOR
 from ..model_builder import ModelBuilder
 from .vehicle import vehicle_group
 

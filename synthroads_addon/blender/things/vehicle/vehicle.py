@@ -6,7 +6,7 @@ import bpy
 
 from ....base.classes import class_id
 from ....road.things.vehicles import CHASSIS
-from ...materials.vehicles import COLOR
+from ...materials.looks import COLOR
 from ...nodes import operations as op
 from ...nodes.builder import Tree, Value, makes_group, node_group
 from .details import declare_materials
