@@ -28,6 +28,7 @@ from typing import Any
 
 import bpy
 
+from ...base.files import PRESETS
 from ...base.stepper import pause
 from .layout import arrange
 
@@ -300,7 +301,7 @@ def _sources() -> bytes:
     """Return a digest of the sources of all node groups: a change to any of them makes new groups."""
     digest, blender = hashlib.sha256(), Path(__file__).parents[1]
     names = ("nodes/*.py", "things/**/*.py", "materials/looks.py")  # the last has the colour's attribute
-    for path in sorted(path for name in names for path in blender.glob(name)):
+    for path in (*sorted(path for name in names for path in blender.glob(name)), PRESETS / "vehicles.json"):
         digest.update(path.read_bytes())
     return digest.digest()
 

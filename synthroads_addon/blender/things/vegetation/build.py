@@ -3,19 +3,27 @@
 from __future__ import annotations
 
 import math
+from functools import cache
 from typing import Any
 
+from ....base.files import PRESETS
+from ....base.schema import read_json
 from ....road.parameters import Vegetation
 from ..model_builder import ModelBuilder
 from .grass import grass_group
 from .shrub import shrub_group
-from .species import GRASSES, SHRUBS, TREES
 from .tree import tree_group
 
-_KINDS = {"grass": (grass_group, GRASSES), "shrub": (shrub_group, SHRUBS), "tree": (tree_group, TREES)}
-"""Kind of plant -> its group, and the shapes of its species."""
+_GROUPS = {"grass": grass_group, "shrub": shrub_group, "tree": tree_group}
 _ROADSIDE_SHARE = 0.8
 """Grass on verges and median, as a share of the density elsewhere; reed grows on neither."""
+
+
+@cache
+def species_shapes() -> dict[str, dict[str, dict[str, float]]]:
+    """Return the shapes of the species by kind of plant and name: inputs of its group, for a plant of height 1."""
+    shapes: dict[str, dict[str, dict[str, float]]] = read_json(PRESETS / "plants.json")
+    return shapes
 
 
 def build_vegetation(builder: ModelBuilder) -> None:
@@ -24,17 +32,16 @@ def build_vegetation(builder: ModelBuilder) -> None:
     if terrain is None or "Terrain" not in builder.objects or builder.detail == 0.0:
         return
     for name, plants in builder.parameters.of_type(Vegetation).items():
-        group, shapes = _KINDS[plants.kind]
         builder.add_thing(
             name,
             plants,
-            group(),
+            _GROUPS[plants.kind](),
             reach=terrain.half_width,
             first_metre=math.floor(builder.stretch[0]),
             zero=builder.zero,
             seed=plants.seed % 2**30,
             detail=builder.detail,
-            **shapes[plants.species],
+            **species_shapes()[plants.kind][plants.species],
             **_further_inputs(plants, builder),
         )
 

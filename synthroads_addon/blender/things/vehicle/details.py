@@ -40,25 +40,27 @@ def declare_materials(tree: Tree) -> dict[str, Value]:
 
 
 def wheels(
-    tree: Tree, radius: float, width: float, places: Iterable[tuple[float, float]], materials: Mapping[str, Value]
+    tree: Tree, materials: Mapping[str, Value], radius: float, width: float, axles: Iterable[tuple[float, float]]
 ) -> Value:
-    """Return wheels that stand on z = 0, at places (x of their middles, y); they look away from x = 0."""
+    """Return wheels that stand on z = 0 and look away from x = 0.
+
+    Args:
+        tree: the group.
+        materials: by name.
+        radius, width: of a wheel.
+        axles: x of the middles of an axle's wheels, 0 for a single wheel, and y.
+    """
     inputs = {"rubber_material": materials["rubber"], "chrome_material": materials["chrome"]}
     wheel = tree.call(_wheel_group(), radius=radius, wheel_width=width, **inputs).value
-    stands = [(x, y, radius) for x, y in places]
+    stands = [(side * x, y, radius) for x, y in axles for side in ((-1.0, 1.0) if x else (1.0,))]
     points = row_of_points(tree, len(stands))
     place = op.choose(op.index(tree), stands)
     turned = op.switch(op.component(place, "X") < 0.0, math.pi, 0.0)
     return op.realize(put_on_points(points, wheel, place, rotation=op.turn(tree, z=turned)))
 
 
-def pair(x: float, y: float) -> list[tuple[float, float]]:
-    """Return the places of an axle's two wheels."""
-    return [(-x, y), (x, y)]
-
-
 def boxes(
-    tree: Tree, items: Iterable[tuple[str, Point, Point]], materials: Mapping[str, Value], mirrored: bool = False
+    tree: Tree, materials: Mapping[str, Value], items: Iterable[tuple[str, Point, Point]], mirrored: bool = False
 ) -> Value:
     """Return boxes: material, middle, size. Mirrored ones stand on both sides."""
     group = _box_group()
@@ -70,7 +72,13 @@ def boxes(
 
 
 def rod(
-    tree: Tree, start: Point, end: Point, radii: tuple[float, float], material: Value, mirrored: bool = False
+    tree: Tree,
+    materials: Mapping[str, Value],
+    material: str,
+    start: Point,
+    end: Point,
+    radii: tuple[float, float],
+    mirrored: bool = False,
 ) -> Value:
     """Return a round, tapered, closed rod between two places."""
     radius, end_radius = radii
@@ -81,14 +89,14 @@ def rod(
         start_radius=radius,
         end_radius=end_radius,
         both_sides=mirrored,
-        material=material,
+        material=materials[material],
     ).value
 
 
-def ball(tree: Tree, middle: Point, size: Point, material: Value) -> Value:
+def ball(tree: Tree, materials: Mapping[str, Value], material: str, middle: Point, size: Point) -> Value:
     """Return an ellipsoid of half axes `size`."""
     sphere = tree.node("GeometryNodeMeshUVSphere", segments=12, rings=8, radius=1.0).value
-    return paint_faces(op.transform(sphere, translation=middle, scale=size), material)
+    return paint_faces(op.transform(sphere, translation=middle, scale=size), materials[material])
 
 
 def smooth(vehicle: Value) -> Value:
