@@ -189,6 +189,14 @@ class _Build:
         return RoadModel(collection, builder.objects, origin)
 
 
+def scene_origin(scene: bpy.types.Scene) -> NDArray[np.float64] | None:
+    """Return the map coordinates (3,) of the road's local origin in a scene; None without a road."""
+    for collection in scene.collection.children_recursive:
+        if ORIGIN in collection:
+            return np.array(collection[ORIGIN], dtype=np.float64)
+    return None
+
+
 def remove_road(keep: bpy.types.Collection | None = None) -> None:
     """Remove the objects that `build_road` made, and its collection unless the user keeps something in it.
 

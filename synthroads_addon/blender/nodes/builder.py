@@ -36,6 +36,22 @@ KEY = "synthroads_key"
 """Custom property of a group: hash of what it was built from."""
 
 
+def _calculation(operation: str, turned: bool = False) -> Callable[[Value, Operand], Value]:
+    """Return the method of an arithmetic operator; `turned` is that of the right one of its operands."""
+
+    def calculate(value: Value, other: Operand) -> Value:
+        return value._math(operation, other, value) if turned else value._math(operation, value, other)
+
+    return calculate
+
+
+def _comparison(operation: str) -> Callable[[Value, Operand], Value]:
+    def compare(value: Value, other: Operand) -> Value:
+        return value._compare(operation, other)
+
+    return compare
+
+
 class Value:
     """An output socket that can be calculated with; vectors take numbers component-wise."""
 
@@ -63,17 +79,18 @@ class Value:
         kind = "INT" if {_kind(self), _kind(other)} == {"INT"} else "FLOAT"
         return self.tree.node("FunctionNodeCompare", self, other, operation=operation, data_type=kind).value
 
-    def __add__(self, other: Operand) -> Value:
-        return self._math("ADD", self, other)
-
-    def __radd__(self, other: Operand) -> Value:
-        return self._math("ADD", other, self)
-
-    def __sub__(self, other: Operand) -> Value:
-        return self._math("SUBTRACT", self, other)
-
-    def __rsub__(self, other: Operand) -> Value:
-        return self._math("SUBTRACT", other, self)
+    __add__ = _calculation("ADD")
+    __radd__ = _calculation("ADD", turned=True)
+    __sub__ = _calculation("SUBTRACT")
+    __rsub__ = _calculation("SUBTRACT", turned=True)
+    __truediv__ = _calculation("DIVIDE")
+    __rtruediv__ = _calculation("DIVIDE", turned=True)
+    __floordiv__ = _calculation("DIVIDE_FLOOR")
+    __mod__ = _calculation("FLOORED_MODULO")
+    __lt__ = _comparison("LESS_THAN")
+    __le__ = _comparison("LESS_EQUAL")
+    __gt__ = _comparison("GREATER_THAN")
+    __ge__ = _comparison("GREATER_EQUAL")
 
     def __mul__(self, other: Operand) -> Value:
         if _kind(other) == "VECTOR" and self.kind != "VECTOR":
@@ -83,32 +100,8 @@ class Value:
     def __rmul__(self, other: Operand) -> Value:
         return self * other
 
-    def __truediv__(self, other: Operand) -> Value:
-        return self._math("DIVIDE", self, other)
-
-    def __rtruediv__(self, other: Operand) -> Value:
-        return self._math("DIVIDE", other, self)
-
-    def __floordiv__(self, other: Operand) -> Value:
-        return self._math("DIVIDE_FLOOR", self, other)
-
-    def __mod__(self, other: Operand) -> Value:
-        return self._math("FLOORED_MODULO", self, other)
-
     def __neg__(self) -> Value:
         return self._math("MULTIPLY", self, -1 if self.kind == "INT" else -1.0)
-
-    def __lt__(self, other: Operand) -> Value:
-        return self._compare("LESS_THAN", other)
-
-    def __le__(self, other: Operand) -> Value:
-        return self._compare("LESS_EQUAL", other)
-
-    def __gt__(self, other: Operand) -> Value:
-        return self._compare("GREATER_THAN", other)
-
-    def __ge__(self, other: Operand) -> Value:
-        return self._compare("GREATER_EQUAL", other)
 
     def __and__(self, other: Operand) -> Value:
         return self.tree.node("FunctionNodeBooleanMath", self, other, operation="AND").value

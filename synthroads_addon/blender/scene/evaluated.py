@@ -25,7 +25,7 @@ from ...scanning.scene.motion import (
     lane_motions,
 )
 from ..labels import Label, Labels, velocity_of
-from ..model.build import ORIGIN
+from ..model.build import scene_origin
 from ..things.model_builder import ROLE, SUPPORT
 from .changes import Changes
 from .reading import Copied, MeshPart, Places, Whole, copy_mesh, join_parts, slot_names
@@ -387,6 +387,11 @@ class _Reading:
         return labels
 
 
+def _origin(scene: bpy.types.Scene) -> Float:
+    origin = scene_origin(scene)
+    return np.zeros(3) if origin is None else origin
+
+
 def _depsgraph(source: Source) -> bpy.types.Depsgraph:
     if isinstance(source, bpy.types.Depsgraph):
         return source
@@ -395,10 +400,3 @@ def _depsgraph(source: Source) -> bpy.types.Depsgraph:
     layer = source.view_layers[0]
     layer.update()
     return layer.depsgraph
-
-
-def _origin(scene: bpy.types.Scene) -> Float:
-    for collection in scene.collection.children_recursive:
-        if ORIGIN in collection:
-            return np.array(collection[ORIGIN], dtype=np.float64)
-    return np.zeros(3)

@@ -18,7 +18,7 @@ from ...road.tessellation import sample_stations
 from ..compat import set_modifier_input
 from ..materials import material
 from ..nodes.inputs import input_name
-from .meshes import points_mesh, signed_instance
+from .meshes import on_plan, points_mesh, signed_instance
 
 ROLE = "synthroads_role"
 """Custom property of the objects that `build_road` makes: what they are in the model."""
@@ -92,8 +92,8 @@ class ModelBuilder:
         It is that of the whole road, 4 m halved as often as need be: pieces of a stretch are the whole road's.
         """
         bends = [max(abs(e.curvature_start), abs(e.curvature_end)) for e in self.geometry.alignment.elements]
-        wanted = np.sqrt(8.0 * self.tolerance / max(*bends, 1e-9))
-        return float(2.0 ** np.floor(np.log2(np.clip(wanted, 0.5, 4.0))))
+        longest = np.sqrt(8.0 * self.tolerance / max(*bends, 1e-9))
+        return float(2.0 ** np.floor(np.log2(np.clip(longest, 0.5, 4.0))))
 
     @cached_property
     def widest(self) -> float:
@@ -174,6 +174,16 @@ class ModelBuilder:
             for name, value in {**objects, **(inputs or {})}.items():
                 set_modifier_input(modifier, name, _as_input(name, kinds.get(name, ""), value))
         self._added(role, item)
+
+    def stand(self, role: str, item: PointObject, rotation_deg: float = 0.0) -> None:
+        """Put an added object to a point object's place in plan, at the axis's elevation, turned by `rotation_deg`.
+
+        Its frame then has x to the right of traffic with the stations, y along it, and z up.
+        """
+        heading = self.geometry.alignment.heading(np.array([item.station]))[0]
+        added = self.objects[role]
+        added.location = tuple((on_plan(self.geometry, [item])[0] - self.origin).tolist())
+        added.rotation_euler = (0.0, 0.0, float(heading - np.pi / 2 + np.deg2rad(rotation_deg)))
 
     def add_instance(self, role: str, collection: bpy.types.Collection) -> bpy.types.Object:
         """Add an empty that shows a collection."""

@@ -12,8 +12,9 @@ from mathutils import Matrix
 
 import synthroads_addon
 from synthroads_addon.base.errors import Cancelled
+from synthroads_addon.blender.model.build import scene_origin
 from synthroads_addon.blender.model.store import find_road, recall_parameters
-from synthroads_addon.blender.views.cloud import Pace, scene_origin
+from synthroads_addon.blender.views.cloud import Pace
 from synthroads_addon.cloud.formats.registry import ENDINGS, open_writer
 from synthroads_addon.cloud.points import PointBlock
 from synthroads_addon.cloud.tools.display import COLOURINGS, drawing_places, read_display

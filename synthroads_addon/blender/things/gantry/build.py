@@ -10,7 +10,6 @@ import numpy as np
 from ....road.parameters import Gantry
 from ....road.things.furniture import GantrySign
 from ...materials import material
-from ..frames import stand
 from ..meshes import attribute, fill
 from ..model_builder import ModelBuilder
 from ..sign.looks import FaceStyle, face_inputs
@@ -48,7 +47,7 @@ def build_gantries(builder: ModelBuilder) -> None:
             catwalk=any(sign.kind == "display" for sign in gantry.signs),
             **_MATERIALS,
         )
-        stand(builder, name, gantry, gantry.rotation_deg)
+        builder.stand(name, gantry, gantry.rotation_deg)
         for number, sign in enumerate(gantry.signs, 1):
             _add_face(builder, name, gantry, number, sign)
 
@@ -66,7 +65,7 @@ def _add_face(builder: ModelBuilder, name: str, gantry: Gantry, number: int, sig
     }
     role = f"{name}/sign-{number}"
     builder.add(role, None, gantry_sign_group(), inputs)
-    stand(builder, role, gantry, gantry.rotation_deg)
+    builder.stand(role, gantry, gantry.rotation_deg)
 
 
 def _board_inputs(sign: GantrySign) -> dict[str, Any]:

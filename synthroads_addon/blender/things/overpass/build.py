@@ -6,7 +6,6 @@ import bpy
 import numpy as np
 
 from ....road.parameters import Overpass
-from ..frames import stand
 from ..meshes import fill
 from ..model_builder import ModelBuilder
 from .overpass import overpass_group
@@ -47,4 +46,4 @@ def build_overpasses(builder: ModelBuilder) -> None:
             slope=terrain.batter_slope if terrain else 1.5,
             **_MATERIALS,
         )
-        stand(builder, name, bridge)
+        builder.stand(name, bridge)
