@@ -114,20 +114,20 @@ def _clear(shade: Shade) -> None:
     shade.transparency = 0.8
 
 
-_BEFORE: dict[str, Callable[[Shade], None]] = {
+_BEFORE_NOISES: dict[str, Callable[[Shade], None]] = {
     **dict.fromkeys(("noise_aluminium", "noise_concrete", "noise_wood"), _bay),
     "gantry_steel": _gantry_steel,
     "car_paint": _paint,
     "tarpaulin": lambda shade: _paint(shade, _COVER_TINT),
 }
-_AFTER = {"barrier_concrete": _joints, "birch_bark": _scars, "acrylic_glass": _clear}
+_AFTER_NOISES = {"barrier_concrete": _joints, "birch_bark": _scars, "acrylic_glass": _clear}
 
 
 def vary_color(name: str, shade: Shade) -> None:
     """Let the base colour vary as that of a material of the table does; others keep their mean."""
-    if name in _BEFORE:
-        _BEFORE[name](shade)
+    if name in _BEFORE_NOISES:
+        _BEFORE_NOISES[name](shade)
     for noise in _NOISES.get(name, ()):
         shade.vary(noise.amount, shade.noise(noise.wavelength, noise.detail, noise.stretch))
-    if name in _AFTER:
-        _AFTER[name](shade)
+    if name in _AFTER_NOISES:
+        _AFTER_NOISES[name](shade)

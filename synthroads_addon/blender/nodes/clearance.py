@@ -29,7 +29,7 @@ def highest_below(pavement: Value, start: Value, end: Value, depth: tuple[Value,
     `shear` * x in y.
     """
     tree = pavement.tree
-    columns = op.rounded_up((end - start) / SPACING) + 1
+    columns = op.round_up((end - start) / SPACING) + 1
     points, column, row = op.grid(tree, columns, _ROWS)
     x = start + (end - start) * (column / (columns - 1.0))
     y = depth[0] + (depth[1] - depth[0]) * (row / (_ROWS - 1.0)) + x * shear

@@ -51,7 +51,7 @@ def power(a: Value, exponent: Operand) -> Value:
     return a.tree.node("ShaderNodeMath", a, exponent, operation="POWER").value
 
 
-def rounded_up(a: Value) -> Value:
+def round_up(a: Value) -> Value:
     """Return the least whole number that is not less than `a`."""
     return a.tree.node("FunctionNodeFloatToInt", a, rounding_mode="CEILING").value
 
@@ -181,7 +181,7 @@ def separate(geometry: Value, selection: Value, domain: str = "POINT") -> Value:
     return geometry.tree.node("GeometryNodeSeparateGeometry", geometry, selection, domain=domain)["Selection"]
 
 
-def without_degenerate(geometry: Value) -> Value:
+def delete_degenerate(geometry: Value) -> Value:
     """Delete faces without area."""
     area = geometry.tree.node("GeometryNodeInputMeshFaceArea").value
     return delete_faces(geometry, area < SMALLEST_AREA)

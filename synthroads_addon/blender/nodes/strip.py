@@ -75,5 +75,5 @@ def strip_group(tree: Tree) -> None:
         mesh = op.store(mesh, "station", op.sample_index(backbone, op.named_attribute(tree, "station"), number))
         mesh = op.label(op.set_position(mesh, place), strip.class_, strip.instance, strip.material)
         # Of faces that narrow, rounding would decide which way they look.
-        mesh = op.delete_faces(op.without_degenerate(mesh), op.named_attribute(tree, "strip_width") < CLOSED)
+        mesh = op.delete_faces(op.delete_degenerate(mesh), op.named_attribute(tree, "strip_width") < CLOSED)
     tree.output("Mesh", mesh, description="Ribbon whose faces look up")

@@ -52,7 +52,7 @@ def concrete_barrier_group(tree: Tree) -> None:
         share = op.switch(ramp > 1e-3, 1.0, op.minimum(inside / op.maximum(ramp, 1e-3), 1.0))
         line = op.store(line, "tall", op.maximum(barrier.height * share, CONCRETE_TIP))
     with tree.frame("Profile swept along the rows"):
-        mesh = op.without_degenerate(_swept(tree, line, barrier))
+        mesh = op.delete_degenerate(_sweep_profile(tree, line, barrier))
     with tree.frame("Labels"):
         mesh = op.label(mesh, class_id("barrier"), barrier.instance, barrier.material)
     tree.output("Mesh", op.only_if(end - begin > 0.01, mesh), description="Barrier; its points carry their station")
@@ -64,7 +64,7 @@ def _rows(tree: Tree, barrier: _Barrier, begin: Value, end: Value, ramp: Value) 
     Those beyond the backbone's ends collapse there.
     """
     first, last = barrier.start_station, barrier.end_station
-    count = op.rounded_up(op.maximum(last - first, 0.01) / barrier.step - 1e-4) + 1
+    count = op.round_up(op.maximum(last - first, 0.01) / barrier.step - 1e-4) + 1
     line = row_of_points(tree, count)
     station = op.minimum(first + op.index(tree) * barrier.step, last)
     for kink in (first + ramp, last - ramp):
@@ -74,7 +74,7 @@ def _rows(tree: Tree, barrier: _Barrier, begin: Value, end: Value, ramp: Value) 
     return op.store(line, "station", op.minimum(op.maximum(station, begin), end))
 
 
-def _swept(tree: Tree, line: Value, barrier: _Barrier) -> Value:
+def _sweep_profile(tree: Tree, line: Value, barrier: _Barrier) -> Value:
     def outline(number: Value) -> Value:
         step, jersey = (op.choose(number, _outline(name)) for name in ("step", "new_jersey"))
         return op.switch(barrier.new_jersey, step, jersey)

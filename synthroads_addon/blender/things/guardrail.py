@@ -120,10 +120,10 @@ def _rows(tree: Tree, rail: _Rail, ramp: Value) -> Value:
     Between the ramps the rows are whole parts of the post spacing from the start on, as the posts are.
     """
     first, last = rail.start_station, rail.end_station
-    step = rail.post_spacing / op.rounded_up(rail.post_spacing / rail.beam_step - 1e-4)
-    outer = op.rounded_up(ramp / rail.beam_step - 1e-4)
-    skipped = op.rounded_up(ramp / step + 1e-4)
-    middle = op.maximum(op.rounded_up((last - first - ramp) / step - 1e-4) - skipped, 0)
+    step = rail.post_spacing / op.round_up(rail.post_spacing / rail.beam_step - 1e-4)
+    outer = op.round_up(ramp / rail.beam_step - 1e-4)
+    skipped = op.round_up(ramp / step + 1e-4)
+    middle = op.maximum(op.round_up((last - first - ramp) / step - 1e-4) - skipped, 0)
     middle = tree.node("FunctionNodeFloatToInt", middle, rounding_mode="ROUND").value
     # Those that lie on a ramp are left out; where it ends there is a row of its own.
     line = row_of_points(tree, outer * 2 + middle + 2)
@@ -144,7 +144,7 @@ def _beam(tree: Tree, line: Value, side: float, spacer: Value) -> Value:
     left = op.sample_index(line, op.named_attribute(tree, "left", "FLOAT_VECTOR"), number)
     depth = (op.component(profile, "X") + spacer + POST_DEPTH) * side
     place = top + left * depth + op.vector(tree, 0.0, 0.0, op.component(profile, "Z"))
-    mesh = op.without_degenerate(op.set_position(mesh, place))
+    mesh = op.delete_degenerate(op.set_position(mesh, place))
     # Seen along the rows the profile runs round clockwise on the right side: there its faces look outwards.
     return tree.node("GeometryNodeFlipFaces", mesh).value if side > 0 else mesh
 

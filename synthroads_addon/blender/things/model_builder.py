@@ -172,7 +172,7 @@ class ModelBuilder:
                 if kind == "NodeSocketObject" and name in self.objects
             }
             for name, value in {**objects, **(inputs or {})}.items():
-                set_modifier_input(modifier, name, _as_input(name, kinds.get(name, ""), value))
+                set_modifier_input(modifier, name, _to_input(name, kinds.get(name, ""), value))
         self._added(role, item)
 
     def stand(self, role: str, item: PointObject, rotation_deg: float = 0.0) -> None:
@@ -220,7 +220,7 @@ def named_fields(item: RoadObject, group: bpy.types.NodeTree) -> dict[str, str]:
     return fields
 
 
-def _as_input(name: str, kind: str, value: Any) -> Any:
+def _to_input(name: str, kind: str, value: Any) -> Any:
     """Return a value as the modifier takes it."""
     if name.endswith("Instance"):
         return int(signed_instance([value])[0])

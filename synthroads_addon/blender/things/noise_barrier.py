@@ -87,7 +87,7 @@ def noise_barrier_group(tree: Tree) -> None:
     wall = _Wall(tree)
     axis, surfaces = wall.geometry()
     with tree.frame("Number of bays"):
-        count = op.rounded_up(
+        count = op.round_up(
             op.maximum((wall.end_station - wall.start_station) / wall.post_spacing - SHORTEST_ELEMENT, 1.0)
         )
     with tree.frame("Posts"):
@@ -213,7 +213,7 @@ def _slatted_wall(tree: Tree, panel: _Panel, relief: _Relief) -> Value:
         op.vector(tree, 0.0, out * 0.5, tall * 0.5),
     )
     span, length = (tall, panel.length) if relief.lying else (panel.length, tall)
-    count = op.rounded_up(span / relief.pitch - 0.5)
+    count = op.round_up(span / relief.pitch - 0.5)
     pitch = span / count
     across = (op.index(tree) + 0.5) * pitch
     front = out - panel.thickness * 0.5 + _SUNK

@@ -62,7 +62,7 @@ def temporary_barrier_group(tree: Tree) -> None:
 def _elements(tree: Tree, barrier: _TemporaryBarrier, begin: Value, end: Value) -> Value:
     """Return one point per element with its number and the stations that it lies between."""
     whole = (barrier.end_station - barrier.start_station) / barrier.segment_length - SHORTEST_ELEMENT
-    count = op.rounded_up(op.maximum(whole, 1.0))
+    count = op.round_up(op.maximum(whole, 1.0))
     points = op.store(row_of_points(tree, count), "number", op.index(tree))
     start = barrier.start_station + op.index(tree) * barrier.segment_length
     stop = op.switch(op.index(tree) < count - 1, barrier.end_station, start + barrier.segment_length)

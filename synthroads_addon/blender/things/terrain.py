@@ -109,7 +109,7 @@ def _side_group(tree: Tree) -> None:
     with tree.frame("Mesh"):
         mesh = op.store(mesh, "distance", distance)
         mesh = op.set_position(mesh, place + op.vector(tree, 0.0, 0.0, height))
-        tree.output("Mesh", op.without_degenerate(mesh))
+        tree.output("Mesh", op.delete_degenerate(mesh))
 
 
 def _ground_above(tree: Tree, ground: Value, place: Value) -> Value:

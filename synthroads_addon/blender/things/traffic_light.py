@@ -104,7 +104,7 @@ def _lamps(tree: Tree, light: _Light) -> Value:
     points = op.store(row_of_points(tree, light.lights), "number", number)
     lamps = op.realize(put_on_points(points, dome, op.vector(tree, 0.0, _front(light), light.level(number))))
     number = op.named_attribute(tree, "number", "INT")
-    is_green = (number > 0) & number.equals(op.rounded_up(op.minimum(light.lights, 3.0)) - 1)
+    is_green = (number > 0) & number.equals(op.round_up(op.minimum(light.lights, 3.0)) - 1)
     for glass, chosen in (
         (light.yellow_material, True),
         (light.red_material, number.equals(0)),

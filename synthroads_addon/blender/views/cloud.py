@@ -84,7 +84,7 @@ class CloudView:
             count = self._pace.points(len(self.cloud), context.region, context.region_data.perspective_matrix)
             begin = perf_counter()
             batch.draw_range(shader, elem_start=0, elem_count=count)
-            self._pace.took(perf_counter() - begin, count)
+            self._pace.measure(perf_counter() - begin, count)
             gpu.state.point_size_set(1.0)
             gpu.state.depth_test_set(depth_test)
             gpu.state.depth_mask_set(depth_mask)
@@ -131,7 +131,7 @@ class Pace:
         self._draw_all_soon(region)
         return max(fluent, min(count, 10_000))
 
-    def took(self, seconds: float, count: int) -> None:
+    def measure(self, seconds: float, count: int) -> None:
         """Learn how long drawing took."""
         self._rate = count / max(seconds, 1e-6)
 

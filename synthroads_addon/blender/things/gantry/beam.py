@@ -77,7 +77,7 @@ def _chords(tree: Tree, length: Value, height: Value, depth: Value) -> Value:
 def _lattice(tree: Tree, length: Value, height: Value, depth: Value) -> Value:
     """Return posts, cross bars and diagonals; every second bay is turned upside down."""
     width = _chord(height)
-    bays = op.rounded_up(length / (op.maximum(height, 0.5) * _BAY))
+    bays = op.round_up(length / (op.maximum(height, 0.5) * _BAY))
     points = row_of_points(tree, bays * len(_BARS) + _FRAME)
     bay, number = op.index(tree) // len(_BARS), op.index(tree) % len(_BARS)
     mirror = 1.0 - (bay % 2) * 2.0
@@ -93,7 +93,7 @@ def _lattice(tree: Tree, length: Value, height: Value, depth: Value) -> Value:
 
 def _joints(tree: Tree, kind: Value, length: Value, height: Value, depth: Value) -> Value:
     """Return pairs of flanges, no higher than the beam."""
-    pieces = op.rounded_up(length / _JOINT_SPACING)
+    pieces = op.round_up(length / _JOINT_SPACING)
     points = row_of_points(tree, pieces - 1)
     place = op.vector(tree, (op.index(tree) + 1) * (length / pieces), 0.0, height * 0.5)
     plate = box(tree, op.vector(tree, 0.08, depth + 0.06, height * 0.97))

@@ -39,7 +39,7 @@ def gantry_catwalk_group(tree: Tree) -> None:
                 move_geometry(rail, op.vector(tree, 0.0, edge * side, z)) for z in (top - _BAR / 2, top - _HANDRAIL / 2)
             ]
     with tree.frame("Posts of the railings, and supports below the grating"):
-        bays = op.rounded_up(length / _SPACING)
+        bays = op.round_up(length / _SPACING)
         points = row_of_points(tree, bays + 1)
         x = op.index(tree) * ((length - _BAR) / bays) + _BAR / 2
         tall = top - _BAR - _SUPPORT

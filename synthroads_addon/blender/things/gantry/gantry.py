@@ -142,7 +142,7 @@ def _catwalk(tree: Tree, gantry: _Gantry, surfaces: tuple[Value, Value], top: Va
     tall = top + 1.1 - foot
     rail = box(tree, op.vector(tree, 0.05, 0.05, tall), op.vector(tree, 0.0, 0.0, tall * 0.5))
     rungs = put_on_points(
-        row_of_points(tree, op.rounded_up(tall / _RUNG - 1.0)),
+        row_of_points(tree, op.round_up(tall / _RUNG - 1.0)),
         box(tree, (0.4, 0.03, 0.03)),
         op.vector(tree, 0.0, 0.0, (op.index(tree) + 0.5) * _RUNG),
     )

@@ -70,7 +70,7 @@ def bridge_embankment_group(tree: Tree) -> None:
         earth = op.store(
             paint_faces(op.join(*slopes, turned), bank.ground_material), "class_id", class_id("ground"), "FACE"
         )
-        mesh = op.without_degenerate(op.join(crown, earth))
+        mesh = op.delete_degenerate(op.join(crown, earth))
     tree.output("Mesh", mesh, description="Embankment with its classes; the road on it is part of the bridge")
 
 

@@ -29,7 +29,7 @@ def bridge_railing_group(tree: Tree) -> None:
         upper = move_geometry(rail, op.vector(tree, 0.0, 0.0, height - high - 0.1 - _LOWER))
         hand = box(tree, op.vector(tree, length, wide, high), op.vector(tree, length * 0.5, 0.0, height - high / 2))
     with tree.frame("Posts"):
-        bays = op.rounded_up(length / _POST_SPACING)
+        bays = op.round_up(length / _POST_SPACING)
         points = row_of_points(tree, bays + 1)
         x = op.index(tree) * ((length - _POST) / bays) + _POST / 2
         tall = height - high / 2
@@ -37,7 +37,7 @@ def bridge_railing_group(tree: Tree) -> None:
             points, box(tree, op.vector(tree, _POST, _POST, tall)), op.vector(tree, x, 0.0, tall * 0.5)
         )
     with tree.frame("Bars between the rails"):
-        points = row_of_points(tree, op.rounded_up(length / _BAR_SPACING) - 1)
+        points = row_of_points(tree, op.round_up(length / _BAR_SPACING) - 1)
         x = (op.index(tree) + 1) * _BAR_SPACING
         tall = height - high - 0.1 - _LOWER
         open_ = tree.node("GeometryNodeMeshCylinder", vertices=4, fill_type="NONE", radius=_BAR * 0.7, depth=tall).value

@@ -49,7 +49,7 @@ def marking_group(tree: Tree) -> None:
         dashed = line.dash > 0.0
         length = op.switch(dashed, end - first, line.dash)
         period = op.switch(dashed, (end - first) * 2.0, line.dash + line.gap)
-        count = op.rounded_up(op.maximum((end - first) / period - 1e-6, 0.0))
+        count = op.round_up(op.maximum((end - first) / period - 1e-6, 0.0))
     with tree.frame("Edges as attributes of the rows"):
         across = (edges.left_offset, edges.right_offset, edges.left_height, edges.right_height)
         for name, value in zip(_EDGES, across, strict=True):

@@ -80,7 +80,7 @@ def _corners_of(tree: Tree, shape: Value) -> tuple[Value, Value, Value]:
         points = _ROUND_STEPS if name == "round" else _STEPS
         rows.append((float(starts[outline]), float(len(SIGN_OUTLINES[outline])), float(points)))
     row = op.choose(shape, rows)
-    start, count, steps = (op.rounded_up(op.component(row, axis)) for axis in "XYZ")
+    start, count, steps = (op.round_up(op.component(row, axis)) for axis in "XYZ")
     return start, count, steps
 
 

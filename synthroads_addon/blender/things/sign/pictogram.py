@@ -27,11 +27,11 @@ def pictogram_group(tree: Tree) -> None:
 
     ranges, corners = _tables()
     with tree.frame("Corners of its polygons out of the table of all"):
-        first, count, others = (op.rounded_up(op.component(op.choose(drawn.pictogram, ranges), axis)) for axis in "XYZ")
+        first, count, others = (op.round_up(op.component(op.choose(drawn.pictogram, ranges), axis)) for axis in "XYZ")
         corner = op.choose(op.index(tree) + first, corners)
         place = corner * (1.0, 1.0, 0.0)
         points = tree.node("GeometryNodePoints", count=count, position=place).value
-        polygon = op.rounded_up(op.component(corner, "Z"))
+        polygon = op.round_up(op.component(corner, "Z"))
         curves = tree.node("GeometryNodePointsToCurves", points, curve_group_id=polygon).value
         curves = tree.node("GeometryNodeSetSplineCyclic", curves, cyclic=True).value
     with tree.frame("Filled one by one: the red ones come first"):

@@ -66,7 +66,7 @@ def _lattice(tree: Tree, radius: Value, height: Value) -> Value:
     chords = row_of_points(tree, 3)
     foot = corner(op.index(tree))
     chords = bars(chords, foot, foot + (0.0, 0.0, 1.0), _CHORD)
-    panels = op.rounded_up(height / _PANEL)
+    panels = op.round_up(height / _PANEL)
     number = op.index(tree)
     side, panel = number // panels, number % panels
     odd = panel % 2

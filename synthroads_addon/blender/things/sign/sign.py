@@ -73,7 +73,7 @@ def sign_group(tree: Tree) -> None:
 def _mounting(tree: Tree, face: Face, sign: _Sign, spread: Value, long: Value) -> Value:
     """Return the rails behind the face, and the clamps that hold them to the posts."""
     with tree.frame("Rails behind the face, one above the other"):
-        count = op.rounded_up(op.maximum(face.height / _RAIL_SPACING, 2.0))
+        count = op.round_up(op.maximum(face.height / _RAIL_SPACING, 2.0))
 
         def level(number: Value) -> Value:
             return sign.lower_edge + face.height * spread * ((number + 0.5) / count)

@@ -50,7 +50,7 @@ def sign_writing_group(tree: Tree) -> None:
     with tree.frame("Height of a line, and size of the letters"):
         above = [tree.node("FunctionNodeInputInt", integer=0).value]
         for line in written:
-            above.append(above[-1] + op.rounded_up(op.minimum(line["Length"], 1.0)))
+            above.append(above[-1] + op.round_up(op.minimum(line["Length"], 1.0)))
         pitch = op.component(high - low, "Y") / op.maximum(above[-1], 1.0)
         room = op.component(high - low, "X")
         size = op.minimum(pitch * (LETTERS / CAPITAL), room / op.maximum(longest, 1e-3))

@@ -67,9 +67,9 @@ def points_on(
     axis = op.object_geometry(stand.backbone)
     ribbon = station_ribbon(axis)
     first = stand.first_metre - stand.zero
-    rows = _integer(op.rounded_up(last_station(axis)) - first, 0)
+    rows = _integer(op.round_up(last_station(axis)) - first, 0)
     per_metre = reach * 2.0 * density
-    each = _integer(op.rounded_up(per_metre * _SPARE), 1)
+    each = _integer(op.round_up(per_metre * _SPARE), 1)
     points = tree.node("GeometryNodePoints", count=rows * each).value
     number = op.index(tree)
     metre = number // each

@@ -122,7 +122,7 @@ def _wheel_group(tree: Tree) -> None:
         out = op.component(profile, "X") * radius
         across = op.component(profile, "Y") * width
         turned = op.vector(tree, -across, op.unary("COSINE", angle) * out, op.unary("SINE", angle) * out)
-        wheel = op.without_degenerate(op.set_position(mesh, turned))
+        wheel = op.delete_degenerate(op.set_position(mesh, turned))
     with tree.frame("Tyre and rim"):
         wheel = paint_faces(wheel, rubber)
         rim = (op.index(tree) % (len(_WHEEL) - 1)) < _RIM_FACES

@@ -86,7 +86,7 @@ def hull(tree: Tree, materials: Mapping[str, Value], patches: Iterable[tuple[Any
     for patch in shape.patches:
         chosen = _in_patch(patch, table[:, 9], face_row, band)
         mesh = paint_faces(mesh, materials[patch.material], chosen)
-    return op.without_degenerate(mesh)
+    return op.delete_degenerate(mesh)
 
 
 def _widths(tumble: float) -> list[tuple[float, float, float]]:
