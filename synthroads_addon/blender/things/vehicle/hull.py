@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from ...nodes import operations as op
 from ...nodes.builder import Operand, Tree, Value
 from ...nodes.solids import paint_faces
+from .details import VehicleMaterials
 
 Float = NDArray[np.float64]
 
@@ -64,7 +65,7 @@ _BANDS = len(_WIDTHS) - 1
 _ARCH_STEPS = 6
 
 
-def hull(tree: Tree, materials: Mapping[str, Value], patches: Iterable[tuple[Any, ...]], **fields: Any) -> Value:
+def hull(tree: Tree, materials: VehicleMaterials, patches: Iterable[tuple[Any, ...]], **fields: Any) -> Value:
     """Return the body, closed, its faces outwards; `fields` are those of `Hull`."""
     shape = Hull(patches=tuple(Patch(*patch) for patch in patches), **fields)
     table = _rows(shape)

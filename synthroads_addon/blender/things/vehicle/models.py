@@ -16,7 +16,7 @@ from ....base.files import PRESETS
 from ....base.schema import read_json
 from ...nodes import operations as op
 from ...nodes.builder import Tree, Value, node_group
-from .details import ball, boxes, declare_materials, rod, smooth, wheels
+from .details import VehicleMaterials, ball, boxes, rod, smooth, wheels
 from .hull import hull
 
 _PARTS: dict[str, Callable[..., Value]] = {"hull": hull, "wheels": wheels, "boxes": boxes, "rod": rod, "ball": ball}
@@ -29,7 +29,7 @@ def model_group(model: str) -> bpy.types.NodeTree:
 
 
 def _build(tree: Tree, model: str) -> None:
-    materials, parts = declare_materials(tree), []
+    materials, parts = VehicleMaterials(tree), []
     for frame in _models()[model]:
         with tree.frame(frame["frame"]):
             made = [_PARTS[part["part"]](tree, materials, **_settings(part)) for part in frame["parts"]]

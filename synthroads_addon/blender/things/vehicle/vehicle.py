@@ -9,7 +9,8 @@ from ....road.things.vehicles import CHASSIS
 from ...materials.looks import COLOR
 from ...nodes import operations as op
 from ...nodes.builder import Tree, Value, makes_group, node_group
-from .details import declare_materials
+from ...nodes.inputs import Inputs, metres, socket
+from .details import VehicleMaterials
 from .models import model_group
 
 _POINTS = (
@@ -24,19 +25,22 @@ def vehicle_group(model: str) -> bpy.types.NodeTree:
     return node_group(f"SR Vehicles {model.title()}", _build, model, description=description)
 
 
+class _Vehicles(Inputs):
+    points = socket("Geometry", _POINTS)
+    road = socket("Object", "Surface that they drive on")
+
+
 def _build(tree: Tree, model: str) -> None:
-    points = tree.input("Points", "Geometry", description=_POINTS)
-    road = tree.input("Road", "Object", description="Surface that they drive on")
-    materials = declare_materials(tree)
+    traffic, materials = _Vehicles(tree), VehicleMaterials(tree)
     with tree.frame("Vehicle"):
-        body = tree.call(model_group(model), **{f"{key}_material": value for key, value in materials.items()}).value
+        body = tree.call(model_group(model), **materials.values).value
     with tree.frame("On the road"):
         chassis = CHASSIS[model]
         vehicles = tree.call(
             _on_wheels_group(),
-            points=points,
+            points=traffic.points,
             vehicle=body,
-            road=op.object_geometry(road),
+            road=op.object_geometry(traffic.road),
             front_axle=chassis.front,
             rear_axle=chassis.rear,
             half_track=chassis.half_track,
@@ -44,24 +48,26 @@ def _build(tree: Tree, model: str) -> None:
     tree.output("Mesh", vehicles, description="Vehicles; each face has its own vehicle's instance number")
 
 
+class _OnWheels(Inputs):
+    points = socket("Geometry", _POINTS)
+    vehicle = socket("Geometry", "The vehicle, its wheels on z = 0, facing along +y")
+    road = socket("Geometry", "Surface that the vehicles drive on")
+    front_axle = metres(1.3, (-20.0, 20.0), "Place of the middle of the front axles along y")
+    rear_axle = metres(-1.3, (-20.0, 20.0), "Place of the middle of the hind axles along y")
+    half_track = metres(0.8, (0.1, 3.0), "Distance of the wheels from x = 0")
+
+
 @makes_group("SR On Wheels")
 def _on_wheels_group(tree: Tree) -> None:
     """A vehicle on each point, pitched and rolled as the road below its axles."""
-    points = tree.input("Points", "Geometry", description=_POINTS)
-    vehicle = tree.input("Vehicle", "Geometry", description="The vehicle, its wheels on z = 0, facing along +y")
-    road = tree.input("Road", "Geometry", description="Surface that the vehicles drive on")
-    limits = (-20.0, 20.0)
-    front = tree.number(
-        "Front Axle", 1.3, limits, unit="m", description="Place of the middle of the front axles along y"
-    )
-    rear = tree.number("Rear Axle", -1.3, limits, unit="m", description="Place of the middle of the hind axles along y")
-    track = tree.number("Half Track", 0.8, (0.1, 3.0), unit="m", description="Distance of the wheels from x = 0")
+    inputs = _OnWheels(tree)
+    road, front, rear = inputs.road, inputs.front_axle, inputs.rear_axle
     with tree.frame("The road below the wheels"):
-        behind, across_behind = _axle(tree, road, rear, track)
-        ahead, across_ahead = _axle(tree, road, front, track)
+        behind, across_behind = _axle(tree, road, rear, inputs.half_track)
+        ahead, across_ahead = _axle(tree, road, front, inputs.half_track)
     with tree.frame("As the road is pitched and rolled"):
         # Place and turn are evaluated where the points still are.
-        points = op.store(points, "vehicle_place", behind - (ahead - behind) * (rear / (front - rear)))
+        points = op.store(inputs.points, "vehicle_place", behind - (ahead - behind) * (rear / (front - rear)))
         rotation = tree.node(
             "FunctionNodeAxesToRotation",
             ahead - behind,
@@ -69,7 +75,7 @@ def _on_wheels_group(tree: Tree) -> None:
             primary_axis="Y",
             secondary_axis="X",
         ).value
-        vehicles = tree.node("GeometryNodeInstanceOnPoints", points, instance=vehicle, rotation=rotation).value
+        vehicles = tree.node("GeometryNodeInstanceOnPoints", points, instance=inputs.vehicle, rotation=rotation).value
         place = op.named_attribute(tree, "vehicle_place", "FLOAT_VECTOR")
         vehicles = tree.node("GeometryNodeSetPosition", vehicles, position=place).value
     with tree.frame("Labels"):
