@@ -14,8 +14,8 @@ from ...scanning.scene.mesh import SceneMesh
 from ...scanning.scene.motion import Motion, MovingMesh, ScannedScene
 from ..compat import set_modifier_input
 from ..materials import material
-from ..things.vehicle.build import MATERIALS
 from ..things.vehicle.models import model_group
+from ..things.vehicle.vehicle import MATERIALS
 from .evaluated import scene_mesh
 
 

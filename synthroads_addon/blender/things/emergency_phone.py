@@ -8,9 +8,8 @@ from ...base.classes import class_id
 from ..nodes import operations as op
 from ..nodes.builder import Tree, Value, makes_group
 from ..nodes.inputs import material_of, metres
-from ..nodes.solids import Point, box, loft, move_geometry, paint_faces
+from ..nodes.solids import Point, box, loft, move_geometry, paint_faces, tube
 from ..nodes.standing import BURIED, Standing
-from ..nodes.tubes import tube
 from .sign.writing import sign_writing_group
 
 _CORNER = 0.16

@@ -9,9 +9,8 @@ from ...road.parameters import Pole
 from ..nodes import operations as op
 from ..nodes.builder import Tree, Value, makes_group
 from ..nodes.inputs import boolean, material_of, metres
-from ..nodes.solids import box, move_geometry, paint_faces, prism, row_of_points
+from ..nodes.solids import box, cone, move_geometry, paint_faces, prism, row_of_points, tube
 from ..nodes.standing import BURIED, Standing, put_on
-from ..nodes.tubes import cone, tube
 from .model_builder import ModelBuilder
 
 _TAPER = 0.45

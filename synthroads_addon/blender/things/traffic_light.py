@@ -10,9 +10,8 @@ from ...road.things.body_shapes import TRAFFIC_LIGHT_POST
 from ..nodes import operations as op
 from ..nodes.builder import Tree, Value, makes_group
 from ..nodes.inputs import integer, material_of, metres
-from ..nodes.solids import box, loft, move_geometry, paint_faces, put_on_points, row_of_points
+from ..nodes.solids import box, cone, loft, move_geometry, paint_faces, put_on_points, row_of_points, tube
 from ..nodes.standing import BURIED, Standing
-from ..nodes.tubes import cone, tube
 from .model_builder import ModelBuilder
 
 # In diameters of a light: a chamber of the housing, and the board behind it.

@@ -19,14 +19,18 @@ from synthroads_addon.blender.compat import modifier_input, set_modifier_input
 from synthroads_addon.blender.nodes import builder
 from synthroads_addon.blender.nodes import operations as op
 from synthroads_addon.blender.nodes.builder import Tree, Value, node_group
-from synthroads_addon.blender.nodes.describe import describe
 from synthroads_addon.blender.nodes.strip import strip_group
 from synthroads_addon.blender.things.guardrail import guardrail_group
 from synthroads_addon.blender.things.road.carriageway import carriageway_marking_group, height_group
 from synthroads_addon.blender.things.road.layout import MarkingLayout, SideLayout
 from synthroads_addon.blender.things.road.road import road_group
 from synthroads_addon.blender.things.vehicle.vehicle import vehicle_group
+<<<<<<< HEAD
 from synthroads_addon.road.things.vehicles import CHASSIS
+=======
+from synthroads_addon.road.things.chassis import CHASSIS
+from tests.helpers.scenes.described_group import describe
+>>>>>>> b932e51 (A thing's node group and what builds it from the parameters stand in one file; a group as text is the tests' business)
 from tests.helpers.scenes.kept_groups import KeptGroups
 
 LAYOUT = (

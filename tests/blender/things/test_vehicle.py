@@ -11,8 +11,8 @@ from synthroads_addon.blender.compat import set_modifier_input
 from synthroads_addon.blender.materials import material
 from synthroads_addon.blender.materials.looks import COLOR
 from synthroads_addon.blender.scene.evaluated import scene_mesh
-from synthroads_addon.blender.things.vehicle.build import MATERIALS
 from synthroads_addon.blender.things.vehicle.models import model_group
+from synthroads_addon.blender.things.vehicle.vehicle import MATERIALS
 from synthroads_addon.materials.table import materials
 from synthroads_addon.road.parameters import Carriageway, Vehicle
 from synthroads_addon.road.tessellation import sample_stations

@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import bpy
+import numpy as np
+
 from ....base.classes import class_id
+from ....road.parameters import Overpass
 from ....road.things.body_shapes import BRIDGE_BEARING, BRIDGE_BURIED, BRIDGE_SEAT
 from ...nodes import operations as op
 from ...nodes.backbone import height_on
@@ -10,6 +14,8 @@ from ...nodes.builder import Tree, Value, makes_group
 from ...nodes.clearance import highest_below, pavement_near
 from ...nodes.inputs import Inputs, instance_number, material_of, metres, number, socket
 from ...nodes.solids import flip_faces, move_geometry, put_on_points
+from ..meshes import fill
+from ..model_builder import ModelBuilder
 from .abutment import bridge_abutment_group
 from .deck import EDGE, bridge_deck_group
 from .embankment import bridge_embankment_group
@@ -165,3 +171,42 @@ def _embankment(bridge: _Overpass, ground: Value, low: Value, wing: Value, shear
         pavement_material=bridge.pavement_material,
         ground_material=bridge.ground_material,
     ).value
+
+
+_LONGEST_APPROACH = 150.0
+_APPROACH_ALONE = 20.0
+"""Length (m) of the embankments where there is no terrain."""
+_MATERIALS = {
+    "concrete_material": "bridge_concrete",
+    "edge_material": "barrier_concrete",
+    "steel_material": "galvanised_steel",
+    "pavement_material": "asphalt",
+    "ground_material": "grass_ground",
+}
+
+
+def build_overpasses(builder: ModelBuilder) -> None:
+    """Make one object per overpass."""
+    terrain = builder.parameters.terrain
+    for name, bridge in builder.parameters.of_type(Overpass).items():
+        approaches = {}
+        for side, face in (("left", bridge.left_abutment), ("right", -bridge.right_abutment)):
+            # As far as there is ground.
+            reach = terrain.half_width - face if terrain else _APPROACH_ALONE
+            approaches[f"{side}_approach_length"] = float(np.clip(reach, 1.0, _LONGEST_APPROACH))
+        mesh = bpy.data.meshes.new("SR Overpass")
+        across = np.array([bridge.offset - offset for offset in bridge.pier_offsets])
+        fill(mesh, np.column_stack([across, np.zeros((len(across), 2))]))
+        builder.add_thing(
+            name,
+            bridge,
+            overpass_group(),
+            mesh,
+            **approaches,
+            left_abutment=bridge.left_abutment - bridge.offset,
+            right_abutment=bridge.right_abutment - bridge.offset,
+            skew=float(np.deg2rad(bridge.rotation_deg)),
+            slope=terrain.batter_slope if terrain else 1.5,
+            **_MATERIALS,
+        )
+        builder.stand(name, bridge)

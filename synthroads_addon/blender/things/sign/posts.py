@@ -7,9 +7,8 @@ import math
 from ...nodes import operations as op
 from ...nodes.builder import Tree, Value, makes_group
 from ...nodes.inputs import boolean, integer, material_of, metres, socket
-from ...nodes.solids import bars, paint_faces, row_of_points
+from ...nodes.solids import bars, paint_faces, row_of_points, tube
 from ...nodes.standing import BURIED, OnSurface, on_surface, put_on
-from ...nodes.tubes import tube
 
 MOST_POSTS = 4
 _PANEL = 0.9

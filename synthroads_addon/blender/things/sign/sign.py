@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from ....base.classes import class_id
+from ....road.parameters import TrafficSign
 from ....road.things.body_shapes import SIGN_RAIL
 from ...nodes import operations as op
 from ...nodes.builder import Tree, Value, makes_group
 from ...nodes.inputs import Inputs, boolean, integer, material_of, metres
-from ...nodes.solids import box, move_geometry, paint_faces, put_on_points, row_of_points
+from ...nodes.solids import box, move_geometry, paint_faces, put_on_points, row_of_points, tube
 from ...nodes.standing import Standing, put_on
-from ...nodes.tubes import tube
+from ..model_builder import ModelBuilder
 from .face import Face, sign_face_group
+from .looks import sign_face_inputs
 from .outline import SHAPES
 from .posts import MOST_POSTS, sign_posts_group
 
@@ -90,3 +92,27 @@ def _mounting(tree: Tree, face: Face, sign: _Sign, spread: Value, long: Value) -
         place = op.vector(tree, beside, 0.0, level(number // sign.posts) - height / 2.0)
         clamps = put_on_points(row_of_points(tree, sign.posts * count), clamp, place)
         return paint_faces(op.join(rails, clamps), face.back_material)
+
+
+_LARGE = 8.0
+"""Area of a board from which it stands on lattice posts, m2."""
+_LARGE_POST, _MOST_LATTICES = 0.15, 2
+"""Least diameter of lattice posts, m, and their number at most."""
+
+
+def build_signs(builder: ModelBuilder) -> None:
+    """Make one object per traffic sign."""
+    for name, sign in builder.parameters.of_type(TrafficSign).items():
+        builder.add_thing(
+            name,
+            sign,
+            sign_group(),
+            **sign_face_inputs(sign),
+            lattice=_stands_on_lattices(sign),
+            post_material="galvanised_steel",
+        )
+
+
+def _stands_on_lattices(sign: TrafficSign) -> bool:
+    large = sign.width * sign.height >= _LARGE
+    return large and sign.post_diameter >= _LARGE_POST and sign.posts <= _MOST_LATTICES
