@@ -22,10 +22,8 @@ from ...nodes.solids import box, move_geometry, paint_faces, put_on_points, row_
 from ..meshes import attribute, fill
 from ..model_builder import ModelBuilder
 from ..sign.looks import FaceStyle, face_inputs
-from .beam import KINDS, gantry_beam_group
 from .board import gantry_sign_group
-from .catwalk import gantry_catwalk_group
-from .post import gantry_post_group
+from .structure import KINDS, gantry_beam_group, gantry_catwalk_group, gantry_post_group
 
 _LADDER_FOOT, _RUNG = 2.3, 0.3  # m
 _ENCLOSED = 0.02

@@ -16,10 +16,9 @@ from ...nodes.inputs import Inputs, instance_number, material_of, metres, number
 from ...nodes.solids import flip_faces, move_geometry, put_on_points
 from ..meshes import fill
 from ..model_builder import ModelBuilder
-from .abutment import bridge_abutment_group
 from .deck import EDGE, bridge_deck_group
 from .embankment import bridge_embankment_group
-from .pier import bridge_pier_group
+from .supports import bridge_abutment_group, bridge_pier_group
 
 _WINGS = (3.0, 12.0)
 """Shortest and longest wing walls, m."""
