@@ -52,11 +52,11 @@ class VehicleMeshes:
 
     def _model(self, model: str) -> SceneMesh:
         if model not in self._models:
-            self._models[model] = _own_frame(model)
+            self._models[model] = _model_mesh(model)
         return self._models[model]
 
 
-def _own_frame(model: str) -> SceneMesh:
+def _model_mesh(model: str) -> SceneMesh:
     """Return a model in the frame of `LaneMotion`: its middle at 0 on the road, x forward, y left, z up."""
     item = bpy.data.objects.new("SR Vehicle", bpy.data.meshes.new("SR Vehicle"))
     bpy.context.scene.collection.objects.link(item)
