@@ -1,4 +1,4 @@
-"""What a gantry is built of: SR Gantry Beam (box, truss or tube), SR Gantry Post, and SR Gantry Catwalk on the beam."""
+"""Parts of a gantry: SR Gantry Beam (box, truss or tube), SR Gantry Post, and SR Gantry Catwalk on the beam."""
 
 from __future__ import annotations
 
