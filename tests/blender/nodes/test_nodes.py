@@ -25,12 +25,8 @@ from synthroads_addon.blender.things.road.carriageway import carriageway_marking
 from synthroads_addon.blender.things.road.layout import MarkingLayout, SideLayout
 from synthroads_addon.blender.things.road.road import road_group
 from synthroads_addon.blender.things.vehicle.vehicle import vehicle_group
-<<<<<<< HEAD
 from synthroads_addon.road.things.vehicles import CHASSIS
-=======
-from synthroads_addon.road.things.chassis import CHASSIS
 from tests.helpers.scenes.described_group import describe
->>>>>>> b932e51 (A thing's node group and what builds it from the parameters stand in one file; a group as text is the tests' business)
 from tests.helpers.scenes.kept_groups import KeptGroups
 
 LAYOUT = (

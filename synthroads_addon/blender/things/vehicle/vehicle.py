@@ -6,10 +6,9 @@ import bpy
 import numpy as np
 
 from ....base.classes import class_id
-from ....road.things.vehicles import CHASSIS
 from ....road.lane_lines import LaneLine, lane_of
 from ....road.parameters import PointObject, Vehicle
-from ....road.things.chassis import CHASSIS, wheel_base
+from ....road.things.vehicles import CHASSIS
 from ...materials.looks import COLOR
 from ...nodes import operations as op
 from ...nodes.builder import Tree, Value, makes_group, node_group
@@ -144,7 +143,7 @@ def build_vehicles(builder: ModelBuilder) -> None:
 def vehicle_place(line: LaneLine, vehicle: Vehicle) -> PointObject:
     """Return where a vehicle is at the time 0: its middle on its lane's line, looking along it with the traffic."""
     station = np.array([vehicle.station])
-    turn = float(np.rad2deg(line.turn(station, wheel_base(vehicle.model) / 2.0)[0]))
+    turn = float(np.rad2deg(line.turn(station, CHASSIS[vehicle.model].wheel_base / 2.0)[0]))
     return PointObject(
         instance=vehicle.instance,
         station=vehicle.station,
