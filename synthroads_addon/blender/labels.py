@@ -26,13 +26,13 @@ class Label:
     """Label of an object's faces where these have none of their own.
 
     Attributes:
-        own: class that the object has, stronger than its materials'; -1 for none.
-        otherwise: class that it has where its materials have none.
+        strong: class that the object has, stronger than its materials'; -1 for none.
+        weak: class that it has where its materials have none.
         instance: instance number; -1 for none.
     """
 
-    own: int
-    otherwise: int
+    strong: int
+    weak: int
     instance: int
 
 
@@ -48,12 +48,12 @@ class Labels:
         self._ids = {row.name: row.id for row in classes()}
         self._by_collection = self._collections(scene)
 
-    def of(self, item: bpy.types.Object, owner: bpy.types.Object) -> Label:
+    def label_of(self, item: bpy.types.Object, owner: bpy.types.Object) -> Label:
         """Return the label of an original object, and of the original that shows it as an instance (or itself)."""
-        own = self.by_name.find("objects", item.name, owner.name)
-        own = self._property(item, owner) if own is None else own
-        otherwise = self._by_collection.get(item, self._by_collection.get(owner, UNLABELLED))
-        return Label(-1 if own is None else own, otherwise, self._instance(item, owner))
+        strong = self.by_name.find("objects", item.name, owner.name)
+        strong = self._property(item, owner) if strong is None else strong
+        weak = self._by_collection.get(item, self._by_collection.get(owner, UNLABELLED))
+        return Label(-1 if strong is None else strong, weak, self._instance(item, owner))
 
     def _property(self, *candidates: bpy.types.Object) -> int | None:
         for candidate in candidates:

@@ -27,9 +27,7 @@ class BlenderServices:
         """Return the means of materials of the open file."""
         return list(constants(names).values())
 
-    def layers(
-        self, request: LayerRequest, progress: Callable[[float], None]
-    ) -> AbstractContextManager[LayerSource]:
+    def layers(self, request: LayerRequest, progress: Callable[[float], None]) -> AbstractContextManager[LayerSource]:
         """Open a source of colours and layers, see `layer_source`."""
         return layer_source(request, progress=progress)
 

@@ -14,7 +14,7 @@ from synthroads_addon.blender.casters import make_caster
 from synthroads_addon.blender.model.build import build_road
 from synthroads_addon.blender.nodes.builder import Tree, node_group
 from synthroads_addon.blender.scene.evaluated import scanned_scene, scene_mesh
-from synthroads_addon.blender.scene.reading import MeshPart, Places, Whole, join_parts
+from synthroads_addon.blender.scene.reading import MeshPart, Places, SceneTables, join_parts
 from synthroads_addon.jobs.road_scene import plan_road_scan
 from synthroads_addon.road.geometry import RoadGeometry
 from synthroads_addon.road.tessellation import MAXIMUM_SPACING
@@ -92,7 +92,7 @@ def test_more_triangles_than_32_bits_can_count_are_refused() -> None:
     corners = np.zeros((200_000, 3), np.float32)
     part = MeshPart(corners, np.zeros((100_000, 3), np.int32), 0, None, None, None)
     places = Places(array("d"), array("l", [0]) * 25_000)
-    whole = Whole([], ("asphalt",), np.zeros(3))
+    whole = SceneTables([], ("asphalt",), np.zeros(3))
     with pytest.raises(InputError, match=r"scene is 5000000000: must have less than 2\*\*31 vertices and triangles"):
         join_parts([(part, places)], whole)
 

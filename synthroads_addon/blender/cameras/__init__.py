@@ -27,7 +27,7 @@ __all__ = [
     "check_colour",
     "image_views",
     "layer_source",
-    "takes_returns",
+    "renders_returns",
 ]
 
 _BOUNCES = 3
@@ -49,7 +49,7 @@ def check_colour(settings: ColourSettings) -> None:
         raise InputError("colour: lighting", settings.lighting, "must be direct for eevee")
 
 
-def takes_returns(settings: ColourSettings) -> bool:
+def renders_returns(settings: ColourSettings) -> bool:
     """Return whether what is rendered is a pixel per return here, and not images."""
     return settings.source == "returns" or (
         settings.source == "auto" and settings.engine == "cycles" and HAS_RETURN_CAMERA
@@ -114,7 +114,7 @@ def _passes(request: LayerRequest, constants: SurfaceConstants) -> Passes:
     needed = needed_layers(request.wanted, settings.mode)
     if whole:
         needed -= {"base_color"} - request.wanted
-    returns = takes_returns(settings)
+    returns = renders_returns(settings)
     return Passes(
         layers=constants.varying(needed),
         lit=lit,

@@ -17,9 +17,7 @@ def read_layers(path: Path) -> dict[str, NDArray[Any]]:
     ``roughness.X``, ``Depth.Z`` and ``Combined.R``.
     """
     with OpenEXR.File(str(path), separate_channels=True) as file:
-        return {
-            name.split(".", 1)[1]: channel.pixels for part in file.parts for name, channel in part.channels.items()
-        }
+        return {name.split(".", 1)[1]: channel.pixels for part in file.parts for name, channel in part.channels.items()}
 
 
 def write_image(path: Path, values: NDArray[np.float32]) -> None:

@@ -14,7 +14,7 @@ from mathutils import Matrix
 from ...scanning.colour.colour import MaterialLayers
 from ...scanning.colour.images import ImageLayers
 from ...scanning.colour.views import RenderedImage, View
-from .stage import Rendered, RenderStage
+from .stage import RenderedPasses, RenderStage
 
 _LARGEST_HALF = 65504.0
 _SENSOR = 36.0
@@ -37,7 +37,7 @@ class RenderedLayers(ImageLayers):
         """Render all images; must run on Blender's main thread. Calls `progress` with the share that is done."""
         for number, view in enumerate(self._views):
             aim(self._stage.camera, view)
-            self.images.append(self._kept(number, view, self._stage.render(*view.size)))
+            self.images.append(self._store_image(number, view, self._stage.render(*view.size)))
             progress((number + 1) / len(self._views))
         self._locate()
         self.report = {
@@ -47,11 +47,10 @@ class RenderedLayers(ImageLayers):
             "bytes": sum(i.layers.nbytes + i.depth.nbytes + i.material.nbytes for i in self.images),
         }
 
-    def _kept(self, number: int, view: View, rendered: Rendered) -> RenderedImage:
+    def _store_image(self, number: int, view: View, rendered: RenderedPasses) -> RenderedImage:
         light = ("sun", "sky")
         parts = [
-            values * np.float32(self._exposure) if name in light else values
-            for name, values in rendered.layers.items()
+            values * np.float32(self._exposure) if name in light else values for name, values in rendered.layers.items()
         ]
         height, width = rendered.material.shape
         joined = np.concatenate(parts, axis=2) if parts else np.zeros((height, width, 0), np.float32)
@@ -60,12 +59,12 @@ class RenderedLayers(ImageLayers):
         material = np.rint(rendered.material).astype(np.uint16)
         return RenderedImage(
             view,
-            self._mapped(f"{number}-layers", layers),
-            self._mapped(f"{number}-depth", rendered.depth),
-            self._mapped(f"{number}-material", material),
+            self._map_file(f"{number}-layers", layers),
+            self._map_file(f"{number}-depth", rendered.depth),
+            self._map_file(f"{number}-material", material),
         )
 
-    def _mapped(self, name: str, array: np.ndarray[Any, Any]) -> np.ndarray[Any, Any]:
+    def _map_file(self, name: str, array: np.ndarray[Any, Any]) -> np.ndarray[Any, Any]:
         path = Path(self._folder.name) / f"{name}.npy"
         np.save(path, array)
         # An empty array can't be mapped.

@@ -11,18 +11,12 @@ from typing import NamedTuple, Self
 
 import bpy
 import numpy as np
-from mathutils import Vector
 
 from ...road.surroundings import Environment
 from ...scanning.colour.light import SunAndSky, expose_light, sun_direction
-from ..compat import sky_texture
+from ..sky import SUN_ANGLE, SUN_COLOR, fill_sky, new_sun
 from .stage import SUN_GROUP, Passes, stage
 
-_SUN_STRENGTH = 4.2
-_SUN_COLOR = (1.0, 0.93, 0.84)
-_SKY_STRENGTH = 0.16
-_SUN_ANGLE = math.radians(0.53)
-_LOWEST_SUN = 1.0  # degrees: below, the sky's model ends
 _PROBE_SAMPLES = 128
 
 
@@ -53,16 +47,13 @@ def daylight(environment: Environment, sharp: bool) -> Iterator[Daylight]:
     """
     towards, sky = sun_direction(environment), _Sky.of(environment)
     with ExitStack() as stack:
-        lamp = bpy.data.lights.new("SR Stage Sun", "SUN")
+        sun = new_sun("SR Stage Sun", environment, 0.0 if sharp else SUN_ANGLE)
+        lamp = sun.data
         stack.callback(lambda: bpy.data.lights.remove(lamp))
-        lamp.energy, lamp.color = _SUN_STRENGTH * environment.sun_strength, _SUN_COLOR
-        lamp.angle = 0.0 if sharp else _SUN_ANGLE
-        sun = bpy.data.objects.new("SR Stage Sun", lamp)
         stack.callback(lambda: bpy.data.objects.remove(sun))
-        sun.rotation_euler = Vector(towards).to_track_quat("Z", "Y").to_euler()
         world = stack.enter_context(_world(sky))
         # A lamp's irradiance falls on a matt surface, which spreads it over pi.
-        facing = np.array(_SUN_COLOR) * lamp.energy / math.pi
+        facing = np.array(SUN_COLOR) * lamp.energy / math.pi
         light, exposure = expose_light(towards, facing, np.array(_sky_radiance(sky)))
         yield Daylight(sun, world, light, exposure)
 
@@ -83,16 +74,7 @@ class _Sky(NamedTuple):
 def _world(sky: _Sky) -> Iterator[bpy.types.World]:
     world = bpy.data.worlds.new("SR Stage Sky")
     try:
-        if world.node_tree is None:
-            world.use_nodes = True
-        nodes, links = world.node_tree.nodes, world.node_tree.links
-        nodes.clear()
-        elevation, azimuth = max(sky.elevation, _LOWEST_SUN), sky.azimuth
-        texture = sky_texture(nodes, math.radians(elevation), math.radians(azimuth))
-        background, output = nodes.new("ShaderNodeBackground"), nodes.new("ShaderNodeOutputWorld")
-        background.inputs["Strength"].default_value = _SKY_STRENGTH * (0.4 + 0.6 * sky.strength)
-        links.new(texture.outputs["Color"], background.inputs["Color"])
-        links.new(background.outputs["Background"], output.inputs["Surface"])
+        fill_sky(world, *sky)
         yield world
     finally:
         bpy.data.worlds.remove(world)

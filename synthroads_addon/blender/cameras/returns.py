@@ -80,11 +80,11 @@ class ReturnCamera:
         return LayerValues(arrays, np.concatenate([part.source for part in parts]))
 
     def _block(self, points: SeenPoints, wanted: frozenset[str]) -> LayerValues:
-        channels, found = self._rendered(points) if len(points) else ({}, np.zeros(0, bool))
-        source = np.where(found, FROM_RETURN, FROM_MATERIAL).astype(np.uint8)
+        channels, matching = self._render_points(points) if len(points) else ({}, np.zeros(0, bool))
+        source = np.where(matching, FROM_RETURN, FROM_MATERIAL).astype(np.uint8)
         return self.material.layer_values(points, channels, source, wanted)
 
-    def _rendered(self, points: SeenPoints) -> tuple[dict[str, NDArray[np.float32]], NDArray[np.bool_]]:
+    def _render_points(self, points: SeenPoints) -> tuple[dict[str, NDArray[np.float32]], NDArray[np.bool_]]:
         """Return the channels (N, C) of points, and which of them are what their pixels show (N,)."""
         # A height that is a power of two divides without error, whichever way a version counts the rows.
         height = int(np.clip(1 << ((len(points) - 1).bit_length() // 2), _SMALLEST, _HEIGHT))
@@ -96,17 +96,18 @@ class ReturnCamera:
         assert rendered.position is not None
         # Blender versions differ in the order of the rows.
         error = [
-            np.linalg.norm(_flat(rendered.position[::step], len(points)) - points.position, axis=1) for step in (1, -1)
+            np.linalg.norm(_first_pixels(rendered.position[::step], len(points)) - points.position, axis=1)
+            for step in (1, -1)
         ]
         step = 1 if np.median(error[0]) <= np.median(error[1]) else -1
-        found = error[0 if step == 1 else 1] < _LARGEST_ERROR + 1e-6 * np.abs(middle).max()
-        found &= np.rint(_flat(rendered.material[::step, :, None], len(points))[:, 0]) == points.material + 1
-        self.worst = max(self.worst, float(error[0 if step == 1 else 1][found].max(initial=0.0)))
-        channels = {name: _flat(values[::step], len(points)) for name, values in rendered.layers.items()}
+        matching = error[0 if step == 1 else 1] < _LARGEST_ERROR + 1e-6 * np.abs(middle).max()
+        matching &= np.rint(_first_pixels(rendered.material[::step, :, None], len(points))[:, 0]) == points.material + 1
+        self.worst = max(self.worst, float(error[0 if step == 1 else 1][matching].max(initial=0.0)))
+        channels = {name: _first_pixels(values[::step], len(points)) for name, values in rendered.layers.items()}
         for name in (SUN_GROUP, SKY_GROUP):
             if name in channels:
                 channels[name] = channels[name] * np.float32(self._exposure)
-        return channels, found
+        return channels, matching
 
     def _aim(self, points: SeenPoints, width: int, height: int) -> Float:
         """Give the camera the rays of points; return where it stands (3,)."""
@@ -162,5 +163,5 @@ def _fill_image(values: Float, width: int, height: int, columns: int) -> NDArray
     return image
 
 
-def _flat(image: NDArray[np.float32], count: int) -> NDArray[np.float32]:
+def _first_pixels(image: NDArray[np.float32], count: int) -> NDArray[np.float32]:
     return image.reshape(-1, image.shape[2])[:count]

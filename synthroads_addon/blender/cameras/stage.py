@@ -57,7 +57,7 @@ class Passes:
 
 
 @dataclass(frozen=True)
-class Rendered:
+class RenderedPasses:
     """One rendered image, rows from the top.
 
     Attributes:
@@ -88,7 +88,7 @@ class RenderStage:
         self.scene, self.camera, self.passes, self.folder = scene, camera, passes, folder
         self.images = self.pixels = 0
 
-    def render(self, width: int, height: int) -> Rendered:
+    def render(self, width: int, height: int) -> RenderedPasses:
         """Render an image through the camera as it is; must run on Blender's main thread."""
         render, path = self.scene.render, self.folder / "image.exr"
         render.resolution_x, render.resolution_y, render.resolution_percentage = width, height, 100
@@ -103,7 +103,7 @@ class RenderStage:
         self.scene.render.use_persistent_data = False
         self.scene.render.use_persistent_data = True
 
-    def _read(self, channels: dict[str, NDArray[Any]]) -> Rendered:
+    def _read(self, channels: dict[str, NDArray[Any]]) -> RenderedPasses:
         def several(name: str, parts: str) -> NDArray[np.float32]:
             return np.stack([channels[f"{name}.{part}"] for part in parts], axis=-1)
 
@@ -119,7 +119,7 @@ class RenderStage:
         number = next(channels[name] for name in numbers if name in channels)
         depth = channels[f"{_DEPTH}.Z"] if self.passes.depth else None
         position = several(_POSITION, "XYZ") if self.passes.position else None
-        return Rendered(layers, number, depth, position)
+        return RenderedPasses(layers, number, depth, position)
 
 
 @contextmanager
@@ -147,7 +147,7 @@ def stage(
         stack.enter_context(prepared_materials(materials, passes.layers, engine == "eevee"))
         stack.callback(_forget_images, known)
         scene = bpy.data.scenes.new(NAME)
-        stack.callback(_strike, scene)
+        stack.callback(_remove_stage, scene)
         data = bpy.data.cameras.new(NAME)
         stack.callback(lambda: bpy.data.cameras.remove(data))
         camera = bpy.data.objects.new(NAME, data)
@@ -162,7 +162,7 @@ def stage(
         yield RenderStage(scene, camera, passes, folder)
 
 
-def _strike(scene: bpy.types.Scene) -> None:
+def _remove_stage(scene: bpy.types.Scene) -> None:
     """Remove the scene and what its renderer kept.
 
     A renderer that outlives its scene still knows the objects, and Blender 4.5 crashes now and then when one of these

@@ -48,5 +48,5 @@ class EmbreeCaster:
         limit = np.full(len(origins), maximum_range, dtype=np.float32)
         if len(self._meshes) == 1:
             return np.asarray(self._scene.run(origins, directions, dists=limit))
-        found = self._scene.run(origins, directions, dists=limit, output=1)
-        return np.asarray(np.take(self._firsts, found["geomID"]) + found["primID"])
+        hits = self._scene.run(origins, directions, dists=limit, output=1)
+        return np.asarray(np.take(self._firsts, hits["geomID"]) + hits["primID"])

@@ -1,9 +1,10 @@
-"""Blender materials from the material table: one module per family, each with means equal to the table's."""
+"""Blender materials from the material table; their means are equal to the table's."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
+from functools import partial
 
 import bpy
 
@@ -11,23 +12,13 @@ from ...base.errors import nearest_name
 from ...materials.table import UNKNOWN, Material, materials
 from ...materials.variation import vary_material
 from ...road.parameters import Environment, MaterialVariation
-from . import furniture, ground, paving, plants, signs, structures, vehicles
-from .shading import Shade, shade
+from .looks import vary_color
+from .shading import shade
 
 PROPERTY = "synthroads_material"
 """Custom property of a Blender material: its name in the table."""
 MEAN = "synthroads_mean"
 """Custom property of a Blender material: its mean properties on this road, as JSON."""
-
-_BUILDERS: dict[str, Callable[[Shade], None]] = {
-    **paving.BUILDERS,
-    **ground.BUILDERS,
-    **plants.BUILDERS,
-    **furniture.BUILDERS,
-    **structures.BUILDERS,
-    **signs.BUILDERS,
-    **vehicles.BUILDERS,
-}
 
 
 def material(name: str) -> bpy.types.Material:
@@ -43,9 +34,7 @@ def material(name: str) -> bpy.types.Material:
     return made
 
 
-def vary(
-    variation: MaterialVariation, environment: Environment, own: Mapping[str, Material] | None = None
-) -> None:
+def vary(variation: MaterialVariation, environment: Environment, own: Mapping[str, Material] | None = None) -> None:
     """Give the materials that the file has their means on a road with this variation and weather.
 
     Args:
@@ -60,7 +49,7 @@ def vary(
 
 
 def _shade(item: bpy.types.Material, mean: Material) -> None:
-    shade(item, mean, _BUILDERS.get(item[PROPERTY]))
+    shade(item, mean, partial(vary_color, item[PROPERTY]))
     item[MEAN] = mean.to_json()
 
 
@@ -91,9 +80,7 @@ def _principled(name: str) -> Material:
     if node is None:
         colour, rough, metal = item.diffuse_color, item.roughness, item.metallic
     else:
-        colour, rough, metal = (
-            node.inputs[key].default_value for key in ("Base Color", "Roughness", "Metallic")
-        )
+        colour, rough, metal = (node.inputs[key].default_value for key in ("Base Color", "Roughness", "Metallic"))
     # A renderer's default specular of 0.5 would drown the contrast of the base colours.
     specular = min(0.2, node.inputs["Specular IOR Level"].default_value) if node else 0.2
 

@@ -24,7 +24,6 @@ class Shade:
         mean: the table's entry; the base colour's mean must stay equal to it.
         place: position in the world, m.
         factor: what the base colour is multiplied with; its mean is 1.
-        tint: second base colour to mix towards and its share (a field of mean 0.5), or None.
         transparency: share of the light that passes straight through.
     """
 
@@ -32,14 +31,11 @@ class Shade:
     mean: Material
     place: Value
     factor: Value | None = None
-    roughness: Value | None = None
     transparency: float = 0.0
 
-    def noise(
-        self, wavelength: float, detail: float = 2.0, stretch: tuple[float, float, float] = (1, 1, 1)
-    ) -> Value:
+    def noise(self, wavelength: float, detail: float = 2.0, stretch: tuple[float, float, float] = (1, 1, 1)) -> Value:
         """Return a noise from -1 to 1 of mean 0 whose features are about `wavelength` (m) large."""
-        place = self.tree.node("ShaderNodeVectorMath", self.place, stretch, operation="MULTIPLY").value
+        place = self.place * stretch
         node = self.tree.node("ShaderNodeTexNoise", place, scale=1.0 / wavelength, detail=detail)
         return node.value * 2.0 - 1.0
 
@@ -53,7 +49,7 @@ class Shade:
         self.factor = change if self.factor is None else self.factor * change
 
 
-def shade(item: bpy.types.Material, mean: Material, build: Callable[[Shade], None] | None) -> None:
+def shade(item: bpy.types.Material, mean: Material, build: Callable[[Shade], None]) -> None:
     """Give a new Blender material its nodes: a Principled BSDF with the table's values, varied by `build`."""
     if item.node_tree is None:
         item.use_nodes = True
@@ -62,8 +58,7 @@ def shade(item: bpy.types.Material, mean: Material, build: Callable[[Shade], Non
     with tree.frame("Variation around the mean"):
         place = tree.node("ShaderNodeNewGeometry")["Position"]
         varied = Shade(tree, mean, place)
-        if build:
-            build(varied)
+        build(varied)
     with tree.frame("Surface"):
         surface = tree.node(
             "ShaderNodeBsdfPrincipled",
@@ -74,12 +69,8 @@ def shade(item: bpy.types.Material, mean: Material, build: Callable[[Shade], Non
         )
         color: Operand = mean.base_color
         if varied.factor is not None:
-            color = tree.node(
-                "ShaderNodeVectorMath", mean.base_color, varied.factor, operation="MULTIPLY"
-            ).value
+            color = tree.node("ShaderNodeVectorMath", mean.base_color, varied.factor, operation="MULTIPLY").value
             tree.group.links.new(color.source(), surface.raw.inputs["Base Color"])
-        if varied.roughness is not None:
-            tree.group.links.new(varied.roughness.source(), surface.raw.inputs["Roughness"])
         seen = surface.value
         if varied.transparency:
             clear = tree.node("ShaderNodeBsdfTransparent").value
@@ -87,9 +78,8 @@ def shade(item: bpy.types.Material, mean: Material, build: Callable[[Shade], Non
         tree.node("ShaderNodeOutputMaterial", seen)
     with tree.frame("Layers"):
         _layer(tree, "base_color", color=color)
-        rough = mean.roughness if varied.roughness is None else varied.roughness
-        for name, value in {"roughness": rough, "metallic": mean.metallic, "specular": mean.specular}.items():
-            _layer(tree, name, value=value)
+        for name in ("roughness", "metallic", "specular"):
+            _layer(tree, name, value=getattr(mean, name))
     item.diffuse_color = (*mean.base_color, 1.0)
     item.roughness, item.metallic = mean.roughness, mean.metallic
     arrange(item.node_tree)

@@ -17,7 +17,7 @@ from ..materials import vary
 from ..nodes.builder import remove_unused_groups
 from ..things.model_builder import ROLE, ModelBuilder
 from .parts import PARTS, required_parts
-from .stage import Made, in_scene, new_staging, remove_staged, remove_with_meshes
+from .stage import DataBlockLog, in_scene, new_staging, remove_staged, remove_with_meshes
 
 COLLECTION = "SynthRoads"
 ORIGIN = "synthroads_origin"
@@ -72,10 +72,10 @@ def build_road(
     """
     work = _Build(parameters, tolerance, vegetation_detail, parts, stretch, geometry)
     try:
-        with work.made.noted():
+        with work.log.record():
             work.build()
     except BaseException:
-        work.made.remove()
+        work.log.remove()
         raise
     model = work.swap()
     bpy.context.view_layer.update()
@@ -103,14 +103,14 @@ def build_steps(
     try:
         more = True
         while more:
-            with work.made.noted():
+            with work.log.record():
                 more = turns.take(_TURN)
                 if not turns.is_aside:
                     work.evaluate()
             yield None if turns.is_aside else work.share
     except BaseException:
         turns.close()
-        work.made.remove()
+        work.log.remove()
         raise
     model = work.swap()
     work.evaluate()
@@ -121,7 +121,7 @@ class _Build:
     """A road that is being built: in a collection of its own, until it takes the place of the one built before.
 
     Attributes:
-        made: data-blocks that were made for it.
+        log: data-blocks that were made for it.
         share: of it that is done, 0 to 1.
     """
 
@@ -139,9 +139,9 @@ class _Build:
             raise ValueError(f"parts: {sorted(self._wanted - set(PARTS))} are not among {tuple(PARTS)}")
         self._scene = bpy.context.scene.name
         remove_staged()
-        self.made = Made()
+        self.log = DataBlockLog()
         self.share = 0.0
-        with self.made.noted():
+        with self.log.record():
             self._collection = new_staging(bpy.context.scene)
         self._builder = ModelBuilder(parameters, self._collection, tolerance, detail, stretch, geometry)
 
@@ -181,12 +181,20 @@ class _Build:
             bpy.data.collections.remove(self._collection)
         for role, item in builder.objects.items():
             item.name = role  # its mesh keeps the name it has: to rename a mesh is to evaluate all that hangs on it
-        self.made.keep(collection)
+        self.log.keep(collection)
         origin = np.array(parameters.transform.translate) + builder.origin
         collection[ORIGIN] = [float(value) for value in origin]
         remove_unused_groups()
         vary(parameters.materials, parameters.environment)
         return RoadModel(collection, builder.objects, origin)
+
+
+def scene_origin(scene: bpy.types.Scene) -> NDArray[np.float64] | None:
+    """Return the map coordinates (3,) of the road's local origin in a scene; None without a road."""
+    for collection in scene.collection.children_recursive:
+        if ORIGIN in collection:
+            return np.array(collection[ORIGIN], dtype=np.float64)
+    return None
 
 
 def remove_road(keep: bpy.types.Collection | None = None) -> None:

@@ -9,21 +9,21 @@ from ..things.beacon import build_beacons
 from ..things.cabinet import build_cabinets
 from ..things.concrete_barrier import build_concrete_barriers
 from ..things.delineator import build_delineators
-from ..things.gantry.build import build_gantries
+from ..things.gantry.gantry import build_gantries
 from ..things.guardrail import build_guardrails
 from ..things.kilometre_board import build_kilometre_boards
 from ..things.model_builder import ModelBuilder
 from ..things.noise_barrier import build_noise_barriers
-from ..things.overpass.build import build_overpasses
+from ..things.overpass.overpass import build_overpasses
 from ..things.painted_area import build_painted_areas
 from ..things.pole import build_poles
 from ..things.road.build import build_surface
-from ..things.sign.build import build_signs
+from ..things.sign.sign import build_signs
 from ..things.temporary_barrier import build_temporary_barriers
 from ..things.terrain import build_terrain
 from ..things.traffic_light import build_traffic_lights
 from ..things.vegetation.build import build_vegetation
-from ..things.vehicle.build import build_vehicles
+from ..things.vehicle.vehicle import build_vehicles
 
 PARTS: dict[str, Callable[[ModelBuilder], None]] = {
     "road": build_surface,

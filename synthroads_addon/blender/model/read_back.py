@@ -21,12 +21,11 @@ from ...road.parameters import (
 )
 from ...road.section_geometry import CarriagewaySection
 from ..compat import modifier_input
-from ..things.road.layout import input_name, own_widths
+from ..things.model_builder import named_fields
+from ..things.road.layout import input_name, strip_widths
 
 _ROLES = {"Terrain": "terrain"}
 """Roles of objects that are not the ids of what they show."""
-_RENAMED = {"Smallest Height": "height_min", "Largest Height": "height_max"}
-"""Inputs that are not named as their fields."""
 _BEAM_OF_SIDE = ("Left Beam", "Right Beam")
 _BEAMS = frozenset(_BEAM_OF_SIDE)
 _MARKING_FIELDS = {
@@ -55,9 +54,9 @@ def edited_parameters(parameters: RoadParameters, objects: Mapping[str, bpy.type
     for role, item in objects.items():
         name = _ROLES.get(role, role)
         if role == "Road":
-            changed |= dict(_road(parameters, item.modifiers[0]))
+            changed |= dict(_edited_road_objects(parameters, item.modifiers[0]))
         elif name in parameters.objects and item.modifiers:
-            changed[name] = _plain(parameters.objects[name], item.modifiers[0])
+            changed[name] = _edited_object(parameters.objects[name], item.modifiers[0])
     data = parameters.to_dict()
     for name, item in changed.items():
         data["objects"][name] = item.to_dict()
@@ -71,29 +70,29 @@ def carried_inputs(parameters: RoadParameters, role: str, modifier: bpy.types.No
     item = parameters.objects.get(_ROLES.get(role, role))
     if item is None:
         return frozenset()
-    return frozenset(_named_fields(item, modifier)) | (_BEAMS if isinstance(item, Guardrail) else frozenset())
+    return frozenset(_number_fields(item, modifier)) | (_BEAMS if isinstance(item, Guardrail) else frozenset())
 
 
 def _road_inputs(parameters: RoadParameters) -> Iterator[str]:
     for carriageway in parameters.of_type(Carriageway).values():
         side = carriageway.side.title()
-        yield from (input_name(side, strip) for strip, _ in own_widths(carriageway))
+        yield from (input_name(side, strip) for strip, _ in strip_widths(carriageway))
         yield from (f"{side} Verge Slope", f"{side} Turns About Inner Edge")
     for name in parameters.of_type(LineMarking):
         yield from (f"{name} {label}" for label in _MARKING_FIELDS)
 
 
-def _named_fields(item: RoadObject, modifier: bpy.types.NodesModifier) -> dict[str, str]:
-    """Return the inputs that are named as fields of an object, and those fields."""
-    pairs = ((name, _RENAMED.get(name, name.lower().replace(" ", "_"))) for name in _input_names(modifier))
-    fields = type(item).model_fields
-    return {name: field for name, field in pairs if field in fields and isinstance(getattr(item, field), float)}
+def _number_fields(item: RoadObject, modifier: bpy.types.NodesModifier) -> dict[str, str]:
+    """Return the inputs that are named as numbers of an object, and those fields."""
+    fields = named_fields(item, modifier.node_group)
+    return {name: field for name, field in fields.items() if isinstance(getattr(item, field), float)}
 
 
-def _plain(item: RoadObject, modifier: bpy.types.NodesModifier) -> RoadObject:
+def _edited_object(item: RoadObject, modifier: bpy.types.NodesModifier) -> RoadObject:
     """Return an object with the inputs that are named as its fields."""
     update: dict[str, Any] = {
-        field: _value(getattr(item, field), modifier, name) for name, field in _named_fields(item, modifier).items()
+        field: _input_value(getattr(item, field), modifier, name)
+        for name, field in _number_fields(item, modifier).items()
     }
     if isinstance(item, Guardrail):
         left, right = (bool(modifier_input(modifier, name)) for name in _BEAM_OF_SIDE)
@@ -101,7 +100,9 @@ def _plain(item: RoadObject, modifier: bpy.types.NodesModifier) -> RoadObject:
     return item.model_copy(update=update)
 
 
-def _road(parameters: RoadParameters, modifier: bpy.types.NodesModifier) -> Iterator[tuple[str, RoadObject]]:
+def _edited_road_objects(
+    parameters: RoadParameters, modifier: bpy.types.NodesModifier
+) -> Iterator[tuple[str, RoadObject]]:
     sections = sections_of(parameters)
     for name, carriageway in parameters.of_type(Carriageway).items():
         edited = _carriageway(carriageway, modifier)
@@ -110,7 +111,7 @@ def _road(parameters: RoadParameters, modifier: bpy.types.NodesModifier) -> Iter
         yield name, edited.model_copy(update={"pavement": pavement})
     for name, line in parameters.of_type(LineMarking).items():
         fields = {
-            field: _value(getattr(line, field), modifier, f"{name} {label}")
+            field: _input_value(getattr(line, field), modifier, f"{name} {label}")
             for label, field in _MARKING_FIELDS.items()
         }
         yield name, line.model_copy(update=fields)
@@ -119,14 +120,14 @@ def _road(parameters: RoadParameters, modifier: bpy.types.NodesModifier) -> Iter
 def _carriageway(carriageway: Carriageway, modifier: bpy.types.NodesModifier) -> Carriageway:
     side = carriageway.side.title()
     widths = {
-        strip: _width(width, _value(nominal_width(width), modifier, input_name(side, strip)))
-        for strip, width in own_widths(carriageway)
+        strip: _scale_width(width, _input_value(nominal_width(width), modifier, input_name(side, strip)))
+        for strip, width in strip_widths(carriageway)
     }
     lanes = tuple(
         lane.model_copy(update={"width": widths[f"Lane {number}"]}) for number, lane in enumerate(carriageway.lanes, 1)
     )
     slope = carriageway.verge_slope_percent / 100.0
-    changed = _value(slope, modifier, f"{side} Verge Slope")
+    changed = _input_value(slope, modifier, f"{side} Verge Slope")
     about_edge = modifier_input(modifier, f"{side} Turns About Inner Edge")
     return carriageway.model_copy(
         update={
@@ -163,25 +164,17 @@ def _fit_damage(before: CarriagewaySection, after: CarriagewaySection) -> Paveme
     return pavement.model_copy(update={"ruts": tuple(ruts), "potholes": tuple(potholes)})
 
 
-def _width(width: AnyWidth, nominal: float) -> AnyWidth:
+def _scale_width(width: AnyWidth, nominal: float) -> AnyWidth:
     """Return a width whose largest value along the road is `nominal`; its points keep their shares."""
     if not isinstance(width, tuple):
         return nominal
     before = nominal_width(width)
     if nominal == before:
         return width
-    return tuple(
-        WidthPoint(station=point.station, width=nominal * point.width / max(before, 1e-9)) for point in width
-    )
+    return tuple(WidthPoint(station=point.station, width=nominal * point.width / max(before, 1e-9)) for point in width)
 
 
-def _value(before: float, modifier: bpy.types.NodesModifier, name: str) -> float:
+def _input_value(before: float, modifier: bpy.types.NodesModifier, name: str) -> float:
     """Return an input's value: the one from before where it is the same in 32 bits, else its shortest decimal."""
     now = np.float32(modifier_input(modifier, name))
     return before if now == np.float32(before) else float(str(now))
-
-
-def _input_names(modifier: bpy.types.NodesModifier) -> Iterator[str]:
-    for item in modifier.node_group.interface.items_tree:
-        if item.item_type == "SOCKET" and item.in_out == "INPUT" and item.socket_type == "NodeSocketFloat":
-            yield item.name

@@ -17,7 +17,7 @@ STAGING = "synthroads_staging"
 _NOT_OURS = ("screens", "window_managers", "workspaces", "brushes", "palettes", "scenes")
 
 
-class Made:
+class DataBlockLog:
     """Notes the data-blocks that are made while it looks, by Blender's number of them: those outlive an undo.
 
     Between two looks the user may make data-blocks too; those are not noted.
@@ -28,7 +28,7 @@ class Made:
         self._groups = {group.session_uid: group.name for group in bpy.data.node_groups if KEY in group}
 
     @contextmanager
-    def noted(self) -> Iterator[None]:
+    def record(self) -> Iterator[None]:
         """Note what is made inside."""
         before = {item.session_uid for item in _blocks()}
         try:

@@ -46,15 +46,15 @@ def objects_of(collection: bpy.types.Collection) -> dict[str, bpy.types.Object]:
 
 def recall(collection: bpy.types.Collection) -> tuple[RoadParameters, Scenario]:
     """Return what a road was built from; raise `InputError` if that can't be read."""
-    return recall_parameters(collection), Scenario.from_dict(_kept(collection, SCENARIO), "Road")
+    return recall_parameters(collection), Scenario.from_dict(_stored(collection, SCENARIO), "Road")
 
 
 def recall_parameters(collection: bpy.types.Collection) -> RoadParameters:
     """Return the parameter set of a road; raise `InputError` if it can't be read."""
-    return RoadParameters.from_dict(_kept(collection, PARAMETERS), "Road")
+    return RoadParameters.from_dict(_stored(collection, PARAMETERS), "Road")
 
 
-def _kept(collection: bpy.types.Collection, key: str) -> Any:
+def _stored(collection: bpy.types.Collection, key: str) -> Any:
     try:
         return json.loads(collection[key])
     except (KeyError, TypeError, ValueError):

@@ -60,9 +60,7 @@ def height_on(road: Value, terrain: Value, place: Value) -> Value:
     above = place + (0.0, 0.0, 500.0)
 
     def cast(target: Value) -> tuple[Value, Value]:
-        ray = tree.node(
-            "GeometryNodeRaycast", target_geometry=target, source_position=above, ray_length=1000.0
-        )
+        ray = tree.node("GeometryNodeRaycast", target_geometry=target, source_position=above, ray_length=1000.0)
         return ray["Is Hit"], op.component(ray["Hit Position"], "Z")
 
     on_road, road_z = cast(road)

@@ -1,12 +1,16 @@
-"""A small builder of Geometry Nodes: a node group is a function that reads top to bottom.
+"""A small builder of Geometry Nodes: a node group is a class of inputs and a function that reads top to bottom.
 
-    def build(tree: Tree) -> None:
-        width = tree.number("Width", 3.5, (2.0, 6.0), unit="m", description="Width of the lane")
+    class Lane(Inputs):
+        width = metres(3.5, (2.0, 6.0), "Width of the lane")
+
+    @makes_group("SR Lane")
+    def lane_group(tree: Tree) -> None:
+        lane = Lane(tree)
         with tree.frame("Pavement"):
-            grid = tree.node("GeometryNodeMeshGrid", size_x=width, size_y=2.0 * width + 1.0)
+            grid = tree.node("GeometryNodeMeshGrid", size_x=lane.width, size_y=2.0 * lane.width + 1.0)
         tree.output("Mesh", grid.value)
 
-    group = node_group("SR Lane", build)
+    group = lane_group()
 
 Sockets are `Value`s: they can be added, multiplied, compared and handed to other nodes. Places of nodes are
 worked out from the frames and the links. A group that is in the file already, in the same version, is used
@@ -18,17 +22,34 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from functools import cache
+from functools import cache, wraps
 from pathlib import Path
 from typing import Any
 
 import bpy
 
+from ...base.files import PRESETS
 from ...base.stepper import pause
 from .layout import arrange
 
 KEY = "synthroads_key"
 """Custom property of a group: hash of what it was built from."""
+
+
+def _calculation(operation: str, turned: bool = False) -> Callable[[Value, Operand], Value]:
+    """Return the method of an arithmetic operator; `turned` is that of the right one of its operands."""
+
+    def calculate(value: Value, other: Operand) -> Value:
+        return value._math(operation, other, value) if turned else value._math(operation, value, other)
+
+    return calculate
+
+
+def _comparison(operation: str) -> Callable[[Value, Operand], Value]:
+    def compare(value: Value, other: Operand) -> Value:
+        return value._compare(operation, other)
+
+    return compare
 
 
 class Value:
@@ -48,9 +69,7 @@ class Value:
         kinds = {_kind(operand) for operand in operands}
         if "VECTOR" in kinds:
             if operation == "MULTIPLY" and "VECTOR" not in {_kind(operands[1])}:
-                return self.tree.node(
-                    "ShaderNodeVectorMath", operands[0], scale=operands[1], operation="SCALE"
-                ).value
+                return self.tree.node("ShaderNodeVectorMath", operands[0], scale=operands[1], operation="SCALE").value
             return self.tree.node("ShaderNodeVectorMath", *operands, operation=operation).value
         if kinds == {"INT"} and operation != "DIVIDE":
             return self.tree.node("FunctionNodeIntegerMath", *operands, operation=operation).value
@@ -60,17 +79,18 @@ class Value:
         kind = "INT" if {_kind(self), _kind(other)} == {"INT"} else "FLOAT"
         return self.tree.node("FunctionNodeCompare", self, other, operation=operation, data_type=kind).value
 
-    def __add__(self, other: Operand) -> Value:
-        return self._math("ADD", self, other)
-
-    def __radd__(self, other: Operand) -> Value:
-        return self._math("ADD", other, self)
-
-    def __sub__(self, other: Operand) -> Value:
-        return self._math("SUBTRACT", self, other)
-
-    def __rsub__(self, other: Operand) -> Value:
-        return self._math("SUBTRACT", other, self)
+    __add__ = _calculation("ADD")
+    __radd__ = _calculation("ADD", turned=True)
+    __sub__ = _calculation("SUBTRACT")
+    __rsub__ = _calculation("SUBTRACT", turned=True)
+    __truediv__ = _calculation("DIVIDE")
+    __rtruediv__ = _calculation("DIVIDE", turned=True)
+    __floordiv__ = _calculation("DIVIDE_FLOOR")
+    __mod__ = _calculation("FLOORED_MODULO")
+    __lt__ = _comparison("LESS_THAN")
+    __le__ = _comparison("LESS_EQUAL")
+    __gt__ = _comparison("GREATER_THAN")
+    __ge__ = _comparison("GREATER_EQUAL")
 
     def __mul__(self, other: Operand) -> Value:
         if _kind(other) == "VECTOR" and self.kind != "VECTOR":
@@ -80,32 +100,8 @@ class Value:
     def __rmul__(self, other: Operand) -> Value:
         return self * other
 
-    def __truediv__(self, other: Operand) -> Value:
-        return self._math("DIVIDE", self, other)
-
-    def __rtruediv__(self, other: Operand) -> Value:
-        return self._math("DIVIDE", other, self)
-
-    def __floordiv__(self, other: Operand) -> Value:
-        return self._math("DIVIDE_FLOOR", self, other)
-
-    def __mod__(self, other: Operand) -> Value:
-        return self._math("FLOORED_MODULO", self, other)
-
     def __neg__(self) -> Value:
         return self._math("MULTIPLY", self, -1 if self.kind == "INT" else -1.0)
-
-    def __lt__(self, other: Operand) -> Value:
-        return self._compare("LESS_THAN", other)
-
-    def __le__(self, other: Operand) -> Value:
-        return self._compare("LESS_EQUAL", other)
-
-    def __gt__(self, other: Operand) -> Value:
-        return self._compare("GREATER_THAN", other)
-
-    def __ge__(self, other: Operand) -> Value:
-        return self._compare("GREATER_EQUAL", other)
 
     def __and__(self, other: Operand) -> Value:
         return self.tree.node("FunctionNodeBooleanMath", self, other, operation="AND").value
@@ -297,8 +293,8 @@ def _kind(operand: Operand) -> str:
 def _sources() -> bytes:
     """Return a digest of the sources of all node groups: a change to any of them makes new groups."""
     digest, blender = hashlib.sha256(), Path(__file__).parents[1]
-    names = ("nodes/*.py", "things/**/*.py", "materials/vehicles.py")  # the last has the colour's attribute
-    for path in sorted(path for name in names for path in blender.glob(name)):
+    names = ("nodes/*.py", "things/**/*.py", "materials/looks.py")  # the last has the colour's attribute
+    for path in (*sorted(path for name in names for path in blender.glob(name)), PRESETS / "vehicles.json"):
         digest.update(path.read_bytes())
     return digest.digest()
 
@@ -310,14 +306,12 @@ def remove_unused_groups() -> None:
             bpy.data.node_groups.remove(group)
 
 
-def node_group(
-    name: str, build: Callable[[Tree], None], *arguments: object, description: str = ""
-) -> bpy.types.NodeTree:
+def node_group(name: str, build: Callable[..., None], *arguments: object, description: str = "") -> bpy.types.NodeTree:
     """Return the node group `name`, from this file if it holds the same version, else built anew.
 
     Args:
         name: as shown in Blender; an older version of that name is renamed.
-        build: declares inputs, adds nodes, declares outputs.
+        build: declares inputs, adds nodes, declares outputs; is called with the tree and the arguments.
         arguments: what `build` depends on apart from its source (a number of lanes, say).
         description: shown as a tooltip.
     """
@@ -331,6 +325,19 @@ def node_group(
     group[KEY] = key
     group.is_modifier = True
     group.description = description or (build.__doc__ or "").strip().partition("\n")[0]
-    build(Tree(group))
+    build(Tree(group), *arguments)
     arrange(group)
     return group
+
+
+def makes_group(name: str) -> Callable[[Callable[[Tree], None]], Callable[[], bpy.types.NodeTree]]:
+    """Turn a function that builds a node group into one that returns the node group `name`, see `node_group`."""
+
+    def decorate(build: Callable[[Tree], None]) -> Callable[[], bpy.types.NodeTree]:
+        @wraps(build)
+        def make() -> bpy.types.NodeTree:
+            return node_group(name, build)
+
+        return make
+
+    return decorate

@@ -17,7 +17,7 @@ def pavement_near(road: Value, reach: Value) -> Value:
     tree = road.tree
     place = op.position(tree)
     flat = op.vector(tree, op.component(place, "X"), op.component(place, "Y"))
-    near = tree.node("ShaderNodeVectorMath", flat, operation="LENGTH")["Value"] < reach
+    near = op.length(flat) < reach
     paved = op.named_attribute(tree, "class_id", "INT").equals(class_id("road"))
     return op.separate(road, paved & near, "FACE")
 
@@ -29,7 +29,7 @@ def highest_below(pavement: Value, start: Value, end: Value, depth: tuple[Value,
     `shear` * x in y.
     """
     tree = pavement.tree
-    columns = op.rounded_up((end - start) / SPACING) + 1
+    columns = op.round_up((end - start) / SPACING) + 1
     points, column, row = op.grid(tree, columns, _ROWS)
     x = start + (end - start) * (column / (columns - 1.0))
     y = depth[0] + (depth[1] - depth[0]) * (row / (_ROWS - 1.0)) + x * shear

@@ -2,18 +2,10 @@
 
 from __future__ import annotations
 
-import bpy
-
 from . import operations as op
 from .backbone import height_on, look_up, raise_place, station_ribbon
-from .builder import Operand, Tree, Value, node_group
-
-FAR = (-1000.0, 1000.0)
-
-
-def foot_group() -> bpy.types.NodeTree:
-    """Return the group SR Foot."""
-    return node_group("SR Foot", _build)
+from .builder import Operand, Tree, Value, makes_group
+from .inputs import FAR, Inputs, backbone_socket, metres, socket
 
 
 def foot_at(backbone: Value, surfaces: tuple[Value, Value], station: Value, offset: Operand) -> tuple[Value, Value]:
@@ -30,18 +22,46 @@ def foot_at(backbone: Value, surfaces: tuple[Value, Value], station: Value, offs
     return node["Foot"], node["Left"]
 
 
-def _build(tree: Tree) -> None:
+class Lengthwise(Inputs):
+    """Inputs of a group that puts something along the road.
+
+    Attributes:
+        backbone, road, terrain: objects that it follows and stands on.
+        start_station, end_station: where it begins and ends.
+        offset: of its axis.
+    """
+
+    backbone = backbone_socket("Object")
+    road = socket("Object", "Surface that it stands on")
+    terrain = socket("Object", "Surface beside the road")
+    start_station = metres(0.0, (0.0, 1e6), "Beginning, terminal included")
+    end_station = metres(100.0, (0.0, 1e6), "End, terminal included")
+    offset = metres(0.0, (-100.0, 100.0), "Offset of its axis")
+
+    def geometry(self) -> tuple[Value, tuple[Value, Value]]:
+        """Return the geometry of the backbone, and that of road and terrain."""
+        with self.tree.frame("Geometry"):
+            axis = op.object_geometry(self.backbone)
+            return axis, (op.object_geometry(self.road), op.object_geometry(self.terrain))
+
+
+class _Foot(Inputs):
+    backbone = backbone_socket()
+    road = socket("Geometry", "Surface of the road")
+    terrain = socket("Geometry", "Surface beside the road")
+    station = metres(0.0, (-1e3, 1e6), "Station")
+    offset = metres(0.0, FAR, "Offset, positive to the left")
+
+
+@makes_group("SR Foot")
+def foot_group(tree: Tree) -> None:
     """The point on the surface at a station and an offset, both of which may be fields."""
-    backbone = tree.input("Backbone", "Geometry", description="Polyline along the axis with its attributes")
-    road = tree.input("Road", "Geometry", description="Surface of the road")
-    terrain = tree.input("Terrain", "Geometry", description="Surface beside the road")
-    station = tree.number("Station", 0.0, (-1e3, 1e6), unit="m", description="Station")
-    offset = tree.number("Offset", 0.0, FAR, unit="m", description="Offset, positive to the left")
-    ribbon = station_ribbon(backbone)
+    foot = _Foot(tree)
+    ribbon = station_ribbon(foot.backbone)
     with tree.frame("Place in plan"):
-        left = look_up(ribbon, "left", station)
-        place = look_up(ribbon, "axis", station) + left * offset
+        left = look_up(ribbon, "left", foot.station)
+        place = look_up(ribbon, "axis", foot.station) + left * foot.offset
     with tree.frame("On the surface"):
-        foot = raise_place(place, height_on(road, terrain, place) - op.component(place, "Z"))
-        tree.output("Foot", foot, description="Point on the surface")
+        below = raise_place(place, height_on(foot.road, foot.terrain, place) - op.component(place, "Z"))
+        tree.output("Foot", below, description="Point on the surface")
     tree.output("Left", left, description="Unit vector to the left")

@@ -26,9 +26,7 @@ def arrange(group: bpy.types.NodeTree) -> None:
     for block in blocks.values():
         top -= _arrange_block(block, depths, top, places) + FRAME_GAP
     # One call for all: setting a node's place by itself updates the whole tree each time.
-    group.nodes.foreach_set(
-        "location", [value for node in group.nodes for value in places.get(node.name, (0.0, 0.0))]
-    )
+    group.nodes.foreach_set("location", [value for node in group.nodes for value in places.get(node.name, (0.0, 0.0))])
     for node in group.nodes:
         if node.type == "GROUP_INPUT":
             for socket in node.outputs:

@@ -36,6 +36,11 @@ def maximum(a: Value, b: Operand) -> Value:
     return a.tree.node("ShaderNodeMath", a, b, operation="MAXIMUM").value
 
 
+def clip(a: Value, low: Operand, high: Operand) -> Value:
+    """Return the number, at least `low` and at most `high`."""
+    return minimum(maximum(a, low), high)
+
+
 def unary(operation: str, a: Value) -> Value:
     """Return a function of one number: ``ABSOLUTE``, ``CEIL``, ``FLOOR``, ``SQRT``, ``SINE``, ..."""
     return a.tree.node("ShaderNodeMath", a, operation=operation).value
@@ -46,7 +51,7 @@ def power(a: Value, exponent: Operand) -> Value:
     return a.tree.node("ShaderNodeMath", a, exponent, operation="POWER").value
 
 
-def rounded_up(a: Value) -> Value:
+def round_up(a: Value) -> Value:
     """Return the least whole number that is not less than `a`."""
     return a.tree.node("FunctionNodeFloatToInt", a, rounding_mode="CEILING").value
 
@@ -54,6 +59,18 @@ def rounded_up(a: Value) -> Value:
 def dot(a: Value, b: Operand) -> Value:
     """Return the dot product of two vectors."""
     return a.tree.node("ShaderNodeVectorMath", a, b, operation="DOT_PRODUCT").value
+
+
+def length(a: Value) -> Value:
+    """Return the length of a vector."""
+    return a.tree.node("ShaderNodeVectorMath", a, operation="LENGTH")["Value"]
+
+
+def upright(along: Value) -> Value:
+    """Return the rotation whose z points up and whose x points along a vector in plan."""
+    return along.tree.node(
+        "FunctionNodeAxesToRotation", (0.0, 0.0, 1.0), along, primary_axis="Z", secondary_axis="X"
+    ).value
 
 
 def vector(tree: Tree, x: Operand = 0.0, y: Operand = 0.0, z: Operand = 0.0) -> Value:
@@ -75,9 +92,7 @@ def switch(condition: Value, false: Operand, true: Operand) -> Value:
 
 def only_if(condition: Value, geometry: Value) -> Value:
     """Return the geometry if the (single) condition holds, else nothing."""
-    return condition.tree.node(
-        "GeometryNodeSwitch", input_type="GEOMETRY", switch=condition, true=geometry
-    ).value
+    return condition.tree.node("GeometryNodeSwitch", input_type="GEOMETRY", switch=condition, true=geometry).value
 
 
 def choose(index: Value, items: list[tuple[float, float, float]]) -> Value:
@@ -109,9 +124,7 @@ def point_count(geometry: Value) -> Value:
 def sample_index(geometry: Value, value: Value, index: Operand) -> Value:
     """Return `value`, evaluated on the points of another geometry, at `index`."""
     kind = _DATA_TYPES[value.kind]
-    return geometry.tree.node(
-        "GeometryNodeSampleIndex", geometry, value, index, data_type=kind, clamp=True
-    ).value
+    return geometry.tree.node("GeometryNodeSampleIndex", geometry, value, index, data_type=kind, clamp=True).value
 
 
 def sample_surface(mesh: Value, value: Value, place: Value) -> Value:
@@ -147,11 +160,7 @@ def set_position(geometry: Value, place: Value) -> Value:
 
 def store(geometry: Value, name: str, value: Operand, domain: str = "POINT") -> Value:
     """Store a named attribute."""
-    kind = (
-        _DATA_TYPES[value.kind]
-        if isinstance(value, Value)
-        else ("INT" if isinstance(value, int) else "FLOAT")
-    )
+    kind = _DATA_TYPES[value.kind] if isinstance(value, Value) else ("INT" if isinstance(value, int) else "FLOAT")
     return geometry.tree.node(
         "GeometryNodeStoreNamedAttribute", geometry, data_type=kind, domain=domain, name=name, value=value
     ).value
@@ -159,16 +168,12 @@ def store(geometry: Value, name: str, value: Operand, domain: str = "POINT") -> 
 
 def delete_faces(geometry: Value, selection: Value) -> Value:
     """Delete faces, and the points that only they used."""
-    return geometry.tree.node(
-        "GeometryNodeDeleteGeometry", geometry, selection, domain="FACE", mode="ALL"
-    ).value
+    return geometry.tree.node("GeometryNodeDeleteGeometry", geometry, selection, domain="FACE", mode="ALL").value
 
 
 def delete_points(geometry: Value, selection: Value) -> Value:
     """Delete points."""
-    return geometry.tree.node(
-        "GeometryNodeDeleteGeometry", geometry, selection, domain="POINT", mode="ALL"
-    ).value
+    return geometry.tree.node("GeometryNodeDeleteGeometry", geometry, selection, domain="POINT", mode="ALL").value
 
 
 def separate(geometry: Value, selection: Value, domain: str = "POINT") -> Value:
@@ -176,7 +181,7 @@ def separate(geometry: Value, selection: Value, domain: str = "POINT") -> Value:
     return geometry.tree.node("GeometryNodeSeparateGeometry", geometry, selection, domain=domain)["Selection"]
 
 
-def without_degenerate(geometry: Value) -> Value:
+def delete_degenerate(geometry: Value) -> Value:
     """Delete faces without area."""
     area = geometry.tree.node("GeometryNodeInputMeshFaceArea").value
     return delete_faces(geometry, area < SMALLEST_AREA)
@@ -190,11 +195,18 @@ def join(*geometries: Value) -> Value:
     return node.value
 
 
-def label(geometry: Value, class_id: Operand, instance: Operand, material: Value) -> Value:
-    """Give every face its class, its instance and its material."""
+def label(geometry: Value, class_id: Operand, instance: Operand, material: Value | None = None) -> Value:
+    """Give every face its class, its instance and, if given, its material."""
     labelled = store(geometry, "class_id", class_id, "FACE")
     labelled = store(labelled, "instance_id", instance, "FACE")
+    if material is None:
+        return labelled
     return geometry.tree.node("GeometryNodeSetMaterial", labelled, material=material).value
+
+
+def transform(geometry: Value, **changes: Operand) -> Value:
+    """Return the geometry scaled (``scale``), turned (``rotation``) and moved (``translation``) as a whole."""
+    return geometry.tree.node("GeometryNodeTransform", geometry, **changes).value
 
 
 def realize(geometry: Value) -> Value:
@@ -207,8 +219,6 @@ def turn(tree: Tree, x: Operand = 0.0, y: Operand = 0.0, z: Operand = 0.0) -> Va
     return tree.node("FunctionNodeEulerToRotation", vector(tree, x, y, z)).value
 
 
-def random_turn(
-    tree: Tree, low: tuple[float, float, float], high: tuple[float, float, float], seed: Operand
-) -> Value:
+def random_turn(tree: Tree, low: tuple[float, float, float], high: tuple[float, float, float], seed: Operand) -> Value:
     """Return a random rotation whose Euler angles (rad) lie between `low` and `high`."""
     return tree.node("FunctionNodeEulerToRotation", random(tree, low, high, seed)).value

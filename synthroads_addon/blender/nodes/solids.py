@@ -17,12 +17,12 @@ def box(tree: Tree, size: Operand, middle: Operand = (0.0, 0.0, 0.0)) -> Value:
 
 def move_geometry(geometry: Value, by: Operand) -> Value:
     """Return the geometry moved as a whole."""
-    return geometry.tree.node("GeometryNodeTransform", geometry, translation=by).value
+    return op.transform(geometry, translation=by)
 
 
-def paint_faces(geometry: Value, material: Value) -> Value:
-    """Give all faces a material."""
-    return geometry.tree.node("GeometryNodeSetMaterial", geometry, material=material).value
+def paint_faces(geometry: Value, material: Value, selection: Value | bool = True) -> Value:
+    """Give all faces, or those selected, a material."""
+    return geometry.tree.node("GeometryNodeSetMaterial", geometry, selection, material=material).value
 
 
 def flip_faces(geometry: Value) -> Value:
@@ -60,12 +60,12 @@ def loft(
     return op.join(body, *lids)
 
 
-def prism(tree: Tree, outline: list[tuple[float, float]], size: Operand = 1.0) -> Value:
+def prism(tree: Tree, outline: list[tuple[float, float]], size: Operand = (1.0, 1.0, 1.0)) -> Value:
     """Return an upright solid on an outline from z = 0 to 1, scaled by `size`; from above it runs anticlockwise."""
 
     def place(point: Value, row: Value) -> Value:
         raised = point + op.vector(tree, 0.0, 0.0, row)
-        return tree.node("ShaderNodeVectorMath", raised, size, operation="MULTIPLY").value
+        return raised * size
 
     points = [(x, y, 0.0) for x, y in outline]
     return loft(tree, lambda number: op.choose(number, points), len(points), 2, place)
@@ -75,7 +75,7 @@ def bars(points: Value, start: Value, end: Value, width: Operand) -> Value:
     """Return a square bar for every point of a mesh, from one place to another (fields on its points)."""
     tree = points.tree
     along = end - start
-    length = tree.node("ShaderNodeVectorMath", along, operation="LENGTH")["Value"]
+    length = op.length(along)
     body = box(tree, 1.0)
     return op.realize(
         tree.node(
@@ -101,3 +101,16 @@ def put_on_points(
     return points.tree.node(
         "GeometryNodeInstanceOnPoints", op.set_position(points, place), instance=body, scale=scale, **settings
     ).value
+
+
+def tube(tree: Tree, radius: Operand, height: Value | float, sides: int = 12) -> Value:
+    """Return an upright closed tube from z = 0 on."""
+    cylinder = tree.node("GeometryNodeMeshCylinder", vertices=sides, radius=radius, depth=height)
+    smooth = tree.node("GeometryNodeSetShadeSmooth", cylinder["Mesh"], cylinder["Side"]).value
+    return move_geometry(smooth, op.vector(tree, 0.0, 0.0, height * 0.5))
+
+
+def cone(tree: Tree, bottom: Operand, top: Operand, height: Operand, sides: int = 16) -> Value:
+    """Return an upright closed cone, cut off, from z = 0 on."""
+    body = tree.node("GeometryNodeMeshCone", vertices=sides, radius_top=top, radius_bottom=bottom, depth=height)
+    return tree.node("GeometryNodeSetShadeSmooth", body["Mesh"], body["Side"]).value

@@ -2,49 +2,49 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from . import operations as op
 from .backbone import height_on, raise_place
-from .builder import Operand, Tree, Value
-from .strip import INSTANCES
+from .builder import Operand, Value
+from .inputs import Inputs, instance_number, socket
 
 BURIED = 0.3
 """Depth to which posts and foundations are modelled below the surface, m."""
 
 
-@dataclass(frozen=True)
-class Standing:
-    """The inputs of a group that puts something on points.
+class OnSurface(Inputs):
+    """Inputs of a group that puts something on points.
 
     Attributes:
         points: places in plan, with ``heading`` (rad, the turn about z) and ``elevation`` (m above the surface).
         road, terrain: objects whose surfaces things stand on.
-        instance: instance number of the faces.
     """
 
-    points: Value
-    road: Value
-    terrain: Value
-    instance: Value
+    points = socket("Geometry", "Places; heading (rad) and elevation (m) as attributes")
+    road = socket("Object", "Surface that it stands on")
+    terrain = socket("Object", "Surface beside the road")
 
     def places(self) -> Value:
         """Return the points on the surface."""
         return on_surface(self.points, self.road, self.terrain)
 
-    def labelled(self, mesh: Value, class_id: int) -> Value:
+
+class Standing(OnSurface):
+    """Those of one thing.
+
+    Attributes:
+        instance: instance number of the faces.
+    """
+
+    instance = instance_number()
+
+    def put_labelled(self, parts: list[Value], class_id: int) -> Value:
+        """Return the parts on every point of the surface, labelled."""
+        places = self.places()
+        return self.label(put_on(places, op.join(*parts)), class_id)
+
+    def label(self, mesh: Value, class_id: int) -> Value:
         """Give every face its class and its instance."""
-        return op.store(op.store(mesh, "class_id", class_id, "FACE"), "instance_id", self.instance, "FACE")
-
-
-def declare_standing(tree: Tree) -> Standing:
-    """Declare the inputs of a group that puts something on points."""
-    return Standing(
-        points=tree.input("Points", "Geometry", description="Places; heading (rad) and elevation (m) as attributes"),
-        road=tree.input("Road", "Object", description="Surface that it stands on"),
-        terrain=tree.input("Terrain", "Object", description="Surface beside the road"),
-        instance=tree.integer("Instance", 0, INSTANCES, description="Instance number of the faces"),
-    )
+        return op.label(mesh, class_id, self.instance)
 
 
 def on_surface(points: Value, road: Value, terrain: Value) -> Value:
@@ -52,7 +52,7 @@ def on_surface(points: Value, road: Value, terrain: Value) -> Value:
     tree = points.tree
     place = op.position(tree)
     height = height_on(op.object_geometry(road), op.object_geometry(terrain), place)
-    flat = tree.node("ShaderNodeVectorMath", place, (1.0, 1.0, 0.0), operation="MULTIPLY").value
+    flat = place * (1.0, 1.0, 0.0)
     return op.set_position(points, raise_place(flat, height + op.named_attribute(tree, "elevation")))
 
 

@@ -2,11 +2,19 @@
 
 from __future__ import annotations
 
-import bpy
-
 from . import operations as op
 from .backbone import limit_offset, row
-from .builder import Tree, node_group
+from .builder import Tree, makes_group
+from .inputs import (
+    FAR,
+    Inputs,
+    backbone_socket,
+    instance_number,
+    integer,
+    material_of,
+    metres,
+    socket,
+)
 
 _DETAIL = (
     "Finer columns: a point per column and row (row by row within a column, from the left), with the attributes share "
@@ -16,36 +24,28 @@ NARROW = 0.25
 """Strips narrower than this (m) have two columns whatever their detail: nothing of it lies there."""
 CLOSED = 1e-4
 """Where a strip is narrower than this (m) it has no faces."""
-FAR = (-1000.0, 1000.0)
-INSTANCES = (-(2**31), 2**31 - 1)
-"""Limits of instance numbers: 32 bits, with a sign in the nodes and without one elsewhere."""
 
 
-def strip_group() -> bpy.types.NodeTree:
-    """Return the group SR Strip."""
-    return node_group("SR Strip", _build)
+class _Strip(Inputs):
+    backbone = backbone_socket()
+    left_offset = metres(1.0, FAR, "Offset of the left edge, positive to the left")
+    right_offset = metres(-1.0, FAR, "Offset of the right edge")
+    left_height = metres(0.0, FAR, "Left edge above the axis, per row")
+    right_height = metres(0.0, FAR, "Right edge above the axis, per row")
+    class_ = integer(0, (0, 255), "Semantic class of the faces")
+    instance = instance_number()
+    material = material_of("the faces")
+    detail = socket("Geometry", _DETAIL)
 
 
-def _build(tree: Tree) -> None:
+@makes_group("SR Strip")
+def strip_group(tree: Tree) -> None:
     """A ribbon along a backbone between two offsets, each at its own height above the axis.
 
     Offsets and heights may be fields on the backbone's points.
     """
-    backbone = tree.input("Backbone", "Geometry", description="Polyline along the axis with its attributes")
-    left = tree.number(
-        "Left Offset", 1.0, FAR, unit="m", description="Offset of the left edge, positive to the left"
-    )
-    right = tree.number("Right Offset", -1.0, FAR, unit="m", description="Offset of the right edge")
-    left_height = tree.number(
-        "Left Height", 0.0, FAR, unit="m", description="Left edge above the axis, per row"
-    )
-    right_height = tree.number(
-        "Right Height", 0.0, FAR, unit="m", description="Right edge above the axis, per row"
-    )
-    class_id = tree.integer("Class", 0, (0, 255), description="Semantic class of the faces")
-    instance = tree.integer("Instance", 0, INSTANCES, description="Instance number of the faces")
-    material = tree.input("Material", "Material", description="Material of the faces")
-    detail = tree.input("Detail", "Geometry", description=_DETAIL)
+    strip = _Strip(tree)
+    backbone, detail = strip.backbone, strip.detail
 
     with tree.frame("Columns, one row per point of the backbone"):
         rows, detailed = op.point_count(backbone), op.point_count(detail)
@@ -54,7 +54,8 @@ def _build(tree: Tree) -> None:
     with tree.frame("Rows of the backbone"):
         axis, leftwards, curvature = row(backbone, number)
         left, right, left_height, right_height = (
-            op.sample_index(backbone, value, number) for value in (left, right, left_height, right_height)
+            op.sample_index(backbone, value, number)
+            for value in (strip.left_offset, strip.right_offset, strip.left_height, strip.right_height)
         )
     with tree.frame("Share of the left edge and depth of every column"):
         share = op.switch(detailed > 0, 1.0 - column, op.sample_index(detail, op.named_attribute(tree, "share"), point))
@@ -72,7 +73,7 @@ def _build(tree: Tree) -> None:
         mesh = op.store(op.store(mesh, "offset", offset), "row", number)
         mesh = op.store(mesh, "strip_width", left - right)
         mesh = op.store(mesh, "station", op.sample_index(backbone, op.named_attribute(tree, "station"), number))
-        mesh = op.label(op.set_position(mesh, place), class_id, instance, material)
+        mesh = op.label(op.set_position(mesh, place), strip.class_, strip.instance, strip.material)
         # Of faces that narrow, rounding would decide which way they look.
-        mesh = op.delete_faces(op.without_degenerate(mesh), op.named_attribute(tree, "strip_width") < CLOSED)
+        mesh = op.delete_faces(op.delete_degenerate(mesh), op.named_attribute(tree, "strip_width") < CLOSED)
     tree.output("Mesh", mesh, description="Ribbon whose faces look up")

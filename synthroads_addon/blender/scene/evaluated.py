@@ -25,10 +25,10 @@ from ...scanning.scene.motion import (
     lane_motions,
 )
 from ..labels import Label, Labels, velocity_of
-from ..model.build import ORIGIN
+from ..model.build import scene_origin
 from ..things.model_builder import ROLE, SUPPORT
 from .changes import Changes
-from .reading import Copied, MeshPart, Places, Whole, copy_mesh, join_parts, slot_names
+from .reading import MeshCopy, MeshPart, Places, SceneTables, copy_mesh, join_parts, slot_names
 
 Float = NDArray[np.float64]
 Source: TypeAlias = bpy.types.Depsgraph | bpy.types.Scene | None
@@ -65,8 +65,8 @@ def scene_mesh(
     depsgraph = _depsgraph(source)
     reading = _Reading(depsgraph, objects, classes)
     reading.copy_all()
-    whole = reading.whole(_origin(depsgraph.scene), number_objects)
-    return join_parts(reading.pairs(None), whole)
+    tables = reading.tables(_origin(depsgraph.scene), number_objects)
+    return join_parts(reading.pairs(None), tables)
 
 
 def scanned_scene(
@@ -147,9 +147,9 @@ def scanned_scene_steps(
 
 
 def _put_together(reading: _Reading, origin: Float, number_objects: bool) -> ScannedScene:
-    whole = reading.whole(origin, number_objects)
-    moving = tuple(_moving(reading, carrier, motion, whole) for carrier, motion in reading.motions.items())
-    return ScannedScene(join_parts(reading.pairs(None), whole), moving, reading.labels.by_name.unmatched())
+    tables = reading.tables(origin, number_objects)
+    moving = tuple(_moving(reading, carrier, motion, tables) for carrier, motion in reading.motions.items())
+    return ScannedScene(join_parts(reading.pairs(None), tables), moving, reading.labels.by_name.unmatched())
 
 
 @dataclass(frozen=True)
@@ -165,13 +165,13 @@ class CopiedScene:
     put_together: Callable[[], ScannedScene]
 
 
-def _moving(reading: _Reading, carrier: Hashable, motion: Motion, whole: Whole) -> MovingMesh:
+def _moving(reading: _Reading, carrier: Hashable, motion: Motion, tables: SceneTables) -> MovingMesh:
     """Return what one carrier moves, in the motion's own frame."""
     rotation, translation, _ = motion.pose(np.zeros(1))
     into = np.eye(4)
     into[:3, :3] = rotation[0].T
     into[:3, 3] = -rotation[0].T @ translation[0]
-    mesh = join_parts(reading.pairs(carrier), whole, into)
+    mesh = join_parts(reading.pairs(carrier), tables, into)
     if len(mesh) and isinstance(motion, LaneMotion):
         far = float(np.abs(mesh.vertices).max())
         if far > _FARTHEST_FROM_MOTION:
@@ -181,7 +181,7 @@ def _moving(reading: _Reading, carrier: Hashable, motion: Motion, whole: Whole) 
 
 
 @dataclass(frozen=True)
-class _Known:
+class _MeshUse:
     """Properties that all uses of one mesh by one object have in common.
 
     Attributes:
@@ -198,7 +198,7 @@ class _Known:
 
 
 @dataclass(frozen=True)
-class _Waiting:
+class _QueuedMesh:
     """A mesh that has not been copied yet: that of an object, after its modifiers.
 
     Attributes:
@@ -237,8 +237,8 @@ class _Reading:
         self._lanes = lanes or {}
         self._speed_factor = speed_factor
         self._materials: dict[str, int] = {}
-        self._waiting: dict[tuple[Hashable, ...], _Waiting] = {}
-        self._copied: dict[tuple[Hashable, ...], Copied] = {}
+        self._queued: dict[tuple[Hashable, ...], _QueuedMesh] = {}
+        self._copied: dict[tuple[Hashable, ...], MeshCopy] = {}
         self._parts: dict[tuple[Hashable, ...], MeshPart] = {}
         self._labels: list[Label] = []
         self._nameless: dict[int, tuple[str, tuple[Hashable, ...]]] = {}
@@ -251,16 +251,16 @@ class _Reading:
 
         It ends early where a mesh is no longer what it was.
         """
-        total = max(1, len(self._waiting))
-        while self._waiting:
-            key, waiting = next(iter(self._waiting.items()))
-            item = bpy.data.objects.get(waiting.item)
+        total = max(1, len(self._queued))
+        while self._queued:
+            key, queued = next(iter(self._queued.items()))
+            item = bpy.data.objects.get(queued.item)
             mesh = item.evaluated_get(self._depsgraph).data if item is not None else None
             if not isinstance(mesh, bpy.types.Mesh) or mesh.as_pointer() != key[0]:
                 return  # the user has changed it
-            self._copy(key, waiting.name, mesh, waiting.slots)
-            del self._waiting[key]
-            yield 1.0 - len(self._waiting) / total
+            self._copy(key, queued.name, mesh, queued.slots)
+            del self._queued[key]
+            yield 1.0 - len(self._queued) / total
 
     @property
     def materials(self) -> tuple[str, ...]:
@@ -270,7 +270,7 @@ class _Reading:
     @property
     def complete(self) -> bool:
         """Return whether no mesh waits."""
-        return not self._waiting
+        return not self._queued
 
     def copy_all(self) -> None:
         """Copy the meshes that wait."""
@@ -292,13 +292,13 @@ class _Reading:
             self._parts[key] = self._copied.pop(key).part()
         return self._parts[key]
 
-    def whole(self, origin: Float, number_objects: bool) -> Whole:
+    def tables(self, origin: Float, number_objects: bool) -> SceneTables:
         """Return what all meshes have in common."""
         labels = self._numbered() if number_objects else self._labels
-        return Whole(labels, self.materials, origin)
+        return SceneTables(labels, self.materials, origin)
 
     def _walk(self, depsgraph: bpy.types.Depsgraph) -> None:
-        known: dict[tuple[int, int, int], _Known | None] = {}
+        known: dict[tuple[int, int, int], _MeshUse | None] = {}
         for use in depsgraph.object_instances:
             # Curves, texts, surfaces and metaballs come a second time as the mesh that they make.
             item = use.object
@@ -318,7 +318,7 @@ class _Reading:
             places.matrices.fromlist(matrix)
             places.labels.append(about.label)
 
-    def _look(self, item: bpy.types.Object, owner: bpy.types.Object) -> _Known | None:
+    def _look(self, item: bpy.types.Object, owner: bpy.types.Object) -> _MeshUse | None:
         """Return what is known of an evaluated object and its owner; None if they aren't scanned."""
         original, shown_by = item.original, owner.original
         if not len(item.data.polygons) or SUPPORT in shown_by:
@@ -328,33 +328,33 @@ class _Reading:
         slots = slot_names(item)
         # Materials may be linked to the object, so that the same mesh can look different.
         part = (item.data.as_pointer(), *slots)
-        if part not in self._waiting and part not in self._copied:
+        if part not in self._queued and part not in self._copied:
             for name in slots:
                 self._materials.setdefault(name, len(self._materials))
             place = (original.name, original.library.filepath if original.library else None)
-            own = original.evaluated_get(self._depsgraph).data == item.data
-            if own and bpy.data.objects.get(place) == original:
-                self._waiting[part] = _Waiting(item.name, place, slots)
+            is_own_mesh = original.evaluated_get(self._depsgraph).data == item.data
+            if is_own_mesh and bpy.data.objects.get(place) == original:
+                self._queued[part] = _QueuedMesh(item.name, place, slots)
             else:  # of a geometry's instance, or of a curve: only seen in passing
                 self._copy(part, item.name, item.data, slots)
-        label = self.labels.of(original, shown_by)
+        label = self.labels.label_of(original, shown_by)
         self._labels.append(label)
         if label.instance < 0:
             self._nameless[len(self._labels) - 1] = (shown_by.name_full, part)
         role = original.get(ROLE, shown_by.get(ROLE))
         lane = (role, self._lanes[role]) if role in self._lanes else None
-        return _Known(part, len(self._labels) - 1, lane, self._velocity(original, shown_by))
+        return _MeshUse(part, len(self._labels) - 1, lane, self._velocity(original, shown_by))
 
     def _velocity(self, item: bpy.types.Object, owner: bpy.types.Object) -> tuple[Hashable, Float] | None:
         """Return the key of what moves an original object, and its velocity; None if nothing does."""
         inside = velocity_of(item) if item != owner else None
-        found = inside or velocity_of(owner)
-        if not found or not self._speed_factor or not found[1].any():
+        moved = inside or velocity_of(owner)
+        if not moved or not self._speed_factor or not moved[1].any():
             return None
         # What moves inside of a collection does so wherever the collection is shown.
-        return (found[0].name_full, owner.name_full if inside else ""), found[1] * self._speed_factor
+        return (moved[0].name_full, owner.name_full if inside else ""), moved[1] * self._speed_factor
 
-    def _carrier(self, known: _Known, matrix: list[float]) -> Hashable:
+    def _carrier(self, known: _MeshUse, matrix: list[float]) -> Hashable:
         """Return the key of what moves a use, whose motion is in `motions` then; its own velocity counts first."""
         if known.velocity is not None:
             key, velocity = known.velocity
@@ -387,6 +387,11 @@ class _Reading:
         return labels
 
 
+def _origin(scene: bpy.types.Scene) -> Float:
+    origin = scene_origin(scene)
+    return np.zeros(3) if origin is None else origin
+
+
 def _depsgraph(source: Source) -> bpy.types.Depsgraph:
     if isinstance(source, bpy.types.Depsgraph):
         return source
@@ -395,10 +400,3 @@ def _depsgraph(source: Source) -> bpy.types.Depsgraph:
     layer = source.view_layers[0]
     layer.update()
     return layer.depsgraph
-
-
-def _origin(scene: bpy.types.Scene) -> Float:
-    for collection in scene.collection.children_recursive:
-        if ORIGIN in collection:
-            return np.array(collection[ORIGIN], dtype=np.float64)
-    return np.zeros(3)

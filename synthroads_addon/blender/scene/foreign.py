@@ -103,7 +103,7 @@ def _try_in_a_process(path: Path, importer: str) -> None:
 
 def open_scene_warnings() -> list[str]:
     """Return what may make a scan of the open scene other than was meant, in sentences."""
-    found = [
+    warnings = [
         f"the linked file {library.filepath} is missing: what it holds is not scanned"
         for library in bpy.data.libraries
         if not Path(bpy.path.abspath(library.filepath)).is_file()
@@ -111,5 +111,5 @@ def open_scene_warnings() -> list[str]:
     units = bpy.context.scene.unit_settings
     scale = units.scale_length
     if units.system != "NONE" and abs(scale - 1.0) > 1e-6:
-        found.append(f"the scene's unit scale is {scale:g}: it is scanned as if a unit were 1 m")
-    return found
+        warnings.append(f"the scene's unit scale is {scale:g}: it is scanned as if a unit were 1 m")
+    return warnings

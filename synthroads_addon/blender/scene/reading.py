@@ -58,7 +58,7 @@ class Places:
 
 
 @dataclass(frozen=True)
-class Whole:
+class SceneTables:
     """Tables that the meshes of a scene have in common.
 
     Attributes:
@@ -82,7 +82,7 @@ def slot_names(item: bpy.types.Object) -> list[str]:
 
 
 @dataclass
-class Copied:
+class MeshCopy:
     """Copy of an evaluated mesh, as fast as memory allows; `part` makes the rest of it without Blender.
 
     Attributes:
@@ -126,7 +126,7 @@ class Copied:
 
 def copy_mesh(
     name: str, mesh: bpy.types.Mesh, slots: Sequence[str], materials: dict[str, int], by_name: NameClasses
-) -> Copied:
+) -> MeshCopy:
     """Return what is needed of an evaluated mesh.
 
     Args:
@@ -147,7 +147,7 @@ def copy_mesh(
         triangles = triangle_corners(mesh)
         face = np.empty(len(triangles), np.int32)
         mesh.loop_triangle_polygons.foreach_get("value", face)
-    return Copied(
+    return MeshCopy(
         name,
         vertices,
         corners,
@@ -188,11 +188,11 @@ def _by_triangle(values: NDArray[Any], face: NDArray[np.int32] | None) -> NDArra
 def _material_classes(
     slots: Iterable[str], materials: dict[str, int], by_name: NameClasses
 ) -> NDArray[np.int16] | None:
-    found = {materials[name]: by_name.find("materials", name) for name in slots}
-    if all(number is None for number in found.values()):
+    classes = {materials[name]: by_name.find("materials", name) for name in slots}
+    if all(number is None for number in classes.values()):
         return None
-    result = np.full(max(found) + 1, -1, np.int16)
-    for index, number in found.items():
+    result = np.full(max(classes) + 1, -1, np.int16)
+    for index, number in classes.items():
         result[index] = -1 if number is None else number
     return result
 
@@ -207,20 +207,20 @@ def _face_values(mesh: bpy.types.Mesh, name: str) -> NDArray[Any] | None:
     return values
 
 
-def join_parts(pairs: list[tuple[MeshPart, Places]], whole: Whole, frame: Float | None = None) -> SceneMesh:
+def join_parts(pairs: list[tuple[MeshPart, Places]], tables: SceneTables, frame: Float | None = None) -> SceneMesh:
     """Return parts at their places as one mesh, without triangles that have no area.
 
     Args:
         pairs: parts and where they stand; emptied, so that no part is held longer than it is needed.
-        whole: of the scene.
+        tables: of the scene.
         frame: (4, 4) from the scene's frame to the mesh's own, whose origin is 0 then; the same frame if None.
     """
-    origin = whole.origin if frame is None else np.zeros(3)
+    origin = tables.origin if frame is None else np.zeros(3)
     uses = np.array([len(places.labels) for _, places in pairs], dtype=np.int64)
     sizes = np.array([(len(part.vertices), len(part.triangles)) for part, _ in pairs], dtype=np.int64).reshape(-1, 2)
     counts = uses @ sizes
     if not counts[1]:
-        return empty_scene_mesh(origin, whole.materials)
+        return empty_scene_mesh(origin, tables.materials)
     if counts.max() >= 2**31:
         raise InputError("scene", int(counts.max()), "must have less than 2**31 vertices and triangles, with instances")
     as_it_is = pairs[0][0] if len(pairs) == 1 and frame is None and pairs[0][1].matrices == _IDENTITY else None
@@ -238,7 +238,7 @@ def join_parts(pairs: list[tuple[MeshPart, Places]], whole: Whole, frame: Float 
         for matrices, labels in _blocks(part, places):
             last = vertex + len(matrices) * len(part.vertices), triangle + len(matrices) * len(part.triangles)
             mine = {name: arrays[name][triangle : last[1]] for name in ("triangles", *_PER_FACE)}
-            _label(part, [whole.labels[i] for i in labels], mine)
+            _label(part, [tables.labels[i] for i in labels], mine)
             if not as_it_is:
                 into = matrices if frame is None else frame @ matrices
                 _place(part, into, arrays["vertices"][vertex : last[0]], mine["triangles"], vertex)
@@ -247,7 +247,7 @@ def join_parts(pairs: list[tuple[MeshPart, Places]], whole: Whole, frame: Float 
     if keep is not None:
         for name in ("triangles", *_PER_FACE):
             arrays[name] = arrays[name][keep]
-    return SceneMesh(**arrays, materials=whole.materials, origin=origin)
+    return SceneMesh(**arrays, materials=tables.materials, origin=origin)
 
 
 def _blocks(part: MeshPart, places: Places) -> Iterator[tuple[Float, array[int]]]:
@@ -288,9 +288,9 @@ def _label(part: MeshPart, labels: list[Label], into: dict[str, NDArray[Any]]) -
     if part.class_id is not None:
         class_id[...] = part.class_id
         return
-    own, otherwise = np.array([(label.own, label.otherwise) for label in labels], np.int16).T[:, :, None]
+    strong, weak = np.array([(label.strong, label.weak) for label in labels], np.int16).T[:, :, None]
     of_material = np.int16(-1) if part.material_class is None else part.material_class[part.material]
-    class_id[...] = np.where(own >= 0, own, np.where(of_material >= 0, of_material, otherwise))
+    class_id[...] = np.where(strong >= 0, strong, np.where(of_material >= 0, of_material, weak))
 
 
 def _with_area(vertices: NDArray[np.float32], triangles: NDArray[np.int32]) -> NDArray[np.bool_] | None:

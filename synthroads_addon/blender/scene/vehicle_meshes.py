@@ -14,8 +14,8 @@ from ...scanning.scene.mesh import SceneMesh
 from ...scanning.scene.motion import Motion, MovingMesh, ScannedScene
 from ..compat import set_modifier_input
 from ..materials import material
-from ..things.vehicle.build import MATERIALS
 from ..things.vehicle.models import model_group
+from ..things.vehicle.vehicle import MATERIALS
 from .evaluated import scene_mesh
 
 
@@ -52,11 +52,11 @@ class VehicleMeshes:
 
     def _model(self, model: str) -> SceneMesh:
         if model not in self._models:
-            self._models[model] = _own_frame(model)
+            self._models[model] = _model_mesh(model)
         return self._models[model]
 
 
-def _own_frame(model: str) -> SceneMesh:
+def _model_mesh(model: str) -> SceneMesh:
     """Return a model in the frame of `LaneMotion`: its middle at 0 on the road, x forward, y left, z up."""
     item = bpy.data.objects.new("SR Vehicle", bpy.data.meshes.new("SR Vehicle"))
     bpy.context.scene.collection.objects.link(item)
@@ -64,7 +64,7 @@ def _own_frame(model: str) -> SceneMesh:
         modifier = item.modifiers.new("SynthRoads", "NODES")
         modifier.node_group = model_group(model)
         for key, entry in MATERIALS.items():
-            set_modifier_input(modifier, f"{key} Material", material(entry))
+            set_modifier_input(modifier, key, material(entry))
         bpy.context.view_layer.update()
         mesh = scene_mesh(objects=[item])
     finally:

@@ -4,17 +4,16 @@ from __future__ import annotations
 
 import math
 
-import bpy
 import numpy as np
 
 from ...base.classes import class_id
 from ...road.parameters import ConstructionBeacon
 from ...road.things.body_shapes import BEACON_BLADE, BEACON_BLADE_BOTTOM, BEACON_FOOT
-from ..materials import material
 from ..nodes import operations as op
-from ..nodes.backbone import height_on
-from ..nodes.builder import Tree, Value, node_group
-from ..nodes.solids import box, flip_faces, move_geometry, paint_faces, prism, put_on_points
+from ..nodes.builder import Tree, Value, makes_group
+from ..nodes.inputs import material_of, socket
+from ..nodes.solids import box, flip_faces, move_geometry, paint_faces, prism, put_on_points, row_of_points
+from ..nodes.standing import OnSurface
 from .model_builder import ModelBuilder
 
 CELLS = (2, 8)
@@ -23,35 +22,29 @@ _LENS = (0.095, 0.075)
 _HEXADECAGON = 16
 
 
-def beacon_group() -> bpy.types.NodeTree:
-    """Return the group SR Beacon."""
-    return node_group("SR Beacon", _build)
+class _Beacon(OnSurface):
+    points = socket("Geometry", "One point per beacon, at any height; pass_side +1 is left")
+    road = socket("Object", "Surface that the beacons stand on")
+    red_material = material_of("the red stripes")
+    white_material = material_of("the white stripes")
+    rubber_material = material_of("the foot")
+    housing_material = material_of("the lamp")
+    lens_material = material_of("the lamp's lens")
 
 
-def _build(tree: Tree) -> None:
+@makes_group("SR Beacon")
+def beacon_group(tree: Tree) -> None:
     """A beacon on each point; points carry ``heading`` (rad), ``elevation``, ``width``, ``height``, ``pass_side``."""
-    points = tree.input("Points", "Geometry", description="One point per beacon, at any height; pass_side +1 is left")
-    road = tree.input("Road", "Object", description="Surface that the beacons stand on")
-    terrain = tree.input("Terrain", "Object", description="Surface beside the road")
-    names = {"Red": "red stripes", "White": "white stripes", "Rubber": "foot", "Housing": "lamp", "Lens": "lamp's lens"}
-    red, white, rubber, housing, lens = (
-        tree.input(f"{name} Material", "Material", description=f"Material of the {what}")
-        for name, what in names.items()
-    )
+    beacon = _Beacon(tree)
 
     with tree.frame("Foot and its tenon"):
-        foot = paint_faces(op.join(_foot(tree), box(tree, (0.07, 0.05, 0.1), (0.0, 0.0, 0.12))), rubber)
+        foot = paint_faces(op.join(_foot(tree), box(tree, (0.07, 0.05, 0.1), (0.0, 0.0, 0.12))), beacon.rubber_material)
     with tree.frame("Blades of size 1: stripes fall to the left or to the right"):
-        blades = [_blade(tree, red, white, side) for side in (1, -1)]
+        blades = [_blade(tree, beacon.red_material, beacon.white_material, side) for side in (1, -1)]
     with tree.frame("Lamp"):
-        lamp = _lamp(tree, housing, lens)
+        lamp = _lamp(tree, beacon.housing_material, beacon.lens_material)
     with tree.frame("On the surface"):
-        place = op.position(tree)
-        height = height_on(op.object_geometry(road), op.object_geometry(terrain), place)
-        flat = tree.node("ShaderNodeVectorMath", place, (1.0, 1.0, 0.0), operation="MULTIPLY").value
-        points = op.set_position(
-            points, flat + op.vector(tree, 0.0, 0.0, height + op.named_attribute(tree, "elevation"))
-        )
+        points = beacon.places()
     with tree.frame("Beacons"):
         turned = op.turn(tree, z=op.named_attribute(tree, "heading"))
         place, tall = op.position(tree), op.named_attribute(tree, "height")
@@ -94,13 +87,11 @@ def _blade(tree: Tree, red: Value, white: Value, side: int) -> Value:
         # Seen from the front they rise to the right. A mirror turns the faces round.
         y = -BEACON_BLADE / 2 - 0.002
         scale = (float(side), 1.0, 1.0)
-        face = tree.node(
-            "GeometryNodeTransform", stripes, translation=(0.0, y if front else -y, 0.0), scale=scale
-        ).value
+        face = op.transform(stripes, translation=(0.0, y if front else -y, 0.0), scale=scale)
         faces.append(face if (side > 0) == front else flip_faces(face))
     mesh = paint_faces(op.join(*faces), white)
     first = (op.named_attribute(tree, "stripe", "INT") % 2).equals(0)
-    mesh = tree.node("GeometryNodeSetMaterial", mesh, first, material=red).value
+    mesh = paint_faces(mesh, red, first)
     plate = box(tree, (1.0, BEACON_BLADE, 1.0), (0.0, 0.0, 0.5))
     return op.join(paint_faces(plate, white), mesh)
 
@@ -115,7 +106,7 @@ def _blade_face(tree: Tree) -> Value:
             corners = [(0.0, 0.0, 0.0), (1.0, 0.0, 1.0), (0.0, 0.0, 1.0)]
         half = tree.node("GeometryNodeMeshCircle", vertices=3, fill_type="NGON").value
         half = op.set_position(half, op.choose(op.index(tree), corners))
-        cells = tree.node("GeometryNodeMeshLine", count=columns * rows).value
+        cells = row_of_points(tree, columns * rows)
         column, row = op.index(tree) % columns, op.index(tree) // columns
         cells = op.store(cells, "stripe", row - column + upper + columns)
         place = op.vector(tree, column / float(columns) - 0.5, 0.0, row / float(rows))
@@ -131,9 +122,7 @@ def _lamp(tree: Tree, housing: Value, lens: Value) -> Value:
     drum = tree.node("GeometryNodeMeshCylinder", vertices=_HEXADECAGON, radius=radius, depth=deep).value
     glass = tree.node("GeometryNodeMeshCylinder", vertices=_HEXADECAGON, radius=radius * 0.85, depth=deep + 0.03).value
     lying = op.turn(tree, x=1.5707963)
-    parts = [
-        tree.node("GeometryNodeTransform", mesh, translation=middle, rotation=lying).value for mesh in (drum, glass)
-    ]
+    parts = [op.transform(mesh, translation=middle, rotation=lying) for mesh in (drum, glass)]
     return op.join(body, paint_faces(parts[0], housing), paint_faces(parts[1], lens))
 
 
@@ -142,23 +131,22 @@ def build_beacons(builder: ModelBuilder) -> None:
     beacons = list(builder.parameters.of_type(ConstructionBeacon).values())
     if not beacons:
         return
-    inputs = {
-        **builder.surfaces(),
-        "Red Material": material("sheeting_red"),
-        "White Material": material("sheeting_white"),
-        "Rubber Material": material("rubber"),
-        "Housing Material": material("plastic_black"),
-        "Lens Material": material("lamp_yellow"),
+    materials = {
+        "Red Material": "sheeting_red",
+        "White Material": "sheeting_white",
+        "Rubber Material": "rubber",
+        "Housing Material": "plastic_black",
+        "Lens Material": "lamp_yellow",
     }
     attributes = {
         "width": np.array([beacon.width for beacon in beacons]),
         "height": np.array([beacon.height for beacon in beacons]),
-        "pass_side": np.array([_own_side(beacon) for beacon in beacons]),
+        "pass_side": np.array([_passing_side(beacon) for beacon in beacons]),
     }
-    builder.add("Beacons", builder.points("Beacons", beacons, attributes), beacon_group(), inputs)
+    builder.add("Beacons", builder.points("Beacons", beacons, attributes), beacon_group(), materials)
 
 
-def _own_side(beacon: ConstructionBeacon) -> int:
+def _passing_side(beacon: ConstructionBeacon) -> int:
     """Return +1 where traffic passes a beacon on its own left, -1 on its right: one turned round has them swapped."""
     with_stations = math.cos(math.radians(beacon.rotation_deg)) > 0.0
     return 1 if (beacon.pass_side == "left") == with_stations else -1

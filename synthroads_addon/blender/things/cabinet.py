@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
-import bpy
-
 from ...base.classes import class_id
 from ...road.parameters import Cabinet
-from ..materials import material
 from ..nodes import operations as op
-from ..nodes.builder import Tree, Value, node_group
+from ..nodes.builder import Tree, Value, makes_group
+from ..nodes.inputs import material_of, metres
 from ..nodes.solids import box, paint_faces, put_on_points, row_of_points
-from ..nodes.standing import declare_standing, put_on
+from ..nodes.standing import Standing
 from .emergency_phone import emergency_phone_group
 from .model_builder import ModelBuilder
 
@@ -27,46 +23,40 @@ _WIDE = 0.7
 """Width from which a cabinet has two doors, m."""
 _MATERIALS = {
     "emergency_phone": {
-        "Body": "plastic_orange",
-        "Plinth": "concrete",
-        "Band": "sheeting_white",
-        "Writing": "sheeting_white",
-        "Panel": "plastic_black",
+        "body_material": "plastic_orange",
+        "plinth_material": "concrete",
+        "band_material": "sheeting_white",
+        "writing_material": "sheeting_white",
+        "panel_material": "plastic_black",
     },
-    "utility": {"Body": "cabinet_grey", "Plinth": "concrete", "Fitting": "plastic_black"},
+    "utility": {
+        "body_material": "cabinet_grey",
+        "plinth_material": "concrete",
+        "fitting_material": "plastic_black",
+    },
 }
 
 
-@dataclass(frozen=True)
-class _Cabinet:
-    width: Value
-    depth: Value
-    height: Value
+class _Cabinet(Standing):
+    width = metres(0.8, (0.1, 5.0), "Width of its front")
+    depth = metres(0.35, (0.1, 5.0), "Depth (m)")
+    height = metres(1.1, (0.3, 5.0), "Top above the surface")
+    body_material = material_of("body parts")
+    plinth_material = material_of("plinth parts")
+    fitting_material = material_of("fitting parts")
 
 
-def cabinet_group() -> bpy.types.NodeTree:
-    """Return the group SR Cabinet."""
-    return node_group("SR Cabinet", _build)
-
-
-def _build(tree: Tree) -> None:
+@makes_group("SR Cabinet")
+def cabinet_group(tree: Tree) -> None:
     """A utility cabinet, its doors towards those who drive along +y; points carry ``heading`` and ``elevation``."""
-    standing = declare_standing(tree)
-    cabinet = _Cabinet(
-        width=tree.number("Width", 0.8, (0.1, 5.0), unit="m", description="Width of its front"),
-        depth=tree.number("Depth", 0.35, (0.1, 5.0), unit="m", description="Depth (m)"),
-        height=tree.number("Height", 1.1, (0.3, 5.0), unit="m", description="Top above the surface"),
-    )
-    names = ("Body", "Plinth", "Fitting")
-    body, plinth, fitting = (
-        tree.input(f"{name} Material", "Material", description=f"Material of {name.lower()} parts") for name in names
-    )
+    cabinet = _Cabinet(tree)
+    body, fitting = cabinet.body_material, cabinet.fitting_material
 
     with tree.frame("Plinth, body and lid"):
         foot = _block(tree, cabinet, 2.0 * _OVERHANG, -BURIED, _PLINTH)
         walls = _block(tree, cabinet, _OVERHANG, _PLINTH, cabinet.height - _LID)
         lid = _block(tree, cabinet, 0.0, cabinet.height - _LID, cabinet.height)
-        parts = [paint_faces(foot, plinth), paint_faces(op.join(walls, lid), body)]
+        parts = [paint_faces(foot, cabinet.plinth_material), paint_faces(op.join(walls, lid), body)]
     with tree.frame("Doors"):
         count = op.switch(cabinet.width >= _WIDE, 1, 2)
         pitch = (cabinet.width - 2.0 * _OVERHANG) / count
@@ -91,7 +81,7 @@ def _build(tree: Tree) -> None:
         place = op.vector(tree, beside, front - _DOOR * 0.5, level)
         parts.append(paint_faces(put_on_points(row_of_points(tree, count * _SLOTS), slot, place), fitting))
     with tree.frame("Put onto the points"):
-        mesh = standing.labelled(put_on(standing.places(), op.join(*parts)), class_id("utility"))
+        mesh = cabinet.put_labelled(parts, class_id("utility"))
     tree.output("Mesh", mesh, description="Cabinet")
 
 
@@ -105,12 +95,4 @@ def build_cabinets(builder: ModelBuilder) -> None:
     """Make one object per emergency phone and utility cabinet."""
     for name, cabinet in builder.parameters.of_type(Cabinet).items():
         group = emergency_phone_group() if cabinet.kind == "emergency_phone" else cabinet_group()
-        inputs = {
-            **builder.surfaces(),
-            "Width": cabinet.width,
-            "Depth": cabinet.depth,
-            "Height": cabinet.height,
-            "Instance": cabinet.instance,
-            **{f"{part} Material": material(entry) for part, entry in _MATERIALS[cabinet.kind].items()},
-        }
-        builder.add(name, builder.points(name, [cabinet], {}), group, inputs)
+        builder.add_thing(name, cabinet, group, **_MATERIALS[cabinet.kind])

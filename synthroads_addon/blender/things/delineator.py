@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-import bpy
 import numpy as np
 
 from ...base.classes import class_id
 from ...road.parameters import Delineator
 from ...road.things.body_shapes import DELINEATOR
-from ..materials import material
 from ..nodes import operations as op
-from ..nodes.builder import Tree, Value, node_group
-from ..nodes.standing import on_surface, put_on
+from ..nodes.builder import Tree, Value, makes_group
+from ..nodes.inputs import material_of, socket
+from ..nodes.solids import paint_faces
+from ..nodes.standing import OnSurface, put_on
 from .model_builder import ModelBuilder
 
 _SLANT = 0.6
@@ -27,37 +27,32 @@ _UNDER, _PROUD = 0.001, 0.004
 """How far reflectors reach into the post, and out of it, m."""
 
 
-def delineator_group() -> bpy.types.NodeTree:
-    """Return the group SR Delineator."""
-    return node_group("SR Delineator", _build)
+class _Delineator(OnSurface):
+    points = socket("Geometry", "One point per post, at any height")
+    road = socket("Object", "Surface that the posts stand on")
+    white_material = material_of("this part")
+    black_material = material_of("this part")
+    reflector_material = material_of("this part")
 
 
-def _build(tree: Tree) -> None:
+@makes_group("SR Delineator")
+def delineator_group(tree: Tree) -> None:
     """A delineator post on each point; points carry ``heading``, ``elevation``, ``height`` and ``instance``."""
-    points = tree.input("Points", "Geometry", description="One point per post, at any height")
-    road = tree.input("Road", "Object", description="Surface that the posts stand on")
-    terrain = tree.input("Terrain", "Object", description="Surface beside the road")
-    names = ("White Material", "Black Material", "Reflector Material")
-    white, black, glass = (
-        tree.input(name, "Material", description="Material of this part") for name in names
-    )
+    post = _Delineator(tree)
+    glass = post.reflector_material
 
     with tree.frame("Body: white, with a slanted black band"):
-        body = _body(tree, white, black)
+        body = _body(tree, post.white_material, post.black_material)
     with tree.frame("Reflectors: an upright one in front, two round ones behind"):
         body = op.join(body, _front(tree, glass), _behind(tree, glass, 0.07), _behind(tree, glass, -0.07))
     with tree.frame("On the surface"):
-        places = on_surface(points, road, terrain)
+        places = post.places()
         tall = op.vector(tree, 1.0, 1.0, op.named_attribute(tree, "height"))
         posts = put_on(places, body, tall)
     with tree.frame("Labels"):
         posts = op.store(posts, "class_id", class_id("warning_post"), "FACE")
         posts = op.store(posts, "instance_id", op.named_attribute(tree, "instance", "INT"), "FACE")
     tree.output("Mesh", posts, description="Posts; each face has its own post's instance number")
-
-
-def _set_material(mesh: Value, material: Value, selection: Value | bool = True) -> Value:
-    return mesh.tree.node("GeometryNodeSetMaterial", mesh, selection, material=material).value
 
 
 def _body(tree: Tree, white: Value, black: Value) -> Value:
@@ -69,10 +64,10 @@ def _body(tree: Tree, white: Value, black: Value) -> Value:
     mesh = op.set_position(mesh, section + op.vector(tree, 0.0, 0.0, level + slant))
     # Faces of a grid run column by column, rows - 1 of them each.
     banded = (op.index(tree) % (rows - 1)).equals(_BAND)
-    mesh = _set_material(_set_material(mesh, white), black, banded)
+    mesh = paint_faces(paint_faces(mesh, white), black, banded)
     lid = tree.node("GeometryNodeMeshCircle", vertices=len(DELINEATOR), fill_type="NGON").value
     outline = op.choose(op.index(tree), [(x, y, _LEVELS[-1] + _SLANT * x) for x, y in DELINEATOR])
-    return op.join(mesh, _set_material(op.set_position(lid, outline), white))
+    return op.join(mesh, paint_faces(op.set_position(lid, outline), white))
 
 
 def _front(tree: Tree, glass: Value) -> Value:
@@ -100,7 +95,7 @@ def _flank(x: Value) -> Value:
 def _reflector_body(face: Value, glass: Value) -> Value:
     """Return a reflector as thick as it stands out of the post."""
     solid = face.tree.node("GeometryNodeExtrudeMesh", face, offset_scale=_UNDER + _PROUD, individual=False).value
-    return _set_material(solid, glass)
+    return paint_faces(solid, glass)
 
 
 def build_delineators(builder: ModelBuilder) -> None:
@@ -108,11 +103,10 @@ def build_delineators(builder: ModelBuilder) -> None:
     posts = list(builder.parameters.of_type(Delineator).values())
     if not posts:
         return
-    inputs = {
-        **builder.surfaces(),
-        "White Material": material("plastic_white"),
-        "Black Material": material("plastic_black"),
-        "Reflector Material": material("reflector"),
+    mesh = builder.points("Delineators", posts, {"height": np.array([post.height for post in posts])})
+    materials = {
+        "White Material": "plastic_white",
+        "Black Material": "plastic_black",
+        "Reflector Material": "reflector",
     }
-    heights = np.array([post.height for post in posts])
-    builder.add("Delineators", builder.points("Delineators", posts, {"height": heights}), delineator_group(), inputs)
+    builder.add("Delineators", mesh, delineator_group(), materials)

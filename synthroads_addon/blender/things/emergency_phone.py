@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-
-import bpy
 
 from ...base.classes import class_id
 from ..nodes import operations as op
-from ..nodes.builder import Tree, Value, node_group
-from ..nodes.solids import Point, box, loft, move_geometry, paint_faces
-from ..nodes.standing import BURIED, declare_standing, put_on
-from ..nodes.tubes import tube
+from ..nodes.builder import Tree, Value, makes_group
+from ..nodes.inputs import material_of, metres
+from ..nodes.solids import Point, box, loft, move_geometry, paint_faces, tube
+from ..nodes.standing import BURIED, Standing
 from .sign.writing import sign_writing_group
 
 _CORNER = 0.16
@@ -27,49 +24,39 @@ _LETTERS = (0.77, 0.92)
 """Lower and upper border of the writing as shares of the height."""
 
 
-@dataclass(frozen=True)
-class _Phone:
-    width: Value
-    depth: Value
-    height: Value
+class _Phone(Standing):
+    width = metres(0.3, (0.05, 2.0), "Width of its front")
+    depth = metres(0.3, (0.05, 2.0), "Depth (m)")
+    height = metres(1.6, (0.3, 4.0), "Top above the surface")
+    body_material = material_of("the body")
+    plinth_material = material_of("the plinth")
+    band_material = material_of("the band")
+    writing_material = material_of("the writing")
+    panel_material = material_of("the panel")
 
 
-def emergency_phone_group() -> bpy.types.NodeTree:
-    """Return the group SR Emergency Phone."""
-    return node_group("SR Emergency Phone", _build)
-
-
-def _build(tree: Tree) -> None:
+@makes_group("SR Emergency Phone")
+def emergency_phone_group(tree: Tree) -> None:
     """An emergency telephone, its front towards those who drive along +y; points carry ``heading``, ``elevation``."""
-    standing = declare_standing(tree)
-    phone = _Phone(
-        width=tree.number("Width", 0.3, (0.05, 2.0), unit="m", description="Width of its front"),
-        depth=tree.number("Depth", 0.3, (0.05, 2.0), unit="m", description="Depth (m)"),
-        height=tree.number("Height", 1.6, (0.3, 4.0), unit="m", description="Top above the surface"),
-    )
-    names = ("Body", "Plinth", "Band", "Writing", "Panel")
-    body, plinth, band, writing, panel = (
-        tree.input(f"{name} Material", "Material", description=f"Material of the {name.lower()}") for name in names
-    )
+    phone = _Phone(tree)
 
     with tree.frame("Plinth, body with its roof, and reflective band"):
-        solids = ((_PLINTH, plinth), (_BODY, body), (_BAND, band))
+        solids = ((_PLINTH, phone.plinth_material), (_BODY, phone.body_material), (_BAND, phone.band_material))
         parts = [paint_faces(_pillar(tree, phone, rows), material) for rows, material in solids]
     with tree.frame("Speech panel with its button"):
         front = phone.depth * (-0.5 * _BODY_WIDTH)
         size = op.vector(tree, phone.width * 0.6, 0.012, phone.height * 0.15)
-        parts.append(paint_faces(box(tree, size, op.vector(tree, 0.0, front, phone.height * 0.68)), panel))
-        button = tree.node(
-            "GeometryNodeTransform",
-            tube(tree, phone.width * 0.08, 0.01),
-            translation=op.vector(tree, 0.0, front, phone.height * 0.64),
-            rotation=(math.pi / 2, 0.0, 0.0),
-        ).value
-        parts.append(paint_faces(button, body))
+        parts.append(
+            paint_faces(box(tree, size, op.vector(tree, 0.0, front, phone.height * 0.68)), phone.panel_material)
+        )
+        button = tube(tree, phone.width * 0.08, 0.01)
+        middle = op.vector(tree, 0.0, front, phone.height * 0.64)
+        button = op.transform(button, translation=middle, rotation=(math.pi / 2, 0.0, 0.0))
+        parts.append(paint_faces(button, phone.body_material))
     with tree.frame("SOS on all four sides"):
-        parts.append(paint_faces(_writing(tree, phone), writing))
+        parts.append(paint_faces(_writing(tree, phone), phone.writing_material))
     with tree.frame("Put onto the points"):
-        mesh = standing.labelled(put_on(standing.places(), op.join(*parts)), class_id("utility"))
+        mesh = phone.put_labelled(parts, class_id("utility"))
     tree.output("Mesh", mesh, description="Emergency telephone")
 
 
@@ -91,8 +78,7 @@ def _pillar(tree: Tree, phone: _Phone, rows: list[tuple[float, float]]) -> Value
         level = op.choose(row, [(z, share, 0.0) for z, share in rows])
         z, share = op.component(level, "X"), op.component(level, "Y")
         z = op.switch(z < 0.0, z * phone.height, z)
-        flat = tree.node("ShaderNodeVectorMath", point, op.vector(tree, phone.width, phone.depth), operation="MULTIPLY")
-        return flat.value * share + op.vector(tree, 0.0, 0.0, z)
+        return point * op.vector(tree, phone.width, phone.depth) * share + op.vector(tree, 0.0, 0.0, z)
 
     points = _outline()
     return loft(tree, lambda number: op.choose(number, points), len(points), len(rows), place)
@@ -108,7 +94,7 @@ def _writing(tree: Tree, phone: _Phone) -> Value:
             op.vector(tree, wide * 0.36, phone.height * _LETTERS[1]),
         )
         letters = tree.call(sign_writing_group(), line_1="SOS", low_corner=low, high_corner=high).value
-        upright = tree.node("GeometryNodeTransform", letters, rotation=(math.pi / 2, 0.0, 0.0)).value
+        upright = op.transform(letters, rotation=(math.pi / 2, 0.0, 0.0))
         upright = move_geometry(upright, op.vector(tree, 0.0, deep * (-0.5 * _BODY_WIDTH) - 0.001))
-        sides.append(tree.node("GeometryNodeTransform", upright, rotation=(0.0, 0.0, turns * math.pi / 2)).value)
+        sides.append(op.transform(upright, rotation=(0.0, 0.0, turns * math.pi / 2)))
     return op.join(*sides)

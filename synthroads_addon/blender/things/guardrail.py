@@ -2,10 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
-import bpy
-
 from ...base.classes import class_id
 from ...road.parameters import Guardrail
 from ...road.things.body_shapes import (
@@ -16,11 +12,12 @@ from ...road.things.body_shapes import (
     GUARDRAIL_SPACER,
     GUARDRAIL_TIP,
 )
-from ..materials import material
 from ..nodes import operations as op
 from ..nodes.backbone import first_station, height_on, last_station, look_up, raise_place, station_ribbon
-from ..nodes.builder import Operand, Tree, Value, node_group
-from ..nodes.strip import INSTANCES
+from ..nodes.builder import Operand, Tree, Value, makes_group
+from ..nodes.foot import Lengthwise
+from ..nodes.inputs import boolean, instance_number, material_of, metres, socket
+from ..nodes.solids import row_of_points
 from .model_builder import ModelBuilder
 
 _THICKNESS = 0.003
@@ -37,33 +34,32 @@ BURIED = 0.35
 """Depth to which posts are modelled below the surface, m."""
 
 
-def guardrail_group() -> bpy.types.NodeTree:
-    """Return the group SR Guardrail."""
-    return node_group("SR Guardrail", _build)
-
-
-@dataclass(frozen=True)
-class Rail:
+class _Rail(Lengthwise):
     """The group's inputs, and where the rail's foot and top are at any station."""
 
-    tree: Tree
-    first: Value
-    last: Value
-    offset: Value
-    beams: dict[float, Value]
-    spacer: Value
-    height: Value
-    spacing: Value
-    terminal: Value
-    step: Value
+    road = socket("Object", "Surface that the guardrail stands on")
+    offset = metres(0.0, (-100.0, 100.0), "Offset of the posts' axis")
+    left_beam = boolean(True, "A beam on the left of the posts")
+    right_beam = boolean(True, "A beam on the right of the posts")
+    spacer = metres(0.0, (0.0, 0.5), "Distance between posts and beam")
+    height = metres(0.75, (0.3, 1.5), "Top of the beam above the surface")
+    post_spacing = metres(4.0, (0.5, 10.0), "Distance between posts")
+    terminal_length = metres(12.0, (0.0, 50.0), "Length of the ramp at each end")
+    beam_step = metres(2.0, (0.1, 8.0), "Largest length of a straight piece of beam")
+    instance = instance_number()
+    material = material_of("beams and posts")
+
+    def beams(self) -> tuple[tuple[float, Value], ...]:
+        """Return the sides, +1 for the left and -1 for the right, and whether there is a beam."""
+        return (1.0, self.left_beam), (-1.0, self.right_beam)
 
     def ramp(self) -> Value:
         """Return the length of the ramp at either end."""
-        return op.minimum(self.terminal, (self.last - self.first) * 0.5)
+        return op.minimum(self.terminal_length, (self.end_station - self.start_station) * 0.5)
 
     def top_at(self, station: Value, ramp: Value) -> Value:
         """Return the height of the beam's top edge above the surface."""
-        inside = op.minimum(station - self.first, self.last - station) / op.maximum(ramp, 1e-3)
+        inside = op.minimum(station - self.start_station, self.end_station - station) / op.maximum(ramp, 1e-3)
         share = op.switch(ramp > 1e-3, 1.0, op.minimum(inside, 1.0))
         return self.height * share + GUARDRAIL_TIP * (1.0 - share)
 
@@ -75,39 +71,11 @@ class Rail:
         return raise_place(place, rise), left
 
 
-def _declare(tree: Tree) -> Rail:
-    def metres(name: str, default: float, limits: tuple[float, float], description: str) -> Value:
-        return tree.number(name, default, limits, unit="m", description=description)
-
-    return Rail(
-        tree,
-        first=metres("Start Station", 0.0, (0.0, 1e6), "Beginning, terminal included"),
-        last=metres("End Station", 100.0, (0.0, 1e6), "End, terminal included"),
-        offset=metres("Offset", 0.0, (-100.0, 100.0), "Offset of the posts' axis"),
-        beams={
-            1.0: tree.boolean("Left Beam", True, description="A beam on the left of the posts"),
-            -1.0: tree.boolean("Right Beam", True, description="A beam on the right of the posts"),
-        },
-        spacer=metres("Spacer", 0.0, (0.0, 0.5), "Distance between posts and beam"),
-        height=metres("Height", 0.75, (0.3, 1.5), "Top of the beam above the surface"),
-        spacing=metres("Post Spacing", 4.0, (0.5, 10.0), "Distance between posts"),
-        terminal=metres("Terminal Length", 12.0, (0.0, 50.0), "Length of the ramp at each end"),
-        step=metres("Beam Step", 2.0, (0.1, 8.0), "Largest length of a straight piece of beam"),
-    )
-
-
-def _build(tree: Tree) -> None:
+@makes_group("SR Guardrail")
+def guardrail_group(tree: Tree) -> None:
     """A steel guardrail along the road: W-beams, posts and spacers, with ramped terminals."""
-    backbone = tree.input("Backbone", "Object", description="Polyline along the axis with its attributes")
-    road = tree.input("Road", "Object", description="Surface that the guardrail stands on")
-    terrain = tree.input("Terrain", "Object", description="Surface beside the road")
-    rail = _declare(tree)
-    instance = tree.integer("Instance", 0, INSTANCES, description="Instance number of the faces")
-    steel = tree.input("Material", "Material", description="Material of beams and posts")
-
-    with tree.frame("Geometry"):
-        axis = op.object_geometry(backbone)
-        surfaces = op.object_geometry(road), op.object_geometry(terrain)
+    rail = _Rail(tree)
+    axis, surfaces = rail.geometry()
     ribbon = station_ribbon(axis)
     with tree.frame("Rows of the beams: terminal, middle, terminal"):
         ramp = rail.ramp()
@@ -121,44 +89,44 @@ def _build(tree: Tree) -> None:
         foot, left = rail.foot_at(station, ribbon, surfaces)
         line = op.store(op.store(line, "left", left), "top", raise_place(foot, rail.top_at(station, ramp)))
     parts = []
-    for side, wanted in rail.beams.items():
+    for side, present in rail.beams():
         with tree.frame(f"{'Left' if side > 0 else 'Right'} beam"):
-            parts.append(op.only_if(wanted, _beam(tree, line, side, rail.spacer)))
+            parts.append(op.only_if(present, _beam(tree, line, side, rail.spacer)))
     with tree.frame("Posts from the start on, where the beam is high enough"):
         posts = op.store(_post_rows(tree, rail), "tall", rail.top_at(station, ramp))
         # A post on the end of a backbone beyond which the rail goes on is the next stretch's.
-        beyond = (station > end) | ((station > end - 1e-3) & (rail.last > end + 1e-3))
+        beyond = (station > end) | ((station > end - 1e-3) & (rail.end_station > end + 1e-3))
         posts = op.delete_points(posts, beyond | (station < begin))
         foot, left = rail.foot_at(station, ribbon, surfaces)
         posts = op.set_position(op.store(posts, "left", left), foot)
         posts = op.delete_points(posts, op.named_attribute(tree, "tall") < GUARDRAIL_LOWEST_POST)
-        parts += _instances(tree, posts, rail.spacer, rail.beams)
+        parts += _instances(tree, posts, rail)
     with tree.frame("Labels"):
-        mesh = op.label(op.realize(op.join(*parts)), class_id("guardrail"), instance, steel)
+        mesh = op.label(op.realize(op.join(*parts)), class_id("guardrail"), rail.instance, rail.material)
     tree.output("Mesh", mesh, description="Beams, posts and spacers")
 
 
-def _post_rows(tree: Tree, rail: Rail) -> Value:
+def _post_rows(tree: Tree, rail: _Rail) -> Value:
     """Return one point per post with its station."""
-    number = (rail.last - rail.first) / rail.spacing + 1e-4
+    number = (rail.end_station - rail.start_station) / rail.post_spacing + 1e-4
     count = tree.node("FunctionNodeFloatToInt", number, rounding_mode="FLOOR").value + 1
-    posts = tree.node("GeometryNodeMeshLine", count=count).value
-    return op.store(posts, "station", rail.first + op.index(tree) * rail.spacing)
+    posts = row_of_points(tree, count)
+    return op.store(posts, "station", rail.start_station + op.index(tree) * rail.post_spacing)
 
 
-def _rows(tree: Tree, rail: Rail, ramp: Value) -> Value:
+def _rows(tree: Tree, rail: _Rail, ramp: Value) -> Value:
     """Return points with their station: no piece is longer than the step, and the ramps end at a point.
 
     Between the ramps the rows are whole parts of the post spacing from the start on, as the posts are.
     """
-    first, last = rail.first, rail.last
-    step = rail.spacing / op.rounded_up(rail.spacing / rail.step - 1e-4)
-    outer = op.rounded_up(ramp / rail.step - 1e-4)
-    skipped = op.rounded_up(ramp / step + 1e-4)
-    middle = op.maximum(op.rounded_up((last - first - ramp) / step - 1e-4) - skipped, 0)
+    first, last = rail.start_station, rail.end_station
+    step = rail.post_spacing / op.round_up(rail.post_spacing / rail.beam_step - 1e-4)
+    outer = op.round_up(ramp / rail.beam_step - 1e-4)
+    skipped = op.round_up(ramp / step + 1e-4)
+    middle = op.maximum(op.round_up((last - first - ramp) / step - 1e-4) - skipped, 0)
     middle = tree.node("FunctionNodeFloatToInt", middle, rounding_mode="ROUND").value
     # Those that lie on a ramp are left out; where it ends there is a row of its own.
-    line = tree.node("GeometryNodeMeshLine", count=outer * 2 + middle + 2).value
+    line = row_of_points(tree, outer * 2 + middle + 2)
     number = op.index(tree)
     into = first + ramp * (number / op.maximum(outer, 1))
     within = first + (number - outer + skipped - 1) * step
@@ -176,33 +144,27 @@ def _beam(tree: Tree, line: Value, side: float, spacer: Value) -> Value:
     left = op.sample_index(line, op.named_attribute(tree, "left", "FLOAT_VECTOR"), number)
     depth = (op.component(profile, "X") + spacer + POST_DEPTH) * side
     place = top + left * depth + op.vector(tree, 0.0, 0.0, op.component(profile, "Z"))
-    mesh = op.without_degenerate(op.set_position(mesh, place))
+    mesh = op.delete_degenerate(op.set_position(mesh, place))
     # Seen along the rows the profile runs round clockwise on the right side: there its faces look outwards.
     return tree.node("GeometryNodeFlipFaces", mesh).value if side > 0 else mesh
 
 
-def _instances(tree: Tree, posts: Value, spacer: Value, beams: dict[float, Value]) -> list[Value]:
+def _instances(tree: Tree, posts: Value, rail: _Rail) -> list[Value]:
     """Put a post on every point, and beside it the spacers of the beams that there are."""
     left, tall = op.named_attribute(tree, "left", "FLOAT_VECTOR"), op.named_attribute(tree, "tall")
-    upright = tree.node(
-        "FunctionNodeAxesToRotation", (0.0, 0.0, 1.0), left, primary_axis="Z", secondary_axis="X"
-    ).value
+    upright = op.upright(left)
 
     def on_posts(body: Value, height: Operand, scale: Operand) -> Value:
         points = tree.node("GeometryNodeSetPosition", posts, offset=op.vector(tree, 0.0, 0.0, height)).value
-        return tree.node(
-            "GeometryNodeInstanceOnPoints", points, instance=body, rotation=upright, scale=scale
-        ).value
+        return tree.node("GeometryNodeInstanceOnPoints", points, instance=body, rotation=upright, scale=scale).value
 
     parts = [on_posts(_post(tree), -BURIED, op.vector(tree, 1.0, 1.0, tall + (BURIED - GUARDRAIL_POST_TOP)))]
-    for side, wanted in beams.items():
+    for side, present in rail.beams():
         # A little shorter than the gap: faces that coincide with the post's or the beam's have no first hit.
         box = tree.node("GeometryNodeMeshCube", size=(0.96, 0.1, 0.22)).value
-        middle = op.vector(tree, (spacer * 0.5 + POST_DEPTH) * side, 0.0, -0.155)
-        body = tree.node(
-            "GeometryNodeTransform", box, translation=middle, scale=op.vector(tree, spacer, 1.0, 1.0)
-        ).value
-        parts.append(op.only_if(wanted & (spacer > 1e-3), on_posts(body, tall, 1.0)))
+        middle = op.vector(tree, (rail.spacer * 0.5 + POST_DEPTH) * side, 0.0, -0.155)
+        body = op.transform(box, translation=middle, scale=op.vector(tree, rail.spacer, 1.0, 1.0))
+        parts.append(op.only_if(present & (rail.spacer > 1e-3), on_posts(body, tall, 1.0)))
     return parts
 
 
@@ -216,19 +178,14 @@ def _post(tree: Tree) -> Value:
 def build_guardrails(builder: ModelBuilder) -> None:
     """Make one object per guardrail."""
     for name, rail in builder.parameters.of_type(Guardrail).items():
-        inputs = {
-            **builder.surfaces("Backbone"),
-            "Start Station": builder.along(rail.start_station),
-            "End Station": builder.along(min(rail.end_station, builder.geometry.length)),
-            "Offset": rail.offset,
-            "Left Beam": rail.faces in ("left", "both"),
-            "Right Beam": rail.faces in ("right", "both"),
-            "Spacer": GUARDRAIL_SPACER[rail.faces],
-            "Height": rail.height,
-            "Post Spacing": rail.post_spacing,
-            "Terminal Length": rail.terminal_length,
-            "Beam Step": builder.step,
-            "Instance": rail.instance,
-            "Material": material("galvanised_steel"),
-        }
-        builder.add(name, bpy.data.meshes.new("SR Guardrail"), guardrail_group(), inputs)
+        builder.add_thing(
+            name,
+            rail,
+            guardrail_group(),
+            end_station=builder.along(min(rail.end_station, builder.geometry.length)),
+            left_beam=rail.faces in ("left", "both"),
+            right_beam=rail.faces in ("right", "both"),
+            spacer=GUARDRAIL_SPACER[rail.faces],
+            beam_step=builder.step,
+            material="galvanised_steel",
+        )

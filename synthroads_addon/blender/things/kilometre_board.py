@@ -4,18 +4,16 @@ from __future__ import annotations
 
 import math
 
-import bpy
-
 from ...base.classes import class_id
 from ...road.parameters import KilometreBoard
 from ...road.things.body_shapes import KILOMETRE_POST
-from ..materials import material
 from ..nodes import operations as op
-from ..nodes.builder import Tree, node_group
+from ..nodes.builder import Tree, makes_group
+from ..nodes.inputs import Inputs, material_of, metres
 from ..nodes.solids import move_geometry
-from ..nodes.standing import declare_standing, put_on
+from ..nodes.standing import Standing, put_on
 from .model_builder import ModelBuilder
-from .sign.face import declare_face, sign_face_group
+from .sign.face import Face, sign_face_group
 from .sign.looks import FaceStyle, face_inputs
 from .sign.posts import sign_posts_group
 
@@ -24,29 +22,25 @@ _THICKNESS = 0.024
 """Thickness of either half of a board, m."""
 
 
-def kilometre_board_group() -> bpy.types.NodeTree:
-    """Return the group SR Kilometre Board."""
-    return node_group("SR Kilometre Board", _build)
+class _Board(Inputs):
+    lower_edge = metres(1.2, (0.0, 10.0), "Lower edge of the board above the surface")
+    post_material = material_of("the post")
 
 
-def _build(tree: Tree) -> None:
+@makes_group("SR Kilometre Board")
+def kilometre_board_group(tree: Tree) -> None:
     """A board on a post, read from both sides; points carry ``heading`` (rad) and ``elevation`` (m)."""
-    standing = declare_standing(tree)
-    face = declare_face(tree)
-    lower_edge = tree.number(
-        "Lower Edge", 1.2, (0.0, 10.0), unit="m", description="Lower edge of the board above the surface"
-    )
-    steel = tree.input("Post Material", "Material", description="Material of the post")
+    standing, face, board = Standing(tree), Face(tree), _Board(tree)
 
     with tree.frame("Two faces back to back around the post"):
-        plate = tree.call(sign_face_group(), instance=standing.instance, **face).value
-        front = move_geometry(plate, op.vector(tree, 0.0, -face["thickness"]))
-        behind = tree.node("GeometryNodeTransform", front, rotation=(0.0, 0.0, math.pi)).value
-        middle = lower_edge + face["height"] * 0.5
-        board = move_geometry(op.join(front, behind), op.vector(tree, 0.0, 0.0, middle))
+        plate = tree.call(sign_face_group(), instance=standing.instance, **face.values).value
+        front = move_geometry(plate, op.vector(tree, 0.0, -face.thickness))
+        behind = op.transform(front, rotation=(0.0, 0.0, math.pi))
+        middle = board.lower_edge + face.height * 0.5
+        plates = move_geometry(op.join(front, behind), op.vector(tree, 0.0, 0.0, middle))
     with tree.frame("Put onto the points"):
         places = standing.places()
-        mesh = put_on(places, board)
+        mesh = put_on(places, plates)
     with tree.frame("Post, up into the board"):
         post = tree.call(
             sign_posts_group(),
@@ -55,22 +49,16 @@ def _build(tree: Tree) -> None:
             terrain=standing.terrain,
             top=middle,
             post_diameter=KILOMETRE_POST,
-            material=steel,
+            material=board.post_material,
         ).value
     with tree.frame("Labels"):
-        mesh = standing.labelled(op.join(mesh, post), class_id("road_sign"))
+        mesh = standing.label(op.join(mesh, post), class_id("road_sign"))
     tree.output("Mesh", mesh, description="Board with its post")
 
 
 def build_kilometre_boards(builder: ModelBuilder) -> None:
     """Make one object per kilometre board."""
     for name, board in builder.parameters.of_type(KilometreBoard).items():
-        inputs = {
-            **builder.surfaces(),
-            **face_inputs(_STYLE, "rectangle", board.width, board.height, (board.text,)),
-            "Thickness": _THICKNESS,
-            "Lower Edge": board.lower_edge,
-            "Post Material": material("galvanised_steel"),
-            "Instance": board.instance,
-        }
-        builder.add(name, builder.points(name, [board], {}), kilometre_board_group(), inputs)
+        face = face_inputs(_STYLE, "rectangle", board.width, board.height, (board.text,))
+        group = kilometre_board_group()
+        builder.add_thing(name, board, group, **face | {"thickness": _THICKNESS}, post_material="galvanised_steel")

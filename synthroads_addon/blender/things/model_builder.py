@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from functools import cached_property
 from typing import Any
 
@@ -12,11 +12,13 @@ from numpy.typing import NDArray
 
 from ...base.stepper import aside, pause, rest
 from ...road.geometry import RoadGeometry
-from ...road.parameters import PointObject, RoadParameters
+from ...road.parameters import PointObject, RoadObject, RoadParameters
 from ...road.stretches import cut_stretch, frame_of
 from ...road.tessellation import sample_stations
 from ..compat import set_modifier_input
-from .meshes import points_mesh, signed_instance
+from ..materials import material
+from ..nodes.inputs import input_name
+from .meshes import on_plan, points_mesh, signed_instance
 
 ROLE = "synthroads_role"
 """Custom property of the objects that `build_road` makes: what they are in the model."""
@@ -24,6 +26,14 @@ SUPPORT = "synthroads_support"
 """Custom property of objects that only other objects need: they are hidden and never scanned."""
 
 _ROOM = 5.0
+_RENAMED = {"Smallest Height": "height_min", "Largest Height": "height_max"}
+"""Inputs that are not named as their fields."""
+_KINDS: dict[str, tuple[type, ...]] = {
+    "NodeSocketFloat": (float,),
+    "NodeSocketInt": (int,),
+    "NodeSocketBool": (bool,),
+}
+"""Kinds of sockets that fields of a thing fill, and the fields' types."""
 
 
 class ModelBuilder:
@@ -82,8 +92,8 @@ class ModelBuilder:
         It is that of the whole road, 4 m halved as often as need be: pieces of a stretch are the whole road's.
         """
         bends = [max(abs(e.curvature_start), abs(e.curvature_end)) for e in self.geometry.alignment.elements]
-        wanted = np.sqrt(8.0 * self.tolerance / max(*bends, 1e-9))
-        return float(2.0 ** np.floor(np.log2(np.clip(wanted, 0.5, 4.0))))
+        longest = np.sqrt(8.0 * self.tolerance / max(*bends, 1e-9))
+        return float(2.0 ** np.floor(np.log2(np.clip(longest, 0.5, 4.0))))
 
     @cached_property
     def widest(self) -> float:
@@ -97,25 +107,54 @@ class ModelBuilder:
         return station - self.zero
 
     def points(
-        self, name: str, items: Sequence[PointObject], attributes: Mapping[str, NDArray[Any]]
+        self, name: str, items: Sequence[PointObject], attributes: Mapping[str, NDArray[Any]] | None = None
     ) -> bpy.types.Mesh:
         """Return a mesh with one vertex per point object, see `meshes.points_mesh`."""
-        return points_mesh(name, self.geometry, items, attributes, self.origin)
+        return points_mesh(name, self.geometry, items, attributes or {}, self.origin)
 
-    def surfaces(self, *more: str) -> dict[str, bpy.types.Object]:
-        """Return what objects stand on (inputs ``Road`` and ``Terrain``), and further objects by role."""
-        roles = ("Road", "Terrain", *more)
-        return {role: self.objects[role] for role in roles if role in self.objects}
+    def add_thing(
+        self,
+        name: str,
+        item: RoadObject,
+        group: bpy.types.NodeTree,
+        mesh: bpy.types.Mesh | None = None,
+        **inputs: Any,
+    ) -> None:
+        """Add a thing of the road as an object. Inputs of its group that are named as its fields have their values.
+
+        Args:
+            name: its id.
+            item: the thing.
+            group: its node group.
+            mesh: of the object; if None, a vertex at a point object's place, and nothing for other things.
+            inputs: the group's other inputs, by their fields in its class of inputs, see `add`.
+        """
+        if mesh is None and isinstance(item, PointObject):
+            mesh = self.points(name, [item])
+        values = {label: getattr(item, field) for label, field in named_fields(item, group).items()}
+        values = {label: value - self.zero if label.endswith("Station") else value for label, value in values.items()}
+        values |= {input_name(field): value for field, value in inputs.items()}
+        self.add(name, mesh, group, values)
 
     def add(
         self,
         role: str,
-        mesh: bpy.types.Mesh,
+        mesh: bpy.types.Mesh | None = None,
         group: bpy.types.NodeTree | None = None,
         inputs: Mapping[str, Any] | None = None,
         support: bool = False,
     ) -> None:
-        """Add an object to the model, with its modifier if it has a group."""
+        """Add an object to the model, with its modifier if it has a group.
+
+        Args:
+            role: what it is in the model.
+            mesh: of the object; one without anything if None.
+            group: of its modifier.
+            inputs: the modifier's, by name; materials by their names in the table. Those that are named as objects of
+                the model (``Road``, ``Terrain``) need not be among them.
+            support: only other objects need it.
+        """
+        mesh = mesh or bpy.data.meshes.new("SR")
         item = bpy.data.objects.new(role, mesh)
         mesh.name = f"SR {role}"
         item[ROLE] = role
@@ -126,11 +165,25 @@ class ModelBuilder:
         if group is not None:
             modifier = item.modifiers.new("SynthRoads", "NODES")
             modifier.node_group = group
-            for name, value in (inputs or {}).items():
-                set_modifier_input(
-                    modifier, name, int(signed_instance([value])[0]) if name.endswith("Instance") else value
-                )
+            kinds = {socket.name: socket.socket_type for socket in group_inputs(group)}
+            objects = {
+                name: self.objects[name]
+                for name, kind in kinds.items()
+                if kind == "NodeSocketObject" and name in self.objects
+            }
+            for name, value in {**objects, **(inputs or {})}.items():
+                set_modifier_input(modifier, name, _to_input(name, kinds.get(name, ""), value))
         self._added(role, item)
+
+    def stand(self, role: str, item: PointObject, rotation_deg: float = 0.0) -> None:
+        """Put an added object to a point object's place in plan, at the axis's elevation, turned by `rotation_deg`.
+
+        Its frame then has x to the right of traffic with the stations, y along it, and z up.
+        """
+        heading = self.geometry.alignment.heading(np.array([item.station]))[0]
+        added = self.objects[role]
+        added.location = tuple((on_plan(self.geometry, [item])[0] - self.origin).tolist())
+        added.rotation_euler = (0.0, 0.0, float(heading - np.pi / 2 + np.deg2rad(rotation_deg)))
 
     def add_instance(self, role: str, collection: bpy.types.Collection) -> bpy.types.Object:
         """Add an empty that shows a collection."""
@@ -148,3 +201,27 @@ class ModelBuilder:
             self._unseen = 0
             rest()  # so that they are evaluated in a turn of their own
         pause()
+
+
+def group_inputs(group: bpy.types.NodeTree) -> Iterator[bpy.types.NodeTreeInterfaceSocket]:
+    """Yield the sockets of a group's inputs."""
+    for item in group.interface.items_tree:
+        if item.item_type == "SOCKET" and item.in_out == "INPUT":
+            yield item
+
+
+def named_fields(item: RoadObject, group: bpy.types.NodeTree) -> dict[str, str]:
+    """Return the inputs of a group that are named as numbers and choices of a thing, and these fields of it."""
+    fields = {}
+    for socket in group_inputs(group):
+        field = _RENAMED.get(socket.name, socket.name.lower().replace(" ", "_"))
+        if field in type(item).model_fields and type(getattr(item, field)) in _KINDS.get(socket.socket_type, ()):
+            fields[socket.name] = field
+    return fields
+
+
+def _to_input(name: str, kind: str, value: Any) -> Any:
+    """Return a value as the modifier takes it."""
+    if name.endswith("Instance"):
+        return int(signed_instance([value])[0])
+    return material(value) if kind == "NodeSocketMaterial" and isinstance(value, str) else value

@@ -5,18 +5,15 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-import bpy
-
 from ...base.classes import class_id
 from ...road.parameters import NoiseBarrier
 from ...road.things.body_shapes import SHORTEST_ELEMENT
-from ..materials import material
 from ..nodes import operations as op
 from ..nodes.backbone import first_station, last_station
-from ..nodes.builder import Tree, Value, node_group
-from ..nodes.foot import foot_at
+from ..nodes.builder import Tree, Value, makes_group
+from ..nodes.foot import Lengthwise, foot_at
+from ..nodes.inputs import Inputs, instance_number, integer, material_of, metres, socket
 from ..nodes.solids import box, paint_faces, prism, put_on_points, row_of_points
-from ..nodes.strip import INSTANCES
 from .model_builder import ModelBuilder
 
 # Section of an HEA profile of width 1 (HEA 160: 152 mm across the wall, 160 mm along it).
@@ -67,60 +64,35 @@ _RELIEFS = {
 }
 
 
-def noise_barrier_group() -> bpy.types.NodeTree:
-    """Return the group SR Noise Barrier."""
-    return node_group("SR Noise Barrier", _build)
+class _Wall(Lengthwise):
+    road = socket("Object", "Surface that the wall stands on")
+    start_station = metres(0.0, (0.0, 1e6), "First post")
+    end_station = metres(100.0, (0.0, 1e6), "Last post")
+    offset = metres(0.0, (-100.0, 100.0), "Offset of the panels' middle")
+    height = metres(4.0, (1.0, 12.0), "Top of the posts above the surface")
+    panel = integer(0, (0, 3), "Kind of the panels: 0 aluminium, 1 concrete, 2 wood, 3 glass")
+    thickness = metres(0.15, (0.02, 0.6), "Thickness of the panels")
+    post_spacing = metres(4.0, (1.0, 10.0), "Distance between posts")
+    post_width = metres(0.16, (0.05, 0.5), "Width of a post")
+    instance = instance_number()
+    post_material = material_of("the posts")
+    panel_material = material_of("the panels")
+    frame_material = material_of("frames and caps")
+    plinth_material = material_of("the plinth")
 
 
-@dataclass(frozen=True)
-class _Wall:
-    first: Value
-    last: Value
-    offset: Value
-    height: Value
-    panel: Value
-    thickness: Value
-    spacing: Value
-    post_width: Value
-
-
-def _declare(tree: Tree) -> _Wall:
-    def metres(name: str, default: float, limits: tuple[float, float], description: str) -> Value:
-        return tree.number(name, default, limits, unit="m", description=description)
-
-    kinds = "Kind of the panels: 0 aluminium, 1 concrete, 2 wood, 3 glass"
-    return _Wall(
-        first=metres("Start Station", 0.0, (0.0, 1e6), "First post"),
-        last=metres("End Station", 100.0, (0.0, 1e6), "Last post"),
-        offset=metres("Offset", 0.0, (-100.0, 100.0), "Offset of the panels' middle"),
-        height=metres("Height", 4.0, (1.0, 12.0), "Top of the posts above the surface"),
-        panel=tree.integer("Panel", 0, (0, 3), description=kinds),
-        thickness=metres("Thickness", 0.15, (0.02, 0.6), "Thickness of the panels"),
-        spacing=metres("Post Spacing", 4.0, (1.0, 10.0), "Distance between posts"),
-        post_width=metres("Post Width", 0.16, (0.05, 0.5), "Width of a post"),
-    )
-
-
-def _build(tree: Tree) -> None:
+@makes_group("SR Noise Barrier")
+def noise_barrier_group(tree: Tree) -> None:
     """A noise barrier along the road: posts, and between them level panels on a plinth."""
-    backbone = tree.input("Backbone", "Object", description="Polyline along the axis with its attributes")
-    road = tree.input("Road", "Object", description="Surface that the wall stands on")
-    terrain = tree.input("Terrain", "Object", description="Surface beside the road")
-    wall = _declare(tree)
-    instance = tree.integer("Instance", 0, INSTANCES, description="Instance number of the faces")
-    names = {"Post": "the posts", "Panel": "the panels", "Frame": "frames and caps", "Plinth": "the plinth"}
-    steel, face, frame, concrete = (
-        tree.input(f"{name} Material", "Material", description=f"Material of {what}") for name, what in names.items()
-    )
-
-    with tree.frame("Geometry"):
-        axis = op.object_geometry(backbone)
-        surfaces = op.object_geometry(road), op.object_geometry(terrain)
+    wall = _Wall(tree)
+    axis, surfaces = wall.geometry()
     with tree.frame("Number of bays"):
-        count = op.rounded_up(op.maximum((wall.last - wall.first) / wall.spacing - SHORTEST_ELEMENT, 1.0))
+        count = op.round_up(
+            op.maximum((wall.end_station - wall.start_station) / wall.post_spacing - SHORTEST_ELEMENT, 1.0)
+        )
     with tree.frame("Posts"):
         posts = _posts(tree, wall, count, axis, surfaces)
-        posts = paint_faces(op.realize(posts), steel)
+        posts = paint_faces(op.realize(posts), wall.post_material)
     with tree.frame("Bays: both ends' feet"):
         bays = _bays(tree, wall, count, axis, surfaces)
     with tree.frame("Plinths and panels"):
@@ -130,32 +102,32 @@ def _build(tree: Tree) -> None:
         panel = tree.call(
             _panel_group(),
             panel=wall.panel,
-            length=wall.spacing - gap * 2.0,
+            length=wall.post_spacing - gap * 2.0,
             height=wall.height - plinth,
             thickness=wall.thickness,
-            panel_material=face,
-            frame_material=frame,
+            panel_material=wall.panel_material,
+            frame_material=wall.frame_material,
         ).value
-        walls = _fill_bays(tree, wall, bays, (gap, plinth), (panel, paint_faces(box(tree, 1.0), concrete)))
+        walls = _fill_bays(tree, wall, bays, (gap, plinth), (panel, paint_faces(box(tree, 1.0), wall.plinth_material)))
     with tree.frame("Labels"):
-        mesh = op.join(posts, walls)
-        mesh = op.store(mesh, "class_id", class_id("noise_barrier"), "FACE")
-        mesh = op.store(mesh, "instance_id", instance, "FACE")
+        mesh = op.label(op.join(posts, walls), class_id("noise_barrier"), wall.instance)
     tree.output("Mesh", mesh, description="Posts, plinths and panels; a panel's points carry the number of its bay")
 
 
 def _posts(tree: Tree, wall: _Wall, count: Value, axis: Value, surfaces: tuple[Value, Value]) -> Value:
     """Return the posts as instances; those beyond the backbone, and on an end that the wall passes, are left out."""
-    posts = tree.node("GeometryNodeMeshLine", count=count + 1).value
+    posts = row_of_points(tree, count + 1)
     number = op.index(tree)
-    posts = op.store(posts, "station", op.switch(number < count, wall.last, wall.first + number * wall.spacing))
+    posts = op.store(
+        posts, "station", op.switch(number < count, wall.end_station, wall.start_station + number * wall.post_spacing)
+    )
     station, end = op.named_attribute(tree, "station"), last_station(axis)
-    passed = (station > end - 1e-3) & (wall.last > end + 1e-3)
+    passed = (station > end - 1e-3) & (wall.end_station > end + 1e-3)
     posts = op.delete_points(posts, passed | (station < first_station(axis)))
     foot, left = foot_at(axis, surfaces, station, wall.offset)
     size = op.vector(tree, wall.post_width, wall.post_width, wall.height + BURIED)
-    upright = tree.node("FunctionNodeAxesToRotation", (0.0, 0.0, 1.0), left, primary_axis="Z", secondary_axis="X")
-    return put_on_points(posts, _post(tree), foot + (0.0, 0.0, -BURIED), size, upright.value)
+    upright = op.upright(left)
+    return put_on_points(posts, _post(tree), foot + (0.0, 0.0, -BURIED), size, upright)
 
 
 def _post(tree: Tree) -> Value:
@@ -168,10 +140,10 @@ def _post(tree: Tree) -> Value:
 
 def _bays(tree: Tree, wall: _Wall, count: Value, axis: Value, surfaces: tuple[Value, Value]) -> Value:
     """Return one point per bay with its number and the ``start`` and ``end`` of its foot, cut with the backbone."""
-    bays = tree.node("GeometryNodeMeshLine", count=count).value
+    bays = row_of_points(tree, count)
     number = op.index(tree)
-    start = wall.first + number * wall.spacing
-    end = op.switch(number < count - 1, wall.last, start + wall.spacing)
+    start = wall.start_station + number * wall.post_spacing
+    end = op.switch(number < count - 1, wall.end_station, start + wall.post_spacing)
     for name, station in {"from": start, "to": end}.items():
         within = op.minimum(op.maximum(station, first_station(axis)), last_station(axis))
         bays = op.store(bays, name, within)
@@ -188,11 +160,11 @@ def _fill_bays(tree: Tree, wall: _Wall, bays: Value, sizes: tuple[Value, Value],
     (gap, plinth), (panel, block) = sizes, bodies
     start, end = (op.named_attribute(tree, name, "FLOAT_VECTOR") for name in ("start", "end"))
     low = op.minimum(op.component(start, "Z"), op.component(end, "Z"))
-    along = tree.node("ShaderNodeVectorMath", end - start, (1.0, 1.0, 0.0), operation="MULTIPLY").value
-    length = op.maximum(tree.node("ShaderNodeVectorMath", along, operation="LENGTH")["Value"] - gap * 2.0, 0.02)
+    along = (end - start) * (1.0, 1.0, 0.0)
+    length = op.maximum(op.length(along) - gap * 2.0, 0.02)
     middle = (start + end) * 0.5
     level = op.vector(tree, op.component(middle, "X"), op.component(middle, "Y"), low + plinth)
-    turned = tree.node("FunctionNodeAxesToRotation", (0.0, 0.0, 1.0), along, primary_axis="Z", secondary_axis="X").value
+    turned = op.upright(along)
     # The panels' face looks to -y, which is away from the road on its right side.
     facing = tree.node(
         "FunctionNodeRotateRotation",
@@ -200,7 +172,9 @@ def _fill_bays(tree: Tree, wall: _Wall, bays: Value, sizes: tuple[Value, Value],
         op.turn(tree, z=op.switch(wall.offset < 0.0, 0.0, math.pi)),
         rotation_space="LOCAL",
     ).value
-    panels = put_on_points(bays, panel, level, op.vector(tree, length / (wall.spacing - gap * 2.0), 1.0, 1.0), facing)
+    panels = put_on_points(
+        bays, panel, level, op.vector(tree, length / (wall.post_spacing - gap * 2.0), 1.0, 1.0), facing
+    )
     deep = plinth + BURIED
     below = level - op.vector(tree, 0.0, 0.0, deep * 0.5)
     return op.realize(
@@ -208,35 +182,24 @@ def _fill_bays(tree: Tree, wall: _Wall, bays: Value, sizes: tuple[Value, Value],
     )
 
 
-def _panel_group() -> bpy.types.NodeTree:
-    """Return the group SR Noise Panel."""
-    return node_group("SR Noise Panel", _build_panel)
+class _Panel(Inputs):
+    panel = integer(0, (0, 3), "Kind: 0 aluminium, 1 concrete, 2 wood, 3 glass")
+    length = metres(3.98, (0.1, 20.0), "Length")
+    height = metres(3.5, (0.1, 20.0), "Height")
+    thickness = metres(0.15, (0.02, 0.6), "Thickness")
+    panel_material = material_of("the panel")
+    frame_material = material_of("frame and cap")
 
 
-@dataclass(frozen=True)
-class _Panel:
-    length: Value
-    height: Value
-    thickness: Value
-    face: Value
-    frame: Value
-
-
-def _build_panel(tree: Tree) -> None:
+@makes_group("SR Noise Panel")
+def _panel_group(tree: Tree) -> None:
     """A panel of a noise barrier, upright on the origin along x; its face looks to -y."""
-    kind = tree.integer("Panel", 0, (0, 3), description="Kind: 0 aluminium, 1 concrete, 2 wood, 3 glass")
-    panel = _Panel(
-        length=tree.number("Length", 3.98, (0.1, 20.0), unit="m", description="Length"),
-        height=tree.number("Height", 3.5, (0.1, 20.0), unit="m", description="Height"),
-        thickness=tree.number("Thickness", 0.15, (0.02, 0.6), unit="m", description="Thickness"),
-        face=tree.input("Panel Material", "Material", description="Material of the panel"),
-        frame=tree.input("Frame Material", "Material", description="Material of frame and cap"),
-    )
+    panel = _Panel(tree)
     parts = []
     for number, name in enumerate(_KINDS):
         with tree.frame(f"{name.capitalize()} panel"):
             made = _slatted_wall(tree, panel, _RELIEFS[name]) if name in _RELIEFS else _glass_pane(tree, panel)
-            parts.append(op.only_if(kind.equals(number), made))
+            parts.append(op.only_if(panel.panel.equals(number), made))
     tree.output("Mesh", op.realize(op.join(*parts)), description="The panel")
 
 
@@ -250,7 +213,7 @@ def _slatted_wall(tree: Tree, panel: _Panel, relief: _Relief) -> Value:
         op.vector(tree, 0.0, out * 0.5, tall * 0.5),
     )
     span, length = (tall, panel.length) if relief.lying else (panel.length, tall)
-    count = op.rounded_up(span / relief.pitch - 0.5)
+    count = op.round_up(span / relief.pitch - 0.5)
     pitch = span / count
     across = (op.index(tree) + 0.5) * pitch
     front = out - panel.thickness * 0.5 + _SUNK
@@ -262,10 +225,10 @@ def _slatted_wall(tree: Tree, panel: _Panel, relief: _Relief) -> Value:
     else:
         start = op.vector(tree, across - panel.length * 0.5, front, 0.001)
         slats = put_on_points(row_of_points(tree, count), slat, start, size)
-    parts = [paint_faces(core, panel.face), paint_faces(op.realize(slats), panel.face)]
+    parts = [paint_faces(core, panel.panel_material), paint_faces(op.realize(slats), panel.panel_material)]
     if relief.cap:
         strip = op.vector(tree, panel.length, panel.thickness, _CAP)
-        parts.append(paint_faces(box(tree, strip, op.vector(tree, 0.0, 0.0, tall + _CAP / 2)), panel.frame))
+        parts.append(paint_faces(box(tree, strip, op.vector(tree, 0.0, 0.0, tall + _CAP / 2)), panel.frame_material))
     return op.join(*parts)
 
 
@@ -276,7 +239,7 @@ def _glass_pane(tree: Tree, panel: _Panel) -> Value:
     upright = box(tree, op.vector(tree, _RAIL, deep, tall - 2.0 * _RAIL))
     side = panel.length * 0.5 - _RAIL / 2
     frame = [
-        tree.node("GeometryNodeTransform", part, translation=op.vector(tree, x, 0.0, z)).value
+        op.transform(part, translation=op.vector(tree, x, 0.0, z))
         for part, x, z in (
             (level, 0.0, _RAIL / 2),
             (level, 0.0, tall - _RAIL / 2),
@@ -286,27 +249,21 @@ def _glass_pane(tree: Tree, panel: _Panel) -> Value:
     ]
     inside = op.vector(tree, panel.length - 1.9 * _RAIL, op.minimum(deep * 0.6, _PANE), tall - 1.9 * _RAIL)
     pane = box(tree, inside, op.vector(tree, 0.0, 0.0, tall * 0.5))
-    return op.join(paint_faces(op.join(*frame), panel.frame), paint_faces(pane, panel.face))
+    return op.join(paint_faces(op.join(*frame), panel.frame_material), paint_faces(pane, panel.panel_material))
 
 
 def build_noise_barriers(builder: ModelBuilder) -> None:
     """Make one object per noise barrier."""
     for name, wall in builder.parameters.of_type(NoiseBarrier).items():
         face, frame = _MATERIALS[wall.panel]
-        inputs = {
-            **builder.surfaces("Backbone"),
-            "Start Station": builder.along(wall.start_station),
-            "End Station": builder.along(min(wall.end_station, builder.geometry.length)),
-            "Offset": wall.offset,
-            "Height": wall.height,
-            "Panel": _KINDS.index(wall.panel),
-            "Thickness": wall.thickness,
-            "Post Spacing": wall.post_spacing,
-            "Post Width": wall.post_width,
-            "Instance": wall.instance,
-            "Post Material": material("galvanised_steel"),
-            "Panel Material": material(face),
-            "Frame Material": material(frame),
-            "Plinth Material": material("noise_concrete"),
-        }
-        builder.add(name, bpy.data.meshes.new("SR Noise Barrier"), noise_barrier_group(), inputs)
+        builder.add_thing(
+            name,
+            wall,
+            noise_barrier_group(),
+            end_station=builder.along(min(wall.end_station, builder.geometry.length)),
+            panel=_KINDS.index(wall.panel),
+            post_material="galvanised_steel",
+            panel_material=face,
+            frame_material=frame,
+            plinth_material="noise_concrete",
+        )

@@ -12,10 +12,11 @@ from ...base.classes import class_id
 from ...base.stepper import aside
 from ...road.paint import arrow_outlines, hatching_outlines, pieces
 from ...road.parameters import Arrow, Hatching
-from ..materials import material
 from ..nodes import operations as op
 from ..nodes.backbone import height_on, look_up, station_ribbon
-from ..nodes.builder import Tree, node_group
+from ..nodes.builder import Tree, makes_group
+from ..nodes.inputs import Inputs, backbone_socket, material_of, socket
+from ..nodes.solids import paint_faces
 from .meshes import attribute, fill_polygons, signed_instance
 from .model_builder import ModelBuilder
 
@@ -23,35 +24,35 @@ _LONGEST = 1.0
 """Outlines are cut into pieces no longer than this (m), so that they follow the road's curves and its crossfall."""
 
 
-def painted_area_group() -> bpy.types.NodeTree:
-    """Return the group SR Painted Area."""
-    return node_group("SR Painted Area", _build)
+class _PaintedArea(Inputs):
+    outlines = socket("Geometry", "Faces with x = station, y = offset")
+    backbone = backbone_socket("Object")
+    road = socket("Object", "Surface that is painted")
+    material = material_of("the paint")
+    yellow_material = material_of("temporary paint")
 
 
-def _build(tree: Tree) -> None:
+@makes_group("SR Painted Area")
+def painted_area_group(tree: Tree) -> None:
     """Faces given by stations and offsets, laid on the pavement.
 
     Their points carry ``film`` (m), ``instance`` and ``yellow`` (0 or 1).
     """
-    outlines = tree.input("Outlines", "Geometry", description="Faces with x = station, y = offset")
-    backbone = tree.input("Backbone", "Object", description="Polyline along the axis with its attributes")
-    road = tree.input("Road", "Object", description="Surface that is painted")
-    white = tree.input("Material", "Material", description="Material of the paint")
-    yellow = tree.input("Yellow Material", "Material", description="Material of temporary paint")
+    area = _PaintedArea(tree)
 
     with tree.frame("Place in plan"):
-        ribbon = station_ribbon(op.object_geometry(backbone))
+        ribbon = station_ribbon(op.object_geometry(area.backbone))
         station, offset = (op.component(op.position(tree), axis) for axis in ("X", "Y"))
         plan = look_up(ribbon, "axis", station) + look_up(ribbon, "left", station) * offset
     with tree.frame("On the pavement"):
-        surface = op.object_geometry(road)
+        surface = op.object_geometry(area.road)
         height = height_on(surface, surface, plan) + op.named_attribute(tree, "film")
-        flat = tree.node("ShaderNodeVectorMath", plan, (1.0, 1.0, 0.0), operation="MULTIPLY").value
-        mesh = op.set_position(outlines, flat + op.vector(tree, 0.0, 0.0, height))
+        flat = plan * (1.0, 1.0, 0.0)
+        mesh = op.set_position(area.outlines, flat + op.vector(tree, 0.0, 0.0, height))
     with tree.frame("Labels"):
-        mesh = op.label(mesh, class_id("road_marking"), op.named_attribute(tree, "instance", "INT"), white)
+        mesh = op.label(mesh, class_id("road_marking"), op.named_attribute(tree, "instance", "INT"), area.material)
         temporary = op.named_attribute(tree, "yellow") > 0.5
-        mesh = tree.node("GeometryNodeSetMaterial", mesh, temporary, material=yellow).value
+        mesh = paint_faces(mesh, area.yellow_material, temporary)
     tree.output("Mesh", mesh, description="Paint whose faces look up")
 
 
@@ -69,13 +70,8 @@ def build_painted_areas(builder: ModelBuilder) -> None:
     attribute(mesh, "film", np.repeat([item.film_thickness for item in items], sizes))
     attribute(mesh, "yellow", np.repeat([float(item.color == "yellow") for item in items], sizes))
     attribute(mesh, "instance", np.repeat(signed_instance([item.instance for item in items]), sizes))
-    inputs = {
-        "Backbone": builder.objects["Backbone"],
-        "Road": builder.objects["Road"],
-        "Material": material("paint_white"),
-        "Yellow Material": material("paint_yellow"),
-    }
-    builder.add("Painted Areas", mesh, painted_area_group(), inputs)
+    materials = {"Material": "paint_white", "Yellow Material": "paint_yellow"}
+    builder.add("Painted Areas", mesh, painted_area_group(), materials)
 
 
 def _outlines(builder: ModelBuilder) -> Iterator[tuple[NDArray[np.float64], Hatching | Arrow]]:

@@ -3,18 +3,14 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-
-import bpy
 
 from ...base.classes import class_id
 from ...road.parameters import Pole
-from ..materials import material
 from ..nodes import operations as op
-from ..nodes.builder import Tree, Value, node_group
-from ..nodes.solids import box, move_geometry, paint_faces, prism
-from ..nodes.standing import BURIED, declare_standing, put_on
-from ..nodes.tubes import cone, tube
+from ..nodes.builder import Tree, Value, makes_group
+from ..nodes.inputs import boolean, material_of, metres
+from ..nodes.solids import box, cone, move_geometry, paint_faces, prism, row_of_points, tube
+from ..nodes.standing import BURIED, Standing, put_on
 from .model_builder import ModelBuilder
 
 _TAPER = 0.45
@@ -33,48 +29,35 @@ _CAMERA = (0.13, 0.4, 0.12)  # m: across, along, high
 _DOME = 0.09  # radius, m
 
 
-@dataclass(frozen=True)
-class _Pole:
-    height: Value
-    diameter: Value
-    arm: Value
-    steel: Value
-    housing: Value
-    glass: Value
+class _Pole(Standing):
+    surveillance = boolean(False, "Carries cameras instead of a street light")
+    height = metres(12.0, (1.0, 40.0), "Top above the surface")
+    diameter = metres(0.18, (0.03, 1.0), "Diameter at the foot (m)")
+    arm_length = metres(1.5, (0.0, 10.0), "Length of the arm; 0 for none")
+    steel_material = material_of("mast and arm")
+    housing_material = material_of("luminaire and housings")
+    glass_material = material_of("lamps and lenses")
+
+    def rise(self) -> Value:
+        """Return how much higher the arm ends than it begins."""
+        return self.arm_length * _ARM_RISE
 
 
-def pole_group() -> bpy.types.NodeTree:
-    """Return the group SR Pole."""
-    return node_group("SR Pole", _build)
-
-
-def _build(tree: Tree) -> None:
+@makes_group("SR Pole")
+def pole_group(tree: Tree) -> None:
     """A pole, its arm to the left of those who drive along +y; points carry ``heading`` (rad) and ``elevation`` (m)."""
-    standing = declare_standing(tree)
-    cameras = tree.boolean("Surveillance", False, description="Carries cameras instead of a street light")
-    pole = _Pole(
-        height=tree.number("Height", 12.0, (1.0, 40.0), unit="m", description="Top above the surface"),
-        diameter=tree.number("Diameter", 0.18, (0.03, 1.0), unit="m", description="Diameter at the foot (m)"),
-        arm=tree.number("Arm Length", 1.5, (0.0, 10.0), unit="m", description="Length of the arm; 0 for none"),
-        steel=tree.input("Steel Material", "Material", description="Material of mast and arm"),
-        housing=tree.input("Housing Material", "Material", description="Material of luminaire and housings"),
-        glass=tree.input("Glass Material", "Material", description="Material of lamps and lenses"),
-    )
+    pole = _Pole(tree)
 
     with tree.frame("Street light"):
         mount = pole.height - _THICK * 0.5
-        light = op.join(_mast(tree, pole, mount - _rise(pole)), _arm(tree, pole, mount), _luminaire(tree, pole))
+        light = op.join(_mast(tree, pole, mount - pole.rise()), _arm(tree, pole, mount), _luminaire(tree, pole))
     with tree.frame("Surveillance"):
         mount = pole.height - 0.35
         watch = op.join(_mast(tree, pole, pole.height), _arm(tree, pole, mount), _cameras(tree, pole, mount))
     with tree.frame("Put onto the points"):
-        body = tree.node("GeometryNodeSwitch", input_type="GEOMETRY", switch=cameras, false=light, true=watch).value
-        mesh = standing.labelled(put_on(standing.places(), body), class_id("pole"))
+        body = op.switch(pole.surveillance, light, watch)
+        mesh = pole.label(put_on(pole.places(), body), class_id("pole"))
     tree.output("Mesh", mesh, description="Pole with what it carries")
-
-
-def _rise(pole: _Pole) -> Value:
-    return pole.arm * _ARM_RISE
 
 
 def _mast(tree: Tree, pole: _Pole, top: Value) -> Value:
@@ -83,71 +66,68 @@ def _mast(tree: Tree, pole: _Pole, top: Value) -> Value:
     mast = cone(tree, radius, radius * _TAPER, top)
     foot = move_geometry(tube(tree, radius, BURIED, 16), (0.0, 0.0, -BURIED))
     door = box(tree, op.vector(tree, radius * 0.9, 0.02, 0.35), op.vector(tree, 0.0, radius * -0.93, 0.8))
-    return paint_faces(op.join(mast, foot, door), pole.steel)
+    return paint_faces(op.join(mast, foot, door), pole.steel_material)
 
 
 def _arm(tree: Tree, pole: _Pole, end: Value) -> Value:
     """Return a quarter of an ellipse from the mast's axis to the left and up to its end's height."""
-    line = tree.node("GeometryNodeMeshLine", count=9).value
+    line = row_of_points(tree, 9)
     turn = op.index(tree) * (math.pi / 16.0)
-    across = (op.unary("COSINE", turn) - 1.0) * pole.arm
-    above = end - _rise(pole) * (1.0 - op.unary("SINE", turn))
+    across = (op.unary("COSINE", turn) - 1.0) * pole.arm_length
+    above = end - pole.rise() * (1.0 - op.unary("SINE", turn))
     line = op.set_position(line, op.vector(tree, across, 0.0, above))
     profile = tree.node("GeometryNodeCurvePrimitiveCircle", resolution=8, radius=_TUBE).value
     curve = tree.node("GeometryNodeMeshToCurve", line).value
     pipe = tree.node("GeometryNodeCurveToMesh", curve, profile_curve=profile, fill_caps=True).value
     pipe = tree.node("GeometryNodeSetShadeSmooth", pipe).value
-    return op.only_if(pole.arm > _SHORTEST_ARM, paint_faces(pipe, pole.steel))
+    return op.only_if(pole.arm_length > _SHORTEST_ARM, paint_faces(pipe, pole.steel_material))
 
 
 def _luminaire(tree: Tree, pole: _Pole) -> Value:
     """Return the street light at the end of the arm; its top is the pole's."""
-    body = paint_faces(prism(tree, _LUMINAIRE, (1.0, 1.0, _THICK)), pole.housing)
-    glass = paint_faces(prism(tree, _GLASS, (1.0, 1.0, 0.01)), pole.glass)
+    body = paint_faces(prism(tree, _LUMINAIRE, (1.0, 1.0, _THICK)), pole.housing_material)
+    glass = paint_faces(prism(tree, _GLASS, (1.0, 1.0, 0.01)), pole.glass_material)
     parts = op.join(body, move_geometry(glass, (0.0, 0.0, -0.01)))
-    return move_geometry(parts, op.vector(tree, -pole.arm, 0.0, pole.height - _THICK))
+    return move_geometry(parts, op.vector(tree, -pole.arm_length, 0.0, pole.height - _THICK))
 
 
 def _cameras(tree: Tree, pole: _Pole, mount: Value) -> Value:
     """Return a camera along the road either way, a dome camera at the end of the arm, and a cabinet on the mast."""
     front = move_geometry(_camera(tree, pole), op.vector(tree, 0.0, (pole.diameter + _CAMERA[1]) * -0.5))
-    behind = tree.node("GeometryNodeTransform", front, rotation=(0.0, 0.0, math.pi)).value
+    behind = op.transform(front, rotation=(0.0, 0.0, math.pi))
     pair = move_geometry(op.join(front, behind), op.vector(tree, 0.0, 0.0, mount - 0.3))
-    cap = paint_faces(move_geometry(tube(tree, _DOME, 0.14), (0.0, 0.0, -0.17)), pole.housing)
+    cap = paint_faces(move_geometry(tube(tree, _DOME, 0.14), (0.0, 0.0, -0.17)), pole.housing_material)
     ball = tree.node("GeometryNodeMeshUVSphere", segments=12, rings=6, radius=_DOME * 0.9).value
     ball = tree.node("GeometryNodeSetShadeSmooth", ball).value
-    dome = op.join(cap, paint_faces(move_geometry(ball, (0.0, 0.0, -0.18)), pole.glass))
-    dome = op.only_if(pole.arm > _SHORTEST_ARM, move_geometry(dome, op.vector(tree, -pole.arm, 0.0, mount)))
+    dome = op.join(cap, paint_faces(move_geometry(ball, (0.0, 0.0, -0.18)), pole.glass_material))
+    dome = op.only_if(
+        pole.arm_length > _SHORTEST_ARM, move_geometry(dome, op.vector(tree, -pole.arm_length, 0.0, mount))
+    )
     cabinet = box(tree, (0.3, 0.22, 0.45), op.vector(tree, 0.0, pole.diameter * 0.5 + 0.1, 2.2))
-    return op.join(pair, dome, paint_faces(cabinet, pole.housing))
+    return op.join(pair, dome, paint_faces(cabinet, pole.housing_material))
 
 
 def _camera(tree: Tree, pole: _Pole) -> Value:
     """Return a camera under its sunshield around the origin, looking along -y and down."""
     across, along, high = _CAMERA
     shield = box(tree, (across + 0.03, along + 0.08, 0.008), (0.0, -0.03, high / 2 + 0.012))
-    lens = tree.node(
-        "GeometryNodeTransform",
-        tube(tree, 0.045, 0.02),
-        translation=(0.0, 0.01 - along / 2, 0.0),
-        rotation=(math.pi / 2, 0.0, 0.0),
-    ).value
-    camera = op.join(paint_faces(op.join(box(tree, _CAMERA), shield), pole.housing), paint_faces(lens, pole.glass))
-    return tree.node("GeometryNodeTransform", camera, rotation=(math.radians(8.0), 0.0, 0.0)).value
+    lens = tube(tree, 0.045, 0.02)
+    lens = op.transform(lens, translation=(0.0, 0.01 - along / 2, 0.0), rotation=(math.pi / 2, 0.0, 0.0))
+    camera = op.join(
+        paint_faces(op.join(box(tree, _CAMERA), shield), pole.housing_material), paint_faces(lens, pole.glass_material)
+    )
+    return op.transform(camera, rotation=(math.radians(8.0), 0.0, 0.0))
 
 
 def build_poles(builder: ModelBuilder) -> None:
     """Make one object per pole."""
     for name, pole in builder.parameters.of_type(Pole).items():
-        inputs = {
-            **builder.surfaces(),
-            "Surveillance": pole.kind == "surveillance",
-            "Height": pole.height,
-            "Diameter": pole.diameter,
-            "Arm Length": pole.arm_length,
-            "Instance": pole.instance,
-            "Steel Material": material("galvanised_steel"),
-            "Housing Material": material("cabinet_grey"),
-            "Glass Material": material("lamp_glass" if pole.kind == "lighting" else "display"),
-        }
-        builder.add(name, builder.points(name, [pole], {}), pole_group(), inputs)
+        builder.add_thing(
+            name,
+            pole,
+            pole_group(),
+            surveillance=pole.kind == "surveillance",
+            steel_material="galvanised_steel",
+            housing_material="cabinet_grey",
+            glass_material="lamp_glass" if pole.kind == "lighting" else "display",
+        )

@@ -12,11 +12,19 @@ from ...road.alignment import clip_offset
 from ...road.geometry import RoadGeometry
 from ...road.parameters import Terrain
 from ...road.terrain import GROUND_MARGIN, ground_elevation
-from ..materials import material
 from ..nodes import operations as op
 from ..nodes.backbone import limit_offset, row
-from ..nodes.builder import Tree, Value, node_group
-from ..nodes.strip import INSTANCES
+from ..nodes.builder import Tree, Value, makes_group
+from ..nodes.inputs import (
+    Inputs,
+    backbone_socket,
+    instance_number,
+    integer,
+    material_of,
+    metres,
+    number,
+    socket,
+)
 from .meshes import fill
 from .model_builder import ModelBuilder
 
@@ -26,31 +34,25 @@ _FINE = 0.12
 """Share of even spacing among the columns; the rest grows away from the road."""
 
 
-def terrain_group() -> bpy.types.NodeTree:
-    """Return the group SR Terrain."""
-    return node_group("SR Terrain", _build)
+class _Terrain(Inputs):
+    backbone = backbone_socket("Object")
+    road = socket("Object", "The road, whose outermost edges the terrain begins at")
+    ground = socket("Object", "Surface of the ground before the road was built")
+    half_width = metres(60.0, (5.0, 1000.0), "Reach to either side of the axis")
+    batter_slope = number(1.5, (0.5, 10.0), "Run of the batter per metre of height (m/m)")
+    columns = integer(40, (3, 500), "Points across each side, closer near the road")
+    instance = instance_number()
+    material = material_of("the ground")
 
 
-def _build(tree: Tree) -> None:
+@makes_group("SR Terrain")
+def terrain_group(tree: Tree) -> None:
     """Ground on both sides of the road, joined to it by batters of a given slope."""
-    backbone = tree.input("Backbone", "Object", description="Polyline along the axis with its attributes")
-    road = tree.input("Road", "Object", description="The road, whose outermost edges the terrain begins at")
-    ground = tree.input("Ground", "Object", description="Surface of the ground before the road was built")
-    reach = tree.number(
-        "Half Width", 60.0, (5.0, 1000.0), unit="m", description="Reach to either side of the axis"
-    )
-    batter = tree.number(
-        "Batter Slope", 1.5, (0.5, 10.0), description="Run of the batter per metre of height (m/m)"
-    )
-    columns = tree.integer(
-        "Columns", 40, (3, 500), description="Points across each side, closer near the road"
-    )
-    instance = tree.integer("Instance", 0, INSTANCES, description="Instance number of the faces")
-    cover = tree.input("Material", "Material", description="Material of the ground")
+    terrain = _Terrain(tree)
 
     with tree.frame("Geometry"):
-        axis, surface = op.object_geometry(backbone), op.object_geometry(ground)
-        edges = op.object_geometry(road)
+        axis, surface = op.object_geometry(terrain.backbone), op.object_geometry(terrain.ground)
+        edges = op.object_geometry(terrain.road)
     sides = []
     for name, sign in (("Left", 1.0), ("Right", -1.0)):
         with tree.frame(f"{name} edge of the road"):
@@ -62,32 +64,30 @@ def _build(tree: Tree) -> None:
                 edge=edge,
                 ground=surface,
                 side=sign,
-                half_width=reach,
-                batter_slope=batter,
-                columns=columns,
+                half_width=terrain.half_width,
+                batter_slope=terrain.batter_slope,
+                columns=terrain.columns,
             ).value)  # fmt: skip
     with tree.frame("Labels"):
-        mesh = op.label(op.join(*sides), class_id("ground"), instance, cover)
+        mesh = op.label(op.join(*sides), class_id("ground"), terrain.instance, terrain.material)
     tree.output("Mesh", mesh, description="Terrain; its points carry their distance from the road")
 
 
-def _side_group() -> bpy.types.NodeTree:
-    return node_group("SR Terrain Side", _build_side)
+class _Side(Inputs):
+    backbone = backbone_socket()
+    edge = socket("Geometry", "Points of the road's edge, one per row of the backbone")
+    ground = socket("Geometry", "Surface of the ground before the road was built")
+    side = number(1.0, (-1.0, 1.0), "+1 for the left, -1 for the right side")
+    half_width = metres(60.0, (5.0, 1000.0), "Reach from the axis")
+    batter_slope = number(1.5, (0.5, 10.0), "Run of the batter per metre of height (m/m)")
+    columns = integer(40, (3, 500), "Points from the edge outwards")
 
 
-def _build_side(tree: Tree) -> None:
+@makes_group("SR Terrain Side")
+def _side_group(tree: Tree) -> None:
     """Terrain on one side: from the road's edge outwards, between the batter's two planes."""
-    backbone = tree.input("Backbone", "Geometry", description="Polyline along the axis with its attributes")
-    edge = tree.input(
-        "Edge", "Geometry", description="Points of the road's edge, one per row of the backbone"
-    )
-    ground = tree.input("Ground", "Geometry", description="Surface of the ground before the road was built")
-    side = tree.number("Side", 1.0, (-1.0, 1.0), description="+1 for the left, -1 for the right side")
-    reach = tree.number("Half Width", 60.0, (5.0, 1000.0), unit="m", description="Reach from the axis")
-    batter = tree.number(
-        "Batter Slope", 1.5, (0.5, 10.0), description="Run of the batter per metre of height (m/m)"
-    )
-    columns = tree.integer("Columns", 40, (3, 500), description="Points from the edge outwards")
+    inputs = _Side(tree)
+    backbone, side, columns = inputs.backbone, inputs.side, inputs.columns
 
     with tree.frame("Columns from left to right, rows as the backbone's"):
         mesh, column, number = op.grid(tree, columns, op.point_count(backbone))
@@ -96,20 +96,20 @@ def _build_side(tree: Tree) -> None:
         spread = outwards * _FINE + op.power(outwards, 2.2) * (1.0 - _FINE)
     with tree.frame("Offset, cut where it would fold"):
         axis, left, curvature = row(backbone, number)
-        start = op.sample_index(edge, op.position(tree), number)
+        start = op.sample_index(inputs.edge, op.position(tree), number)
         start_offset = op.dot(start - axis, left)
-        width = op.maximum(reach - start_offset * side, 0.0)
+        width = op.maximum(inputs.half_width - start_offset * side, 0.0)
         beyond = limit_offset(start_offset + width * spread * side, curvature) - start_offset
         distance = beyond * side
     with tree.frame("Height: the ground, as far as the batter reaches to it"):
         place = start + left * beyond
-        rise = _ground_above(tree, ground, place)
-        steepest = distance / batter
+        rise = _ground_above(tree, inputs.ground, place)
+        steepest = distance / inputs.batter_slope
         height = op.maximum(op.minimum(rise, steepest), -steepest)
     with tree.frame("Mesh"):
         mesh = op.store(mesh, "distance", distance)
         mesh = op.set_position(mesh, place + op.vector(tree, 0.0, 0.0, height))
-        tree.output("Mesh", op.without_degenerate(mesh))
+        tree.output("Mesh", op.delete_degenerate(mesh))
 
 
 def _ground_above(tree: Tree, ground: Value, place: Value) -> Value:
@@ -126,15 +126,8 @@ def build_terrain(builder: ModelBuilder) -> None:
         return
     ground = _ground_mesh(builder.geometry, terrain, builder.tolerance, builder.stretch, builder.origin)
     builder.add("Ground", ground, support=True)
-    inputs = {
-        **{role: builder.objects[role] for role in ("Backbone", "Road", "Ground")},
-        "Half Width": terrain.half_width,
-        "Batter Slope": terrain.batter_slope,
-        "Columns": int(np.clip(terrain.half_width * 0.6, 12, 120)),
-        "Instance": terrain.instance,
-        "Material": material("grass_ground"),
-    }
-    builder.add("Terrain", bpy.data.meshes.new("SR Terrain"), terrain_group(), inputs)
+    columns = int(np.clip(terrain.half_width * 0.6, 12, 120))
+    builder.add_thing("Terrain", terrain, terrain_group(), columns=columns, material="grass_ground")
 
 
 def _ground_mesh(

@@ -16,7 +16,7 @@ from mathutils import Matrix, Vector
 from numpy.typing import NDArray
 
 from ...cloud.tools.display import ColourBy, DisplayCloud
-from ..model.build import ORIGIN
+from ..model.build import scene_origin
 
 _NEARER = 0.004
 """By which share of their distance points are drawn nearer: at 50 m, 20 cm along the line of sight."""
@@ -24,14 +24,6 @@ _FLUENT = 0.05
 """Seconds that drawing may take while a view is turned."""
 _STILL = 0.3
 """Seconds after which a view that isn't turned any more is drawn with all points."""
-
-
-def scene_origin(scene: bpy.types.Scene) -> NDArray[np.float64] | None:
-    """Return the map coordinates (3,) of the road's local origin in a scene; None without a road."""
-    for collection in scene.collection.children_recursive:
-        if ORIGIN in collection:
-            return np.array(collection[ORIGIN], dtype=np.float64)
-    return None
 
 
 class CloudView:
@@ -92,7 +84,7 @@ class CloudView:
             count = self._pace.points(len(self.cloud), context.region, context.region_data.perspective_matrix)
             begin = perf_counter()
             batch.draw_range(shader, elem_start=0, elem_count=count)
-            self._pace.took(perf_counter() - begin, count)
+            self._pace.measure(perf_counter() - begin, count)
             gpu.state.point_size_set(1.0)
             gpu.state.depth_test_set(depth_test)
             gpu.state.depth_mask_set(depth_mask)
@@ -139,7 +131,7 @@ class Pace:
         self._draw_all_soon(region)
         return max(fluent, min(count, 10_000))
 
-    def took(self, seconds: float, count: int) -> None:
+    def measure(self, seconds: float, count: int) -> None:
         """Learn how long drawing took."""
         self._rate = count / max(seconds, 1e-6)
 

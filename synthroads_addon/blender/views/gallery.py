@@ -199,8 +199,8 @@ def _close_up(parameters: RoadParameters, mesh: SceneMesh, instance: int) -> boo
 
 def _material_pictures(folder: Path, quality: Quality, only: str, say: Callable[[str], None]) -> list[Path]:
     """Render a cube of every material: lit, and each layer as a plain colour."""
-    wanted = [layer for layer in ("lit", *LAYERS) if only in f"materials-{layer}"]
-    if not wanted:
+    layers = [layer for layer in ("lit", *LAYERS) if only in f"materials-{layer}"]
+    if not layers:
         return []
     empty_file()
     pictures.light(_DAYLIGHT)
@@ -216,7 +216,7 @@ def _material_pictures(folder: Path, quality: Quality, only: str, say: Callable[
     away = 1.1 * _PITCH * max(columns, rows * 16.0 / 9.0) * 60.0 / 36.0
     pictures.camera(middle + Vector((0.12 * away, -away, 0.14 * away)), middle, 60.0)
     made = []
-    for layer in wanted:
+    for layer in layers:
         if layer != "lit":
             _show_layer(layer)
         made.append(_render(folder / f"materials-{layer}.png", quality, say))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from pathlib import Path
 
 import bpy
@@ -11,47 +10,19 @@ from mathutils import Vector
 from numpy.typing import ArrayLike
 
 from ...road.parameters import Environment
-from ..compat import sky_texture
+from ..sky import fill_sky, new_sun
 
 SUN = "SR Sun"
 CAMERA = "SR Camera"
 
-_SUN_STRENGTH = 4.2
-_SKY_STRENGTH = 0.16
-_SUN_ANGLE = math.radians(0.53)
-
 
 def light(environment: Environment) -> None:
     """Give the scene a sun and a sky; those of an earlier call are replaced."""
-    elevation, azimuth = math.radians(environment.sun_elevation_deg), math.radians(environment.sun_azimuth_deg)
-    # Azimuths count clockwise from north (+y).
-    towards = Vector(
-        (math.cos(elevation) * math.sin(azimuth), math.cos(elevation) * math.cos(azimuth), math.sin(elevation))
-    )
-    remove(SUN)
-    lamp = bpy.data.lights.new(SUN, "SUN")
-    lamp.energy = _SUN_STRENGTH * environment.sun_strength
-    lamp.angle = _SUN_ANGLE
-    lamp.color = (1.0, 0.93, 0.84)
-    sun = bpy.data.objects.new(SUN, lamp)
-    sun.rotation_euler = towards.to_track_quat("Z", "Y").to_euler()
-    bpy.context.scene.collection.objects.link(sun)
-    _sky(elevation, azimuth, environment)
-
-
-def _sky(elevation: float, azimuth: float, environment: Environment) -> None:
     scene = bpy.context.scene
-    world = bpy.data.worlds.get("SR Sky") or bpy.data.worlds.new("SR Sky")
-    scene.world = world
-    if world.node_tree is None:
-        world.use_nodes = True
-    nodes, links = world.node_tree.nodes, world.node_tree.links
-    nodes.clear()
-    sky = sky_texture(nodes, max(elevation, math.radians(1.0)), azimuth)
-    background, output = nodes.new("ShaderNodeBackground"), nodes.new("ShaderNodeOutputWorld")
-    background.inputs["Strength"].default_value = _SKY_STRENGTH * (0.4 + 0.6 * environment.sun_strength)
-    links.new(sky.outputs["Color"], background.inputs["Color"])
-    links.new(background.outputs["Background"], output.inputs["Surface"])
+    remove(SUN)
+    scene.collection.objects.link(new_sun(SUN, environment))
+    scene.world = bpy.data.worlds.get("SR Sky") or bpy.data.worlds.new("SR Sky")
+    fill_sky(scene.world, environment.sun_elevation_deg, environment.sun_azimuth_deg, environment.sun_strength)
 
 
 def camera(place: ArrayLike, target: ArrayLike, lens: float = 35.0) -> bpy.types.Object:

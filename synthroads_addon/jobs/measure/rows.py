@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from ...base.machine import machine
 from ...base.progress import StageTimer, peak_memory_mb
-from ...blender.cameras import HAS_RETURN_CAMERA, layer_source, takes_returns
+from ...blender.cameras import HAS_RETURN_CAMERA, layer_source, renders_returns
 from ...blender.cameras.returns import RENDERINGS_KEPT
 from ...blender.services import BlenderServices
 from ...road.geometry import RoadGeometry
@@ -179,7 +179,7 @@ def _measure_stretches(
         values = sample_points(source, result.seen, LAYERS) if coloured and result.seen is not None else None
     seconds, images = done - prepared, prepared - start
     restarts = 0
-    if coloured and takes_returns(request.settings):  # stretches are too few for the renderer to begin anew
+    if coloured and renders_returns(request.settings):  # stretches are too few for the renderer to begin anew
         restarts = int(counts.points / path.share / RETURNS_AT_ONCE / RENDERINGS_KEPT)
     cost = _Cost(
         image_seconds=images,

@@ -13,8 +13,9 @@ from bpy.app.handlers import persistent
 from mathutils import Vector
 
 from ...base.errors import InputError
+from ...blender.model.build import scene_origin
 from ...blender.model.store import find_road
-from ...blender.views.cloud import CloudView, scene_origin
+from ...blender.views.cloud import CloudView
 from ...cloud.formats.registry import ENDINGS
 from ...cloud.tools.display import COLOURINGS, ColourBy, DisplayCloud, height_colors, read_display
 from ..work.common import Sidebar, column, is_free

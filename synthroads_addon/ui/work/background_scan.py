@@ -17,7 +17,7 @@ import bpy
 
 from ...base.errors import InputError
 from ...base.progress import Progress, StageTimer
-from ...blender.cameras import takes_returns
+from ...blender.cameras import renders_returns
 from ...jobs.road_scene import scan_road
 from ...road.geometry import RoadGeometry
 from ...road.parameters import RoadParameters
@@ -51,7 +51,7 @@ def _scan(job: dict[str, Any]) -> dict[str, Any]:
     window.scene, window.view_layer = scene, scene.view_layers[job["view_layer"]]
     scenario = Scenario.from_dict(job["scenario"])
     road = RoadGeometry(RoadParameters.from_dict(job["parameters"]))
-    timer = StageTimer(_overall_progress(takes_returns(scenario.colour.settings(scenario.fidelity))))
+    timer = StageTimer(_overall_progress(renders_returns(scenario.colour.settings(scenario.fidelity))))
     with bpy.context.temp_override(window=window):
         counts = scan_road(scenario, road, Path(job["folder"]), timer)
     return {"counts": counts, "stages": timer.stages}

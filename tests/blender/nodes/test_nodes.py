@@ -19,7 +19,6 @@ from synthroads_addon.blender.compat import modifier_input, set_modifier_input
 from synthroads_addon.blender.nodes import builder
 from synthroads_addon.blender.nodes import operations as op
 from synthroads_addon.blender.nodes.builder import Tree, Value, node_group
-from synthroads_addon.blender.nodes.describe import describe
 from synthroads_addon.blender.nodes.strip import strip_group
 from synthroads_addon.blender.things.guardrail import guardrail_group
 from synthroads_addon.blender.things.road.carriageway import carriageway_marking_group, height_group
@@ -27,6 +26,7 @@ from synthroads_addon.blender.things.road.layout import MarkingLayout, SideLayou
 from synthroads_addon.blender.things.road.road import road_group
 from synthroads_addon.blender.things.vehicle.vehicle import vehicle_group
 from synthroads_addon.road.things.vehicles import CHASSIS
+from tests.helpers.scenes.described_group import describe
 from tests.helpers.scenes.kept_groups import KeptGroups
 
 LAYOUT = (
@@ -53,7 +53,7 @@ def all_groups() -> list[bpy.types.NodeTree]:
         loaded = import_module(module.name)
         for name, make in vars(loaded).items():
             own = getattr(make, "__module__", "") == loaded.__name__
-            if name.endswith("_group") and own and not signature(make).parameters:
+            if name.endswith("_group") and own and not signature(make, follow_wrapped=False).parameters:
                 make()
     for model in CHASSIS:
         vehicle_group(model)

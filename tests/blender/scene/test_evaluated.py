@@ -16,7 +16,7 @@ from synthroads_addon.base.errors import InputError
 from synthroads_addon.blender.materials import material
 from synthroads_addon.blender.scene import evaluated
 from synthroads_addon.blender.scene.evaluated import scanned_scene, scene_mesh
-from synthroads_addon.blender.scene.reading import Copied, copy_mesh
+from synthroads_addon.blender.scene.reading import MeshCopy, copy_mesh
 from synthroads_addon.blender.things.meshes import fill
 from synthroads_addon.blender.things.model_builder import SUPPORT
 from synthroads_addon.scanning.scene.mesh import SceneMesh
@@ -353,7 +353,7 @@ class TestSize:
             bpy.context.scene.collection.objects.link(item)
         read: list[str] = []
 
-        def counted(name: str, *rest: Any) -> Copied:
+        def counted(name: str, *rest: Any) -> MeshCopy:
             read.append(name)
             return copy_mesh(name, *rest)
 

@@ -10,8 +10,10 @@ from mathutils.bvhtree import BVHTree
 from synthroads_addon.base.classes import class_id
 from synthroads_addon.blender.compat import set_modifier_input
 from synthroads_addon.blender.materials import material
+from synthroads_addon.blender.nodes.inputs import input_name
 from synthroads_addon.blender.scene.evaluated import scene_mesh
-from synthroads_addon.blender.things.vegetation import shrub, species, tree
+from synthroads_addon.blender.things.vegetation import shrub, tree
+from synthroads_addon.blender.things.vegetation.build import species_shapes
 from synthroads_addon.blender.things.vegetation.grass import tuft_group
 from synthroads_addon.materials.table import materials
 from synthroads_addon.road.parameters import Vegetation
@@ -20,7 +22,7 @@ from synthroads_addon.scanning.scene.mesh import SceneMesh
 from tests.helpers.scenes.furnished_road import Data, Float, FurnishedRoad, normals, of_material, pieces
 
 TREES, SHRUBS, GRASSES = (SPECIES[kind] for kind in ("tree", "shrub", "grass"))
-SHAPES = {"tree": species.TREES, "shrub": species.SHRUBS, "grass": species.GRASSES}
+SHAPES = species_shapes()
 GROUPS = {"tree": tree.shape_group, "shrub": shrub.shape_group, "grass": tuft_group}
 MOST_TRIANGLES = {"tree": 3000, "shrub": 1100, "grass": 12}
 """Of one plant: what keeps the scenes as large as they are meant to be."""
@@ -52,7 +54,7 @@ def alone(kind: str, name: str, **inputs: float) -> SceneMesh:
     for key, part in made_of.items():
         set_modifier_input(modifier, key, material(f"{name}_{part}"))
     for key, value in {**SHAPES[kind][name], **inputs}.items():
-        set_modifier_input(modifier, key, value)
+        set_modifier_input(modifier, input_name(key), value)
     bpy.context.view_layer.update()
     return scene_mesh(objects=[item])
 
@@ -214,7 +216,7 @@ class TestOnTheRoad:
         assert len(road.edit("poplar", "Density", 0.004).triangles) == len(before.triangles)
         slim = road.edit("poplar", "Crown Radius", 0.05)
         assert np.allclose(slim.triangles.shape, before.triangles.shape)
-        road.edit("poplar", "Crown Radius", species.TREES["poplar"]["Crown Radius"])
+        road.edit("poplar", "Crown Radius", SHAPES["tree"]["poplar"]["crown_radius"])
 
 
 def test_less_detail_is_fewer_triangles_and_none_is_none() -> None:

@@ -12,8 +12,9 @@ from mathutils import Matrix
 
 import synthroads_addon
 from synthroads_addon.base.errors import Cancelled
+from synthroads_addon.blender.model.build import scene_origin
 from synthroads_addon.blender.model.store import find_road, recall_parameters
-from synthroads_addon.blender.views.cloud import Pace, scene_origin
+from synthroads_addon.blender.views.cloud import Pace
 from synthroads_addon.cloud.formats.registry import ENDINGS, open_writer
 from synthroads_addon.cloud.points import PointBlock
 from synthroads_addon.cloud.tools.display import COLOURINGS, drawing_places, read_display
@@ -250,7 +251,7 @@ def test_a_slow_machine_draws_fewer_points_while_the_view_turns() -> None:
     pace, region = Pace(), Region()
     still, turned = Matrix.Identity(4), Matrix.Rotation(0.1, 4, "Z")
     assert pace.points(2_000_000, region, still) == 2_000_000
-    pace.took(1.0, 2_000_000)
+    pace.measure(1.0, 2_000_000)
     assert pace.points(2_000_000, region, still) == 2_000_000  # nothing moves
     assert pace.points(2_000_000, region, turned) == 100_000
     pace._draw_all()
@@ -261,5 +262,5 @@ def test_a_slow_machine_draws_fewer_points_while_the_view_turns() -> None:
 def test_a_fast_machine_draws_them_all() -> None:
     pace, region = Pace(), Region()
     pace.points(2_000_000, region, Matrix.Identity(4))
-    pace.took(0.001, 2_000_000)
+    pace.measure(0.001, 2_000_000)
     assert pace.points(2_000_000, region, Matrix.Rotation(0.1, 4, "Z")) == 2_000_000

@@ -4,38 +4,36 @@ from __future__ import annotations
 
 import math
 
-import bpy
-
 from ....base.classes import class_id
 from ...nodes import operations as op
-from ...nodes.builder import Tree, node_group
+from ...nodes.builder import Tree, makes_group
+from ...nodes.inputs import INSTANCES, Inputs, integer, socket
 from ...nodes.solids import move_geometry, put_on_points
-from ...nodes.strip import INSTANCES
-from ..sign.face import declare_face, sign_face_group
+from ..sign.face import Face, sign_face_group
 
 _BEFORE = 0.002
 """Distance between a board and the back of its face, m."""
 
 
-def gantry_sign_group() -> bpy.types.NodeTree:
-    """Return the group SR Gantry Sign."""
-    return node_group("SR Gantry Sign", _build)
+class _Sign(Inputs):
+    gantry = socket("Object", "The gantry, whose points tell where its signs are")
+    number = integer(1, (1, 100), "Which of its signs, from 1 on")
 
 
-def _build(tree: Tree) -> None:
+@makes_group("SR Gantry Sign")
+def gantry_sign_group(tree: Tree) -> None:
     """The face of one sign of a gantry, before its board."""
-    gantry = tree.input("Gantry", "Object", description="The gantry, whose points tell where its signs are")
-    number = tree.integer("Number", 1, (1, 100), description="Which of its signs, from 1 on")
-    face = declare_face(tree)
+    sign, face = _Sign(tree), Face(tree)
     instance = tree.integer("Instance", 0, INSTANCES, description="Instance number of the faces")
     with tree.frame("Middle of the sign"):
-        points = op.separate(op.object_geometry(gantry), op.named_attribute(tree, "number", "INT").equals(number))
+        points = op.separate(
+            op.object_geometry(sign.gantry), op.named_attribute(tree, "number", "INT").equals(sign.number)
+        )
     with tree.frame("Face"):
-        plate = tree.call(sign_face_group(), instance=instance, **face).value
-        plate = move_geometry(plate, op.vector(tree, 0.0, face["thickness"] * -1.0 - _BEFORE))
+        plate = tree.call(sign_face_group(), instance=instance, **face.values).value
+        plate = move_geometry(plate, op.vector(tree, 0.0, face.thickness * -1.0 - _BEFORE))
         turned = op.turn(tree, z=op.switch(op.named_attribute(tree, "facing") > 0.0, math.pi, 0.0))
         mesh = op.realize(put_on_points(points, plate, op.position(tree), 1.0, turned))
     with tree.frame("Labels"):
-        mesh = op.store(mesh, "class_id", class_id("shield_gantry"), "FACE")
-        mesh = op.store(mesh, "instance_id", instance, "FACE")
+        mesh = op.label(mesh, class_id("shield_gantry"), instance)
     tree.output("Mesh", mesh, description="The face")

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-
-import bpy
 
 from ....base.classes import class_id
 from ...nodes import operations as op
-from ...nodes.builder import Tree, Value, node_group
+from ...nodes.builder import Tree, Value, makes_group
+from ...nodes.inputs import Inputs, material_of, metres, number, socket
 from ...nodes.solids import flip_faces, paint_faces
 
 _GRADE = 0.05
@@ -21,29 +19,24 @@ _BELOW = 0.4  # m that a slope goes on below the ground
 _UNDER_WALL = 0.3  # m that it begins before the wing walls' end
 
 
-def bridge_embankment_group() -> bpy.types.NodeTree:
-    """Return the group SR Bridge Embankment."""
-    return node_group("SR Bridge Embankment", _build)
-
-
-@dataclass(frozen=True)
-class _Bank:
-    tree: Tree
-    ground: Value
-    face: Value
-    side: Value
-    wing: Value
-    length: Value
-    top: Value
-    width: Value
-    edge: Value
-    shear: Value
-    slope: Value
+class _Bank(Inputs):
+    ground = socket("Geometry", "Surface that the slopes fall to")
+    face = metres(20.0, (-300.0, 300.0), "x of the abutment's face")
+    side = number(1.0, (-1.0, 1.0), "+1 if the embankment runs along +x, -1 if along -x")
+    wing_length = metres(8.0, (0.5, 50.0), "Length of the wing walls, from the face")
+    length = metres(40.0, (1.0, 500.0), "End of the embankment, from the face")
+    top = metres(6.0, (-100.0, 100.0), "z of the deck's surface")
+    width = metres(10.0, (2.0, 60.0), "Width of its crown along y")
+    edge_width = metres(0.8, (0.1, 5.0), "Width beside the pavement, on either side")
+    shear = number(0.0, (-3.0, 3.0), "Move in y per metre of x: the bridge's skew")
+    slope = number(1.5, (0.5, 10.0), "Run of the slopes per metre of height (m/m)")
+    pavement_material = material_of("the crossing road")
+    ground_material = material_of("the slopes")
 
     def crown(self, along: Value, across: Value) -> Value:
         """Return the point of the crown so far behind the abutment's face, and so far from its middle."""
         x = self.face + self.side * along
-        beyond = op.maximum(along - self.wing, 0.0)
+        beyond = op.maximum(along - self.wing_length, 0.0)
         z = self.top - beyond * beyond * _GRADE / (beyond + _ROUNDING)
         return op.vector(self.tree, x, across + x * self.shear, z)
 
@@ -60,56 +53,41 @@ class _Bank:
         return turned + along * (self.shear * across * share)
 
 
-def _build(tree: Tree) -> None:
+@makes_group("SR Bridge Embankment")
+def bridge_embankment_group(tree: Tree) -> None:
     """An embankment from an abutment outwards, falling from the deck's level, with slopes down to the ground."""
-
-    def metres(name: str, default: float, limits: tuple[float, float], description: str) -> Value:
-        return tree.number(name, default, limits, unit="m", description=description)
-
-    bank = _Bank(
-        tree,
-        ground=tree.input("Ground", "Geometry", description="Surface that the slopes fall to"),
-        face=metres("Face", 20.0, (-300.0, 300.0), "x of the abutment's face"),
-        side=tree.number("Side", 1.0, (-1.0, 1.0), description="+1 if the embankment runs along +x, -1 if along -x"),
-        wing=metres("Wing Length", 8.0, (0.5, 50.0), "Length of the wing walls, from the face"),
-        length=metres("Length", 40.0, (1.0, 500.0), "End of the embankment, from the face"),
-        top=metres("Top", 6.0, (-100.0, 100.0), "z of the deck's surface"),
-        width=metres("Width", 10.0, (2.0, 60.0), "Width of its crown along y"),
-        edge=metres("Edge Width", 0.8, (0.1, 5.0), "Width beside the pavement, on either side"),
-        shear=tree.number("Shear", 0.0, (-3.0, 3.0), description="Move in y per metre of x: the bridge's skew"),
-        slope=tree.number("Slope", 1.5, (0.5, 10.0), description="Run of the slopes per metre of height (m/m)"),
-    )
-    asphalt = tree.input("Pavement Material", "Material", description="Material of the crossing road")
-    grass = tree.input("Ground Material", "Material", description="Material of the slopes")
+    bank = _Bank(tree)
     with tree.frame("Crown: verge, pavement, verge"):
-        crown = _crown(tree, bank, asphalt, grass)
+        crown = _crown(tree, bank)
     slopes = []
     for name, across in (("left", 1.0), ("right", -1.0)):
         with tree.frame(f"Slope on the {name}, and the cone around the wing wall"):
             slopes.append(_slope(tree, bank, across))
     with tree.frame("End"):
         end = _end(tree, *slopes)
-        turned = tree.node("GeometryNodeSwitch", bank.side > 0.0, flip_faces(end), end, input_type="GEOMETRY").value
+        turned = op.switch(bank.side > 0.0, flip_faces(end), end)
     with tree.frame("Labels"):
-        earth = op.store(paint_faces(op.join(*slopes, turned), grass), "class_id", class_id("ground"), "FACE")
-        mesh = op.without_degenerate(op.join(crown, earth))
+        earth = op.store(
+            paint_faces(op.join(*slopes, turned), bank.ground_material), "class_id", class_id("ground"), "FACE"
+        )
+        mesh = op.delete_degenerate(op.join(crown, earth))
     tree.output("Mesh", mesh, description="Embankment with its classes; the road on it is part of the bridge")
 
 
-def _crown(tree: Tree, bank: _Bank, asphalt: Value, grass: Value) -> Value:
+def _crown(tree: Tree, bank: _Bank) -> Value:
     mesh, column, row = op.grid(tree, 4, _EDGE)
-    half, paved = bank.width * 0.5, bank.width * 0.5 - bank.edge
+    half, paved = bank.width * 0.5, bank.width * 0.5 - bank.edge_width
     outer = column.equals(0) | column.equals(3)
     across = op.switch(outer, paved, half) * op.switch(column < 2, -1.0, 1.0)
-    start = bank.wing - _UNDER_WALL
+    start = bank.wing_length - _UNDER_WALL
     # Along -x the other side is on the left.
     place = bank.crown(start + (bank.length - start) * (row / (_EDGE - 1.0)), across * bank.side)
     mesh = op.set_position(mesh, place)
     middle = (op.index(tree) // (_EDGE - 1)).equals(1)
     ground = tree.node("FunctionNodeInputInt", integer=class_id("ground")).value
     label = op.switch(middle, ground, class_id("bridge"))
-    mesh = op.store(paint_faces(mesh, grass), "class_id", label, "FACE")
-    return tree.node("GeometryNodeSetMaterial", mesh, middle, material=asphalt).value
+    mesh = op.store(paint_faces(mesh, bank.ground_material), "class_id", label, "FACE")
+    return paint_faces(mesh, bank.pavement_material, middle)
 
 
 def _slope(tree: Tree, bank: _Bank, across: float) -> Value:
@@ -117,7 +95,7 @@ def _slope(tree: Tree, bank: _Bank, across: float) -> Value:
     mesh, column, row = op.grid(tree, _CONE + _EDGE, 2)
     turn = op.maximum(1.0 - column / float(_CONE), 0.0) * (math.pi / 2)
     share = op.maximum((column - _CONE) / (_EDGE - 1.0), 0.0)
-    along = bank.wing + (bank.length - bank.wing) * share
+    along = bank.wing_length + (bank.length - bank.wing_length) * share
     crown = bank.crown(along, bank.width * (0.5 * across))
     down = bank.away(across, turn, share) * bank.slope - (0.0, 0.0, 1.0)
     ray = tree.node(
@@ -128,7 +106,7 @@ def _slope(tree: Tree, bank: _Bank, across: float) -> Value:
         ray_length=200.0,
     )
     nearest = op.component(op.sample_surface(bank.ground, op.position(tree), crown), "Z")
-    run = tree.node("ShaderNodeVectorMath", down, operation="LENGTH")["Value"]
+    run = op.length(down)
     fall = op.switch(
         ray["Is Hit"],
         op.minimum(op.maximum(op.component(crown, "Z") - nearest, 0.3), 30.0),
@@ -136,7 +114,7 @@ def _slope(tree: Tree, bank: _Bank, across: float) -> Value:
     )
     mesh = op.set_position(mesh, op.switch(row > 0, crown, crown + down * fall))
     turned = bank.side * across < 0.0
-    return tree.node("GeometryNodeSwitch", turned, mesh, flip_faces(mesh), input_type="GEOMETRY").value
+    return op.switch(turned, mesh, flip_faces(mesh))
 
 
 def _end(tree: Tree, left: Value, right: Value) -> Value:

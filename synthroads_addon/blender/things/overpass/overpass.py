@@ -2,92 +2,66 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import bpy
+import numpy as np
 
 from ....base.classes import class_id
+from ....road.parameters import Overpass
 from ....road.things.body_shapes import BRIDGE_BEARING, BRIDGE_BURIED, BRIDGE_SEAT
 from ...nodes import operations as op
 from ...nodes.backbone import height_on
-from ...nodes.builder import Tree, Value, node_group
+from ...nodes.builder import Tree, Value, makes_group
 from ...nodes.clearance import highest_below, pavement_near
+from ...nodes.inputs import Inputs, instance_number, material_of, metres, number, socket
 from ...nodes.solids import flip_faces, move_geometry, put_on_points
-from ...nodes.strip import INSTANCES
-from .abutment import bridge_abutment_group
+from ..meshes import fill
+from ..model_builder import ModelBuilder
 from .deck import EDGE, bridge_deck_group
 from .embankment import bridge_embankment_group
-from .pier import bridge_pier_group
+from .supports import bridge_abutment_group, bridge_pier_group
 
 _WINGS = (3.0, 12.0)
 """Shortest and longest wing walls, m."""
 
 
-def overpass_group() -> bpy.types.NodeTree:
-    """Return the group SR Overpass."""
-    return node_group("SR Overpass", _build)
+class _Overpass(Inputs):
+    piers = socket("Geometry", "A point per pier, in the middle of the deck")
+    road = socket("Object", "Surface with the pavement below")
+    terrain = socket("Object", "Surface beside the road")
+    left_abutment = metres(20.0, (1.0, 300.0), "Face of the left abutment, left of the origin")
+    right_abutment = metres(-20.0, (-300.0, -1.0), "Face of the right one, negative: right of the origin")
+    left_approach_length = metres(40.0, (1.0, 500.0), "Embankment behind the left face")
+    right_approach_length = metres(40.0, (1.0, 500.0), "Embankment behind the right face")
+    skew = number(0.0, (-1.0, 1.0), "Turn about the vertical", unit="rad")
+    width = metres(10.0, (2.0, 60.0), "Width of the deck along the road")
+    clearance = metres(4.9, (3.0, 20.0), "Underside above the pavement's highest point below it")
+    deck_thickness = metres(1.2, (0.3, 5.0), "Height of the deck")
+    parapet_height = metres(1.1, (0.0, 3.0), "Top of the railings above the deck; none below 0.5 m")
+    pier_width = metres(1.0, (0.2, 4.0), "Width of a pier across the road")
+    slope = number(1.5, (0.5, 10.0), "Run of the embankments per metre of height (m/m)")
+    concrete_material = material_of("deck, piers and walls")
+    edge_material = material_of("edge beams")
+    steel_material = material_of("railings and bearings")
+    pavement_material = material_of("the crossing road")
+    ground_material = material_of("the embankments")
+    instance = instance_number()
+
+    def __init__(self, tree: Tree) -> None:
+        """Declare the inputs; x of the abutments' faces by side: -1 left (-x), +1 right."""
+        super().__init__(tree)
+        self.faces = {-1.0: -self.left_abutment, 1.0: -self.right_abutment}
 
 
-@dataclass(frozen=True)
-class _Overpass:
-    """The group's inputs; faces and lengths of the approaches by side: -1 left (-x), +1 right."""
-
-    tree: Tree
-    faces: dict[float, Value]
-    approaches: dict[float, Value]
-    skew: Value
-    width: Value
-    clearance: Value
-    thickness: Value
-    parapet: Value
-    pier_width: Value
-    slope: Value
-    materials: dict[str, Value]
-
-
-def _declare(tree: Tree) -> _Overpass:
-    def metres(name: str, default: float, limits: tuple[float, float], description: str) -> Value:
-        return tree.number(name, default, limits, unit="m", description=description)
-
-    left = metres("Left Abutment", 20.0, (1.0, 300.0), "Face of the left abutment, left of the origin")
-    right = metres("Right Abutment", -20.0, (-300.0, -1.0), "Face of the right one, negative: right of the origin")
-    approaches = {
-        -1.0: metres("Left Approach Length", 40.0, (1.0, 500.0), "Embankment behind the left face"),
-        1.0: metres("Right Approach Length", 40.0, (1.0, 500.0), "Embankment behind the right face"),
-    }
-    names = {"Concrete": "deck, piers and walls", "Edge": "edge beams", "Steel": "railings and bearings"}
-    names |= {"Pavement": "the crossing road", "Ground": "the embankments"}
-    return _Overpass(
-        tree,
-        faces={-1.0: -left, 1.0: -right},
-        approaches=approaches,
-        skew=tree.number("Skew", 0.0, (-1.0, 1.0), unit="rad", description="Turn about the vertical"),
-        width=metres("Width", 10.0, (2.0, 60.0), "Width of the deck along the road"),
-        clearance=metres("Clearance", 4.9, (3.0, 20.0), "Underside above the pavement's highest point below it"),
-        thickness=metres("Deck Thickness", 1.2, (0.3, 5.0), "Height of the deck"),
-        parapet=metres("Parapet Height", 1.1, (0.0, 3.0), "Top of the railings above the deck; none below 0.5 m"),
-        pier_width=metres("Pier Width", 1.0, (0.2, 4.0), "Width of a pier across the road"),
-        slope=tree.number("Slope", 1.5, (0.5, 10.0), description="Run of the embankments per metre of height (m/m)"),
-        materials={
-            name: tree.input(f"{name} Material", "Material", description=f"Material of {what}")
-            for name, what in names.items()
-        },
-    )
-
-
-def _build(tree: Tree) -> None:
+@makes_group("SR Overpass")
+def overpass_group(tree: Tree) -> None:
     """A level bridge around the origin, which crosses along x; the road that it spans runs along y.
 
     Piers are points, of which only x counts. The bridge is skewed by moving it along y: its faces stay parallel to y.
     """
-    piers = tree.input("Piers", "Geometry", description="A point per pier, in the middle of the deck")
-    road = tree.input("Road", "Object", description="Surface with the pavement below")
-    terrain = tree.input("Terrain", "Object", description="Surface beside the road")
-    bridge = _declare(tree)
-    instance = tree.integer("Instance", 0, INSTANCES, description="Instance number of the faces")
+    bridge = _Overpass(tree)
 
     with tree.frame("Surfaces and skew"):
-        surfaces = op.object_geometry(road), op.object_geometry(terrain)
+        surfaces = op.object_geometry(bridge.road), op.object_geometry(bridge.terrain)
         shear = op.unary("TANGENT", bridge.skew)
     with tree.frame("Underside, above the pavement's highest point"):
         reach = op.maximum(bridge.faces[1.0], -bridge.faces[-1.0]) * 1.5 + bridge.width
@@ -102,13 +76,13 @@ def _build(tree: Tree) -> None:
         place = op.position(tree)
         mesh = op.set_position(mesh, place + op.vector(tree, 0.0, op.component(place, "X") * shear))
     with tree.frame("Piers, parallel to the road"):
-        mesh = op.join(mesh, _piers(bridge, piers, surfaces, shear, low))
+        mesh = op.join(mesh, _piers(bridge, surfaces, shear, low))
     with tree.frame("Embankments"):
         ground = op.join(*surfaces)
         banks = [_embankment(bridge, ground, low, wings[side], shear, side) for side in (-1.0, 1.0)]
     with tree.frame("Labels"):
         mesh = op.join(op.store(mesh, "class_id", class_id("bridge"), "FACE"), *banks)
-        mesh = op.store(mesh, "instance_id", instance, "FACE")
+        mesh = op.store(mesh, "instance_id", bridge.instance, "FACE")
     tree.output("Mesh", mesh, description="The bridge; its embankments' slopes are ground")
 
 
@@ -122,8 +96,8 @@ def _lowest(bridge: _Overpass, surfaces: tuple[Value, Value], shear: Value, face
 
 def _wing_length(bridge: _Overpass, low: Value, foot: Value) -> Value:
     """Return the length of the wing walls, so that the embankment's cones reach the abutment's face."""
-    wanted = (low + bridge.thickness - foot) * bridge.slope
-    return op.minimum(op.maximum(wanted, _WINGS[0]), _WINGS[1])
+    needed = (low + bridge.deck_thickness - foot) * bridge.slope
+    return op.clip(needed, *_WINGS)
 
 
 def _deck(bridge: _Overpass, low: Value, wings: dict[float, Value]) -> Value:
@@ -135,12 +109,12 @@ def _deck(bridge: _Overpass, low: Value, wings: dict[float, Value]) -> Value:
         start=left - wings[-1.0],
         end=right + wings[1.0],
         width=bridge.width,
-        thickness=bridge.thickness,
-        parapet_height=bridge.parapet,
-        concrete_material=bridge.materials["Concrete"],
-        edge_material=bridge.materials["Edge"],
-        steel_material=bridge.materials["Steel"],
-        pavement_material=bridge.materials["Pavement"],
+        thickness=bridge.deck_thickness,
+        parapet_height=bridge.parapet_height,
+        concrete_material=bridge.concrete_material,
+        edge_material=bridge.edge_material,
+        steel_material=bridge.steel_material,
+        pavement_material=bridge.pavement_material,
     ).value
     return move_geometry(deck, op.vector(bridge.tree, 0.0, 0.0, low))
 
@@ -150,29 +124,29 @@ def _abutment(bridge: _Overpass, low: Value, feet: dict[float, Value], wings: di
     made = tree.call(
         bridge_abutment_group(),
         width=bridge.width,
-        thickness=bridge.thickness,
+        thickness=bridge.deck_thickness,
         foot=feet[side] - low - BRIDGE_BURIED,
         wing_length=wings[side],
-        concrete_material=bridge.materials["Concrete"],
-        steel_material=bridge.materials["Steel"],
+        concrete_material=bridge.concrete_material,
+        steel_material=bridge.steel_material,
     ).value
     if side < 0.0:
-        made = flip_faces(tree.node("GeometryNodeTransform", made, scale=(-1.0, 1.0, 1.0)).value)
+        made = flip_faces(op.transform(made, scale=(-1.0, 1.0, 1.0)))
     return move_geometry(made, op.vector(tree, bridge.faces[side], 0.0, low))
 
 
-def _piers(bridge: _Overpass, points: Value, surfaces: tuple[Value, Value], shear: Value, low: Value) -> Value:
+def _piers(bridge: _Overpass, surfaces: tuple[Value, Value], shear: Value, low: Value) -> Value:
     tree = bridge.tree
     pier = tree.call(
         bridge_pier_group(),
         pier_width=bridge.pier_width,
         width=bridge.width,
-        concrete_material=bridge.materials["Concrete"],
-        steel_material=bridge.materials["Steel"],
+        concrete_material=bridge.concrete_material,
+        steel_material=bridge.steel_material,
     )
     x = op.component(op.position(tree), "X")
     plan = op.vector(tree, x, x * shear)
-    points = op.store(points, "foot", height_on(*surfaces, plan) - BRIDGE_BURIED)
+    points = op.store(bridge.piers, "foot", height_on(*surfaces, plan) - BRIDGE_BURIED)
     tall = low - BRIDGE_BEARING - op.named_attribute(tree, "foot")
     top = plan + op.vector(tree, 0.0, 0.0, low - BRIDGE_BEARING)
     bodies = put_on_points(points, pier["Body"], top, op.vector(tree, 1.0, 1.0, tall))
@@ -180,18 +154,58 @@ def _piers(bridge: _Overpass, points: Value, surfaces: tuple[Value, Value], shea
 
 
 def _embankment(bridge: _Overpass, ground: Value, low: Value, wing: Value, shear: Value, side: float) -> Value:
+    approach = bridge.left_approach_length if side < 0.0 else bridge.right_approach_length
     return bridge.tree.call(
         bridge_embankment_group(),
         ground=ground,
         face=bridge.faces[side],
         side=side,
         wing_length=wing,
-        length=op.maximum(bridge.approaches[side], wing + 1.0),
-        top=low + bridge.thickness,
+        length=op.maximum(approach, wing + 1.0),
+        top=low + bridge.deck_thickness,
         width=bridge.width,
         edge_width=bridge.width * EDGE,
         shear=shear,
         slope=bridge.slope,
-        pavement_material=bridge.materials["Pavement"],
-        ground_material=bridge.materials["Ground"],
+        pavement_material=bridge.pavement_material,
+        ground_material=bridge.ground_material,
     ).value
+
+
+_LONGEST_APPROACH = 150.0
+_APPROACH_ALONE = 20.0
+"""Length (m) of the embankments where there is no terrain."""
+_MATERIALS = {
+    "concrete_material": "bridge_concrete",
+    "edge_material": "barrier_concrete",
+    "steel_material": "galvanised_steel",
+    "pavement_material": "asphalt",
+    "ground_material": "grass_ground",
+}
+
+
+def build_overpasses(builder: ModelBuilder) -> None:
+    """Make one object per overpass."""
+    terrain = builder.parameters.terrain
+    for name, bridge in builder.parameters.of_type(Overpass).items():
+        approaches = {}
+        for side, face in (("left", bridge.left_abutment), ("right", -bridge.right_abutment)):
+            # As far as there is ground.
+            reach = terrain.half_width - face if terrain else _APPROACH_ALONE
+            approaches[f"{side}_approach_length"] = float(np.clip(reach, 1.0, _LONGEST_APPROACH))
+        mesh = bpy.data.meshes.new("SR Overpass")
+        across = np.array([bridge.offset - offset for offset in bridge.pier_offsets])
+        fill(mesh, np.column_stack([across, np.zeros((len(across), 2))]))
+        builder.add_thing(
+            name,
+            bridge,
+            overpass_group(),
+            mesh,
+            **approaches,
+            left_abutment=bridge.left_abutment - bridge.offset,
+            right_abutment=bridge.right_abutment - bridge.offset,
+            skew=float(np.deg2rad(bridge.rotation_deg)),
+            slope=terrain.batter_slope if terrain else 1.5,
+            **_MATERIALS,
+        )
+        builder.stand(name, bridge)

@@ -2,69 +2,47 @@
 
 from __future__ import annotations
 
-import bpy
-
 from ...nodes import operations as op
-from ...nodes.builder import Tree, Value, node_group
-from .line import declare_marking, marking_group
+from ...nodes.builder import Tree, makes_group
+from ...nodes.inputs import Inputs, metres, number
+from .line import Marking, marking_group
 
 
-def height_group() -> bpy.types.NodeTree:
-    """Return the group SR Carriageway Height."""
-    return node_group("SR Carriageway Height", _build_height)
+class _Section(Inputs):
+    side = number(1.0, (-1.0, 1.0), "+1 for the left, -1 for the right carriageway")
+    distance = metres(5.0, (0.0, 1000.0), "Distance from the axis")
+    paved_edge = metres(14.0, (0.0, 1000.0), "Where the verge begins")
+    pivot = metres(8.0, (0.0, 1000.0), "Line that keeps the axis's height")
+    crossfall = number(0.025, (-0.12, 0.12), "Positive where the surface falls to the right (m/m), per row")
+    verge_slope = number(0.08, (0.0, 0.15), "Fall of the verge outwards (m/m)")
 
 
-def carriageway_marking_group() -> bpy.types.NodeTree:
-    """Return the group SR Carriageway Marking."""
-    return node_group("SR Carriageway Marking", _build_marking)
-
-
-def _declare_section(tree: Tree) -> dict[str, Value]:
-    widths = (0.0, 1000.0)
-    return {
-        "side": tree.number(
-            "Side", 1.0, (-1.0, 1.0), description="+1 for the left, -1 for the right carriageway"
-        ),
-        "distance": tree.number("Distance", 5.0, widths, unit="m", description="Distance from the axis"),
-        "paved_edge": tree.number("Paved Edge", 14.0, widths, unit="m", description="Where the verge begins"),
-        "pivot": tree.number("Pivot", 8.0, widths, unit="m", description="Line that keeps the axis's height"),
-        "crossfall": tree.number(
-            "Crossfall",
-            0.025,
-            (-0.12, 0.12),
-            description="Positive where the surface falls to the right (m/m), per row",
-        ),
-        "verge_slope": tree.number(
-            "Verge Slope", 0.08, (0.0, 0.15), description="Fall of the verge outwards (m/m)"
-        ),
-    }
-
-
-def _build_height(tree: Tree) -> None:
+@makes_group("SR Carriageway Height")
+def height_group(tree: Tree) -> None:
     """Offset and height above the axis of a line at a distance from it."""
-    section = _declare_section(tree)
-    side, distance, paved = section["side"], section["distance"], section["paved_edge"]
+    section = _Section(tree)
+    side, distance, paved = section.side, section.distance, section.paved_edge
     with tree.frame("The pavement turns about the pivot, the verge falls away"):
         # A surface that falls to the right rises with the offset, and the offset is side * distance.
-        rise = section["crossfall"] * side
+        rise = section.crossfall * side
         beyond = op.maximum(distance - paved, 0.0)
-        height = rise * (op.minimum(distance, paved) - section["pivot"]) - beyond * section["verge_slope"]
+        height = rise * (op.minimum(distance, paved) - section.pivot) - beyond * section.verge_slope
     tree.output("Height", height, description="Height above the axis, per row of the backbone (m)")
     tree.output("Offset", distance * side, description="Offset, positive to the left (m)")
 
 
-def _build_marking(tree: Tree) -> None:
+@makes_group("SR Carriageway Marking")
+def carriageway_marking_group(tree: Tree) -> None:
     """A line marking centred on a line at a distance from the axis."""
     backbone = tree.input("Backbone", "Geometry", description="Polyline along the axis with its attributes")
-    section = _declare_section(tree)
+    section = _Section(tree)
     width = tree.number("Width", 0.15, (0.05, 1.0), unit="m", description="Width of the line")
-    marking = declare_marking(tree)
+    marking = Marking(tree)
     with tree.frame("Both edges of the line"):
-        middle = section.pop("distance")
-        half = width * (section["side"] * 0.5)
+        half = width * (section.side * 0.5)
         # Left is outwards on the left carriageway and inwards on the right one.
-        left = tree.call(height_group(), distance=middle + half, **section)
-        right = tree.call(height_group(), distance=middle - half, **section)
+        left = tree.call(height_group(), **section.values | {"distance": section.distance + half})
+        right = tree.call(height_group(), **section.values | {"distance": section.distance - half})
     with tree.frame("Line"):
         mesh = tree.call(
             marking_group(),
@@ -73,6 +51,6 @@ def _build_marking(tree: Tree) -> None:
             right_offset=right["Offset"],
             left_height=left["Height"],
             right_height=right["Height"],
-            **marking,
+            **marking.values,
         ).value
     tree.output("Mesh", mesh, description="Dashes whose faces look up")

@@ -66,7 +66,7 @@ def road_layout(parameters: RoadParameters) -> tuple[SideLayout, ...]:
         lines = [(key, line) for key, line in parameters.of_type(LineMarking).items() if line.carriageway == name]
         turnouts = tuple(key for key, item in parameters.of_type(Turnout).items() if item.carriageway == name)
         section = sections[carriageway.side]
-        varying = {key for key, width in own_widths(carriageway) if isinstance(width, tuple)}
+        varying = {key for key, width in strip_widths(carriageway) if isinstance(width, tuple)}
         if turnouts:
             varying.add("Hard Shoulder")
         sides.append(
@@ -85,7 +85,7 @@ def road_layout(parameters: RoadParameters) -> tuple[SideLayout, ...]:
     return tuple(sides)
 
 
-def own_widths(carriageway: Carriageway) -> Iterator[tuple[str, AnyWidth]]:
+def strip_widths(carriageway: Carriageway) -> Iterator[tuple[str, AnyWidth]]:
     """Yield (name, width) of the inner offset and of the strips, from the median outwards."""
     yield "Inner Offset", carriageway.inner_offset
     yield "Inner Edge Strip", carriageway.inner_edge_strip_width
@@ -116,7 +116,7 @@ def road_inputs(parameters: RoadParameters, zero: float = 0.0) -> dict[str, floa
     inputs: dict[str, float | int | bool] = {}
     for carriageway in parameters.of_type(Carriageway).values():
         side = carriageway.side.title()
-        inputs |= {input_name(side, strip): nominal_width(width) for strip, width in own_widths(carriageway)}
+        inputs |= {input_name(side, strip): nominal_width(width) for strip, width in strip_widths(carriageway)}
         inputs[f"{side} Verge Slope"] = carriageway.verge_slope_percent / 100.0
         inputs[f"{side} Turns About Inner Edge"] = carriageway.rotation_axis == "inner_edge"
         inputs[f"{side} Instance"] = carriageway.instance
@@ -158,7 +158,7 @@ def varying_widths(geometry: RoadGeometry, station: Float) -> dict[str, Float]:
     values: dict[str, Float] = {}
     for layout in road_layout(geometry.parameters):
         section = geometry.sections["left" if layout.side == "Left" else "right"]
-        for strip, width in own_widths(section.carriageway):
+        for strip, width in strip_widths(section.carriageway):
             if strip in layout.varying:
                 share = width_at(width, station) / max(nominal_width(width), 1e-9)
                 values[attribute_name(layout.side, strip)] = share
@@ -178,9 +178,9 @@ def _turnout_widths(side: str, section: CarriagewaySection, station: Float) -> d
         attribute_name(side, name): sum((shape.strips[kind] for shape in shapes), 0.0 * station)
         for kind, name in zip(TURNOUT_STRIPS, TURNOUT_NAMES, strict=True)
     }
-    own = section.carriageway.hard_shoulder_width
-    nominal = max(nominal_width(own), 1e-9)
-    values[attribute_name(side, "Hard Shoulder Main")] = width_at(own, station) / nominal
+    main = section.carriageway.hard_shoulder_width
+    nominal = max(nominal_width(main), 1e-9)
+    values[attribute_name(side, "Hard Shoulder Main")] = width_at(main, station) / nominal
     values[attribute_name(side, "Hard Shoulder")] = (
         np.minimum.reduce([shape.hard_shoulder for shape in shapes]) / nominal
     )

@@ -2,50 +2,57 @@
 
 from __future__ import annotations
 
-import bpy
-
 from ...nodes import operations as op
 from ...nodes.backbone import last_station, look_up, station_ribbon
-from ...nodes.builder import Tree, Value, node_group
-from ...nodes.strip import FAR, INSTANCES, strip_group
+from ...nodes.builder import Tree, Value, makes_group
+from ...nodes.inputs import FAR, Inputs, backbone_socket, instance_number, integer, material_of, metres
+from ...nodes.solids import row_of_points
+from ...nodes.strip import strip_group
 
 _EDGES = ("edge_left", "edge_right", "edge_left_height", "edge_right_height")
 SNAP = 1e-3
 """End of a dash this near (m) to a row of the backbone: it is that row."""
 
 
-def marking_group() -> bpy.types.NodeTree:
-    """Return the group SR Line Marking."""
-    return node_group("SR Line Marking", _build)
+class Marking(Inputs):
+    """Inputs of a line that don't say where it lies across the road."""
+
+    start_station = metres(0.0, (0.0, 1e6), "Beginning of the first dash")
+    end_station = metres(1e6, (0.0, 1e6), "End of the line")
+    dash = metres(6.0, (0.0, 100.0), "Length of a dash; 0 for a solid line")
+    gap = metres(12.0, (0.0, 100.0), "Length of a gap")
+    film_thickness = metres(0.003, (0.0, 0.01), "Height above the pavement")
+    class_ = integer(2, (0, 255), "Semantic class of the faces")
+    instance = instance_number()
+    material = material_of("the faces")
 
 
-def _build(tree: Tree) -> None:
+class _Edges(Inputs):
+    backbone = backbone_socket()
+    left_offset = metres(0.1, FAR, "Offset of the left edge, positive to the left")
+    right_offset = metres(-0.1, FAR, "Offset of the right edge")
+    left_height = metres(0.0, FAR, "Pavement at the left edge above the axis")
+    right_height = metres(0.0, FAR, "Pavement at the right edge")
+
+
+@makes_group("SR Line Marking")
+def marking_group(tree: Tree) -> None:
     """A line between two offsets, dashed or solid, raised above the pavement by its film.
 
     Offsets and heights may be fields on the backbone's points.
     """
-    backbone = tree.input("Backbone", "Geometry", description="Polyline along the axis with its attributes")
-    left = tree.number(
-        "Left Offset", 0.1, FAR, unit="m", description="Offset of the left edge, positive to the left"
-    )
-    right = tree.number("Right Offset", -0.1, FAR, unit="m", description="Offset of the right edge")
-    left_height = tree.number(
-        "Left Height", 0.0, FAR, unit="m", description="Pavement at the left edge above the axis"
-    )
-    right_height = tree.number("Right Height", 0.0, FAR, unit="m", description="Pavement at the right edge")
-    given = declare_marking(tree)
-    first, last = given["start_station"], given["end_station"]
-    dash, gap, film = given["dash"], given["gap"], given["film_thickness"]
+    edges, line = _Edges(tree), Marking(tree)
+    backbone, first, film = edges.backbone, line.start_station, line.film_thickness
 
     with tree.frame("Dashes: a solid line is one dash"):
-        end = op.minimum(last, last_station(backbone))
-        dashed = dash > 0.0
-        length = op.switch(dashed, end - first, dash)
-        period = op.switch(dashed, (end - first) * 2.0, dash + gap)
-        count = op.rounded_up(op.maximum((end - first) / period - 1e-6, 0.0))
+        end = op.minimum(line.end_station, last_station(backbone))
+        dashed = line.dash > 0.0
+        length = op.switch(dashed, end - first, line.dash)
+        period = op.switch(dashed, (end - first) * 2.0, line.dash + line.gap)
+        count = op.round_up(op.maximum((end - first) / period - 1e-6, 0.0))
     with tree.frame("Edges as attributes of the rows"):
-        edges = dict(zip(_EDGES, (left, right, left_height, right_height), strict=True))
-        for name, value in edges.items():
+        across = (edges.left_offset, edges.right_offset, edges.left_height, edges.right_height)
+        for name, value in zip(_EDGES, across, strict=True):
             backbone = op.store(backbone, name, value)
     rows = _with_ends(tree, backbone, (first, end, length, period, count))
     with tree.frame("Ribbon over all rows; the faces of the gaps are deleted"):
@@ -56,34 +63,13 @@ def _build(tree: Tree) -> None:
             right_offset=op.named_attribute(tree, "edge_right"),
             left_height=op.named_attribute(tree, "edge_left_height") + film,
             right_height=op.named_attribute(tree, "edge_right_height") + film,
-            class_=given["class_"],
-            instance=given["instance"],
-            material=given["material"],
+            class_=line.class_,
+            instance=line.instance,
+            material=line.material,
         ).value
         station = op.named_attribute(tree, "station")
         painted = (station > first) & (station < end) & ((station - first) % period < length)
         tree.output("Mesh", op.delete_faces(ribbon, ~painted), description="Dashes whose faces look up")
-
-
-def declare_marking(tree: Tree) -> dict[str, Value]:
-    """Declare the inputs of a line that don't say where it lies across the road."""
-    stations, lengths = (0.0, 1e6), (0.0, 100.0)
-    return {
-        "start_station": tree.number(
-            "Start Station", 0.0, stations, unit="m", description="Beginning of the first dash"
-        ),
-        "end_station": tree.number("End Station", 1e6, stations, unit="m", description="End of the line"),
-        "dash": tree.number(
-            "Dash", 6.0, lengths, unit="m", description="Length of a dash; 0 for a solid line"
-        ),
-        "gap": tree.number("Gap", 12.0, lengths, unit="m", description="Length of a gap"),
-        "film_thickness": tree.number(
-            "Film Thickness", 0.003, (0.0, 0.01), unit="m", description="Height above the pavement"
-        ),
-        "class_": tree.integer("Class", 2, (0, 255), description="Semantic class of the faces"),
-        "instance": tree.integer("Instance", 0, INSTANCES, description="Instance number of the faces"),
-        "material": tree.input("Material", "Material", description="Material of the faces"),
-    }
 
 
 def _with_ends(tree: Tree, backbone: Value, dashes: tuple[Value, Value, Value, Value, Value]) -> Value:
@@ -91,13 +77,13 @@ def _with_ends(tree: Tree, backbone: Value, dashes: tuple[Value, Value, Value, V
     first, end, length, period, count = dashes
     ribbon = station_ribbon(backbone, _EDGES)
     with tree.frame("Ends of the dashes as rows of their own"):
-        points = tree.node("GeometryNodeMeshLine", count=count * 2).value
+        points = row_of_points(tree, count * 2)
         number = op.index(tree)
-        wanted = op.minimum(first + (number // 2) * period + (number % 2) * length, end)
-        near = tree.node("GeometryNodeSampleNearest", ribbon, op.vector(tree, wanted), domain="POINT").value
+        end_of_dash = op.minimum(first + (number // 2) * period + (number % 2) * length, end)
+        near = tree.node("GeometryNodeSampleNearest", ribbon, op.vector(tree, end_of_dash), domain="POINT").value
         snapped = op.sample_index(ribbon, op.named_attribute(tree, "station"), near)
-        distance = op.unary("ABSOLUTE", wanted - snapped)
-        points = op.delete_points(op.store(points, "station", wanted), distance < SNAP)
+        distance = op.unary("ABSOLUTE", end_of_dash - snapped)
+        points = op.delete_points(op.store(points, "station", end_of_dash), distance < SNAP)
         station = op.named_attribute(tree, "station")
         for name in ("curvature", *_EDGES):
             points = op.store(points, name, look_up(ribbon, name, station))

@@ -20,7 +20,7 @@ def markings_group(layout: SideLayout) -> bpy.types.NodeTree:
     """Return the group SR Left Markings or SR Right Markings for these lines."""
     return node_group(
         f"SR {layout.side} Markings",
-        lambda tree: _build(tree, layout),
+        _build,
         layout,
         description="Line markings of one side, each on its boundary",
     )
@@ -50,8 +50,7 @@ def _build(tree: Tree, layout: SideLayout) -> None:
     backbone = tree.input("Backbone", "Geometry", description="Polyline along the axis with its attributes")
     about = "Distance of a boundary from the axis, counted from the median"
     distances = [
-        tree.number(f"Distance {i}", 0.0, _FAR, unit="m", description=about)
-        for i in range(len(strips_of(layout)) + 1)
+        tree.number(f"Distance {i}", 0.0, _FAR, unit="m", description=about) for i in range(len(strips_of(layout)) + 1)
     ]
     plane = tree.number("Plane Edge", 14.0, _FAR, unit="m", description="Where the pavement's plane ends")
     pivot = tree.number("Pivot", 8.0, _FAR, unit="m", description="Line that keeps the axis's height")

@@ -11,6 +11,7 @@ from ....base.classes import class_id
 from ...nodes import operations as op
 from ...nodes.backbone import row
 from ...nodes.builder import Node, Tree, Value, node_group
+from ...nodes.solids import row_of_points
 from ...nodes.strip import strip_group
 from .layout import SideLayout
 from .markings import declare_marking, markings_group
@@ -38,7 +39,7 @@ def road_group(layout: tuple[SideLayout, ...]) -> bpy.types.NodeTree:
     """Return the group SR Road for these lanes, turnouts and markings."""
     return node_group(
         "SR Road",
-        lambda tree: _build(tree, layout),
+        _build,
         layout,
         description="The road's surface, live from its widths",
     )
@@ -120,7 +121,7 @@ def _edges(tree: Tree, backbone: Value, sides: list[_SideInputs]) -> Iterator[Va
     for sign in (1.0, -1.0):
         side = sides[0] if sign > 0 else sides[-1]
         offset, height = side.edge(outer=side.layout.sign == sign)
-        points = tree.node("GeometryNodeMeshLine", count=op.point_count(backbone)).value
+        points = row_of_points(tree, op.point_count(backbone))
         number = op.index(tree)
         axis, left, _ = row(backbone, number)
         offset, height = (op.sample_index(backbone, value, number) for value in (offset, height))

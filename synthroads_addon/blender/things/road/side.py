@@ -10,7 +10,8 @@ import bpy
 from ....base.classes import class_id
 from ...nodes import operations as op
 from ...nodes.builder import Operand, Tree, Value, node_group
-from ...nodes.strip import INSTANCES, strip_group
+from ...nodes.inputs import INSTANCES
+from ...nodes.strip import strip_group
 from .carriageway import height_group
 from .layout import TURNOUT_NAMES, SideLayout, attribute_name, input_name
 
@@ -23,7 +24,7 @@ def side_group(layout: SideLayout) -> bpy.types.NodeTree:
     """Return the group SR Left Carriageway or SR Right Carriageway for these lanes and turnouts."""
     return node_group(
         f"SR {layout.side} Carriageway",
-        lambda tree: _build(tree, layout),
+        _build,
         layout,
         description="Pavement and verge of one side, live from their widths",
     )

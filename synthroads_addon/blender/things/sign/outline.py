@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import bpy
-
 from ....road.things.body_shapes import SIGN_OUTLINES
 from ...nodes import operations as op
-from ...nodes.builder import Tree, Value, node_group
+from ...nodes.builder import Tree, Value, makes_group
+from ...nodes.inputs import Inputs, integer, metres
 
 SHAPES = ("round", "triangle", "rectangle", "octagon", "arrow")
 """Shapes by their number in the group's input."""
@@ -16,31 +15,27 @@ _SHARPEST = 0.35
 """Share of its radius that a corner keeps, however far inside."""
 
 
-def sign_outline_group() -> bpy.types.NodeTree:
-    """Return the group SR Sign Outline."""
-    return node_group("SR Sign Outline", _build)
+class _Outline(Inputs):
+    shape = integer(2, (0, len(SHAPES) - 1), ", ".join(f"{i} {name}" for i, name in enumerate(SHAPES)))
+    width = metres(1.0, (0.01, 20.0), "Width of the outline")
+    height = metres(1.0, (0.01, 20.0), "Height of the outline")
+    corner_radius = metres(0.05, (0.001, 10.0), "Radius of its corners")
+    inset = metres(0.0, (0.0, 1.0), "Distance inside of the outline, at most a quarter of its smaller side")
 
 
-def _build(tree: Tree) -> None:
+@makes_group("SR Sign Outline")
+def sign_outline_group(tree: Tree) -> None:
     """A closed curve in the xy plane around the origin: the outline of a sign, or one inside of it."""
-    names = ", ".join(f"{i} {name}" for i, name in enumerate(SHAPES))
-
-    def metres(name: str, default: float, limits: tuple[float, float], description: str) -> Value:
-        return tree.number(name, default, limits, unit="m", description=description)
-
-    shape = tree.integer("Shape", 2, (0, len(SHAPES) - 1), description=names)
-    width = metres("Width", 1.0, (0.01, 20.0), "Width of the outline")
-    height = metres("Height", 1.0, (0.01, 20.0), "Height of the outline")
-    radius = metres("Corner Radius", 0.05, (0.001, 10.0), "Radius of its corners")
-    inset = metres("Inset", 0.0, (0.0, 1.0), "Distance inside of the outline, at most a quarter of its smaller side")
+    outline = _Outline(tree)
+    width, height, inset = outline.width, outline.height, outline.inset
 
     with tree.frame("Corners of the shape, and points on each"):
-        start, count, steps = _of_shape(tree, shape)
+        start, count, steps = _corners_of(tree, outline.shape)
         number = op.index(tree)
         corner, step = number // steps, number % steps
     with tree.frame("Radius; a round sign is nothing but corners"):
         half = op.minimum(width, height) * 0.499
-        outer = op.minimum(op.switch(shape.equals(0), radius, half), half)
+        outer = op.minimum(op.switch(outline.shape.equals(0), outline.corner_radius, half), half)
         inner = op.maximum(outer - inset, outer * _SHARPEST)
     with tree.frame("Middle of the corner's arc, and of those beside it"):
         size = op.vector(tree, width - outer * 2.0, height - outer * 2.0)
@@ -74,7 +69,7 @@ def _table() -> list[tuple[float, float, float]]:
     return [(x, y, 0.0) for corners in SIGN_OUTLINES.values() for x, y in corners]
 
 
-def _of_shape(tree: Tree, shape: Value) -> tuple[Value, Value, Value]:
+def _corners_of(tree: Tree, shape: Value) -> tuple[Value, Value, Value]:
     """Return where the shape's corners start in the table, their number, and the number of points on each."""
     starts, total = {}, 0
     for name, corners in SIGN_OUTLINES.items():
@@ -85,7 +80,7 @@ def _of_shape(tree: Tree, shape: Value) -> tuple[Value, Value, Value]:
         points = _ROUND_STEPS if name == "round" else _STEPS
         rows.append((float(starts[outline]), float(len(SIGN_OUTLINES[outline])), float(points)))
     row = op.choose(shape, rows)
-    start, count, steps = (op.rounded_up(op.component(row, axis)) for axis in "XYZ")
+    start, count, steps = (op.round_up(op.component(row, axis)) for axis in "XYZ")
     return start, count, steps
 
 

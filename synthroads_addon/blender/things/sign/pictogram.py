@@ -2,45 +2,43 @@
 
 from __future__ import annotations
 
-import bpy
-
 from ...nodes import operations as op
-from ...nodes.builder import Tree, Value, node_group
+from ...nodes.builder import Tree, Value, makes_group
+from ...nodes.inputs import Inputs, integer, material_of, socket
 from ...nodes.solids import paint_faces
 from .pictograms import NAMES, PICTOGRAMS, RED
 
 Row = tuple[float, float, float]
 
 
-def pictogram_group() -> bpy.types.NodeTree:
-    """Return the group SR Pictogram."""
-    return node_group("SR Pictogram", _build)
+class _Pictogram(Inputs):
+    pictogram = integer(0, (0, len(NAMES) - 1), ", ".join(f"{i} {name}" for i, name in enumerate(NAMES)))
+    low_corner = socket("Vector", "Lower left corner of the box (m)")
+    high_corner = socket("Vector", "Upper right corner of the box (m)")
+    writing_material = material_of("pictograms")
+    border_material = material_of("those parts that are red")
 
 
-def _build(tree: Tree) -> None:
+@makes_group("SR Pictogram")
+def pictogram_group(tree: Tree) -> None:
     """A pictogram in the xy plane, as large as fits into a box."""
-    wanted = tree.integer(
-        "Pictogram", 0, (0, len(NAMES) - 1), description=", ".join(f"{i} {name}" for i, name in enumerate(NAMES))
-    )
-    low = tree.input("Low Corner", "Vector", description="Lower left corner of the box (m)")
-    high = tree.input("High Corner", "Vector", description="Upper right corner of the box (m)")
-    color = tree.input("Writing Material", "Material", description="Material of pictograms")
-    border = tree.input("Border Material", "Material", description="Material of those parts that are red")
+    drawn = _Pictogram(tree)
+    low, high = drawn.low_corner, drawn.high_corner
 
     ranges, corners = _tables()
     with tree.frame("Corners of its polygons out of the table of all"):
-        first, count, others = (op.rounded_up(op.component(op.choose(wanted, ranges), axis)) for axis in "XYZ")
+        first, count, others = (op.round_up(op.component(op.choose(drawn.pictogram, ranges), axis)) for axis in "XYZ")
         corner = op.choose(op.index(tree) + first, corners)
-        place = tree.node("ShaderNodeVectorMath", corner, (1.0, 1.0, 0.0), operation="MULTIPLY").value
+        place = corner * (1.0, 1.0, 0.0)
         points = tree.node("GeometryNodePoints", count=count, position=place).value
-        polygon = op.rounded_up(op.component(corner, "Z"))
+        polygon = op.round_up(op.component(corner, "Z"))
         curves = tree.node("GeometryNodePointsToCurves", points, curve_group_id=polygon).value
         curves = tree.node("GeometryNodeSetSplineCyclic", curves, cyclic=True).value
     with tree.frame("Filled one by one: the red ones come first"):
         red = op.index(tree) < others
         mesh = op.join(
-            paint_faces(_fill_curves(op.separate(curves, red, "CURVE")), border),
-            paint_faces(_fill_curves(op.separate(curves, ~red, "CURVE")), color),
+            paint_faces(_fill_curves(op.separate(curves, red, "CURVE")), drawn.border_material),
+            paint_faces(_fill_curves(op.separate(curves, ~red, "CURVE")), drawn.writing_material),
         )
     with tree.frame("Fitted into the box"):
         extent = tree.node("GeometryNodeBoundBox", mesh)
@@ -50,9 +48,7 @@ def _build(tree: Tree) -> None:
             op.component(room, "Y") / op.maximum(op.component(size, "Y"), 1e-3),
         )
         middle = (low + high) * 0.5 - (extent["Max"] + extent["Min"]) * (scale * 0.5)
-        mesh = tree.node(
-            "GeometryNodeTransform", mesh, translation=middle, scale=op.vector(tree, scale, scale, 1.0)
-        ).value
+        mesh = op.transform(mesh, translation=middle, scale=op.vector(tree, scale, scale, 1.0))
     tree.output("Mesh", mesh, description="Pictogram, facing +z")
 
 

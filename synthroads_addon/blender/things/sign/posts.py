@@ -4,13 +4,11 @@ from __future__ import annotations
 
 import math
 
-import bpy
-
 from ...nodes import operations as op
-from ...nodes.builder import Tree, Value, node_group
-from ...nodes.solids import bars, paint_faces, row_of_points
-from ...nodes.standing import BURIED, on_surface, put_on
-from ...nodes.tubes import tube
+from ...nodes.builder import Tree, Value, makes_group
+from ...nodes.inputs import boolean, integer, material_of, metres, socket
+from ...nodes.solids import bars, paint_faces, row_of_points, tube
+from ...nodes.standing import BURIED, OnSurface, on_surface, put_on
 
 MOST_POSTS = 4
 _PANEL = 0.9
@@ -19,28 +17,28 @@ _CHORD, _DIAGONAL = 0.045, 0.02
 """Thickness of a lattice post's chords and diagonals, m."""
 
 
-def sign_posts_group() -> bpy.types.NodeTree:
-    """Return the group SR Sign Posts."""
-    return node_group("SR Sign Posts", _build)
+class _Posts(OnSurface):
+    points = socket("Geometry", "Places of the signs on the surface")
+    road = socket("Object", "Surface that the posts stand on")
+    posts = integer(1, (1, MOST_POSTS), "Number of posts")
+    width = metres(1.0, (0.01, 20.0), "Width of the sign")
+    top = metres(2.5, (0.1, 20.0), "Top of the posts above the sign's place (m)")
+    post_diameter = metres(0.076, (0.02, 0.5), "Diameter of a post")
+    lattice = boolean(False, "Lattice posts instead of tubes")
+    material = material_of("the posts")
 
 
-def _build(tree: Tree) -> None:
+@makes_group("SR Sign Posts")
+def sign_posts_group(tree: Tree) -> None:
     """The posts of signs, side by side; points carry ``heading`` (rad), ``elevation`` (m) and stand on the surface."""
-    points = tree.input("Points", "Geometry", description="Places of the signs on the surface")
-    road = tree.input("Road", "Object", description="Surface that the posts stand on")
-    terrain = tree.input("Terrain", "Object", description="Surface beside the road")
-    count = tree.integer("Posts", 1, (1, MOST_POSTS), description="Number of posts")
-    width = tree.number("Width", 1.0, (0.01, 20.0), unit="m", description="Width of the sign")
-    top = tree.number("Top", 2.5, (0.1, 20.0), unit="m", description="Top of the posts above the sign's place (m)")
-    diameter = tree.number("Post Diameter", 0.076, (0.02, 0.5), unit="m", description="Diameter of a post")
-    lattice = tree.boolean("Lattice", False, description="Lattice posts instead of tubes")
-    material = tree.input("Material", "Material", description="Material of the posts")
+    sign = _Posts(tree)
+    count, top, diameter = sign.posts, sign.top, sign.post_diameter
 
     with tree.frame("Places side by side, each on the surface below it"):
-        beside = ((op.index(tree) + 0.5) / count - 0.5) * width
+        beside = ((op.index(tree) + 0.5) / count - 0.5) * sign.width
         side_by_side = op.set_position(row_of_points(tree, count), op.vector(tree, beside))
-        level = op.store(points, "level", op.component(op.position(tree), "Z"))
-        places = on_surface(put_on(level, side_by_side), road, terrain)
+        level = op.store(sign.points, "level", op.component(op.position(tree), "Z"))
+        places = on_surface(put_on(level, side_by_side), sign.road, sign.terrain)
     with tree.frame("Length from below the surface up"):
         foot = op.component(op.position(tree), "Z") - BURIED
         places = op.store(places, "tall", op.maximum(op.named_attribute(tree, "level") + top - foot, 0.1))
@@ -50,9 +48,9 @@ def _build(tree: Tree) -> None:
     with tree.frame("Lattice post of height 1"):
         girder = _lattice(tree, diameter * 0.5 - _CHORD / 2.0, top + BURIED)
     with tree.frame("Posts"):
-        post = tree.node("GeometryNodeSwitch", input_type="GEOMETRY", switch=lattice, false=pipe, true=girder).value
+        post = op.switch(sign.lattice, pipe, girder)
         posts = put_on(places, post, op.vector(tree, 1.0, 1.0, op.named_attribute(tree, "tall")))
-        posts = paint_faces(posts, material)
+        posts = paint_faces(posts, sign.material)
     tree.output("Mesh", posts, description="Posts")
 
 
@@ -67,14 +65,12 @@ def _lattice(tree: Tree, radius: Value, height: Value) -> Value:
     chords = row_of_points(tree, 3)
     foot = corner(op.index(tree))
     chords = bars(chords, foot, foot + (0.0, 0.0, 1.0), _CHORD)
-    panels = op.rounded_up(height / _PANEL)
+    panels = op.round_up(height / _PANEL)
     number = op.index(tree)
     side, panel = number // panels, number % panels
     odd = panel % 2
     start = corner(side + odd) + op.vector(tree, 0.0, 0.0, panel * _PANEL)
     end = corner(side + 1 - odd) + op.vector(tree, 0.0, 0.0, (panel + 1) * _PANEL)
     diagonals = bars(row_of_points(tree, panels * 3), start, end, _DIAGONAL)
-    squeezed = tree.node(
-        "GeometryNodeTransform", diagonals, scale=op.vector(tree, 1.0, 1.0, 1.0 / (panels * _PANEL))
-    ).value
+    squeezed = op.transform(diagonals, scale=op.vector(tree, 1.0, 1.0, 1.0 / (panels * _PANEL)))
     return op.join(chords, squeezed)

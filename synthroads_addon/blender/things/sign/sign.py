@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
-import bpy
-
 from ....base.classes import class_id
+from ....road.parameters import TrafficSign
 from ....road.things.body_shapes import SIGN_RAIL
 from ...nodes import operations as op
-from ...nodes.builder import Tree, Value, node_group
-from ...nodes.solids import box, move_geometry, paint_faces, put_on_points, row_of_points
-from ...nodes.standing import declare_standing, put_on
-from ...nodes.tubes import tube
-from .face import declare_face, sign_face_group
+from ...nodes.builder import Tree, Value, makes_group
+from ...nodes.inputs import Inputs, boolean, integer, material_of, metres
+from ...nodes.solids import box, move_geometry, paint_faces, put_on_points, row_of_points, tube
+from ...nodes.standing import Standing, put_on
+from ..model_builder import ModelBuilder
+from .face import Face, sign_face_group
+from .looks import sign_face_inputs
 from .outline import SHAPES
 from .posts import MOST_POSTS, sign_posts_group
 
@@ -31,49 +30,27 @@ _PLAY = 0.0005  # m between rails and what is before and behind them
 _CLAMP = (0.006, 0.05)  # m beyond the post, and in height
 
 
-def sign_group() -> bpy.types.NodeTree:
-    """Return the group SR Sign."""
-    return node_group("SR Sign", _build)
+class _Sign(Inputs):
+    lower_edge = metres(2.0, (0.0, 10.0), "Lower edge of the face above the surface")
+    posts = integer(1, (1, MOST_POSTS), "Number of posts")
+    post_diameter = metres(0.076, (0.02, 0.5), "Diameter of a post")
+    lattice = boolean(False, "Lattice posts instead of tubes")
+    post_material = material_of("the posts")
 
 
-@dataclass(frozen=True)
-class _Sign:
-    face: dict[str, Value]
-    lower_edge: Value
-    posts: Value
-    diameter: Value
-    lattice: Value
-    material: Value
-
-
-def _declare(tree: Tree) -> _Sign:
-    def metres(name: str, default: float, limits: tuple[float, float], description: str) -> Value:
-        return tree.number(name, default, limits, unit="m", description=description)
-
-    return _Sign(
-        face=declare_face(tree),
-        lower_edge=metres("Lower Edge", 2.0, (0.0, 10.0), "Lower edge of the face above the surface"),
-        posts=tree.integer("Posts", 1, (1, MOST_POSTS), description="Number of posts"),
-        diameter=metres("Post Diameter", 0.076, (0.02, 0.5), "Diameter of a post"),
-        lattice=tree.boolean("Lattice", False, description="Lattice posts instead of tubes"),
-        material=tree.input("Post Material", "Material", description="Material of the posts"),
-    )
-
-
-def _build(tree: Tree) -> None:
+@makes_group("SR Sign")
+def sign_group(tree: Tree) -> None:
     """A traffic sign on its posts, facing those who drive along +y; points carry ``heading`` and ``elevation``."""
-    standing = declare_standing(tree)
-    sign = _declare(tree)
-    face = sign.face
+    standing, face, sign = Standing(tree), Face(tree), _Sign(tree)
 
     with tree.frame("What is behind the face, by its shape"):
-        behind = op.choose(face["shape"], [_BEHIND[shape] for shape in SHAPES])
+        behind = op.choose(face.shape, [_BEHIND[shape] for shape in SHAPES])
         top, spread, long = (op.component(behind, axis) for axis in "XYZ")
     with tree.frame("Face, in front of the posts"):
-        plate = tree.call(sign_face_group(), instance=standing.instance, **face).value
-        front = (sign.diameter * 0.5 + face["thickness"] + SIGN_RAIL) * -1.0
-        plate = move_geometry(plate, op.vector(tree, 0.0, front, sign.lower_edge + face["height"] * 0.5))
-    mounting = _mounting(tree, sign, spread, long)
+        plate = tree.call(sign_face_group(), instance=standing.instance, **face.values).value
+        front = (sign.post_diameter * 0.5 + face.thickness + SIGN_RAIL) * -1.0
+        plate = move_geometry(plate, op.vector(tree, 0.0, front, sign.lower_edge + face.height * 0.5))
+    mounting = _mounting(tree, face, sign, spread, long)
     with tree.frame("Put onto the points"):
         places = standing.places()
         mesh = put_on(places, op.join(plate, mounting))
@@ -84,35 +61,58 @@ def _build(tree: Tree) -> None:
             road=standing.road,
             terrain=standing.terrain,
             posts=sign.posts,
-            width=face["width"],
-            top=sign.lower_edge + face["height"] * top,
-            post_diameter=sign.diameter,
+            width=face.width,
+            top=sign.lower_edge + face.height * top,
+            post_diameter=sign.post_diameter,
             lattice=sign.lattice,
-            material=sign.material,
+            material=sign.post_material,
         ).value
     with tree.frame("Labels"):
-        mesh = standing.labelled(op.join(mesh, posts), class_id("road_sign"))
+        mesh = standing.label(op.join(mesh, posts), class_id("road_sign"))
     tree.output("Mesh", mesh, description="Sign with its posts")
 
 
-def _mounting(tree: Tree, sign: _Sign, spread: Value, long: Value) -> Value:
+def _mounting(tree: Tree, face: Face, sign: _Sign, spread: Value, long: Value) -> Value:
     """Return the rails behind the face, and the clamps that hold them to the posts."""
-    face = sign.face
     with tree.frame("Rails behind the face, one above the other"):
-        count = op.rounded_up(op.maximum(face["height"] / _RAIL_SPACING, 2.0))
+        count = op.round_up(op.maximum(face.height / _RAIL_SPACING, 2.0))
 
         def level(number: Value) -> Value:
-            return sign.lower_edge + face["height"] * spread * ((number + 0.5) / count)
+            return sign.lower_edge + face.height * spread * ((number + 0.5) / count)
 
         # A little less deep than the gap: faces that coincide with the plate's have no first hit.
-        bar = box(tree, op.vector(tree, face["width"] * long, SIGN_RAIL - 2.0 * _PLAY, SIGN_RAIL))
-        depth = (sign.diameter + SIGN_RAIL) * -0.5
+        bar = box(tree, op.vector(tree, face.width * long, SIGN_RAIL - 2.0 * _PLAY, SIGN_RAIL))
+        depth = (sign.post_diameter + SIGN_RAIL) * -0.5
         rails = put_on_points(row_of_points(tree, count), bar, op.vector(tree, 0.0, depth, level(op.index(tree))))
     with tree.frame("Clamps around the posts"):
-        radius, height = sign.diameter * 0.5 + _CLAMP[0], _CLAMP[1]
+        radius, height = sign.post_diameter * 0.5 + _CLAMP[0], _CLAMP[1]
         clamp = tube(tree, radius, height, 8)
         number = op.index(tree)
-        beside = (((number % sign.posts) + 0.5) / sign.posts - 0.5) * face["width"]
+        beside = (((number % sign.posts) + 0.5) / sign.posts - 0.5) * face.width
         place = op.vector(tree, beside, 0.0, level(number // sign.posts) - height / 2.0)
         clamps = put_on_points(row_of_points(tree, sign.posts * count), clamp, place)
-        return paint_faces(op.join(rails, clamps), face["back_material"])
+        return paint_faces(op.join(rails, clamps), face.back_material)
+
+
+_LARGE = 8.0
+"""Area of a board from which it stands on lattice posts, m2."""
+_LARGE_POST, _MOST_LATTICES = 0.15, 2
+"""Least diameter of lattice posts, m, and their number at most."""
+
+
+def build_signs(builder: ModelBuilder) -> None:
+    """Make one object per traffic sign."""
+    for name, sign in builder.parameters.of_type(TrafficSign).items():
+        builder.add_thing(
+            name,
+            sign,
+            sign_group(),
+            **sign_face_inputs(sign),
+            lattice=_stands_on_lattices(sign),
+            post_material="galvanised_steel",
+        )
+
+
+def _stands_on_lattices(sign: TrafficSign) -> bool:
+    large = sign.width * sign.height >= _LARGE
+    return large and sign.post_diameter >= _LARGE_POST and sign.posts <= _MOST_LATTICES

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import bpy
-
 from ...nodes import operations as op
-from ...nodes.builder import Tree, node_group
+from ...nodes.builder import Tree, makes_group
+from ...nodes.inputs import Inputs, boolean, socket
 from ...nodes.solids import move_geometry
 
 LINES = 6
@@ -19,52 +18,57 @@ _SMALLEST = 0.02
 """Letters lower than this (m) can't be read and are left out."""
 
 
-def sign_writing_group() -> bpy.types.NodeTree:
-    """Return the group SR Sign Writing."""
-    return node_group("SR Sign Writing", _build)
+_LINE = "Writing; empty lines take no room"
 
 
-def sign_line_group() -> bpy.types.NodeTree:
-    """Return the group SR Sign Line."""
-    return node_group("SR Sign Line", _build_line)
+class _Writing(Inputs):
+    line_1 = socket("String", _LINE)
+    line_2 = socket("String", _LINE)
+    line_3 = socket("String", _LINE)
+    line_4 = socket("String", _LINE)
+    line_5 = socket("String", _LINE)
+    line_6 = socket("String", _LINE)
+    low_corner = socket("Vector", "Lower left corner of the box (m)")
+    high_corner = socket("Vector", "Upper right corner of the box (m)")
+    flush_left = boolean(False, "Lines begin on the left, else they are centred")
 
 
-def _build(tree: Tree) -> None:
+@makes_group("SR Sign Writing")
+def sign_writing_group(tree: Tree) -> None:
     """Lines of writing in the xy plane, one below the other, all of one size: as large as fits into the box."""
-    lines = [
-        tree.input(f"Line {number}", "String", description="Writing; empty lines take no room")
-        for number in range(1, LINES + 1)
-    ]
-    low = tree.input("Low Corner", "Vector", description="Lower left corner of the box (m)")
-    high = tree.input("High Corner", "Vector", description="Upper right corner of the box (m)")
-    flush = tree.boolean("Flush Left", False, description="Lines begin on the left, else they are centred")
+    writing = _Writing(tree)
+    low, high = writing.low_corner, writing.high_corner
 
     with tree.frame("Letters of size 1, and the length of each line"):
-        written = [tree.call(sign_line_group(), writing=line) for line in lines]
+        written = [
+            tree.call(sign_line_group(), writing=line)
+            for line in (writing.values[f"line_{number}"] for number in range(1, LINES + 1))
+        ]
         longest = written[0]["Length"]
         for line in written[1:]:
             longest = op.maximum(longest, line["Length"])
     with tree.frame("Height of a line, and size of the letters"):
         above = [tree.node("FunctionNodeInputInt", integer=0).value]
         for line in written:
-            above.append(above[-1] + op.rounded_up(op.minimum(line["Length"], 1.0)))
+            above.append(above[-1] + op.round_up(op.minimum(line["Length"], 1.0)))
         pitch = op.component(high - low, "Y") / op.maximum(above[-1], 1.0)
         room = op.component(high - low, "X")
         size = op.minimum(pitch * (LETTERS / CAPITAL), room / op.maximum(longest, 1e-3))
     placed = []
     for number, line in enumerate(written):
         with tree.frame(f"Line {number + 1} in its place"):
-            left = op.component(low, "X") + op.switch(flush, (room - line["Length"] * size) * 0.5, 0.0)
+            left = op.component(low, "X") + op.switch(writing.flush_left, (room - line["Length"] * size) * 0.5, 0.0)
             base = op.component(high, "Y") - pitch * (above[number] + 0.5) - size * (CAPITAL / 2.0)
             place, scale = op.vector(tree, left, base), op.vector(tree, size, size, 1.0)
-            placed.append(tree.node("GeometryNodeTransform", line.value, translation=place, scale=scale).value)
+            placed.append(op.transform(line.value, translation=place, scale=scale))
     with tree.frame("Filled"):
         mesh = op.realize(tree.node("GeometryNodeFillCurve", op.join(*placed)).value)
         mesh = op.only_if(size * CAPITAL > _SMALLEST, mesh)
     tree.output("Mesh", mesh, description="Letters, facing +z")
 
 
-def _build_line(tree: Tree) -> None:
+@makes_group("SR Sign Line")
+def sign_line_group(tree: Tree) -> None:
     """The outlines of one line's letters of size 1 in the xy plane, from x = 0 on."""
     writing = tree.input("Writing", "String", description="What is written")
     with tree.frame("Letters"):

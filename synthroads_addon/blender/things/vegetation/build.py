@@ -3,22 +3,27 @@
 from __future__ import annotations
 
 import math
+from functools import cache
 from typing import Any
 
-import bpy
-
+from ....base.files import PRESETS
+from ....base.schema import read_json
 from ....road.parameters import Vegetation
-from ...materials import material
 from ..model_builder import ModelBuilder
 from .grass import grass_group
 from .shrub import shrub_group
-from .species import GRASSES, SHRUBS, TREES
 from .tree import tree_group
 
-_KINDS = {"grass": (grass_group, GRASSES), "shrub": (shrub_group, SHRUBS), "tree": (tree_group, TREES)}
-"""Kind of plant -> its group, and the shapes of its species."""
+_GROUPS = {"grass": grass_group, "shrub": shrub_group, "tree": tree_group}
 _ROADSIDE_SHARE = 0.8
 """Grass on verges and median, as a share of the density elsewhere; reed grows on neither."""
+
+
+@cache
+def species_shapes() -> dict[str, dict[str, dict[str, float]]]:
+    """Return the shapes of the species by kind of plant and name: inputs of its group, for a plant of height 1."""
+    shapes: dict[str, dict[str, dict[str, float]]] = read_json(PRESETS / "plants.json")
+    return shapes
 
 
 def build_vegetation(builder: ModelBuilder) -> None:
@@ -27,29 +32,23 @@ def build_vegetation(builder: ModelBuilder) -> None:
     if terrain is None or "Terrain" not in builder.objects or builder.detail == 0.0:
         return
     for name, plants in builder.parameters.of_type(Vegetation).items():
-        inputs: dict[str, Any] = {
-            **builder.surfaces("Backbone"),
-            "Density": plants.density,
-            "Band Start": plants.band_start,
-            "Band End": plants.band_end,
-            "Smallest Height": plants.height_min,
-            "Largest Height": plants.height_max,
-            "Reach": terrain.half_width,
-            "First Metre": math.floor(builder.stretch[0]),
-            "Zero": builder.zero,
-            "Seed": plants.seed % 2**30,
-            "Detail": builder.detail,
-            "Instance": plants.instance,
-        }
-        group, shapes = _KINDS[plants.kind]
-        inputs |= shapes[plants.species]
-        builder.add(name, bpy.data.meshes.new("SR Plants"), group(), inputs | _extra(plants, builder))
+        builder.add_thing(
+            name,
+            plants,
+            _GROUPS[plants.kind](),
+            reach=terrain.half_width,
+            first_metre=math.floor(builder.stretch[0]),
+            zero=builder.zero,
+            seed=plants.seed % 2**30,
+            detail=builder.detail,
+            **species_shapes()[plants.kind][plants.species],
+            **_further_inputs(plants, builder),
+        )
 
 
-def _extra(plants: Vegetation, builder: ModelBuilder) -> dict[str, Any]:
+def _further_inputs(plants: Vegetation, builder: ModelBuilder) -> dict[str, Any]:
     """Return the inputs that only one kind of plant has: materials, and the density on verges and median."""
     if plants.kind == "grass":
         roadside = plants.density * _ROADSIDE_SHARE * (plants.species != "reed")
-        return {"Roadside Density": roadside, "Roadside Reach": builder.widest, "Material": material(plants.species)}
-    parts = {"Bark Material": "bark", "Leaves Material": "leaves"}
-    return {name: material(f"{plants.species}_{part}") for name, part in parts.items()}
+        return {"roadside_density": roadside, "roadside_reach": builder.widest, "material": plants.species}
+    return {"bark_material": f"{plants.species}_bark", "leaves_material": f"{plants.species}_leaves"}

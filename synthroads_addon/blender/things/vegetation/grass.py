@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import bpy
-
 from ....base.classes import class_id
 from ...nodes import operations as op
-from ...nodes.builder import Tree, Value, node_group
-from .plants import declare_stand, one_high, plant_points, points_in_band, points_on
+from ...nodes.builder import Tree, Value, makes_group
+from ...nodes.inputs import Inputs, integer, material_of, metres, number, share
+from ...nodes.solids import Point
+from .plants import Stand, one_high, plant_points, points_in_band, points_on
 
 _VARIANTS = 4
 _GOLDEN_ANGLE = 2.4
@@ -17,91 +17,78 @@ _BLADE = [(0.0, -0.5, -0.04), (0.0, 0.5, -0.04), (0.0, 0.0, 1.0)]
 _STALK = [(0.0, 0.0, -0.04), (0.10, -0.5, 0.78), (0.10, 0.5, 0.78), (0.2, 0.0, 1.0)]
 
 
-def grass_group() -> bpy.types.NodeTree:
-    """Return the group SR Grass."""
-    return node_group("SR Grass", _build)
+class _Roadside(Inputs):
+    roadside_density = number(1.0, (0.0, 50.0), "Tufts per area of verge and median (1/m2)")
+    roadside_reach = metres(30.0, (1.0, 100.0), "Farthest verge from the axis")
+    roadside_height = share(0.5, (0.0, 1.0), "Height there, as a share of the height elsewhere")
+    material = material_of("the blades")
 
 
-def _build(tree: Tree) -> None:
+class _Tuft(Inputs):
+    blades = integer(8, (1, 200), "Blades of a tuft")
+    blade_width = metres(0.11, (0.002, 1.0), "Width of a blade at its foot")
+    spread = metres(0.4, (0.0, 2.0), "Radius of the tuft on the ground")
+    lean = number(0.8, (0.0, 1.5), "Lean of the outermost blades from the vertical", unit="rad")
+    stalks = integer(2, (1, 50), "Stalks of a tuft, taller than its blades")
+    ear_width = metres(0.07, (0.002, 1.0), "Width of a stalk's ear")
+    blade_height = share(0.75, (0.05, 1.0), "Length of the blades, of the stalks'")
+
+
+@makes_group("SR Grass")
+def grass_group(tree: Tree) -> None:
     """Tufts of grass in a band beside the road, and shorter ones on its verges and median."""
-    stand = declare_stand(tree, 1.0, (0.1, 0.45), (0.0, 60.0))
-    beside = tree.number("Roadside Density", 1.0, (0.0, 50.0), description="Tufts per area of verge and median (1/m2)")
-    near = tree.number("Roadside Reach", 30.0, (1.0, 100.0), unit="m", description="Farthest verge from the axis")
-    about = "Height there, as a share of the height elsewhere"
-    short = tree.number("Roadside Height", 0.5, (0.0, 1.0), unit="share", description=about)
-    material = tree.input("Material", "Material", description="Material of the blades")
+    stand, roadside = Stand(tree), _Roadside(tree)
     with tree.panel("Shape at height 1"):
-        shape = _declare_tuft(tree)
+        shape = _Tuft(tree)
 
     with tree.frame("Places on the terrain"):
         points = points_in_band(tree, stand, stand.density * stand.detail)
         points = op.store(points, "share", 1.0)
     with tree.frame("Places on verges and median"):
-        roadside = op.named_attribute(tree, "class_id", "INT").equals(class_id("roadside"))
-        faces = op.separate(op.object_geometry(stand.road), roadside, "FACE")
-        mown = points_on(tree, stand, faces, beside * stand.detail, near, stand.seed + 7)
-        points = op.join(points, op.store(mown, "share", short))
+        beside = op.named_attribute(tree, "class_id", "INT").equals(class_id("roadside"))
+        faces = op.separate(op.object_geometry(stand.road), beside, "FACE")
+        density = roadside.roadside_density * stand.detail
+        mown = points_on(tree, stand, faces, density, roadside.roadside_reach, stand.seed + 7)
+        points = op.join(points, op.store(mown, "share", roadside.roadside_height))
     with tree.frame("Kinds of tufts"):
-        variants = [tree.call(tuft_group(), **shape, seed=100 * n).value for n in range(_VARIANTS)]
+        variants = [tree.call(tuft_group(), **shape.values, seed=100 * n).value for n in range(_VARIANTS)]
     with tree.frame("Tufts"):
         share = op.named_attribute(tree, "share")
-        height = op.random(tree, stand.lowest, stand.tallest, stand.seed + 3) * share
+        height = op.random(tree, stand.smallest_height, stand.largest_height, stand.seed + 3) * share
         # Low tufts are broad for their height. Fewer tufts are broader, so that they cover as much of the ground.
-        broad = (height + stand.tallest * share) * 0.65 / op.unary("SQRT", op.maximum(stand.detail, 0.05))
+        broad = (height + stand.largest_height * share) * 0.65 / op.unary("SQRT", op.maximum(stand.detail, 0.05))
         mesh = plant_points(tree, stand, points, variants, op.vector(tree, broad, broad, height), 0.12)
-        mesh = op.label(mesh, class_id("vegetation"), stand.instance, material)
+        mesh = op.label(mesh, class_id("vegetation"), stand.instance, roadside.material)
     tree.output("Mesh", mesh, description="Grass; only faces that scanner and camera can see")
 
 
-def _declare_tuft(tree: Tree) -> dict[str, Value]:
-    return {
-        "blades": tree.integer("Blades", 8, (1, 200), description="Blades of a tuft"),
-        "blade_width": tree.number(
-            "Blade Width", 0.11, (0.002, 1.0), unit="m", description="Width of a blade at its foot"
-        ),
-        "spread": tree.number("Spread", 0.4, (0.0, 2.0), unit="m", description="Radius of the tuft on the ground"),
-        "lean": tree.number(
-            "Lean", 0.8, (0.0, 1.5), unit="rad", description="Lean of the outermost blades from the vertical"
-        ),
-        "stalks": tree.integer("Stalks", 2, (1, 50), description="Stalks of a tuft, taller than its blades"),
-        "ear_width": tree.number("Ear Width", 0.07, (0.002, 1.0), unit="m", description="Width of a stalk's ear"),
-        "blade_height": tree.number(
-            "Blade Height", 0.75, (0.05, 1.0), unit="share", description="Length of the blades, of the stalks'"
-        ),
-    }
-
-
-def tuft_group() -> bpy.types.NodeTree:
-    """Return the group SR Grass Tuft."""
-    return node_group("SR Grass Tuft", _build_tuft)
-
-
-def _build_tuft(tree: Tree) -> None:
+@makes_group("SR Grass Tuft")
+def tuft_group(tree: Tree) -> None:
     """One tuft of height 1: blades all around, and some stalks in the middle."""
-    shape = _declare_tuft(tree)
+    shape = _Tuft(tree)
     seed = tree.integer("Seed", 0, (0, 2**30), description="Seed of the blades")
     with tree.frame("A blade"):
         disc = tree.node("GeometryNodeMeshCircle", vertices=3, fill_type="NGON").value
-        blade = _shape_blade(disc, _BLADE, shape["blade_width"])
+        blade = _shape_blade(disc, _BLADE, shape.blade_width)
     with tree.frame("Blades, the outer ones lean more"):
-        blades = _around(tree, blade, shape["blades"], shape["spread"], shape["lean"], seed)
+        blades = _around(tree, blade, shape.blades, shape.spread, shape.lean, seed)
     with tree.frame("A stalk with its ear"):
         face = tree.node("GeometryNodeMeshGrid", vertices_x=2, vertices_y=2).value
-        stalk = _shape_blade(face, _STALK, shape["ear_width"])
+        stalk = _shape_blade(face, _STALK, shape.ear_width)
     with tree.frame("Stalks"):
-        stalks = _around(tree, stalk, shape["stalks"], shape["spread"] * 0.6, shape["lean"] * 0.3, seed + 50)
+        stalks = _around(tree, stalk, shape.stalks, shape.spread * 0.6, shape.lean * 0.3, seed + 50)
     with tree.frame("Blades of their height, all 1 high"):
-        low = op.vector(tree, 1.0, 1.0, shape["blade_height"])
-        place = tree.node("ShaderNodeVectorMath", op.position(tree), low, operation="MULTIPLY").value
+        low = op.vector(tree, 1.0, 1.0, shape.blade_height)
+        place = op.position(tree) * low
         blades = op.set_position(blades, place)
         tuft = one_high(op.join(blades, stalks))
     tree.output("Mesh", tuft, description="The tuft's blades")
 
 
-def _shape_blade(face: Value, outline: list[tuple[float, float, float]], width: Value) -> Value:
+def _shape_blade(face: Value, outline: list[Point], width: Value) -> Value:
     tree = face.tree
     size = op.vector(tree, 1.0, width, 1.0)
-    place = tree.node("ShaderNodeVectorMath", op.choose(op.index(tree), outline), size, operation="MULTIPLY").value
+    place = op.choose(op.index(tree), outline) * size
     return op.set_position(face, place)
 
 

@@ -6,12 +6,10 @@ beside: a stretch of a road has the whole road's plants.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from ...nodes import operations as op
 from ...nodes.backbone import first_station, last_station, look_up, station_ribbon
 from ...nodes.builder import Operand, Tree, Value
-from ...nodes.strip import INSTANCES
+from ...nodes.inputs import Inputs, backbone_socket, instance_number, integer, metres, number, share, socket
 
 _SPARE = 1.5
 """Places that are looked at for each one that is wanted: outside of curves and on slopes there is more ground to a
@@ -23,53 +21,29 @@ _NEEDED_NO_MORE = ("distance", "station", "offset", "edge", "share", "id")
 """Attributes of the places that the plants' many points would only carry along."""
 
 
-@dataclass(frozen=True)
-class Stand:
+class Stand(Inputs):
     """Inputs of a stand of plants, common to all kinds."""
 
-    backbone: Value
-    terrain: Value
-    road: Value
-    density: Value
-    start: Value
-    end: Value
-    lowest: Value
-    tallest: Value
-    reach: Value
-    first_metre: Value
-    zero: Value
-    seed: Value
-    detail: Value
-    instance: Value
-
-
-def declare_stand(tree: Tree, density: float, heights: tuple[float, float], band: tuple[float, float]) -> Stand:
-    """Declare the inputs common to all kinds of plants."""
-    metres = (0, 2**20)
-    return Stand(
-        backbone=tree.input("Backbone", "Object", description="Polyline along the axis with its attributes"),
-        terrain=tree.input("Terrain", "Object", description="Terrain whose points carry their distance"),
-        road=tree.input("Road", "Object", description="Road, for its verges and median"),
-        density=tree.number("Density", density, (0.0, 50.0), description="Plants per area (1/m2)"),
-        start=tree.number(
-            "Band Start", band[0], (-5.0, 1000.0), unit="m", description="From the outer edge of the verge"
-        ),
-        end=tree.number("Band End", band[1], (-5.0, 1000.0), unit="m", description="From the outer edge of the verge"),
-        lowest=tree.number("Smallest Height", heights[0], (0.01, 60.0), unit="m", description="Height of the smallest"),
-        tallest=tree.number("Largest Height", heights[1], (0.01, 60.0), unit="m", description="Height of the tallest"),
-        reach=tree.number("Reach", 60.0, (1.0, 1000.0), unit="m", description="Farthest ground from the axis"),
-        first_metre=tree.integer("First Metre", 0, metres, description="Whole metre of the road that it begins with"),
-        zero=tree.integer("Zero", 0, metres, description="Whole metre of the road that the stations count from"),
-        seed=tree.integer("Seed", 0, (0, 2**31 - 1), description="Seed of places, sizes and turns"),
-        detail=tree.number("Detail", 1.0, (0.0, 1.0), unit="share", description="Share of the triangles"),
-        instance=tree.integer("Instance", 0, INSTANCES, description="Instance number of the faces"),
-    )
+    backbone = backbone_socket("Object")
+    terrain = socket("Object", "Terrain whose points carry their distance")
+    road = socket("Object", "Road, for its verges and median")
+    density = number(1.0, (0.0, 50.0), "Plants per area (1/m2)")
+    band_start = metres(0.0, (-5.0, 1000.0), "From the outer edge of the verge")
+    band_end = metres(60.0, (-5.0, 1000.0), "From the outer edge of the verge")
+    smallest_height = metres(0.1, (0.01, 60.0), "Height of the smallest")
+    largest_height = metres(0.45, (0.01, 60.0), "Height of the tallest")
+    reach = metres(60.0, (1.0, 1000.0), "Farthest ground from the axis")
+    first_metre = integer(0, (0, 2**20), "Whole metre of the road that it begins with")
+    zero = integer(0, (0, 2**20), "Whole metre of the road that the stations count from")
+    seed = integer(0, (0, 2**31 - 1), "Seed of places, sizes and turns")
+    detail = share(1.0, (0.0, 1.0), "Share of the triangles")
+    instance = instance_number()
 
 
 def points_in_band(tree: Tree, stand: Stand, density: Operand) -> Value:
     """Return points spread at random over the terrain in the band."""
     surface = op.object_geometry(stand.terrain)
-    return points_on(tree, stand, surface, density, stand.reach, stand.seed, (stand.start, stand.end))
+    return points_on(tree, stand, surface, density, stand.reach, stand.seed, (stand.band_start, stand.band_end))
 
 
 def points_on(
@@ -93,17 +67,17 @@ def points_on(
     axis = op.object_geometry(stand.backbone)
     ribbon = station_ribbon(axis)
     first = stand.first_metre - stand.zero
-    rows = _integer(op.rounded_up(last_station(axis)) - first, 0)
+    rows = _integer(op.round_up(last_station(axis)) - first, 0)
     per_metre = reach * 2.0 * density
-    each = _integer(op.rounded_up(per_metre * _SPARE), 1)
+    each = _integer(op.round_up(per_metre * _SPARE), 1)
     points = tree.node("GeometryNodePoints", count=rows * each).value
     number = op.index(tree)
     metre = number // each
     # A number of its own for every place on the road, however much of the road is here.
     points = op.store(points, "id", (stand.first_metre + metre) * each + number % each)
-    own = op.named_attribute(tree, "id", "INT")
-    points = op.store(points, "station", (metre + first) + op.random(tree, 0.0, 1.0, seed + 11, own))
-    points = op.store(points, "offset", op.random(tree, -1.0, 1.0, seed + 12, own) * reach)
+    identity = op.named_attribute(tree, "id", "INT")
+    points = op.store(points, "station", (metre + first) + op.random(tree, 0.0, 1.0, seed + 11, identity))
+    points = op.store(points, "offset", op.random(tree, -1.0, 1.0, seed + 12, identity) * reach)
     station, offset = op.named_attribute(tree, "station"), op.named_attribute(tree, "offset")
     points = op.delete_points(points, (station < first_station(axis)) | (station > last_station(axis)))
     above = look_up(ribbon, "axis", station) + look_up(ribbon, "left", station) * offset + (0.0, 0.0, _ABOVE)
@@ -117,8 +91,8 @@ def points_on(
     )
     # Ground per metre of road and metre across it: longer outside of a curve, and on a slope.
     ground = 1.0 - look_up(ribbon, "curvature", station) * offset
-    wanted = per_metre * ground / op.maximum(op.component(ray["Hit Normal"], "Z"), 0.1)
-    gone = ~ray["Is Hit"] | (op.random(tree, 0.0, 1.0, seed + 13, own) * each > wanted)
+    needed = per_metre * ground / op.maximum(op.component(ray["Hit Normal"], "Z"), 0.1)
+    gone = ~ray["Is Hit"] | (op.random(tree, 0.0, 1.0, seed + 13, identity) * each > needed)
     if band is not None:
         gone = gone | (ray["Attribute"] < band[0]) | (ray["Attribute"] > band[1])
     return op.set_position(op.delete_points(points, gone), ray["Hit Position"])
@@ -154,5 +128,5 @@ def one_high(plant: Value) -> Value:
     tree = plant.tree
     top = op.component(tree.node("GeometryNodeBoundBox", plant)["Max"], "Z")
     size = op.vector(tree, 1.0, 1.0, 1.0 / top)
-    place = tree.node("ShaderNodeVectorMath", op.position(tree), size, operation="MULTIPLY").value
+    place = op.position(tree) * size
     return op.set_position(plant, place)

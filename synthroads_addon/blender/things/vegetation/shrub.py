@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import bpy
-
 from ....base.classes import class_id
 from ...nodes import operations as op
-from ...nodes.builder import Tree, Value, node_group
-from .crown import bend_stems, crown_group, declare_crown, declare_materials, declare_plant
-from .plants import declare_stand, plant_points, points_in_band
+from ...nodes.builder import Tree, Value, makes_group
+from ...nodes.inputs import metres
+from .crown import Crown, Plant, PlantMaterials, bend_stems, crown_group
+from .plants import Stand, plant_points, points_in_band
 
 # Kinds of one species: seed, and a factor on the crown's radius.
 _KINDS = ((5, 1.0), (17, 0.82), (29, 1.15))
@@ -26,52 +25,46 @@ _DEFAULTS = {
 }
 
 
-def shrub_group() -> bpy.types.NodeTree:
-    """Return the group SR Shrub."""
-    return node_group("SR Shrub", _build)
+_STAND = {"density": 0.006, "smallest_height": 0.5, "largest_height": 3.0, "band_start": 2.0, "band_end": 60.0}
 
 
-def _build(tree: Tree) -> None:
+class _Shape(Crown):
+    stem_radius = metres(0.015, (0.0005, 0.2), "Radius of the thickest stem")
+
+
+@makes_group("SR Shrub")
+def shrub_group(tree: Tree) -> None:
     """Shrubs of one species in a band beside the road, of three kinds, with gaps between their leaves."""
-    stand = declare_stand(tree, 0.006, (0.5, 3.0), (2.0, 60.0))
+    stand = Stand(tree, **_STAND)
     with tree.panel("Shape at height 1"):
-        shape = declare_crown(tree, **_DEFAULTS) | {"stem_radius": _stem_radius(tree)}
+        shape = _Shape(tree, **_DEFAULTS)
     with tree.panel("Materials"):
-        materials = declare_materials(tree)
+        materials = PlantMaterials(tree)
     with tree.frame("Places"):
         points = points_in_band(tree, stand, stand.density)
     with tree.frame("Kinds of shrubs"):
-        kinds = [_kind(tree, {**shape, **materials, "detail": stand.detail}, *kind) for kind in _KINDS]
+        kinds = [_kind(tree, {**shape.values, **materials.values, "detail": stand.detail}, *kind) for kind in _KINDS]
     with tree.frame("Shrubs"):
-        tall = op.random(tree, stand.lowest, stand.tallest, stand.seed + 3)
+        tall = op.random(tree, stand.smallest_height, stand.largest_height, stand.seed + 3)
         broad = op.random(tree, 0.85, 1.25, stand.seed + 4)
         scale = op.vector(tree, tall * broad, tall * broad, tall)
         mesh = plant_points(tree, stand, points, kinds, scale, _LEAN)
-        mesh = op.store(mesh, "class_id", class_id("vegetation"), "FACE")
-        mesh = op.store(mesh, "instance_id", stand.instance, "FACE")
+        mesh = op.label(mesh, class_id("vegetation"), stand.instance)
     tree.output("Mesh", mesh, description="Shrubs")
-
-
-def _stem_radius(tree: Tree) -> Value:
-    return tree.number("Stem Radius", 0.015, (0.0005, 0.2), unit="m", description="Radius of the thickest stem")
 
 
 def _kind(tree: Tree, inputs: dict[str, Value], seed: int, wider: float) -> Value:
     return tree.call(shape_group(), **inputs | {"crown_radius": inputs["crown_radius"] * wider}, seed=seed).value
 
 
-def shape_group() -> bpy.types.NodeTree:
-    """Return the group SR Shrub Shape."""
-    return node_group("SR Shrub Shape", _build_shape)
-
-
-def _build_shape(tree: Tree) -> None:
+@makes_group("SR Shrub Shape")
+def shape_group(tree: Tree) -> None:
     """One shrub of height 1: stems and leaves."""
-    shape = declare_crown(tree, **_DEFAULTS)
-    radius = _stem_radius(tree)
-    plant = declare_plant(tree)
+    shape, plant = _Shape(tree, **_DEFAULTS), Plant(tree)
     with tree.frame("Stems and leaves"):
-        shrub = tree.call(crown_group(), **shape, **plant, branch_radius=radius, from_ground=True).value
+        shrub = tree.call(
+            crown_group(), **shape.crown(), **plant.values, branch_radius=shape.stem_radius, from_ground=True
+        ).value
     with tree.frame("Crooked, and 1 high"):
-        grown_up = bend_stems(tree, shrub, plant["seed"])
+        grown_up = bend_stems(tree, shrub, plant.seed)
     tree.output("Mesh", grown_up, description="The shrub, upright on the origin")

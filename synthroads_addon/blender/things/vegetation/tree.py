@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import bpy
-
 from ....base.classes import class_id
 from ...nodes import operations as op
-from ...nodes.builder import Tree, Value, node_group
-from .crown import bend_stems, crown_group, declare_crown, declare_materials, declare_plant
-from .plants import declare_stand, plant_points, points_in_band
+from ...nodes.builder import Tree, Value, makes_group
+from ...nodes.inputs import metres
+from ...nodes.solids import paint_faces
+from .crown import Crown, Plant, PlantMaterials, bend_stems, crown_group
+from .plants import Stand, plant_points, points_in_band
 
 # Kinds of one species: seed, and factors on the crown's bottom and radius.
 _KINDS = ((11, 1.0, 1.0), (23, 0.85, 0.86), (37, 1.2, 1.12))
@@ -18,59 +18,51 @@ _FOOT = 0.02
 _LEAN = 0.04
 
 
-def tree_group() -> bpy.types.NodeTree:
-    """Return the group SR Tree."""
-    return node_group("SR Tree", _build)
+_STAND = {"density": 0.005, "smallest_height": 5.0, "largest_height": 14.0, "band_start": 12.0, "band_end": 60.0}
 
 
-def _build(tree: Tree) -> None:
+class _Shape(Crown):
+    trunk_radius = metres(0.02, (0.001, 0.2), "Radius of the trunk at its foot")
+
+
+@makes_group("SR Tree")
+def tree_group(tree: Tree) -> None:
     """Trees of one species in a band beside the road, of three kinds, with gaps between their leaves."""
-    stand = declare_stand(tree, 0.005, (5.0, 14.0), (12.0, 60.0))
+    stand = Stand(tree, **_STAND)
     with tree.panel("Shape at height 1"):
-        shape = declare_crown(tree) | {"trunk_radius": _trunk_radius(tree)}
+        shape = _Shape(tree)
     with tree.panel("Materials"):
-        materials = declare_materials(tree)
+        materials = PlantMaterials(tree)
     with tree.frame("Places"):
         points = points_in_band(tree, stand, stand.density)
     with tree.frame("Kinds of trees"):
-        kinds = [_kind(tree, {**shape, **materials, "detail": stand.detail}, *kind) for kind in _KINDS]
+        kinds = [_kind(tree, {**shape.values, **materials.values, "detail": stand.detail}, *kind) for kind in _KINDS]
     with tree.frame("Trees"):
-        tall = op.random(tree, stand.lowest, stand.tallest, stand.seed + 3)
+        tall = op.random(tree, stand.smallest_height, stand.largest_height, stand.seed + 3)
         slender = op.random(tree, 0.9, 1.15, stand.seed + 4)
         scale = op.vector(tree, tall * slender, tall * slender, tall)
         mesh = plant_points(tree, stand, points, kinds, scale, _LEAN)
-        mesh = op.store(mesh, "class_id", class_id("vegetation"), "FACE")
-        mesh = op.store(mesh, "instance_id", stand.instance, "FACE")
+        mesh = op.label(mesh, class_id("vegetation"), stand.instance)
     tree.output("Mesh", mesh, description="Trees")
 
 
-def _trunk_radius(tree: Tree) -> Value:
-    about = "Radius of the trunk at its foot"
-    return tree.number("Trunk Radius", 0.02, (0.001, 0.2), unit="m", description=about)
-
-
 def _kind(tree: Tree, inputs: dict[str, Value], seed: int, lower: float, wider: float) -> Value:
-    own = {"crown_bottom": inputs["crown_bottom"] * lower, "crown_radius": inputs["crown_radius"] * wider}
-    return tree.call(shape_group(), **inputs | own, seed=seed).value
+    changed = {"crown_bottom": inputs["crown_bottom"] * lower, "crown_radius": inputs["crown_radius"] * wider}
+    return tree.call(shape_group(), **inputs | changed, seed=seed).value
 
 
-def shape_group() -> bpy.types.NodeTree:
-    """Return the group SR Tree Shape."""
-    return node_group("SR Tree Shape", _build_shape)
-
-
-def _build_shape(tree: Tree) -> None:
+@makes_group("SR Tree Shape")
+def shape_group(tree: Tree) -> None:
     """One tree of height 1: trunk, branches and leaves."""
-    shape = declare_crown(tree)
-    radius = _trunk_radius(tree)
-    plant = declare_plant(tree)
+    shape, plant = _Shape(tree), Plant(tree)
+    radius = shape.trunk_radius
     with tree.frame("Trunk, with a wider foot"):
         trunk = _trunk(tree, radius)
-        trunk = tree.node("GeometryNodeSetMaterial", trunk, material=plant["bark_material"]).value
+        trunk = paint_faces(trunk, plant.bark_material)
     with tree.frame("Crown"):
-        crown = tree.call(crown_group(), **shape, **plant, branch_radius=radius * 0.4).value
+        crown = tree.call(crown_group(), **shape.crown(), **plant.values, branch_radius=radius * 0.4).value
     with tree.frame("Crooked, and 1 high"):
-        grown_up = bend_stems(tree, op.join(trunk, crown), plant["seed"])
+        grown_up = bend_stems(tree, op.join(trunk, crown), plant.seed)
     tree.output("Mesh", grown_up, description="The tree, upright on the origin")
 
 
@@ -88,5 +80,5 @@ def _trunk(tree: Tree, radius: Value) -> Value:
     height = op.component(place, "Z")
     wider = 1.0 + 0.45 * op.maximum(1.0 - height * 12.0, 0.0)
     size = op.vector(tree, wider, wider, 1.0)
-    place = tree.node("ShaderNodeVectorMath", place, size, operation="MULTIPLY").value
+    place = place * size
     return op.set_position(trunk, place - (0.0, 0.0, _FOOT))

@@ -3,26 +3,31 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
-
-import bpy
+from collections.abc import Iterable
 
 from ...nodes import operations as op
-from ...nodes.builder import Tree, Value, node_group
-from ...nodes.solids import Point, box, move_geometry, paint_faces, put_on_points
+from ...nodes.builder import Tree, Value, makes_group
+from ...nodes.inputs import Inputs, boolean, material_of, metres, socket
+from ...nodes.solids import Point, box, move_geometry, paint_faces, put_on_points, row_of_points
 
-MATERIALS = {
-    "paint": "Paint, in the vehicle's colour",
-    "glass": "Windows",
-    "rubber": "Tyres",
-    "chrome": "Rims and bright metal",
-    "black": "Bumpers, frames and other dark parts",
-    "white_light": "Headlights",
-    "red_light": "Tail lights",
-    "plate": "Number plates",
-    "cover": "Tarpaulin or box of a truck",
-}
-"""Materials of a vehicle, and what has them."""
+
+class VehicleMaterials(Inputs):
+    """Materials of a vehicle."""
+
+    paint_material = socket("Material", "Paint, in the vehicle's colour")
+    glass_material = socket("Material", "Windows")
+    rubber_material = socket("Material", "Tyres")
+    chrome_material = socket("Material", "Rims and bright metal")
+    black_material = socket("Material", "Bumpers, frames and other dark parts")
+    white_light_material = socket("Material", "Headlights")
+    red_light_material = socket("Material", "Tail lights")
+    plate_material = socket("Material", "Number plates")
+    cover_material = socket("Material", "Tarpaulin or box of a truck")
+
+    def __getitem__(self, name: str) -> Value:
+        """Return a material by the name that parts have it by, such as ``paint``."""
+        return self.values[f"{name}_material"]
+
 
 _SIDES = 16
 # Cross-section of a wheel from the hub outside to the hub inside: radius as a share of the wheel's, and place across as
@@ -33,34 +38,33 @@ _SHARP = math.radians(38.0)
 """Faces that meet at a larger angle show an edge."""
 
 
-def declare_materials(tree: Tree) -> dict[str, Value]:
-    """Declare the material inputs."""
-    return {
-        key: tree.input(f"{key.replace('_', ' ').title()} Material", "Material", description=about)
-        for key, about in MATERIALS.items()
-    }
-
-
 def wheels(
-    tree: Tree, radius: float, width: float, places: Iterable[tuple[float, float]], materials: Mapping[str, Value]
+    tree: Tree, materials: VehicleMaterials, radius: float, width: float, axles: Iterable[tuple[float, float]]
 ) -> Value:
-    """Return wheels that stand on z = 0, at places (x of their middles, y); they look away from x = 0."""
-    inputs = {"rubber_material": materials["rubber"], "chrome_material": materials["chrome"]}
-    wheel = tree.call(_wheel_group(), radius=radius, wheel_width=width, **inputs).value
-    stands = [(x, y, radius) for x, y in places]
-    points = tree.node("GeometryNodeMeshLine", count=len(stands)).value
+    """Return wheels that stand on z = 0 and look away from x = 0.
+
+    Args:
+        tree: the group.
+        materials: by name.
+        radius, width: of a wheel.
+        axles: x of the middles of an axle's wheels, 0 for a single wheel, and y.
+    """
+    wheel = tree.call(
+        _wheel_group(),
+        radius=radius,
+        wheel_width=width,
+        rubber_material=materials.rubber_material,
+        chrome_material=materials.chrome_material,
+    ).value
+    stands = [(side * x, y, radius) for x, y in axles for side in ((-1.0, 1.0) if x else (1.0,))]
+    points = row_of_points(tree, len(stands))
     place = op.choose(op.index(tree), stands)
     turned = op.switch(op.component(place, "X") < 0.0, math.pi, 0.0)
     return op.realize(put_on_points(points, wheel, place, rotation=op.turn(tree, z=turned)))
 
 
-def pair(x: float, y: float) -> list[tuple[float, float]]:
-    """Return the places of an axle's two wheels."""
-    return [(-x, y), (x, y)]
-
-
 def boxes(
-    tree: Tree, items: Iterable[tuple[str, Point, Point]], materials: Mapping[str, Value], mirrored: bool = False
+    tree: Tree, materials: VehicleMaterials, items: Iterable[tuple[str, Point, Point]], mirrored: bool = False
 ) -> Value:
     """Return boxes: material, middle, size. Mirrored ones stand on both sides."""
     group = _box_group()
@@ -72,7 +76,13 @@ def boxes(
 
 
 def rod(
-    tree: Tree, start: Point, end: Point, radii: tuple[float, float], material: Value, mirrored: bool = False
+    tree: Tree,
+    materials: VehicleMaterials,
+    material: str,
+    start: Point,
+    end: Point,
+    radii: tuple[float, float],
+    mirrored: bool = False,
 ) -> Value:
     """Return a round, tapered, closed rod between two places."""
     radius, end_radius = radii
@@ -83,14 +93,14 @@ def rod(
         start_radius=radius,
         end_radius=end_radius,
         both_sides=mirrored,
-        material=material,
+        material=materials[material],
     ).value
 
 
-def ball(tree: Tree, middle: Point, size: Point, material: Value) -> Value:
+def ball(tree: Tree, materials: VehicleMaterials, material: str, middle: Point, size: Point) -> Value:
     """Return an ellipsoid of half axes `size`."""
     sphere = tree.node("GeometryNodeMeshUVSphere", segments=12, rings=8, radius=1.0).value
-    return paint_faces(tree.node("GeometryNodeTransform", sphere, translation=middle, scale=size).value, material)
+    return paint_faces(op.transform(sphere, translation=middle, scale=size), materials[material])
 
 
 def smooth(vehicle: Value) -> Value:
@@ -101,87 +111,90 @@ def smooth(vehicle: Value) -> Value:
     return tree.node("GeometryNodeSetShadeSmooth", rounded, angle > _SHARP, False, domain="EDGE").value
 
 
-def _wheel_group() -> bpy.types.NodeTree:
-    return node_group("SR Wheel", _build_wheel)
+class _Wheel(Inputs):
+    radius = metres(0.32, (0.05, 2.0), "Radius of the tyre")
+    wheel_width = metres(0.21, (0.02, 2.0), "Width of the tyre")
+    rubber_material = material_of("the tyre")
+    chrome_material = material_of("the rim")
 
 
-def _build_wheel(tree: Tree) -> None:
+@makes_group("SR Wheel")
+def _wheel_group(tree: Tree) -> None:
     """A wheel around the origin, its axle along x, whose outer side looks to -x."""
-    radius = tree.number("Radius", 0.32, (0.05, 2.0), unit="m", description="Radius of the tyre")
-    width = tree.number("Wheel Width", 0.21, (0.02, 2.0), unit="m", description="Width of the tyre")
-    rubber = tree.input("Rubber Material", "Material", description="Material of the tyre")
-    chrome = tree.input("Chrome Material", "Material", description="Material of the rim")
+    inputs = _Wheel(tree)
     with tree.frame("Profile, turned around the axle"):
         mesh, column, row = op.grid(tree, _SIDES + 1, len(_WHEEL))
         profile = op.choose(row, [(share, across, 0.0) for share, across in _WHEEL])
         # The lowest point of the tread is a corner of the polygon.
         angle = (column % _SIDES) * (2.0 * math.pi / _SIDES) + 0.5 * math.pi
-        out = op.component(profile, "X") * radius
-        across = op.component(profile, "Y") * width
+        out = op.component(profile, "X") * inputs.radius
+        across = op.component(profile, "Y") * inputs.wheel_width
         turned = op.vector(tree, -across, op.unary("COSINE", angle) * out, op.unary("SINE", angle) * out)
-        wheel = op.without_degenerate(op.set_position(mesh, turned))
+        wheel = op.delete_degenerate(op.set_position(mesh, turned))
     with tree.frame("Tyre and rim"):
-        wheel = paint_faces(wheel, rubber)
+        wheel = paint_faces(wheel, inputs.rubber_material)
         rim = (op.index(tree) % (len(_WHEEL) - 1)) < _RIM_FACES
-        wheel = tree.node("GeometryNodeSetMaterial", wheel, rim, material=chrome).value
+        wheel = paint_faces(wheel, inputs.chrome_material, rim)
     tree.output("Mesh", wheel, description="The wheel")
 
 
-def _box_group() -> bpy.types.NodeTree:
-    return node_group("SR Vehicle Box", _build_box)
+class _Sides(Inputs):
+    both_sides = boolean(False, "Another one stands on the other side of x = 0")
+    material = material_of("the faces")
 
 
-def _build_box(tree: Tree) -> None:
+class _Box(Inputs):
+    middle = socket("Vector", "Middle of the box (m)")
+    size = socket("Vector", "Its size (m)")
+
+
+@makes_group("SR Vehicle Box")
+def _box_group(tree: Tree) -> None:
     """A box, or one on each side of a vehicle."""
-    middle = tree.input("Middle", "Vector", description="Middle of the box (m)")
-    size = tree.input("Size", "Vector", description="Its size (m)")
-    both, material = _declare_sides(tree)
+    inputs, sides = _Box(tree), _Sides(tree)
+    middle, size, material = inputs.middle, inputs.size, sides.material
     with tree.frame("Box"):
         body = paint_faces(move_geometry(box(tree, size), middle), material)
     with tree.frame("On the other side"):
         other = move_geometry(box(tree, size), _mirror(middle))
-        body = op.join(body, op.only_if(both, paint_faces(other, material)))
+        body = op.join(body, op.only_if(sides.both_sides, paint_faces(other, material)))
     tree.output("Mesh", body, description="The box")
 
 
-def _rod_group() -> bpy.types.NodeTree:
-    return node_group("SR Vehicle Rod", _build_rod)
+class _Rod(Inputs):
+    start = socket("Vector", "Middle of its first end (m)")
+    end = socket("Vector", "Middle of its other end (m)")
+    start_radius = metres(0.05, (0.001, 5.0), "Radius at the first end")
+    end_radius = metres(0.05, (0.001, 5.0), "Radius at the other end")
 
 
-def _build_rod(tree: Tree) -> None:
+@makes_group("SR Vehicle Rod")
+def _rod_group(tree: Tree) -> None:
     """A round, tapered rod between two places, or one on each side of a vehicle."""
-    start = tree.input("Start", "Vector", description="Middle of its first end (m)")
-    end = tree.input("End", "Vector", description="Middle of its other end (m)")
-    thick = tree.number("Start Radius", 0.05, (0.001, 5.0), unit="m", description="Radius at the first end")
-    thin = tree.number("End Radius", 0.05, (0.001, 5.0), unit="m", description="Radius at the other end")
-    both, material = _declare_sides(tree)
+    inputs, sides = _Rod(tree), _Sides(tree)
+    start, end = inputs.start, inputs.end
 
     def between(first: Value, last: Value) -> Value:
         way = last - first
-        length = tree.node("ShaderNodeVectorMath", way, operation="LENGTH")["Value"]
+        length = op.length(way)
         cone = tree.node(
             "GeometryNodeMeshCone",
             fill_type="NGON",
             vertices=8,
-            radius_bottom=thick,
-            radius_top=thin,
+            radius_bottom=inputs.start_radius,
+            radius_top=inputs.end_radius,
             depth=length,
         ).value
         turned = tree.node("FunctionNodeAlignRotationToVector", vector=way, axis="Z").value
-        body = tree.node("GeometryNodeTransform", cone, translation=first, rotation=turned).value
-        return paint_faces(body, material)
+        body = op.transform(cone, translation=first, rotation=turned)
+        return paint_faces(body, sides.material)
 
     with tree.frame("Rod"):
         body = between(start, end)
     with tree.frame("On the other side"):
-        body = op.join(body, op.only_if(both, between(_mirror(start), _mirror(end))))
+        body = op.join(body, op.only_if(sides.both_sides, between(_mirror(start), _mirror(end))))
     tree.output("Mesh", body, description="The rod")
 
 
-def _declare_sides(tree: Tree) -> tuple[Value, Value]:
-    both = tree.boolean("Both Sides", False, description="Another one stands on the other side of x = 0")
-    return both, tree.input("Material", "Material", description="Material of the faces")
-
-
 def _mirror(place: Value) -> Value:
-    return place.tree.node("ShaderNodeVectorMath", place, (-1.0, 1.0, 1.0), operation="MULTIPLY").value
+    return place * (-1.0, 1.0, 1.0)

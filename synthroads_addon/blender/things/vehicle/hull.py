@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import NamedTuple
+from collections.abc import Iterable, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,29 +11,9 @@ from numpy.typing import NDArray
 from ...nodes import operations as op
 from ...nodes.builder import Operand, Tree, Value
 from ...nodes.solids import paint_faces
+from .details import VehicleMaterials
 
 Float = NDArray[np.float64]
-
-
-class HullSection(NamedTuple):
-    """A cross-section, symmetric about x = 0.
-
-    Attributes:
-        y: its place, positive to the front, m.
-        body, top, roof: half widths of the body, of the windows' upper edges and of the roof's flat part, m.
-        low, belt, upper, edge, ridge: heights of the underside, the windows' lower and upper edges, the roof's edges
-            and its middle, m. Where there are no windows the last four make the bonnet or the boot.
-    """
-
-    y: float
-    body: float
-    low: float
-    belt: float
-    top: float
-    upper: float
-    roof: float
-    edge: float
-    ridge: float
 
 
 class Patch(NamedTuple):
@@ -56,14 +36,18 @@ class Hull(NamedTuple):
     """A body.
 
     Attributes:
-        sections: from rear to front; the first and the last have no width, so that they close the body.
+        sections: cross-sections (S, 9), symmetric about x = 0, from rear to front; the first and the last have no
+            width, so that they close the body. In order: y, positive to the front; half widths of the body, then with
+            its heights of underside and belt (the windows' lower edges), of the windows' upper edges, with their
+            height, and of the roof's flat part, with the heights of the roof's edges and its middle. Where there are
+            no windows the heights above the belt make the bonnet or the boot.
         axles: places of the axles whose wheels have arches, m.
         wheel, arch: radii of wheels and arches, m.
         tumble: how much narrower the body is at its belt, as a share.
         patches: in order; what no patch has is painted.
     """
 
-    sections: tuple[HullSection, ...]
+    sections: tuple[tuple[float, ...], ...]
     axles: tuple[float, ...]
     wheel: float
     arch: float
@@ -81,8 +65,9 @@ _BANDS = len(_WIDTHS) - 1
 _ARCH_STEPS = 6
 
 
-def hull(tree: Tree, shape: Hull, materials: Mapping[str, Value]) -> Value:
-    """Return the body, closed, its faces outwards."""
+def hull(tree: Tree, materials: VehicleMaterials, patches: Iterable[tuple[Any, ...]], **fields: Any) -> Value:
+    """Return the body, closed, its faces outwards; `fields` are those of `Hull`."""
+    shape = Hull(patches=tuple(Patch(*patch) for patch in patches), **fields)
     table = _rows(shape)
     mesh, column, row = op.grid(tree, 2 * _BANDS + 1, len(table))
     # Columns go round, from the middle of the underside up the left side and down the right one.
@@ -101,8 +86,8 @@ def hull(tree: Tree, shape: Hull, materials: Mapping[str, Value]) -> Value:
     band = op.switch(face_column > _BANDS - 1, face_column, 2 * _BANDS - 1 - face_column)
     for patch in shape.patches:
         chosen = _in_patch(patch, table[:, 9], face_row, band)
-        mesh = tree.node("GeometryNodeSetMaterial", mesh, chosen, material=materials[patch.material]).value
-    return op.without_degenerate(mesh)
+        mesh = paint_faces(mesh, materials[patch.material], chosen)
+    return op.delete_degenerate(mesh)
 
 
 def _widths(tumble: float) -> list[tuple[float, float, float]]:

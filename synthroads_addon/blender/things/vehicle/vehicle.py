@@ -3,13 +3,18 @@
 from __future__ import annotations
 
 import bpy
+import numpy as np
 
 from ....base.classes import class_id
+from ....road.lane_lines import LaneLine, lane_of
+from ....road.parameters import PointObject, Vehicle
 from ....road.things.vehicles import CHASSIS
-from ...materials.vehicles import COLOR
+from ...materials.looks import COLOR
 from ...nodes import operations as op
-from ...nodes.builder import Tree, Value, node_group
-from .details import declare_materials
+from ...nodes.builder import Tree, Value, makes_group, node_group
+from ...nodes.inputs import Inputs, metres, socket
+from ..model_builder import ModelBuilder
+from .details import VehicleMaterials
 from .models import model_group
 
 _POINTS = (
@@ -21,22 +26,25 @@ _POINTS = (
 def vehicle_group(model: str) -> bpy.types.NodeTree:
     """Return the group that places vehicles of a model, e.g. SR Vehicles Car."""
     description = f"A {model} on each point; points carry heading (rad), {COLOR} and instance"
-    return node_group(f"SR Vehicles {model.title()}", lambda tree: _build(tree, model), model, description=description)
+    return node_group(f"SR Vehicles {model.title()}", _build, model, description=description)
+
+
+class _Vehicles(Inputs):
+    points = socket("Geometry", _POINTS)
+    road = socket("Object", "Surface that they drive on")
 
 
 def _build(tree: Tree, model: str) -> None:
-    points = tree.input("Points", "Geometry", description=_POINTS)
-    road = tree.input("Road", "Object", description="Surface that they drive on")
-    materials = declare_materials(tree)
+    traffic, materials = _Vehicles(tree), VehicleMaterials(tree)
     with tree.frame("Vehicle"):
-        body = tree.call(model_group(model), **{f"{key}_material": value for key, value in materials.items()}).value
+        body = tree.call(model_group(model), **materials.values).value
     with tree.frame("On the road"):
         chassis = CHASSIS[model]
         vehicles = tree.call(
             _on_wheels_group(),
-            points=points,
+            points=traffic.points,
             vehicle=body,
-            road=op.object_geometry(road),
+            road=op.object_geometry(traffic.road),
             front_axle=chassis.front,
             rear_axle=chassis.rear,
             half_track=chassis.half_track,
@@ -44,27 +52,26 @@ def _build(tree: Tree, model: str) -> None:
     tree.output("Mesh", vehicles, description="Vehicles; each face has its own vehicle's instance number")
 
 
-def _on_wheels_group() -> bpy.types.NodeTree:
-    return node_group("SR On Wheels", _build_on_wheels)
+class _OnWheels(Inputs):
+    points = socket("Geometry", _POINTS)
+    vehicle = socket("Geometry", "The vehicle, its wheels on z = 0, facing along +y")
+    road = socket("Geometry", "Surface that the vehicles drive on")
+    front_axle = metres(1.3, (-20.0, 20.0), "Place of the middle of the front axles along y")
+    rear_axle = metres(-1.3, (-20.0, 20.0), "Place of the middle of the hind axles along y")
+    half_track = metres(0.8, (0.1, 3.0), "Distance of the wheels from x = 0")
 
 
-def _build_on_wheels(tree: Tree) -> None:
+@makes_group("SR On Wheels")
+def _on_wheels_group(tree: Tree) -> None:
     """A vehicle on each point, pitched and rolled as the road below its axles."""
-    points = tree.input("Points", "Geometry", description=_POINTS)
-    vehicle = tree.input("Vehicle", "Geometry", description="The vehicle, its wheels on z = 0, facing along +y")
-    road = tree.input("Road", "Geometry", description="Surface that the vehicles drive on")
-    limits = (-20.0, 20.0)
-    front = tree.number(
-        "Front Axle", 1.3, limits, unit="m", description="Place of the middle of the front axles along y"
-    )
-    rear = tree.number("Rear Axle", -1.3, limits, unit="m", description="Place of the middle of the hind axles along y")
-    track = tree.number("Half Track", 0.8, (0.1, 3.0), unit="m", description="Distance of the wheels from x = 0")
+    inputs = _OnWheels(tree)
+    road, front, rear = inputs.road, inputs.front_axle, inputs.rear_axle
     with tree.frame("The road below the wheels"):
-        behind, across_behind = _axle(tree, road, rear, track)
-        ahead, across_ahead = _axle(tree, road, front, track)
+        behind, across_behind = _axle(tree, road, rear, inputs.half_track)
+        ahead, across_ahead = _axle(tree, road, front, inputs.half_track)
     with tree.frame("As the road is pitched and rolled"):
         # Place and turn are evaluated where the points still are.
-        points = op.store(points, "vehicle_place", behind - (ahead - behind) * (rear / (front - rear)))
+        points = op.store(inputs.points, "vehicle_place", behind - (ahead - behind) * (rear / (front - rear)))
         rotation = tree.node(
             "FunctionNodeAxesToRotation",
             ahead - behind,
@@ -72,7 +79,7 @@ def _build_on_wheels(tree: Tree) -> None:
             primary_axis="Y",
             secondary_axis="X",
         ).value
-        vehicles = tree.node("GeometryNodeInstanceOnPoints", points, instance=vehicle, rotation=rotation).value
+        vehicles = tree.node("GeometryNodeInstanceOnPoints", points, instance=inputs.vehicle, rotation=rotation).value
         place = op.named_attribute(tree, "vehicle_place", "FLOAT_VECTOR")
         vehicles = tree.node("GeometryNodeSetPosition", vehicles, position=place).value
     with tree.frame("Labels"):
@@ -102,5 +109,44 @@ def _on_road(road: Value, place: Value, way: Value) -> Value:
     nearest = op.sample_surface(road, op.position(tree), place)
     beyond = op.component(nearest, "Z") + op.dot(place - nearest, way) * op.named_attribute(tree, "grade")
     height = op.switch(ray["Is Hit"], beyond, op.component(ray["Hit Position"], "Z"))
-    flat = tree.node("ShaderNodeVectorMath", place, (1.0, 1.0, 0.0), operation="MULTIPLY").value
+    flat = place * (1.0, 1.0, 0.0)
     return flat + op.vector(tree, 0.0, 0.0, height)
+
+
+MATERIALS = {
+    "Paint Material": "car_paint",
+    "Glass Material": "glass",
+    "Rubber Material": "rubber",
+    "Chrome Material": "chrome",
+    "Black Material": "plastic_black",
+    "White Light Material": "lamp_glass",
+    "Red Light Material": "lamp_red",
+    "Plate Material": "number_plate",
+    "Cover Material": "tarpaulin",
+}
+"""Material inputs of the groups -> entries of the material table."""
+
+
+def build_vehicles(builder: ModelBuilder) -> None:
+    """Make one object per vehicle, so that each can be moved on its own."""
+    lines: dict[tuple[str, int], LaneLine] = {}
+    for name, vehicle in builder.parameters.of_type(Vehicle).items():
+        lane = (vehicle.carriageway, vehicle.lane)
+        if lane not in lines:
+            lines[lane] = lane_of(builder.geometry, vehicle)
+        grade = lines[lane].carriageway.traffic * builder.geometry.profile.grade(np.array([vehicle.station]))
+        place = vehicle_place(lines[lane], vehicle)
+        mesh = builder.points("Vehicle", [place], {COLOR: np.array([vehicle.color]), "grade": grade})
+        builder.add(name, mesh, vehicle_group(vehicle.model), MATERIALS)
+
+
+def vehicle_place(line: LaneLine, vehicle: Vehicle) -> PointObject:
+    """Return where a vehicle is at the time 0: its middle on its lane's line, looking along it with the traffic."""
+    station = np.array([vehicle.station])
+    turn = float(np.rad2deg(line.turn(station, CHASSIS[vehicle.model].wheel_base / 2.0)[0]))
+    return PointObject(
+        instance=vehicle.instance,
+        station=vehicle.station,
+        offset=float(line.offset(station)[0]),
+        rotation_deg=turn if line.carriageway.traffic > 0 else 180.0 + turn,
+    )

@@ -1,4 +1,4 @@
-"""A node group as text: what tests compare, and what a reader of a change sees."""
+"""A node group as text: what tests compare, and a reader of a change sees."""
 
 from __future__ import annotations
 

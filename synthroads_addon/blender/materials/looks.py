@@ -1,0 +1,133 @@
+"""How the base colour of each material varies: noises added up, and what a few materials have beside them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+from ..nodes import operations as op
+from ..nodes.builder import Value
+from .shading import Shade
+
+COLOR = "vehicle_color"
+"""Attribute of vehicles that the paint's base colour is read from."""
+ELEMENT = 6.0
+"""Length of a concrete barrier between two joints, m."""
+_JOINT = 0.02  # m
+_STEEL = 0.5
+"""Mean base colour of a gantry's steel: what its attribute ``shade`` is a share of."""
+_COVER_TINT = 0.35
+"""How much of the vehicle's colour its cover has; the rest is the table's mean."""
+_DRY = (0.55, 0.18, 0.25)
+"""How much red, green and blue change between fresh and dry grass, as shares of the mean."""
+_AUTUMN = (0.35, 0.12, 0.0)
+"""The same between a dark and a light tree's leaves."""
+
+
+class _Noise(NamedTuple):
+    """One noise: see `Shade.vary` and `Shade.noise`."""
+
+    amount: float | tuple[float, float, float]
+    wavelength: float
+    detail: float
+    stretch: tuple[float, float, float] = (1.0, 1.0, 1.0)
+
+
+_TURF = (_Noise(0.45, 0.04, 2.0), _Noise(0.30, 0.7, 3.0), _Noise(0.30, 14.0, 3.0))
+# Features about as large as the tufts are apart, and patches.
+_GRASS = (_Noise(0.30, 0.15, 1.0), _Noise(_DRY, 0.9, 0.0), _Noise(0.30, 9.0, 2.0))
+_LEAVES = (_Noise(0.35, 0.3, 1.0), _Noise(_AUTUMN, 8.0, 1.0), _Noise(0.25, 25.0, 1.0))
+_BARK = (_Noise(0.35, 0.08, 3.0, (1.0, 1.0, 0.25)),)
+# Film that is a little dirty in patches and in streaks that run down.
+_SHEETING = (_Noise(0.05, 0.6, 3.0), _Noise(0.05, 0.15, 2.0, (1.0, 1.0, 0.15)))
+# Weathered plastic or paint.
+_HOUSING = (_Noise(0.08, 0.5, 3.0, (1.0, 1.0, 0.3)), _Noise(0.05, 0.04, 2.0))
+_WORN = (_Noise(0.10, 0.05, 3.0),)
+_SPECIES = ("maple", "birch", "poplar", "spruce", "pine", "hawthorn", "hazel", "blackthorn")
+
+_NOISES: dict[str, tuple[_Noise, ...]] = {
+    "asphalt": (_Noise(0.25, 0.012, 1.0), _Noise(0.12, 0.6, 4.0), _Noise(0.10, 25.0, 2.0)),
+    "concrete": (_Noise(0.10, 0.01, 1.0), _Noise(0.12, 1.5, 4.0)),
+    "paint_white": (_Noise(0.18, 0.05, 3.0),),
+    "verge": (_Noise(0.45, 0.03, 2.0), _Noise(0.30, 0.8, 3.0)),
+    "median": _TURF,
+    "grass_ground": _TURF,
+    "soil": (_Noise(0.35, 0.05, 3.0), _Noise(0.20, 3.0, 2.0)),
+    **dict.fromkeys(("grass", "meadow", "ryegrass", "reed"), _GRASS),
+    **dict.fromkeys(("leaves", *(f"{species}_leaves" for species in _SPECIES)), _LEAVES),
+    **dict.fromkeys(("bark", *(f"{species}_bark" for species in _SPECIES)), _BARK),
+    "birch_bark": (_Noise(0.15, 0.2, 2.0),),
+    "galvanised_steel": (_Noise(0.12, 0.08, 3.0), _Noise(0.10, 3.0, 2.0)),
+    "barrier_concrete": (_Noise(0.10, 0.012, 1.0), _Noise(0.16, 0.9, 4.0), _Noise(0.12, 0.25, 2.0, (1.0, 1.0, 0.15))),
+    # Board-marked, with stains that run down.
+    "bridge_concrete": (_Noise(0.08, 0.012, 1.0), _Noise(0.14, 1.6, 4.0), _Noise(0.14, 0.5, 3.0, (1.0, 1.0, 0.12))),
+    "noise_aluminium": (_Noise(0.08, 1.2, 3.0, (1.0, 1.0, 0.3)),),
+    "noise_concrete": (_Noise(0.16, 0.02, 2.0), _Noise(0.14, 1.0, 4.0, (1.0, 1.0, 0.3))),
+    "noise_wood": (_Noise(0.30, 0.12, 3.0, (1.0, 1.0, 0.06)), _Noise(0.18, 0.02, 2.0, (1.0, 1.0, 0.05))),
+    "gantry_steel": (_Noise(0.06, 0.1, 3.0), _Noise(0.06, 2.5, 2.0, (1.0, 1.0, 0.3))),
+    "plastic_red": _WORN,
+    "rubber": _WORN,
+    **dict.fromkeys((f"sheeting_{color}" for color in ("white", "red", "blue", "yellow", "grey")), _SHEETING),
+    "plastic_orange": _HOUSING,
+    "cabinet_grey": _HOUSING,
+    "tarpaulin": (_Noise(0.06, 1.5, 2.0),),
+}
+
+
+def _attribute(shade: Shade, name: str) -> Value:
+    return shade.tree.node("ShaderNodeAttribute", attribute_name=name)["Vector"]
+
+
+def _bay(shade: Shade) -> None:
+    """Panels that differ a little, by the attribute ``bay``."""
+    bay = op.component(_attribute(shade, "bay"), "X")
+    number = shade.tree.node("ShaderNodeTexWhiteNoise", w=bay, noise_dimensions="1D")["Value"]
+    shade.vary(0.08, number * 2.0 - 1.0)
+
+
+def _gantry_steel(shade: Shade) -> None:
+    """Steel as bright as its faces' attribute ``shade`` says."""
+    shade.scale(op.component(_attribute(shade, "shade"), "X") / _STEEL)
+
+
+def _paint(shade: Shade, share: float = 1.0) -> None:
+    """Let the base colour have a share of the vehicle's colour."""
+    color = shade.tree.node("ShaderNodeVectorMath", _attribute(shade, COLOR), shade.mean.base_color, operation="DIVIDE")
+    shade.scale(color.value if share == 1.0 else color.value * share + (1.0 - share,) * 3)
+
+
+def _joints(shade: Shade) -> None:
+    """Dark joints at whole elements, by the attribute ``station``."""
+    station = op.component(_attribute(shade, "station"), "X")
+    beside = op.unary("ABSOLUTE", station % ELEMENT - ELEMENT / 2)
+    joint = shade.tree.node("ShaderNodeMath", beside, _JOINT / 2, operation="LESS_THAN").value
+    shade.scale((1.0 - joint * 0.8) / (1.0 - 0.8 * _JOINT / ELEMENT))
+
+
+def _scars(shade: Shade) -> None:
+    """Dark scars across a white bark."""
+    scars = shade.noise(0.12, 1.0, (0.35, 0.35, 1.6))
+    shade.scale(shade.tree.node("ShaderNodeMapRange", scars, 0.25, 0.4, 1.12, 0.25).value)
+
+
+def _clear(shade: Shade) -> None:
+    shade.transparency = 0.8
+
+
+_BEFORE_NOISES: dict[str, Callable[[Shade], None]] = {
+    **dict.fromkeys(("noise_aluminium", "noise_concrete", "noise_wood"), _bay),
+    "gantry_steel": _gantry_steel,
+    "car_paint": _paint,
+    "tarpaulin": lambda shade: _paint(shade, _COVER_TINT),
+}
+_AFTER_NOISES = {"barrier_concrete": _joints, "birch_bark": _scars, "acrylic_glass": _clear}
+
+
+def vary_color(name: str, shade: Shade) -> None:
+    """Let the base colour vary as that of a material of the table does; others keep their mean."""
+    if name in _BEFORE_NOISES:
+        _BEFORE_NOISES[name](shade)
+    for noise in _NOISES.get(name, ()):
+        shade.vary(noise.amount, shade.noise(noise.wavelength, noise.detail, noise.stretch))
+    if name in _AFTER_NOISES:
+        _AFTER_NOISES[name](shade)

@@ -1,0 +1,118 @@
+"""Inputs of a node group as the fields of a class: each is named, limited and described in one place.
+
+A field's name is the input's: `post_spacing` is "Post Spacing" in Blender.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import nullcontext
+from itertools import groupby
+from typing import Any
+
+from .builder import Tree, Value
+
+INSTANCES = (-(2**31), 2**31 - 1)
+"""Limits of instance numbers: 32 bits, with a sign in the nodes and without one elsewhere."""
+FAR = (-1000.0, 1000.0)
+"""Limits of offsets and heights, m."""
+
+
+class Input:
+    """A field of `Inputs`: as a value of the group where one has been declared.
+
+    Args:
+        declare: method of `Tree` that declares it.
+        panel: heading that it stands under in the modifier, with the fields beside it of the same panel.
+        settings: further arguments of the method.
+    """
+
+    def __init__(self, declare: Callable[..., Value], panel: str = "", **settings: Any) -> None:
+        self.declare, self.panel, self.settings = declare, panel, settings
+        self.name = ""
+
+    def __set_name__(self, owner: type, name: str) -> None:
+        self.name = name
+
+    def __get__(self, inputs: Inputs, owner: type | None = None) -> Value:
+        return inputs.values[self.name]
+
+
+class Inputs:
+    """Inputs of a node group; a subclass has them as fields, after those of its bases.
+
+    Args:
+        tree: the group that they are declared for.
+        defaults: default values in place of those of the fields.
+
+    Attributes:
+        tree: the group.
+        values: by field, as `Tree.call` takes them.
+    """
+
+    def __init__(self, tree: Tree, **defaults: float) -> None:
+        self.tree = tree
+        self.values: dict[str, Value] = {}
+        for panel, fields in groupby(self.fields(), lambda field: field.panel):
+            with tree.panel(panel) if panel else nullcontext():
+                for field in fields:
+                    settings = dict(field.settings)
+                    if field.name in defaults:
+                        settings["default"] = defaults[field.name]
+                    self.values[field.name] = field.declare(tree, input_name(field.name), **settings)
+
+    @classmethod
+    def fields(cls) -> Iterator[Input]:
+        """Yield the fields in order; one that a subclass declares anew keeps its place."""
+        fields = {name: item for base in reversed(cls.__mro__) for name, item in vars(base).items()}
+        yield from (item for item in fields.values() if isinstance(item, Input))
+
+
+def input_name(field: str) -> str:
+    """Return the name of the input that a field stands for."""
+    return field.rstrip("_").replace("_", " ").title()
+
+
+def number(default: float, limits: tuple[float, float], description: str, *, unit: str = "", panel: str = "") -> Input:
+    """Return a number's field, see `Tree.number`."""
+    return Input(Tree.number, panel, default=default, limits=limits, unit=unit, description=description)
+
+
+def metres(default: float, limits: tuple[float, float], description: str) -> Input:
+    """Return a length's field, m."""
+    return number(default, limits, description, unit="m")
+
+
+def share(default: float, limits: tuple[float, float], description: str, *, panel: str = "") -> Input:
+    """Return a share's field."""
+    return number(default, limits, description, unit="share", panel=panel)
+
+
+def integer(default: int, limits: tuple[int, int], description: str, *, panel: str = "") -> Input:
+    """Return a whole number's field."""
+    return Input(Tree.integer, panel, default=default, limits=limits, description=description)
+
+
+def boolean(default: bool, description: str, *, panel: str = "") -> Input:
+    """Return the field of a choice of yes or no."""
+    return Input(Tree.boolean, panel, default=default, description=description)
+
+
+def socket(kind: str, description: str, *, panel: str = "") -> Input:
+    """Return the field of an input of another kind: ``Geometry``, ``Object``, ``Vector``, ``String``, ..."""
+    return Input(Tree.input, panel, kind=kind, description=description)
+
+
+def material_of(what: str, *, panel: str = "") -> Input:
+    """Return the field of a part's material."""
+    return socket("Material", f"Material of {what}", panel=panel)
+
+
+def instance_number() -> Input:
+    """Return the field of the faces' instance number."""
+    return integer(0, INSTANCES, "Instance number of the faces")
+
+
+def backbone_socket(kind: str = "Geometry") -> Input:
+    """Return the field of the backbone, as geometry or as an object."""
+    return socket(kind, "Polyline along the axis with its attributes")

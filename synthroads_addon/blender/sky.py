@@ -1,0 +1,40 @@
+"""Sun and sky of a road's environment, as lamp and world."""
+
+from __future__ import annotations
+
+import math
+
+import bpy
+from mathutils import Vector
+
+from ..road.surroundings import Environment
+from ..scanning.colour.light import sun_direction
+from .compat import sky_texture
+
+SUN_STRENGTH = 4.2
+SUN_COLOR = (1.0, 0.93, 0.84)
+SUN_ANGLE = math.radians(0.53)
+_SKY_STRENGTH = 0.16
+_LOWEST_SUN = 1.0  # degrees: below, the sky's model ends
+
+
+def new_sun(name: str, environment: Environment, angle: float = SUN_ANGLE) -> bpy.types.Object:
+    """Return a new lamp that shines as the sun does, in no scene; `angle` (rad) is the disc's."""
+    lamp = bpy.data.lights.new(name, "SUN")
+    lamp.energy, lamp.color, lamp.angle = SUN_STRENGTH * environment.sun_strength, SUN_COLOR, angle
+    sun = bpy.data.objects.new(name, lamp)
+    sun.rotation_euler = Vector(sun_direction(environment)).to_track_quat("Z", "Y").to_euler()
+    return sun
+
+
+def fill_sky(world: bpy.types.World, elevation_deg: float, azimuth_deg: float, sun_strength: float) -> None:
+    """Give a world the nodes of a clear sky, by the sun's elevation and azimuth (degrees) and its strength."""
+    if world.node_tree is None:
+        world.use_nodes = True
+    nodes, links = world.node_tree.nodes, world.node_tree.links
+    nodes.clear()
+    texture = sky_texture(nodes, math.radians(max(elevation_deg, _LOWEST_SUN)), math.radians(azimuth_deg))
+    background, output = nodes.new("ShaderNodeBackground"), nodes.new("ShaderNodeOutputWorld")
+    background.inputs["Strength"].default_value = _SKY_STRENGTH * (0.4 + 0.6 * sun_strength)
+    links.new(texture.outputs["Color"], background.inputs["Color"])
+    links.new(background.outputs["Background"], output.inputs["Surface"])

@@ -1,0 +1,95 @@
+"""SR Bridge Abutment: bearing seat, back wall and wing walls. SR Bridge Pier: a wall pier and its bearings."""
+
+from __future__ import annotations
+
+import math
+
+from ....road.things.body_shapes import BRIDGE_ABUTMENT, BRIDGE_BEARING, BRIDGE_PIER_LENGTH, BRIDGE_SEAT
+from ...nodes import operations as op
+from ...nodes.builder import Operand, Tree, Value, makes_group
+from ...nodes.inputs import Inputs, material_of, metres
+from ...nodes.solids import box, loft, paint_faces
+from .deck import PAVEMENT, WEB
+
+_WALL = 0.5
+"""Thickness of the wing walls, m."""
+_INSIDE = 0.06  # m from the deck's edge to the wing walls
+
+
+class _Abutment(Inputs):
+    width = metres(10.0, (2.0, 60.0), "Width of the deck")
+    thickness = metres(1.2, (0.3, 5.0), "Height of the deck")
+    foot = metres(-6.0, (-50.0, 50.0), "z of the walls' lower edge")
+    wing_length = metres(8.0, (1.6, 50.0), "Length of the wing walls, from the face")
+    concrete_material = material_of("the walls")
+    steel_material = material_of("the bearings")
+
+
+@makes_group("SR Bridge Abutment")
+def bridge_abutment_group(tree: Tree) -> None:
+    """An abutment whose face looks to -x and stands on x = 0; the deck's underside is z = 0."""
+    abutment = _Abutment(tree)
+    width, height = abutment.width, abutment.thickness
+    wide = width - 2.0 * _INSIDE
+
+    def wall(start: float, end: Operand, top: Value, size: Operand, middle: Operand = 0.0) -> Value:
+        corner = op.vector(tree, start, middle, abutment.foot)
+        length = op.vector(tree, end, middle, top) - corner
+        return box(tree, length + op.vector(tree, 0.0, size), corner + length * 0.5)
+
+    with tree.frame("Seat and back wall"):
+        level = height * 0.0 - BRIDGE_BEARING
+        walls = [wall(0.0, BRIDGE_ABUTMENT, level, wide)]
+        walls.append(wall(BRIDGE_SEAT + 0.04, BRIDGE_ABUTMENT - 0.01, height - PAVEMENT * 0.5, wide - 0.02))
+    with tree.frame("Wing walls"):
+        for side in (1.0, -1.0):
+            beside = (wide * 0.5 - _WALL / 2) * side
+            walls.append(wall(BRIDGE_ABUTMENT - 0.02, abutment.wing_length, height - PAVEMENT * 0.6, _WALL, beside))
+    with tree.frame("Bearings below the webs"):
+        beside, below = width * (0.25 * sum(WEB)), -BRIDGE_BEARING / 2
+        pads = [
+            box(tree, (0.5, 0.6, BRIDGE_BEARING + 0.02), op.vector(tree, BRIDGE_SEAT / 2, beside * side, below))
+            for side in (1.0, -1.0)
+        ]
+    with tree.frame("All"):
+        mesh = op.join(
+            paint_faces(op.join(*walls), abutment.concrete_material),
+            paint_faces(op.join(*pads), abutment.steel_material),
+        )
+    tree.output("Mesh", mesh, description="The abutment")
+
+
+_ROUND = 8
+"""Points of a rounded end."""
+
+
+class _Pier(Inputs):
+    pier_width = metres(1.0, (0.2, 4.0), "Width along x")
+    width = metres(10.0, (2.0, 60.0), "Width of the deck")
+    concrete_material = material_of("the pier")
+    steel_material = material_of("the bearings")
+
+
+@makes_group("SR Bridge Pier")
+def bridge_pier_group(tree: Tree) -> None:
+    """A pier along y whose bearings carry a deck with its underside on z = 0; its body is 1 high, to be stretched."""
+    pier = _Pier(tree)
+    width, deck = pier.pier_width, pier.width
+    angles = [math.pi * i / (_ROUND - 1) for i in range(_ROUND)]
+    end = [(0.5 * math.cos(a), 0.5 * math.sin(a)) for a in angles]
+    # z says which end a point belongs to.
+    outline = [(x, y, 1.0) for x, y in end] + [(-x, -y, -1.0) for x, y in end]
+    with tree.frame("Body"):
+        straight = (op.maximum(deck * BRIDGE_PIER_LENGTH, width * 1.02) - width) * 0.5
+
+        def place(point: Value, row: Value) -> Value:
+            y = op.component(point, "Y") * width + op.component(point, "Z") * straight
+            return op.vector(tree, op.component(point, "X") * width, y, row - 1)
+
+        body = loft(tree, lambda number: op.choose(number, outline), len(outline), 2, place)
+    with tree.frame("Bearings"):
+        beside = op.minimum(deck * (0.25 * sum(WEB)), straight)
+        size = op.vector(tree, op.minimum(width * 0.8, 0.6), 0.5, BRIDGE_BEARING + 0.02)
+        pads = [box(tree, size, op.vector(tree, 0.0, beside * side, -BRIDGE_BEARING / 2)) for side in (1.0, -1.0)]
+    tree.output("Body", paint_faces(body, pier.concrete_material), description="The pier, from z = -1 to 0")
+    tree.output("Bearings", paint_faces(op.join(*pads), pier.steel_material), description="The bearings")
