@@ -14,6 +14,7 @@ import torch
 
 from synthroads_addon.base.errors import InputError, MissingFileError, OutputError
 from synthroads_addon.base.files import write_file
+from synthroads_addon.base.random_streams import stream
 from synthroads_addon.base.schema import canonical_json, read_json
 
 from .configuration import Configuration, from_data
@@ -136,8 +137,6 @@ class Run(Generic[C]):
 
 def stream_seed(seed: int, *purpose: str | int) -> int:
     """Return the 63-bit seed of one purpose."""
-    from synthroads_addon.base.random_streams import stream
-
     return int(stream(seed, *purpose).integers(2**63))
 
 
@@ -157,7 +156,7 @@ def plain(value: Any) -> Any:
 
 def _curves(history: list[dict[str, float]]) -> bytes:
     """Return a PNG with one small plot per figure of the history."""
-    from matplotlib.figure import Figure
+    from matplotlib.figure import Figure  # takes half a second, which only pictures need
 
     names = [name for name in history[-1] if name not in ("epoch", "seconds")]
     figure = Figure(figsize=(4 * min(len(names), 3), 3 * -(-len(names) // 3)), layout="constrained")

@@ -25,9 +25,13 @@ from .data.effects import SequenceEffects
 from .data.slices import Batch, SliceSettings
 from .networks.losses import LossOptions, centerline_loss
 from .networks.models import TARGETS, CenterlineModel, ModelOptions, build
+from .scores import tables
 from .scores.evaluation import Cropping, case
+from .scores.measuring import measure_run
 from .use.calibration import DEVIATIONS, IntervalCalibration
+from .use.find_road import find_road
 from .use.predictor import CenterlinePredictor, UseOptions
+from .use.writing import corridor_json, geojson
 
 _FIRST_WEIGHTS = "first weights"
 
@@ -89,16 +93,12 @@ def evaluate(run: Run[CenterlineConfiguration], evaluation: Evaluation, progress
     Raises:
         InputError: the run isn't finished, or the data hold no road with a known centreline.
     """
-    from .scores.measuring import measure_run
-
     return measure_run(run.configuration, predictor(run), evaluation, progress)
 
 
 def report(result: Mapping[str, Any]) -> str:
     """Return what `evaluate` found as tables for people."""
-    from .scores.tables import report
-
-    return report(result)
+    return tables.report(result)
 
 
 def predict(run: Run[CenterlineConfiguration], prediction: Prediction, progress: Progress = silent) -> dict[str, Any]:
@@ -108,9 +108,6 @@ def predict(run: Run[CenterlineConfiguration], prediction: Prediction, progress:
         InputError: the run isn't finished, the output isn't a .geojson file, or the cloud has no ground.
         OutputError: an output is already there.
     """
-    from .use.find_road import find_road
-    from .use.writing import corridor_json, geojson
-
     lines, corridor = prediction.output, prediction.output.with_suffix(".corridor.json")
     if lines.suffix.lower() != ".geojson":
         raise InputError("--output", str(lines), "must end in .geojson for a centreline")

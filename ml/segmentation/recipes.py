@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Literal
 
 import numpy as np
@@ -146,8 +147,6 @@ def mapped_intensities(synthetic: Sequence[CloudTile], real: Sequence[CloudTile]
     Raises:
         InputError: one of them has no intensities.
     """
-    from dataclasses import replace
-
     have, want = _histogram(synthetic, "data.synthetic"), _histogram(real, "data.real")
     mapping = QuantileMap(have, want)
     return [

@@ -4,17 +4,14 @@ from __future__ import annotations
 
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.spatial import cKDTree
 
 from synthroads_addon.base.errors import InputError
 from synthroads_addon.road.centerline import read_axis
 from synthroads_addon.road.geometry import RoadGeometry
-
-if TYPE_CHECKING:
-    from scipy.spatial import cKDTree
 
 Float = NDArray[np.float64]
 
@@ -199,8 +196,6 @@ class MeasuredAxis:
     @cached_property
     def _samples(self) -> tuple[cKDTree, NDArray[np.intp]]:
         """Return a tree of places along the line and the segment that each lies on."""
-        from scipy.spatial import cKDTree
-
         counts = np.maximum(1, np.ceil(np.diff(self.station) / _SAMPLE).astype(int))
         owner = np.repeat(np.arange(len(counts)), counts)
         share = (np.arange(len(owner)) - np.repeat(np.cumsum(counts) - counts, counts) + 0.5) / counts[owner]

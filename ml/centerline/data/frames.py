@@ -12,6 +12,11 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.signal import savgol_filter
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components, dijkstra
+from scipy.spatial import cKDTree
+from scipy.special import ndtr
 
 from synthroads_addon.base.errors import InputError
 
@@ -99,8 +104,6 @@ def wander(station: Float, rng: np.random.Generator, length: float) -> tuple[Flo
     A Gaussian process of cosines with random wavelengths (Rahimi and Recht, "Random features", 2007; correlation length
     ``length``, m) passed through the normal distribution function.
     """
-    from scipy.special import ndtr
-
     rate = rng.standard_normal(_WAVES) / length
     phase = rng.uniform(0.0, 2.0 * np.pi, _WAVES)
     # Normal amplitudes make the sum normal whatever the number of waves.
@@ -209,9 +212,6 @@ def _cells(plan: Float, cell: float) -> Float:
 
 def _way_through(cells: Float, cell: float) -> NDArray[np.intp]:
     """Return the cells on the shortest way between the two that lie farthest apart along the strip."""
-    from scipy.sparse.csgraph import dijkstra
-    from scipy.spatial import cKDTree
-
     pairs = cKDTree(cells).query_pairs(2.1 * cell, output_type="ndarray")
     pairs = _bridge_cells(cells, pairs)
     graph = _graph(len(cells), pairs, np.hypot(*(cells[pairs[:, 0]] - cells[pairs[:, 1]]).T))
@@ -228,9 +228,6 @@ def _way_through(cells: Float, cell: float) -> NDArray[np.intp]:
 
 def _bridge_cells(cells: Float, pairs: NDArray[np.intp]) -> NDArray[np.intp]:
     """Return the pairs of cells (P, 2) and those of the shortest ways that join what they leave apart."""
-    from scipy.sparse.csgraph import connected_components
-    from scipy.spatial import cKDTree
-
     while True:
         count, part = connected_components(_graph(len(cells), pairs, np.ones(len(pairs))), directed=False)
         if count == 1:
@@ -242,8 +239,6 @@ def _bridge_cells(cells: Float, pairs: NDArray[np.intp]) -> NDArray[np.intp]:
 
 
 def _graph(count: int, pairs: NDArray[np.intp], weights: Float) -> Any:
-    from scipy.sparse import coo_array
-
     return coo_array((weights, (pairs[:, 0], pairs[:, 1])), shape=(count, count)).tocsr()
 
 
@@ -276,7 +271,5 @@ def _on_path(path: MeasuredAxis, station: Float) -> Frames:
 
 def _smooth_line(points: Float, window: float) -> MeasuredAxis:
     """Return the line through points (N, 2), `SPACING` apart, each moved on the parabola through those around it."""
-    from scipy.signal import savgol_filter
-
     size = min(int(window / SPACING), len(points) - 1) // 2 * 2 + 1
     return MeasuredAxis(savgol_filter(points, size, polyorder=min(2, size - 1), axis=0, mode="interp"))

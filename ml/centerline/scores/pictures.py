@@ -99,7 +99,7 @@ def corridor_picture(shown: Case, prediction: Float, view: PictureView, title: s
 
 
 def _panels(title: str, heights: Sequence[float], view: PictureView, height: float) -> tuple[Any, Sequence[Any]]:
-    from matplotlib.figure import Figure
+    from matplotlib.figure import Figure  # takes half a second, which only pictures need
 
     figure = Figure(figsize=(13.0, 1.6 + 2.0 * sum(heights)), layout="constrained")
     panels = figure.subplots(len(heights), 1, sharex=True, height_ratios=heights)

@@ -8,6 +8,7 @@ file is an NPZ: ``notes`` (JSON) and one member per tile, so that tiles can be r
 
 from __future__ import annotations
 
+import io
 import json
 import zipfile
 import zlib
@@ -134,8 +135,6 @@ def write_pack(path: Path, tiles: list[Packed], scheme: ClassScheme, voxel: floa
     Raises:
         OutputError: the file is there already or can't be written.
     """
-    import io
-
     notes = {
         "type": "SynthRoads training data",
         "version": "1.0",

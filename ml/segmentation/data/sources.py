@@ -9,6 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import laspy
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
@@ -267,8 +268,6 @@ def _with_places(block: PointBlock, places: NDArray[np.int16]) -> PointBlock:
 
 def _numbers(cloud: CloudReader, field: str) -> Iterator[NDArray[Any]]:
     """Yield an attribute of a LAS file block by block, as `CloudReader.blocks` yields points."""
-    import laspy
-
     path = cloud.header.path
     if not cloud.header.kind.startswith("LAS"):
         raise InputError(str(path), None, "a mapping of classes is for LAS and LAZ files")

@@ -32,7 +32,7 @@ def comparison(tile: CloudTile, predicted: NDArray[np.int16], names: Sequence[st
         predicted: (N,) classes.
         names: of the classes.
     """
-    from matplotlib.figure import Figure
+    from matplotlib.figure import Figure  # takes half a second, which only pictures need
     from matplotlib.patches import Patch
 
     colors = class_colors(names)
