@@ -155,9 +155,7 @@ def _map_intensity(arguments: argparse.Namespace) -> Outcome:
 def _convert(arguments: argparse.Namespace) -> Outcome:
     from synthroads_addon.cloud.tools.convert import convert
 
-    done = convert(
-        arguments.file, arguments.output, arguments.classes, arguments.overwrite, progress_bar(arguments)
-    )
+    done = convert(arguments.file, arguments.output, arguments.classes, arguments.overwrite, progress_bar(arguments))
     lines = [f"{done['points']:,} points written to {arguments.output}"]
     if done["left_out"]:
         lines.append(f"left out, for want of a meaning here: {', '.join(done['left_out'])}")

@@ -38,10 +38,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments of `synthroads tradeoff`."""
     scenes = ", ".join(SCENES)
     parser.add_argument(
-        "--scenario",
-        action="append",
-        metavar="NAME_OR_FILE",
-        help=f"scene to measure on; can be repeated ({scenes})",
+        "--scenario", action="append", metavar="NAME_OR_FILE", help=f"scene to measure on; can be repeated ({scenes})"
     )
     parser.add_argument("--output", required=True, type=Path, metavar="DIR", help="folder for tables, JSON and plots")
     text = f"any of {', '.join(KNOBS)} (all)"

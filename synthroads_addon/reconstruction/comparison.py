@@ -11,14 +11,7 @@ from scipy.spatial.distance import cdist
 
 from ..road.geometry import RoadGeometry
 from ..road.objects import width_at
-from ..road.parameters import (
-    ConcreteBarrier,
-    Delineator,
-    Guardrail,
-    LineObject,
-    NoiseBarrier,
-    RoadParameters,
-)
+from ..road.parameters import ConcreteBarrier, Delineator, Guardrail, LineObject, NoiseBarrier, RoadParameters
 from ..road.things.furniture import Side
 
 Float = NDArray[np.float64]

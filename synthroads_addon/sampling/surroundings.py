@@ -27,14 +27,7 @@ from ..road.section_geometry import CarriagewaySection
 from ..road.surroundings import Vegetation, Vehicle
 from ..road.terrain import fit_to_ground, road_elevation_model
 from ..road.things.furniture import Side
-from ..road.things.vehicles import (
-    COLORS,
-    HEAVY_SPEED,
-    VEHICLE_GAP,
-    VEHICLE_LANE_WIDTH,
-    VEHICLE_ROOM,
-    VEHICLE_TYPES,
-)
+from ..road.things.vehicles import COLORS, HEAVY_SPEED, VEHICLE_GAP, VEHICLE_LANE_WIDTH, VEHICLE_ROOM, VEHICLE_TYPES
 from ..scenario.road import Interval, MaterialLimits, RoadScenario
 from .placing.site import PlacementSite
 

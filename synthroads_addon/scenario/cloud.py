@@ -15,7 +15,6 @@ Intensity = Literal["received", "range_corrected"]
 CLOUD_FORMATS: tuple[CloudFormat, ...] = get_args(CloudFormat)
 
 
-
 class CloudScenario(ClosedModel):
     """The cloud's files and their content."""
 

@@ -16,13 +16,7 @@ from ...road.objects import RoadObject
 from .barriers import median_barriers, plan_noise_barrier, roadside_barriers
 from .construction import closed_lanes, construction_zones
 from .delineators import delineator_stations, delineators
-from .equipment import (
-    plan_cabinets,
-    plan_lighting,
-    plan_periodic,
-    plan_surveillance,
-    plan_traffic_lights,
-)
+from .equipment import plan_cabinets, plan_lighting, plan_periodic, plan_surveillance, plan_traffic_lights
 from .gantries import GantryPlan, gantries, plan_gantries
 from .layout import Layout
 from .overpass import OverpassPlan, overpass, plan_overpass

@@ -157,12 +157,7 @@ def _lanes(layout: Layout, plan: GantryPlan, side: Side) -> list[tuple[float, fl
 
 
 def _signs(
-    layout: Layout,
-    plan: GantryPlan,
-    side: Side,
-    reach: tuple[float, float],
-    displays: bool,
-    rng: np.random.Generator,
+    layout: Layout, plan: GantryPlan, side: Side, reach: tuple[float, float], displays: bool, rng: np.random.Generator
 ) -> Iterator[GantrySign]:
     """Yield a display or a destination sign over each lane below the beam."""
     names = sign_catalogue().destinations

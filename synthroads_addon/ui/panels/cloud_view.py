@@ -29,10 +29,7 @@ _FAR = 20_000.0
 """A cloud farther than this (m) from the road's origin and beyond the road's length is likely to be of elsewhere."""
 _LABELS: dict[ColourBy, tuple[str, str]] = {
     "class": ("Class", "The classes' colours, as in the pictures of a scan"),
-    "intensity": (
-        "Intensity",
-        "Black to white, the darkest and brightest half percent cut; times the squared range",
-    ),
+    "intensity": ("Intensity", "Black to white, the darkest and brightest half percent cut; times the squared range"),
     "rgb": ("RGB", "The points' own colours"),
     "height": ("Height", "From dark blue to yellow, the lowest and highest half percent cut"),
 }

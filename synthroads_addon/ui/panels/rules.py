@@ -301,9 +301,7 @@ def _fill(rules: SYNTHROADS_PG_rules, parameters: RoadParameters, violations: li
         row.name = RULES[violation.rule].title
         row.rule, row.object, row.text = violation.rule, violation.object, violation.text
         row.station, row.offset = violation.station, offset_of(geometry, violation)
-        row.value, row.limit = (
-            _write_number(number, violation.unit) for number in (violation.value, violation.limit)
-        )
+        row.value, row.limit = (_write_number(number, violation.unit) for number in (violation.value, violation.limit))
         row.found = f"{_brief(violation.value)} / {_brief(violation.limit)} {violation.unit}".removesuffix(" 1")
     rules["index"] = -1  # past its update: nothing was clicked yet
 

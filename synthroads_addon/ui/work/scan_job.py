@@ -140,9 +140,7 @@ def _shares(steps: Generator[float, None, CopiedScene]) -> Generator[Step, None,
             raise
 
 
-def _scan_copied(
-    scan: RoadScan, copied: CopiedScene, services: SnapshotServices, output: _Output
-) -> dict[str, Any]:
+def _scan_copied(scan: RoadScan, copied: CopiedScene, services: SnapshotServices, output: _Output) -> dict[str, Any]:
     """Scan what was read."""
     scenario, road, timer = scan.scenario, scan.road, output.timer
     with timer.stage("scene mesh"):
