@@ -14,7 +14,7 @@ from typing import Any
 if __name__ == "__main__":
     sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from headless.commands import Outcome, add_common_arguments, entry
+from headless.commands import Outcome, entry
 from headless.marked_documents import fill
 from headless.messages import progress_bar
 from headless.tradeoff_plot import plot
@@ -50,7 +50,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--document", type=Path, metavar="FILE", help="fill the tables of this Markdown file as well")
     parser.add_argument("--pictures", type=Path, metavar="DIR", help="put the plots here as well")
     parser.add_argument(_ROW, metavar="JSON", help=argparse.SUPPRESS)
-    add_common_arguments(parser)
 
 
 def run(arguments: argparse.Namespace) -> Outcome:

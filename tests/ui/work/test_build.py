@@ -11,7 +11,7 @@ import pytest
 from synthroads_addon.base.errors import InputError
 from synthroads_addon.blender.model import build as model_module
 from synthroads_addon.blender.model.build import build_road, build_steps
-from synthroads_addon.blender.model.stage import Made, remove_staged
+from synthroads_addon.blender.model.stage import DataBlockLog, remove_staged
 from synthroads_addon.blender.model.store import find_road, recall
 from synthroads_addon.blender.scene.evaluated import scene_mesh
 from synthroads_addon.blender.things.model_builder import ROLE
@@ -174,7 +174,7 @@ def test_what_a_build_could_not_clean_up_goes_with_the_next_look() -> None:
     remove_staged()
     assert [line for line in lines() if not line.startswith("materials")] == expected
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(Made, "remove", lambda self: None)
+        patch.setattr(DataBlockLog, "remove", lambda self: None)
         steps.close()
 
 
