@@ -17,7 +17,7 @@ if __name__ == "__main__":
     sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from headless.benchmark_table import DEMO, QUICK, TABLE, judge_lines, markdown
-from headless.commands import Outcome, add_changes_argument, add_common_arguments, entry
+from headless.commands import Outcome, add_changes_argument, entry
 from headless.marked_documents import fill
 from headless.messages import progress_bar
 from headless.waves import CELLS, write_waves
@@ -50,7 +50,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--quick", action="store_true", help="a small scene: to see that all works, in seconds")
     parser.add_argument("--overwrite", action="store_true", help="replace files that are already there")
     parser.add_argument(_PART, metavar="JSON", help=argparse.SUPPRESS)
-    add_common_arguments(parser)
 
 
 def run(arguments: argparse.Namespace) -> Outcome:

@@ -17,12 +17,7 @@ DEMO = (
     'outputs=["parameters","cloud"]',
 )
 """Changes of the demo's scenario: more than 15 million points, with everything that a point can have."""
-QUICK = (
-    "road.length=60",
-    "fidelity=draft",
-    "scan.platform.speed=8",
-    "colour.ground_sampling_distance=0.5",
-)
+QUICK = ("road.length=60", "fidelity=draft", "scan.platform.speed=8", "colour.ground_sampling_distance=0.5")
 """Further changes, with which it takes seconds: to see that all works, not how fast."""
 
 

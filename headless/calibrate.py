@@ -16,10 +16,10 @@ from typing import Any
 if __name__ == "__main__":
     sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from headless.commands import Outcome, add_common_arguments, entry
+from headless.commands import Outcome, entry, numbers
 from headless.messages import progress_bar
 from synthroads_addon.base.errors import InputError
-from synthroads_addon.base.progress import Progress, silent
+from synthroads_addon.base.progress import exhaust
 from synthroads_addon.calibration.job import (
     PARTS,
     Calibration,
@@ -31,17 +31,18 @@ from synthroads_addon.calibration.job import (
 )
 from synthroads_addon.calibration.pavement import RoadClasses
 
+_SAME = (
+    *("table", "real", "class_field", "device", "incidence_deg", "ranges", "scanner", "reflection", "attenuation"),
+    *("range_corrected", "decibels", "hold", "gain"),
+)
+"""Arguments that a calibration's job has under the same name."""
+
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments of `synthroads calibrate`."""
     parser.formatter_class = argparse.RawDescriptionHelpFormatter
-    parser.add_argument(
-        "--material",
-        action="append",
-        required=True,
-        metavar="NAME[=CLASS]",
-        help="material of the table, and the cloud's class by number or name, or paved or line (can be repeated)",
-    )
+    text = "material of the table, and the cloud's class by number or name, or paved or line (can be repeated)"
+    parser.add_argument("--material", action="append", required=True, metavar="NAME[=CLASS]", help=text)
     _cloud_arguments(parser.add_argument_group("the real cloud"))
     _view_arguments(parser.add_argument_group("how it was seen"))
     _fit_arguments(parser.add_argument_group("the fit"))
@@ -50,7 +51,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     files.add_argument("--save", type=Path, metavar="FILE", help="write the fitted materials to this table (.json)")
     files.add_argument("--plot", type=Path, metavar="FILE", help="draw the distributions (.png)")
     files.add_argument("--overwrite", action="store_true", help="replace files that are already there")
-    add_common_arguments(parser)
 
 
 def _cloud_arguments(group: argparse._ArgumentGroup) -> None:
@@ -58,13 +58,11 @@ def _cloud_arguments(group: argparse._ArgumentGroup) -> None:
     text = "extra attribute of it that holds the classes (its own classes)"
     group.add_argument("--class-field", metavar="NAME", help=text)
     group.add_argument("--axis", type=Path, metavar="FILE", help="axis of its road: tells the classes by offset")
-    group.add_argument(
-        "--paved", type=_pair, action="append", default=[], metavar="FROM,TO",
-        help="offsets between which there is pavement, m, positive to the left (can be repeated)",
-    )
-    group.add_argument(
-        "--line", type=_number, action="append", default=[], metavar="M", help="offset of a marking (can be repeated)"
-    )
+    text = "offsets between which there is pavement, m, positive to the left (can be repeated)"
+    pair = numbers((2,), "FROM,TO")
+    group.add_argument("--paved", type=pair, action="append", default=[], metavar="FROM,TO", help=text)
+    text = "offset of a marking (can be repeated)"
+    group.add_argument("--line", type=numbers((1,), "a number"), action="append", default=[], metavar="M", help=text)
     group.add_argument("--line-width", type=float, default=0.15, metavar="M", help="of the markings, m (0.15)")
 
 
@@ -73,25 +71,21 @@ def _view_arguments(group: argparse._ArgumentGroup) -> None:
     group.add_argument("--incidence-deg", type=_numbers, default=(0.0,), metavar="D,D,...", help="angles, degrees (0)")
     text = "ranges, m (60)"
     group.add_argument("--range", type=_numbers, default=(60.0,), metavar="M,M,...", help=text, dest="ranges")
-    group.add_argument("--scanner", type=_place, metavar="X,Y,Z", help="one place that all was seen from, instead")
-    group.add_argument(
-        "--reflection", choices=("lambert", "oren_nayar"), default="lambert", help="as in the scan (lambert)"
-    )
+    text = "one place that all was seen from, instead"
+    group.add_argument("--scanner", type=numbers((3,), "X,Y,Z"), metavar="X,Y,Z", help=text)
+    reflections = ("lambert", "oren_nayar")
+    group.add_argument("--reflection", choices=reflections, default="lambert", help="as in the scan (lambert)")
     group.add_argument("--attenuation", type=float, default=0.0, metavar="1/M", help="of the air, there and back (0)")
     group.add_argument("--range-corrected", action="store_true", help="the device takes out the range's influence")
     group.add_argument("--decibels", type=float, metavar="DB", help="its 16 bits span this many dB (they are linear)")
-    group.add_argument(
-        "--texture", action="append", default=[], metavar="NAME=IMAGE[@M]",
-        help="take a material's colours from an image that shows a surface M wide (1 m; can be repeated)",
-    )
+    text = "take a material's colours from an image that shows a surface M wide (1 m; can be repeated)"
+    group.add_argument("--texture", action="append", default=[], metavar="NAME=IMAGE[@M]", help=text)
 
 
 def _fit_arguments(group: argparse._ArgumentGroup) -> None:
     group.add_argument("--no-fit", action="store_true", help="compare only; the gain is still free")
-    group.add_argument(
-        "--fit", metavar="PART,...", default="spread,wavelength",
-        help=f"besides the brightness: any of {', '.join(PARTS)}, or none (spread,wavelength)",
-    )
+    text = f"besides the brightness: any of {', '.join(PARTS)}, or none (spread,wavelength)"
+    group.add_argument("--fit", metavar="PART,...", default="spread,wavelength", help=text)
     group.add_argument("--hold", metavar="NAME", help="keep this material's brightness: it says what the gain is")
     group.add_argument("--gain", type=float, metavar="G", help="the device's gain, known from another cloud (free)")
 
@@ -104,7 +98,8 @@ def run(arguments: argparse.Namespace) -> Outcome:
         check_target(field, path, ending, arguments.overwrite)
     if arguments.save and (job.real is None or not job.fit):
         raise InputError("--save", str(arguments.save), "needs a cloud that materials are fitted to")
-    result = follow_job(job, progress_bar(arguments))
+    progress = progress_bar(arguments)
+    result = exhaust(steps(job), lambda share: progress("calibrate", share))
     if arguments.save:
         save_fitted(result, arguments.save, arguments.overwrite)
     if arguments.plot:
@@ -125,17 +120,6 @@ def check_target(field: str, path: Path | None, ending: str, overwrite: bool) ->
         raise InputError(field, str(path), "is there already; --overwrite replaces it")
 
 
-def follow_job(job: CalibrationJob, progress: Progress = silent) -> Calibration:
-    """Run a job and show its progress."""
-    run = steps(job)
-    while True:
-        try:
-            progress("calibrate", next(run))
-        except StopIteration as end:
-            result: Calibration = end.value
-            return result
-
-
 def job_of(arguments: argparse.Namespace) -> CalibrationJob:
     """Return the job that the arguments stand for."""
     textures = dict(_texture(text) for text in arguments.texture)
@@ -147,26 +131,11 @@ def job_of(arguments: argparse.Namespace) -> CalibrationJob:
         raise InputError("--axis", None, "is needed with --paved and --line")
     road = None
     if arguments.axis is not None:
-        road = RoadClasses(arguments.axis, tuple(arguments.paved), tuple(arguments.line), arguments.line_width)
-    return CalibrationJob(
-        targets=tuple(targets),
-        table=arguments.table,
-        real=arguments.real,
-        class_field=arguments.class_field,
-        road=road,
-        device=arguments.device,
-        incidence_deg=arguments.incidence_deg,
-        ranges=arguments.ranges,
-        scanner=arguments.scanner,
-        reflection=arguments.reflection,
-        attenuation=arguments.attenuation,
-        range_corrected=arguments.range_corrected,
-        decibels=arguments.decibels,
-        fit=not arguments.no_fit,
-        parts=frozenset(_parts(arguments.fit)),
-        hold=arguments.hold,
-        gain=arguments.gain,
-    )
+        lines = tuple(offset for (offset,) in arguments.line)
+        road = RoadClasses(arguments.axis, tuple(arguments.paved), lines, arguments.line_width)
+    same = {name: getattr(arguments, name) for name in _SAME}
+    parts = frozenset(_parts(arguments.fit))
+    return CalibrationJob(targets=tuple(targets), road=road, fit=not arguments.no_fit, parts=parts, **same)
 
 
 def summary(result: Calibration) -> list[str]:
@@ -193,9 +162,9 @@ def _table(row: dict[str, Any]) -> list[str]:
     if errors:
         cells = (f"{errors[name]:>12.2%}" if name in errors else " " * 12 for name in row["expected"])
         lines.append("  error/IQR " + "".join(cells))
+    names = ("25", "50", "75")
     if row["views"] and not errors:
-        lines.append("   incidence       range" + "".join(f"{name:>12}" for name in ("25", "50", "75")))
-        names = ("25", "50", "75")
+        lines.append("   incidence       range" + "".join(f"{name:>12}" for name in names))
         for view in row["views"]:
             quartiles = "".join(f"{view[name]:>12,.6g}" for name in names)
             lines.append(f"  {view['incidence_deg']:>6g} deg {view['range']:>9g} m{quartiles}")
@@ -233,27 +202,6 @@ def _numbers(text: str) -> tuple[float, ...]:
         return tuple(float(part) for part in text.split(","))
     except ValueError:
         raise argparse.ArgumentTypeError(f"is '{text}': must be numbers, e.g. 0,10,20") from None
-
-
-def _number(text: str) -> float:
-    return _several(text, 1, "a number, m")[0]
-
-
-def _pair(text: str) -> tuple[float, float]:
-    low, high = _several(text, 2, "FROM,TO in metres")
-    return low, high
-
-
-def _place(text: str) -> tuple[float, float, float]:
-    x, y, z = _several(text, 3, "X,Y,Z in metres")
-    return x, y, z
-
-
-def _several(text: str, count: int, wanted: str) -> tuple[float, ...]:
-    values = _numbers(text)
-    if len(values) != count or not all(abs(value) < 1e9 for value in values):
-        raise argparse.ArgumentTypeError(f"is '{text}': must be {wanted}")
-    return values
 
 
 if __name__ == "__main__":

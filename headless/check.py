@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING, Any
 if __name__ == "__main__":
     sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from headless.commands import add_common_arguments, entry
+from headless.commands import entry
+from synthroads_addon.base.text_table import text_table
 
 if TYPE_CHECKING:
     from synthroads_addon.checking.checker import Violation
@@ -20,7 +21,6 @@ if TYPE_CHECKING:
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments of `synthroads check`."""
     parser.add_argument("file", type=Path, metavar="FILE", help="parameter set (parameters.json)")
-    add_common_arguments(parser)
 
 
 def run(arguments: argparse.Namespace) -> tuple[int, dict[str, Any], str]:
@@ -41,14 +41,8 @@ def table(violations: list[Violation]) -> str:
         (v.rule, v.object, f"{v.station:.1f} m", _number(v.value, v.unit), _number(v.limit, v.unit), v.text)
         for v in violations
     ]
-    widths = [max(len(row[column]) for row in (head, *rows)) for column in range(5)]
-    lines = []
-    for row in (head, *rows):
-        left = [row[column].ljust(widths[column]) for column in (0, 1)]
-        right = [row[column].rjust(widths[column]) for column in (2, 3, 4)]
-        lines.append("  ".join([*left, *right, row[5]]).rstrip())
     count = len(violations)
-    return "\n".join([*lines, f"{count} violation{'s' if count > 1 else ''}"])
+    return "\n".join([*text_table(head, rows, (2, 3, 4)), f"{count} violation{'s' if count > 1 else ''}"])
 
 
 def _number(value: float, unit: str) -> str:

@@ -6,7 +6,7 @@ import argparse
 from collections.abc import Sequence
 from typing import Any
 
-from headless.commands import Parser, add_short_options, leave, module_of, run
+from headless.commands import Parser, complete_arguments, leave, module_of, run
 from synthroads_addon.base.version import generator
 
 COMMANDS = {
@@ -65,7 +65,7 @@ def build_parser() -> argparse.ArgumentParser:
     for name, summary in COMMANDS.items():
         module = module_of(name)
         module.add_arguments(commands.add_parser(name, help=summary, description=module.__doc__))
-    add_short_options(parser)
+    complete_arguments(parser)
     return parser
 
 

@@ -10,8 +10,9 @@ from typing import Any
 if __name__ == "__main__":
     sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from headless.commands import Outcome, add_common_arguments, entry
+from headless.commands import Outcome, entry, whole_number
 from headless.messages import progress_bar
+from synthroads_addon.base.text_table import text_table
 
 _COLUMNS = (
     ("points", "points", "{:,}"),
@@ -44,19 +45,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         tool.add_argument("--classes", metavar="NAME_OR_FILE", help="5, or a .json file of classes (the cloud's own)")
     for tool in (thin, mapping, change):
         tool.add_argument("--overwrite", action="store_true", help="replace a file that is already there")
-        add_common_arguments(tool)
 
 
 def run(arguments: argparse.Namespace) -> Outcome:
     """Run `synthroads cloud`."""
-    actions = {
-        "info": _info,
-        "subsample": _subsample,
-        "map-intensity": _map_intensity,
-        "convert": _convert,
-        "preview": _preview,
-    }
-    return actions[arguments.tool](arguments)
+    actions = {"info": _info, "subsample": _subsample, "map-intensity": _map_intensity, "convert": _convert}
+    return actions.get(arguments.tool, _preview)(arguments)
 
 
 def table(figures: dict[str, Any]) -> str:
@@ -75,11 +69,7 @@ def table(figures: dict[str, Any]) -> str:
         if values:
             shown = (form.format(values[key]) if values[key] is not None else "-" for key, _, form in _COLUMNS)
             rows.append((name, *shown))
-    widths = [max(len(row[column]) for row in rows) for column in range(len(rows[0]))]
-    for row in rows:
-        cells = [cell.rjust(width) for cell, width in zip(row[1:], widths[1:], strict=True)]
-        lines.append("  ".join([row[0].ljust(widths[0]), *cells]).rstrip())
-    return "\n".join(lines)
+    return "\n".join([*lines, *text_table(rows[0], rows[1:], range(1, len(rows[0])))])
 
 
 def _file_arguments(parser: argparse.ArgumentParser) -> None:
@@ -91,10 +81,9 @@ def _info_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("file", type=Path, metavar="FILE", help="cloud (.laz, .las, .ply, .e57, .npz)")
     text = "of roughness's neighbourhood, m (0.5)"
     parser.add_argument("--radius", type=_positive, default=0.5, metavar="M", help=text)
-    parser.add_argument(
-        "--samples", type=_count, default=5000, metavar="N", help="points per class for the roughness (5000; 0: none)"
-    )
-    add_common_arguments(parser)
+    text = "points per class for the roughness (5000; 0: none)"
+    count = whole_number(10_000_000, "10 million")
+    parser.add_argument("--samples", type=count, default=5000, metavar="N", help=text)
 
 
 def _preview_arguments(parser: argparse.ArgumentParser) -> None:
@@ -105,7 +94,6 @@ def _preview_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--line", type=float, nargs=4, metavar=("X1", "Y1", "X2", "Y2"), help="cut along this line")
     parser.add_argument("--depth", type=_positive, default=1.0, metavar="M", help="thickness of the cut, m (1)")
     parser.add_argument("--overwrite", action="store_true", help="replace pictures that are already there")
-    add_common_arguments(parser)
 
 
 def _info(arguments: argparse.Namespace) -> Outcome:
@@ -120,28 +108,16 @@ def _info(arguments: argparse.Namespace) -> Outcome:
 def _subsample(arguments: argparse.Namespace) -> Outcome:
     from synthroads_addon.cloud.tools.convert import subsample
 
-    done = subsample(
-        arguments.file,
-        arguments.output,
-        arguments.grid,
-        arguments.classes,
-        arguments.overwrite,
-        progress_bar(arguments),
-    )
+    settings = (arguments.grid, arguments.classes, arguments.overwrite)
+    done = subsample(arguments.file, arguments.output, *settings, progress_bar(arguments))
     return 0, done, f"{done['points']:,} of {done['points_read']:,} points written to {arguments.output}"
 
 
 def _map_intensity(arguments: argparse.Namespace) -> Outcome:
     from synthroads_addon.cloud.tools.convert import map_intensity
 
-    done = map_intensity(
-        arguments.file,
-        arguments.target,
-        arguments.output,
-        arguments.per_class,
-        arguments.overwrite,
-        progress_bar(arguments),
-    )
+    files = (arguments.file, arguments.target, arguments.output)
+    done = map_intensity(*files, arguments.per_class, arguments.overwrite, progress_bar(arguments))
     lines = [f"{done['points']:,} points written to {arguments.output}"]
     before, after = done["distance_before"], done["distance_after"]
     lines.append(f"largest gap between the distributions (Kolmogorov-Smirnov): {before:.4f} before, {after:.6f} after")
@@ -155,9 +131,7 @@ def _map_intensity(arguments: argparse.Namespace) -> Outcome:
 def _convert(arguments: argparse.Namespace) -> Outcome:
     from synthroads_addon.cloud.tools.convert import convert
 
-    done = convert(
-        arguments.file, arguments.output, arguments.classes, arguments.overwrite, progress_bar(arguments)
-    )
+    done = convert(arguments.file, arguments.output, arguments.classes, arguments.overwrite, progress_bar(arguments))
     lines = [f"{done['points']:,} points written to {arguments.output}"]
     if done["left_out"]:
         lines.append(f"left out, for want of a meaning here: {', '.join(done['left_out'])}")
@@ -187,12 +161,6 @@ def _positive(text: str) -> float:
     if not 0 < value <= 1000:
         raise argparse.ArgumentTypeError(f"is '{text}': must be above 0, at most 1000 m")
     return value
-
-
-def _count(text: str) -> int:
-    if not text.isascii() or not text.isdigit() or int(text) > 10_000_000:
-        raise argparse.ArgumentTypeError(f"is '{text}': must be a whole number from 0 to 10 million")
-    return int(text)
 
 
 if __name__ == "__main__":

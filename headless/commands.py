@@ -80,12 +80,14 @@ class Parser(argparse.ArgumentParser):
         self.exit(2, f"{self.prog}: {message}\n")
 
 
-def add_short_options(parser: argparse.ArgumentParser) -> None:
-    """Let `SHORT_OPTIONS` stand for a parser's long options, and for those of its sub-commands."""
+def complete_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add what every command understands to a parser or all of its sub-commands, and the letters of `SHORT_OPTIONS`."""
+    inner = [action for action in parser._actions if isinstance(action, argparse._SubParsersAction)]
+    if not inner:
+        _add_common_arguments(parser)
+    for its_parser in (its_parser for action in inner for its_parser in action.choices.values()):
+        complete_arguments(its_parser)
     for action in parser._actions:
-        if isinstance(action, argparse._SubParsersAction):
-            for its_parser in action.choices.values():
-                add_short_options(its_parser)
         letters = [SHORT_OPTIONS[name] for name in action.option_strings if name in SHORT_OPTIONS]
         action.option_strings = [*letters, *action.option_strings]
         parser._option_string_actions.update(dict.fromkeys(letters, action))
@@ -101,13 +103,15 @@ def command(name: str, argv: Sequence[str] | None = None) -> int:
     module = module_of(name)
     parser = Parser(prog=f"synthroads {name}", description=module.__doc__)
     module.add_arguments(parser)
-    add_short_options(parser)
+    complete_arguments(parser)
     return run(module.run, parser.parse_args(argv))
 
 
-def add_changes_argument(parser: argparse.ArgumentParser) -> None:
-    """Add ``--set PATH=VALUE``, gathered in ``changes``."""
-    text = "change one field of the scenario, e.g. road.length=800 (can be repeated)"
+def add_changes_argument(
+    parser: argparse.ArgumentParser, owner: str = "the scenario", example: str = "road.length=800"
+) -> None:
+    """Add ``--set PATH=VALUE``, gathered in ``changes``, by which fields of an owner are changed."""
+    text = f"change one field of {owner}, e.g. {example} (can be repeated)"
     parser.add_argument("--set", action="append", default=[], metavar="PATH=VALUE", dest="changes", help=text)
 
 
@@ -187,6 +191,32 @@ def choice_summary(report: dict[str, Any]) -> list[str]:
     return lines + ([f"  expected time: {seconds:.0f} s in all"] if seconds is not None else [])
 
 
+def numbers(counts: Sequence[int], form: str) -> Callable[[str], tuple[float, ...]]:
+    """Return what reads so many numbers with commas from an argument, in metres; ``form`` says it in the message."""
+
+    def read(text: str) -> tuple[float, ...]:
+        try:
+            values = tuple(float(part) for part in text.split(","))
+        except ValueError:
+            values = ()
+        if len(values) not in counts or not all(abs(value) < 1e9 for value in values):
+            raise argparse.ArgumentTypeError(f"is '{text}': must be {form} in metres")
+        return values
+
+    return read
+
+
+def whole_number(most: int, shown: str) -> Callable[[str], int]:
+    """Return what reads a whole number from 0 to the largest from an argument."""
+
+    def read(text: str) -> int:
+        if not text.isascii() or not text.isdigit() or int(text) > most:
+            raise argparse.ArgumentTypeError(f"is '{text}': must be a whole number from 0 to {shown}")
+        return int(text)
+
+    return read
+
+
 def add_renamed_argument(parser: argparse.ArgumentParser, former: str, name: str) -> None:
     """Refuse an option's former name with a hint at its name; help doesn't show it."""
 
@@ -208,7 +238,7 @@ def _split_names(text: str) -> list[str]:
     return list(dict.fromkeys(text.split(",")))
 
 
-def add_common_arguments(parser: argparse.ArgumentParser) -> None:
+def _add_common_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the flags that every sub-command understands."""
     amount = parser.add_mutually_exclusive_group()
     text = "no progress and no notes: print errors only, and the result where it is written to no file"

@@ -9,7 +9,7 @@ from pathlib import Path
 if __name__ == "__main__":
     sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from headless.commands import Outcome, add_common_arguments, entry
+from headless.commands import Outcome, add_changes_argument, entry
 from headless.messages import detail, progress_bar
 from synthroads_addon.base.errors import InputError
 from synthroads_addon.dataset.manifest import Manifest, faults, read_manifest
@@ -24,24 +24,22 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--output", required=True, type=Path, metavar="DIR", help="folder for the data set")
     where = parser.add_mutually_exclusive_group()
     where.add_argument("--jobs", type=int, metavar="N", help="scenes made at once on this machine (1)")
-    where.add_argument("--scheduler", metavar="ADDRESS", help="Dask scheduler whose workers make them (none), tcp://HOST:PORT")
+    where.add_argument(
+        "--scheduler", metavar="ADDRESS", help="Dask scheduler whose workers make them (none), tcp://HOST:PORT"
+    )
     parser.add_argument("--resume", action="store_true", help="continue what was begun in this folder")
     parser.add_argument("--overwrite", action="store_true", help="replace the data set that is there")
     parser.add_argument(
         "--splits", nargs="+", metavar="SPLIT", help="make scenes of these splits only (all); --resume makes the others"
     )
     parser.add_argument("--verify", action="store_true", help="make nothing: compare every file with its checksum")
-    parser.add_argument("--set", action="append", default=[], metavar="PATH=VALUE", dest="changes", help=_SET)
-    add_common_arguments(parser)
-
-
-_SET = "change one field of every scenario after the recipe's own, e.g. fidelity=draft (can be repeated)"
+    add_changes_argument(parser, "every scenario after the recipe's own", "fidelity=draft")
 
 
 def run(arguments: argparse.Namespace) -> Outcome:
     """Run `synthroads dataset`."""
-    for name, kept in (("--resume", arguments.resume), ("--verify", arguments.verify)):
-        if kept and arguments.overwrite:
+    for name, keeps in (("--resume", arguments.resume), ("--verify", arguments.verify)):
+        if keeps and arguments.overwrite:
             raise InputError("--overwrite", None, f"can't be given with {name}, which keeps what is there")
     if arguments.verify:
         return _verify(arguments.output)
@@ -64,13 +62,11 @@ def _change_recipe(recipe: Recipe, changes: list[str]) -> Recipe:
     """Return a recipe whose scenarios are changed as well; the changes become a part of it."""
     if not changes:
         return recipe
-    own = dict(parsed_change(change) for change in changes)
-    groups = [
-        group.model_copy(
-            update={"set": {**group.set, **own}, "variants": tuple({**each, **own} for each in group.variants)}
-        )
-        for group in recipe.groups
-    ]
+    values = dict(parsed_change(change) for change in changes)
+    groups = []
+    for group in recipe.groups:
+        update = {"set": group.set | values, "variants": tuple(each | values for each in group.variants)}
+        groups.append(group.model_copy(update=update))
     return Recipe.from_dict(recipe.model_copy(update={"groups": tuple(groups)}).to_dict(), "recipe")
 
 

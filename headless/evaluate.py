@@ -9,7 +9,7 @@ from pathlib import Path
 if __name__ == "__main__":
     sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from headless.commands import Outcome, add_common_arguments, entry
+from headless.commands import Outcome, entry
 from headless.messages import progress_bar
 
 
@@ -21,7 +21,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--output", required=True, type=Path, metavar="DIR", help="folder for tables and pictures")
     text = "classes of clouds of others, for segmentation: semantickitti, ign or a JSON file (the cloud's own)"
     parser.add_argument("--mapping", metavar="MAPPING", help=text)
-    add_common_arguments(parser)
 
 
 def run(arguments: argparse.Namespace) -> Outcome:

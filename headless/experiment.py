@@ -12,7 +12,7 @@ from pathlib import Path
 if __name__ == "__main__":
     sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from headless.commands import Outcome, add_common_arguments, entry
+from headless.commands import Outcome, add_changes_argument, entry
 from headless.messages import progress_bar
 from ml.configuration import experiment_names
 from synthroads_addon.base.errors import InputError
@@ -29,9 +29,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--configuration", metavar="NAME_OR_FILE", help=text)
     text = "seeds of each training, one after another (the experiment's)"
     parser.add_argument("--seeds", type=int, nargs="+", metavar="N", help=text)
-    text = "change one field of all configurations, e.g. threads=1 (can be repeated)"
-    parser.add_argument("--set", action="append", default=[], metavar="PATH=VALUE", dest="changes", help=text)
-    add_common_arguments(parser)
+    add_changes_argument(parser, "all configurations", "threads=1")
 
 
 def run(arguments: argparse.Namespace) -> Outcome:

@@ -13,7 +13,7 @@ from typing import Any
 if __name__ == "__main__":
     sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from headless.commands import Outcome, add_common_arguments, entry
+from headless.commands import Outcome, add_changes_argument, entry
 from ml.configuration import load_configuration
 from synthroads_addon.base.errors import InputError
 from synthroads_addon.base.files import write_file
@@ -26,10 +26,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("configuration", metavar="CONFIGURATION", help=text)
     text = "steps that are measured (%(default)s)"
     parser.add_argument("--steps", type=int, default=3, metavar="N", help=text)
-    text = "change one field of the configuration, e.g. threads=1 (can be repeated)"
-    parser.add_argument("--set", action="append", default=[], metavar="PATH=VALUE", dest="changes", help=text)
+    add_changes_argument(parser, "the configuration", "threads=1")
     parser.add_argument("--output", type=Path, metavar="FILE", help="JSON file to write as well")
-    add_common_arguments(parser)
 
 
 def run(arguments: argparse.Namespace) -> Outcome:

@@ -9,7 +9,7 @@ from pathlib import Path
 if __name__ == "__main__":
     sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from headless.commands import Outcome, add_common_arguments, entry
+from headless.commands import Outcome, entry
 from headless.messages import logger
 
 
@@ -19,7 +19,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--only", default="", metavar="TEXT", help="only pictures whose name contains this (all)")
     parser.add_argument("--width", type=int, default=1280, metavar="N", help="width of a picture, pixels (1280)")
     parser.add_argument("--samples", type=int, default=48, metavar="N", help="samples per pixel (48)")
-    add_common_arguments(parser)
 
 
 def run(arguments: argparse.Namespace) -> Outcome:

@@ -15,13 +15,13 @@ from headless.commands import (
     Outcome,
     add_changes_argument,
     add_choice_arguments,
-    add_common_arguments,
     add_device_argument,
     add_twin_argument,
     all_changes,
     choice_changes,
     choice_summary,
     entry,
+    whole_number,
 )
 from headless.messages import detail, progress_bar
 from synthroads_addon.scenario.scenario import load_scenario, scenario_names
@@ -37,7 +37,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--scenario", default="rq31-600m", metavar="NAME_OR_FILE", help=text)
     parser.add_argument("--output", required=True, type=Path, metavar="DIR", help="folder for the files")
     add_device_argument(parser)
-    parser.add_argument("--seed", type=_seed, metavar="N", help="seed of everything random (the scenario's own)")
+    seed = whole_number(2**63 - 1, "2^63 - 1")
+    parser.add_argument("--seed", type=seed, metavar="N", help="seed of everything random (the scenario's own)")
     text = "point on the trade-off (the scenario's own)"
     parser.add_argument("--fidelity", choices=("draft", "standard", "high"), help=text)
     parser.add_argument("--parameters", type=Path, metavar="FILE", help="take this road instead of sampling one")
@@ -46,7 +47,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_twin_argument(parser)
     add_changes_argument(parser)
     parser.add_argument("--overwrite", action="store_true", help="replace files that are already there")
-    add_common_arguments(parser)
 
 
 def run(arguments: argparse.Namespace) -> Outcome:
@@ -56,15 +56,8 @@ def run(arguments: argparse.Namespace) -> Outcome:
     detail("scenario", scenario.to_dict())
     from synthroads_addon.jobs.generate import Job, generate
 
-    job = Job(
-        scenario,
-        arguments.output,
-        arguments.parameters,
-        arguments.axis,
-        arguments.overwrite,
-        new_file=True,
-        begun=begun,
-    )
+    files = (arguments.output, arguments.parameters, arguments.axis)
+    job = Job(scenario, *files, arguments.overwrite, new_file=True, begun=begun)
     report = generate(job, progress_bar(arguments))
     return 0, report, summary(report, arguments.output)
 
@@ -91,12 +84,6 @@ def summary(report: dict[str, Any], output: Path) -> str:
     lines.append(f"  {'in all':<12} {report['seconds']:8.2f} s")
     lines.append(f"written to {output}")
     return "\n".join(lines)
-
-
-def _seed(text: str) -> int:
-    if not text.isascii() or not text.isdigit() or int(text) >= 2**63:
-        raise argparse.ArgumentTypeError(f"is '{text}': must be a whole number from 0 to 2^63 - 1")
-    return int(text)
 
 
 if __name__ == "__main__":

@@ -14,7 +14,7 @@ if __name__ == "__main__":
 
 import ml.catalogue
 from headless import catalogue
-from headless.commands import Outcome, add_common_arguments, entry
+from headless.commands import Outcome, entry
 from synthroads_addon.base.catalogue import Kind, entries
 from synthroads_addon.base.errors import InputError, nearest_name
 from synthroads_addon.base.field_list import FieldEntry, fields_of
@@ -53,7 +53,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.words = "names"  # type: ignore[attr-defined]
     text = "whose fields: the scenario's, or those of a training (%(default)s)"
     parser.add_argument("--of", choices=_OWNERS, default="scenario", help=text)
-    add_common_arguments(parser)
 
 
 def run(arguments: argparse.Namespace) -> Outcome:

@@ -13,7 +13,7 @@ from typing import Any
 if __name__ == "__main__":
     sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from headless.commands import Outcome, add_common_arguments, entry
+from headless.commands import Outcome, entry
 from synthroads_addon.base.errors import InputError, OutputError
 
 _LIMITS = {"voxel": (0.02, 10.0), "corridor": (5.0, 1000.0), "limit_mb": (0.5, 1e5)}
@@ -34,7 +34,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     text = "seed of the choice of tiles (%(default)s)"
     parser.add_argument("--seed", type=int, default=1, metavar="N", help=text)
     parser.add_argument("--overwrite", action="store_true", help="replace a file that is there")
-    add_common_arguments(parser)
 
 
 def run(arguments: argparse.Namespace) -> Outcome:

@@ -10,7 +10,7 @@ from typing import Any
 if __name__ == "__main__":
     sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from headless.commands import Outcome, add_changes_argument, add_common_arguments, all_changes, entry
+from headless.commands import Outcome, add_changes_argument, all_changes, entry
 from synthroads_addon.road.guidelines import STANDARD_CROSS_SECTIONS, USUAL_SECTION
 from synthroads_addon.road.parameters import DESIGN_CLASSES, RoadParameters
 from synthroads_addon.sampling.road import sample_road
@@ -38,7 +38,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     text = f"length of the road, m ({RoadScenario().length:g})"
     parser.add_argument("--length", type=float, metavar="M", help=text)
     add_changes_argument(parser)
-    add_common_arguments(parser)
 
 
 def run(arguments: argparse.Namespace) -> Outcome:

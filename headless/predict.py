@@ -9,7 +9,7 @@ from pathlib import Path
 if __name__ == "__main__":
     sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from headless.commands import Outcome, add_common_arguments, entry
+from headless.commands import Outcome, entry
 from headless.messages import progress_bar
 from headless.train import summary
 
@@ -25,7 +25,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     text = "write the classes' LAS codes to the field classification, besides predicted_class (segmentation)"
     parser.add_argument("--classification", action="store_true", help=text)
     parser.add_argument("--overwrite", action="store_true", help="replace files that are already there")
-    add_common_arguments(parser)
 
 
 def run(arguments: argparse.Namespace) -> Outcome:

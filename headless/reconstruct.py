@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 if __name__ == "__main__":
     sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from headless.commands import Outcome, add_common_arguments, add_renamed_argument, add_twin_argument, entry
+from headless.commands import Outcome, add_renamed_argument, add_twin_argument, entry
 from headless.messages import progress_bar
 from synthroads_addon.base.errors import InputError
 from synthroads_addon.base.files import output_folder
@@ -52,7 +52,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--no-picture", action="store_true", help=f"don't draw {PICTURE}")
     add_twin_argument(parser)
     parser.add_argument("--overwrite", action="store_true", help="replace files that are already there")
-    add_common_arguments(parser)
 
 
 def run(arguments: argparse.Namespace) -> Outcome:

@@ -17,11 +17,11 @@ from headless.commands import (
     Outcome,
     add_changes_argument,
     add_choice_arguments,
-    add_common_arguments,
     add_device_argument,
     all_changes,
     choice_changes,
     entry,
+    numbers,
 )
 from headless.messages import detail, progress_bar
 from synthroads_addon.base.errors import InputError
@@ -36,6 +36,8 @@ _FIELDS = {
     "fidelity": "fidelity",
 }
 """Arguments that are short for fields of the scenario."""
+_SAME = ("output", "scene", "path", "classes", "epsg", "origin", "up", "overwrite")
+"""Arguments that the scan of a scene has under the same name."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -48,14 +50,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     text = "follow this line, CSV (x, y, z) or GeoJSON (the scene's road, else straight over its middle)"
     where.add_argument("--path", type=Path, metavar="FILE", help=text)
     where.add_argument("--trajectory", metavar="FILE", help="CSV: time, x, y, z, roll, pitch, heading")
-    where.add_argument(
-        "--tripod",
-        type=_place,
-        action="append",
-        default=[],
-        metavar="X,Y[,Z]",
-        help="stand here, on the surface or with the scanner at Z (can be repeated; --tripod=-4,7 where X < 0)",
-    )
+    text = "stand here, on the surface or with the scanner at Z (can be repeated; --tripod=-4,7 where X < 0)"
+    place = numbers((2, 3), "X,Y or X,Y,Z")
+    where.add_argument("--tripod", type=place, action="append", default=[], metavar="X,Y[,Z]", help=text)
     text = "flight height, or that of the scanner on a tripod, m (the platform's usual one)"
     parser.add_argument("--height", type=float, metavar="M", help=text)
     parser.add_argument("--speed", type=float, metavar="M/S", help="speed over ground, m/s (the platform's usual one)")
@@ -69,10 +66,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--fidelity", choices=("draft", "standard", "high"), help=text)
     add_choice_arguments(parser)
     parser.add_argument("--epsg", type=int, metavar="N", help="coordinate system of the map (that of the scene's road)")
-    parser.add_argument("--origin", type=_origin, metavar="X,Y,Z", help="map coordinates of the scene's origin (0,0,0)")
+    text = "map coordinates of the scene's origin (0,0,0)"
+    parser.add_argument("--origin", type=numbers((3,), "X,Y,Z"), metavar="X,Y,Z", help=text)
     parser.add_argument("--up", choices=("y", "z"), help="what points up in .obj (y), .ply and .stl (z)")
     parser.add_argument("--overwrite", action="store_true", help="replace files that are already there")
-    add_common_arguments(parser)
 
 
 def run(arguments: argparse.Namespace) -> Outcome:
@@ -82,19 +79,8 @@ def run(arguments: argparse.Namespace) -> Outcome:
     detail("scenario", scenario.to_dict())
     from synthroads_addon.jobs.scan_scene import SceneScan, scan_scene
 
-    job = SceneScan(
-        scenario=scenario,
-        output=arguments.output,
-        scene=arguments.scene,
-        path=arguments.path,
-        tripods=tuple(arguments.tripod),
-        classes=arguments.classes,
-        epsg=arguments.epsg,
-        origin=arguments.origin,
-        up=arguments.up,
-        overwrite=arguments.overwrite,
-        begun=begun,
-    )
+    same = {name: getattr(arguments, name) for name in _SAME}
+    job = SceneScan(scenario=scenario, tripods=tuple(arguments.tripod), begun=begun, **same)
     report = scan_scene(job, progress_bar(arguments))
     return 0, report, summary(report, arguments.output)
 
@@ -123,24 +109,6 @@ def summary(report: dict[str, Any], output: Path) -> str:
     lines = [f"  {name:<20} {number:>12,} points" for name, number in rows]
     lines += [f"warning: {text}" for text in report["warnings"]]
     return "\n".join([*lines, generate.summary(report, output)])
-
-
-def _place(text: str) -> tuple[float, ...]:
-    return _numbers(text, (2, 3), "X,Y or X,Y,Z")
-
-
-def _origin(text: str) -> tuple[float, ...]:
-    return _numbers(text, (3,), "X,Y,Z")
-
-
-def _numbers(text: str, counts: tuple[int, ...], wanted: str) -> tuple[float, ...]:
-    try:
-        values = tuple(float(part) for part in text.split(","))
-    except ValueError:
-        values = ()
-    if len(values) not in counts or not all(abs(value) < 1e9 for value in values):
-        raise argparse.ArgumentTypeError(f"is '{text}': must be {wanted} in metres")
-    return values
 
 
 if __name__ == "__main__":

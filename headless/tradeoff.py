@@ -14,7 +14,7 @@ from typing import Any
 if __name__ == "__main__":
     sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from headless.commands import Outcome, add_common_arguments, entry
+from headless.commands import Outcome, entry
 from headless.marked_documents import fill
 from headless.messages import progress_bar
 from headless.tradeoff_plot import plot
@@ -38,10 +38,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments of `synthroads tradeoff`."""
     scenes = ", ".join(SCENES)
     parser.add_argument(
-        "--scenario",
-        action="append",
-        metavar="NAME_OR_FILE",
-        help=f"scene to measure on; can be repeated ({scenes})",
+        "--scenario", action="append", metavar="NAME_OR_FILE", help=f"scene to measure on; can be repeated ({scenes})"
     )
     parser.add_argument("--output", required=True, type=Path, metavar="DIR", help="folder for tables, JSON and plots")
     text = f"any of {', '.join(KNOBS)} (all)"
@@ -53,7 +50,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--document", type=Path, metavar="FILE", help="fill the tables of this Markdown file as well")
     parser.add_argument("--pictures", type=Path, metavar="DIR", help="put the plots here as well")
     parser.add_argument(_ROW, metavar="JSON", help=argparse.SUPPRESS)
-    add_common_arguments(parser)
 
 
 def run(arguments: argparse.Namespace) -> Outcome:

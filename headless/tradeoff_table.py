@@ -58,9 +58,7 @@ def time_noise(results: Iterable[Mapping[str, Any]]) -> float | None:
     return max(((max(times) - min(times)) * len(times) / sum(times) for times in several), default=None)
 
 
-def better_row(
-    row: Mapping[str, Any], others: Iterable[Mapping[str, Any]], noise: float
-) -> Mapping[str, Any] | None:
+def better_row(row: Mapping[str, Any], others: Iterable[Mapping[str, Any]], noise: float) -> Mapping[str, Any] | None:
     """Return a row that is faster than `row`, beyond the noise of time, and as accurate in all errors.
 
     Errors count as equal up to `ALIKE`. The fastest such row; None if there is none, so that `row` lies on the front.

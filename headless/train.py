@@ -9,7 +9,7 @@ from pathlib import Path
 if __name__ == "__main__":
     sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from headless.commands import Outcome, add_common_arguments, entry
+from headless.commands import Outcome, add_changes_argument, entry
 from headless.messages import detail, progress_bar
 from ml.configuration import load_configuration, shipped_names
 
@@ -21,9 +21,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--output", required=True, type=Path, metavar="DIR", help="folder for the run")
     parser.add_argument("--resume", action="store_true", help="go on with an interrupted training")
     parser.add_argument("--overwrite", action="store_true", help="begin anew in a folder that holds a run")
-    text = "change one field of the configuration, e.g. seed=2 (can be repeated)"
-    parser.add_argument("--set", action="append", default=[], metavar="PATH=VALUE", dest="changes", help=text)
-    add_common_arguments(parser)
+    add_changes_argument(parser, "the configuration", "seed=2")
 
 
 def run(arguments: argparse.Namespace) -> Outcome:

@@ -9,7 +9,7 @@ from pathlib import Path
 if __name__ == "__main__":
     sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from headless.commands import Outcome, add_common_arguments, add_renamed_argument, add_twin_argument, entry
+from headless.commands import Outcome, add_renamed_argument, add_twin_argument, entry
 from synthroads_addon.base.errors import InputError
 from synthroads_addon.base.files import output_folder
 from synthroads_addon.road.parameters import read_parameters
@@ -27,7 +27,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--max-deviation", type=float, default=TOLERANCE, metavar="M", help=text)
     add_renamed_argument(parser, "--tolerance", "--max-deviation")
     parser.add_argument("--overwrite", action="store_true", help="replace files that are already there")
-    add_common_arguments(parser)
 
 
 def run(arguments: argparse.Namespace) -> Outcome:

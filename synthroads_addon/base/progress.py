@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Generator, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from typing import Protocol
+from typing import Protocol, TypeVar
+
+S = TypeVar("S")
+T = TypeVar("T")
 
 
 class Progress(Protocol):
@@ -18,6 +21,16 @@ class Progress(Protocol):
 
 def silent(stage: str, share: float) -> None:
     """Report nothing."""
+
+
+def exhaust(steps: Generator[S, None, T], report: Callable[[S], object]) -> T:
+    """Run a generator to its end, report each value that it yields, and return what it returns."""
+    while True:
+        try:
+            report(next(steps))
+        except StopIteration as end:
+            result: T = end.value
+            return result
 
 
 @dataclass

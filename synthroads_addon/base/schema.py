@@ -113,12 +113,7 @@ class Model(BaseModel):
         conditions: what the class's validators require of several fields together, in the words of JSON Schema.
     """
 
-    model_config = ConfigDict(
-        extra="allow",
-        frozen=True,
-        allow_inf_nan=False,
-        json_schema_extra=_complete_schema,
-    )
+    model_config = ConfigDict(extra="allow", frozen=True, allow_inf_nan=False, json_schema_extra=_complete_schema)
     vendor_keys_allowed: ClassVar[bool] = True
     conditions: ClassVar[Sequence[dict[str, Any]]] = ()
 

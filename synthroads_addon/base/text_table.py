@@ -3,25 +3,27 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 
 _NUMBER = re.compile(r"[-–+\d.,]*( \([\d.,]+\))?")
 
 
-def text_table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:
-    """Return the lines of a table with columns two spaces apart; behind the first, those of numbers are right-aligned.
+def text_table(head: Sequence[str], rows: Sequence[Sequence[str]], right: Collection[int] | None = None) -> list[str]:
+    """Return the lines of a table with columns two spaces apart.
 
     Args:
         head: titles of the columns.
         rows: cells, as many each as there are titles.
+        right: columns that are right-aligned; None: those behind the first whose cells are numbers.
     """
-    right = [column > 0 and all(_NUMBER.fullmatch(row[column]) for row in rows) for column in range(len(head))]
+    if right is None:
+        right = [i for i in range(1, len(head)) if all(_NUMBER.fullmatch(row[i]) for row in rows)]
     widths = [max(len(row[column]) for row in (head, *rows)) for column in range(len(head))]
     lines = []
     for row in (head, *rows):
         cells = [
-            cell.rjust(width) if numbers else cell.ljust(width)
-            for cell, width, numbers in zip(row, widths, right, strict=True)
+            cell.rjust(width) if column in right else cell.ljust(width)
+            for column, (cell, width) in enumerate(zip(row, widths, strict=True))
         ]
         lines.append("  ".join(cells).rstrip())
     return lines

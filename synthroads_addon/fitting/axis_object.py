@@ -72,24 +72,12 @@ def fitted_axis(path: Path, scenario: RoadScenario) -> tuple[AlignmentObject, Ro
     origin = np.round(points.mean(axis=0))
     fit = fit_axis(points - origin)
     alignment = alignment_object(fit)
-    road = scenario.model_copy(
-        update={"length": alignment.length, "map_origin": tuple(float(value) for value in origin)}
-    )
+    road = scenario.model_copy(update={"length": alignment.length, "map_origin": tuple(origin.tolist())})
     report = {
         "file": path.name,
         "points": fit.points,
         "elements": len(alignment.horizontal),
-        "horizontal": {
-            "rms": round(fit.rms, 4),
-            "p95": round(fit.p95, 4),
-            "worst": round(fit.worst, 4),
-            "worst_station": round(fit.worst_station, 2),
-        },
-        "height": {
-            "rms": round(fit.height_rms, 4),
-            "p95": round(fit.height_p95, 4),
-            "worst": round(fit.height_worst, 4),
-            "worst_station": round(fit.height_worst_station, 2),
-        },
+        "horizontal": fit.horizontal.to_dict(),
+        "height": fit.height.to_dict(),
     }
     return alignment, road, report

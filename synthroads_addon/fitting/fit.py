@@ -22,7 +22,7 @@ from .chain import FREE, AxisData, Chain, ChainFit, Heights, Plan, elevations, r
 from .search import Goal, descent, improve_fit, independent
 from .start import Start, start_heights, start_plan
 
-__all__ = ["AxisFit", "fit_axis", "read_axis"]
+__all__ = ["AxisFit", "Deviations", "fit_axis", "read_axis"]
 
 _WINDOW = 1200.0  # m
 _TAIL = 300.0  # m at a window's end that only steady what lies before
@@ -42,28 +42,49 @@ _RELAXED = 1.5  # times what dense knots reach is aimed at where the tolerance c
 
 
 @dataclass(frozen=True)
+class Deviations:
+    """Distances of points from what was fitted to them.
+
+    Attributes:
+        rms, p95, worst: of the distances, m.
+        worst_station: where the worst is, m.
+    """
+
+    rms: float
+    p95: float
+    worst: float
+    worst_station: float
+
+    @classmethod
+    def of(cls, station: FloatArray, distance: FloatArray) -> Deviations:
+        """Return root mean square, 95th percentile and maximum of distances (N,) at stations (N,), m."""
+        size = np.abs(distance)
+        worst, rms = int(size.argmax()), float(np.sqrt((size**2).mean()))
+        return cls(rms, float(np.percentile(size, 95)), float(size[worst]), float(station[worst]))
+
+    def to_dict(self, largest: str = "worst", digits: int = 2) -> dict[str, float]:
+        """Return them as JSON data, m; the name of the worst, and the digits of its station, are given."""
+        sizes = {"rms": self.rms, "p95": self.p95, largest: self.worst}
+        rounded = {name: round(value, 4) for name, value in sizes.items()}
+        return rounded | {f"{largest}_station": round(self.worst_station, digits)}
+
+
+@dataclass(frozen=True)
 class AxisFit:
     """A fitted axis and how far the points are from it.
 
     Attributes:
         alignment: starts at the foot of the first point and ends at that of the last.
         profile: elevation over the alignment's stations.
-        rms, p95, worst: of the points' horizontal distances from the alignment, m.
-        worst_station: where the worst is, m.
-        height_rms, height_p95, height_worst, height_worst_station: the same for the heights.
+        horizontal: of the points' horizontal distances from the alignment.
+        height: of their heights above the profile.
         points: how many were used, i.e. without consecutive duplicates.
     """
 
     alignment: Alignment
     profile: Profile
-    rms: float
-    p95: float
-    worst: float
-    worst_station: float
-    height_rms: float
-    height_p95: float
-    height_worst: float
-    height_worst_station: float
+    horizontal: Deviations
+    height: Deviations
     points: int
 
 
@@ -93,7 +114,7 @@ def fit_axis(points: ArrayLike, tolerance: float = 0.05) -> AxisFit:
     placed = Alignment(alignment.elements, alignment.x + origin[0], alignment.y + origin[1], heading)
     real = weights == 1.0
     station, above = station[real], local[real, 2] - profile.elevation(station[real])
-    return AxisFit(placed, profile, *_figures(station, across[real]), *_figures(station, above), points=len(given))
+    return AxisFit(placed, profile, Deviations.of(station, across[real]), Deviations.of(station, above), len(given))
 
 
 def _check_points(points: ArrayLike) -> FloatArray:
@@ -125,13 +146,6 @@ def _bridge_gaps(points: FloatArray) -> tuple[FloatArray, FloatArray]:
     share = (nth / (added[owner] + 1.0))[:, None]
     dense = points[owner] + share * (points[owner + 1] - points[owner])
     return np.vstack((dense, points[-1:])), np.append(np.where(nth == 0, 1.0, _CHORD_WEIGHT), 1.0)
-
-
-def _figures(station: FloatArray, distance: FloatArray) -> tuple[float, float, float, float]:
-    """Return rms, 95th percentile and maximum of the absolute distances, and the maximum's station."""
-    size = np.abs(distance)
-    worst = int(size.argmax())
-    return float(np.sqrt((size**2).mean())), float(np.percentile(size, 95)), float(size[worst]), float(station[worst])
 
 
 @dataclass(frozen=True)

@@ -9,19 +9,25 @@ from pathlib import Path as FilePath
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import ndimage
 
 from ..base.classes import ClassScheme
 from ..base.errors import InputError
 from ..cloud.formats.registry import open_cloud
-from .ground import above_ground
 from .path import CloudPath
 
 Float = NDArray[np.float64]
+_Points = tuple[Float, NDArray[np.float32], NDArray[np.uint8]]
 
 FEWEST_POINTS = 2000
 """Fewer points on the road's surface than this are no road that could be measured."""
 _LABELLED_SHARE = 0.01  # of the surface's points must be labelled pavement for the labels to be believed
 _UNSORTED_SHARE = 0.5  # of the points without any class: the cloud has to be sorted by height
+CELL = 0.5
+WINDOW = 9
+"""Cells (m) whose lowest points make the ground, and the cells across which nothing that stands may fill: what is
+narrower than ``CELL * WINDOW`` falls off the ground."""
+_STEP = 0.15  # m: what rises more than this above the opened surface is no ground
 
 
 class PointKind(IntEnum):
@@ -114,7 +120,7 @@ def read_road_cloud(path: FilePath) -> RoadCloud:
         MissingFileError: there is no such file.
         InputError: it is no cloud, or holds too few points of ground or road.
     """
-    parts: list[tuple[Float, NDArray[np.float32], NDArray[np.uint8]]] = []
+    parts: list[_Points] = []
     with open_cloud(path) as cloud:
         header = cloud.header
         table = kind_table(header.scheme)
@@ -128,11 +134,9 @@ def read_road_cloud(path: FilePath) -> RoadCloud:
     if not sum(len(part[0]) for part in parts):
         known = ", ".join(KIND_OF_CLASS)
         raise InputError(str(path), None, f"holds no points of a class that a road is made from ({known})")
-    xyz, intensity, kind = (np.concatenate([part[i] for part in parts]) for i in range(3))
-    origin = np.round(np.append(xyz[:, :2].mean(axis=0), xyz[:, 2].min()))
-    xyz = xyz - origin
-    found = {names.get(int(c), f"class_{c}"): int(counts[c]) for c in np.flatnonzero(counts)}
-    return _sorted_cloud(path, xyz, intensity, kind, (origin, header.epsg, found))
+    xyz, intensity, kind = map(np.concatenate, zip(*parts, strict=True))
+    classes = {names.get(int(c), f"class_{c}"): int(counts[c]) for c in np.flatnonzero(counts)}
+    return _sort_by_height(path, (xyz, intensity, kind), header.epsg, classes)
 
 
 def kind_table(scheme: ClassScheme) -> NDArray[np.uint8]:
@@ -143,18 +147,18 @@ def kind_table(scheme: ClassScheme) -> NDArray[np.uint8]:
     return table
 
 
-def _sorted_cloud(
+def _sort_by_height(
     path: FilePath,
-    xyz: Float,
-    intensity: NDArray[np.float32],
-    kind: NDArray[np.uint8],
-    told: tuple[Float, int | None, dict[str, int]],
+    points: tuple[Float, NDArray[np.float32], NDArray[np.uint8]],
+    epsg: int | None,
+    classes: dict[str, int],
 ) -> RoadCloud:
-    """Return the cloud after what has no class was sorted by height, or left out."""
-    origin, epsg, classes = told
+    """Return the cloud of points (map coordinates, intensity, kind), those without a class sorted or left out."""
+    xyz, intensity, kind = points
+    origin = np.round(np.append(xyz[:, :2].mean(axis=0), xyz[:, 2].min()))
+    xyz = xyz - origin
     unsorted = kind == PointKind.UNSORTED
-    surface = np.isin(kind, SURFACE)
-    if unsorted.mean() > _UNSORTED_SHARE and surface.sum() < FEWEST_POINTS:
+    if unsorted.mean() > _UNSORTED_SHARE and np.isin(kind, SURFACE).sum() < FEWEST_POINTS:
         height = above_ground(xyz)
         kind = np.where(unsorted & (np.abs(height) < 0.12), PointKind.GROUND, kind).astype(np.uint8)
         kind = np.where(unsorted & (height >= 0.2) & (height < 8.0), PointKind.FURNITURE, kind).astype(np.uint8)
@@ -168,3 +172,24 @@ def _sorted_cloud(
     labelled = bool(paved.sum() > _LABELLED_SHARE * surface.sum())
     marked = labelled and bool((kind == PointKind.MARKING).sum() > 0.001 * paved.sum())
     return RoadCloud(xyz, intensity, kind, origin, epsg, labelled, marked, sum(classes.values()), classes)
+
+
+def above_ground(xyz: Float) -> Float:
+    """Return the height (N,) of points (N, 3) above the ground below them, m.
+
+    The ground is the lowest point of each cell, opened by a window (so that cars, barriers and bushes fall off),
+    gaps filled from the nearest cell, and smoothed.
+    """
+    low = np.floor(xyz[:, :2].min(axis=0) / CELL)
+    cell = (np.floor(xyz[:, :2] / CELL) - low).astype(np.int64)
+    shape = tuple(cell.max(axis=0) + 1)
+    lowest = np.full(shape, np.inf)
+    np.minimum.at(lowest, (cell[:, 0], cell[:, 1]), xyz[:, 2])
+    empty = ~np.isfinite(lowest)
+    nearest = ndimage.distance_transform_edt(empty, return_distances=False, return_indices=True)
+    filled = lowest[tuple(nearest)]
+    opened = ndimage.grey_opening(filled, size=(WINDOW, WINDOW))
+    ground = ndimage.uniform_filter(np.where(filled - opened > _STEP, opened, filled), 3)
+    place = xyz[:, :2] / CELL - low - 0.5
+    under = ndimage.map_coordinates(ground, place.T, order=1, mode="nearest")
+    return xyz[:, 2] - np.asarray(under)

@@ -11,14 +11,7 @@ from scipy.spatial.distance import cdist
 
 from ..road.geometry import RoadGeometry
 from ..road.objects import width_at
-from ..road.parameters import (
-    ConcreteBarrier,
-    Delineator,
-    Guardrail,
-    LineObject,
-    NoiseBarrier,
-    RoadParameters,
-)
+from ..road.parameters import ConcreteBarrier, Delineator, Guardrail, LineObject, NoiseBarrier, RoadParameters
 from ..road.things.furniture import Side
 
 Float = NDArray[np.float64]
@@ -46,13 +39,12 @@ def compare(found: RoadParameters, truth: RoadParameters) -> dict[str, Any]:
     same = bool(np.median(np.cos(turn[covered] if covered.any() else turn)) > 0.0)
     height = here.profile.elevation(at) + found.transform.translate[2]
     height = height - there.profile.elevation(station) - truth.transform.translate[2]
+    sides = {side: _carriageway(there, here, side, same, station[covered], at[covered]) for side in there.sections}
     return {
         "covered": round(float(covered.mean()), 4),
         "centreline": _figures(offset[covered]),
         "profile": _figures(height[covered]),
-        "carriageways": {
-            side: _carriageway(there, here, side, same, station[covered], at[covered]) for side in there.sections
-        },
+        "carriageways": sides,
         "surface": _figures(_surface(there, here, station[covered], truth, found)),
         "barriers": _barriers(there, here, _apart(truth, found)),
         "delineators": _posts(there, here, _apart(truth, found)),
@@ -80,13 +72,9 @@ def _figures(difference: Float) -> dict[str, float]:
     if not len(difference):
         return {}
     size = np.abs(difference)
-    return {
-        "mean": round(float(difference.mean()), 4),
-        "mae": round(float(size.mean()), 4),
-        "rms": round(float(np.sqrt((size**2).mean())), 4),
-        "p95": round(float(np.percentile(size, 95)), 4),
-        "largest": round(float(size.max()), 4),
-    }
+    figures = {"mean": difference.mean(), "mae": size.mean(), "rms": np.sqrt((size**2).mean())}
+    figures |= {"p95": np.percentile(size, 95), "largest": size.max()}
+    return {name: round(float(value), 4) for name, value in figures.items()}
 
 
 def _carriageway(
@@ -96,16 +84,13 @@ def _carriageway(
     other: Side = side if same else ("left" if side == "right" else "right")
     if other not in here.sections:
         return {"found": False}
-    true, mine = there.sections[side], here.sections[other]
+    both = ((there.sections[side], station), (here.sections[other], at))
     lanes = [
         sum((width_at(lane.width, where) >= _LANE_THERE).astype(int) for lane in section.carriageway.lanes)
-        for section, where in ((true, station), (mine, at))
+        for section, where in both
     ]
-    width = [
-        section.main_edge(where) - width_at(section.carriageway.inner_offset, where)
-        for section, where in ((true, station), (mine, at))
-    ]
-    inner = [width_at(section.carriageway.inner_offset, where) for section, where in ((true, station), (mine, at))]
+    inner = [width_at(section.carriageway.inner_offset, where) for section, where in both]
+    width = [section.main_edge(where) - near for (section, where), near in zip(both, inner, strict=True)]
     return {
         "found": True,
         "lanes": [int(np.median(count)) for count in lanes],
@@ -133,8 +118,9 @@ def _surface(
 
 def _barriers(there: RoadGeometry, here: RoadGeometry, apart: Float) -> dict[str, Any]:
     """Return length, recall and precision of all barriers: shares of their metres with one of the other set near."""
-    true = [item for item in there.parameters.objects.values() if isinstance(item, _BARRIERS)]
-    mine = [item for item in here.parameters.objects.values() if isinstance(item, _BARRIERS)]
+    true, mine = (
+        [item for item in road.parameters.objects.values() if isinstance(item, _BARRIERS)] for road in (there, here)
+    )
     recalled, error = _match_barriers(there, true, here, mine, apart)
     precise, _ = _match_barriers(here, mine, there, true, -apart)
     return {

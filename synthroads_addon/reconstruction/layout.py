@@ -133,14 +133,9 @@ def paved_bands(profiles: Profiles, paved: Grid) -> list[tuple[float, float]]:
     share = np.where(known, paved, 0.0).sum(axis=0) / np.maximum(rows, 1)
     on = (share > 0.5) & (rows > 0.3 * covered_length(profiles))
     on = ndimage.binary_closing(on, iterations=round(0.3 / ACROSS))
-    label, count = ndimage.label(on)
-    spans = []
-    for number in range(1, count + 1):
-        columns = np.flatnonzero(label == number)
-        low, high = profiles.offsets[columns[0]] - ACROSS / 2, profiles.offsets[columns[-1]] + ACROSS / 2
-        if high - low >= _NARROWEST_BAND:
-            spans.append((float(low), float(high)))
-    return spans
+    columns = [part[0] for part in ndimage.find_objects(ndimage.label(on)[0])]
+    spans = [(profiles.offsets[c.start] - ACROSS / 2, profiles.offsets[c.stop - 1] + ACROSS / 2) for c in columns]
+    return [(float(low), float(high)) for low, high in spans if high - low >= _NARROWEST_BAND]
 
 
 def paved_by_brightness(profiles: Profiles, lines: list[Line]) -> Grid:
@@ -228,12 +223,6 @@ def _edge_line(profiles: Profiles, paved: Grid, span: tuple[float, float], sign:
         cover=np.zeros(len(stations)),
         start=float(stations[0]),
         end=float(stations[-1]),
-        width=0.0,
-        width_std=0.0,
-        painted=0.0,
-        dash=0.0,
-        gap=0.0,
-        first_dash=0.0,
     )
 
 

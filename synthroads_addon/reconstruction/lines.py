@@ -30,6 +30,7 @@ _AROUND = 41  # rows around one, in which there is a dash
 _FULL = 0.3  # of a line's usual width: less is no paint
 _FEWEST_POINTS = 4  # on a line in a stretch
 _SOLID = 0.65  # of its length: a line painted there is solid
+_Track = list[tuple[float, float]]
 _STANDARD_DASHES = ((6.0, 12.0), (4.0, 8.0), (3.0, 6.0), (6.0, 6.0), (3.0, 3.0))
 _DASH_TOLERANCE = 0.6  # m
 
@@ -61,12 +62,12 @@ class Line:
     cover: Float
     start: float
     end: float
-    width: float
-    width_std: float
-    painted: float
-    dash: float
-    gap: float
-    first_dash: float
+    width: float = 0.0
+    width_std: float = 0.0
+    painted: float = 0.0
+    dash: float = 0.0
+    gap: float = 0.0
+    first_dash: float = 0.0
 
     @property
     def solid(self) -> bool:
@@ -93,8 +94,8 @@ def find_lines(profiles: Profiles) -> list[Line]:
 def _tracks(profiles: Profiles) -> list[tuple[Float, Float]]:
     """Return (stations, offsets) of each line, roughly: peaks of mean profiles linked from window to window."""
     rows = len(profiles.stations)
-    closed: list[list[tuple[float, float]]] = []
-    running: list[list[tuple[float, float]]] = []
+    closed: list[_Track] = []
+    running: list[_Track] = []
     for row in range(0, max(1, rows - _WINDOW // 2), _STEP):
         station = float(profiles.stations[row : row + _WINDOW].mean())
         peaks = _peaks(profiles, profiles.paint[row : row + _WINDOW])
@@ -111,9 +112,8 @@ def _peaks(profiles: Profiles, paint: Grid) -> list[float]:
     count = ndimage.gaussian_filter1d(known.sum(axis=0).astype(np.float64), 1.0)
     total = ndimage.gaussian_filter1d(np.where(known, paint, 0.0).sum(axis=0).astype(np.float64), 1.0)
     mean = np.where(count > 0.05 * len(paint), total / np.maximum(count, 1e-9), 0.0)
-    found, told = find_peaks(mean, height=_HEIGHT, prominence=_PROMINENCE, width=(None, _WIDEST / ACROSS))
-    del told
-    return [float(_vertex(mean, at, profiles.offsets)) for at in found]
+    peaks = find_peaks(mean, height=_HEIGHT, prominence=_PROMINENCE, width=(None, _WIDEST / ACROSS))[0]
+    return [_vertex(mean, at, profiles.offsets) for at in peaks]
 
 
 def _vertex(values: Float, at: int, places: Float) -> float:
@@ -123,9 +123,7 @@ def _vertex(values: Float, at: int, places: Float) -> float:
     return float(places[at] + (0.5 * ACROSS * (before - after) / bend if bend < 0.0 else 0.0))
 
 
-def _link_peaks(
-    running: list[list[tuple[float, float]]], peaks: list[float], station: float
-) -> tuple[list[list[tuple[float, float]]], list[list[tuple[float, float]]]]:
+def _link_peaks(running: list[_Track], peaks: list[float], station: float) -> tuple[list[_Track], list[_Track]]:
     """Return the tracks that go on, with the peaks that continue them or begin new ones, and those that ended."""
     pairs = sorted(
         (abs(peak - _expected_place(track, station)), i, j)
@@ -145,7 +143,7 @@ def _link_peaks(
     return going, ended
 
 
-def _expected_place(track: list[tuple[float, float]], station: float) -> float:
+def _expected_place(track: _Track, station: float) -> float:
     """Return where a track should be at a station: straight on from its last 40 m."""
     if len(track) < 3:
         return track[-1][1]
@@ -168,7 +166,7 @@ def _measure_line(profiles: Profiles, stations: Float, offsets: Float) -> Line |
     grid, measured, weights = _stretches(profiles, middle, np.where(inside, share, 0.0))
     if (weights > 0.0).sum() < 4:
         return None
-    width, width_std = _width(cover[inside], share[inside])
+    width, width_std = mean_with_std(cover[inside][np.nan_to_num(share[inside]) > 0.5])
     apart = np.zeros(len(grid))
     if profiles.points is not None:
         on = np.where(inside & np.isfinite(share), share, 0.0) > 0.5
@@ -309,11 +307,6 @@ def _cover(share: Float) -> Float:
     return np.where(total > 0.0, on / np.maximum(total, 1.0), np.nan)
 
 
-def _width(cover: Float, share: Float) -> tuple[float, float]:
-    """Return the mean width (m) of the paint in rows (R,) that are painted, and its standard deviation."""
-    return mean_with_std(cover[np.nan_to_num(share) > 0.5])
-
-
 def _dashes(stations: Float, cover: Float) -> tuple[float, float, float, float]:
     """Return the painted share, dash and gap (m, 0 if solid) and where a dash begins, from the shares of rows (R,).
 
@@ -337,7 +330,6 @@ def _dashes(stations: Float, cover: Float) -> tuple[float, float, float, float]:
         if abs(wanted + gap - period) < 0.5 * _DASH_TOLERANCE and abs(wanted - dash) < 2.0 * _DASH_TOLERANCE:
             dash, period = wanted, wanted + gap
     angle = float(np.angle((np.exp(2j * np.pi * stations[known] / period) * (wave - wave.mean())).mean()))
-    middle = angle / (2.0 * np.pi) * period  # of a dash
-    first = middle - 0.5 * dash
+    first = angle / (2.0 * np.pi) * period - 0.5 * dash  # half a dash before the middle of one
     first += period * np.ceil((stations[0] - first) / period)
     return share, round(dash, 2), round(period - dash, 2), float(first)

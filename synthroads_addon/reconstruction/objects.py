@@ -3,7 +3,7 @@ class only says that something stands there, its shape does."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -161,17 +161,7 @@ def facing(barrier: FoundBarrier, side: Literal["left", "right", "both"]) -> Fou
     if barrier.kind != "guardrail" or side == "both":
         return barrier
     behind = -1.0 if side == "left" else 1.0
-    shift = behind * (_BEAM + GUARDRAIL_SPACER[side])
-    return FoundBarrier(
-        barrier.kind,
-        barrier.start,
-        barrier.end,
-        barrier.offset + shift,
-        barrier.height,
-        side,
-        barrier.offset_std,
-        barrier.points,
-    )
+    return replace(barrier, offset=barrier.offset + behind * (_BEAM + GUARDRAIL_SPACER[side]), faces=side)
 
 
 def find_posts(standing: StandingObject, barrier_points: NDArray[np.bool_]) -> list[FoundPost]:
@@ -183,19 +173,17 @@ def find_posts(standing: StandingObject, barrier_points: NDArray[np.bool_]) -> l
     """
     posts: list[FoundPost] = []
     for kind in (PointKind.POST, PointKind.FURNITURE):
-        own = np.flatnonzero((standing.kind == kind) & ~barrier_points)
-        part = standing.chosen(np.isin(np.arange(len(standing.kind)), own))
-        clusters = _clusters(part)
+        part = standing.chosen((standing.kind == kind) & ~barrier_points)
         tree = cKDTree(np.column_stack([standing.station, standing.offset])) if kind == PointKind.FURNITURE else None
-        for members in clusters:
+        for members in _clusters(part):
             post = _post(part.chosen(members), kind)
-            if post is not None and (tree is None or _stands_alone(tree, post, int(members.sum()))):
+            if post is not None and (tree is None or _stands_alone(tree, post, len(members))):
                 posts.append(post)
     return sorted(posts, key=lambda item: (item.station, item.offset))
 
 
-def _clusters(part: StandingObject) -> list[NDArray[np.bool_]]:
-    """Return masks of the clusters of points that hang together."""
+def _clusters(part: StandingObject) -> list[NDArray[np.intp]]:
+    """Return the points of each cluster that hangs together, in their order."""
     if not len(part.station):
         return []
     pairs = cKDTree(np.column_stack([part.station, part.offset])).query_pairs(_POST_APART, output_type="ndarray")
@@ -203,13 +191,7 @@ def _clusters(part: StandingObject) -> list[NDArray[np.bool_]]:
     graph = coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(count, count))
     number, label = connected_components(graph, directed=False)
     order = np.argsort(label, kind="stable")
-    groups = np.split(order, np.searchsorted(label[order], np.arange(1, number)))
-    masks = []
-    for group in groups:
-        mask = np.zeros(count, dtype=bool)
-        mask[group] = True
-        masks.append(mask)
-    return masks
+    return np.split(order, np.searchsorted(label[order], np.arange(1, number)))
 
 
 def _post(part: StandingObject, kind: PointKind) -> FoundPost | None:

@@ -196,9 +196,7 @@ def _begin(cells: Float, tree: cKDTree) -> tuple[Float, float, float]:
         if np.sqrt(spread[1]) > _LONGISH * np.sqrt(max(spread[0], 1e-9)):
             half = float(np.percentile(np.abs((near - centre) @ axes[:, 0]), 98))
             return centre, float(np.arctan2(axes[1, 1], axes[0, 1])), min(half + _MARGIN, _REACH)
-    raise InputError(
-        "road", None, "its surface in the cloud is nowhere longer than wide: --path gives its course"
-    )
+    raise InputError("road", None, "its surface in the cloud is nowhere longer than wide: --path gives its course")
 
 
 def _march(cells: Float, tree: cKDTree, start: Float, direction: float, half: float) -> list[Float]:

@@ -13,7 +13,7 @@ from ..road.geometry import RoadGeometry
 from ..road.parameters import LineMarking
 from .cloud import PointKind, RoadCloud
 from .reconstruct import Reconstruction
-from .section import MeasuredSection, SideSection, standard_section
+from .section import MeasuredSection, Side, SideSection, standard_section
 
 Float = NDArray[np.float64]
 
@@ -38,10 +38,7 @@ def report(found: Reconstruction, cloud: RoadCloud) -> dict[str, Any]:
         "surface": _surface(found, cloud, geometry),
         "edges": {name: _edges(side, found, geometry) for name, side in section.sides.items()},
         "lines": _lines(found, geometry),
-        "crossfall": {
-            name: _figures(100.0 * (_fall(found, name) - _model_fall(geometry, name, found.measured.stations)))
-            for name in section.sides
-        },
+        "crossfall": {name: _figures(100.0 * _excess_fall(found, geometry, name)) for name in section.sides},
         "widenings": {name: _widenings(side, found.measured.stations) for name, side in section.sides.items()},
         "objects": _objects(found),
         "rules_broken": [asdict(violation) for violation in violations],
@@ -63,18 +60,8 @@ def _centreline(found: Reconstruction) -> dict[str, Any]:
     fit, std = found.measured.fit, found.centre.std[np.isfinite(found.centre.raw)]
     return {
         "elements": len(fit.alignment.elements),
-        "from_alignment": {
-            "rms": round(fit.rms, 4),
-            "p95": round(fit.p95, 4),
-            "largest": round(fit.worst, 4),
-            "largest_station": round(fit.worst_station, 1),
-        },
-        "height_from_profile": {
-            "rms": round(fit.height_rms, 4),
-            "p95": round(fit.height_p95, 4),
-            "largest": round(fit.height_worst, 4),
-            "largest_station": round(fit.height_worst_station, 1),
-        },
+        "from_alignment": fit.horizontal.to_dict("largest", 1),
+        "height_from_profile": fit.height.to_dict("largest", 1),
         "std": {"mean": round(float(std.mean()), 4), "largest": round(float(std.max()), 4)},
         "seen": round(float(np.isfinite(found.centre.raw).mean()), 4),
     }
@@ -91,17 +78,17 @@ def section_report(section: MeasuredSection) -> dict[str, Any]:
 
 
 def _side(side: SideSection) -> dict[str, Any]:
-    return {
-        "lanes": [lane.to_dict() for lane in reversed(side.lanes)],
-        "inner_offset": side.inner_offset.to_dict(),
-        "inner_edge_strip": side.inner_strip.to_dict(),
-        "outside_of_lanes": side.outer_width.to_dict(),
-        "outer_edge_strip": side.strip.to_dict(),
-        "hard_shoulder": side.shoulder.to_dict(),
-        "paved_width": side.paved_width.to_dict(),
-        "outer_edge_seen": side.edge_seen,
-        "outermost_line_is_edge": side.closed,
+    widths = {
+        "inner_offset": side.inner_offset,
+        "inner_edge_strip": side.inner_strip,
+        "outside_of_lanes": side.outer_width,
+        "outer_edge_strip": side.strip,
+        "hard_shoulder": side.shoulder,
+        "paved_width": side.paved_width,
     }
+    lanes = [lane.to_dict() for lane in reversed(side.lanes)]
+    seen = {"outer_edge_seen": side.edge_seen, "outermost_line_is_edge": side.closed}
+    return {"lanes": lanes, **{name: width.to_dict() for name, width in widths.items()}, **seen}
 
 
 def _surface(found: Reconstruction, cloud: RoadCloud, geometry: RoadGeometry) -> dict[str, Any]:
@@ -149,12 +136,10 @@ def _lines(found: Reconstruction, geometry: RoadGeometry) -> dict[str, Any]:
     return result
 
 
-def _fall(found: Reconstruction, name: Any) -> Float:
-    return found.surfaces[name].fall
-
-
-def _model_fall(geometry: RoadGeometry, name: Any, stations: Float) -> Float:
-    return geometry.crossfall(geometry.sections[name].carriageway, stations)
+def _excess_fall(found: Reconstruction, geometry: RoadGeometry, side: Side) -> Float:
+    """Return by how much the crossfall that was measured in each stretch is more than the reconstructed one, m/m."""
+    modelled = geometry.crossfall(geometry.sections[side].carriageway, found.measured.stations)
+    return found.surfaces[side].fall - modelled
 
 
 def _widenings(side: SideSection, stations: Float) -> list[dict[str, float]]:
@@ -165,14 +150,8 @@ def _widenings(side: SideSection, stations: Float) -> list[dict[str, float]]:
     result = []
     for part in np.split(np.arange(len(wide)), np.flatnonzero(np.diff(wide)) + 1):
         if len(part) and wide[part[0]] and stations[part[-1]] - stations[part[0]] >= _LONG:
-            extra = float(np.median(edge[part]) - usual)
-            result.append(
-                {
-                    "start": round(float(stations[part[0]]), 1),
-                    "end": round(float(stations[part[-1]]), 1),
-                    "wider_by": round(extra, 2),
-                }
-            )
+            start, end = (round(float(stations[part[i]]), 1) for i in (0, -1))
+            result.append({"start": start, "end": end, "wider_by": round(float(np.median(edge[part]) - usual), 2)})
     return result
 
 
@@ -207,8 +186,5 @@ def _figures(difference: Float) -> dict[str, Any]:
     known = difference[np.isfinite(difference)]
     if not len(known):
         return {}
-    return {
-        "mean": round(float(known.mean()), 4),
-        "rms": round(float(np.sqrt((known**2).mean())), 4),
-        "p95": round(float(np.percentile(np.abs(known), 95)), 4),
-    }
+    figures = {"mean": known.mean(), "rms": np.sqrt((known**2).mean()), "p95": np.percentile(np.abs(known), 95)}
+    return {name: round(float(value), 4) for name, value in figures.items()}

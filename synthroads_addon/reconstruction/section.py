@@ -309,10 +309,7 @@ def _inside(first: Float, apart: Float, inner: Edge) -> tuple[Estimate, Estimate
     else:
         offset = Estimate(Estimate.of(first).value - _USUAL_STRIP, np.inf)
         strip = Estimate(_USUAL_STRIP, np.inf)
-    return (
-        Estimate(max(0.0, offset.value), offset.std),
-        Estimate(float(np.clip(strip.value, 0.0, 2.0)), strip.std),
-    )
+    return (Estimate(max(0.0, offset.value), offset.std), Estimate(float(np.clip(strip.value, 0.0, 2.0)), strip.std))
 
 
 def _usual(outside: Float, line: Line | None) -> NDArray[np.bool_]:

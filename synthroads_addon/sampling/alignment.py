@@ -123,11 +123,8 @@ class HorizontalSampler:
             return []
         curvature = sign / radius
         joint = self._clothoids([(0.0, curvature)], self._transition(0.0, curvature), room)
-        return (
-            [_AlignmentPart(lacking, 0.0, 0.0), *joint, _AlignmentPart(_SHORTEST_END, curvature, curvature)]
-            if joint
-            else []
-        )
+        end = _AlignmentPart(_SHORTEST_END, curvature, curvature)
+        return [_AlignmentPart(lacking, 0.0, 0.0), *joint, end] if joint else []
 
     def _arc_after_arc(self, kind: str, start: float, room: float) -> list[_AlignmentPart]:
         """Return the clothoids of an S-curve ("s") or an egg curve ("egg")."""
@@ -281,11 +278,8 @@ def sample_profile(scenario: RoadScenario, rng: np.random.Generator) -> tuple[Ve
     climbed = 0.0
     for before, here, after in zip(stations[:-2], stations[1:-1], stations[2:], strict=True):
         # The first and last span have no rounding at the road's end: they can give their whole length.
-        spans = [
-            (here - before) / (1 if before == stations[0] else 2),
-            (after - here) / (1 if after == stations[-1] else 2),
-        ]
-        tangent = min(spans)
+        span_before = (here - before) / (1 if before == stations[0] else 2)
+        tangent = min(span_before, (after - here) / (1 if after == stations[-1] else 2))
         climbed += grades[-1] / 100.0 * (here - before)
         low = max(lowest, grades[-1] - 200.0 * tangent / limits.crest)
         high = min(highest, grades[-1] + 200.0 * tangent / limits.sag)
@@ -300,11 +294,8 @@ def sample_profile(scenario: RoadScenario, rng: np.random.Generator) -> tuple[Ve
         radii.append(round_value(rng.uniform(least, largest)) if change > 0 else 0.0)
     elevations = np.concatenate([[0.0], np.cumsum(np.diff(stations) * np.array(grades) / 100.0)])
     elevations -= np.interp(scenario.length / 2.0, stations, elevations)
-    radii = [0.0, *radii, 0.0]
-    return tuple(
-        VerticalPoint(station=station, elevation=round_value(z), radius=radius)
-        for station, z, radius in zip(stations, elevations, radii, strict=True)
-    )
+    rows = zip(stations, elevations, [0.0, *radii, 0.0], strict=True)
+    return tuple(VerticalPoint(station=station, elevation=round_value(z), radius=radius) for station, z, radius in rows)
 
 
 def grade_limits(scenario: RoadScenario) -> tuple[float, float]:

@@ -111,23 +111,19 @@ class _Painter:
         start, end = span
         return LineMarking(instance=1, carriageway=self.name, kind=kind, start_station=start, end_station=end, **given)
 
-    def _arrows(
-        self, name: str, kind: Any, stations: list[float], distances: np.ndarray
-    ) -> Iterator[tuple[str, Arrow]]:
-        for number, (station, distance) in enumerate(zip(stations, distances.tolist(), strict=True)):
-            yield (
-                f"{name}-{number + 1}",
-                Arrow(
-                    instance=1,
-                    carriageway=self.name,
-                    kind=kind,
-                    station=round_value(station),
-                    offset=round_value(self.carriageway.sign * distance),
-                    rotation_deg=0.0 if self.carriageway.traffic > 0 else 180.0,
-                    length=self.arrow_length,
-                    film_thickness=self.film,
-                ),
+    def _arrows(self, name: str, kind: Any, stations: list[float], away: np.ndarray) -> Iterator[tuple[str, Arrow]]:
+        for number, (station, distance) in enumerate(zip(stations, away.tolist(), strict=True), start=1):
+            arrow = Arrow(
+                instance=1,
+                carriageway=self.name,
+                kind=kind,
+                station=round_value(station),
+                offset=round_value(self.carriageway.sign * distance),
+                rotation_deg=0.0 if self.carriageway.traffic > 0 else 180.0,
+                length=self.arrow_length,
+                film_thickness=self.film,
             )
+            yield f"{name}-{number}", arrow
 
 
 def _stations(shape: TurnoutShape, begin: float, end: float) -> _Span:

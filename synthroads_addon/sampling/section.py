@@ -51,14 +51,7 @@ def cross_section_of(scenario: RoadScenario) -> StandardCrossSection:
 def _own_cross_section(cross_section: str | FreeCrossSection) -> StandardCrossSection:
     if isinstance(cross_section, str):
         return STANDARD_CROSS_SECTIONS[cross_section]
-    return StandardCrossSection(
-        lanes=cross_section.lanes,
-        hard_shoulder=cross_section.hard_shoulder,
-        outer_edge_strip=cross_section.outer_edge_strip,
-        inner_edge_strip=cross_section.inner_edge_strip,
-        median=cross_section.median,
-        verge=cross_section.verge,
-    )
+    return StandardCrossSection(**{name: getattr(cross_section, name) for name in FreeCrossSection.model_fields})
 
 
 class CarriagewaySampler:
@@ -105,20 +98,17 @@ class CarriagewaySampler:
         return tuple(changed if i == index else lane for i, lane in enumerate(lanes))
 
     def _carriageway(self, side: Side, lanes: tuple[Lane, ...], rng: np.random.Generator) -> Carriageway:
-        section = self.section
-        inner = section.median / 2.0
+        section, axis = self.section, self.axis.horizontal
         return Carriageway(
             instance=1,
             side=side,
-            inner_offset=inner,
+            inner_offset=section.median / 2.0,
             hard_shoulder_width=section.hard_shoulder,
             outer_edge_strip_width=section.outer_edge_strip,
             lanes=lanes,
             inner_edge_strip_width=section.inner_edge_strip,
             verge_width=section.verge,
-            crossfall=crossfall_points(
-                self.scenario.design_class, side, section.paved_width / 2.0, self.axis.horizontal
-            ),
+            crossfall=crossfall_points(self.scenario.design_class, side, section.paved_width / 2.0, axis),
             pavement=Pavement(
                 kind="concrete" if self.concrete else "asphalt",
                 ruts=self._ruts(lanes, rng),
@@ -135,17 +125,16 @@ class CarriagewaySampler:
         start = round_value((self.length - length) * rng.random())
         lane = next(i for i, lane in enumerate(lanes) if isinstance(lane.width, float))
         width = draw(rng, bounds(limits.rut_width))
-        return (
-            Rut(
-                lane=lane,
-                start_station=start,
-                end_station=round_value(min(start + length, self.length)),
-                depth=draw(rng, bounds(limits.rut_depth)),
-                width=width,
-                track=round_value(min(_WHEEL_TRACK, self.section.lanes[lane] - width)),
-                ramp_length=round_value(min(_RUT_RAMP, length / 3.0)),
-            ),
+        rut = Rut(
+            lane=lane,
+            start_station=start,
+            end_station=round_value(min(start + length, self.length)),
+            depth=draw(rng, bounds(limits.rut_depth)),
+            width=width,
+            track=round_value(min(_WHEEL_TRACK, self.section.lanes[lane] - width)),
+            ramp_length=round_value(min(_RUT_RAMP, length / 3.0)),
         )
+        return (rut,)
 
     def _potholes(self, side: Side, lanes: tuple[Lane, ...], rng: np.random.Generator) -> tuple[Pothole, ...]:
         """Return potholes that lie wholly on the pavement, anywhere on it."""

@@ -27,14 +27,7 @@ from ..road.section_geometry import CarriagewaySection
 from ..road.surroundings import Vegetation, Vehicle
 from ..road.terrain import fit_to_ground, road_elevation_model
 from ..road.things.furniture import Side
-from ..road.things.vehicles import (
-    COLORS,
-    HEAVY_SPEED,
-    VEHICLE_GAP,
-    VEHICLE_LANE_WIDTH,
-    VEHICLE_ROOM,
-    VEHICLE_TYPES,
-)
+from ..road.things.vehicles import COLORS, HEAVY_SPEED, VEHICLE_GAP, VEHICLE_LANE_WIDTH, VEHICLE_ROOM, VEHICLE_TYPES
 from ..scenario.road import Interval, MaterialLimits, RoadScenario
 from .placing.site import PlacementSite
 
@@ -75,26 +68,17 @@ def _seed(rng: np.random.Generator) -> int:
 def sample_terrain(scenario: RoadScenario, seed: int) -> Terrain:
     """Return the ground of a seed; its instance number is 1."""
     rng = stream(seed, "terrain")
-    return Terrain(
-        instance=1,
-        half_width=scenario.half_width,
-        embankment_height=draw(rng, scenario.embankment_height),
-        undulation=draw(rng, scenario.undulation),
-        wavelength=draw(rng, scenario.wavelength),
-        batter_slope=draw(rng, scenario.batter_slope),
-        seed=_seed(rng),
-        elevation_model=scenario.elevation_model,
-    )
+    names = ("embankment_height", "undulation", "wavelength", "batter_slope")
+    drawn = {name: draw(rng, getattr(scenario, name)) for name in names}
+    given = {"half_width": scenario.half_width, "elevation_model": scenario.elevation_model}
+    return Terrain(instance=1, seed=_seed(rng), **drawn, **given)
 
 
 def sample_environment(scenario: RoadScenario, seed: int) -> Environment:
     """Return the light and weather of a seed."""
     rng, limits = stream(seed, "environment"), scenario.environment
-    light = {
-        "sun_azimuth_deg": draw(rng, limits.sun_azimuth_deg),
-        "sun_elevation_deg": draw(rng, limits.sun_elevation_deg),
-        "cloud_cover": draw(rng, limits.cloud_cover),
-    }
+    names = ("sun_azimuth_deg", "sun_elevation_deg", "cloud_cover")
+    light = {name: draw(rng, getattr(limits, name)) for name in names}
     wet, wetness = rng.random() < limits.wet, draw(rng, limits.wetness)
     if rng.random() < limits.bad_weather:
         weather = list(WEATHER)[rng.integers(len(WEATHER))]

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -225,13 +225,16 @@ def sample_turnout(
 ) -> Turnout:
     """Return the turnout at a place, with instance 1."""
     limits = scenario.turnouts
-    carriageway = f"carriageway-{direction.side}"
+    begin = place.begin + BLEND + STEP if place.kind == "entry" else place.begin
+    same: dict[str, Any] = {
+        "instance": 1,
+        "carriageway": f"carriageway-{direction.side}",
+        "kind": place.kind,
+        "start_station": direction.lowest_station(begin, math.fsum(place.lengths)),
+    }
     if place.kind == "emergency_bay":
         return Turnout(
-            instance=1,
-            carriageway=carriageway,
-            kind="emergency_bay",
-            start_station=direction.lowest_station(place.begin, math.fsum(place.lengths)),
+            **same,
             taper_in_length=place.lengths[0],
             lane_length=place.lengths[1],
             taper_out_length=place.lengths[2],
@@ -240,12 +243,8 @@ def sample_turnout(
         )
     taper, lane, ramp = place.lengths
     leaving = place.kind == "exit"
-    begin = place.begin if leaving else place.begin + BLEND + STEP
     return Turnout(
-        instance=1,
-        carriageway=carriageway,
-        kind="exit" if leaving else "entry",
-        start_station=direction.lowest_station(begin, math.fsum(place.lengths)),
+        **same,
         taper_in_length=taper if leaving else 0.0,
         lane_length=lane,
         taper_out_length=0.0 if leaving else taper,

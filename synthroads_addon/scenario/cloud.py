@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Literal, get_args
+from typing import Literal
 
 from pydantic import Field, model_validator
 
@@ -12,8 +12,6 @@ from ..cloud.layers import DEFAULT_ATTRIBUTES, LAYERS, Attribute
 
 CloudFormat = Literal["laz", "las", "ply", "e57", "npz"]
 Intensity = Literal["received", "range_corrected"]
-CLOUD_FORMATS: tuple[CloudFormat, ...] = get_args(CloudFormat)
-
 
 
 class CloudScenario(ClosedModel):

@@ -16,9 +16,7 @@ _KINDS = (("platform", "kind", ("roll_deg", "pitch_deg", "yaw_deg")), ("weather"
 _DEVICE_SETTINGS = ("pulse_rate_khz", "field_of_view_deg", "lines_per_second", "angle_step_deg")
 
 
-def without_what_gives_way(
-    data: dict[str, Any], before: Mapping[str, Any], named: AbstractSet[str]
-) -> dict[str, Any]:
+def without_what_gives_way(data: dict[str, Any], before: Mapping[str, Any], named: AbstractSet[str]) -> dict[str, Any]:
     """Return a changed scenario's JSON data without what it said itself and doesn't fit the changes any more.
 
     Of a design class and a standard cross-section that don't fit each other, the one that no change names is left out;

@@ -1,41 +1,37 @@
 """The sidebar panel "SynthRoads": properties from the schema, operators that call the library, panels.
 
-Each module has the classes that Blender is to know in `CLASSES`, and where it keeps something of its own in Blender,
-`register` and `unregister`. Panels come in the order of their `bl_order`, but a parent before its children.
+Blender is to know every class of its own that a module defines, and those in its `CLASSES`, which were made of data. A
+module can have `ATTACHED`, an owner and the name and class of a property group that is attached to it, `HANDLERS` by
+the event that calls them, and functions `register` and `unregister` for what else it keeps in Blender. Panels come in
+the order of their `bl_order`, but a parent before its children.
 """
 
 from __future__ import annotations
 
+from types import ModuleType
+
 import bpy
 
 from .fields import preferences, properties
-from .panels import calibration, cloud_view, edit, export, file_lists, panels, presets, road_files, rules, swatches
+from .panels import calibration, calibration_settings, cloud_view, edit, export, panels, presets, road_files, rules
 from .work import build, long_operator, scan
 
 MODULES = (
-    preferences,
-    properties,
-    long_operator,
-    build,
-    scan,
-    file_lists,
-    presets,
-    road_files,
-    panels,
-    rules,
-    edit,
-    swatches,
-    cloud_view,
-    export,
-    calibration,
+    *(preferences, properties, long_operator, build, scan, presets, road_files, panels, rules, edit, cloud_view),
+    *(export, calibration_settings, calibration),
 )
 
 
 def register() -> None:
-    """Register every class and attach the settings."""
+    """Register every class, attach the settings, and listen to what happens in Blender."""
     for module in MODULES:
-        for cls in module.CLASSES:
+        for cls in _classes_of(module):
             bpy.utils.register_class(cls)
+        if attached := getattr(module, "ATTACHED", None):
+            owner, name, group = attached
+            setattr(owner, name, bpy.props.PointerProperty(type=group))
+        for event, function in getattr(module, "HANDLERS", {}).items():
+            getattr(bpy.app.handlers, event).append(function)
         if hasattr(module, "register"):
             module.register()
 
@@ -43,7 +39,17 @@ def register() -> None:
 def unregister() -> None:
     """Undo `register`; what is at work is stopped."""
     for module in reversed(MODULES):
+        for event, function in getattr(module, "HANDLERS", {}).items():
+            getattr(bpy.app.handlers, event).remove(function)
         if hasattr(module, "unregister"):
             module.unregister()
-        for cls in reversed(module.CLASSES):
+        if attached := getattr(module, "ATTACHED", None):
+            delattr(*attached[:2])
+        for cls in reversed(_classes_of(module)):
             bpy.utils.unregister_class(cls)
+
+
+def _classes_of(module: ModuleType) -> list[type]:
+    """Return the classes of a module that Blender is to know, in the order in which they are defined."""
+    own = [c for c in vars(module).values() if isinstance(c, type) and c.__module__ == module.__name__]
+    return list(getattr(module, "CLASSES", ())) or [c for c in own if issubclass(c, bpy.types.bpy_struct)]

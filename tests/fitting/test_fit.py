@@ -85,7 +85,7 @@ def test_exact_points_give_the_elements_back(name: str) -> None:
     length, curvature = differences(fit.alignment, truth)
     assert length < 1e-4
     assert curvature < 1e-8
-    assert fit.worst < 1e-6
+    assert fit.horizontal.worst < 1e-6
 
 
 @pytest.mark.parametrize("step", [pytest.param(0.5, marks=pytest.mark.slow), 2.0, 5.0])
@@ -103,7 +103,7 @@ def test_coordinates_rounded_to_a_millimetre_give_the_elements_back() -> None:
     length, curvature = differences(fit.alignment, truth)
     assert length < 0.1
     assert curvature < 1e-6
-    assert 1e-4 < fit.rms < 4e-4
+    assert 1e-4 < fit.horizontal.rms < 4e-4
 
 
 @pytest.mark.parametrize("name", ["line", "bend", "s-curve"])
@@ -116,7 +116,7 @@ def test_noise_of_2_cm_leaves_the_kinds_and_nearly_the_lengths(name: str, seed: 
     assert curvature < 1e-4  # where two clothoids meet in the S; arcs are much better known:
     arcs = [(a, b) for a, b in zip(fit.alignment.elements, truth.elements, strict=True) if b.kind == "arc"]
     assert all(a.mean_curvature == pytest.approx(b.mean_curvature, rel=0.005) for a, b in arcs)
-    assert 0.017 < fit.rms < 0.022
+    assert 0.017 < fit.horizontal.rms < 0.022
     assert off_road(fit.alignment, truth) < 0.02
 
 
@@ -149,7 +149,7 @@ def test_a_second_run_gives_the_same_bytes() -> None:
     first, second = fitted("bend", 0.02), fit_axis(sampled(road(BEND), noise=0.02))
     assert first.alignment.elements == second.alignment.elements
     assert first.profile.points == second.profile.points
-    assert (first.rms, first.worst) == (second.rms, second.worst)
+    assert (first.horizontal.rms, first.horizontal.worst) == (second.horizontal.rms, second.horizontal.worst)
 
 
 def test_figures_are_those_of_the_points_given() -> None:
@@ -159,12 +159,12 @@ def test_figures_are_those_of_the_points_given() -> None:
     fit = fit_axis(np.column_stack((points, np.zeros(len(points)))))
     station, offset = fit.alignment.project(points)
     assert fit.points == len(points)
-    assert fit.rms == pytest.approx(np.sqrt((offset**2).mean()), rel=1e-6)
-    assert fit.p95 == pytest.approx(np.percentile(np.abs(offset), 95), rel=1e-6)
-    assert fit.worst == pytest.approx(np.abs(offset).max(), rel=1e-6)
-    assert fit.worst == pytest.approx(0.95, abs=0.1)
-    assert fit.worst_station == pytest.approx(station[500], abs=1e-6)
-    assert fit.worst_station == pytest.approx(500.0, abs=1.5)
+    assert fit.horizontal.rms == pytest.approx(np.sqrt((offset**2).mean()), rel=1e-6)
+    assert fit.horizontal.p95 == pytest.approx(np.percentile(np.abs(offset), 95), rel=1e-6)
+    assert fit.horizontal.worst == pytest.approx(np.abs(offset).max(), rel=1e-6)
+    assert fit.horizontal.worst == pytest.approx(0.95, abs=0.1)
+    assert fit.horizontal.worst_station == pytest.approx(station[500], abs=1e-6)
+    assert fit.horizontal.worst_station == pytest.approx(500.0, abs=1.5)
 
 
 def test_the_alignment_begins_and_ends_with_the_points() -> None:
@@ -194,8 +194,8 @@ def test_jumps_between_blocks_of_chords_stay_within_the_tolerance() -> None:
         for a, b, n in zip(position[:-1], position[1:], normal, strict=False)
     ]
     fit = fit_axis(np.vstack(blocks))
-    assert fit.rms <= 0.05
-    assert fit.p95 <= 0.10
+    assert fit.horizontal.rms <= 0.05
+    assert fit.horizontal.p95 <= 0.10
     assert len(fit.alignment.elements) <= len(S_CURVE)
     assert off_road(fit.alignment, truth) < 0.12
 
@@ -204,7 +204,7 @@ def test_noise_beyond_the_tolerance_is_reported_and_not_followed() -> None:
     points = np.column_stack((np.arange(600.0), np.random.default_rng(2).normal(0.0, 0.08, 600)))
     fit = fit_axis(points)
     assert kinds(fit.alignment) in (["line"], ["arc"])
-    assert 0.075 < fit.rms < 0.085
+    assert 0.075 < fit.horizontal.rms < 0.085
 
 
 def test_a_wider_tolerance_needs_no_more_elements() -> None:
@@ -213,8 +213,8 @@ def test_a_wider_tolerance_needs_no_more_elements() -> None:
     counts = []
     for tolerance in (0.02, 0.1, 0.5, 50.0):
         fit = fit_axis(points, tolerance)
-        assert fit.rms <= tolerance
-        assert fit.p95 <= 2 * tolerance
+        assert fit.horizontal.rms <= tolerance
+        assert fit.horizontal.p95 <= 2 * tolerance
         counts.append(len(fit.alignment.elements))
     assert counts == sorted(counts, reverse=True)
     assert counts[0] > counts[2] > counts[3] == 1
@@ -226,7 +226,7 @@ def test_a_smooth_curve_is_not_taken_for_a_chain_of_many_elements(height: float,
     s = np.arange(0.0, 320.0)
     fit = fit_axis(np.column_stack((s, height * np.sin(s / width))))
     assert len(fit.alignment.elements) <= 4
-    assert fit.rms <= 0.05
+    assert fit.horizontal.rms <= 0.05
 
 
 def test_what_counts_as_exact() -> None:
@@ -243,8 +243,8 @@ def test_a_corner_is_rounded_and_its_straights_stay_straight() -> None:
     fit = fit_axis(np.vstack((s * [1.0, 0.0], [100.0, 0.0] + s * [0.0, 1.0])))
     assert len(fit.alignment.elements) <= 6
     assert kinds(fit.alignment)[0] == kinds(fit.alignment)[-1] == "line"
-    assert fit.p95 < 0.5
-    assert fit.worst_station == pytest.approx(99.0, abs=3.0)
+    assert fit.horizontal.p95 < 0.5
+    assert fit.horizontal.worst_station == pytest.approx(99.0, abs=3.0)
 
 
 def test_ends_are_cut_and_prolonged_along_their_clothoids() -> None:
@@ -269,7 +269,7 @@ def test_dense_curves_between_sparse_straights() -> None:
     truth = road([(500.0, 0.0, 0.0), (157.0, 1 / 100, 1 / 100), (500.0, 0.0, 0.0)], heading=0.0)
     s = np.concatenate(([0.0], np.arange(500.0, 657.0, 2.0), [657.0, 1157.0]))
     fit = fit_axis(truth.position(s))
-    assert fit.worst < 0.05
+    assert fit.horizontal.worst < 0.05
     assert off_road(fit.alignment, truth) < 0.3
     assert fit.alignment.length == pytest.approx(truth.length, abs=0.2)
 
@@ -277,7 +277,7 @@ def test_dense_curves_between_sparse_straights() -> None:
 def test_a_few_coarse_points_give_a_smooth_road_through_them() -> None:
     truth = road([(1000.0, 0.0, 1 / 800), (1000.0, 1 / 800, 0.0), (1000.0, 0.0, -1 / 900)])
     fit = fit_axis(sampled(truth, 60.0))
-    assert fit.rms < 0.05
+    assert fit.horizontal.rms < 0.05
     assert off_road(fit.alignment, truth) < 0.1
 
 
@@ -288,7 +288,7 @@ def test_several_turns_above_each_other() -> None:
     fit = fit_axis(points)
     assert kinds(fit.alignment) == ["arc"]
     assert fit.alignment.length == pytest.approx(50 * 6 * np.pi, abs=0.01)
-    assert fit.height_worst < 1e-3
+    assert fit.height.worst < 1e-3
 
 
 @pytest.mark.parametrize("noise", [0.0, pytest.param(0.02, marks=pytest.mark.slow)])
@@ -301,7 +301,7 @@ def test_windows_of_a_long_road_join_without_a_seam(noise: float) -> None:
     if not noise:
         assert kinds(fit.alignment) == kinds(truth)
         assert differences(fit.alignment, truth)[0] < 1e-2
-    assert fit.rms < max(1e-4, 1.1 * noise)
+    assert fit.horizontal.rms < max(1e-4, 1.1 * noise)
     assert off_road(fit.alignment, truth) < max(1e-3, 2.5 * noise)
     assert len(fit.alignment.elements) <= len(rows) + 2
     ends = fit.alignment.element_starts[1:-1]
@@ -319,7 +319,7 @@ def test_the_profile_finds_its_parabolas_again() -> None:
         assert found.station == pytest.approx(point.station, abs=0.01)
         assert found.elevation == pytest.approx(point.elevation, abs=1e-3)
         assert found.radius == pytest.approx(point.radius, rel=1e-3)
-    assert fit.height_worst < 1e-4
+    assert fit.height.worst < 1e-4
 
 
 def test_noisy_heights_give_few_parabolas_within_the_noise() -> None:
@@ -329,9 +329,9 @@ def test_noisy_heights_give_few_parabolas_within_the_noise() -> None:
     noisy = truth.elevation(s) + np.random.default_rng(3).normal(0.0, 0.02, s.size)
     fit = fit_axis(np.column_stack((road(BEND).position(s), noisy)))
     assert len(fit.profile.points) <= 5
-    assert fit.height_rms < 0.023
+    assert fit.height.rms < 0.023
     assert np.abs(fit.profile.elevation(s) - truth.elevation(s)).max() < 0.03
-    assert fit.height_worst_station == pytest.approx(s[np.abs(fit.profile.elevation(s) - noisy).argmax()], abs=0.5)
+    assert fit.height.worst_station == pytest.approx(s[np.abs(fit.profile.elevation(s) - noisy).argmax()], abs=0.5)
 
 
 def test_two_points_and_duplicates() -> None:
@@ -359,11 +359,13 @@ def test_two_points_and_duplicates() -> None:
 )
 def test_points_that_are_no_road_end_in_an_honest_report(points: object) -> None:
     fit = fit_axis(points)  # type: ignore[arg-type]
-    assert np.isfinite([fit.rms, fit.p95, fit.worst, fit.height_rms, fit.alignment.length]).all()
-    assert fit.rms <= fit.worst
+    assert np.isfinite(
+        [fit.horizontal.rms, fit.horizontal.p95, fit.horizontal.worst, fit.height.rms, fit.alignment.length]
+    ).all()
+    assert fit.horizontal.rms <= fit.horizontal.worst
     plan = np.asarray(points, dtype=float)[:, :2]
     nearest = np.abs(fit.alignment.project(plan)[1])
-    assert fit.worst >= nearest.max() - 1e-6
+    assert fit.horizontal.worst >= nearest.max() - 1e-6
 
 
 def check_jacobian(data: Plan | Heights, chain: Chain, stations: np.ndarray, tolerance: float) -> None:
@@ -408,15 +410,15 @@ def real_fit(path: Path) -> AxisFit:
     start = time.process_time()
     fit = fit_axis(read_axis(path))
     seconds = time.process_time() - start
-    length = fit.alignment.length
+    plane, height = fit.horizontal, fit.height
     print(
-        f"{path.stem}: {length:.0f} m, {len(fit.alignment.elements)} elements, rms {fit.rms:.4f} p95 {fit.p95:.4f}"
-        f" worst {fit.worst:.3f} m at {fit.worst_station:.0f} m; heights rms {fit.height_rms:.4f}"
-        f" p95 {fit.height_p95:.4f} worst {fit.height_worst:.3f} m; {seconds:.1f} s"
+        f"{path.stem}: {fit.alignment.length:.0f} m, {len(fit.alignment.elements)} elements, rms {plane.rms:.4f}"
+        f" p95 {plane.p95:.4f} worst {plane.worst:.3f} m at {plane.worst_station:.0f} m; heights rms {height.rms:.4f}"
+        f" p95 {height.p95:.4f} worst {height.worst:.3f} m; {seconds:.1f} s"
     )
     # 3 to 8 s per kilometre of a quiet core; many times that where BLAS's threads wait for a shared one: this only
     # tells a search that doesn't end.
-    assert seconds < 150.0 * max(1.0, length / 1000.0)
+    assert seconds < 150.0 * max(1.0, fit.alignment.length / 1000.0)
     return fit
 
 
@@ -428,11 +430,11 @@ def real_fit(path: Path) -> AxisFit:
 class TestRealAxes:
     def test_follows_within_the_tolerance_with_few_elements(self, path: Path) -> None:
         fit = real_fit(path)
-        assert fit.rms <= 0.05
-        assert fit.p95 <= 0.10
+        assert fit.horizontal.rms <= 0.05
+        assert fit.horizontal.p95 <= 0.10
         assert len(fit.alignment.elements) < fit.alignment.length / 30.0
-        assert fit.height_rms < 0.04
-        assert fit.height_p95 < 0.08
+        assert fit.height.rms < 0.04
+        assert fit.height.p95 < 0.08
 
     def test_curvature_is_continuous(self, path: Path) -> None:
         elements = real_fit(path).alignment.elements

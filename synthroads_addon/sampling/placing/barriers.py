@@ -12,7 +12,7 @@ import numpy as np
 from ...base.schema import round_value
 from ...road.guidelines import BARRIER_DISTANCE, EMBANKMENT_HEIGHT, EMBANKMENT_RUN, OBSTACLE_LEAD, SHORTEST_BARRIER
 from ...road.objects import LineObject
-from ...road.things.furniture import ConcreteBarrier, Guardrail, NoiseBarrier
+from ...road.things.furniture import ConcreteBarrier, Guardrail, NoiseBarrier, Side
 from ...scenario.road import BarrierLimits
 from .draw import draw, pick
 from .edge import STEP_OF_BARRIERS, Segment
@@ -69,20 +69,23 @@ class BarrierSystem:
 
     def beside(self, roadside: Roadside, piece: Piece, terminal: float) -> LineObject:
         """Return a barrier of a piece; its nearest part stands 0.5 m from the base."""
-        terminal = round_value(min(terminal, (piece.end - piece.start) / 4.0))
-        start, end = round_value(piece.start), round_value(piece.end)
+        terminal = min(terminal, (piece.end - piece.start) / 4.0)
         if self.concrete:
             axis = piece.base + BARRIER_DISTANCE + self.concrete[2] / 2.0
-            return _concrete(self.concrete, (start, end), roadside.sign * axis, terminal)
+            return _concrete(self.concrete, piece[:2], roadside.sign * axis, terminal)
+        return self.rail(piece[:2], roadside.sign * (piece.base + BARRIER_AXIS), roadside.towards_road, terminal)
+
+    def rail(self, span: Range, offset: float, faces: Side | Literal["both"], terminal: float = 0.0) -> Guardrail:
+        """Return a guardrail between two stations with the axis of its posts at an offset, ramped at its ends, m."""
         return Guardrail(
             instance=1,
-            start_station=start,
-            end_station=end,
-            offset=round_value(roadside.sign * (piece.base + BARRIER_AXIS)),
-            faces=roadside.towards_road,
+            start_station=round_value(span[0]),
+            end_station=round_value(span[1]),
+            offset=round_value(offset),
+            faces=faces,
             height=self.height,
             post_spacing=self.post_spacing,
-            terminal_length=terminal,
+            terminal_length=round_value(terminal),
         )
 
 
@@ -96,7 +99,7 @@ def median_barriers(layout: Layout, rng: np.random.Generator) -> Iterator[tuple[
     if median.has_obstacles:
         for side, inner in median.inner.items():
             sign = layout.sides[side].sign
-            yield f"guardrail-median-{side}", _rail(system, span, sign * (inner - BARRIER_AXIS), side)
+            yield f"guardrail-median-{side}", system.rail(span, sign * (inner - BARRIER_AXIS), side)
         return
     profile, height, foot = system.concrete or CONCRETE_PROFILES[0]
     foot = min(foot, 2.0 * (median.half_width - BARRIER_DISTANCE))
@@ -104,7 +107,7 @@ def median_barriers(layout: Layout, rng: np.random.Generator) -> Iterator[tuple[
     if foot >= _NARROWEST_FOOT and (system.concrete or not steel_fits):
         yield "concrete-barrier-median", _concrete((profile, height, foot), span, 0.0, 0.0)
     elif steel_fits:
-        yield "guardrail-median", _rail(system, span, 0.0, "both")
+        yield "guardrail-median", system.rail(span, 0.0, "both")
 
 
 def roadside_barriers(layout: Layout, roadside: Roadside, rng: np.random.Generator) -> Iterator[tuple[str, LineObject]]:
@@ -193,12 +196,11 @@ def _inner(roadside: Roadside, segment: Segment) -> Range:
 def _pieces(roadside: Roadside, stretches: list[Range]) -> Iterator[Piece]:
     """Yield the barriers of stretches: one in each segment of the edge, long enough where there is room."""
     for segment in roadside.edge.segments:
+        low, high = segment.start, segment.end
         inside = [
-            lengthen_range(
-                max(start, segment.start), min(end, segment.end), SHORTEST_BARRIER, segment.start, segment.end
-            )
+            lengthen_range(max(start, low), min(end, high), SHORTEST_BARRIER, low, high)
             for start, end in stretches
-            if start < segment.end and end > segment.start
+            if start < high and end > low
         ]
         for start, end in merge_ranges(inside, _JOIN):
             piece = _prolong_piece(roadside, segment, Piece(start, end, segment.base, segment.ramp))
@@ -221,28 +223,15 @@ def _prolong_piece(roadside: Roadside, segment: Segment, piece: Piece) -> Piece:
     return piece
 
 
-def _rail(system: BarrierSystem, span: Range, offset: float, faces: Literal["left", "right", "both"]) -> Guardrail:
-    return Guardrail(
-        instance=1,
-        start_station=span[0],
-        end_station=span[1],
-        offset=round_value(offset),
-        faces=faces,
-        height=system.height,
-        post_spacing=system.post_spacing,
-        terminal_length=0.0,
-    )
-
-
 def _concrete(shape: Profile, span: Range, offset: float, terminal: float) -> ConcreteBarrier:
     profile, height, foot = shape
     return ConcreteBarrier(
         instance=1,
-        start_station=span[0],
-        end_station=span[1],
+        start_station=round_value(span[0]),
+        end_station=round_value(span[1]),
         offset=round_value(offset),
         profile=profile,
         height=height,
         base_width=round_value(foot),
-        terminal_length=terminal,
+        terminal_length=round_value(terminal),
     )

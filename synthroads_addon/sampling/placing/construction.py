@@ -132,40 +132,34 @@ def _equipment(
     stations = _beacon_stations(marks)
     places = zip(stations.tolist(), zone.distance(stations, BEACON_DISTANCE).tolist(), strict=True)
     for number, (station, distance) in enumerate(places, start=1):
-        yield (
-            f"beacon-{side}-{number:03d}",
-            ConstructionBeacon(
-                instance=1,
-                station=round_value(station),
-                offset=round_value(sign * distance),
-                rotation_deg=roadside.facing,
-                pass_side="left" if sign < 0 else "right",
-            ),
+        beacon = ConstructionBeacon(
+            instance=1,
+            station=round_value(station),
+            offset=round_value(sign * distance),
+            rotation_deg=roadside.facing,
+            pass_side="left" if sign < 0 else "right",
         )
+        yield f"beacon-{side}-{number:03d}", beacon
     if marks[2] - marks[1] >= SHORTEST_TEMPORARY_BARRIER + 2.0 * BARRIER_SETBACK:
         offset = round_value(sign * (zone.boundary + BARRIER_DISTANCE))
         low, high = round_value(marks[1] + BARRIER_SETBACK), round_value(marks[2] - BARRIER_SETBACK)
-        yield (
-            f"temporary-barrier-{side}",
-            TemporaryBarrier(instance=1, start_station=low, end_station=high, offset=offset, end_offset=offset),
-        )
+        barrier = TemporaryBarrier(instance=1, start_station=low, end_station=high, offset=offset, end_offset=offset)
+        yield f"temporary-barrier-{side}", barrier
     yield f"marking-construction-{side}", _line(side, zone, draw(rng, layout.site.scenario.markings.film_thickness))
 
 
 def _beacon_stations(marks: tuple[float, float, float, float]) -> NDArray[np.float64]:
     """Return the stations of beacons, one at each end of the tapers."""
-    parts = []
-    for (low, high), spacing in zip(pairwise(marks), (SPACING_TAPER, SPACING, SPACING_TAPER), strict=True):
-        parts.append(np.linspace(low, high, math.ceil((high - low) / spacing), endpoint=False))
+    spans = zip(pairwise(marks), (SPACING_TAPER, SPACING, SPACING_TAPER), strict=True)
+    parts = [np.linspace(*span, math.ceil((span[1] - span[0]) / step), endpoint=False) for span, step in spans]
     return np.append(np.concatenate(parts), marks[3])
 
 
 def _line(side: Side, zone: Zone, film_thickness: float) -> LineMarking:
     """Return the yellow line along the beacons."""
     distances = zone.distance(np.array(zone.stations), LINE_DISTANCE).tolist()
-    points = [
-        WidthPoint(station=round_value(s), width=round_value(d)) for s, d in zip(zone.stations, distances, strict=True)
-    ]
+    places = zip(zone.stations, distances, strict=True)
+    points = [WidthPoint(station=round_value(station), width=round_value(width)) for station, width in places]
     return LineMarking(
         instance=1,
         carriageway=f"carriageway-{side}",

@@ -30,10 +30,8 @@ def delineators(roadside: Roadside, stations: NDArray[np.float64]) -> Iterator[t
     facing = roadside.facing
     places = zip(np.round(stations, 9).tolist(), np.round(roadside.sign * distances, 9).tolist(), strict=True)
     for number, (station, offset) in enumerate(places, start=1):
-        yield (
-            f"delineator-{roadside.side}-{number:04d}",
-            Delineator(instance=1, station=station, offset=offset, rotation_deg=facing),
-        )
+        post = Delineator(instance=1, station=station, offset=offset, rotation_deg=facing)
+        yield f"delineator-{roadside.side}-{number:04d}", post
 
 
 def delineator_stations(elements: tuple[HorizontalElement, ...]) -> NDArray[np.float64]:

@@ -75,7 +75,7 @@ def _gore_is_taken(roadside: Roadside, station: float) -> bool:
 def plan_traffic_lights(layout: Layout, rng: np.random.Generator) -> None:
     """Put traffic lights beside entry ramps, on their outer side before the gore."""
     for side, roadside in layout.sides.items():
-        for _, turnout in layout.site.entries(side):
+        for turnout in layout.site.turnouts_of_kind(side, "entry"):
             if rng.random() >= layout.site.scenario.furniture.traffic_lights or turnout.ramp is None:
                 continue
             shape = layout.site.shape(turnout)

@@ -7,8 +7,6 @@ barriers. Then the barriers are built, and then what stands behind them, which s
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 
@@ -16,13 +14,7 @@ from ...road.objects import RoadObject
 from .barriers import median_barriers, plan_noise_barrier, roadside_barriers
 from .construction import closed_lanes, construction_zones
 from .delineators import delineator_stations, delineators
-from .equipment import (
-    plan_cabinets,
-    plan_lighting,
-    plan_periodic,
-    plan_surveillance,
-    plan_traffic_lights,
-)
+from .equipment import plan_cabinets, plan_lighting, plan_periodic, plan_surveillance, plan_traffic_lights
 from .gantries import GantryPlan, gantries, plan_gantries
 from .layout import Layout
 from .overpass import OverpassPlan, overpass, plan_overpass
@@ -32,94 +24,75 @@ from .site import PlacementSite
 
 __all__ = ["closed_lanes", "place_furniture"]
 
+Streams = dict[str, np.random.Generator]
+"""The random numbers of each family of furniture."""
+_FAMILIES = ("signs", "equipment", "structures", "barriers")
+
 
 def place_furniture(site: PlacementSite) -> Iterator[tuple[str, RoadObject]]:
     """Yield (id, object) of all furniture; every object has the instance number 1."""
-    layout, streams = Layout(site), _Streams(site)
+    layout, streams = Layout(site), {name: site.stream("furniture", name) for name in _FAMILIES}
     by_rules = site.scenario.placement == "rules"
     if by_rules:
         _plan_fixed(layout, streams)
-    bridge = plan_overpass(layout, streams.structures)
-    planned = plan_gantries(layout, streams.structures)
-    zones, in_zones = construction_zones(layout, streams.structures)
+    bridge = plan_overpass(layout, streams["structures"])
+    planned = plan_gantries(layout, streams["structures"])
+    zones, in_zones = construction_zones(layout, streams["structures"])
     yield from in_zones.items()
     for side, roadside in layout.sides.items():
-        noise_barrier = plan_noise_barrier(layout, roadside, streams.barriers)
+        noise_barrier = plan_noise_barrier(layout, roadside, streams["barriers"])
         if noise_barrier:
             yield f"noise-barrier-{side}", noise_barrier
     if by_rules and site.scenario.furniture.signs:
-        plan_other_signs(layout, streams.signs, zones)
+        plan_other_signs(layout, streams["signs"], zones)
     elif site.scenario.furniture.signs:
-        plan_random_signs(layout, streams.signs)
+        plan_random_signs(layout, streams["signs"])
     if by_rules:
-        plan_traffic_lights(layout, streams.equipment)
+        plan_traffic_lights(layout, streams["equipment"])
     else:
-        plan_random_equipment(layout, streams.equipment)
-    plan_surveillance(layout, streams.equipment)
-    plan_lighting(layout, streams.equipment)
-    plan_cabinets(layout, streams.equipment)
+        plan_random_equipment(layout, streams["equipment"])
+    plan_surveillance(layout, streams["equipment"])
+    plan_lighting(layout, streams["equipment"])
+    plan_cabinets(layout, streams["equipment"])
     yield from _fronts_by_rules(layout, streams) if by_rules else _fronts_at_random(layout, streams)
     yield from _behind(layout, streams, planned, bridge)
 
 
-@dataclass(frozen=True)
-class _Streams:
-    """The random numbers of each family of furniture."""
-
-    site: PlacementSite
-
-    @cached_property
-    def signs(self) -> np.random.Generator:
-        return self.site.stream("furniture", "signs")
-
-    @cached_property
-    def equipment(self) -> np.random.Generator:
-        return self.site.stream("furniture", "equipment")
-
-    @cached_property
-    def structures(self) -> np.random.Generator:
-        return self.site.stream("furniture", "structures")
-
-    @cached_property
-    def barriers(self) -> np.random.Generator:
-        return self.site.stream("furniture", "barriers")
-
-
-def _plan_fixed(layout: Layout, streams: _Streams) -> None:
+def _plan_fixed(layout: Layout, streams: Streams) -> None:
     """Plan what has its station by a rule."""
     signs = layout.site.scenario.furniture.signs
     if signs:
         plan_gore_signs(layout)
-    plan_periodic(layout, streams.equipment)
+    plan_periodic(layout, streams["equipment"])
     if signs:
-        plan_exit_signs(layout, streams.signs)
+        plan_exit_signs(layout, streams["signs"])
 
 
-def _fronts_by_rules(layout: Layout, streams: _Streams) -> Iterator[tuple[str, RoadObject]]:
+def _fronts_by_rules(layout: Layout, streams: Streams) -> Iterator[tuple[str, RoadObject]]:
     """Yield barriers and delineators."""
-    yield from median_barriers(layout, streams.barriers)
+    yield from median_barriers(layout, streams["barriers"])
     for roadside in layout.sides.values():
-        yield from roadside_barriers(layout, roadside, streams.barriers)
+        yield from roadside_barriers(layout, roadside, streams["barriers"])
     if layout.site.scenario.furniture.delineators:
         stations = delineator_stations(layout.site.alignment.horizontal)
         for roadside in layout.sides.values():
             yield from delineators(roadside, stations)
 
 
-def _fronts_at_random(layout: Layout, streams: _Streams) -> Iterator[tuple[str, RoadObject]]:
+def _fronts_at_random(layout: Layout, streams: Streams) -> Iterator[tuple[str, RoadObject]]:
     """Yield barriers and delineators."""
-    yield from random_median_barrier(layout, streams.barriers)
+    yield from random_median_barrier(layout, streams["barriers"])
     for roadside in layout.sides.values():
-        yield from random_front(layout, roadside, streams.barriers)
+        yield from random_front(layout, roadside, streams["barriers"])
 
 
 def _behind(
-    layout: Layout, streams: _Streams, planned: list[GantryPlan], bridge: OverpassPlan | None
+    layout: Layout, streams: Streams, planned: list[GantryPlan], bridge: OverpassPlan | None
 ) -> Iterator[tuple[str, RoadObject]]:
     """Yield what stands behind the barriers."""
     for roadside in layout.sides.values():
         yield from roadside.stand()
     yield from median_signs(layout)
-    yield from gantries(layout, planned, streams.structures)
+    yield from gantries(layout, planned, streams["structures"])
     if bridge:
-        yield "overpass", overpass(layout, bridge, streams.structures)
+        yield "overpass", overpass(layout, bridge, streams["structures"])

@@ -81,25 +81,23 @@ def gantries(layout: Layout, plans: list[GantryPlan], rng: np.random.Generator) 
         ends = [layout.sides[side].sign * distance for side in plan.sides for distance in reaches[side]]
         displays = bool(rng.random() < 0.5)
         left, right = round_value(max(ends)), round_value(min(ends))
-        yield (
-            f"gantry-{number}",
-            Gantry(
-                instance=1,
-                station=round_value(plan.station),
-                offset=round_value((left + right) / 2.0),
-                kind=plan.kind,
-                left_offset=left,
-                right_offset=right,
-                post_side=plan.sides[0],
-                clearance=draw(rng, limits.gantry_clearance),
-                beam=beam,
-                beam_height=height,
-                beam_depth=round_value(min(depth, 0.6 * (limits.gantry_spacing or 10.0))),
-                post_width=round_value(post),
-                shade=pick(rng, SHADES),
-                signs=tuple(s for side in plan.sides for s in _signs(layout, plan, side, reaches[side], displays, rng)),
-            ),
+        gantry = Gantry(
+            instance=1,
+            station=round_value(plan.station),
+            offset=round_value((left + right) / 2.0),
+            kind=plan.kind,
+            left_offset=left,
+            right_offset=right,
+            post_side=plan.sides[0],
+            clearance=draw(rng, limits.gantry_clearance),
+            beam=beam,
+            beam_height=height,
+            beam_depth=round_value(min(depth, 0.6 * (limits.gantry_spacing or 10.0))),
+            post_width=round_value(post),
+            shade=pick(rng, SHADES),
+            signs=tuple(s for side in plan.sides for s in _signs(layout, plan, side, reaches[side], displays, rng)),
         )
+        yield f"gantry-{number}", gantry
 
 
 def _kind(layout: Layout, rng: np.random.Generator) -> tuple[Kind, tuple[Side, ...]]:
@@ -157,12 +155,7 @@ def _lanes(layout: Layout, plan: GantryPlan, side: Side) -> list[tuple[float, fl
 
 
 def _signs(
-    layout: Layout,
-    plan: GantryPlan,
-    side: Side,
-    reach: tuple[float, float],
-    displays: bool,
-    rng: np.random.Generator,
+    layout: Layout, plan: GantryPlan, side: Side, reach: tuple[float, float], displays: bool, rng: np.random.Generator
 ) -> Iterator[GantrySign]:
     """Yield a display or a destination sign over each lane below the beam."""
     names = sign_catalogue().destinations

@@ -160,16 +160,9 @@ class Roadside:
         counts: Counter[str] = Counter()
         for spot in sorted(self.spots, key=lambda item: item.station):
             counts[spot.name] += 1
-            yield (
-                f"{spot.name}-{self.side}-{counts[spot.name]:03d}",
-                spot.make(
-                    instance=1,
-                    station=round_value(spot.station),
-                    offset=round_value(self.sign * self._distance(spot)),
-                    rotation_deg=self.facing,
-                    **spot.fields,
-                ),
-            )
+            station, offset = round_value(spot.station), round_value(self.sign * self._distance(spot))
+            item = spot.make(instance=1, station=station, offset=offset, rotation_deg=self.facing, **spot.fields)
+            yield f"{spot.name}-{self.side}-{counts[spot.name]:03d}", item
 
     def _distance(self, spot: Spot) -> float:
         """Return the distance (m) of a spot's axis from the centreline."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import cos, radians, sin, tan
 
 import numpy as np
@@ -74,7 +74,7 @@ def plan_overpass(layout: Layout, rng: np.random.Generator) -> OverpassPlan | No
     start = draw_start(rng, free_ranges(0.0, layout.length, *taken), 2.0 * half)
     if start is None:
         return None
-    return _reserve_place(layout, OverpassPlan(start + half, half, width, skew, pier, in_median, beside))
+    return _reserve_place(layout, replace(plan, station=start + half, half=half))
 
 
 def overpass(layout: Layout, plan: OverpassPlan, rng: np.random.Generator) -> Overpass:

@@ -12,7 +12,7 @@ import numpy as np
 
 from ...base.schema import round_value
 from ...road.objects import LineObject
-from ...road.things.furniture import Delineator, Guardrail, TrafficLight
+from ...road.things.furniture import Delineator, TrafficLight
 from ...road.things.signs import sign_catalogue
 from .barriers import TERMINAL, BarrierSystem
 from .draw import pick
@@ -63,19 +63,8 @@ def random_median_barrier(layout: Layout, rng: np.random.Generator) -> Iterator[
     room = median.half_width - BARRIER_AXIS
     span = _stretch(free_ranges(0.0, layout.length, median.taken), rng)
     if limits.median and len(median.inner) > 1 and room >= 0.0 and span:
-        yield (
-            "guardrail-median",
-            Guardrail(
-                instance=1,
-                start_station=round_value(span[0]),
-                end_station=round_value(span[1]),
-                offset=round_value(room * pick(rng, (-1.0, -0.5, 0.0, 0.5, 1.0))),
-                faces="both",
-                height=system.height,
-                post_spacing=system.post_spacing,
-                terminal_length=round_value(min(TERMINAL, (span[1] - span[0]) / 4.0)),
-            ),
-        )
+        offset, terminal = room * pick(rng, (-1.0, -0.5, 0.0, 0.5, 1.0)), min(TERMINAL, (span[1] - span[0]) / 4.0)
+        yield "guardrail-median", system.rail(span, offset, "both", terminal)
 
 
 def random_front(
@@ -107,15 +96,9 @@ def _delineators(
         taken.add(start, start + 2.0 * _DELINEATOR_HALF)
         station = start + _DELINEATOR_HALF
         edge = roadside.edge.line_beside(np.array([station]), _DELINEATOR_HALF)[0]
-        yield (
-            f"delineator-{roadside.side}-{number:04d}",
-            Delineator(
-                instance=1,
-                station=round_value(station),
-                offset=round_value(roadside.sign * (edge + pick(rng, DELINEATOR_DISTANCES))),
-                rotation_deg=roadside.facing,
-            ),
-        )
+        offset = round_value(roadside.sign * (edge + pick(rng, DELINEATOR_DISTANCES)))
+        post = Delineator(instance=1, station=round_value(station), offset=offset, rotation_deg=roadside.facing)
+        yield f"delineator-{roadside.side}-{number:04d}", post
 
 
 def _stations(roadside: Roadside, per_km: float, layout: Layout, rng: np.random.Generator) -> Iterator[float]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 
@@ -40,7 +41,7 @@ def plan_gore_signs(layout: Layout) -> None:
     sign = sign_catalogue().signs[GORE_SIGN]
     for side, roadside in layout.sides.items():
         section = layout.site.sections[side]
-        for _, turnout in layout.site.exits(side):
+        for turnout in layout.site.turnouts_of_kind(side, "exit"):
             station = _gore_station(layout.site.shape(turnout), sign.width)
             if not 0.0 <= station <= layout.length:
                 continue
@@ -56,7 +57,7 @@ def plan_gore_signs(layout: Layout) -> None:
 def plan_exit_signs(layout: Layout, rng: np.random.Generator) -> None:
     """Put the signs that announce exits; those that fall before the road's begin are left out."""
     for side, roadside in layout.sides.items():
-        for _, turnout in layout.site.exits(side):
+        for turnout in layout.site.turnouts_of_kind(side, "exit"):
             number, names = str(rng.integers(1, 100)), _names(rng, 3)
             values = {"number": number, "exit": names[0], "near": names[1], "middle": names[1], "far": names[2]}
             for distance, code in EXIT_SEQUENCE.items():
@@ -80,7 +81,7 @@ def plan_other_signs(layout: Layout, rng: np.random.Generator, zones: dict[Side,
         begin = 0.0 if roadside.traffic > 0 else layout.length
         if urban:
             stand(roadside, limit, roadside.ahead(begin, LIMIT_BEHIND_BEGIN), _ROOM)
-        for _, turnout in layout.site.entries(side):
+        for turnout in layout.site.turnouts_of_kind(side, "entry"):
             _behind_entry(layout, roadside, turnout, limit if urban else None, rng)
         for code, station in _curve_signs(layout, roadside):
             stand_on_both_sides(layout, roadside, code, station)
@@ -131,17 +132,9 @@ def stand_on_both_sides(layout: Layout, roadside: Roadside, code: str, station: 
     if len(median.inner) < 2 or not fits or place is None:
         return
     median.taken.add(place - _HALF, place + _HALF)
-    median.signs.append(
-        TrafficSign(
-            instance=1,
-            station=round_value(place),
-            offset=round_value(roadside.sign * offset),
-            rotation_deg=roadside.facing,
-            code=code,
-            text=sign.text,
-            **sign.fields(),
-        )
-    )
+    axis = {"station": round_value(place), "offset": round_value(roadside.sign * offset)}
+    fields: dict[str, Any] = {**axis, "rotation_deg": roadside.facing, "code": code, "text": sign.text, **sign.fields()}
+    median.signs.append(TrafficSign(instance=1, **fields))
 
 
 def is_obstacle(sign: SignType) -> bool:

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from ...base.random_streams import stream
 from ...road.guidelines import LIMITS, DesignLimits
@@ -42,10 +43,8 @@ class PlacementSite:
     sections: dict[Side, CarriagewaySection] = field(init=False)
 
     def __post_init__(self) -> None:
-        sections = {
-            side: CarriagewaySection(carriageway, self.turnouts_of(side).values())
-            for side, carriageway in self.carriageways.items()
-        }
+        sides = self.carriageways.items()
+        sections = {side: CarriagewaySection(road, self.turnouts_of(side).values()) for side, road in sides}
         object.__setattr__(self, "sections", sections)
 
     @cached_property
@@ -71,13 +70,9 @@ class PlacementSite:
         """Return the turnouts of one carriageway by id."""
         return {name: item for name, item in self.turnouts.items() if item.carriageway == f"carriageway-{side}"}
 
-    def exits(self, side: Side) -> list[tuple[str, Turnout]]:
-        """Return the exits of one carriageway with their ids."""
-        return [(name, item) for name, item in self.turnouts_of(side).items() if item.kind == "exit"]
-
-    def entries(self, side: Side) -> list[tuple[str, Turnout]]:
-        """Return the entries of one carriageway with their ids."""
-        return [(name, item) for name, item in self.turnouts_of(side).items() if item.kind == "entry"]
+    def turnouts_of_kind(self, side: Side, kind: Literal["exit", "entry"]) -> list[Turnout]:
+        """Return the exits or the entries of one carriageway."""
+        return [item for item in self.turnouts_of(side).values() if item.kind == kind]
 
     def shape(self, turnout: Turnout) -> TurnoutShape:
         """Return the shape of one of the road's turnouts."""
@@ -88,24 +83,3 @@ class PlacementSite:
         """Return the station at which traffic meets a turnout first."""
         ahead = self.shape(turnout).carriageway.traffic > 0
         return turnout.start_station if ahead else turnout.end_station
-
-    def gore_tip(self, turnout: Turnout) -> float:
-        """Return the station of an exit's or entry's gore tip."""
-        return self.shape(turnout).gore_tip()
-
-    def nose(self, turnout: Turnout) -> float:
-        """Return the station of an exit's or entry's nose, where the unpaved ground begins."""
-        return self.shape(turnout).nose_station()
-
-    def curvature(self, station: ArrayLike) -> Float:
-        """Return the curvature (1/m, positive to the left) at stations, same shape."""
-        borders, at_borders = self._curvatures
-        return np.interp(np.asarray(station, dtype=np.float64), borders, at_borders)
-
-    @cached_property
-    def _curvatures(self) -> tuple[Float, Float]:
-        elements = self.alignment.horizontal
-        lengths = np.array([element.length for element in elements])
-        ends = np.cumsum(lengths)
-        borders = np.column_stack([np.concatenate([[0.0], ends[:-1]]), ends]).ravel()
-        return borders, np.array([(e.curvature_start, e.curvature_end) for e in elements]).ravel()

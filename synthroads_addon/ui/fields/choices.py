@@ -34,10 +34,7 @@ def _design_classes() -> Iterator[tuple[str, str, str]]:
         yield name, value_name("road.design_class", name), f"With {', '.join(sections)}"
 
 
-ITEMS: dict[str, Items] = {
-    "fidelity": tuple(_fidelities()),
-    "road.design_class": tuple(_design_classes()),
-}
+ITEMS: dict[str, Items] = {"fidelity": tuple(_fidelities()), "road.design_class": tuple(_design_classes())}
 """Path of a choice and its items."""
 STANDARD_PARTS: dict[str, Items] = {"road.cross_section": tuple(_cross_sections())}
 """Path of a field that takes a standard part's name or a part by hand, and the standard parts."""

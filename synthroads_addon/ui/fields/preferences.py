@@ -100,6 +100,3 @@ class SYNTHROADS_AP_preferences(bpy.types.AddonPreferences):
 
 def _usual_library() -> str:
     return str(Path(bpy.utils.user_resource("DATAFILES")) / "synthroads")
-
-
-CLASSES = (SYNTHROADS_AP_preferences,)

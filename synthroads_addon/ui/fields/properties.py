@@ -126,20 +126,7 @@ def _data(text: str) -> dict[str, Any]:
     return json.loads(text)
 
 
-CLASSES = (
-    SYNTHROADS_PG_file,
-    *(cls for field in FIELDS.values() for cls in field.classes()),
-    SYNTHROADS_PG_settings,
-)
+CLASSES = (SYNTHROADS_PG_file, *(cls for field in FIELDS.values() for cls in field.classes()), SYNTHROADS_PG_settings)
 PATHS = {field.path: field for field in leaves(FIELDS)}
 """Every field that is set by itself, by its path in the scenario."""
-
-
-def register() -> None:
-    """Attach the settings to scenes."""
-    bpy.types.Scene.synthroads = bpy.props.PointerProperty(type=SYNTHROADS_PG_settings)
-
-
-def unregister() -> None:
-    """Take the settings away."""
-    del bpy.types.Scene.synthroads
+ATTACHED = (bpy.types.Scene, "synthroads", SYNTHROADS_PG_settings)

@@ -8,17 +8,48 @@ Annotations are not postponed here: Blender reads the properties from them.
 from typing import cast
 
 import bpy
+import numpy as np
 
 from ...base.errors import InputError
+from ...base.progress import exhaust
 from ...calibration.fit import FITTED
-from ...calibration.job import Calibration, Compared, save_fitted
-from ..work import calibration_run
-from ..work.calibration_run import PICTURE, calibration_work, fitted_result, show_picture
-from ..work.common import Sidebar, column, is_free, large_button, refuse
+from ...calibration.job import Calibration, CalibrationJob, Compared, save_fitted, steps
+from ...calibration.plot import calibration_picture
+from ..work.common import Sidebar, column, large_button, refusing
 from ..work.job import PanelJob
 from ..work.long_operator import LongOperator
-from . import calibration_settings
-from .calibration_settings import file_of
+from .calibration_settings import file_of, textured_materials
+
+PICTURE = "SynthRoads Calibration"
+"""Name of the image that shows the result."""
+
+
+def panel_job(job: CalibrationJob) -> PanelJob[Calibration]:
+    """Return a calibration as a job in a thread: it touches none of Blender's data."""
+    return PanelJob.aside("Calibration", lambda report: exhaust(steps(job), report), "Calibrating")
+
+
+latest: Calibration | None = None
+"""The last result."""
+
+
+def fitted_result() -> Calibration | None:
+    """Return the last result if it is a fit."""
+    return latest if latest is not None and latest.job.fit and latest.job.real is not None else None
+
+
+def show_picture(result: Calibration) -> bpy.types.Image:
+    """Return the image that shows a result; made, or drawn anew where the file has it."""
+    drawn = np.asarray(calibration_picture(result).convert("RGBA"), dtype=np.float32)[::-1] / 255.0
+    height, width = drawn.shape[:2]
+    image = bpy.data.images.get(PICTURE)
+    if image is None:
+        image = bpy.data.images.new(PICTURE, width, height)
+    elif tuple(image.size) != (width, height):
+        image.scale(width, height)
+    image.pixels.foreach_set(np.ascontiguousarray(drawn).ravel())
+    image.update()
+    return image
 
 
 class _Calibrates(LongOperator):
@@ -29,7 +60,7 @@ class _Calibrates(LongOperator):
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         """Object mode, nothing else at work, and something to compare."""
-        if not is_free(cast("type[bpy.types.Operator]", cls), context):
+        if not super().poll(context):
             return False
         settings = context.window_manager.synthroads_calibration
         if not settings.classes or (cls.fit and not settings.real):
@@ -40,13 +71,13 @@ class _Calibrates(LongOperator):
 
     def job(self, context: bpy.types.Context) -> PanelJob[Calibration]:
         """Return the calibration that the panel asks for."""
-        wanted = context.window_manager.synthroads_calibration.job(self.fit)
-        return PanelJob("Calibration", calibration_work(wanted))
+        return panel_job(context.window_manager.synthroads_calibration.job(self.fit))
 
     def succeed(self, context: bpy.types.Context, job: PanelJob[Calibration]) -> str:
         """Draw the diagrams; return the largest errors."""
+        global latest
         assert job.result is not None
-        calibration_run.latest = job.result
+        latest = job.result
         show_picture(job.result)
         return _sentence(job.result)
 
@@ -80,18 +111,14 @@ class SYNTHROADS_OT_save_materials(bpy.types.Operator):
             return False
         return True
 
-    def execute(self, context: bpy.types.Context) -> set[str]:
+    @refusing
+    def execute(self, context: bpy.types.Context) -> None:
         """Write the table; other materials that it holds stay."""
         result, path = fitted_result(), file_of(context.window_manager.synthroads_calibration.table)
         if path is None:
-            self.report({"ERROR"}, "Choose the table's file")
-            return {"CANCELLED"}
-        try:
-            save_fitted(cast(Calibration, result), path, overwrite=True)
-        except InputError as error:
-            return refuse(self, error)
+            raise InputError("Table", None, "choose the table's file")
+        save_fitted(cast(Calibration, result), path, overwrite=True)
         self.report({"INFO"}, f"Saved to {path}")
-        return {"FINISHED"}
 
 
 class SYNTHROADS_OT_add_calibration_class(bpy.types.Operator):
@@ -165,12 +192,12 @@ class SYNTHROADS_PT_calibration(Sidebar, bpy.types.Panel):
         row = large_button(layout).row(align=True)
         row.operator(SYNTHROADS_OT_compare_intensities.bl_idname, icon="SEQ_HISTOGRAM")
         row.operator(SYNTHROADS_OT_fit_materials.bl_idname, icon="MOD_DATA_TRANSFER")
-        if calibration_run.latest is not None:
-            _draw_result(layout, calibration_run.latest)
+        if latest is not None:
+            _draw_result(layout, latest)
 
 
 def _draw_classes(layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup) -> None:
-    textured = calibration_settings.textured_materials()
+    textured = textured_materials()
     for index, item in enumerate(settings.classes):
         box = layout.box()
         row = box.row(align=True)
@@ -244,24 +271,7 @@ def _sentence(result: Calibration) -> str:
     return f"Largest error as a share of the interquartile range: {', '.join(shown)}"
 
 
-CLASSES = (
-    *calibration_settings.CLASSES,
-    SYNTHROADS_OT_compare_intensities,
-    SYNTHROADS_OT_fit_materials,
-    SYNTHROADS_OT_save_materials,
-    SYNTHROADS_OT_add_calibration_class,
-    SYNTHROADS_OT_remove_calibration_class,
-    SYNTHROADS_OT_show_calibration,
-    SYNTHROADS_PT_calibration,
-)
-
-
-def register() -> None:
-    """Attach the settings."""
-    calibration_settings.register()
-
-
 def unregister() -> None:
-    """Take the settings away, and forget the last result."""
-    calibration_run.latest = None
-    calibration_settings.unregister()
+    """Forget the last result."""
+    global latest
+    latest = None

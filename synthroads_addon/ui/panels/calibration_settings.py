@@ -186,14 +186,4 @@ def _pair(text: str) -> tuple[float, float]:
     return values[0], values[1]
 
 
-CLASSES = (SYNTHROADS_PG_calibration_class, SYNTHROADS_PG_calibration)
-
-
-def register() -> None:
-    """Attach the settings to the window manager."""
-    bpy.types.WindowManager.synthroads_calibration = bpy.props.PointerProperty(type=SYNTHROADS_PG_calibration)
-
-
-def unregister() -> None:
-    """Take the settings away."""
-    del bpy.types.WindowManager.synthroads_calibration
+ATTACHED = (bpy.types.WindowManager, "synthroads_calibration", SYNTHROADS_PG_calibration)

@@ -3,11 +3,12 @@
 Annotations are not postponed here: Blender reads the properties from them.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
 import bpy
+import bpy.utils.previews
 import numpy as np
 from bpy.app.handlers import persistent
 from mathutils import Vector
@@ -18,25 +19,22 @@ from ...blender.model.store import find_road
 from ...blender.views.cloud import CloudView
 from ...cloud.formats.registry import ENDINGS
 from ...cloud.tools.display import COLOURINGS, ColourBy, DisplayCloud, height_colors, read_display
-from ..work.common import Sidebar, column, is_free
-from ..work.job import Aside, PanelJob, Report, Work
+from ..work.common import Sidebar, column, right_label
+from ..work.job import PanelJob, Report
 from ..work.long_operator import LongOperator, draw_job
 from ..work.view import frame_points, redraw_views, view_of
-from .swatches import swatch
 
 ENDINGS_GLOB = ";".join(f"*{ending}" for ending in ENDINGS)
 _FAR = 20_000.0
 """A cloud farther than this (m) from the road's origin and beyond the road's length is likely to be of elsewhere."""
 _LABELS: dict[ColourBy, tuple[str, str]] = {
     "class": ("Class", "The classes' colours, as in the pictures of a scan"),
-    "intensity": (
-        "Intensity",
-        "Black to white, the darkest and brightest half percent cut; times the squared range",
-    ),
+    "intensity": ("Intensity", "Black to white, the darkest and brightest half percent cut; times the squared range"),
     "rgb": ("RGB", "The points' own colours"),
     "height": ("Height", "From dark blue to yellow, the lowest and highest half percent cut"),
 }
-_GRADIENT_STEPS = 10
+_GRADIENT_STEPS, _SWATCH_SIZE = 10, 32
+_icons: Any = None
 
 view = CloudView()
 """Cloud that is drawn over the 3D views."""
@@ -122,23 +120,13 @@ class SYNTHROADS_OT_show_cloud(LongOperator, bpy.types.Operator):
     )
     nothing_done = "the view is as before"
 
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        """Nothing else at work."""
-        return is_free(cls, context)
-
     def job(self, context: bpy.types.Context) -> PanelJob[DisplayCloud]:
         """Return the reading of the cloud in the scene's frame."""
         path, points = cloud_path(context, self.filepath), context.window_manager.synthroads_cloud_view.points
         origin = scene_origin(context.scene)
-
-        def work() -> Work[DisplayCloud]:
-            cloud: DisplayCloud = yield Aside(
-                lambda report: read_cloud_to_show(path, points, origin, report), "Loading the cloud"
-            )
-            return cloud
-
-        return PanelJob("Loading", work())
+        return PanelJob.aside(
+            "Loading", lambda report: read_cloud_to_show(path, points, origin, report), "Loading the cloud"
+        )
 
     def succeed(self, context: bpy.types.Context, job: PanelJob[DisplayCloud]) -> str:
         """Draw it; where there is no road to look at, look at it."""
@@ -256,9 +244,7 @@ def _legend(layout: bpy.types.UILayout, cloud: DisplayCloud, by: ColourBy) -> No
             row.label(text="", icon_value=swatch(colors[step]))
         row = layout.row()
         row.label(text=form.format(low) + unit)
-        end = row.row()
-        end.alignment = "RIGHT"
-        end.label(text=form.format(high) + unit)
+        right_label(row, form.format(high) + unit)
         if by == "intensity":
             layout.label(text=cloud.brightness_text.capitalize())
 
@@ -268,9 +254,17 @@ def _class_legend(layout: bpy.types.UILayout, cloud: DisplayCloud) -> None:
     for row, count in cloud.classes():
         line = rows.split(factor=0.65)
         line.label(text=row.name.replace("_", " "), icon_value=swatch(row.color))
-        number = line.row()
-        number.alignment = "RIGHT"
-        number.label(text=f"{count:,}")
+        right_label(line, f"{count:,}")
+
+
+def swatch(color: Sequence[int]) -> int:
+    """Return the icon of a colour (red, green, blue; sRGB, 0 to 255); made when it is asked for first."""
+    name = "#" + bytes(int(value) for value in color).hex()
+    if name not in _icons:
+        icon = _icons.new(name)
+        icon.icon_size = (_SWATCH_SIZE, _SWATCH_SIZE)
+        icon.icon_pixels_float = [*(value / 255.0 for value in color), 1.0] * _SWATCH_SIZE**2
+    return int(_icons[name].icon_id)
 
 
 @persistent
@@ -279,23 +273,17 @@ def _forget(path: str) -> None:
     view.remove()
 
 
-CLASSES = (
-    SYNTHROADS_PG_cloud_view,
-    SYNTHROADS_OT_show_cloud,
-    SYNTHROADS_OT_hide_cloud,
-    SYNTHROADS_OT_frame_cloud,
-    SYNTHROADS_PT_cloud_view,
-)
+ATTACHED = (bpy.types.WindowManager, "synthroads_cloud_view", SYNTHROADS_PG_cloud_view)
+HANDLERS = {"load_pre": _forget}
 
 
 def register() -> None:
-    """Attach the settings to the window manager: they belong to the screen, not to the file."""
-    bpy.types.WindowManager.synthroads_cloud_view = bpy.props.PointerProperty(type=SYNTHROADS_PG_cloud_view)
-    bpy.app.handlers.load_pre.append(_forget)
+    """Make room for the icons of colours."""
+    global _icons
+    _icons = bpy.utils.previews.new()
 
 
 def unregister() -> None:
-    """Take settings and cloud away."""
-    bpy.app.handlers.load_pre.remove(_forget)
+    """Take the cloud and the icons away."""
     view.remove()
-    del bpy.types.WindowManager.synthroads_cloud_view
+    bpy.utils.previews.remove(_icons)

@@ -210,14 +210,4 @@ def _draw_inputs(layout: bpy.types.UILayout, item: bpy.types.Object, inputs: lis
         value_row(layout, name).prop(data, prop, text="")
 
 
-CLASSES = (SYNTHROADS_PG_edit, SYNTHROADS_OT_show_plants, SYNTHROADS_PT_edit)
-
-
-def register() -> None:
-    """Attach the state of the sub-panel to the window."""
-    bpy.types.WindowManager.synthroads_edit = bpy.props.PointerProperty(type=SYNTHROADS_PG_edit)
-
-
-def unregister() -> None:
-    """Take it away."""
-    del bpy.types.WindowManager.synthroads_edit
+ATTACHED = (bpy.types.WindowManager, "synthroads_edit", SYNTHROADS_PG_edit)

@@ -4,7 +4,8 @@ Annotations are not postponed here: Blender reads the properties from them.
 """
 
 import os
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +13,6 @@ import bpy
 
 from ...base.errors import InputError
 from ...base.files import output_folder
-from ...blender.model.store import find_road
 from ...cloud.formats.registry import ENDINGS
 from ...cloud.formats.registry import missing_package as cloud_package
 from ...cloud.tools.convert import convert, subsample
@@ -28,10 +28,9 @@ from ...twin.formats import (
     write_twin,
 )
 from ..fields.numbers import exact
-from ..work.common import Sidebar, column, is_free
-from ..work.file_operator import FileOperator
-from ..work.job import Aside, PanelJob, Report, Work
-from ..work.long_operator import draw_job
+from ..work.common import Sidebar, column, has_road, is_free
+from ..work.job import PanelJob, Report
+from ..work.long_operator import FileOperator, draw_job
 from .cloud_view import ENDINGS_GLOB, cloud_path, last_cloud
 from .rules import road_now, wrap_text
 
@@ -99,11 +98,6 @@ class SYNTHROADS_OT_export_cloud(FileOperator, bpy.types.Operator):
         unit="LENGTH",
     )
 
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        """Nothing else at work."""
-        return is_free(cls, context)
-
     def suggest(self, context: bpy.types.Context) -> None:
         """Suggest a file beside the cloud that is read."""
         source = Path(bpy.path.abspath(self.source)) if self.source else last_cloud(context)
@@ -129,11 +123,11 @@ class SYNTHROADS_OT_export_cloud(FileOperator, bpy.types.Operator):
     def job(self, context: bpy.types.Context) -> PanelJob[dict[str, Any]]:
         """Return the writing; the file browser has asked whether a file that is there may be replaced."""
         source, output = cloud_path(context, self.source), Path(bpy.path.abspath(self.filepath))
-        classes, spacing = None if self.classes == "own" else self.classes, exact(self.spacing, None)
-        return _aside("Export", lambda report: export_cloud(source, output, classes, spacing, report))
+        classes = None if self.classes == "own" else self.classes
+        return PanelJob.aside("Export", partial(export_cloud, source, output, classes, exact(self.spacing, None)))
 
     def succeed(self, context: bpy.types.Context, job: PanelJob[dict[str, Any]]) -> str:
-        """Say what was written."""
+        """Return the number of points and the file."""
         assert job.result
         return f"{job.result['points']:,} points written to {job.result['output']}"
 
@@ -171,10 +165,7 @@ class SYNTHROADS_OT_export_twin(FileOperator, bpy.types.Operator):
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         """There must be a road, and nothing else at work."""
-        if find_road(context.scene) is None:
-            cls.poll_message_set("Build a road first")
-            return False
-        return is_free(cls, context)
+        return has_road(cls, context) and is_free(cls, context)
 
     def suggest(self, context: bpy.types.Context) -> None:
         """Suggest the output folder, where the cloud is."""
@@ -199,15 +190,12 @@ class SYNTHROADS_OT_export_twin(FileOperator, bpy.types.Operator):
         if not self.directory.strip():
             raise InputError("Folder", None, "choose a folder for the files")
         check_formats(formats)
-        folder, tolerance, overwrite = (
-            Path(bpy.path.abspath(self.directory)),
-            exact(self.tolerance, None),
-            self.overwrite,
-        )
-        return _aside("Export", lambda report: export_twin(parameters, folder, formats, tolerance, overwrite, report))
+        folder, tolerance = Path(bpy.path.abspath(self.directory)), exact(self.tolerance, None)
+        work = partial(export_twin, parameters, folder, formats, tolerance, self.overwrite)
+        return PanelJob.aside("Export", work)
 
     def succeed(self, context: bpy.types.Context, job: PanelJob[tuple[str, ...]]) -> str:
-        """Say what was written."""
+        """Return the names of the files and their folder."""
         assert job.result
         return f"{', '.join(job.result)} written to {bpy.path.abspath(self.directory)}"
 
@@ -232,15 +220,6 @@ class SYNTHROADS_PT_export(Sidebar, bpy.types.Panel):
         layout.operator(SYNTHROADS_OT_export_twin.bl_idname, icon="EXPORT")
 
 
-def _aside(title: str, work: Callable[[Report], Any]) -> PanelJob[Any]:
-    """Return a job that is done in a thread as a whole."""
-
-    def steps() -> Work[Any]:
-        return (yield Aside(work, title))
-
-    return PanelJob(title, steps())
-
-
 def _draw_formats(layout: bpy.types.UILayout, context: bpy.types.Context, operator: SYNTHROADS_OT_export_twin) -> None:
     rows = layout.column(align=True)
     rows.use_property_split = False
@@ -249,7 +228,7 @@ def _draw_formats(layout: bpy.types.UILayout, context: bpy.types.Context, operat
         row = rows.row()
         row.enabled = name not in missing
         row.prop_enum(operator, "formats", name)
-    _say_what_is_missing(rows, context, {FORMATS[name].label: package for name, package in missing.items()})
+    _draw_missing_packages(rows, context, {FORMATS[name].label: package for name, package in missing.items()})
 
 
 def draw_missing(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
@@ -258,14 +237,11 @@ def draw_missing(layout: bpy.types.UILayout, context: bpy.types.Context) -> None
     clouds = {_FORMATS[f".{name}"][0]: cloud_package(f".{name}") for name in sorted(settings.cloud.formats)}
     twins = {FORMATS[name].label: missing_packages(name) for name in TWIN_FORMATS if name in settings.twin}
     missing = {name: package for name, package in (clouds | twins).items() if package}
-    _say_what_is_missing(layout, context, missing)
+    _draw_missing_packages(layout, context, missing)
 
 
-def _say_what_is_missing(layout: bpy.types.UILayout, context: bpy.types.Context, missing: Mapping[str, str]) -> None:
+def _draw_missing_packages(layout: bpy.types.UILayout, context: bpy.types.Context, missing: Mapping[str, str]) -> None:
     for name, package in missing.items():
         text = f"{name} needs the package {package}: pip install {package}, with Blender's Python"
         for line in wrap_text(text, context):
             layout.label(text=line)
-
-
-CLASSES = (SYNTHROADS_OT_export_cloud, SYNTHROADS_OT_export_twin, SYNTHROADS_PT_export)

@@ -7,11 +7,14 @@ from typing import Any, ClassVar
 import bpy
 
 from ...blender.model.store import BUILT_FROM, find_road
+from ...blender.things.model_builder import ROLE
 from ..fields.drawing import draw_field, value_row
+from ..fields.preferences import preferences
 from ..fields.sheets import SHEETS, Sheet, fields_of
 from ..work.build import SYNTHROADS_OT_build
 from ..work.common import Sidebar, column, large_button
 from ..work.long_operator import draw_job
+from ..work.scan import SYNTHROADS_OT_scan, Written, last_written
 from .export import draw_missing
 from .presets import (
     SYNTHROADS_MT_devices,
@@ -21,7 +24,8 @@ from .presets import (
     scenario_title,
 )
 from .road_files import draw_road_files, source_of
-from .scan import draw_folder, draw_scan
+
+_SOLID = {"MESH", "CURVE", "SURFACE", "META", "FONT"}
 
 
 class SheetPanel(Sidebar):
@@ -104,12 +108,53 @@ class OutputPanel(SheetPanel):
         draw_missing(layout, context)
 
 
-_OWN_PANELS: dict[str, type[SheetPanel]] = {
-    "main": MainPanel,
-    "road": RoadPanel,
-    "scanner": ScannerPanel,
-    "output": OutputPanel,
-}
+def draw_folder(layout: bpy.types.UILayout, settings: Any) -> None:
+    """Draw where the files go; greyed where the preferences say it."""
+    value_row(layout, "Folder").prop(settings, "output", text="", placeholder=preferences().output_folder)
+
+
+def draw_scan(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
+    """Draw the folder and the button; while something is at work, how far it is."""
+    settings = context.scene.synthroads
+    if draw_job(layout):
+        return
+    if find_road(context.scene) is None:
+        layout.label(text="Build a road first", icon="INFO")
+    else:
+        _draw_other_objects(layout, context)
+        if settings.needs_saved_file():
+            _ask_to_save(layout, settings)
+    large_button(layout).operator(SYNTHROADS_OT_scan.bl_idname, icon="LIGHT_AREA")
+    if (written := last_written()) is not None:
+        _draw_result(layout, settings, written)
+
+
+def _ask_to_save(layout: bpy.types.UILayout, settings: Any) -> None:
+    row = layout.row(align=True)
+    row.alert = True
+    row.label(text="Save the file, or choose a folder", icon="ERROR")
+    row.operator("wm.save_mainfile", text="", icon="FILE_TICK")
+    draw_folder(layout, settings)
+
+
+def _draw_other_objects(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
+    """Say that objects of the user's own are scanned as well."""
+    count = sum(item.type in _SOLID and ROLE not in item for item in context.visible_objects)
+    if count:
+        text = "1 other object is scanned too" if count == 1 else f"{count} other objects are scanned too"
+        layout.label(text=text, icon="INFO")
+
+
+def _draw_result(layout: bpy.types.UILayout, settings: Any, written: Written) -> None:
+    """Show what the last scan wrote, as long as the panel names its folder."""
+    if settings.needs_saved_file() or not settings.chosen_folder().strip() or settings.folder() != written.target:
+        return
+    row = layout.row(align=True)
+    row.label(text=f"{written.points:,} points written", icon="CHECKMARK")
+    row.operator("wm.path_open", text="", icon="FILE_FOLDER").filepath = str(written.target)
+
+
+_OWN_PANELS = {"main": MainPanel, "road": RoadPanel, "scanner": ScannerPanel, "output": OutputPanel}
 
 
 def _panel(sheet: Sheet) -> type:

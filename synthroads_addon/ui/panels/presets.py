@@ -1,4 +1,4 @@
-"""Ready-made scenarios and devices, built-in and of the user's own, and roads drawn at random.
+"""Ready-made scenarios and devices, built-in and of the user's own, lists of files, and roads drawn at random.
 
 Annotations are not postponed here: Blender reads the properties from them.
 """
@@ -9,15 +9,16 @@ from typing import Any
 
 import bpy
 
-from ...base.errors import InputError
 from ...base.files import output_folder
 from ...base.random_streams import stream
 from ...scanning.devices.device import device_names, load_device
 from ...scenario.scenario import load_scenario, scenario_names
 from ..fields.choices import device_of
+from ..fields.drawing import ADD_FILE, REMOVE_FILE, owner_of
 from ..fields.numbers import LARGEST_INTEGER
 from ..fields.preferences import preferences
-from ..work.common import is_free, refuse
+from ..work.common import is_free, refusing
+from ..work.long_operator import FileChooser
 
 
 class _Undoable:
@@ -25,6 +26,12 @@ class _Undoable:
 
     bl_options = {"REGISTER", "UNDO"}  # noqa: RUF012 (Blender reads a plain set)
     report: Any
+
+
+def _take_device(context: bpy.types.Context, name_or_file: str) -> None:
+    """Scan with a device; raise `InputError` if it is wrong."""
+    load_device(name_or_file)
+    context.scene.synthroads.scan.device = name_or_file
 
 
 class SYNTHROADS_OT_choose_scenario(_Undoable, bpy.types.Operator):
@@ -40,13 +47,10 @@ class SYNTHROADS_OT_choose_scenario(_Undoable, bpy.types.Operator):
         """Say what is behind the menu's item."""
         return scenario_title(properties.name)
 
-    def execute(self, context: bpy.types.Context) -> set[str]:
+    @refusing
+    def execute(self, context: bpy.types.Context) -> None:
         """Show its values."""
-        try:
-            context.scene.synthroads.take_preset(self.name)
-        except InputError as error:
-            return refuse(self, error)
-        return {"FINISHED"}
+        context.scene.synthroads.take_preset(self.name)
 
 
 class SYNTHROADS_OT_choose_device(_Undoable, bpy.types.Operator):
@@ -66,66 +70,58 @@ class SYNTHROADS_OT_choose_device(_Undoable, bpy.types.Operator):
         rates = ", ".join(f"{mode.pulse_rate_khz:g}" for mode in device.modes)
         return f"{device.title}: {device.wavelength_nm:g} nm, {rates} kHz, {device.maximum_returns} returns at most"
 
-    def execute(self, context: bpy.types.Context) -> set[str]:
+    @refusing
+    def execute(self, context: bpy.types.Context) -> None:
         """Choose it; one that is wrong is refused."""
-        try:
-            load_device(self.name)
-        except InputError as error:
-            return refuse(self, error)
-        context.scene.synthroads.scan.device = self.name
-        return {"FINISHED"}
+        _take_device(context, self.name)
 
 
-class _File:
+class JsonFileChooser(FileChooser):
     """Base of operators that ask for a JSON file."""
 
     filepath: bpy.props.StringProperty(subtype="FILE_PATH", options={"SKIP_SAVE"})
     filter_glob: bpy.props.StringProperty(default="*.json", options={"HIDDEN"})
+
+
+class _LibraryFile(JsonFileChooser):
+    """Base of operators that ask for a scenario or a device, at first in the library's folder."""
+
     kind = ""
 
-    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
-        """Open the file browser in the library's folder."""
+    def suggest(self, context: bpy.types.Context) -> None:
+        """Suggest the library's folder."""
         if not self.filepath:
             folder = preferences().library(self.kind)
             self.filepath = str(folder if folder.is_dir() else folder.home()) + "/"
-        context.window_manager.fileselect_add(self)
-        return {"RUNNING_MODAL"}
 
 
-class SYNTHROADS_OT_load_scenario(_File, _Undoable, bpy.types.Operator):
+class SYNTHROADS_OT_load_scenario(_LibraryFile, _Undoable, bpy.types.Operator):
     """Take over a scenario from a JSON file, the same as the command line takes"""
 
     bl_idname = "synthroads.load_scenario"
     bl_label = "Load Scenario"
     kind = "scenarios"
 
-    def execute(self, context: bpy.types.Context) -> set[str]:
+    @refusing
+    def execute(self, context: bpy.types.Context) -> None:
         """Show the file's values."""
-        try:
-            context.scene.synthroads.take_preset(self.filepath)
-        except InputError as error:
-            return refuse(self, error)
-        return {"FINISHED"}
+        context.scene.synthroads.take_preset(self.filepath)
 
 
-class SYNTHROADS_OT_load_device(_File, _Undoable, bpy.types.Operator):
+class SYNTHROADS_OT_load_device(_LibraryFile, _Undoable, bpy.types.Operator):
     """Scan with a device from a JSON file"""
 
     bl_idname = "synthroads.load_device"
     bl_label = "Load Device"
     kind = "devices"
 
-    def execute(self, context: bpy.types.Context) -> set[str]:
+    @refusing
+    def execute(self, context: bpy.types.Context) -> None:
         """Choose the file's device; one that is wrong is refused."""
-        try:
-            load_device(self.filepath)
-        except InputError as error:
-            return refuse(self, error)
-        context.scene.synthroads.scan.device = self.filepath
-        return {"FINISHED"}
+        _take_device(context, self.filepath)
 
 
-class SYNTHROADS_OT_save_scenario(_File, bpy.types.Operator):
+class SYNTHROADS_OT_save_scenario(_LibraryFile, bpy.types.Operator):
     """Save these settings as a scenario's JSON file. Files in the library's folder are listed in the menu"""
 
     bl_idname = "synthroads.save_scenario"
@@ -134,27 +130,56 @@ class SYNTHROADS_OT_save_scenario(_File, bpy.types.Operator):
 
     check_existing: bpy.props.BoolProperty(default=True, options={"HIDDEN"})
 
-    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
-        """Open the file browser in the library's folder, which is made if need be."""
+    def suggest(self, context: bpy.types.Context) -> None:
+        """Suggest a file in the library's folder, which is made if need be."""
         folder = preferences().library(self.kind)
         try:
             folder.mkdir(parents=True, exist_ok=True)
         except OSError:  # the browser then opens elsewhere
             folder = folder.home()
         self.filepath = str(folder / "scenario.json")
-        context.window_manager.fileselect_add(self)
-        return {"RUNNING_MODAL"}
 
-    def execute(self, context: bpy.types.Context) -> set[str]:
+    @refusing
+    def execute(self, context: bpy.types.Context) -> None:
         """Write the file; the browser has asked whether to replace one that is there."""
         target = Path(self.filepath).with_suffix(".json").absolute()
-        try:
-            scenario = context.scene.synthroads.scenario()
-            with output_folder(target.parent, [target.name], overwrite=True) as folder:
-                (folder / target.name).write_text(scenario.to_json(), encoding="utf-8")
-        except InputError as error:
-            return refuse(self, error)
+        scenario = context.scene.synthroads.scenario()
+        with output_folder(target.parent, [target.name], overwrite=True) as folder:
+            (folder / target.name).write_text(scenario.to_json(), encoding="utf-8")
         self.report({"INFO"}, f"Saved {target}")
+
+
+def _files_of(context: bpy.types.Context, path: str) -> Any:
+    """Return the list of files that a field at a path of the scenario holds."""
+    return getattr(owner_of(context.scene.synthroads, path), path.rpartition(".")[2])
+
+
+class SYNTHROADS_OT_add_file(JsonFileChooser, _Undoable, bpy.types.Operator):
+    """Add a file to the list"""
+
+    bl_idname = ADD_FILE
+    bl_label = "Add File..."
+
+    path: bpy.props.StringProperty(options={"HIDDEN"})
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        """Add the file."""
+        _files_of(context, self.path).add().file = self.filepath
+        return {"FINISHED"}
+
+
+class SYNTHROADS_OT_remove_file(_Undoable, bpy.types.Operator):
+    """Take this file off the list; the file itself stays"""
+
+    bl_idname = REMOVE_FILE
+    bl_label = "Remove File"
+
+    path: bpy.props.StringProperty(options={"HIDDEN"})
+    number: bpy.props.IntProperty(options={"HIDDEN"})
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        """Remove it."""
+        _files_of(context, self.path).remove(self.number)
         return {"FINISHED"}
 
 
@@ -201,7 +226,7 @@ class SYNTHROADS_MT_scenarios(bpy.types.Menu):
         """List them, then loading and saving."""
         layout = self.layout
         _list(layout, SYNTHROADS_OT_choose_scenario.bl_idname, scenario_names(), scenario_title)
-        _list(layout, SYNTHROADS_OT_choose_scenario.bl_idname, own_files("scenarios"), scenario_title)
+        _list(layout, SYNTHROADS_OT_choose_scenario.bl_idname, library_files("scenarios"), scenario_title)
         layout.operator(SYNTHROADS_OT_load_scenario.bl_idname, text="Load Scenario...", icon="FILE_FOLDER")
         layout.operator(SYNTHROADS_OT_save_scenario.bl_idname, text="Save Scenario...", icon="FILE_TICK")
 
@@ -216,7 +241,7 @@ class SYNTHROADS_MT_devices(bpy.types.Menu):
         """List them, then loading."""
         layout = self.layout
         _list(layout, SYNTHROADS_OT_choose_device.bl_idname, device_names(), device_title)
-        _list(layout, SYNTHROADS_OT_choose_device.bl_idname, own_files("devices"), device_title)
+        _list(layout, SYNTHROADS_OT_choose_device.bl_idname, library_files("devices"), device_title)
         layout.operator(SYNTHROADS_OT_load_device.bl_idname, text="Load Device...", icon="FILE_FOLDER")
 
 
@@ -225,19 +250,19 @@ def next_seed(seed: int) -> int:
     return int(stream(seed, "random road").integers(1, LARGEST_INTEGER))
 
 
-def own_files(kind: str) -> list[str]:
+def library_files(kind: str) -> list[str]:
     """Return the JSON files of the library's ``scenarios`` or ``devices``."""
     return sorted(str(path) for path in preferences().library(kind).glob("*.json"))
 
 
 def device_title(name: str) -> str:
-    """Return what a device is called."""
+    """Return a device's title, or the file's name with a question mark where it can't be read."""
     device = device_of(name)
     return device.title if device else f"{Path(name).name}?"
 
 
 def scenario_title(name: str) -> str:
-    """Return what a scenario is called: a file by its name, as a title may be anything."""
+    """Return a built-in scenario's title, or a file's name, as the title in it may be anything."""
     return _built_in_title(name) if name in scenario_names() else Path(name).stem
 
 
@@ -251,15 +276,3 @@ def _list(layout: bpy.types.UILayout, operator: str, names: list[str], title: An
         layout.operator(operator, text=title(name)).name = name
     if names:
         layout.separator()
-
-
-CLASSES = (
-    SYNTHROADS_OT_choose_scenario,
-    SYNTHROADS_OT_choose_device,
-    SYNTHROADS_OT_load_scenario,
-    SYNTHROADS_OT_load_device,
-    SYNTHROADS_OT_save_scenario,
-    SYNTHROADS_OT_random_road,
-    SYNTHROADS_MT_scenarios,
-    SYNTHROADS_MT_devices,
-)

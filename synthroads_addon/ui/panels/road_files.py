@@ -8,19 +8,19 @@ from pathlib import Path
 
 import bpy
 
-from ...base.errors import InputError
 from ...base.files import output_folder
-from ...blender.model.read_back import edited_parameters
-from ...blender.model.store import BUILT_FROM, find_road, objects_of, recall_parameters
+from ...blender.model.store import BUILT_FROM, find_road, recall_parameters
 from ...jobs.generate import Job as PipelineJob
 from ...jobs.generate import road_parameters
 from ...road.parameters import RoadParameters
 from ...scenario.scenario import Scenario
 from ..work.build import road_work
-from ..work.common import is_free, refuse
-from ..work.file_operator import FileOperator
+from ..work.common import has_road, refusing
 from ..work.job import Aside, PanelJob, Work
+from ..work.long_operator import FileOperator
 from ..work.view import look_along, view_of
+from .presets import JsonFileChooser
+from .rules import road_now
 
 _FROM_FILE, _NAME = "file", "parameters.json"
 
@@ -42,11 +42,6 @@ class _Load(FileOperator):
 
     _first = False
 
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        """Object mode, and nothing else at work."""
-        return is_free(cls, context)
-
     def job(self, context: bpy.types.Context) -> PanelJob[str]:
         """Return the reading and the building."""
         self._first = find_road(context.scene) is None
@@ -61,8 +56,7 @@ class _Load(FileOperator):
         return str(job.result)
 
     def _work(self, path: Path, scenario: Scenario) -> Work[str]:
-        reading = Aside(lambda _: self.read(path, scenario), "Reading", 0.0, 0.02)
-        parameters, message = yield reading
+        parameters, message = yield Aside(lambda _: self.read(path, scenario), "Reading", 0.0, 0.02)
         yield from road_work(parameters, scenario, json.dumps([_FROM_FILE, path.name]))
         return message
 
@@ -100,43 +94,32 @@ class SYNTHROADS_OT_load_axis(_Load, bpy.types.Operator):
         return parameters, f"Built {parameters.alignment.length:,.0f} m of road along {path.name}: {said}"
 
 
-class SYNTHROADS_OT_save_road(bpy.types.Operator):
+class SYNTHROADS_OT_save_road(JsonFileChooser, bpy.types.Operator):
     """Write the parameter set of the road as it is edited now"""
 
     bl_idname = "synthroads.save_road"
     bl_label = "Save Parameter Set"
 
-    filepath: bpy.props.StringProperty(subtype="FILE_PATH", options={"SKIP_SAVE"})
     check_existing: bpy.props.BoolProperty(default=True, options={"HIDDEN"})
-    filter_glob: bpy.props.StringProperty(default="*.json", options={"HIDDEN"})
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         """There must be a road."""
-        if find_road(context.scene) is None:
-            cls.poll_message_set("Build a road first")
-            return False
-        return True
+        return has_road(cls, context)
 
-    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
-        """Open the file browser beside the .blend file."""
+    def suggest(self, context: bpy.types.Context) -> None:
+        """Suggest a file beside the .blend file."""
         if not self.filepath:
             self.filepath = str(Path(bpy.data.filepath).with_name(_NAME)) if bpy.data.filepath else _NAME
-        context.window_manager.fileselect_add(self)
-        return {"RUNNING_MODAL"}
 
-    def execute(self, context: bpy.types.Context) -> set[str]:
+    @refusing
+    def execute(self, context: bpy.types.Context) -> None:
         """Write the file; the file browser has asked whether one that is there may be replaced."""
-        road, path = find_road(context.scene), Path(bpy.path.abspath(self.filepath)).with_suffix(".json")
-        assert road  # poll() has seen it
-        try:
-            parameters = edited_parameters(recall_parameters(road), objects_of(road))
-            with output_folder(path.parent, [path.name], overwrite=True) as folder:
-                (folder / path.name).write_text(parameters.to_json(), encoding="utf-8")
-        except InputError as error:
-            return refuse(self, error)
+        parameters, path = road_now(context.scene), Path(bpy.path.abspath(self.filepath)).with_suffix(".json")
+        assert parameters  # poll() has seen the road
+        with output_folder(path.parent, [path.name], overwrite=True) as folder:
+            (folder / path.name).write_text(parameters.to_json(), encoding="utf-8")
         self.report({"INFO"}, f"Parameter set written to {path}")
-        return {"FINISHED"}
 
 
 def draw_road_files(layout: bpy.types.UILayout) -> None:
@@ -146,6 +129,3 @@ def draw_road_files(layout: bpy.types.UILayout) -> None:
     row.operator(SYNTHROADS_OT_load_road.bl_idname, text="Load Set", icon="IMPORT")
     row.operator(SYNTHROADS_OT_save_road.bl_idname, text="Save Set", icon="EXPORT")
     column.operator(SYNTHROADS_OT_load_axis.bl_idname, icon="CURVE_PATH")
-
-
-CLASSES = (SYNTHROADS_OT_load_road, SYNTHROADS_OT_load_axis, SYNTHROADS_OT_save_road)

@@ -16,7 +16,7 @@ from ...blender.things.model_builder import ROLE
 from ...checking.checker import RULES, Violation, check
 from ...road.geometry import RoadGeometry
 from ...road.parameters import Carriageway, LineMarking, RoadParameters
-from ..work.common import Sidebar, redraw_sidebars, refuse
+from ..work.common import Sidebar, has_road, redraw_sidebars, refusing, right_label
 from ..work.view import Marker, look_at_place, redraw_views, view_of
 
 _CHARACTER = 6.2
@@ -40,18 +40,16 @@ class Checked:
     """
 
     def __init__(self) -> None:
-        self.parameters: RoadParameters | None = None
         self.marker = Marker()
-        self.asked = False
-        self.stale = False
+        self.take(None)
 
-    def take(self, parameters: RoadParameters) -> None:
-        """Be about this road."""
+    def take(self, parameters: RoadParameters | None) -> None:
+        """Keep the road that was checked, which the scene's is compared with; None for no road."""
         self.parameters, self.asked, self.stale = parameters, False, False
 
     def forget(self) -> None:
-        """Be about no road."""
-        self.parameters, self.asked, self.stale = None, False, False
+        """Clear the findings."""
+        self.take(None)
         self.marker.hide()
 
     def outdated(self, scene: bpy.types.Scene) -> bool:
@@ -138,17 +136,12 @@ class SYNTHROADS_OT_check_rules(bpy.types.Operator):
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         """There must be a road."""
-        if find_road(context.scene) is None:
-            cls.poll_message_set("Build a road first")
-            return False
-        return True
+        return has_road(cls, context)
 
-    def execute(self, context: bpy.types.Context) -> set[str]:
+    @refusing
+    def execute(self, context: bpy.types.Context) -> None:
         """Check the road and fill the list."""
-        try:
-            parameters = road_now(context.scene)
-        except InputError as error:
-            return refuse(self, error)
+        parameters = road_now(context.scene)
         assert parameters  # poll() has seen the road
         violations = check(parameters)
         _clear(context.window_manager)
@@ -156,7 +149,6 @@ class SYNTHROADS_OT_check_rules(bpy.types.Operator):
         _fill(context.window_manager.synthroads_rules, parameters, violations)
         self.report({"INFO"}, _count(len(violations)))
         redraw_views(context)
-        return {"FINISHED"}
 
 
 class SYNTHROADS_OT_show_violation(bpy.types.Operator):
@@ -173,13 +165,13 @@ class SYNTHROADS_OT_show_violation(bpy.types.Operator):
         """Rules must have been checked, and some be broken."""
         return len(context.window_manager.synthroads_rules.violations) > 0
 
-    def execute(self, context: bpy.types.Context) -> set[str]:
+    @refusing
+    def execute(self, context: bpy.types.Context) -> None:
         """Choose the line, which jumps there."""
         rules = context.window_manager.synthroads_rules
         if self.index >= len(rules.violations):
-            return refuse(self, InputError("index", self.index, f"must be 0 to {len(rules.violations) - 1}"))
+            raise InputError("index", self.index, f"must be 0 to {len(rules.violations) - 1}")
         rules.index = self.index
-        return {"FINISHED"}
 
 
 class SYNTHROADS_OT_clear_rules(bpy.types.Operator):
@@ -258,9 +250,7 @@ def _columns(layout: bpy.types.UILayout, texts: tuple[str, str, str]) -> None:
     split.label(text=texts[0])
     rest = split.split(factor=0.62)
     rest.label(text=texts[1])
-    cell = rest.row()
-    cell.alignment = "RIGHT"
-    cell.label(text=texts[2])
+    right_label(rest, texts[2])
 
 
 def _details(layout: bpy.types.UILayout, context: bpy.types.Context, rules: SYNTHROADS_PG_rules) -> None:
@@ -301,9 +291,7 @@ def _fill(rules: SYNTHROADS_PG_rules, parameters: RoadParameters, violations: li
         row.name = RULES[violation.rule].title
         row.rule, row.object, row.text = violation.rule, violation.object, violation.text
         row.station, row.offset = violation.station, offset_of(geometry, violation)
-        row.value, row.limit = (
-            _write_number(number, violation.unit) for number in (violation.value, violation.limit)
-        )
+        row.value, row.limit = (_write_number(number, violation.unit) for number in (violation.value, violation.limit))
         row.found = f"{_brief(violation.value)} / {_brief(violation.limit)} {violation.unit}".removesuffix(" 1")
     rules["index"] = -1  # past its update: nothing was clicked yet
 
@@ -346,34 +334,9 @@ def _other_file(path: str) -> None:
     _clear(bpy.data.window_managers[0])
 
 
-_HANDLERS = {
-    "depsgraph_update_post": _look_for_changes,
-    "undo_post": _look_for_changes,
-    "redo_post": _look_for_changes,
-    "load_post": _other_file,
-}
+HANDLERS = dict.fromkeys(("depsgraph_update_post", "undo_post", "redo_post"), _look_for_changes)
+HANDLERS["load_post"] = _other_file
 
-CLASSES = (
-    SYNTHROADS_PG_violation,
-    SYNTHROADS_PG_rules,
-    SYNTHROADS_OT_check_rules,
-    SYNTHROADS_OT_show_violation,
-    SYNTHROADS_OT_clear_rules,
-    SYNTHROADS_UL_violations,
-    SYNTHROADS_PT_rules,
-)
-
-
-def register() -> None:
-    """Attach the list to the window manager, which is never undone, and look for changes."""
-    bpy.types.WindowManager.synthroads_rules = bpy.props.PointerProperty(type=SYNTHROADS_PG_rules)
-    for name, function in _HANDLERS.items():
-        getattr(bpy.app.handlers, name).append(function)
-
-
-def unregister() -> None:
-    """Take all that away."""
-    for name, function in _HANDLERS.items():
-        getattr(bpy.app.handlers, name).remove(function)
-    checked.forget()
-    del bpy.types.WindowManager.synthroads_rules
+ATTACHED = (bpy.types.WindowManager, "synthroads_rules", SYNTHROADS_PG_rules)
+"""The list is attached to the window manager, which is never undone."""
+unregister = checked.forget

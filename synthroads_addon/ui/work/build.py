@@ -9,7 +9,6 @@ from ...blender.model.store import find_road, recall, remember
 from ...road.parameters import RoadParameters
 from ...sampling.road import sample_road
 from ...scenario.scenario import Scenario
-from .common import is_free
 from .job import Aside, PanelJob, Step, Work
 from .long_operator import LongOperator
 from .view import look_along
@@ -23,11 +22,6 @@ class SYNTHROADS_OT_build(LongOperator, bpy.types.Operator):
     bl_options = {"UNDO"}  # noqa: RUF012 (Blender reads a plain set)
 
     _first = False
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        """Object mode, and nothing else at work."""
-        return is_free(cls, context)
 
     def job(self, context: bpy.types.Context) -> PanelJob[RoadModel]:
         """Return the building of the road that the panel asks for."""
@@ -66,6 +60,3 @@ def road_work(parameters: RoadParameters, scenario: Scenario, built_from: str) -
     model = yield from build_steps(parameters, fidelity.tolerance, fidelity.vegetation_detail)
     remember(model.collection, parameters, scenario, built_from)
     return model
-
-
-CLASSES = (SYNTHROADS_OT_build,)

@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import wraps
+from typing import Any
+
 import bpy
 
 from ...base.errors import InputError
+from ...blender.model.store import find_road
 from .job import running_job
 
 
@@ -31,6 +36,13 @@ def large_button(layout: bpy.types.UILayout) -> bpy.types.UILayout:
     return row
 
 
+def right_label(layout: bpy.types.UILayout, text: str) -> None:
+    """Draw a text at the right end of what is left of a row."""
+    row = layout.row()
+    row.alignment = "RIGHT"
+    row.label(text=text)
+
+
 def is_free(operator: type[bpy.types.Operator], context: bpy.types.Context) -> bool:
     """Return whether long work may begin, for an operator's `poll`; else say why not."""
     job = running_job()
@@ -41,6 +53,31 @@ def is_free(operator: type[bpy.types.Operator], context: bpy.types.Context) -> b
         operator.poll_message_set("Go back to object mode first")
         return False
     return True
+
+
+def has_road(operator: type[bpy.types.Operator], context: bpy.types.Context) -> bool:
+    """Return whether the scene has a road, for an operator's `poll`; else say that it needs one."""
+    if find_road(context.scene) is None:
+        operator.poll_message_set("Build a road first")
+    return find_road(context.scene) is not None
+
+
+Execute = Callable[[Any, bpy.types.Context], set[str]]
+"""An operator's `execute`."""
+
+
+def refusing(execute: Callable[[Any, bpy.types.Context], None]) -> Execute:
+    """Return an operator's `execute` that ends well, or shows the `InputError` that the function raises."""
+
+    @wraps(execute)
+    def execute_or_refuse(self: bpy.types.Operator, context: bpy.types.Context) -> set[str]:
+        try:
+            execute(self, context)
+        except InputError as error:
+            return refuse(self, error)
+        return {"FINISHED"}
+
+    return execute_or_refuse
 
 
 def refuse(operator: bpy.types.Operator, error: InputError) -> set[str]:

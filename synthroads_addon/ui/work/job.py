@@ -87,6 +87,15 @@ class PanelJob(Generic[T]):
         self._failure: BaseException | None = None
         self._aside: Aside | None = None
 
+    @classmethod
+    def aside(cls, title: str, work: Callable[[Report], T], state: str = "") -> PanelJob[T]:
+        """Return a job that is done in a thread as a whole; `state` is what it does, in words for the window."""
+
+        def steps() -> Work[T]:
+            return (yield Aside(work, state or title))
+
+        return cls(title, steps())
+
     @property
     def running(self) -> bool:
         """Return whether it has begun in the window and not ended yet."""

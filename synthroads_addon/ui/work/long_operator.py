@@ -7,13 +7,13 @@ own. Called from Python (``bpy.ops.synthroads.scan()``) it does the same at once
 from __future__ import annotations
 
 import traceback
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import bpy
 
 from ...base.errors import Cancelled, InputError
 from ...blender.model.stage import remove_staged
-from .common import redraw_sidebars, refuse
+from .common import is_free, redraw_sidebars, refuse
 from .job import TICK, PanelJob, running_job, stop_job
 
 
@@ -30,6 +30,11 @@ class LongOperator:
 
     _job: PanelJob[Any] | None = None
     _timer: bpy.types.Timer | None = None
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """Object mode, and nothing else at work."""
+        return is_free(cast("type[bpy.types.Operator]", cls), context)
 
     def job(self, context: bpy.types.Context) -> PanelJob[Any]:
         """Return the work; raise `InputError` if it can't be done."""
@@ -110,6 +115,34 @@ class LongOperator:
         redraw_sidebars(context)
 
 
+class FileChooser:
+    """Base of operators that ask for a file, or for a folder, before they work on it."""
+
+    def suggest(self, context: bpy.types.Context) -> None:
+        """Set what the file browser shows at first, if there is something."""
+
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        """Open the file browser, which calls `execute`."""
+        self.suggest(context)
+        context.window_manager.fileselect_add(self)
+        return {"RUNNING_MODAL"}
+
+
+class FileOperator(FileChooser, LongOperator):
+    """Base of operators that take long with a file which the user chooses. Called from Python they do it at once."""
+
+    _asked = False
+
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        """Open the file browser; the `execute` that it calls mustn't hold up the window."""
+        self._asked = True
+        return super().invoke(context, event)
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        """Work beside the window after the file browser, else at once."""
+        return self.begin(context) if self._asked else super().execute(context)
+
+
 class SYNTHROADS_OT_cancel(bpy.types.Operator):
     """Stop what is at work; everything is left as it was before"""
 
@@ -170,23 +203,11 @@ def _after_history(*_: object) -> None:
         remove_staged()
 
 
-_BEFORE = ("undo_pre", "redo_pre", "load_pre")
-_AFTER = ("undo_post", "redo_post", "load_post")
-
-CLASSES = (SYNTHROADS_OT_cancel,)
-
-
-def register() -> None:
-    """Listen to undo, redo and other files."""
-    for names, function in ((_BEFORE, _before_history), (_AFTER, _after_history)):
-        for name in names:
-            getattr(bpy.app.handlers, name).append(function)
+HANDLERS = {f"{change}_pre": _before_history for change in ("undo", "redo", "load")}
+HANDLERS |= {f"{change}_post": _after_history for change in ("undo", "redo", "load")}
 
 
 def unregister() -> None:
-    """Stop what is at work, and listen no more."""
+    """Stop what is at work."""
     stop_job()
     _reset_status()
-    for names, function in ((_BEFORE, _before_history), (_AFTER, _after_history)):
-        for name in names:
-            getattr(bpy.app.handlers, name).remove(function)

@@ -210,7 +210,7 @@ def test_barriers_leave_the_ramp_for_the_island() -> None:
     assert (lane.start_station, lane.end_station) == (400.0, 690.0)
     assert lane.offset == pytest.approx(-(EDGE + 2.75 + 0.7))
     # On the island behind the exit board, all of it beside the main road.
-    assert site.nose(site.turnouts["turnout-1"]) + 1.0 < behind.start_station < 800.0
+    assert site.shape(site.turnouts["turnout-1"]).nose_station() + 1.0 < behind.start_station < 800.0
     assert behind.offset == pytest.approx(-(EDGE + 0.7))
     assert ramp.end_station == pytest.approx(behind.start_station, abs=0.02)
     assert ramp.offset < -(EDGE + 6.0)

@@ -133,7 +133,7 @@ def test_traffic_lights_beside_entry_ramps(side: str) -> None:
     (light,) = of(place(site), TrafficLight).values()
     turnout = site.turnouts["turnout-1"]
     ahead = 1.0 if side == "right" else -1.0
-    assert 0.0 <= ahead * (site.nose(turnout) - light.station) <= 20.0
+    assert 0.0 <= ahead * (site.shape(turnout).nose_station() - light.station) <= 20.0
     edge = float(site.sections[side].paved_edge(light.station)[0])
     assert edge + 1.0 < abs(light.offset) < edge + 3.0
     assert light.rotation_deg == (0.0 if side == "right" else 180.0)

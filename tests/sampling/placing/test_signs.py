@@ -112,7 +112,8 @@ def test_the_exit_board_stands_in_the_middle_of_the_island(side: str) -> None:
     assert float(outer[0] - inner[0]) - board.width >= 1.0
     assert board.post_diameter <= 0.1
     assert board.rotation_deg == (0.0 if side == "right" else 180.0)
-    assert 0.0 < (board.station - site.nose(site.turnouts["turnout-1"])) * (1 if side == "right" else -1) < 40.0
+    nose = site.shape(site.turnouts["turnout-1"]).nose_station()
+    assert 0.0 < (board.station - nose) * (1 if side == "right" else -1) < 40.0
 
 
 def test_a_narrow_island_has_a_smaller_exit_board() -> None:

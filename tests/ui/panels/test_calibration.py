@@ -15,8 +15,6 @@ from synthroads_addon.blender.materials.image import base_color_image
 from synthroads_addon.calibration.job import CalibrationJob, MaterialTarget, calibrate, save_fitted
 from synthroads_addon.materials.table import materials
 from synthroads_addon.ui.panels import calibration
-from synthroads_addon.ui.work import calibration_run
-from synthroads_addon.ui.work.job import PanelJob
 from tests.helpers.clouds.calibration_cloud import labelled, striped
 
 
@@ -53,12 +51,12 @@ def test_buttons_fit_and_save_what_the_library_does(settings: Any, tmp_path: Pat
     wanted = calibrate(job)
     save_fitted(wanted, tmp_path / "library.json")
     assert (tmp_path / "panel.json").read_bytes() == (tmp_path / "library.json").read_bytes()
-    result = calibration_run.latest
+    result = calibration.latest
     assert result.to_dict() == wanted.to_dict()
     lines = calibration.lines_of(result.compared[0])
     assert "50 zeros left out" in lines[1]
     assert lines[-1].startswith("Error / IQR: ")
-    image = bpy.data.images[calibration_run.PICTURE]
+    image = bpy.data.images[calibration.PICTURE]
     pixels = np.empty(len(image.pixels), dtype=np.float32)
     image.pixels.foreach_get(pixels)
     assert len(np.unique(pixels)) > 20
@@ -67,13 +65,13 @@ def test_buttons_fit_and_save_what_the_library_does(settings: Any, tmp_path: Pat
 def test_comparing_again_draws_anew_and_saves_nothing(settings: Any, tmp_path: Path) -> None:
     labels(settings, labelled(tmp_path / "real.laz", 30.0, 40.0))
     assert bpy.ops.synthroads.compare_intensities() == {"FINISHED"}
-    before = {entry.target.material: entry.after for entry in calibration_run.latest.compared}
+    before = {entry.target.material: entry.after for entry in calibration.latest.compared}
     assert before == {name: materials()[name] for name in ("asphalt", "paint_white")}
     assert not bpy.ops.synthroads.save_materials.poll()
     settings.real = ""
     assert bpy.ops.synthroads.compare_intensities() == {"FINISHED"}
-    assert len([image for image in bpy.data.images if image.name.startswith(calibration_run.PICTURE)]) == 1
-    assert calibration_run.latest.compared[0].real is None
+    assert len([image for image in bpy.data.images if image.name.startswith(calibration.PICTURE)]) == 1
+    assert calibration.latest.compared[0].real is None
 
 
 def test_classes_beside_an_axis(settings: Any, tmp_path: Path) -> None:
@@ -83,7 +81,7 @@ def test_classes_beside_an_axis(settings: Any, tmp_path: Path) -> None:
     settings.range_corrected, settings.decibels, settings.angles = True, 30.0, "0"
     settings.classes[0].told, settings.classes[1].told = "paved", "line"
     assert bpy.ops.synthroads.fit_materials() == {"FINISHED"}
-    result = calibration_run.latest
+    result = calibration.latest
     assert result.job.road.paved == ((-6.0, 0.0), (0.5, 6.0))
     assert all(np.abs(entry.errors()).max() < 0.05 for entry in result.compared)
     ratio = result.compared[1].after.reflectivity / result.compared[0].after.reflectivity
@@ -98,7 +96,7 @@ def test_materials_of_the_scene_are_this_roads(settings: Any) -> None:
     own = materials()["asphalt"].model_copy(update={"specular": 0.4})
     item["synthroads_mean"] = own.to_json()
     assert bpy.ops.synthroads.compare_intensities() == {"FINISHED"}
-    assert calibration_run.latest.compared[0].before == own
+    assert calibration.latest.compared[0].before == own
 
 
 def test_a_materials_image_is_its_texture(settings: Any) -> None:
@@ -118,7 +116,7 @@ def test_a_materials_image_is_its_texture(settings: Any) -> None:
     settings.classes.remove(1)
     settings.angles = "0"
     assert bpy.ops.synthroads.compare_intensities() == {"FINISHED"}
-    entry = calibration_run.latest.compared[0]
+    entry = calibration.latest.compared[0]
     assert entry.after.base_color[0] == pytest.approx(pixels.mean(), abs=1e-4)
     assert len(np.unique(entry.expected.round(9))) == 2
 
@@ -148,7 +146,7 @@ def test_a_texture_needs_an_image(settings: Any) -> None:
 
 def test_it_can_be_stopped(settings: Any, tmp_path: Path) -> None:
     labels(settings, labelled(tmp_path / "real.laz", 30.0, 40.0))
-    job = PanelJob("Calibration", calibration_run.calibration_work(settings.job(True)))
+    job = calibration.panel_job(settings.job(True))
     job.start()
     job.stop(wait=True)
     assert not job.running

@@ -21,7 +21,7 @@ from synthroads_addon.ui.fields.fields import own
 from synthroads_addon.ui.work import rendered_scan, scan
 from synthroads_addon.ui.work.job import PanelJob
 from synthroads_addon.ui.work.rendered_scan import MARK, SavedScene, _Told
-from synthroads_addon.ui.work.scan_job import Written, scan_work
+from synthroads_addon.ui.work.scan import Written, scan_work
 from tests.helpers.scenes.panel_road import SAME, block_counts, cheap, choose, road, road_file, settings  # noqa: F401
 from tests.helpers.scenes.scene_hash import lines
 
@@ -52,7 +52,7 @@ def content() -> list[str]:
 
 
 def job_of_the_panel() -> PanelJob[Written]:
-    return PanelJob("Scan", scan_work(scan.asked_for(bpy.context)))
+    return PanelJob("Scan", scan_work(scan.requested_scan(bpy.context)))
 
 
 @pytest.mark.slow
@@ -155,7 +155,7 @@ def test_a_blender_that_is_missing_dies_or_fails_is_reported(tmp_path: Path) -> 
 @pytest.mark.any_blender
 def test_the_other_blender_ends_with_this_one(road: Any, tmp_path: Path) -> None:  # noqa: F811
     choose(road, **NO_PICTURES)
-    asked = scan.asked_for(bpy.context)
+    asked = scan.requested_scan(bpy.context)
     (tmp_path / "files").mkdir()
     saved = rendered_scan.save_open_scene(asked.scenario, asked.parameters, tmp_path / "files")
     process = subprocess.Popen(saved.command, stdin=subprocess.PIPE, stdout=subprocess.DEVNULL)

@@ -17,9 +17,9 @@ from synthroads_addon.jobs.generate import FILES, generate
 from synthroads_addon.jobs.generate import Job as PipelineJob
 from synthroads_addon.road.parameters import read_parameters
 from synthroads_addon.scenario.scenario import load_scenario
-from synthroads_addon.ui.work import scan, scan_job
+from synthroads_addon.ui.work import scan
 from synthroads_addon.ui.work.job import PanelJob, running_job
-from synthroads_addon.ui.work.scan_job import Written, scan_work
+from synthroads_addon.ui.work.scan import Written, scan_work
 from tests.helpers.scenes.panel_road import (  # noqa: F401
     SAME,
     block_counts,
@@ -149,7 +149,7 @@ def test_output_beside_a_saved_file(road: Any, road_file: Path) -> None:  # noqa
 
 
 def job_of_the_panel() -> PanelJob[Written]:
-    return PanelJob("Scan", scan_work(scan.asked_for(bpy.context)))
+    return PanelJob("Scan", scan_work(scan.requested_scan(bpy.context)))
 
 
 def tick_to_the_end(job: PanelJob[Any]) -> None:
@@ -257,7 +257,7 @@ def test_a_defect_in_the_thread_is_kept_and_leaves_nothing(
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(scan_job, "plan_scan", lambda *arguments: 1 / 0)
+    monkeypatch.setattr(scan, "plan_scan", lambda *arguments: 1 / 0)
     job = job_of_the_panel()
     tick_to_the_end(job)
     assert isinstance(job.error, ZeroDivisionError)
