@@ -1,4 +1,4 @@
-"""Every format of the geometric-semantic model, whatever the table of formats holds, and the one of the documentation."""
+"""Every format of the geometric-semantic model that the table of formats has, and the one of the documentation."""
 
 from __future__ import annotations
 
