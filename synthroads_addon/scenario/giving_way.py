@@ -29,13 +29,14 @@ def without_what_gives_way(data: dict[str, Any], before: Mapping[str, Any], name
         before: without them.
         named: paths of the changed fields, e.g. ``road.design_class``.
     """
-    road, scan = data.get("road"), data.get("scan")
+    road = data.get("road")
     if isinstance(road, dict):
         data = data | {"road": _without(road, _misfit_of_road(road, named))}
+    for part, tag, kept in _KINDS:  # first: a scan with fields of another platform can't tell what its device can't do
+        data = _begin_anew(data, before, named, part, tag, kept)
+    scan = data.get("scan")
     if isinstance(scan, dict) and "scan.device" in named:
         data = data | {"scan": _without(scan, *_misfits_of_device(scan, named))}
-    for part, tag, kept in _KINDS:
-        data = _begin_anew(data, before, named, part, tag, kept)
     return data
 
 

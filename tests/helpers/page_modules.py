@@ -1,4 +1,4 @@
-"""Modules that a page of the documentation tells its readers to write."""
+"""Modules and other code that a page of the documentation tells its readers to write."""
 
 from __future__ import annotations
 
@@ -27,3 +27,9 @@ def module_of_page(page: str, file: str, monkeypatch: pytest.MonkeyPatch) -> Mod
     monkeypatch.setitem(sys.modules, module.__name__, module)
     exec(compile(code, file, "exec"), vars(module))
     return module
+
+
+def block_of_page(page: str, language: str, number: int = 0) -> str:
+    """Return a page's fenced block in a language, the first if no number says otherwise."""
+    text = (ROOT / "docs" / page).read_text(encoding="utf-8")
+    return re.findall(rf"(?ms)^```{language}\n(.*?)^```$", text)[number]

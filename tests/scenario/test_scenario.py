@@ -143,3 +143,10 @@ def test_settings_that_a_device_can_do_and_those_named_with_it_stay() -> None:
     own = Scenario.from_dict({"scan": {"device": "velodyne-vlp-16", "pulse_rate_khz": 200.0}}).scan
     with pytest.raises(InputError, match=r"pulse_rate_khz is 200\.0"):
         scanner_setting(own)
+
+
+def test_settings_give_way_to_a_device_on_another_platform() -> None:
+    """The fields of the platform before, which the new one hasn't, don't keep them."""
+    scan = load_scenario("rq31-600m", ["scan.device=velodyne-vlp-16", "scan.platform.kind=vehicle"]).scan
+    assert scan.pulse_rate_khz is None
+    scanner_setting(scan)

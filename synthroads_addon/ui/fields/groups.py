@@ -27,7 +27,7 @@ class GroupField(Field):
 
     def __init__(self, path: str, info: FieldInfo, kind: Any, optional: bool, default: Any, hooks: Hooks) -> None:
         super().__init__(path, info, kind, optional, default)
-        self.fields = make_fields(kind, default or _defaults(kind), path, hooks)
+        self.fields = make_fields(kind, _defaults(kind) | (default or {}), path, hooks)
         annotations = {name: p for field in self.fields.values() for name, p in field.properties(hooks).items()}
         self.group = type(
             f"SYNTHROADS_PG_{path.replace('.', '_')}", (bpy.types.PropertyGroup,), {"__annotations__": annotations}

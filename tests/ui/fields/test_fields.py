@@ -378,6 +378,16 @@ def test_another_platform_takes_its_usual_path(panel: Any) -> None:
     assert inherited_value(panel, "scan.platform.height") == PLATFORMS["vehicle"].usual["height"]
 
 
+@pytest.mark.parametrize("kind", PLATFORMS)
+def test_another_platform_begins_with_the_values_of_its_fields(panel: Any, kind: str) -> None:
+    panel.scan.platform.kind = kind
+    if kind == "trajectory":
+        panel.scan.platform.file = "flight.csv"
+    got, first = panel.scenario().scan.platform.to_dict(), PLATFORMS[kind].model_fields
+    wanted = {name: first[name].default for name in got if name != "file"}
+    assert {name: got[name] for name in wanted} == pytest.approx(wanted)
+
+
 def test_section_and_class_go_together(panel: Any) -> None:
     for name in STANDARD_CROSS_SECTIONS:
         panel.road.cross_section = name

@@ -17,6 +17,8 @@ from synthroads_addon.blender.model.build import build_road
 from synthroads_addon.blender.model.store import remember
 from synthroads_addon.sampling.road import sample_road
 from synthroads_addon.scanning.devices.device import DEVICES, device_names
+from synthroads_addon.scanning.platforms.registry import PLATFORMS
+from synthroads_addon.scanning.weather.registry import WEATHERS
 from synthroads_addon.scenario.road import Interval
 from synthroads_addon.scenario.scenario import Scenario, load_scenario, scenario_names
 from synthroads_addon.ui.fields import preferences
@@ -116,9 +118,8 @@ def schema_paths(model: type[BaseModel], prefix: str = "") -> Iterator[str]:
     def walk(node: dict[str, Any], path: str) -> Iterator[str]:
         if "$ref" in node:
             node = schema["$defs"][node["$ref"].rpartition("/")[2]]
-        inner = [
-            part for part in node.get("anyOf", node.get("oneOf", [node])) if "$ref" in part or "properties" in part
-        ]
+        choices = [kind for part in node.get("anyOf", [node]) for kind in part.get("oneOf", [part])]
+        inner = [part for part in choices if "$ref" in part or "properties" in part]
         if node.get("title") == Interval.__name__ or not inner:
             yield path
             return
@@ -135,7 +136,10 @@ def schema_paths(model: type[BaseModel], prefix: str = "") -> Iterator[str]:
 
 def states(settings: Any) -> Iterator[None]:
     """Set the panel to one state after the other that together give every field a meaning."""
-    for kind, path in (("uav", "smoothed"), ("uav", "zigzag"), ("tripod", "direct"), ("trajectory", "direct")):
+    chosen = [("uav", "smoothed", "snow"), ("uav", "zigzag", "snow")]
+    chosen += [(kind, "direct", "snow") for kind in PLATFORMS]
+    chosen += [("uav", "direct", condition) for condition in WEATHERS]
+    for kind, path, condition in chosen:
         settings.take(Scenario())
         settings.scan.platform.kind, settings.scan.platform.path = kind, path
         settings.road.cross_section = BY_HAND
@@ -146,7 +150,7 @@ def states(settings: Any) -> Iterator[None]:
                     owner = getattr(owner, part)
                 if hasattr(owner, field.own):
                     setattr(owner, field.own, True)
-        settings.scan.weather.condition = "snow"
+        settings.scan.weather.condition = condition
         settings.colour.source, settings.colour.lighting = "images", "path"
         yield
 
