@@ -50,9 +50,9 @@ LINES, PULSES = 64, 1024
 """Stretches that errors are taken of, and the pulses of each."""
 _TIMED_PULSES = 1 << 15
 """Pulses of each stretch that is timed: as many as blocks are worth."""
-_TIMED = 8
+_TIMED = 4
 _TIMED_SHARE = 0.1
-"""Stretches that are timed, and the largest share of the path that they may be."""
+"""Stretches that are timed at least, and the largest share of the path that twice as many may be."""
 _COLOURED = 8
 """Scan lines that errors of colours are taken of."""
 _NEAREST = 3
@@ -163,12 +163,22 @@ class Trial:
     def time_scan(self, rings: tuple[int, ...]) -> tuple[float, int]:
         """Return the seconds of the whole scan into files with a beam, projected from stretches, and its points.
 
-        Colours are the materials' means and the relief is the coarsest: what more than that costs is known apart.
+        Few stretches and twice as many tell what every scan takes from what each pulse takes; before these, the few
+        are scanned once, as the first scan waits for much that later ones find done. Colours are the materials' means
+        and the relief is the coarsest: what more than that costs is known apart.
         """
-        count = max(_TIMED, 2 * available_cores())
-        path = scatter_stretches(self.plan.path, count, _TIMED_PULSES / self.plan.setting.shot_rate, 0.5, _TIMED_SHARE)
-        # Pulses come in whole lines, so that stretches hold fewer of them than their duration says.
-        share = sum(map(self.plan.pulses, path.strips)) / self.pulses
+        workers = self.plan.threads or available_cores()
+        few = workers * -(-_TIMED // workers)  # no worker waits for another at the end
+        turns = ((few, _TIMED_SHARE / 2.0), (few, _TIMED_SHARE / 2.0), (2 * few, _TIMED_SHARE))
+        _, (less, soon, _), (more, late, points) = [self._time_stretches(rings, *turn) for turn in turns]
+        rate = late / more
+        if more > less and late > soon:  # else the clock shows no difference, or other work on the machine
+            rate = min(rate, (late - soon) / (more - less))
+        return late + rate * (self.pulses - more), round(points * self.pulses / more)
+
+    def _time_stretches(self, rings: tuple[int, ...], count: int, share: float) -> tuple[int, float, int]:
+        """Scan so many stretches, at most a share of the path, into files; return pulses, seconds and points."""
+        path = scatter_stretches(self.plan.path, count, _TIMED_PULSES / self.plan.setting.shot_rate, 0.5, share)
         request = self.layer_request({"colour.source": "material"})
         plan = replace(self.plan, path=path, rings=rings, relief_octaves=2, request=request)
         with tempfile.TemporaryDirectory(prefix="synthroads-") as folder:
@@ -176,7 +186,8 @@ class Trial:
             begin = self.clock()
             record_to_files([plan], files, StageTimer())
             seconds = self.clock() - begin
-        return seconds / share, round(files.counts.points / share)
+        # Pulses come in whole lines, so that stretches hold fewer of them than their duration says.
+        return sum(map(self.plan.pulses, path.strips)), seconds, files.counts.points
 
 
 def views_near_lines(views: Sequence[View], lines: Sequence[SeenPoints]) -> list[View]:
