@@ -19,9 +19,9 @@ from synthroads_addon.jobs.road_scene import plan_road_scan
 from synthroads_addon.road.geometry import RoadGeometry
 from synthroads_addon.road.tessellation import MAXIMUM_SPACING
 from synthroads_addon.sampling.road import sample_road
-from synthroads_addon.scanning.scan import scan_block
 from synthroads_addon.scenario.road import RoadScenario
 from synthroads_addon.scenario.scenario import Scenario
+from tests.helpers.scenes.scan_scenes import scan_block
 from tools.benchmark_casters import bare_mesh
 
 ROUNDING = 2e-4  # m, of float32 coordinates a few hundred metres from the origin

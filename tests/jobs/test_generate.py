@@ -19,10 +19,9 @@ from synthroads_addon.jobs.generate import FILES, Job, generate
 from synthroads_addon.jobs.scan.plan import plan_scan, road_path
 from synthroads_addon.road.geometry import RoadGeometry
 from synthroads_addon.road.parameters import read_parameters
-from synthroads_addon.scanning.pulses import Poses, make_pulses
-from synthroads_addon.scanning.scan import scan_block
 from synthroads_addon.scenario.scenario import load_scenario
 from tests.helpers.label_truth import misplaced_points
+from tests.helpers.scenes.scan_scenes import emit_pulses, scan_block
 
 ROOT = Path(__file__).parents[2]
 REAL_AXIS = ROOT.parent / "shared" / "real" / "als_rural2lane_t211-278_axis.csv"
@@ -155,9 +154,9 @@ def test_casters_agree(demo) -> None:
     rays = []
     per_second = scan.setting.pulses_per_line * scan.setting.lines_per_second
     for strip in scan.path.strips:
-        poses = Poses.between(scan, strip, strip.start_time, strip.start_time + strip.duration)
+        begin, end = strip.start_time, strip.start_time + strip.duration
         firsts = rng.integers(0, int(strip.duration * per_second) - 1000, 20)
-        rays += [make_pulses(scan, strip, poses, None, int(first), 1000) for first in firsts]
+        rays += [emit_pulses(scan, strip, begin, end, int(first), 1000) for first in firsts]
     origins = np.concatenate([p.origin.T for p in rays])
     directions = np.concatenate([p.direction.T for p in rays])
     hits = {}

@@ -25,7 +25,7 @@ from ...sampling.road import sample_road
 from ...scanning.beam import RINGS
 from ...scanning.plan import ScanPlan
 from ...scanning.record import CollectedBlocks, record, scan_blocks
-from ...scanning.scan import scan_block
+from ...scanning.scan import BlockScan
 from ...scanning.scene.caster import Caster
 from ...scenario.scenario import Scenario
 from ..road_files import write_road_files
@@ -128,7 +128,7 @@ def _cast_beside(plan: ScanPlan) -> Rate:
     object.__setattr__(part, "caster", kept)
     try:
         for block in blocks:
-            scan_block(plan, *block)
+            BlockScan(plan).block(*block)
     finally:
         object.__setattr__(part, "caster", caster)
     origins, directions = np.concatenate(kept.origins), np.concatenate(kept.directions)

@@ -23,9 +23,8 @@ from synthroads_addon.road.geometry import RoadGeometry
 from synthroads_addon.road.parameters import read_parameters
 from synthroads_addon.road.tessellation import sample_stations
 from synthroads_addon.scanning.plan import ScanPlan
-from synthroads_addon.scanning.pulses import Poses, make_pulses
-from synthroads_addon.scanning.scan import scan_pulses
 from synthroads_addon.scenario.scenario import Scenario
+from tests.helpers.scenes.scan_scenes import emit_pulses, scan_pulses
 from tests.helpers.scenes.sparse_scanner import sparse_scanner
 
 pytestmark = pytest.mark.any_blender  # it takes ten minutes
@@ -132,8 +131,8 @@ def errors_of_a_section(work: SectionScan, section: Any, monkeypatch: pytest.Mon
         strip, block = section.blocks[len(section.blocks) // 2]
         first, _ = work.cut.pulses_of(strip, block)
         result = scan_pulses(scan, strip, first, PULSES, block).points
-        poses = Poses.between(scan, strip, work.cut.time(strip, first), work.cut.time(strip, first + PULSES - 1))
-        pulses = make_pulses(scan, strip, poses, None, first, PULSES)
+        times = (work.cut.time(strip, number) for number in (first, first + PULSES - 1))
+        pulses = emit_pulses(scan, strip, *times, first, PULSES)
     monkeypatch.undo()
     road = result.select(np.flatnonzero(result.class_id == class_id("road")))
     rows = np.searchsorted(pulses.time, road.gps_time)
