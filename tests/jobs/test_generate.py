@@ -15,8 +15,9 @@ from headless import commands
 from synthroads_addon.base.errors import InputError
 from synthroads_addon.blender.services import BlenderServices
 from synthroads_addon.cloud.points import concatenate
-from synthroads_addon.jobs.generate import FILES, Job, generate
-from synthroads_addon.jobs.scan.plan import plan_scan, road_path
+from synthroads_addon.jobs.generate import Job, generate
+from synthroads_addon.jobs.job_files import FILES
+from synthroads_addon.jobs.scan.site import Site
 from synthroads_addon.road.geometry import RoadGeometry
 from synthroads_addon.road.parameters import read_parameters
 from synthroads_addon.scenario.scenario import load_scenario
@@ -101,7 +102,7 @@ def demo():
 
 
 def scan_of(scenario, geometry, scene):
-    return plan_scan(scenario, scene, road_path(scenario, geometry), BlenderServices())
+    return Site.of_road(scenario, geometry).plan(scene, BlenderServices())
 
 
 @pytest.mark.keep_scene

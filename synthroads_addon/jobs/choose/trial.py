@@ -20,31 +20,20 @@ from ...base.progress import StageTimer
 from ...blender.cameras import image_views, layer_source
 from ...blender.services import BlenderServices
 from ...cloud.points import PointBlock
-from ...scanning.beam import RINGS, beam_pattern
-from ...scanning.blocks import Blocks
+from ...scanning.beam import RINGS
 from ...scanning.colour.colour import LayerValues, SeenPoints, sample_points
 from ...scanning.colour.request import LayerRequest
 from ...scanning.colour.settings import ColourSettings
 from ...scanning.colour.views import View
 from ...scanning.noise import Noise
-from ...scanning.plan import ScanConditions, ScanPlan
-from ...scanning.platforms.path import Path as ScanPath
+from ...scanning.plan import ScanPlan
 from ...scanning.platforms.stretches import scatter_stretches
 from ...scanning.record import record_as_measured
 from ...scanning.scan import BlockResult, joined_results
 from ...scanning.scene.motion import ScannedScene
-from ...scenario.scenario import Scenario
-from ..measure.errors import (
-    CONVERGED,
-    FINEST,
-    Errors,
-    colour_errors,
-    relief_errors,
-    shift_points,
-    truest_settings,
-)
-from ..scan.files import CloudFiles, record_to_files
-from ..scan.plan import plan_scan
+from ..measure.errors import CONVERGED, FINEST, Errors, colour_errors, relief_errors, shift_points, truest_settings
+from ..scan.files import record_to_files
+from ..scan.site import Site
 
 LINES, PULSES = 64, 1024
 """Stretches that errors are taken of, and the pulses of each."""
@@ -66,28 +55,27 @@ class Trial:
     """A scene that is tried out.
 
     Attributes:
-        scenario: the job, without noise.
-        scene: what is scanned.
+        site: of the scan; its scenario is without noise.
         plan: of the whole path.
         phase: see `scanning.platforms.stretches.scatter_stretches`: other phases are other stretches.
         lines: of these is the error taken.
         clock: measures seconds.
     """
 
-    scenario: Scenario
-    scene: ScannedScene
+    site: Site
     plan: ScanPlan
     phase: float = 0.5
     lines: int = field(default_factory=lambda: LINES)
     clock: Callable[[], float] = time.perf_counter
 
     @classmethod
-    def of(cls, scenario: Scenario, scene: ScannedScene, path: ScanPath, conditions: ScanConditions) -> Trial:
+    def of(cls, site: Site, scene: ScannedScene) -> Trial:
         """Prepare to scan a scene; builds the casters."""
-        quiet = scenario.scan.model_copy(update={"noise": Noise(range_sigma=0.0)})
-        colour = scenario.colour.model_copy(update={"intensity_from_layers": False})
-        scenario = scenario.model_copy(update={"scan": quiet, "colour": colour})
-        return cls(scenario, scene, plan_scan(scenario, scene, path, BlenderServices(), conditions))
+        quiet = site.scenario.scan.model_copy(update={"noise": Noise(range_sigma=0.0)})
+        colour = site.scenario.colour.model_copy(update={"intensity_from_layers": False})
+        scenario = site.scenario.model_copy(update={"scan": quiet, "colour": colour})
+        site = replace(site, scenario=scenario, view=None)
+        return cls(site, site.plan(scene, BlenderServices()))
 
     @property
     def pulses(self) -> int:
@@ -97,9 +85,9 @@ class Trial:
     def scan_lines(self, rings: tuple[int, ...], lines: int = 0) -> list[BlockResult]:
         """Scan the stretches that errors are taken of with a beam; return the points of each, and where they are."""
         path = scatter_stretches(self.plan.path, lines or self.lines, PULSES / self.plan.setting.shot_rate, self.phase)
-        results = iter(record_as_measured(replace(self.plan, path=path, rings=rings)))
-        blocks = Blocks(self.plan.setting, path, len(beam_pattern(rings).weights))
-        return [joined_results([next(results) for _ in blocks.block_numbers(strip)]) for strip in path.strips]
+        plan = replace(self.plan, path=path, rings=rings)
+        results = iter(record_as_measured(plan))
+        return [joined_results([next(results) for _ in plan.cut.block_numbers(strip)]) for strip in path.strips]
 
     def points(self, rings: tuple[int, ...] = RINGS[CONVERGED]) -> list[PointBlock]:
         """Return the points of the stretches with a beam: the converged one, which is the truth, if none is given."""
@@ -138,9 +126,10 @@ class Trial:
     def layer_request(self, changes: Mapping[str, Any]) -> LayerRequest:
         """Return the request for colours with changes of the scenario."""
         given = {path.removeprefix("colour."): value for path, value in changes.items()}
-        colour = type(self.scenario.colour).from_dict(self.scenario.colour.to_dict() | given)
+        scenario = self.site.scenario
+        colour = type(scenario.colour).from_dict(scenario.colour.to_dict() | given)
         assert self.plan.request is not None
-        settings = colour.settings(self.scenario.fidelity, self.plan.path.typical_range)
+        settings = colour.settings(scenario.fidelity, self.plan.path.typical_range)
         return replace(self.plan.request, settings=settings)
 
     def _layers(
@@ -182,7 +171,7 @@ class Trial:
         request = self.layer_request({"colour.source": "material"})
         plan = replace(self.plan, path=path, rings=rings, relief_octaves=2, request=request)
         with tempfile.TemporaryDirectory(prefix="synthroads-") as folder:
-            files = CloudFiles(self.scenario, Path(folder), plan.target.origin, path.typical_range)
+            files = self.site.files(Path(folder), plan.target.origin)
             begin = self.clock()
             record_to_files([plan], files, StageTimer())
             seconds = self.clock() - begin

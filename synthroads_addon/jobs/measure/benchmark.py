@@ -20,6 +20,7 @@ from ...base.progress import StageTimer, peak_memory_mb
 from ...blender.cameras.benchmark import panel_edit, rendering, seconds_of
 from ...blender.casters.measure import bare_rate
 from ...blender.files import empty_file
+from ...blender.services import BlenderServices
 from ...road.geometry import RoadGeometry
 from ...sampling.road import sample_road
 from ...scanning.beam import RINGS
@@ -28,8 +29,8 @@ from ...scanning.record import CollectedBlocks, record, scan_blocks
 from ...scanning.scan import BlockScan
 from ...scanning.scene.caster import Caster
 from ...scenario.scenario import Scenario
-from ..road_files import write_road_files
-from ..road_scene import build_model, plan_road_scan, read_scene, road_cloud_files
+from ..job_files import JobFiles
+from ..road_scene import RoadScene
 from ..scan.files import CloudFiles, record_to_files
 
 _CAST_BLOCKS, _WRITTEN_BLOCKS = 48, 96
@@ -58,14 +59,15 @@ def measure_demo(scenario: Scenario) -> dict[str, Any]:
         folder = Path(text)
         with timer.stage("parameters"):
             road = RoadGeometry(sample_road(scenario.road, scenario.seed, scenario.title))
-            write_road_files(folder, scenario, road, timer)
+            JobFiles(scenario).write_road(folder, road, timer)
+        shown = RoadScene(scenario, road)
         with timer.stage("model"):
-            model = build_model(scenario, road)
+            model = shown.build()
         with timer.stage("scene mesh"):
-            scene = read_scene(scenario, road)
+            scene = shown.read()
         with timer.stage("caster"):
-            plan = plan_road_scan(scenario, road, scene)
-        files = road_cloud_files(scenario, road, folder, plan)
+            plan = shown.site.plan(scene, BlenderServices())
+        files = shown.site.files(folder, plan.target.origin)
         record_to_files([plan], files, timer)
         seconds, memory = timer.seconds, peak_memory_mb()
         floors = [*_casting(plan), _writing(plan, files, folder)]

@@ -11,10 +11,9 @@ import pytest
 from synthroads_addon.base.progress import StageTimer
 from synthroads_addon.jobs.choose.trial import Trial
 from synthroads_addon.jobs.scan.files import CloudFiles
+from synthroads_addon.jobs.scan.site import Site
 from synthroads_addon.scanning.plan import ScanPlan
-from synthroads_addon.scanning.scene.motion import ScannedScene
 from synthroads_addon.scenario.scenario import Scenario
-from tests.helpers.scenes.scan_scenes import plane
 from tests.jobs.scan.test_plan import StandIns, planned
 
 RATE, EACH, FIRST = 2e-6, 0.5, 30.0
@@ -45,7 +44,7 @@ def test_a_scan_of_a_fixed_time_and_a_rate_is_predicted_exactly(
     scans = MadeUpScans(each)
     monkeypatch.setattr("synthroads_addon.jobs.choose.trial.record_to_files", scans.record)
     plan = planned(StandIns(), seconds=75.0)
-    trial = Trial(Scenario.from_dict({"fidelity": "draft"}), ScannedScene(plane()), plan, clock=lambda: scans.now)
+    trial = Trial(Site(Scenario.from_dict({"fidelity": "draft"}), plan.path), plan, clock=lambda: scans.now)
     seconds, points = trial.time_scan(())
     assert trial.pulses > 1e6
     assert seconds == pytest.approx(each + RATE * trial.pulses, rel=1e-9)

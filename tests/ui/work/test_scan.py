@@ -13,8 +13,9 @@ import synthroads_addon
 from synthroads_addon.base.errors import Cancelled
 from synthroads_addon.blender.compat import set_modifier_input
 from synthroads_addon.blender.things.model_builder import ROLE
-from synthroads_addon.jobs.generate import FILES, generate
 from synthroads_addon.jobs.generate import Job as PipelineJob
+from synthroads_addon.jobs.generate import generate
+from synthroads_addon.jobs.job_files import FILES
 from synthroads_addon.road.parameters import read_parameters
 from synthroads_addon.scenario.scenario import load_scenario
 from synthroads_addon.ui.work import scan, scan_job
