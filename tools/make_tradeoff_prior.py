@@ -73,10 +73,10 @@ def measured(platform: str) -> dict[str, Any]:
     builds, few = [], None
     trial = None
     models = model_knobs(scenario, {})
-    shown.rebuild(models[0])  # untimed: the first build pays for what Blender loads once
+    shown.rebuild(models[0].changes)  # untimed: the first build pays for what Blender loads once
     for model in models:
         begin = time.process_time()
-        trial = Trial.of(shown.site, shown.rebuild(model))
+        trial = Trial.of(shown.site, shown.rebuild(model.changes))
         trial.clock = time.process_time
         builds.append(1e6 * (time.process_time() - begin) / shown.area)
         few = few or trial.points(RINGS[1])

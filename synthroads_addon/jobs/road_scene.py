@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -17,7 +18,6 @@ from ..blender.services import BlenderServices
 from ..road.geometry import RoadGeometry
 from ..scanning.scene.motion import ScannedScene
 from ..scenario.scenario import Scenario
-from .choose.knobs import ModelKnobs
 from .job_files import OF_POINTS
 from .scan.by_section import scan_by_section
 from .scan.site import Site
@@ -50,16 +50,10 @@ class RoadScene:
         terrain = self.road.parameters.terrain
         return 2.0 * (terrain.half_width if terrain else self.scenario.road.half_width) * self.road.length
 
-    def build(self, tolerance: float | None = None, detail: float | None = None) -> RoadModel:
-        """Build the road in place of that before, with the materials of the scenario's own table.
-
-        Args:
-            tolerance: geometric tolerance, m; the scenario's if None.
-            detail: share of the plants, 0 to 1; the scenario's if None.
-        """
+    def build(self) -> RoadModel:
+        """Build the road in place of that before, with the materials of the scenario's own table."""
         settings, parameters = self.scenario.settings(), self.road.parameters
-        tolerance = settings.tolerance if tolerance is None else tolerance
-        model = build_road(parameters, tolerance, settings.vegetation_detail if detail is None else detail)
+        model = build_road(parameters, settings.tolerance, settings.vegetation_detail)
         if self.scenario.materials_table:
             vary(parameters.materials, parameters.environment, self.scenario.own_materials())
         return model
@@ -68,10 +62,9 @@ class RoadScene:
         """Return the open scene, which shows the road, as it is scanned."""
         return scanned_scene(geometry=self.road, speed_factor=self.scenario.scan.traffic_speed_factor)
 
-    def rebuild(self, knobs: ModelKnobs | None) -> ScannedScene:
-        """Return the scene of a model that settings are tried out on; it is built in place of that before."""
-        assert knobs is not None
-        self.model = self.build(knobs.tolerance, knobs.detail)
+    def rebuild(self, changes: Mapping[str, Any]) -> ScannedScene:
+        """Return the scene of the model with fields of the scenario changed, which is built in place of that before."""
+        self.model = RoadScene(self.scenario.model_copy(update=changes), self.road).build()
         self.scene = self.read()
         return self.scene
 

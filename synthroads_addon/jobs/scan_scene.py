@@ -85,7 +85,7 @@ def scan_scene(job: SceneScan, progress: Progress = silent) -> dict[str, Any]:
     from .choose.search import decide
 
     begun, timer = job.begun or time.perf_counter(), StageTimer(progress)
-    mapping, report = check_scene_scan(job), {"scene": job.scene.name if job.scene else None}
+    mapping, report = check_scene_scan(job), dict[str, Any](scene=job.scene.name if job.scene else None)
     files = JobFiles(job.scenario, road=False)
     with output_folder(job.output, files.names, job.overwrite) as folder:
         with timer.stage("scene"):

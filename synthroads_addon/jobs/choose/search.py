@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from ...blender.cameras import HAS_RETURN_CAMERA
+from ...cloud.points import PointBlock
 from ...scanning.beam import RINGS
 from ...scanning.scene.motion import ScannedScene
 from ...scenario.scenario import FIDELITIES, Scenario
@@ -33,8 +34,8 @@ _SURE = 0.8
 _HOPELESS = 4.0
 """A time that the shipped table says is exceeded so many times isn't tried out."""
 
-MakeScene = Callable[[ModelKnobs | None], ScannedScene]
-"""Returns the scene of a model, built in place of that before; None stands for a scene that is there."""
+MakeScene = Callable[[Mapping[str, Any]], ScannedScene]
+"""Returns the scene of a model with fields of the scenario changed, built in place of that before."""
 
 
 @dataclass(frozen=True)
@@ -161,7 +162,7 @@ class _Search:
 
     def _measure_beam(self) -> dict[tuple[ModelKnobs | None, int], Errors]:
         """Try all models out, the one with all plants last; the truth is seen among these."""
-        points = {}
+        points: dict[tuple[ModelKnobs | None, int], list[PointBlock]] = {}
         for model in self.models:
             trial = self._try(model)
             points |= {(model, rays): trial.points(rings) for rays, rings in self.rays.items()}
@@ -227,7 +228,7 @@ class _Search:
         """Return the trial of a model, which is built unless it stands."""
         if self.trial is None or self.trial[0] != model:
             begin = time.perf_counter()
-            self.trial = model, Trial.of(self.site, self._make(model))
+            self.trial = model, Trial.of(self.site, self._make(model.changes if model else {}))
             self.build_seconds[model] = time.perf_counter() - begin
         return self.trial[1]
 

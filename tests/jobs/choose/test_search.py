@@ -185,7 +185,7 @@ def errors_afterwards(scenario: Scenario) -> dict[str, float]:
     shown = RoadScene(scenario, RoadGeometry(parameters))
 
     def points(detail: float, rays: int) -> list[PointBlock]:
-        trial = Trial.of(shown.site, shown.rebuild(ModelKnobs(settings.tolerance, detail)))
+        trial = Trial.of(shown.site, shown.rebuild(ModelKnobs(settings.tolerance, detail).changes))
         trial.phase, trial.lines = 0.0, 160
         return trial.points(RINGS[rays])
 
