@@ -128,19 +128,12 @@ def refuse_sections(scenario: Scenario, length: float) -> None:
         return
     if scenario.chooses:
         name = "time_budget" if scenario.tolerance is None else "tolerance"
-        raise InputError(
-            name,
-            getattr(scenario, name),
-            f"can't be kept on a road of {length:g} m, which is built by sections of {section:g} m: choose on a "
-            "shorter road, and set what was chosen",
-        )
+        text = f"can't be kept on a road of {length:g} m, which is built by sections of {section:g} m: choose on a "
+        raise InputError(name, getattr(scenario, name), f"{text}shorter road, and set what was chosen")
     if "scene" in scenario.outputs:
-        raise InputError(
-            "outputs",
-            list(scenario.outputs),
-            f"can't have scene: a road of {length:g} m is built by sections of {section:g} m; leave "
-            f"scene out, or set scan.section_length to {length / 2.0:g} or more",
-        )
+        text = f"can't have scene: a road of {length:g} m is built by sections of {section:g} m; leave scene out, or "
+        text += f"set scan.section_length to {length / 2.0:g} or more"
+        raise InputError("outputs", list(scenario.outputs), text)
 
 
 def choose_settings(scene: RoadScene, begun: float, timer: StageTimer) -> tuple[RoadScene, dict[str, Any]]:

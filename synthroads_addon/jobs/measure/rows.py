@@ -21,7 +21,7 @@ from ...blender.services import BlenderServices
 from ...road.geometry import RoadGeometry
 from ...sampling.road import sample_road
 from ...scanning.beam import RINGS
-from ...scanning.colour.colour import MATERIAL_LAYERS, LayerValues, sample_points, shares_by_source, source_name
+from ...scanning.colour.colour import MATERIAL_LAYERS, LayerValues, sample_points, shares_by_source
 from ...scanning.colour.request import LayerRequest
 from ...scanning.plan import ScanPlan
 from ...scanning.platforms.stretches import middle_stretches, spread_stretches
@@ -32,18 +32,7 @@ from ...scanning.scene.motion import ScannedScene
 from ...scenario.scenario import Scenario, load_scenario
 from ..road_scene import RoadScene
 from ..scan.site import Site
-from .errors import (
-    CONVERGED,
-    FINEST,
-    QUANTILE,
-    beam_errors,
-    colour_difference,
-    known_rows,
-    relief_errors,
-    shift_points,
-    squared_error,
-    truest_settings,
-)
+from .errors import CONVERGED, FINEST, beam_errors, errors_by_source, relief_errors, shift_points, truest_settings
 from .mesh_errors import mesh_height_errors
 from .tradeoff import KNOBS, TRUE_SAMPLES, Knob, row_scenario
 
@@ -205,7 +194,10 @@ def _errors(
         errors["relief_mm"] = 1e3 * _relief_error(sample)
     if "colour" in knob.errors:
         truth, more["colour_truth"], chosen = _true_colours(knob, sample)
-        of_all, more["errors_by_source"] = _colour_errors(sample.values, truth, chosen)
+        assert sample.values is not None
+        mine = {name: array[chosen] for name, array in sample.values.arrays.items()}
+        mine_there = LayerValues(mine, sample.values.source[chosen])
+        of_all, more["errors_by_source"] = errors_by_source(mine_there, truth)
         errors |= of_all
     if "beam" in knob.errors:  # last, as its truth may be another scene
         errors |= _beam_errors(sample, true_plan())
@@ -251,24 +243,3 @@ def _true_colours(knob: Knob, sample: Sample) -> tuple[LayerValues, str, NDArray
         name = f"images of {pixel:g} m pixels every {spacing:g} m, of the points that these show"
     with layer_source(replace(request, settings=settings, wanted=LAYERS)) as source:
         return sample_points(source, seen.select(chosen), LAYERS), name, chosen
-
-
-def _colour_errors(
-    values: LayerValues | None, truth: LayerValues, chosen: NDArray[np.intp]
-) -> tuple[dict[str, float], dict[str, dict[str, float]]]:
-    """Return the errors of colours and layers, of all points and by what gave them to these."""
-    assert values is not None
-    mine = LayerValues({name: array[chosen] for name, array in values.arrays.items()}, values.source[chosen])
-    known = known_rows(truth)
-    difference = colour_difference(mine, truth, known)
-    squares = [squared_error(name, mine, truth, known) for name in MATERIAL_LAYERS]
-
-    def of(rows: NDArray[np.bool_]) -> dict[str, float]:
-        return {
-            "colour_median": round(float(np.median(difference[rows])), 6),
-            "colour_95": round(float(np.quantile(difference[rows], QUANTILE)), 6),
-            "layers_rmse": round(max(float(np.sqrt(square[rows].mean())) for square in squares), 6),
-        }
-
-    names = np.array([source_name(number) for number in range(256)])[mine.source[known]]
-    return of(np.ones(len(difference), bool)), {str(name): of(names == name) for name in np.unique(names)}

@@ -22,12 +22,10 @@ from ...blender.scene.evaluated import scene_mesh
 from ...blender.scene.vehicle_meshes import VehicleMeshes
 from ...blender.services import BlenderServices
 from ...road.geometry import RoadGeometry
-from ...scanning.blocks import Block, Blocks
 from ...scanning.plan import ScanPlan
-from ...scanning.platforms.path import Strip
 from ...scanning.platforms.stretches import PathStretches
 from ...scanning.scene.motion import LaneMotion, ScannedScene, ShiftedMotion, lane_motions
-from ...scanning.sections import Section, sections, shadow_length
+from ...scanning.sections import Section, sections, shadow_length, strip_parts
 from .files import record_to_files
 from .plan import may_render
 from .site import Site
@@ -106,7 +104,7 @@ class SectionScan:
         with timer.stage("caster"):
             plan = replace(self._site, path=path).plan(scene, BlenderServices())
         assert plan.request is not None
-        seen_from = replace(path, strips=_strips(self.cut, section.blocks))
+        seen_from = replace(path, strips=strip_parts(self.cut, section.blocks))
         request = replace(plan.request, path=seen_from, frame=(frame[0], frame[1], frame[2]))
         return replace(plan, frame=frame, only=section.blocks, request=request)
 
@@ -127,31 +125,12 @@ class SectionScan:
 
     def _passing(self, section: Section) -> dict[str, LaneMotion]:
         """Return the vehicles that drive through a section while it is scanned."""
+        look = _LOOK / max(1.0, self._scenario.scan.traffic_speed_factor)
         times = np.concatenate([
-            strip.start_time + np.linspace(0.0, strip.duration, int(np.ceil(strip.duration / self._look)) + 2)
-            for strip in _strips(self.cut, section.blocks)
+            strip.start_time + np.linspace(0.0, strip.duration, int(np.ceil(strip.duration / look)) + 2)
+            for strip in strip_parts(self.cut, section.blocks)
         ])  # fmt: skip
         low, high = section.low - _AROUND, section.high + _AROUND
-        found = {}
-        for name, motion in self._motions.items():
-            station = motion.station(times)
-            if ((station > low) & (station < high)).any():
-                found[name] = motion
-        return found
-
-    @property
-    def _look(self) -> float:
-        return _LOOK / max(1.0, self._scenario.scan.traffic_speed_factor)
-
-
-def _strips(cut: Blocks, blocks: tuple[Block, ...]) -> tuple[Strip, ...]:
-    """Return the parts of strips that some blocks are, each with its strip's index."""
-    parts = []
-    for strip in {block[0].index: block[0] for block in blocks}.values():
-        own = [number for owner, number in blocks if owner.index == strip.index]
-        for run in np.split(own, np.flatnonzero(np.diff(own) > 1) + 1):
-            first, _ = cut.pulses_of(strip, int(run[0]))
-            last, count = cut.pulses_of(strip, int(run[-1]))
-            begin, end = cut.time(strip, first), cut.time(strip, last + count - 1)
-            parts.append(Strip(strip.index, begin, end - begin))
-    return tuple(parts)
+        stations = {name: motion.station(times) for name, motion in self._motions.items()}
+        near = {name for name, station in stations.items() if ((station > low) & (station < high)).any()}
+        return {name: motion for name, motion in self._motions.items() if name in near}
