@@ -27,11 +27,11 @@ sys.path.insert(0, str(ROOT))
 from synthroads_addon.base.schema import canonical_json, read_json  # noqa: E402
 from synthroads_addon.blender.cameras import HAS_RETURN_CAMERA, layer_source  # noqa: E402
 from synthroads_addon.blender.files import empty_file, save_scene  # noqa: E402
-from synthroads_addon.jobs.choose.knobs import colour_choices  # noqa: E402
-from synthroads_addon.jobs.choose.sites import RoadSite  # noqa: E402
+from synthroads_addon.jobs.choose.knobs import colour_choices, model_knobs  # noqa: E402
 from synthroads_addon.jobs.choose.table import FILE  # noqa: E402
 from synthroads_addon.jobs.choose.trial import Trial  # noqa: E402
 from synthroads_addon.jobs.measure.errors import beam_errors, shift_points  # noqa: E402
+from synthroads_addon.jobs.road_scene import RoadScene  # noqa: E402
 from synthroads_addon.road.geometry import RoadGeometry  # noqa: E402
 from synthroads_addon.sampling.road import sample_road  # noqa: E402
 from synthroads_addon.scanning.beam import RINGS  # noqa: E402
@@ -69,21 +69,22 @@ def measured(platform: str) -> dict[str, Any]:
     name, changes = SCENES[platform]
     scenario = load_scenario(name, [*changes, "cloud.point_spacing=null"])
     empty_file()
-    site = RoadSite(scenario, RoadGeometry(sample_road(scenario.road, scenario.seed)))
+    shown = RoadScene(scenario, RoadGeometry(sample_road(scenario.road, scenario.seed)))
     builds, few = [], None
     trial = None
-    site.scene(site.models({})[0])  # untimed: the first build pays for what Blender loads once
-    for model in site.models({}):
+    models = model_knobs(scenario, {})
+    shown.rebuild(models[0].changes)  # untimed: the first build pays for what Blender loads once
+    for model in models:
         begin = time.process_time()
-        trial = Trial.of(scenario, site.scene(model), site.path, site.conditions)
+        trial = Trial.of(shown.site, shown.rebuild(model.changes))
         trial.clock = time.process_time
-        builds.append(1e6 * (time.process_time() - begin) / site.area)
+        builds.append(1e6 * (time.process_time() - begin) / shown.area)
         few = few or trial.points(RINGS[1])
     assert trial is not None
     assert few is not None
     truth = trial.points()
     seconds = {rays: trial.time_scan(rings)[0] for rays, rings in RINGS.items()}
-    colours = colour_choices(scenario, site.path.typical_range, returns=False)
+    colours = colour_choices(scenario, shown.site.path.typical_range, returns=False)
     sources = {key: _expected(pair) for key, pair in trial.colour_errors(colours, WANTED).items()}
     relief = {str(octaves): _short(found["relief"][0]) for octaves, found in trial.relief_errors(OCTAVES).items()}
     first, each, pixel = image_seconds(trial, colours["standard"])
@@ -97,7 +98,7 @@ def measured(platform: str) -> dict[str, Any]:
         "octave": {str(octaves): _short(octave_seconds(trial, octaves)) for octaves in OCTAVES},
         "image": [_short(first), _short(each / CORES), _short(pixel / CORES)],
         "sample": SAMPLE,
-        "scene_file": _short(_saving(site.area)),
+        "scene_file": _short(_saving(shown.area)),
         "previews": PREVIEWS,
     }
 

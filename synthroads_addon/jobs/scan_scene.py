@@ -21,7 +21,6 @@ from ..base.schema import read_json
 from ..cloud.tools.previews import TopView
 from ..road.centerline import read_axis
 from ..road.geometry import RoadGeometry
-from ..road.parameters import RoadParameters
 from ..scanning.plan import ScanConditions
 from ..scanning.platforms.guides import RoadGuide
 from ..scanning.platforms.path import Path as ScanPath
@@ -32,16 +31,14 @@ from ..scanning.scene.extent import bounds, elevation_at, middle_line
 from ..scanning.scene.mesh import SceneMesh
 from ..scanning.scene.motion import ScannedScene
 from ..scenario.scan import scanner_setting
-from ..scenario.scenario import Output, Scenario
-from .report import file_names, report_footer, report_header, write_report
-from .scan.files import CloudFiles, record_to_files
-from .scan.plan import plan_scan, road_view
+from ..scenario.scenario import Scenario
+from .choose.knobs import check_choice
+from .job_files import OF_POINTS, JobFiles
+from .scan.site import Site, road_view
 
 if TYPE_CHECKING:
     from ..blender.scene.foreign import UpAxis
 
-OUTPUTS: tuple[Output, ...] = ("cloud", "previews")
-"""Files that a scan of a scene writes beside ``report.json``, as far as the scenario asks for them."""
 _BORDER = 2.0  # m, of the previews
 
 
@@ -76,15 +73,6 @@ class SceneScan:
     begun: float | None = None
 
 
-@dataclass(frozen=True)
-class _Read:
-    """Scene as it was read."""
-
-    scene: ScannedScene
-    road: RoadParameters | None
-    warnings: list[str]
-
-
 def scan_scene(job: SceneScan, progress: Progress = silent) -> dict[str, Any]:
     """Scan a scene; return the report that is also written to ``report.json``.
 
@@ -95,49 +83,37 @@ def scan_scene(job: SceneScan, progress: Progress = silent) -> dict[str, Any]:
     from ..blender.scene.foreign import open_scene
     from ..blender.services import BlenderServices
     from .choose.search import decide
-    from .choose.sites import SceneSite
 
-    begun = job.begun or time.perf_counter()
-    mapping = check_scene_scan(job)
-    scenario = job.scenario
-    wanted = tuple(name for name in OUTPUTS if name in scenario.outputs)
-    timer, report = StageTimer(progress), report_header()
-    with output_folder(job.output, file_names(scenario, wanted), job.overwrite) as folder:
+    begun, timer = job.begun or time.perf_counter(), StageTimer(progress)
+    mapping, report = check_scene_scan(job), dict[str, Any](scene=job.scene.name if job.scene else None)
+    files = JobFiles(job.scenario, road=False)
+    with output_folder(job.output, files.names, job.overwrite) as folder:
         with timer.stage("scene"):
             if job.scene is not None:
                 open_scene(job.scene, job.up)
         with timer.stage("scene mesh"):
-            read = _read_scene(job, mapping)
-        mesh, road = read.scene.static, RoadGeometry(read.road) if read.road else None
-        path, conditions = scene_path(job, mesh, road), ScanConditions.of(read.road)
-        if scenario.chooses:
+            scene, road, warnings = _read_scene(job, mapping)
+        site = scene_site(job, scene.static, road)
+        if job.scenario.chooses:
             with timer.stage("choice"):
-                decision = decide(scenario, SceneSite(read.scene, path, conditions), begun)
-                scenario, report["choice"] = decision.scenario, decision.report
-        with timer.stage("caster"):
-            plan = plan_scan(scenario, read.scene, path, BlenderServices(), conditions)
-        view = None if "previews" not in wanted else road_view(road) if road else scene_view(mesh)
-        epsg = conditions.epsg if job.epsg is None else job.epsg
-        files = CloudFiles(scenario, folder, mesh.origin, path.typical_range, epsg, view)
-        counts = record_to_files([plan], files, timer)
-        report |= {"scene": job.scene.name if job.scene else None, "counts": counts}
-        report["warnings"] = read.warnings + _warnings_of_counts(counts)
-        report |= report_footer(scenario, timer)
-        report["scenario"] = {name: value for name, value in report["scenario"].items() if name != "road"}
-        return write_report(folder, report)
+                decision = decide(site, begun, lambda _: scene)
+                site, report["choice"] = replace(site, scenario=decision.scenario), decision.report
+                files = JobFiles(decision.scenario, road=False)
+        counts = site.scan(scene, BlenderServices(), folder, timer)
+        report |= {"counts": counts, "warnings": warnings + _warnings_of_counts(counts)}
+        return files.write_report(folder, report, timer)
 
 
 def check_scene_scan(job: SceneScan) -> ClassMapping | None:
     """Refuse a job that can't be done before any work starts; return the classes by name."""
     from ..blender.scene.foreign import check_scene_file  # see `scan_scene`
-    from .choose import search
 
-    search.check(job.scenario, foreign=True)
+    check_choice(job.scenario, foreign=True)
     platform = job.scenario.scan.platform
     if job.scene is not None:
         check_scene_file(job.scene, job.up)
-    if not set(job.scenario.outputs) & set(OUTPUTS):
-        raise InputError("outputs", list(job.scenario.outputs), f"must name at least one of {', '.join(OUTPUTS)}")
+    if not set(job.scenario.outputs) & set(OF_POINTS):
+        raise InputError("outputs", list(job.scenario.outputs), f"must name at least one of {', '.join(OF_POINTS)}")
     if job.tripods:
         tripod = _tripod_of(job)
         if tripod.height is not None and any(len(place) == 3 for place in job.tripods):
@@ -157,25 +133,38 @@ def check_scene_scan(job: SceneScan) -> ClassMapping | None:
     return ClassMapping.from_dict(read_json(job.classes), source=str(job.classes))
 
 
-def _read_scene(job: SceneScan, mapping: ClassMapping | None) -> _Read:
-    """Return the open scene's triangles and road; refuse a scene in which there is nothing to scan."""
+def _read_scene(
+    job: SceneScan, mapping: ClassMapping | None
+) -> tuple[ScannedScene, RoadGeometry | None, list[str]]:
+    """Return the open scene, its road, and warnings; refuse a scene in which there is nothing to scan."""
     from ..blender.model.store import open_road  # see `scan_scene`
     from ..blender.scene.evaluated import scanned_scene
     from ..blender.scene.foreign import open_scene_warnings
 
-    road = open_road()
-    if road and job.origin is not None:
+    parameters = open_road()
+    if parameters and job.origin is not None:
         raise InputError("--origin", list(job.origin), "can't be given: the road in the scene has one of its own")
     factor = job.scenario.scan.traffic_speed_factor
-    geometry = RoadGeometry(road) if road else None
-    scene = scanned_scene(classes=mapping, geometry=geometry, speed_factor=factor, number_objects=True)
+    road = RoadGeometry(parameters) if parameters else None
+    scene = scanned_scene(classes=mapping, geometry=road, speed_factor=factor, number_objects=True)
     if not len(scene.static) and not scene.moving:
         name = str(job.scene) if job.scene else "open scene"
         raise InputError(name, None, "holds nothing visible with faces that could be scanned")
     if job.origin is not None:
         scene = replace(scene, static=replace(scene.static, origin=np.array(job.origin, dtype=np.float64)))
     unused = [f"{job.classes}: nothing in the scene is named as in {entry}" for entry in scene.unmatched]
-    return _Read(scene, road, open_scene_warnings() + unused)
+    return scene, road, open_scene_warnings() + unused
+
+
+def scene_site(job: SceneScan, mesh: SceneMesh, road: RoadGeometry | None) -> Site:
+    """Return the site of a scene's scan."""
+    conditions = ScanConditions.of(road.parameters if road else None)
+    if job.epsg is not None:
+        conditions = replace(conditions, epsg=job.epsg)
+    view = None
+    if "previews" in job.scenario.outputs:
+        view = road_view(road) if road else scene_view(mesh)
+    return Site(job.scenario, scene_path(job, mesh, road), conditions, view)
 
 
 def scene_path(job: SceneScan, mesh: SceneMesh, geometry: RoadGeometry | None) -> ScanPath:

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ..base.random_streams import stream
-from .effects import EchoChanges, Float, PulseHits
-from .plan import ScanPlan
+from .devices.device import ScannerSetting
+from .effects import EchoChanges, EchoEffect, Float, PulseHits
 from .platforms.path import Strip
 from .pulses import Pulses
 from .radiometry import received_intensity
@@ -19,49 +19,76 @@ BothMarks = tuple[Marks, Marks]
 """Marks of what rays meet first, and of what they meet behind it."""
 
 
-def apply_effects(
-    plan: ScanPlan, strip: Strip, key: int, pulses: Pulses, traced: Traced, marks: BothMarks
-) -> tuple[Traced, BothMarks]:
-    """Return what the rays of a block meet, and its marks, after the scan's effects, one after the other.
+@dataclass(frozen=True)
+class EffectChain:
+    """Effects of a scan, applied one after the other: each sees what those before it have left.
 
-    Echoes that are added join what lies behind permeable surfaces, with the face -1.
-
-    Args:
-        plan: with the effects in their order; each sees what those before it have left.
-        strip, key: of the block, for its random numbers.
-        pulses: the block's.
-        traced: what their rays meet.
-        marks: what that adds to returns.
-
-    Raises:
-        ValueError: an effect's echoes are of no ray, or not finite numbers.
+    Attributes:
+        effects, seed, attenuation, setting: see `scanning.plan.ScanPlan`.
     """
-    for effect in plan.effects:
-        hits = _pulse_hits(plan, pulses, traced, marks)
-        changes = effect.change_echoes(hits, stream(plan.seed, f"effect {effect.name}", strip.index, key))
-        _check(effect.name, changes, hits.distance.shape)
-        if changes.transmission is not None:
-            traced, marks = _weaken(traced, marks, np.broadcast_to(changes.transmission, hits.distance.shape))
-        traced, marks = _add(plan, traced, marks, changes)
-    return traced, marks
 
+    effects: tuple[EchoEffect, ...]
+    seed: int
+    attenuation: float
+    setting: ScannerSetting
 
-def _pulse_hits(plan: ScanPlan, pulses: Pulses, traced: Traced, marks: BothMarks) -> PulseHits:
-    first, behind = marks
-    ray, pulse = np.divmod(traced.ray, len(pulses.time))
-    return PulseHits(
-        time=pulses.time,
-        origin=pulses.origin,
-        direction=pulses.direction,
-        share=traced.rays.share[:, 0],
-        distance=first.distance,
-        brightness=_brightness(first, plan.attenuation),
-        behind_pulse=pulse,
-        behind_ray=ray,
-        behind_distance=behind.distance,
-        behind_brightness=_brightness(behind, plan.attenuation),
-        setting=plan.setting,
-    )
+    def apply(
+        self, strip: Strip, key: int, pulses: Pulses, traced: Traced, marks: BothMarks
+    ) -> tuple[Traced, BothMarks]:
+        """Return what the rays of a block meet, and its marks, after the effects.
+
+        Echoes that are added join what lies behind permeable surfaces, with the face -1.
+
+        Args:
+            strip, key: of the block, for its random numbers.
+            pulses: the block's.
+            traced: what their rays meet.
+            marks: what that adds to returns.
+
+        Raises:
+            ValueError: an effect's echoes are of no ray, or not finite numbers.
+        """
+        for effect in self.effects:
+            hits = self._pulse_hits(pulses, traced, marks)
+            changes = effect.change_echoes(hits, stream(self.seed, f"effect {effect.name}", strip.index, key))
+            _check(effect.name, changes, hits.distance.shape)
+            if changes.transmission is not None:
+                traced, marks = _weaken(traced, marks, np.broadcast_to(changes.transmission, hits.distance.shape))
+            traced, marks = self._add(traced, marks, changes)
+        return traced, marks
+
+    def _pulse_hits(self, pulses: Pulses, traced: Traced, marks: BothMarks) -> PulseHits:
+        first, behind = marks
+        ray, pulse = np.divmod(traced.ray, len(pulses.time))
+        return PulseHits(
+            time=pulses.time,
+            origin=pulses.origin,
+            direction=pulses.direction,
+            share=traced.rays.share[:, 0],
+            distance=first.distance,
+            brightness=_brightness(first, self.attenuation),
+            behind_pulse=pulse,
+            behind_ray=ray,
+            behind_distance=behind.distance,
+            behind_brightness=_brightness(behind, self.attenuation),
+            setting=self.setting,
+        )
+
+    def _add(self, traced: Traced, marks: BothMarks, changes: EchoChanges) -> tuple[Traced, BothMarks]:
+        """Return hits and marks with those echoes of an effect that the scanner records."""
+        distance = np.asarray(changes.distance, dtype=np.float64)
+        here = np.flatnonzero((distance >= self.setting.minimum_range) & (distance <= self.setting.maximum_range))
+        distance, brightness = distance[here], np.asarray(changes.brightness, dtype=np.float64)[here]
+        none = np.zeros(len(here), dtype=np.intp)
+        # In the air there is no face; it counts as one that lies across the beam.
+        hits = Hits(none - 1, none, distance, none - 1.0, brightness)
+        added = Marks(
+            distance, np.maximum(brightness, UNCOUNTED), received_intensity(brightness, distance, self.attenuation)
+        )
+        first, behind = marks
+        ray = changes.ray[here] * len(traced.rays.time) + changes.pulse[here]
+        traced = replace(traced, behind=Hits.join([traced.behind, hits]), ray=np.concatenate([traced.ray, ray]))
+        return traced, (first, Marks.join([behind, added]))
 
 
 def _brightness(marks: Marks, attenuation: float) -> Float:
@@ -92,20 +119,3 @@ def _weaken(traced: Traced, marks: BothMarks, transmission: Float) -> tuple[Trac
     )
     behind = Marks(behind.distance[seen], behind.weight[seen] * left[seen], behind.intensity[seen] * left[seen])
     return replace(traced, behind=traced.behind.select(seen), ray=traced.ray[seen]), (first, behind)
-
-
-def _add(plan: ScanPlan, traced: Traced, marks: BothMarks, changes: EchoChanges) -> tuple[Traced, BothMarks]:
-    """Return hits and marks with those echoes of an effect that the scanner records."""
-    distance = np.asarray(changes.distance, dtype=np.float64)
-    here = np.flatnonzero((distance >= plan.setting.minimum_range) & (distance <= plan.setting.maximum_range))
-    distance, brightness = distance[here], np.asarray(changes.brightness, dtype=np.float64)[here]
-    none = np.zeros(len(here), dtype=np.intp)
-    # In the air there is no face; it counts as one that lies across the beam.
-    hits = Hits(none - 1, none, distance, none - 1.0, brightness)
-    added = Marks(
-        distance, np.maximum(brightness, UNCOUNTED), received_intensity(brightness, distance, plan.attenuation)
-    )
-    first, behind = marks
-    ray = changes.ray[here] * len(traced.rays.time) + changes.pulse[here]
-    traced = replace(traced, behind=Hits.join([traced.behind, hits]), ray=np.concatenate([traced.ray, ray]))
-    return traced, (first, Marks.join([behind, added]))

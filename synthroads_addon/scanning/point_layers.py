@@ -9,8 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .plan import ScanPlan
+from .devices.device import ScannerSetting
 from .pulses import Pulses
+from .scene.target import Target
 
 Float = NDArray[np.float64]
 
@@ -20,7 +21,8 @@ class MeasuredPoints:
     """N points of a block, of P pulses, at the time when their layers are filled.
 
     Attributes:
-        plan: the scan's.
+        setting: the scanner's.
+        target: what is scanned.
         pulses: the block's.
         pulse: (N,) pulse of each point.
         distance: (N,) range without errors, m.
@@ -29,7 +31,8 @@ class MeasuredPoints:
         normal: (3, N) unit normals towards the scanner; None where nothing asks for them.
     """
 
-    plan: ScanPlan
+    setting: ScannerSetting
+    target: Target
     pulses: Pulses
     pulse: NDArray[np.intp]
     distance: Float
@@ -53,9 +56,9 @@ def fills(array: str) -> Callable[[Filler], Filler]:
     return register
 
 
-def fill_layers(points: MeasuredPoints) -> dict[str, NDArray[Any]]:
-    """Return the arrays that the plan wants of points, by name."""
-    return {array: filler(points) for array, filler in FILLERS.items() if array in points.plan.wanted}
+def fill_layers(points: MeasuredPoints, wanted: frozenset[str]) -> dict[str, NDArray[Any]]:
+    """Return the arrays that are wanted of points, by name."""
+    return {array: filler(points) for array, filler in FILLERS.items() if array in wanted}
 
 
 def place_points(origin: Float, direction: Float, pulse: NDArray[np.intp], distance: Float, map_origin: Float) -> Float:
@@ -78,7 +81,7 @@ def _normal(points: MeasuredPoints) -> NDArray[Any]:
 
 @fills("scanner")
 def _scanner(points: MeasuredPoints) -> NDArray[Any]:
-    return points.pulses.origin.T[points.pulse] + points.plan.target.origin
+    return points.pulses.origin.T[points.pulse] + points.target.origin
 
 
 @fills("true_range")
@@ -88,10 +91,10 @@ def _true_range(points: MeasuredPoints) -> NDArray[Any]:
 
 @fills("true_xyz")
 def _true_xyz(points: MeasuredPoints) -> NDArray[Any]:
-    pulses, origin = points.pulses, points.plan.target.origin
+    pulses, origin = points.pulses, points.target.origin
     return place_points(pulses.origin, pulses.direction, points.pulse, points.distance, origin)
 
 
 @fills("material")
 def _material(points: MeasuredPoints) -> NDArray[Any]:
-    return points.plan.target.face_values("material", points.face)
+    return points.target.face_values("material", points.face)

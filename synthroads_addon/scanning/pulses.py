@@ -9,11 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..base.random_streams import stream
+from .devices.device import ScannerSetting
 from .devices.shots import shots
 from .knots import Track
-from .noise import TrajectoryNoise, measured_pose
-from .plan import ScanPlan
-from .platforms.path import Strip
+from .noise import Noise, TrajectoryNoise, measured_pose
+from .platforms.path import Path, Strip
+from .scene.target import Target
 
 Float = NDArray[np.float64]
 Index = NDArray[np.intp]
@@ -37,23 +38,6 @@ class Errors:
     range: NDArray[np.float32] | None
     angle: Float | None
     lost: NDArray[np.bool_] | None
-
-    @classmethod
-    def draw(cls, plan: ScanPlan, strip: Strip, count: int, key: int) -> Errors:
-        """Draw the errors of a block."""
-
-        def source(purpose: str) -> np.random.Generator:
-            return stream(plan.seed, purpose, strip.index, key)
-
-        shape = (count, plan.most_returns)
-        angle, dropout = plan.noise.angle_sigma_mrad * 1e-3, plan.noise.dropout
-        return cls(
-            source("range noise").standard_normal((2, max(shape)), dtype=np.float32)
-            if plan.setting.range_sigma
-            else None,
-            source("angle noise").normal(scale=angle, size=(2, count)) if angle else None,
-            source("dropouts").random(shape, dtype=np.float32) < dropout if dropout else None,
-        )
 
     def range_errors(self, pulse: Index, number: NDArray[np.uint8], most: int) -> NDArray[np.float32]:
         """Return (N,) range errors of returns, in units of one sigma.
@@ -88,29 +72,6 @@ class Poses:
     true: Track
     measured: Track
     motions: list[Track]
-
-    @classmethod
-    def between(cls, plan: ScanPlan, strip: Strip, begin: float, end: float) -> Poses:
-        """Return the poses between two times."""
-        spacing = plan.path.knot_spacing
-
-        def true(time: Float) -> tuple[Float, Float, Float]:
-            position, rotation = plan.path.pose(strip, time)
-            return rotation, position, np.ones(len(time))
-
-        def measured(time: Float) -> tuple[Float, Float, Float]:
-            errors = TrajectoryNoise(plan.noise, plan.seed, strip).errors(time)
-            position, rotation = measured_pose(*plan.path.pose(strip, time), errors)
-            return rotation, position, np.ones(len(time))
-
-        track = Track.between(true, begin, end, spacing)
-        noisy = plan.noise.position_sigma or plan.noise.attitude_sigma_deg or plan.noise.heading_sigma_deg
-        return cls(
-            track,
-            # Linear between knots, errors would lose some of their spread if they changed much meanwhile.
-            Track.between(measured, begin, end, min(spacing, plan.noise.correlation_time / 50.0)) if noisy else track,
-            plan.target.motions(begin, end, min(spacing, _MOTION_KNOTS), track if plan.driven else None),
-        )
 
 
 @dataclass(frozen=True)
@@ -148,30 +109,87 @@ class Pulses:
         return Pulses(**chosen)
 
 
-def make_pulses(plan: ScanPlan, strip: Strip, poses: Poses, angle: Float | None, first: int, count: int) -> Pulses:
-    """Return pulses ``first`` to ``first + count`` of a strip.
+@dataclass(frozen=True)
+class Emitter:
+    """The scanner on its way, which errs as it emits pulses.
 
-    Args:
-        angle: (2, P) pointing errors in the scan plane and across it, rad; None without.
+    Attributes:
+        setting, path, noise, seed, driven: see `scanning.plan.ScanPlan`.
+        several: whether several rays sample a pulse.
+        most_returns: of a pulse that are kept at most.
     """
-    several = plan.rays_per_pulse > 1
-    shot = shots(plan.setting, first, count, several or angle is not None)
-    time = shot.time + strip.start_time
-    rotation, origin, _ = poses.true.at(time)
-    direction = _turn_vectors(rotation, shot.direction)
-    frame = (shot.in_plane, shot.across)
-    in_plane, across = (None if not several or axis is None else _turn_vectors(rotation, axis) for axis in frame)
-    measured_origin, measured_direction = origin, direction
-    if poses.measured is not poses.true or angle is not None:
-        believed = shot.direction
-        if angle is not None:
-            assert frame[0] is not None
-            assert frame[1] is not None
-            believed = believed + angle[0] * frame[0] + angle[1] * frame[1]
-            believed /= np.sqrt(np.einsum("ij,ij->j", believed, believed))
-        rotation, measured_origin, _ = poses.measured.at(time)
-        measured_direction = _turn_vectors(rotation, believed)
-    return Pulses(time, shot.scan_angle, origin, direction, in_plane, across, measured_origin, measured_direction)
+
+    setting: ScannerSetting
+    path: Path
+    noise: Noise
+    seed: int
+    driven: bool
+    several: bool
+    most_returns: int
+
+    def draw_errors(self, strip: Strip, count: int, key: int) -> Errors:
+        """Draw the errors of a block."""
+
+        def source(purpose: str) -> np.random.Generator:
+            return stream(self.seed, purpose, strip.index, key)
+
+        shape = (count, self.most_returns)
+        angle, dropout = self.noise.angle_sigma_mrad * 1e-3, self.noise.dropout
+        return Errors(
+            source("range noise").standard_normal((2, max(shape)), dtype=np.float32)
+            if self.setting.range_sigma
+            else None,
+            source("angle noise").normal(scale=angle, size=(2, count)) if angle else None,
+            source("dropouts").random(shape, dtype=np.float32) < dropout if dropout else None,
+        )
+
+    def poses_between(self, target: Target, strip: Strip, begin: float, end: float) -> Poses:
+        """Return the scanner's poses, and those of what moves in the target, between two times."""
+        spacing = self.path.knot_spacing
+
+        def true(time: Float) -> tuple[Float, Float, Float]:
+            position, rotation = self.path.pose(strip, time)
+            return rotation, position, np.ones(len(time))
+
+        def measured(time: Float) -> tuple[Float, Float, Float]:
+            errors = TrajectoryNoise(self.noise, self.seed, strip).errors(time)
+            position, rotation = measured_pose(*self.path.pose(strip, time), errors)
+            return rotation, position, np.ones(len(time))
+
+        track = Track.between(true, begin, end, spacing)
+        noisy = self.noise.position_sigma or self.noise.attitude_sigma_deg or self.noise.heading_sigma_deg
+        return Poses(
+            track,
+            # Linear between knots, errors would lose some of their spread if they changed much meanwhile.
+            Track.between(measured, begin, end, min(spacing, self.noise.correlation_time / 50.0)) if noisy else track,
+            target.motions(begin, end, min(spacing, _MOTION_KNOTS), track if self.driven else None),
+        )
+
+    def emit(self, strip: Strip, poses: Poses, angle: Float | None, first: int, count: int) -> Pulses:
+        """Return pulses ``first`` to ``first + count`` of a strip.
+
+        Args:
+            angle: (2, P) pointing errors in the scan plane and across it, rad; None without.
+        """
+        shot = shots(self.setting, first, count, self.several or angle is not None)
+        time = shot.time + strip.start_time
+        rotation, origin, _ = poses.true.at(time)
+        direction = _turn_vectors(rotation, shot.direction)
+        frame = (shot.in_plane, shot.across)
+        in_plane, across = (
+            None if not self.several or axis is None else _turn_vectors(rotation, axis) for axis in frame
+        )
+        measured_origin, measured_direction = origin, direction
+        if poses.measured is not poses.true or angle is not None:
+            believed = shot.direction
+            if angle is not None:
+                assert frame[0] is not None
+                assert frame[1] is not None
+                believed = believed + angle[0] * frame[0] + angle[1] * frame[1]
+                believed /= np.sqrt(np.einsum("ij,ij->j", believed, believed))
+            rotation, measured_origin, _ = poses.measured.at(time)
+            measured_direction = _turn_vectors(rotation, believed)
+        return Pulses(time, shot.scan_angle, origin, direction, in_plane, across, measured_origin, measured_direction)
 
 
 def _turn_vectors(rotation: Float, vectors: Float) -> Float:
@@ -185,15 +203,17 @@ def _turn_vectors(rotation: Float, vectors: Float) -> Float:
     return result
 
 
-def reaching_scene(plan: ScanPlan, pulses: Pulses, motions: list[Track]) -> NDArray[np.bool_] | None:
+def reaching_scene(
+    setting: ScannerSetting, target: Target, pulses: Pulses, motions: list[Track]
+) -> NDArray[np.bool_] | None:
     """Return which pulses (P,) may hit anything at all, as those into the sky don't; None if all may."""
-    boxes = [] if plan.target.bounds is None else [plan.target.bounds]
-    boxes += plan.target.moving_bounds(motions)
+    boxes = [] if target.bounds is None else [target.bounds]
+    boxes += target.moving_bounds(motions)
     if not boxes:
         return np.zeros(len(pulses.time), dtype=bool)
     low, high = np.min([box[0] for box in boxes], axis=0), np.max([box[1] for box in boxes], axis=0)
-    cone = max(plan.setting.divergence) * 2.0
-    width = cone * plan.setting.maximum_range
+    cone = max(setting.divergence) * 2.0
+    width = cone * setting.maximum_range
     towards: NDArray[np.bool_] | None = None
     for axis in range(3):
         place, direction = pulses.origin[axis], pulses.direction[axis]

@@ -13,9 +13,9 @@ from ..base.machine import available_cores
 from ..base.progress import StageTimer
 from .blocks import Block
 from .colour.colour import LayerSource
-from .finish import finish
+from .finish import Finish
 from .plan import ScanPlan
-from .scan import BlockResult, joined_results, scan_block
+from .scan import BlockResult, BlockScan, joined_results
 
 RETURNS_AT_ONCE = 400_000
 """Points that are rendered together: each rendering takes a tenth of a second whatever their number."""
@@ -94,22 +94,22 @@ def scan_blocks(plan: ScanPlan, source: LayerSource | None = None) -> Iterator[B
         source: of colours and layers; where it renders, that happens in the calling thread. Without it the blocks are
             as they were measured.
     """
+    scan, finish = BlockScan(plan), None if source is None else Finish(plan, source)
     renders = source is not None and source.main_thread_only
 
     def work(block: Block) -> BlockResult:
-        result = scan_block(plan, *block)
-        return result if source is None or renders else finish(plan, source, result)
+        result = scan.block(*block)
+        return result if finish is None or renders else finish.block(result)
 
     blocks = iter(plan.blocks())
     if plan.target.caster.main_thread_only:
         results: Iterator[BlockResult] = map(work, blocks)
     else:
         results = _map_side_by_side(work, blocks, plan.threads or available_cores())
-    if source is None or not renders:
+    if finish is None or not renders:
         yield from results
-        return
-    for result in _join_into_batches(results):
-        yield finish(plan, source, result)
+    else:
+        yield from map(finish.block, _join_into_batches(results))
 
 
 def _join_into_batches(results: Iterator[BlockResult]) -> Iterator[BlockResult]:

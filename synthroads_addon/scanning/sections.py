@@ -7,7 +7,7 @@ meets the same surfaces whatever the sections are.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -83,13 +83,30 @@ def sections(cut: Blocks, geometry: RoadGeometry, length: float, shadows: float 
 def reach(cut: Blocks, geometry: RoadGeometry, blocks: list[Block]) -> tuple[float, float]:
     """Return the stations between which the rays of some blocks can meet anything."""
     stations = []
-    for strip in {block[0].index: block[0] for block in blocks}.values():
-        numbers = [number for owner, number in blocks if owner.index == strip.index]
+    for strip, numbers in _by_strip(blocks):
         chosen = np.unique(np.linspace(0, len(numbers) - 1, _PLACES).astype(int))
         rays = [_rays(cut, strip, numbers[i]) for i in chosen]
         origin, direction = (np.concatenate(parts) for parts in zip(*rays, strict=True))
         stations.append(_reached_stations(cut, geometry, origin, direction))
     return min(low for low, _ in stations), max(high for _, high in stations)
+
+
+def strip_parts(cut: Blocks, blocks: Sequence[Block]) -> tuple[Strip, ...]:
+    """Return the parts of strips that some blocks are, each with its strip's index."""
+    parts = []
+    for strip, numbers in _by_strip(blocks):
+        for run in np.split(numbers, np.flatnonzero(np.diff(numbers) > 1) + 1):
+            first, _ = cut.pulses_of(strip, int(run[0]))
+            last, count = cut.pulses_of(strip, int(run[-1]))
+            begin, end = cut.time(strip, first), cut.time(strip, last + count - 1)
+            parts.append(Strip(strip.index, begin, end - begin))
+    return tuple(parts)
+
+
+def _by_strip(blocks: Sequence[Block]) -> list[tuple[Strip, list[int]]]:
+    """Return the strips that blocks are of, and the blocks' numbers in each."""
+    strips = {strip.index: strip for strip, _ in blocks}.values()
+    return [(strip, [number for owner, number in blocks if owner.index == strip.index]) for strip in strips]
 
 
 def shadow_length(geometry: RoadGeometry) -> float:

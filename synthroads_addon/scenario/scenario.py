@@ -103,7 +103,10 @@ class Scenario(ClosedModel):
         Raises:
             InputError: the file isn't there or no material table.
         """
-        return read_material_table(material_table_path(self.materials_table)) if self.materials_table else {}
+        if not self.materials_table:
+            return {}
+        path = material_table_path(self.materials_table)
+        return read_material_table(path)
 
     def section_length(self, length: float) -> float | None:
         """Return the length (m) of the sections by which a road of a length (m) is built and scanned; None: whole."""

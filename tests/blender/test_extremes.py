@@ -15,13 +15,14 @@ from synthroads_addon.blender.model.build import build_road
 from synthroads_addon.blender.nodes.builder import Tree, node_group
 from synthroads_addon.blender.scene.evaluated import scanned_scene, scene_mesh
 from synthroads_addon.blender.scene.reading import MeshPart, Places, SceneTables, join_parts
-from synthroads_addon.jobs.road_scene import plan_road_scan
+from synthroads_addon.blender.services import BlenderServices
+from synthroads_addon.jobs.scan.site import Site
 from synthroads_addon.road.geometry import RoadGeometry
 from synthroads_addon.road.tessellation import MAXIMUM_SPACING
 from synthroads_addon.sampling.road import sample_road
-from synthroads_addon.scanning.scan import scan_block
 from synthroads_addon.scenario.road import RoadScenario
 from synthroads_addon.scenario.scenario import Scenario
+from tests.helpers.scenes.scan_scenes import scan_block
 from tools.benchmark_casters import bare_mesh
 
 ROUNDING = 2e-4  # m, of float32 coordinates a few hundred metres from the origin
@@ -38,7 +39,7 @@ def test_a_road_of_a_metre_is_built_and_scanned() -> None:
     surface = np.isin(scene.static.class_id, [class_id("road"), class_id("road_marking")])
     width = -np.diff(geometry.offsets(0.5)[0, [0, -1]])[0]
     assert 0.5 * width < scene.static.areas()[surface].sum() < 1.2 * width
-    scan = plan_road_scan(scenario, geometry, scene)
+    scan = Site.of_road(scenario, geometry).plan(scene, BlenderServices())
     points = scan_block(scan, scan.path.strips[0], 0).points
     station, _ = geometry.alignment.project(points.xyz[:, :2] - np.array(parameters.transform.translate)[:2])
     assert np.count_nonzero((station >= 0.0) & (station <= 1.0)) > 50

@@ -15,14 +15,14 @@ from headless import commands
 from synthroads_addon.base.errors import InputError
 from synthroads_addon.blender.services import BlenderServices
 from synthroads_addon.cloud.points import concatenate
-from synthroads_addon.jobs.generate import FILES, Job, generate
-from synthroads_addon.jobs.scan.plan import plan_scan, road_path
+from synthroads_addon.jobs.generate import Job, generate
+from synthroads_addon.jobs.job_files import FILES
+from synthroads_addon.jobs.scan.site import Site
 from synthroads_addon.road.geometry import RoadGeometry
 from synthroads_addon.road.parameters import read_parameters
-from synthroads_addon.scanning.pulses import Poses, make_pulses
-from synthroads_addon.scanning.scan import scan_block
 from synthroads_addon.scenario.scenario import load_scenario
 from tests.helpers.label_truth import misplaced_points
+from tests.helpers.scenes.scan_scenes import emit_pulses, scan_block
 
 ROOT = Path(__file__).parents[2]
 REAL_AXIS = ROOT.parent / "shared" / "real" / "als_rural2lane_t211-278_axis.csv"
@@ -102,7 +102,7 @@ def demo():
 
 
 def scan_of(scenario, geometry, scene):
-    return plan_scan(scenario, scene, road_path(scenario, geometry), BlenderServices())
+    return Site.of_road(scenario, geometry).plan(scene, BlenderServices())
 
 
 @pytest.mark.keep_scene
@@ -155,9 +155,9 @@ def test_casters_agree(demo) -> None:
     rays = []
     per_second = scan.setting.pulses_per_line * scan.setting.lines_per_second
     for strip in scan.path.strips:
-        poses = Poses.between(scan, strip, strip.start_time, strip.start_time + strip.duration)
+        begin, end = strip.start_time, strip.start_time + strip.duration
         firsts = rng.integers(0, int(strip.duration * per_second) - 1000, 20)
-        rays += [make_pulses(scan, strip, poses, None, int(first), 1000) for first in firsts]
+        rays += [emit_pulses(scan, strip, begin, end, int(first), 1000) for first in firsts]
     origins = np.concatenate([p.origin.T for p in rays])
     directions = np.concatenate([p.direction.T for p in rays])
     hits = {}

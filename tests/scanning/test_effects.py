@@ -13,12 +13,12 @@ from synthroads_addon.materials.surfaces import surfaces_of
 from synthroads_addon.materials.table import materials
 from synthroads_addon.scanning.colour.colour import MaterialLayers, surface_constants
 from synthroads_addon.scanning.effects import EchoChanges, PulseHits
-from synthroads_addon.scanning.finish import finish
+from synthroads_addon.scanning.finish import Finish
 from synthroads_addon.scanning.plan import ScanPlan
 from synthroads_addon.scanning.relief import micro_relief
-from synthroads_addon.scanning.scan import BlockResult, scan_block, scan_pulses
+from synthroads_addon.scanning.scan import BlockResult
 from synthroads_addon.scanning.scene.mesh import SceneMesh, empty_scene_mesh
-from tests.helpers.scenes.scan_scenes import ORIGIN, Standing, mesh_of, plane, scan_of
+from tests.helpers.scenes.scan_scenes import ORIGIN, Standing, mesh_of, plane, scan_block, scan_of, scan_pulses
 
 HEIGHT = 60.0
 FULL_LINE = 1000  # pulses of the device's line, from left to right
@@ -193,7 +193,7 @@ def test_points_in_the_air_go_through_colours_and_relief(by_layers: bool) -> Non
             relief_strength=1.0,
             relief_octaves=2,
         )
-        points = finish(scan, MaterialLayers(surface_constants(rows)), line(scan)).points
+        points = Finish(scan, MaterialLayers(surface_constants(rows))).block(line(scan)).points
         air = points.material == NO_MATERIAL
         assert 50 < air.sum() < 150
         assert not points.rgb[air].any()

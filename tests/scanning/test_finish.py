@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -13,7 +12,7 @@ import pytest
 from synthroads_addon.materials.reflectance import reflectivity
 from synthroads_addon.materials.table import materials
 from synthroads_addon.scanning.colour.colour import MaterialLayers, surface_constants
-from synthroads_addon.scanning.finish import finish
+from synthroads_addon.scanning.finish import Finish
 from synthroads_addon.scanning.plan import ScanPlan
 from synthroads_addon.scanning.scan import BlockResult
 from tests.helpers.scenes.scan_scenes import mesh_of, middle_pulses, plane, scan_of
@@ -38,7 +37,7 @@ class Striped:
 
 
 def finish_of(scan: ScanPlan, source: Any, corrected: bool = False) -> Callable[[BlockResult], BlockResult]:
-    return partial(finish, replace(scan, means=scan.surfaces, range_corrected=corrected, kept=KEPT), source)
+    return Finish(replace(scan, means=scan.surfaces, range_corrected=corrected, kept=KEPT), source).block
 
 
 def finished(scan: ScanPlan, dark: float, bright: float, material: str = "asphalt") -> BlockResult:

@@ -12,7 +12,6 @@ from synthroads_addon.materials.table import materials
 from synthroads_addon.scanning.knots import Track
 from synthroads_addon.scanning.noise import Noise
 from synthroads_addon.scanning.plan import ScanPlan
-from synthroads_addon.scanning.scan import beam_rays, scan_block, scan_pulses
 from synthroads_addon.scanning.scene.mesh import SceneMesh
 from synthroads_addon.scanning.scene.motion import LinearMotion, MovingMesh
 from synthroads_addon.scanning.trace import trace
@@ -20,11 +19,14 @@ from synthroads_addon.scanning.weather.fog import Fog
 from tests.helpers.scenes.scan_scenes import (
     ORIGIN,
     Standing,
+    beam_rays,
     echoes_and_pulses,
     mesh_of,
     middle_pulses,
     plane,
+    scan_block,
     scan_of,
+    scan_pulses,
     upright,
 )
 
@@ -87,7 +89,7 @@ def test_a_tilted_plane_converges_with_rays_per_pulse() -> None:
 def footprint(scan: ScanPlan) -> tuple[float, float]:
     """Return the widths at 1/e^2 on the ground, in the scan plane and across it, from the rays' own second moments."""
     _, pulses = echoes_and_pulses(scan, 500, 1)
-    rays = beam_rays(scan, pulses, [])
+    rays = beam_rays(scan, pulses)
     reach = -rays.origin[2] / rays.direction[2]
     ground = (rays.origin + reach * rays.direction)[:, :, 0]
     middle = (ground * rays.share[:, 0]).sum(axis=1, keepdims=True)
@@ -182,7 +184,7 @@ def test_shares_never_exceed_what_was_emitted(transmissions: list[float], rays: 
     leaf = materials()["leaves"]
     surfaces = surfaces_of(leaf.model_copy(update={"transmission": value}) for value in transmissions)
     _, pulses = echoes_and_pulses(scan, 499, 2)
-    emitted = beam_rays(scan, pulses, [])
+    emitted = beam_rays(scan, pulses)
     traced = trace(scan.target, surfaces, emitted, [], minimum, 1e4)
     first = np.where(np.isfinite(traced.first.distance), traced.first.share, 0.0)
     assert min(first.min(), traced.behind.share.min(initial=0.0)) >= 0.0

@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 from synthroads_addon.base.errors import InputError
-from synthroads_addon.scanning.scan import scan_block
 from synthroads_addon.scanning.scene.mesh import empty_scene_mesh
-from tests.helpers.scenes.scan_scenes import ORIGIN, Standing, mesh_of, middle_pulses, plane, scan_of
+from tests.helpers.scenes.scan_scenes import ORIGIN, Standing, mesh_of, middle_pulses, plane, scan_block, scan_of
 
 
 def test_flat_ground_is_hit_where_the_beam_points() -> None:

@@ -55,7 +55,7 @@ def rendering(request: LayerRequest, count: int) -> dict[str, Any]:
         ours = stamps[-1] - stamps[0]
     pixels = sum(view.pixels for view in views) / 1e6
     rates = {"ours": pixels / ours, "floor": pixels / _bare_seconds(request, views)}
-    return {"name": "rendering, all layers; Cycles, the picture alone", "unit": "million samples/s", **rates, "rays": 0}
+    return {"name": "rendering, all layers; Cycles, the picture alone", "unit": "million samples/s", **rates}
 
 
 def _bare_seconds(request: LayerRequest, views: list[View]) -> float:

@@ -8,8 +8,11 @@ from typing import Any
 
 from ...base.errors import InputError
 from ...scanning.beam import RINGS
+from ...scanning.colour.colour import MATERIAL_LAYERS
 from ...scenario.colour import COLOUR_FIDELITIES, image_scale
 from ...scenario.scenario import FIDELITIES, Scenario, apply_values
+from ..job_files import OF_POINTS
+from ..scan.plan import coloured_layers
 
 _COARSEST, _FINEST = FIDELITIES["draft"], FIDELITIES["high"]
 KNOBS = (
@@ -135,22 +138,42 @@ def given_knobs(scenario: Scenario) -> dict[str, Any]:
     return found
 
 
-def check_choice(scenario: Scenario) -> None:
-    """Refuse a choice that can't be promised.
+def has_kind(scenario: Scenario, kind: str) -> bool:
+    """Return whether points of a job have what a kind of error of colours is of: ``colour`` or ``layers``."""
+    wanted = coloured_layers(scenario)
+    return "rgb" in wanted if kind == "colour" else bool(set(MATERIAL_LAYERS) & wanted)
+
+
+def check_choice(scenario: Scenario, foreign: bool = False) -> None:
+    """Refuse a choice that can't be made or promised, before any work starts.
+
+    Args:
+        scenario: the job; nothing is refused if it leaves no choice.
+        foreign: the scene isn't built, so that nothing is known of its height's errors.
 
     Raises:
         InputError: names the field.
     """
+    if not scenario.chooses:
+        return
     limits = scenario.tolerance.limits() if scenario.tolerance else {}
     if scenario.tolerance is not None and not limits:
         raise InputError("tolerance", None, "must limit at least one kind of error")
-    if "intensity" in limits and scenario.colour.intensity_from_layers:
-        text = "can't be promised for intensities from the points' layers: take colour.intensity_from_layers out"
-        raise InputError("tolerance.intensity", limits["intensity"], text)
-    if "relief" in limits and scenario.scan.relief != 1.0:
-        text = "can't be promised for a relief of another strength than the surfaces': scan.relief must be 1"
-        raise InputError("tolerance.relief", limits["relief"], text)
-    if {"colour", "layers"} & set(limits) and scenario.colour.lighting == "path":
-        name = "colour" if "colour" in limits else "layers"
-        text = "can't be promised for whole light paths: colour.lighting must be direct"
-        raise InputError(f"tolerance.{name}", limits[name], text)
+    colour, paths = scenario.colour, "can't be promised for whole light paths: colour.lighting must be direct"
+    layers = "can't be promised for intensities from the points' layers: take colour.intensity_from_layers out"
+    relief = "can't be promised for a relief of another strength than the surfaces': scan.relief must be 1"
+    none = "nothing has such an error, as points get no"
+    refusals = (
+        ("intensity", colour.intensity_from_layers, layers),
+        ("relief", scenario.scan.relief != 1.0, relief),
+        ("colour", colour.lighting == "path", paths),
+        ("layers", colour.lighting == "path", paths),
+        ("height", foreign, "can't be promised of a scene that was built elsewhere"),
+        ("colour", not has_kind(scenario, "colour"), f"{none} colours: colour.rgb is false"),
+        ("layers", not has_kind(scenario, "layers"), f"{none} layers: cloud.attributes names none of them"),
+    )
+    for kind, wrong, text in refusals:
+        if wrong and kind in limits:
+            raise InputError(f"tolerance.{kind}", limits[kind], text)
+    if not set(scenario.outputs) & set(OF_POINTS):
+        raise InputError("outputs", list(scenario.outputs), "must have the cloud or previews for settings to be chosen")

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 from ...base.errors import InputError
@@ -26,13 +26,13 @@ class Option:
         changes: of the scenario: dotted path -> value.
         found: expected error and its upper bound by `tolerance.KINDS`; a kind that isn't there has none.
         cost: what tells cheap from dear: the same on every machine, unlike the time.
-        seconds: expected on this machine; None if not known.
+        seconds: expected on this machine.
     """
 
     changes: Mapping[str, Any]
     found: Errors
     cost: float
-    seconds: float | None = None
+    seconds: float = 0.0
 
     def bound(self, kind: str) -> float:
         """Return the upper bound of a kind of error."""
@@ -53,7 +53,7 @@ class Choice:
     """
 
     options: Mapping[str, Option]
-    fixed_seconds: float = field(default=0.0)
+    fixed_seconds: float = 0.0
 
     @property
     def changes(self) -> dict[str, Any]:
@@ -66,10 +66,9 @@ class Choice:
         return {kind: pair for option in self.options.values() for kind, pair in option.found.items()}
 
     @property
-    def seconds(self) -> float | None:
-        """Return the expected time, if it is known."""
-        parts = [option.seconds for option in self.options.values()]
-        return None if None in parts else self.fixed_seconds + sum(part for part in parts if part is not None)
+    def seconds(self) -> float:
+        """Return the expected time."""
+        return self.fixed_seconds + sum(option.seconds for option in self.options.values())
 
 
 Knobs = Mapping[str, Sequence[Option]]
@@ -102,14 +101,15 @@ def _impossible(options: Sequence[Option], limits: Mapping[str, float]) -> Input
     return InputError("tolerance", None, f"{' and '.join(kinds)} can't be kept together: the nearest is {said}")
 
 
-def cheapest(knobs: Knobs, limits: Mapping[str, float]) -> Choice:
+def cheapest(knobs: Knobs, limits: Mapping[str, float], fixed_seconds: float = 0.0) -> Choice:
     """Return the cheapest settings that keep a tolerance.
 
     Raises:
         InputError: there are none; says what is the best to be had.
     """
     kept = options_within(knobs, limits)
-    return Choice({name: min(options, key=lambda option: option.cost) for name, options in kept.items()})
+    best = {name: min(options, key=lambda option: option.cost) for name, options in kept.items()}
+    return Choice(best, fixed_seconds)
 
 
 def best_in_time(
@@ -124,7 +124,7 @@ def best_in_time(
     Of several as good in that, those whose errors' sum is the smallest, and of these the fastest.
 
     Args:
-        knobs: all options' seconds are known.
+        knobs: the options.
         seconds: that the job may take.
         reference: error of each kind that is as bad as the others'; a kind without one doesn't count.
         limits: a tolerance that is to be kept as well.
@@ -137,9 +137,9 @@ def best_in_time(
     choices = [
         Choice(dict(zip(kept, options, strict=True)), fixed_seconds) for options in itertools.product(*kept.values())
     ]
-    fitting = [choice for choice in choices if (choice.seconds or 0.0) <= seconds]
+    fitting = [choice for choice in choices if choice.seconds <= seconds]
     if not fitting:
-        raise too_short(seconds, min(choice.seconds or 0.0 for choice in choices), bool(limits))
+        raise too_short(seconds, min(choice.seconds for choice in choices), bool(limits))
     return min(fitting, key=lambda choice: _loss(choice, reference))
 
 
@@ -153,4 +153,4 @@ def too_short(seconds: float, fastest: float, tolerance: bool = False) -> InputE
 
 def _loss(choice: Choice, reference: Mapping[str, float]) -> tuple[float, float, float]:
     ratios = [choice.found.get(kind, (0.0, 0.0))[0] / max(base, _LEAST) for kind, base in reference.items()]
-    return round(max(ratios, default=0.0), 6), round(sum(ratios), 6), choice.seconds or 0.0
+    return round(max(ratios, default=0.0), 6), round(sum(ratios), 6), choice.seconds

@@ -9,42 +9,33 @@ table's then, unless a tolerance is to be kept as well.
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from typing import Any
 
-from ...base.errors import InputError
 from ...blender.cameras import HAS_RETURN_CAMERA
+from ...cloud.points import PointBlock
 from ...scanning.beam import RINGS
-from ...scanning.colour.colour import MATERIAL_LAYERS
-from ...scanning.devices.device import ScannerSetting
-from ...scanning.devices.shots import shot_count
 from ...scanning.scene.motion import ScannedScene
-from ...scenario.scan import scanner_setting
 from ...scenario.scenario import FIDELITIES, Scenario
 from ..measure.errors import CONVERGED, Errors, beam_errors
 from ..scan.plan import coloured_layers, may_render
-from .knobs import (
-    ModelKnobs,
-    check_choice,
-    colour_choices,
-    given_knobs,
-    octave_choices,
-    rays_changes,
-    rays_choices,
-    with_changes,
-)
-from .options import Choice, Option, best_in_time, cheapest, too_short
-from .sites import Site
+from ..scan.site import Site
+from . import knobs as choices
+from .knobs import ModelKnobs
+from .options import Choice, Knobs, Option, best_in_time, cheapest, too_short
 from .table import JobTimes, nearest_row, table_of
 from .trial import LINES, Trial
 
-_BEAM = ("position", "intensity", "labels", "density")
+_BEAM = frozenset({"position", "intensity", "labels", "density"})
 _COLOURS = frozenset({"colour", "layers"})
 _SURE = 0.8
 """Share of the time left that settings may be expected to take: the table's ratios differ from scene to scene."""
 _HOPELESS = 4.0
 """A time that the shipped table says is exceeded so many times isn't tried out."""
+
+MakeScene = Callable[[Mapping[str, Any]], ScannedScene]
+"""Returns the scene of a model with fields of the scenario changed, built in place of that before."""
 
 
 @dataclass(frozen=True)
@@ -54,29 +45,39 @@ class Decision:
     Attributes:
         scenario: the job with the chosen settings, as it can be repeated.
         report: what was asked for, chosen and expected, as JSON data.
-        model: the model that stands in the open file, if that is the chosen one.
-        scene: of that.
+        stands: whether the scene that was made last is the chosen one.
     """
 
     scenario: Scenario
     report: dict[str, Any]
-    model: ModelKnobs | None
-    scene: ScannedScene | None
+    stands: bool
 
 
-def decide(scenario: Scenario, site: Site, begun: float) -> Decision:
-    """Choose the settings that a scenario leaves open.
+@dataclass(frozen=True)
+class _Findings:
+    """Errors of the options of every knob: of the beam by model and rays, of the relief by octaves, of the colours by
+    name; and where they are from.
+    """
+
+    beam: Mapping[tuple[ModelKnobs | None, int], Errors]
+    relief: Mapping[int, Errors]
+    colour: Mapping[str, Errors]
+    source: str = f"pilot measurements on {LINES} scan lines"
+
+
+def decide(site: Site, begun: float, make: MakeScene, area: float = 0.0) -> Decision:
+    """Choose the settings that a site's scenario leaves open.
 
     Args:
-        scenario: has a tolerance or a time budget, or both.
-        site: what is scanned.
+        site: of the scan; its scenario has a tolerance or a time budget, or both.
         begun: when the job began, by `time.perf_counter`.
+        make: gives the scene.
+        area: of the model, m2; 0 if nothing is built.
 
     Raises:
         InputError: the tolerance can't be kept, which says what is the best to be had; or the time is too short.
     """
-    check_choice(scenario)
-    return _Search(scenario, site, begun).decide()
+    return _Search(site, begun, make, area).decide()
 
 
 class _Search:
@@ -84,231 +85,153 @@ class _Search:
 
     Attributes:
         limits: the tolerance; empty without.
-        trial: of the model that was built last.
-        model: that model; None for a scene that is there.
+        models: to choose from; None for a scene that is there.
         build_seconds: by model, of those that were built.
+        trial: the model that was built last, and the trial of it.
     """
 
-    def __init__(self, scenario: Scenario, site: Site, begun: float) -> None:
-        self.scenario, self.site, self.begun = scenario, site, begun
+    def __init__(self, site: Site, begun: float, make: MakeScene, area: float) -> None:
+        self.site, self.scenario, self.begun, self._make = site, site.scenario, begun, make
         self.began_here = time.perf_counter()
-        self.limits = scenario.tolerance.limits() if scenario.tolerance else {}
-        self.rays, self.octaves = rays_choices(scenario), octave_choices(scenario)
-        colours = colour_choices(scenario, site.path.typical_range, HAS_RETURN_CAMERA)
-        self.colours = colours if _COLOURS & set(self.limits) or may_render(scenario) else {}
-        setting: ScannerSetting = scanner_setting(scenario.scan)
-        pulses = sum(shot_count(setting, strip.duration) for strip in site.path.strips)
-        self.times = JobTimes(table_of(scenario.scan.platform.kind), site.area, pulses)
-        self.models = list(site.models(self.limits))
+        self.limits = self.scenario.tolerance.limits() if self.scenario.tolerance else {}
+        self.rays, self.octaves = choices.rays_choices(self.scenario), choices.octave_choices(self.scenario)
+        colours = choices.colour_choices(self.scenario, site.path.typical_range, HAS_RETURN_CAMERA)
+        self.colours = colours if _COLOURS & set(self.limits) or may_render(self.scenario) else {}
+        pulses = sum(map(site.cut.pulses, site.path.strips))
+        self.times = JobTimes(table_of(self.scenario.scan.platform.kind), area, pulses)
+        self.models: list[ModelKnobs | None] = [*choices.model_knobs(self.scenario, self.limits)] if area else [None]
         self.build_seconds: dict[ModelKnobs | None, float] = {}
-        self.trial: Trial | None = None
-        self.model: ModelKnobs | None = None
-        self.source = f"pilot measurements on {LINES} scan lines"
+        self.trial: tuple[ModelKnobs | None, Trial] | None = None
 
     def decide(self) -> Decision:
+        """Return the decision."""
         budget = self.scenario.time_budget
-        choice = self._choose_by_tolerance() if budget is None else self._choose_by_time(budget)
-        scenario = with_changes(self.scenario, choice.changes)
-        settings = scenario.settings()
-        stands = self.model in (None, ModelKnobs(settings.tolerance, settings.vegetation_detail))
-        report, scene = self._report(choice, budget), self._trial.scene
-        return Decision(scenario, report, self.model, scene) if stands else Decision(scenario, report, None, None)
-
-    def _report(self, choice: Choice, budget: float | None) -> dict[str, Any]:
-        here, kept = time.perf_counter(), given_knobs(self.scenario)
+        found, choice = self._choose_by_tolerance() if budget is None else self._choose_by_time(budget)
+        scenario, here = choices.with_changes(self.scenario, choice.changes), time.perf_counter()
+        kept, settings = choices.given_knobs(self.scenario), scenario.settings()
         asked = {"tolerance": self.limits or None, "time_budget": budget}
-        found = choice.found
-        return {
+        report = {
             "asked": {name: value for name, value in asked.items() if value is not None},
             "kept": kept,
             "chosen": {path: value for path, value in choice.changes.items() if path not in kept},
             "expected": {
-                "errors": {kind: float(f"{pair[0]:.6g}") for kind, pair in found.items()},
-                "at_most": {kind: float(f"{found[kind][1]:.6g}") for kind in self.limits},
-                "seconds": None if choice.seconds is None else round(here - self.begun + choice.seconds, 1),
+                "errors": {kind: float(f"{pair[0]:.6g}") for kind, pair in choice.found.items()},
+                "at_most": {kind: float(f"{choice.found[kind][1]:.6g}") for kind in self.limits},
+                "seconds": round(here - self.begun + choice.seconds, 1),
             },
-            "by": self.source,
+            "by": found.source,
             "pilot_seconds": round(here - self.began_here, 3),
         }
+        built = None if self.trial is None else self.trial[0]
+        return Decision(
+            scenario, report, built in (None, ModelKnobs(settings.tolerance, settings.vegetation_detail))
+        )
 
-    # By a tolerance
-
-    def _choose_by_tolerance(self) -> Choice:
-        choice = cheapest(self._measured_options(), self.limits)
-        rays = int(choice.changes.get("scan.rays_per_pulse", max(self.rays)))
+    def _choose_by_tolerance(self) -> tuple[_Findings, Choice]:
+        found = self._measure()
+        rays = int(cheapest(self._options(found), self.limits).changes.get("scan.rays_per_pulse", max(self.rays)))
         self.times.calibrate(rays, *self._trial.time_scan(self.rays[rays]))
-        timed = {name: self._with_time(name, option) for name, option in choice.options.items()}
-        return Choice(timed, self.times.fixed(self.scenario))
+        return found, cheapest(self._options(found), self.limits, self.times.fixed(self.scenario))
 
-    def _measured_options(self) -> dict[str, list[Option]]:
-        """Return the options of every knob with errors as trials show them: of the beam, only if it is limited."""
-        limited = bool(set(_BEAM) & set(self.limits))
-        if limited:
-            beam = self._measured_beam()
-        else:
+    def _choose_by_time(self, budget: float) -> tuple[_Findings, Choice]:
+        def left() -> float:
+            return budget - (time.perf_counter() - self.begun)
+
+        fewest, fixed = min(self.rays), self.times.fixed(self.scenario)
+        seconds = self.times.model(0) + self.times.scan(fewest) + fixed
+        if seconds > _HOPELESS * left():  # by the shipped table, before anything is built
+            raise too_short(left(), seconds)
+        self.times.calibrate(fewest, *self._try(self.models[0]).time_scan(self.rays[fewest]))
+        fixed = self.times.fixed(self.scenario)
+        if (fastest := self.times.scan(fewest) + fixed) > left():
+            raise too_short(left(), fastest)
+        # The error of the height follows from the model, without a measurement.
+        found = self._measure() if set(self.limits) - {"height"} else self._look_up()
+        return found, best_in_time(self._options(found), _SURE * left(), self._reference(), self.limits, fixed)
+
+    def _measure(self) -> _Findings:
+        """Return errors as trials show them: of the beam and of colours only if they are limited."""
+        limited = set(self.limits)
+        beam = self._measure_beam() if _BEAM & limited else {(self.models[0], min(self.rays)): {}}
+        if self.trial is None:
             self._try(self.models[0])
-            beam = [self._beam_option(self.models[0], min(self.rays), {})]
-        knobs = {"beam": beam}
-        if self.octaves:
-            found = self._trial.relief_errors(self.octaves)
-            knobs["relief"] = [self._relief_option(octaves, errors) for octaves, errors in found.items()]
-        if self.colours:
-            measured = bool(_COLOURS & set(self.limits))
-            errors = self._trial.colour_errors(self.colours, coloured_layers(self.scenario)) if measured else {}
-            knobs["colour"] = [self._colour_option(name, errors.get(name, {})) for name in self.colours]
-        return knobs
+        colour: Mapping[str, Errors] = {name: {} for name in self.colours}
+        if self.colours and _COLOURS & limited:
+            colour = self._trial.colour_errors(self.colours, coloured_layers(self.scenario))
+        return _Findings(beam, self._trial.relief_errors(self.octaves) if self.octaves else {}, colour)
 
-    def _measured_beam(self) -> list[Option]:
+    def _measure_beam(self) -> dict[tuple[ModelKnobs | None, int], Errors]:
         """Try all models out, the one with all plants last; the truth is seen among these."""
-        points = {}
+        points: dict[tuple[ModelKnobs | None, int], list[PointBlock]] = {}
         for model in self.models:
             trial = self._try(model)
-            points[model] = {rays: trial.points(rings) for rays, rings in self.rays.items()}
+            points |= {(model, rays): trial.points(rings) for rays, rings in self.rays.items()}
         exact = self.rays.get(CONVERGED) == RINGS[CONVERGED]
-        truth = points[self.models[-1]][CONVERGED] if exact else self._trial.points()
-        return [
-            self._beam_option(model, rays, beam_errors(mine, truth))
-            for model in self.models
-            for rays, mine in points[model].items()
-        ]
+        truth = points[self.models[-1], CONVERGED] if exact else self._trial.points()
+        return {knobs: beam_errors(mine, truth) for knobs, mine in points.items()}
 
-    # By a time
-
-    def _choose_by_time(self, budget: float) -> Choice:
-        self._refuse_hopeless(budget)
-        fewest = min(self.rays)
-        trial = self._try(self.models[0])
-        self.times.calibrate(fewest, *trial.time_scan(self.rays[fewest]))
-        fastest = self.times.scan(fewest) + self.times.fixed(self.scenario)
-        if fastest > self._left(budget):
-            raise too_short(self._left(budget), fastest)
-        # The error of the height follows from the model, without a measurement.
-        if set(self.limits) - {"height"}:
-            knobs = self._measured_options()
-        else:
-            self.source, knobs = "shipped table, scaled by a short run", self._table_options()
-        timed = {name: [self._with_time(name, option) for option in options] for name, options in knobs.items()}
-        left, fixed = _SURE * self._left(budget), self.times.fixed(self.scenario)
-        return best_in_time(timed, left, self._reference(timed), self.limits, fixed)
-
-    def _refuse_hopeless(self, budget: float) -> None:
-        """Refuse a time that is far too short before anything is built, by the shipped table."""
-        seconds = self.times.model(0) + self.times.scan(min(self.rays)) + self.times.fixed(self.scenario)
-        if seconds > _HOPELESS * self._left(budget):
-            raise too_short(self._left(budget), seconds)
-
-    def _left(self, budget: float) -> float:
-        """Return the seconds that are left of the budget."""
-        return budget - (time.perf_counter() - self.begun)
-
-    def _table_options(self) -> dict[str, list[Option]]:
-        """Return the options of every knob with the shipped table's errors."""
-        table = self.times.table
-        beam = []
+    def _look_up(self) -> _Findings:
+        """Return the shipped table's errors."""
+        table, beam = self.times.table, {}
         for model in self.models:
             few = model is not None and model.detail < FIDELITIES["standard"].vegetation_detail
             few = few and self.scenario.vegetation_detail is None  # as many plants as are wanted otherwise
             for rays in self.rays if model == self.models[-1] else (min(self.rays),):
-                errors = dict(nearest_row(table.beam, rays)) | (dict(table.few_plants) if few else {})
-                beam.append(self._beam_option(model, rays, _exact(errors)))
-        knobs = {"beam": beam}
-        if self.octaves:
-            rows = {octaves: {"relief": nearest_row(table.relief, octaves)} for octaves in self.octaves}
-            knobs["relief"] = [self._relief_option(octaves, _exact(errors)) for octaves, errors in rows.items()]
-        if self.colours:
-            kinds = [kind for kind in sorted(_COLOURS) if has_kind(self.scenario, kind)]
-            errors_of = {name: {kind: table.colour[name][kind] for kind in kinds} for name in self.colours}
-            knobs["colour"] = [self._colour_option(name, _exact(errors)) for name, errors in errors_of.items()]
-        return knobs
+                beam[model, rays] = _exact({**nearest_row(table.beam, rays), **(table.few_plants if few else {})})
+        relief = {octaves: _exact({"relief": nearest_row(table.relief, octaves)}) for octaves in self.octaves}
+        kinds = [kind for kind in sorted(_COLOURS) if choices.has_kind(self.scenario, kind)]
+        colour = {name: _exact({kind: table.colour[name][kind] for kind in kinds}) for name in self.colours}
+        return _Findings(beam, relief, colour, "shipped table, scaled by a short run")
 
-    def _reference(self, knobs: Mapping[str, Sequence[Option]]) -> dict[str, float]:
+    def _reference(self) -> dict[str, float]:
         """Return the errors of the standard fidelity, by which kinds of errors are weighed against each other."""
-        standard = FIDELITIES["standard"]
-        usual = {"beam": {"scan.rays_per_pulse": standard.rays_per_pulse}}
-        usual |= {"relief": {"scan.relief_octaves": standard.relief_octaves}}
-        found = {"height": standard.tolerance}
-        for name, options in knobs.items():
-            fitting = [option for option in options if usual.get(name, {}).items() <= option.changes.items()]
-            if name == "colour":
-                found |= self.times.table.colour["standard"]
-            elif fitting:
-                errors = fitting[-1].found
-                found |= {kind: pair[0] for kind, pair in errors.items() if kind != "height"}
+        table, standard = self.times.table, FIDELITIES["standard"]
+        found = {"height": standard.tolerance, "relief": nearest_row(table.relief, standard.relief_octaves)}
+        found |= {**nearest_row(table.beam, standard.rays_per_pulse), **table.colour["standard"]}
         return {kind: error for kind, error in found.items() if error > 0.0}
 
-    # Options
+    def _options(self, found: _Findings) -> Knobs:
+        """Return the options of every knob, with the times that are expected by what is known of this machine."""
+        knobs = {"beam": [self._beam_option(*knobs, errors) for knobs, errors in found.beam.items()]}
+        if found.relief:
+            knobs["relief"] = [
+                Option({"scan.relief_octaves": octaves}, errors, octaves, self.times.relief(octaves))
+                for octaves, errors in found.relief.items()
+            ]
+        if found.colour:
+            knobs["colour"] = [self._colour_option(name, errors) for name, errors in found.colour.items()]
+        return knobs
+
+    def _beam_option(self, model: ModelKnobs | None, rays: int, errors: Errors) -> Option:
+        """Return an option of rays and a model; its time is that of the scan, and of building if it doesn't stand."""
+        changes, cost, seconds = choices.rays_changes(self.scenario, rays), 4.0 + rays, self.times.scan(rays)
+        if model is None:
+            return Option(changes, errors, cost, seconds)
+        estimate, bound = errors.get("position", (0.0, 0.0))
+        errors = {**errors, "height": (model.height_error, model.height_error)}
+        errors["position"] = estimate, bound + model.position_error
+        if self.trial is None or model != self.trial[0]:
+            seconds += self.build_seconds.get(model, self.times.model(self.models.index(model)))
+        return Option({**model.changes, **changes}, errors, cost + 0.5 * model.detail, seconds)
+
+    def _colour_option(self, name: str, errors: Errors) -> Option:
+        changes = self.colours[name]
+        work = changes["colour.source"], *self._trial.count_images(changes)
+        return Option(changes, errors, self.times.colour_cost(*work), self.times.colour(*work))
 
     @property
     def _trial(self) -> Trial:
         assert self.trial is not None
-        return self.trial
+        return self.trial[1]
 
     def _try(self, model: ModelKnobs | None) -> Trial:
         """Return the trial of a model, which is built unless it stands."""
-        if self.trial is None or self.model != model:
+        if self.trial is None or self.trial[0] != model:
             begin = time.perf_counter()
-            scene = self.site.scene(model)
-            self.trial, self.model = Trial.of(self.scenario, scene, self.site.path, self.site.conditions), model
+            self.trial = model, Trial.of(self.site, self._make(model.changes if model else {}))
             self.build_seconds[model] = time.perf_counter() - begin
-        return self.trial
-
-    def _beam_option(self, model: ModelKnobs | None, rays: int, errors: Errors) -> Option:
-        changes, cost = rays_changes(self.scenario, rays), 4.0 + rays
-        if model is not None:
-            changes, cost = {**model.changes, **changes}, cost + 0.5 * model.detail
-            estimate, bound = errors.get("position", (0.0, 0.0))
-            moved = {"position": (estimate, bound + model.position_error)}
-            errors = {**errors, "height": (model.height_error, model.height_error), **moved}
-        return Option(changes, errors, cost)
-
-    def _relief_option(self, octaves: int, errors: Errors) -> Option:
-        return Option({"scan.relief_octaves": octaves}, errors, octaves)
-
-    def _colour_option(self, name: str, errors: Errors) -> Option:
-        changes = self.colours[name]
-        images = self._trial.count_images(changes)
-        return Option(changes, errors, self.times.colour_cost(changes["colour.source"], *images))
-
-    def _with_time(self, name: str, option: Option) -> Option:
-        """Return a knob's option with its expected time; that of the beam with that of a model that isn't built yet."""
-        changes = option.changes
-        if name == "relief":
-            return replace(option, seconds=self.times.relief(int(changes["scan.relief_octaves"])))
-        if name == "colour":
-            images = self._trial.count_images(changes)
-            return replace(option, seconds=self.times.colour(changes["colour.source"], *images))
-        model = next((one for one in self.models if one and one.changes.items() <= changes.items()), None)
-        build = self.build_seconds.get(model, self.times.model(self.models.index(model)))
-        rays = int(changes.get("scan.rays_per_pulse", max(self.rays)))
-        return replace(option, seconds=self.times.scan(rays) + (0.0 if model == self.model else build))
-
-
-def has_kind(scenario: Scenario, kind: str) -> bool:
-    """Return whether points of a job have what a kind of error of colours is of: ``colour`` or ``layers``."""
-    wanted = coloured_layers(scenario)
-    return "rgb" in wanted if kind == "colour" else bool(set(MATERIAL_LAYERS) & wanted)
+        return self.trial[1]
 
 
 def _exact(errors: Mapping[str, float]) -> Errors:
     return {kind: (error, error) for kind, error in errors.items()}
-
-
-def check(scenario: Scenario, foreign: bool = False) -> None:
-    """Refuse a choice that can't be made before any work starts.
-
-    Args:
-        scenario: the job.
-        foreign: the scene isn't built, so that nothing is known of its height's errors.
-    """
-    if not scenario.chooses:
-        return
-    check_choice(scenario)
-    limits = scenario.tolerance.limits() if scenario.tolerance else {}
-    if foreign and "height" in limits:
-        raise InputError("tolerance.height", limits["height"], "can't be promised of a scene that was built elsewhere")
-    for kind in sorted(_COLOURS & set(limits)):
-        if not has_kind(scenario, kind):
-            has = "colours: colour.rgb is false" if kind == "colour" else "layers: cloud.attributes names none of them"
-            raise InputError(f"tolerance.{kind}", limits[kind], f"nothing has such an error, as points get no {has}")
-    if not set(scenario.outputs) & {"cloud", "previews"}:
-        raise InputError("outputs", list(scenario.outputs), "must have the cloud or previews for settings to be chosen")

@@ -20,39 +20,28 @@ from ...base.progress import StageTimer
 from ...blender.cameras import image_views, layer_source
 from ...blender.services import BlenderServices
 from ...cloud.points import PointBlock
-from ...scanning.beam import RINGS, beam_pattern
-from ...scanning.blocks import Blocks
+from ...scanning.beam import RINGS
 from ...scanning.colour.colour import LayerValues, SeenPoints, sample_points
 from ...scanning.colour.request import LayerRequest
 from ...scanning.colour.settings import ColourSettings
 from ...scanning.colour.views import View
 from ...scanning.noise import Noise
-from ...scanning.plan import ScanConditions, ScanPlan
-from ...scanning.platforms.path import Path as ScanPath
+from ...scanning.plan import ScanPlan
 from ...scanning.platforms.stretches import scatter_stretches
 from ...scanning.record import record_as_measured
 from ...scanning.scan import BlockResult, joined_results
 from ...scanning.scene.motion import ScannedScene
-from ...scenario.scenario import Scenario
-from ..measure.errors import (
-    CONVERGED,
-    FINEST,
-    Errors,
-    colour_errors,
-    relief_errors,
-    shift_points,
-    truest_settings,
-)
-from ..scan.files import CloudFiles, record_to_files
-from ..scan.plan import plan_scan
+from ..measure.errors import CONVERGED, FINEST, Errors, colour_errors, relief_errors, shift_points, truest_settings
+from ..scan.files import record_to_files
+from ..scan.site import Site
 
 LINES, PULSES = 64, 1024
 """Stretches that errors are taken of, and the pulses of each."""
 _TIMED_PULSES = 1 << 15
 """Pulses of each stretch that is timed: as many as blocks are worth."""
-_TIMED = 8
+_TIMED = 4
 _TIMED_SHARE = 0.1
-"""Stretches that are timed, and the largest share of the path that they may be."""
+"""Stretches that are timed at least, and the largest share of the path that twice as many may be."""
 _COLOURED = 8
 """Scan lines that errors of colours are taken of."""
 _NEAREST = 3
@@ -66,28 +55,27 @@ class Trial:
     """A scene that is tried out.
 
     Attributes:
-        scenario: the job, without noise.
-        scene: what is scanned.
+        site: of the scan; its scenario is without noise.
         plan: of the whole path.
         phase: see `scanning.platforms.stretches.scatter_stretches`: other phases are other stretches.
         lines: of these is the error taken.
         clock: measures seconds.
     """
 
-    scenario: Scenario
-    scene: ScannedScene
+    site: Site
     plan: ScanPlan
     phase: float = 0.5
     lines: int = field(default_factory=lambda: LINES)
     clock: Callable[[], float] = time.perf_counter
 
     @classmethod
-    def of(cls, scenario: Scenario, scene: ScannedScene, path: ScanPath, conditions: ScanConditions) -> Trial:
+    def of(cls, site: Site, scene: ScannedScene) -> Trial:
         """Prepare to scan a scene; builds the casters."""
-        quiet = scenario.scan.model_copy(update={"noise": Noise(range_sigma=0.0)})
-        colour = scenario.colour.model_copy(update={"intensity_from_layers": False})
-        scenario = scenario.model_copy(update={"scan": quiet, "colour": colour})
-        return cls(scenario, scene, plan_scan(scenario, scene, path, BlenderServices(), conditions))
+        quiet = site.scenario.scan.model_copy(update={"noise": Noise(range_sigma=0.0)})
+        colour = site.scenario.colour.model_copy(update={"intensity_from_layers": False})
+        scenario = site.scenario.model_copy(update={"scan": quiet, "colour": colour})
+        site = replace(site, scenario=scenario, view=None)
+        return cls(site, site.plan(scene, BlenderServices()))
 
     @property
     def pulses(self) -> int:
@@ -97,9 +85,9 @@ class Trial:
     def scan_lines(self, rings: tuple[int, ...], lines: int = 0) -> list[BlockResult]:
         """Scan the stretches that errors are taken of with a beam; return the points of each, and where they are."""
         path = scatter_stretches(self.plan.path, lines or self.lines, PULSES / self.plan.setting.shot_rate, self.phase)
-        results = iter(record_as_measured(replace(self.plan, path=path, rings=rings)))
-        blocks = Blocks(self.plan.setting, path, len(beam_pattern(rings).weights))
-        return [joined_results([next(results) for _ in blocks.block_numbers(strip)]) for strip in path.strips]
+        plan = replace(self.plan, path=path, rings=rings)
+        results = iter(record_as_measured(plan))
+        return [joined_results([next(results) for _ in plan.cut.block_numbers(strip)]) for strip in path.strips]
 
     def points(self, rings: tuple[int, ...] = RINGS[CONVERGED]) -> list[PointBlock]:
         """Return the points of the stretches with a beam: the converged one, which is the truth, if none is given."""
@@ -138,9 +126,10 @@ class Trial:
     def layer_request(self, changes: Mapping[str, Any]) -> LayerRequest:
         """Return the request for colours with changes of the scenario."""
         given = {path.removeprefix("colour."): value for path, value in changes.items()}
-        colour = type(self.scenario.colour).from_dict(self.scenario.colour.to_dict() | given)
+        scenario = self.site.scenario
+        colour = type(scenario.colour).from_dict(scenario.colour.to_dict() | given)
         assert self.plan.request is not None
-        settings = colour.settings(self.scenario.fidelity, self.plan.path.typical_range)
+        settings = colour.settings(scenario.fidelity, self.plan.path.typical_range)
         return replace(self.plan.request, settings=settings)
 
     def _layers(
@@ -163,20 +152,31 @@ class Trial:
     def time_scan(self, rings: tuple[int, ...]) -> tuple[float, int]:
         """Return the seconds of the whole scan into files with a beam, projected from stretches, and its points.
 
-        Colours are the materials' means and the relief is the coarsest: what more than that costs is known apart.
+        Few stretches and twice as many tell what every scan takes from what each pulse takes; before these, the few
+        are scanned once, as the first scan waits for much that later ones find done. Colours are the materials' means
+        and the relief is the coarsest: what more than that costs is known apart.
         """
-        count = max(_TIMED, 2 * available_cores())
-        path = scatter_stretches(self.plan.path, count, _TIMED_PULSES / self.plan.setting.shot_rate, 0.5, _TIMED_SHARE)
-        # Pulses come in whole lines, so that stretches hold fewer of them than their duration says.
-        share = sum(map(self.plan.pulses, path.strips)) / self.pulses
+        workers = self.plan.threads or available_cores()
+        few = workers * -(-_TIMED // workers)  # no worker waits for another at the end
+        turns = ((few, _TIMED_SHARE / 2.0), (few, _TIMED_SHARE / 2.0), (2 * few, _TIMED_SHARE))
+        _, (less, soon, _), (more, late, points) = [self._time_stretches(rings, *turn) for turn in turns]
+        rate = late / more
+        if more > less and late > soon:  # else the clock shows no difference, or other work on the machine
+            rate = min(rate, (late - soon) / (more - less))
+        return late + rate * (self.pulses - more), round(points * self.pulses / more)
+
+    def _time_stretches(self, rings: tuple[int, ...], count: int, share: float) -> tuple[int, float, int]:
+        """Scan so many stretches, at most a share of the path, into files; return pulses, seconds and points."""
+        path = scatter_stretches(self.plan.path, count, _TIMED_PULSES / self.plan.setting.shot_rate, 0.5, share)
         request = self.layer_request({"colour.source": "material"})
         plan = replace(self.plan, path=path, rings=rings, relief_octaves=2, request=request)
         with tempfile.TemporaryDirectory(prefix="synthroads-") as folder:
-            files = CloudFiles(self.scenario, Path(folder), plan.target.origin, path.typical_range)
+            files = self.site.files(Path(folder), plan.target.origin)
             begin = self.clock()
             record_to_files([plan], files, StageTimer())
             seconds = self.clock() - begin
-        return seconds / share, round(files.counts.points / share)
+        # Pulses come in whole lines, so that stretches hold fewer of them than their duration says.
+        return sum(map(self.plan.pulses, path.strips)), seconds, files.counts.points
 
 
 def views_near_lines(views: Sequence[View], lines: Sequence[SeenPoints]) -> list[View]:

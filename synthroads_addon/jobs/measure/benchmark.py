@@ -6,7 +6,8 @@ A process measures one number of cores: those that it may use.
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Callable, Iterable, Iterator
+from collections import deque
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -20,16 +21,17 @@ from ...base.progress import StageTimer, peak_memory_mb
 from ...blender.cameras.benchmark import panel_edit, rendering, seconds_of
 from ...blender.casters.measure import bare_rate
 from ...blender.files import empty_file
+from ...blender.services import BlenderServices
 from ...road.geometry import RoadGeometry
 from ...sampling.road import sample_road
 from ...scanning.beam import RINGS
 from ...scanning.plan import ScanPlan
 from ...scanning.record import CollectedBlocks, record, scan_blocks
-from ...scanning.scan import scan_block
+from ...scanning.scan import BlockScan
 from ...scanning.scene.caster import Caster
 from ...scenario.scenario import Scenario
-from ..road_files import write_road_files
-from ..road_scene import build_model, plan_road_scan, read_scene, road_cloud_files
+from ..job_files import JobFiles
+from ..road_scene import RoadScene
 from ..scan.files import CloudFiles, record_to_files
 
 _CAST_BLOCKS, _WRITTEN_BLOCKS = 48, 96
@@ -58,22 +60,26 @@ def measure_demo(scenario: Scenario) -> dict[str, Any]:
         folder = Path(text)
         with timer.stage("parameters"):
             road = RoadGeometry(sample_road(scenario.road, scenario.seed, scenario.title))
-            write_road_files(folder, scenario, road, timer)
+            JobFiles(scenario).write_road(folder, road, timer)
+        shown = RoadScene(scenario, road)
         with timer.stage("model"):
-            model = build_model(scenario, road)
+            model = shown.build()
         with timer.stage("scene mesh"):
-            scene = read_scene(scenario, road)
+            scene = shown.read()
         with timer.stage("caster"):
-            plan = plan_road_scan(scenario, road, scene)
-        files = road_cloud_files(scenario, road, folder, plan)
+            plan = shown.site.plan(scene, BlenderServices())
+        files = shown.site.files(folder, plan.target.origin)
         record_to_files([plan], files, timer)
         seconds, memory = timer.seconds, peak_memory_mb()
-        floors = [*_casting(plan), _writing(plan, files, folder)]
+        # The scene, its caster and the materials are the same for every number of rays.
+        bare = replace(plan, targets=False, wanted=frozenset())
+        casting = {rays: _cast_beside(replace(bare, rings=RINGS[rays])) for rays in _RAYS}
+        writing = _writing(plan, files, folder)
+        floors = [*casting.values(), writing]
         assert plan.request is not None
         if scenario.colour.source != "material":
             floors.append(rendering(plan.request, _VIEWS))
-    own = next(row for row in floors if row["rays"] == plan.rays_per_pulse)
-    writing = next(row for row in floors if row["name"].startswith("writing"))
+    own = casting[plan.rays_per_pulse]
     lines = {
         "points": files.counts.points / 1e6,
         "seconds": seconds,
@@ -84,8 +90,6 @@ def measure_demo(scenario: Scenario) -> dict[str, Any]:
         "casting": 100.0 * own["ours"] / own["floor"],
         "writing": writing["ours"],
     }
-    for row in floors:
-        row.pop("rays", None)
     return {"cores": available_cores(), "stages": timer.stages, "lines": lines, "floors": floors}
 
 
@@ -114,39 +118,29 @@ class _KeptRays:
         return self._caster.cast(origins, directions, maximum_range)
 
 
-def _casting(plan: ScanPlan) -> Iterator[Rate]:
-    """Yield casting and radiometry beside the bare caster on the same rays, for several numbers of rays per pulse."""
-    for rays in _RAYS:
-        # The scene, its caster and the materials are the same.
-        yield _cast_beside(replace(plan, rings=RINGS[rays], targets=False, wanted=frozenset()))
-
-
 def _cast_beside(plan: ScanPlan) -> Rate:
+    """Return casting and radiometry beside the bare caster on the same rays."""
     threads, blocks = available_cores(), _spread_blocks(plan, _CAST_BLOCKS)
     part = plan.target._parts[0]
     caster, kept = part.caster, _KeptRays(part.caster)
     object.__setattr__(part, "caster", kept)
     try:
         for block in blocks:
-            scan_block(plan, *block)
+            BlockScan(plan).block(*block)
     finally:
         object.__setattr__(part, "caster", caster)
     origins, directions = np.concatenate(kept.origins), np.concatenate(kept.directions)
     few = replace(plan, only=tuple(blocks), threads=threads)
 
     def ours() -> float:
-        return len(origins) / seconds_of(lambda: _exhaust(scan_blocks(few)))
+        return len(origins) / seconds_of(lambda: deque(scan_blocks(few), maxlen=0))
 
     def floor() -> float:
         limit = plan.setting.maximum_range
         return bare_rate(caster, origins, directions, limit, threads, repeats=1).rays_per_second
 
-    return {
-        "name": f"casting and radiometry, {plan.rays_per_pulse} rays per pulse; Embree",
-        "unit": "million rays/s",
-        **_best_of_both(ours, floor),
-        "rays": plan.rays_per_pulse,
-    }
+    name = f"casting and radiometry, {plan.rays_per_pulse} rays per pulse; Embree"
+    return {"name": name, "unit": "million rays/s", **_best_of_both(ours, floor)}
 
 
 def _best_of_both(ours: Callable[[], float], floor: Callable[[], float]) -> dict[str, float]:
@@ -177,9 +171,4 @@ def _writing(plan: ScanPlan, files: CloudFiles, folder: Path) -> Rate:
             writer.point_writer.write_points(written.points)  # without laspy's bookkeeping
 
     rates = _best_of_both(lambda: count / seconds_of(ours), lambda: count / seconds_of(floor))
-    return {"name": "writing LAZ; lazrs alone", "unit": "million points/s", **rates, "rays": 0}
-
-
-def _exhaust(items: Iterable[object]) -> None:
-    for _ in items:
-        pass
+    return {"name": "writing LAZ; lazrs alone", "unit": "million points/s", **rates}

@@ -22,7 +22,7 @@ from ...base.random_streams import stream
 from ...blender.cameras import HAS_RETURN_CAMERA
 from ...cloud.points import PointBlock
 from ...scanning.beam import RINGS
-from ...scanning.colour.colour import FROM_MATERIAL, MATERIAL_LAYERS, NEARBY, LayerValues
+from ...scanning.colour.colour import FROM_MATERIAL, MATERIAL_LAYERS, NEARBY, LayerValues, source_name
 from ...scanning.colour.difference import cie_lab, ciede2000
 from ...scanning.colour.request import LayerRequest
 from ...scanning.colour.settings import ColourSettings
@@ -134,6 +134,23 @@ def colour_errors(mine: Sequence[LayerValues], truth: Sequence[LayerValues], wan
         estimate, bound = max(layers, key=lambda pair: pair[1])
         result["layers"] = float(np.sqrt(estimate)), float(np.sqrt(bound))
     return result
+
+
+def errors_by_source(mine: LayerValues, truth: LayerValues) -> tuple[dict[str, float], dict[str, dict[str, float]]]:
+    """Return the errors of colours and layers, of all points and by what gave them to these."""
+    known = known_rows(truth)
+    difference = colour_difference(mine, truth, known)
+    squares = [squared_error(name, mine, truth, known) for name in MATERIAL_LAYERS]
+
+    def of(rows: NDArray[np.bool_]) -> dict[str, float]:
+        return {
+            "colour_median": round(float(np.median(difference[rows])), 6),
+            "colour_95": round(float(np.quantile(difference[rows], QUANTILE)), 6),
+            "layers_rmse": round(max(float(np.sqrt(square[rows].mean())) for square in squares), 6),
+        }
+
+    names = np.array([source_name(number) for number in range(256)])[mine.source[known]]
+    return of(np.ones(len(difference), bool)), {str(name): of(names == name) for name in np.unique(names)}
 
 
 def quantile_bound(parts: Sequence[Float], quantile: float, key: str = "") -> tuple[float, float]:

@@ -6,7 +6,6 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable
-from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -15,43 +14,25 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...base.machine import machine
-from ...base.progress import StageTimer, peak_memory_mb
+from ...base.progress import peak_memory_mb
 from ...blender.cameras import HAS_RETURN_CAMERA, layer_source, renders_returns
 from ...blender.cameras.returns import RENDERINGS_KEPT
 from ...blender.services import BlenderServices
 from ...road.geometry import RoadGeometry
 from ...sampling.road import sample_road
 from ...scanning.beam import RINGS
-from ...scanning.colour.colour import (
-    MATERIAL_LAYERS,
-    LayerSource,
-    LayerValues,
-    sample_points,
-    shares_by_source,
-    source_name,
-)
+from ...scanning.colour.colour import MATERIAL_LAYERS, LayerValues, sample_points, shares_by_source
 from ...scanning.colour.request import LayerRequest
 from ...scanning.plan import ScanPlan
 from ...scanning.platforms.stretches import middle_stretches, spread_stretches
-from ...scanning.record import RETURNS_AT_ONCE, record_as_measured
+from ...scanning.record import RETURNS_AT_ONCE, record_as_measured, scan_blocks
 from ...scanning.relief import micro_relief
 from ...scanning.scan import BlockResult, joined_results
 from ...scanning.scene.motion import ScannedScene
 from ...scenario.scenario import Scenario, load_scenario
-from ..road_scene import build_model, plan_road_scan, read_scene
-from ..scan.files import CloudFiles, ScanCounts, record_to_files
-from .errors import (
-    CONVERGED,
-    FINEST,
-    QUANTILE,
-    beam_errors,
-    colour_difference,
-    known_rows,
-    relief_errors,
-    shift_points,
-    squared_error,
-    truest_settings,
-)
+from ..road_scene import RoadScene
+from ..scan.site import Site
+from .errors import CONVERGED, FINEST, beam_errors, errors_by_source, relief_errors, shift_points, truest_settings
 from .mesh_errors import mesh_height_errors
 from .tradeoff import KNOBS, TRUE_SAMPLES, Knob, row_scenario
 
@@ -82,29 +63,24 @@ def measure_row(scenario_name: str, knob: str, value: Any) -> dict[str, Any]:
         return {"knob": knob, "value": value, "left_out": "a pixel per return needs Blender 5.0 or newer"}
     road = RoadGeometry(sample_road(scenario.road, scenario.seed))
     start = time.process_time()
-    build_model(scenario, road)
-    scene = read_scene(scenario, road)
+    shown = RoadScene(scenario, road)
+    shown.build()
+    scene = shown.read()
     built = time.process_time()
-    plan = plan_road_scan(scenario, road, scene)
+    plan = shown.site.plan(scene, BlenderServices())
     ready = time.process_time()
+    costs, sample = _measure_stretches(shown.site, KNOBS[knob], scene, plan)
     whole = load_scenario(scenario_name).vegetation_detail or 1.0
-    cost, errors = _measure_stretches(scenario, knob, road, scene, plan, whole)
     return {
         "knob": knob,
         "value": value,
-        "seconds": round(ready - start + cost.image_seconds + cost.scan_seconds, 3),
+        "seconds": round(ready - start + costs["image_seconds"] + costs["scan_seconds"], 3),
         "model_seconds": round(built - start, 3),
         "caster_seconds": round(ready - built, 3),
-        "image_seconds": round(cost.image_seconds, 3),
-        "scan_seconds": round(cost.scan_seconds, 3),
-        "rays_per_second": cost.rays_per_second,
-        "peak_memory_mb": cost.peak_memory_mb,
         "triangles": plan.target.triangles,
-        "images": cost.rendered.get("images", 0),
-        "megapixels": round(cost.rendered.get("pixels", 0) / 1e6, 3),
-        "shares": cost.shares,
         "machine": machine({"Blender": sys.modules["bpy"].app.version_string}),
-        **errors,
+        **{name: round(cost, 3) if isinstance(cost, float) else cost for name, cost in costs.items()},
+        **_errors(KNOBS[knob], sample, road, lambda: _true_plan(scenario, road, sample.plan, whole)),
     }
 
 
@@ -119,8 +95,6 @@ class Sample:
         result: the points as measured, with normals and materials, and where they were seen.
         values: their colours and layers; None without.
         written: points in the file.
-        truth: returns the plan of the same stretches with the converged footprint among all plants, or None if `plan`
-            is that itself. It may build that scene in place of the one scanned.
     """
 
     scene: ScannedScene
@@ -129,39 +103,19 @@ class Sample:
     result: BlockResult
     values: LayerValues | None
     written: int
-    truth: Callable[[], ScanPlan | None]
-
-
-@dataclass(frozen=True)
-class _Cost:
-    """Cost of the job after the caster is built.
-
-    Attributes:
-        image_seconds: before the first point.
-        scan_seconds: from there to the file, of the whole path.
-        rays_per_second: of that.
-        rendered: as a report has it, before the first point.
-        shares: of the points by the source of their colour.
-    """
-
-    image_seconds: float
-    scan_seconds: float
-    rays_per_second: int
-    peak_memory_mb: float | None
-    rendered: dict[str, Any]
-    shares: dict[str, float]
 
 
 def _measure_stretches(
-    scenario: Scenario, knob: str, road: RoadGeometry, scene: ScannedScene, plan: ScanPlan, plants: float
-) -> tuple[_Cost, dict[str, Any]]:
-    """Do the job on stretches of the path; return what it costs and the errors.
+    site: Site, knob: Knob, scene: ScannedScene, plan: ScanPlan
+) -> tuple[dict[str, Any], Sample]:
+    """Do the job on stretches of the path; return what it costs after the caster is built, and the points.
 
-    Args:
-        plants: share of the plants that the truth has.
+    Returns:
+        ``image_seconds`` before the first point, and ``images`` and ``megapixels`` that are rendered then;
+        ``scan_seconds`` from there to the file, of the whole path, and ``rays_per_second`` of that;
+        ``peak_memory_mb``; ``shares`` of the points by the source of their colour.
     """
-    coloured = "colour" in KNOBS[knob].errors
-    request = plan.request
+    request, coloured = plan.request, "colour" in knob.errors
     assert request is not None
     if coloured:
         request = replace(request, wanted=LAYERS)
@@ -169,54 +123,67 @@ def _measure_stretches(
     part = replace(plan, path=path)
     result = joined_results(record_as_measured(part))
     start = time.process_time()
-    with layer_source(request) as source:
+    with layer_source(request) as source, tempfile.TemporaryDirectory(prefix="synthroads-") as folder:
         if coloured and result.seen is not None:
             sample_points(source, result.seen.select(slice(0, _FEW)), LAYERS)
         prepared, rendered = time.process_time(), dict(source.report)
-        counts = _count_points_in_file(scenario, part, source)
-        done = time.process_time()
-        peak = peak_memory_mb()
+        files = site.files(Path(folder), part.target.origin)
+        with files.opened():
+            for block in scan_blocks(part, source):
+                files.write(block)
+        done, peak, counts = time.process_time(), peak_memory_mb(), files.counts
         values = sample_points(source, result.seen, LAYERS) if coloured and result.seen is not None else None
-    seconds, images = done - prepared, prepared - start
-    restarts = 0
+    images, restarts = prepared - start, 0
     if coloured and renders_returns(request.settings):  # stretches are too few for the renderer to begin anew
         restarts = int(counts.points / path.share / RETURNS_AT_ONCE / RENDERINGS_KEPT)
-    cost = _Cost(
-        image_seconds=images,
-        scan_seconds=seconds / path.share + restarts * images,
-        rays_per_second=round(counts.rays / seconds),
-        peak_memory_mb=peak,
-        rendered=rendered,
-        shares=shares_by_source(counts.by_source),
-    )
-
-    def truth() -> ScanPlan | None:
-        return _truth(scenario, road, part, plants)
-
-    sample = Sample(scene, part, request, result, values, counts.points, truth)
-    return cost, _errors(KNOBS[knob], sample, road)
+    costs = {
+        "image_seconds": images,
+        "scan_seconds": (done - prepared) / path.share + restarts * images,
+        "rays_per_second": round(counts.rays / (done - prepared)),
+        "peak_memory_mb": peak,
+        "images": rendered.get("images", 0),
+        "megapixels": rendered.get("pixels", 0) / 1e6,
+        "shares": shares_by_source(counts.by_source),
+    }
+    return costs, Sample(scene, part, request, result, values, counts.points)
 
 
-def _truth(scenario: Scenario, road: RoadGeometry, part: ScanPlan, plants: float) -> ScanPlan | None:
-    """Return the plan that counts as true, see `Sample.truth`; builds the road anew if it lacks plants."""
+def _true_plan(scenario: Scenario, road: RoadGeometry, part: ScanPlan, plants: float) -> ScanPlan | None:
+    """Return the plan of a plan's stretches with the converged footprint among all plants; None if it is that itself.
+
+    The road is built anew, in place of the one scanned, if it lacks plants.
+
+    Args:
+        scenario: that was scanned.
+        road: the road.
+        part: the plan of the stretches.
+        plants: share of the plants that the truth has.
+    """
     detail = scenario.settings().vegetation_detail
     if detail == plants and part.rays_per_pulse == CONVERGED:
         return None
-    fast = scenario.model_copy(
-        update={"scan": scenario.scan.model_copy(update={"caster": "auto"}), "vegetation_detail": plants}
-    )
-    if detail != plants:
-        build_model(fast, road)
-    elif part.target.caster.name == "embree":
+    if detail == plants and part.target.caster.name == "embree":
         return replace(part, rings=RINGS[CONVERGED])
-    plan = plan_road_scan(fast, road, read_scene(fast, road))
+    scan = scenario.scan.model_copy(update={"caster": "auto"})
+    shown = RoadScene(scenario.model_copy(update={"scan": scan, "vegetation_detail": plants}), road)
+    if detail != plants:
+        shown.build()
+    plan = shown.site.plan(shown.read(), BlenderServices())
     return replace(plan, path=part.path, rings=RINGS[CONVERGED])
 
 
-def _errors(knob: Knob, sample: Sample, road: RoadGeometry) -> dict[str, Any]:
+def _errors(
+    knob: Knob, sample: Sample, road: RoadGeometry, true_plan: Callable[[], ScanPlan | None]
+) -> dict[str, Any]:
     """Return ``errors`` by name of `tradeoff.ROW_TITLES`, and of colours ``colour_truth`` and ``errors_by_source``.
 
     The former is what they were compared with, the latter their errors by what gave them to the points.
+
+    Args:
+        knob: says which errors.
+        sample: the points.
+        road: the analytic road.
+        true_plan: see `_true_plan`.
     """
     errors: dict[str, float] = {}
     more: dict[str, Any] = {}
@@ -227,16 +194,19 @@ def _errors(knob: Knob, sample: Sample, road: RoadGeometry) -> dict[str, Any]:
         errors["relief_mm"] = 1e3 * _relief_error(sample)
     if "colour" in knob.errors:
         truth, more["colour_truth"], chosen = _true_colours(knob, sample)
-        of_all, more["errors_by_source"] = _colour_errors(sample.values, truth, chosen)
+        assert sample.values is not None
+        mine = {name: array[chosen] for name, array in sample.values.arrays.items()}
+        mine_there = LayerValues(mine, sample.values.source[chosen])
+        of_all, more["errors_by_source"] = errors_by_source(mine_there, truth)
         errors |= of_all
     if "beam" in knob.errors:  # last, as its truth may be another scene
-        errors |= _beam_errors(sample)
+        errors |= _beam_errors(sample, true_plan())
     return {"errors": {name: round(error, 6) for name, error in errors.items()}, **more}
 
 
-def _beam_errors(sample: Sample) -> dict[str, float]:
-    """Compare first returns with those of the converged footprint; points with those in the file."""
-    mine, plan = sample.result.points, sample.truth()
+def _beam_errors(sample: Sample, plan: ScanPlan | None) -> dict[str, float]:
+    """Compare first returns with those of the converged footprint's plan; points with those in the file."""
+    mine = sample.result.points
     truth = mine if plan is None else joined_results(record_as_measured(plan)).points
     found = beam_errors([mine], [truth])
     return {
@@ -273,45 +243,3 @@ def _true_colours(knob: Knob, sample: Sample) -> tuple[LayerValues, str, NDArray
         name = f"images of {pixel:g} m pixels every {spacing:g} m, of the points that these show"
     with layer_source(replace(request, settings=settings, wanted=LAYERS)) as source:
         return sample_points(source, seen.select(chosen), LAYERS), name, chosen
-
-
-def _colour_errors(
-    values: LayerValues | None, truth: LayerValues, chosen: NDArray[np.intp]
-) -> tuple[dict[str, float], dict[str, dict[str, float]]]:
-    """Return the errors of colours and layers, of all points and by what gave them to these."""
-    assert values is not None
-    mine = LayerValues({name: array[chosen] for name, array in values.arrays.items()}, values.source[chosen])
-    known = known_rows(truth)
-    difference = colour_difference(mine, truth, known)
-    squares = [squared_error(name, mine, truth, known) for name in MATERIAL_LAYERS]
-
-    def of(rows: NDArray[np.bool_]) -> dict[str, float]:
-        return {
-            "colour_median": round(float(np.median(difference[rows])), 6),
-            "colour_95": round(float(np.quantile(difference[rows], QUANTILE)), 6),
-            "layers_rmse": round(max(float(np.sqrt(square[rows].mean())) for square in squares), 6),
-        }
-
-    names = np.array([source_name(number) for number in range(256)])[mine.source[known]]
-    return of(np.ones(len(difference), bool)), {str(name): of(names == name) for name in np.unique(names)}
-
-
-class _OpenedLayers(BlenderServices):
-    """Blender's services, with a source of layers that is open already."""
-
-    def __init__(self, source: LayerSource) -> None:
-        self._source = source
-
-    def layers(
-        self, request: LayerRequest, progress: Callable[[float], None]
-    ) -> AbstractContextManager[LayerSource]:
-        """Return the open source."""
-        return nullcontext(self._source)
-
-
-def _count_points_in_file(scenario: Scenario, part: ScanPlan, source: LayerSource) -> ScanCounts:
-    """Scan into a file that is thrown away; return what was counted."""
-    with tempfile.TemporaryDirectory(prefix="synthroads-") as folder:
-        files = CloudFiles(scenario, Path(folder), part.target.origin, part.path.typical_range)
-        record_to_files([replace(part, services=_OpenedLayers(source))], files, StageTimer())
-    return files.counts

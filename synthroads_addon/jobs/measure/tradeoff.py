@@ -6,15 +6,13 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
+from ...base.files import PRESETS
+from ...base.schema import read_json
 from ...scenario.colour import USUAL_RANGE, image_scale
 from ...scenario.scenario import Scenario, load_scenario
 
 SCENES = ("rq31-600m", "mobile-mapping-300m", "airborne-1000m")
 """Built-in scenarios that the trade-off is measured on: 60 m above the road, on it, and 700 m above it."""
-BARE = ("colour.rgb=false", "scan.relief=0")
-"""Changes that leave out what the knobs of the model and the beam don't touch."""
-IMAGES = ("scan.relief=0", "colour.source=images")
-WHOLE_PATHS = ("scan.relief=0", "colour.source=returns", "colour.lighting=path")
 TRUE_SAMPLES = 256
 """Samples per pixel of the light that counts as true beside whole light paths."""
 REPEATED = {"fidelity": 2}
@@ -41,79 +39,35 @@ class Knob:
     whole_paths: bool = False
 
 
-def _field(path: str, values: Iterable[Any], common: tuple[str, ...]) -> dict[Any, tuple[str, ...]]:
-    """Return the rows of one field of the scenario."""
-    return {value: (*common, f"{path}={value}") for value in values}
+def _read_knob(
+    table: str,
+    errors: list[str],
+    always: list[str],
+    rows: Iterable[tuple[Any, list[str]]] = (),
+    field: str = "",
+    values: Iterable[Any] = (),
+    whole_paths: bool = False,
+) -> Knob:
+    """Return a knob of the shipped file; see `Knob`.
 
+    Args:
+        table, errors, whole_paths: its own.
+        always: changes of every row.
+        rows: value and further changes.
+        field: of the scenario, that takes each of the `values` in rows of their own.
+        values: of it.
+    """
+    further = [*rows, *((value, [f"{field}={value}"]) for value in values)]
+    return Knob(table, {value: (*always, *changes) for value, changes in further}, tuple(errors), whole_paths)
 
-_ALL_ERRORS = ("height", "beam", "relief", "colour")
-_BETWEEN: dict[Any, tuple[str, ...]] = {
-    f"{preset}, {title}": (f"fidelity={preset}", change)
-    for preset, others in {
-        "draft": (
-            "geometric_tolerance=0.005",
-            "vegetation_detail=1",
-            "scan.rays_per_pulse=7",
-            "scan.relief_octaves=4",
-        ),
-        "standard": (
-            "geometric_tolerance=0.02",
-            "geometric_tolerance=0.001",
-            "vegetation_detail=0.3",
-            "scan.rays_per_pulse=1",
-            "scan.rays_per_pulse=19",
-            "scan.relief_octaves=2",
-            "scan.relief_octaves=6",
-        ),
-        "high": (
-            "geometric_tolerance=0.005",
-            "scan.rays_per_pulse=7",
-            "scan.rays_per_pulse=37",
-            "scan.relief_octaves=4",
-        ),
-    }.items()
-    for change in others
-    for title in [change.rpartition(".")[2] if change.startswith("scan.") else change]
-}
-"""Presets of which one knob is that of another: title -> changes."""
 
 KNOBS: dict[str, Knob] = {
-    "geometric_tolerance": Knob(
-        "model and beam", _field("geometric_tolerance", (0.02, 0.01, 0.005, 0.002, 0.001), BARE), ("height", "beam")
-    ),
-    "vegetation_detail": Knob("model and beam", _field("vegetation_detail", (0, 0.3, 1), BARE), ("height", "beam")),
-    "caster": Knob("model and beam", _field("scan.caster", ("bvhtree", "embree"), BARE), ("height", "beam")),
-    "rays_per_pulse": Knob(
-        "model and beam", _field("scan.rays_per_pulse", (1, 7, 19, 37, 61), BARE), ("height", "beam")
-    ),
-    "point_spacing": Knob(
-        "points", {"none": BARE} | _field("cloud.point_spacing", (0.04, 0.1, 0.2), BARE), ("beam", "relief")
-    ),
-    "roughness_adjustment": Knob(
-        "points", _field("scan.relief", (0, 1), ("colour.rgb=false",)), ("beam", "relief")
-    ),
-    "colour_source": Knob(
-        "colours", _field("colour.source", ("material", "images", "returns"), ("scan.relief=0",)), ("colour",)
-    ),
-    "image_spacing": Knob("colours", _field("colour.image_spacing", (15, 30, 60), IMAGES), ("colour",)),
-    "ground_sampling_distance": Knob(
-        "colours", _field("colour.ground_sampling_distance", (0.06, 0.12, 0.25, 0.5), IMAGES), ("colour",)
-    ),
-    "samples": Knob(
-        "light",
-        {"direct": ("scan.relief=0", "colour.source=returns")} | _field("colour.samples", (4, 16, 64), WHOLE_PATHS),
-        ("colour",),
-        whole_paths=True,
-    ),
-    "fidelity": Knob(
-        "presets",
-        _field("fidelity", ("draft", "standard", "high"), ()),
-        _ALL_ERRORS,
-    ),
-    "between": Knob("presets", _BETWEEN, _ALL_ERRORS),
+    name: _read_knob(**data) for name, data in read_json(PRESETS / "tradeoff_rows.json").items()
 }
 """Knobs by name. ``fidelity`` are the presets: points that set several knobs at once; ``between`` are presets with one
-knob of another, which a preset must not be worse than."""
+knob of another, which a preset must not be worse than. What is usual in them: no colours and relief where the model and
+the beam are measured, which don't touch these."""
+
 
 def rows(knobs: Iterable[str]) -> Iterator[tuple[str, Any]]:
     """Yield (knob, value) of every row."""

@@ -40,10 +40,8 @@ class ScanCounts:
 
     def add(self, result: BlockResult) -> None:
         """Add one block."""
-        self.pulses += result.pulses
-        self.rays += result.rays
-        self.below_threshold += result.below_threshold
-        self.saturated += result.saturated
+        for name in ("pulses", "rays", "below_threshold", "saturated"):
+            setattr(self, name, getattr(self, name) + getattr(result, name))
         self.points += len(result.points)
         self.by_class += np.bincount(result.points.class_id, minlength=256)
         if result.sources is not None:
@@ -89,8 +87,12 @@ class CloudFiles:
     @contextmanager
     def opened(self) -> Iterator[None]:
         """Open the files; they are complete, and under their names, when the context ends without an exception."""
+        cloud = self.scenario.cloud
         with ExitStack() as stack:
-            self._open(stack)
+            if "cloud" in self.scenario.outputs:
+                self._writers = [stack.enter_context(self.open_writer(name)) for name in cloud.file_names()]
+            if cloud.point_spacing:
+                self._grid = stack.enter_context(GridSubsampler(cloud.point_spacing, self.folder))
             yield
             for block in self._grid.blocks() if self._grid else ():
                 self._keep(block)
@@ -117,13 +119,6 @@ class CloudFiles:
             writer.write(points)
         if self.view:
             self.view.add(points)
-
-    def _open(self, stack: ExitStack) -> None:
-        cloud = self.scenario.cloud
-        if "cloud" in self.scenario.outputs:
-            self._writers = [stack.enter_context(self.open_writer(name)) for name in cloud.file_names()]
-        if cloud.point_spacing:
-            self._grid = stack.enter_context(GridSubsampler(cloud.point_spacing, self.folder))
 
     def summary(self) -> dict[str, Any]:
         """Return the counts as JSON data."""

@@ -2,17 +2,12 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from ...cloud.layers import optional_arrays
-from ...cloud.tools.previews import TopView
 from ...materials.surfaces import surfaces_of
 from ...materials.variation import vary_material
-from ...road.geometry import RoadGeometry
 from ...scanning.beam import RINGS
 from ...scanning.colour.request import LayerRequest
 from ...scanning.plan import ScanConditions, ScanPlan, SceneServices
-from ...scanning.platforms.guides import RoadGuide
 from ...scanning.platforms.path import Path as ScanPath
 from ...scanning.relief import micro_relief
 from ...scanning.scene.motion import ScannedScene
@@ -59,7 +54,7 @@ def plan_scan(
         surfaces=surfaces_of(scanned, scan.reflection, spread=not by_layers),
         setting=setting,
         path=path,
-        rings=RINGS[settings.rays_per_pulse] if scan.beam_rings is None else scan.beam_rings,
+        rings=beam_rings(scenario),
         seed=scenario.seed,
         noise=scan.noise,
         attenuation=weather.attenuation(setting.device.wavelength_nm) if loss is None else loss,
@@ -90,6 +85,12 @@ def plan_scan(
     )
 
 
+def beam_rings(scenario: Scenario) -> tuple[int, ...]:
+    """Return the rays on each ring around the beam's axis."""
+    own = scenario.scan.beam_rings
+    return RINGS[scenario.settings().rays_per_pulse] if own is None else own
+
+
 def kept_layers(scenario: Scenario) -> frozenset[str]:
     """Return the names of the optional per-point layers that the files hold."""
     return scenario.cloud.arrays() & optional_arrays() if "cloud" in scenario.outputs else frozenset()
@@ -106,23 +107,3 @@ def may_render(scenario: Scenario) -> bool:
     points = bool(set(scenario.outputs) & {"cloud", "previews"})
     asked = bool(coloured_layers(scenario)) or scenario.colour.intensity_from_layers
     return points and asked and scenario.colour.source != "material"
-
-
-def road_path(scenario: Scenario, geometry: RoadGeometry) -> ScanPath:
-    """Return the scanner's path along a road."""
-    return scenario.scan.platform.make_path(RoadGuide(geometry))
-
-
-def road_view(geometry: RoadGeometry) -> TopView:
-    """Return a raster for the previews that holds the whole swath of a road."""
-    origin = np.array(geometry.parameters.transform.translate)[:2]
-    stations = np.linspace(0.0, geometry.length, 50)
-    terrain = geometry.parameters.terrain
-    reach = terrain.half_width if terrain else float(np.abs(geometry.offsets(stations)).max())
-    plan, heading, _ = geometry.alignment.frame(stations)
-    left = np.stack([-np.sin(heading), np.cos(heading)], axis=1)
-    chord = plan[-1] - plan[0]
-    normal = np.array([-chord[1], chord[0]]) / max(np.hypot(*chord), 1e-9)
-    edges = np.concatenate([plan + reach * left, plan - reach * left])
-    across = (edges - plan[0]) @ normal
-    return TopView(plan[0] + origin, plan[-1] + origin, float(across.min()) - 2, float(across.max()) + 2)

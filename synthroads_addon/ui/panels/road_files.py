@@ -10,8 +10,7 @@ import bpy
 
 from ...base.files import output_folder
 from ...blender.model.store import BUILT_FROM, find_road, recall_parameters
-from ...jobs.generate import Job as PipelineJob
-from ...jobs.generate import road_parameters
+from ...jobs.generate import RoadSource
 from ...road.parameters import RoadParameters
 from ...scenario.scenario import Scenario
 from ..work.build import road_work
@@ -74,7 +73,7 @@ class SYNTHROADS_OT_load_road(_Load, bpy.types.Operator):
 
     def read(self, path: Path, scenario: Scenario) -> tuple[RoadParameters, str]:
         """Read the parameter set."""
-        parameters, _ = road_parameters(PipelineJob(scenario, path.parent, parameters=path))
+        parameters, _ = RoadSource(scenario, parameters=path).read()
         return parameters, f"Built {parameters.alignment.length:,.0f} m of road from {path.name}"
 
 
@@ -87,7 +86,7 @@ class SYNTHROADS_OT_load_axis(_Load, bpy.types.Operator):
 
     def read(self, path: Path, scenario: Scenario) -> tuple[RoadParameters, str]:
         """Fit the alignment and sample the road along it."""
-        parameters, report = road_parameters(PipelineJob(scenario, path.parent, axis=path))
+        parameters, report = RoadSource(scenario, axis=path).read()
         fit = report["axis"]
         across, up = (fit[name]["worst"] for name in ("horizontal", "height"))
         said = f"{fit['points']:,} points, {fit['elements']} elements, within {across:.3f} m, heights {up:.3f} m"

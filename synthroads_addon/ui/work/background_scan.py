@@ -18,7 +18,7 @@ import bpy
 from ...base.errors import InputError
 from ...base.progress import Progress, StageTimer
 from ...blender.cameras import renders_returns
-from ...jobs.road_scene import scan_road
+from ...jobs.road_scene import RoadScene
 from ...road.geometry import RoadGeometry
 from ...road.parameters import RoadParameters
 from ...scenario.scenario import Scenario
@@ -53,7 +53,7 @@ def _scan(job: dict[str, Any]) -> dict[str, Any]:
     road = RoadGeometry(RoadParameters.from_dict(job["parameters"]))
     timer = StageTimer(_overall_progress(renders_returns(scenario.colour.settings(scenario.fidelity))))
     with bpy.context.temp_override(window=window):
-        counts = scan_road(scenario, road, Path(job["folder"]), timer)
+        counts = RoadScene(scenario, road).scan(Path(job["folder"]), timer)
     return {"counts": counts, "stages": timer.stages}
 
 

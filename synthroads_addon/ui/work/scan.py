@@ -23,16 +23,13 @@ from ...blender.scene.evaluated import CopiedScene, scanned_scene_steps
 from ...blender.services import SnapshotServices
 from ...jobs.generate import Job as PipelineJob
 from ...jobs.generate import check
-from ...jobs.report import file_names, report_footer, report_header, write_report
-from ...jobs.road_files import write_road_files
-from ...jobs.road_scene import refuse_empty, road_cloud_files
+from ...jobs.job_files import OF_POINTS, JobFiles
 from ...jobs.scan.files import record_to_files
-from ...jobs.scan.plan import may_render, plan_scan, road_path
+from ...jobs.scan.plan import may_render
+from ...jobs.scan.site import Site
 from ...road.geometry import RoadGeometry
 from ...road.parameters import RoadParameters
-from ...scanning.plan import ScanConditions
 from ...scenario.scenario import Scenario
-from ...twin.formats import twin_file_names
 from ..fields.preferences import with_preferences
 from .common import has_road, is_free
 from .job import Aside, PanelJob, Report, Step, Work
@@ -95,9 +92,8 @@ def scan_work(scan: RoadScan) -> Work[Written]:
     """
     scenario = scan.scenario
     check(PipelineJob(scenario, scan.target, overwrite=scan.overwrite))
-    names = [*file_names(scenario, scenario.outputs), *twin_file_names(scenario.twin)]
     timer, renders = StageTimer(), may_render(scenario)
-    with output_folder(scan.target, names, scan.overwrite) as folder:
+    with output_folder(scan.target, JobFiles(scenario).names, scan.overwrite) as folder:
         yield Step(0.0, "Reading")
         measure = yield from (_save_copy(scan, folder, timer) if renders else _read_open_scene(scan, timer))
         if "scene" in scenario.outputs:
@@ -149,30 +145,25 @@ def _shares(steps: Generator[float, None, CopiedScene]) -> Generator[Step, None,
 
 def _scan_copied(scan: RoadScan, copied: CopiedScene, services: SnapshotServices, output: _Output) -> dict[str, Any]:
     """Scan what was read."""
-    scenario, road, timer = scan.scenario, scan.road, output.timer
+    site, timer = Site.of_road(scan.scenario, scan.road), output.timer
     with timer.stage("scene mesh"):
         scene = copied.put_together()
-    refuse_empty(scene)
     output.report(0.02)
     with timer.stage("caster"):
-        path = road_path(scenario, road)
-        plan = plan_scan(scenario, scene, path, services, ScanConditions.of(scan.parameters))
+        plan = site.plan(scene, services)
     del scene
     shares = {"images": (0.05, 0.05), "scan": (0.05, 1.0), "files": (1.0, 1.0)}
     timer.progress = lambda stage, share: output.report(shares[stage][0] * (1.0 - share) + shares[stage][1] * share)
-    return record_to_files([plan], road_cloud_files(scenario, road, output.folder, plan), timer)
+    return record_to_files([plan], site.files(output.folder, plan.target.origin), timer)
 
 
 def _write_files(scan: RoadScan, measure: _Measure, output: _Output) -> int:
     """Write all files; return the number of points. Runs in a thread: it touches no data of Blender."""
-    scenario = scan.scenario
-    write_road_files(output.folder, scenario, scan.road, output.timer)
-    report = report_header()
-    if set(scenario.outputs) & {"cloud", "previews"}:
-        report["counts"] = measure(output)
-    points = report.get("counts", {}).get("points", 0)
-    write_report(output.folder, report | report_footer(scenario, output.timer))
-    return int(points)
+    files = JobFiles(scan.scenario)
+    files.write_road(output.folder, scan.road, output.timer)
+    told = {"counts": measure(output)} if set(files.outputs) & set(OF_POINTS) else {}
+    files.write_report(output.folder, told, output.timer)
+    return int(told["counts"]["points"]) if told else 0
 
 
 class SYNTHROADS_OT_scan(LongOperator, bpy.types.Operator):

@@ -9,13 +9,13 @@ from synthroads_addon.materials.table import materials
 from synthroads_addon.scanning.beam import RINGS
 from synthroads_addon.scanning.plan import ScanPlan
 from synthroads_addon.scanning.platforms.path import Strip
-from synthroads_addon.scanning.pulses import Poses, Pulses, make_pulses
+from synthroads_addon.scanning.pulses import Pulses
 from synthroads_addon.scanning.returns import Echoes, group_returns
-from synthroads_addon.scanning.scan import beam_rays, hit_marks, scan_pulses
+from synthroads_addon.scanning.scan import BlockResult, BlockScan
 from synthroads_addon.scanning.scene.mesh import SceneMesh
 from synthroads_addon.scanning.scene.motion import ScannedScene
 from synthroads_addon.scanning.scene.target import Target
-from synthroads_addon.scanning.trace import trace
+from synthroads_addon.scanning.trace import Rays, trace
 from synthroads_addon.scenario.scan import scanner_setting
 from synthroads_addon.scenario.scenario import load_scenario
 
@@ -97,6 +97,27 @@ def scan_of(mesh: SceneMesh, rays: int = 1, path: Standing | None = None, moving
     return ScanPlan(target, surfaces, setting, path or Standing(), RINGS[rays], seed=3, wanted=wanted)
 
 
+def scan_block(scan: ScanPlan, strip: Strip, block: int) -> BlockResult:
+    """Scan one block."""
+    return BlockScan(scan).block(strip, block)
+
+
+def scan_pulses(scan: ScanPlan, strip: Strip, first: int, count: int, key: int = 0) -> BlockResult:
+    """Scan pulses of a strip."""
+    return BlockScan(scan).pulses(strip, first, count, key)
+
+
+def emit_pulses(scan: ScanPlan, strip: Strip, begin: float, end: float, first: int, count: int) -> Pulses:
+    """Return pulses of a strip without pointing errors; the poses are those between two times."""
+    emitter = BlockScan(scan).emitter
+    return emitter.emit(strip, emitter.poses_between(scan.target, strip, begin, end), None, first, count)
+
+
+def beam_rays(scan: ScanPlan, pulses: Pulses) -> Rays:
+    """Return the rays of pulses where nothing moves."""
+    return BlockScan(scan).beam.rays(scan.target, pulses, [])
+
+
 def middle_pulses(scan: ScanPlan, count: int = 100):
     """Scan pulses around the nadir of the first line."""
     return scan_pulses(scan, scan.path.strips[0], 500 - count // 2, count)
@@ -105,6 +126,7 @@ def middle_pulses(scan: ScanPlan, count: int = 100):
 def echoes_and_pulses(scan: ScanPlan, first: int, count: int) -> tuple[Echoes, Pulses]:
     """Return the echoes of some pulses of the first strip, before any threshold, and the pulses."""
     strip = scan.path.strips[0]
-    pulses = make_pulses(scan, strip, Poses.between(scan, strip, 0.0, 80.0), None, first, count)
-    traced = trace(scan.target, scan.surfaces, beam_rays(scan, pulses, []), [], 0.0, scan.setting.maximum_range)
-    return group_returns(*hit_marks(scan, traced), traced.pulse, scan.setting.range_resolution), pulses
+    pulses = emit_pulses(scan, strip, 0.0, 80.0, first, count)
+    traced = trace(scan.target, scan.surfaces, beam_rays(scan, pulses), [], 0.0, scan.setting.maximum_range)
+    marks = BlockScan(scan).surfaces.marks(traced)
+    return group_returns(*marks, traced.pulse, scan.setting.range_resolution), pulses

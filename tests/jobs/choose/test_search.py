@@ -17,12 +17,12 @@ from synthroads_addon.blender.model.build import build_road
 from synthroads_addon.blender.scene.evaluated import scanned_scene
 from synthroads_addon.cloud.points import PointBlock
 from synthroads_addon.jobs.choose.knobs import ModelKnobs
-from synthroads_addon.jobs.choose.sites import RoadSite
 from synthroads_addon.jobs.choose.table import table_of
 from synthroads_addon.jobs.choose.trial import Trial
 from synthroads_addon.jobs.generate import Job, generate
 from synthroads_addon.jobs.measure.errors import beam_errors
 from synthroads_addon.jobs.measure.mesh_errors import mesh_height_errors
+from synthroads_addon.jobs.road_scene import RoadScene
 from synthroads_addon.jobs.scan_scene import SceneScan, scan_scene
 from synthroads_addon.road.geometry import RoadGeometry
 from synthroads_addon.sampling.road import sample_road
@@ -181,12 +181,11 @@ def errors_afterwards(scenario: Scenario) -> dict[str, float]:
     The truth has the geometric tolerance of the job: plants stand elsewhere on a mesh that is tessellated otherwise.
     """
     parameters, settings = sample_road(scenario.road, scenario.seed), scenario.settings()
-    site = RoadSite(scenario, RoadGeometry(parameters))
     empty_file()
+    shown = RoadScene(scenario, RoadGeometry(parameters))
 
     def points(detail: float, rays: int) -> list[PointBlock]:
-        scene = site.scene(ModelKnobs(settings.tolerance, detail))
-        trial = Trial.of(scenario, scene, site.path, site.conditions)
+        trial = Trial.of(shown.site, shown.rebuild(ModelKnobs(settings.tolerance, detail).changes))
         trial.phase, trial.lines = 0.0, 160
         return trial.points(RINGS[rays])
 

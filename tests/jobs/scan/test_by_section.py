@@ -14,7 +14,7 @@ from synthroads_addon.blender.cameras import HAS_RETURN_CAMERA
 from synthroads_addon.blender.model.build import build_road
 from synthroads_addon.blender.scene.evaluated import scene_mesh
 from synthroads_addon.jobs.generate import Job, generate
-from synthroads_addon.jobs.scan.plan import road_path
+from synthroads_addon.jobs.scan.site import Site
 from synthroads_addon.road.geometry import RoadGeometry
 from synthroads_addon.road.parameters import (
     ConcreteBarrier,
@@ -164,7 +164,7 @@ def test_as_much_is_built_as_the_rays_reach(tmp_path: Path, kind: str, pitch: fl
     """All pulses of a section end between its stations, and not much more of the road is built."""
     scenario = job(tmp_path, 300.0, platform={"kind": kind, "pitch_deg": pitch, "speed": 20.0})
     geometry = RoadGeometry(sample_road(RoadScenario(length=1800.0), 4))
-    cut = Blocks(scanner_setting(scenario.scan), road_path(scenario, geometry), len(RINGS[7]))
+    cut = Blocks(scanner_setting(scenario.scan), Site.of_road(scenario, geometry).path, len(RINGS[7]))
     parts = list(sections(cut, geometry, 300.0))
     assert [part.start for part in parts] == [300.0 * i for i in range(6)]
     assert sorted((s.index, b) for part in parts for s, b in part.blocks) == [(s.index, b) for s, b in cut.all()]

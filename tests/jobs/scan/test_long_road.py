@@ -19,13 +19,13 @@ from synthroads_addon.base.classes import class_id
 from synthroads_addon.base.progress import StageTimer
 from synthroads_addon.blender.model.build import remove_road
 from synthroads_addon.jobs.scan.by_section import SectionScan
+from synthroads_addon.jobs.scan.site import Site
 from synthroads_addon.road.geometry import RoadGeometry
 from synthroads_addon.road.parameters import read_parameters
 from synthroads_addon.road.tessellation import sample_stations
 from synthroads_addon.scanning.plan import ScanPlan
-from synthroads_addon.scanning.pulses import Poses, make_pulses
-from synthroads_addon.scanning.scan import scan_pulses
 from synthroads_addon.scenario.scenario import Scenario
+from tests.helpers.scenes.scan_scenes import emit_pulses, scan_pulses
 from tests.helpers.scenes.sparse_scanner import sparse_scanner
 
 pytestmark = pytest.mark.any_blender  # it takes ten minutes
@@ -114,34 +114,34 @@ def build_section(work: SectionScan, section: Any) -> Iterator[ScanPlan]:
         remove_road()
 
 
-def errors_of_a_section(work: SectionScan, section: Any, monkeypatch: pytest.MonkeyPatch) -> Float:
+def errors_of_a_section(
+    work: SectionScan, road: RoadGeometry, section: Any, monkeypatch: pytest.MonkeyPatch
+) -> Float:
     """Return how far (m) returns from the pavement lie from where exact rays meet the exact triangles."""
-    from synthroads_addon.jobs.scan import by_section as section_scan
-
-    make = section_scan.plan_scan
+    make = Site.plan
     meshes = []
 
-    def keep(scenario: Any, scene: Any, *rest: Any, **more: Any) -> ScanPlan:
+    def keep(site: Site, scene: Any, services: Any) -> ScanPlan:
         meshes.append(scene.static)
-        return make(scenario, scene, *rest, **more)
+        return make(site, scene, services)
 
-    monkeypatch.setattr(section_scan, "plan_scan", keep)
+    monkeypatch.setattr(Site, "plan", keep)
     with build_section(work, section) as scan:
         MESH[id(scan)] = meshes[-1]
-        triangles = exact_triangles(work.geometry, section.low, section.high, scan, scan.frame)
+        triangles = exact_triangles(road, section.low, section.high, scan, scan.frame)
         strip, block = section.blocks[len(section.blocks) // 2]
         first, _ = work.cut.pulses_of(strip, block)
         result = scan_pulses(scan, strip, first, PULSES, block).points
-        poses = Poses.between(scan, strip, work.cut.time(strip, first), work.cut.time(strip, first + PULSES - 1))
-        pulses = make_pulses(scan, strip, poses, None, first, PULSES)
+        times = (work.cut.time(strip, number) for number in (first, first + PULSES - 1))
+        pulses = emit_pulses(scan, strip, *times, first, PULSES)
     monkeypatch.undo()
-    road = result.select(np.flatnonzero(result.class_id == class_id("road")))
-    rows = np.searchsorted(pulses.time, road.gps_time)
-    assert np.array_equal(pulses.time[rows], road.gps_time)
+    paved = result.select(np.flatnonzero(result.class_id == class_id("road")))
+    rows = np.searchsorted(pulses.time, paved.gps_time)
+    assert np.array_equal(pulses.time[rows], paved.gps_time)
     origin, direction = pulses.origin.T[rows] + scan.frame, pulses.direction.T[rows]
     exact = np.array(list(met(triangles, origin, direction)))
-    place = origin + exact[:, None] * direction + np.array(work.parameters.transform.translate)
-    return np.linalg.norm(road.xyz - place, axis=1)
+    place = origin + exact[:, None] * direction + np.array(road.parameters.transform.translate)
+    return np.linalg.norm(paved.xyz - place, axis=1)
 
 
 @pytest.mark.slow
@@ -168,10 +168,10 @@ def test_100_km(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     print(f"farthest from the analytic surface: {worst * 1000:.2f} mm")
     assert worst < TOLERANCE + 0.001 + LAS_ROUNDING
 
-    work = SectionScan(Scenario.from_dict(sparse(tmp_path, LONG)), parameters)
+    work = SectionScan(Site.of_road(Scenario.from_dict(sparse(tmp_path, LONG)), geometry), geometry)
     sections = list(work.sections())
     for number in np.linspace(0, len(sections) - 1, LOOKED_AT).astype(int):
-        errors = errors_of_a_section(work, sections[number], monkeypatch)
+        errors = errors_of_a_section(work, geometry, sections[number], monkeypatch)
         print(f"{sections[number].start:7.0f} m: {len(errors)} returns, at most {errors.max() * 1000:.3f} mm off")
         assert len(errors) > 50
         assert errors.max() < 0.001

@@ -54,10 +54,12 @@ class StandIns:
         yield MaterialLayers(surface_constants(self.materials(request.mesh.materials)))
 
 
-def planned(services: StandIns, conditions: ScanConditions | None = None, **changes: Any) -> ScanPlan:
+def planned(
+    services: StandIns, conditions: ScanConditions | None = None, seconds: float = 0.02, **changes: Any
+) -> ScanPlan:
     """Return the plan of a short scan over a plane at z = 0, from 60 m above."""
     path = Standing()
-    path.strips = (type(path.strips[0])(0, 0.0, 0.02),)  # type: ignore[misc]
+    path.strips = (type(path.strips[0])(0, 0.0, seconds),)  # type: ignore[misc]
     scan = {"noise": {"range_sigma": 0.0}, "relief": 0.0, "caster": "embree"} | changes.pop("scan", {})
     scenario = Scenario.from_dict({"fidelity": "draft", "scan": scan} | changes)
     return plan_scan(scenario, ScannedScene(plane()), path, services, conditions)

@@ -10,7 +10,7 @@ import pytest
 
 from synthroads_addon.blender.compat import set_modifier_input
 from synthroads_addon.blender.model.store import find_road, recall
-from synthroads_addon.jobs.generate import Job, generate, road_parameters
+from synthroads_addon.jobs.generate import Job, RoadSource, generate
 from synthroads_addon.road.parameters import RoadParameters, read_parameters
 from synthroads_addon.sampling.road import sample_road
 from synthroads_addon.scenario.scenario import Scenario, load_scenario
@@ -71,7 +71,7 @@ def test_a_fitted_road_is_the_librarys(cheap: Any, tmp_path: Path) -> None:
     path = axis_file(tmp_path)
     cheap.road.epsg = 25833
     assert bpy.ops.synthroads.load_axis(filepath=str(path)) == {"FINISHED"}
-    parameters, report = road_parameters(Job(cheap.scenario(), tmp_path, axis=path))
+    parameters, report = RoadSource(cheap.scenario(), axis=path).read()
     assert built()[0] == parameters
     assert report["axis"]["horizontal"]["worst"] < 0.01
     assert parameters.metadata.epsg == 25833

@@ -14,8 +14,9 @@ import pytest
 
 from synthroads_addon.base.errors import Cancelled, InputError
 from synthroads_addon.blender.cameras import HAS_RETURN_CAMERA
-from synthroads_addon.jobs.generate import FILES, generate
 from synthroads_addon.jobs.generate import Job as PipelineJob
+from synthroads_addon.jobs.generate import generate
+from synthroads_addon.jobs.job_files import FILES
 from synthroads_addon.scenario.scenario import load_scenario
 from synthroads_addon.ui.fields.fields import own
 from synthroads_addon.ui.work import rendered_scan, scan

@@ -13,8 +13,10 @@ import synthroads_addon
 from synthroads_addon.base.errors import Cancelled
 from synthroads_addon.blender.compat import set_modifier_input
 from synthroads_addon.blender.things.model_builder import ROLE
-from synthroads_addon.jobs.generate import FILES, generate
 from synthroads_addon.jobs.generate import Job as PipelineJob
+from synthroads_addon.jobs.generate import generate
+from synthroads_addon.jobs.job_files import FILES
+from synthroads_addon.jobs.scan.site import Site
 from synthroads_addon.road.parameters import read_parameters
 from synthroads_addon.scenario.scenario import load_scenario
 from synthroads_addon.ui.work import scan
@@ -257,7 +259,7 @@ def test_a_defect_in_the_thread_is_kept_and_leaves_nothing(
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(scan, "plan_scan", lambda *arguments: 1 / 0)
+    monkeypatch.setattr(Site, "plan", lambda *arguments: 1 / 0)
     job = job_of_the_panel()
     tick_to_the_end(job)
     assert isinstance(job.error, ZeroDivisionError)

@@ -1,0 +1,100 @@
+"""`JobFiles`: the files of a job that need no scene, and ``report.json``: what every job writes about itself."""
+
+from __future__ import annotations
+
+import platform as machine
+import sys
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import laspy
+import numpy as np
+
+from ..base.machine import available_cores
+from ..base.progress import StageTimer
+from ..base.schema import canonical_json
+from ..base.version import generator, version
+from ..road.centerline import centerline_geojson
+from ..road.geometry import RoadGeometry
+from ..road.tessellation import sample_stations
+from ..scenario.scenario import Output, Scenario
+from ..twin.formats import twin_file_names, write_twin
+
+FILES = {
+    "parameters": ("parameters.json",),
+    "cloud": ("cloud.laz",),
+    "centerline": ("centerline.geojson",),
+    "scene": ("scene.blend",),
+    "previews": ("preview_class.png", "preview_intensity.png", "preview_rgb.png"),
+}
+"""The files that each output of a scenario stands for, with one format of the cloud; see `JobFiles.names`."""
+OF_POINTS: tuple[Output, ...] = ("cloud", "previews")
+"""Outputs that are made of points: all that a scan of a scene by others writes beside ``report.json``."""
+
+
+@dataclass(frozen=True)
+class JobFiles:
+    """The files that a job writes.
+
+    Attributes:
+        scenario: the job.
+        road: whether the job makes a road; else it has no other files than `OF_POINTS`.
+    """
+
+    scenario: Scenario
+    road: bool = True
+
+    @property
+    def outputs(self) -> tuple[Output, ...]:
+        """Return the outputs that are wanted and can be had."""
+        return tuple(name for name in self.scenario.outputs if self.road or name in OF_POINTS)
+
+    @property
+    def names(self) -> list[str]:
+        """Return the names of all files, and of the report, which is always written."""
+        files = FILES | {"cloud": self.scenario.cloud.file_names()}
+        twins = twin_file_names(self.scenario.twin) if self.road else []
+        return [*(name for output in self.outputs for name in files[output]), "report.json", *twins]
+
+    def write_road(self, folder: Path, road: RoadGeometry, timer: StageTimer) -> None:
+        """Write the files of a road that need no scene: parameters, centreline and geometric-semantic models."""
+        if "parameters" in self.outputs:
+            (folder / "parameters.json").write_text(road.parameters.to_json(), encoding="utf-8")
+        tolerance = self.scenario.settings().tolerance
+        if "centerline" in self.outputs:
+            text = canonical_json(centerline_geojson(road, sample_stations(road, tolerance)))
+            (folder / "centerline.geojson").write_text(text, encoding="utf-8")
+        if self.scenario.twin:
+            with timer.stage("twin"):
+                write_twin(road.parameters, folder, self.scenario.twin, tolerance)
+
+    def write_report(self, folder: Path, told: dict[str, Any], timer: StageTimer) -> dict[str, Any]:
+        """Write ``report.json`` and return what it holds.
+
+        Args:
+            folder: for it.
+            told: what is to be said of this job besides what every report has: seed, settings, scenario, stages,
+                versions.
+            timer: of the job's stages.
+        """
+        bpy = sys.modules.get("bpy")  # not there if nothing needed Blender
+        scenario = self.scenario.to_dict()
+        report = {"type": "Report", "generator": generator()} | told
+        report |= {
+            "seed": self.scenario.seed,
+            "settings": asdict(self.scenario.settings()),
+            "scenario": {name: value for name, value in scenario.items() if self.road or name != "road"},
+            "seconds": round(timer.seconds, 3),
+            "stages": timer.stages,
+            "versions": {
+                "synthroads": version(),
+                "blender": bpy.app.version_string if bpy else None,
+                "python": machine.python_version(),
+                "numpy": np.__version__,
+                "laspy": laspy.__version__,
+            },
+            "cores": available_cores(),
+        }
+        (folder / "report.json").write_text(canonical_json(report), encoding="utf-8")
+        return report

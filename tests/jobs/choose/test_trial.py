@@ -1,0 +1,51 @@
+"""Times of a whole scan, projected from stretches of it, by a clock and a recorder that are made up."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Any
+
+import pytest
+
+from synthroads_addon.base.progress import StageTimer
+from synthroads_addon.jobs.choose.trial import Trial
+from synthroads_addon.jobs.scan.files import CloudFiles
+from synthroads_addon.jobs.scan.site import Site
+from synthroads_addon.scanning.plan import ScanPlan
+from synthroads_addon.scenario.scenario import Scenario
+from tests.jobs.scan.test_plan import StandIns, planned
+
+RATE, EACH, FIRST = 2e-6, 0.5, 30.0
+"""Seconds of a pulse, of every scan, and of the first one besides."""
+
+
+@dataclass
+class MadeUpScans:
+    """Scans that take as long as they are said to, by a clock of their own; every other pulse has a point."""
+
+    each: float
+    now: float = 100.0
+    first: bool = True
+
+    def record(self, plans: Iterable[ScanPlan], files: CloudFiles, timer: StageTimer) -> dict[str, Any]:
+        for plan in plans:
+            pulses = sum(map(plan.pulses, plan.path.strips))
+            self.now += self.each + RATE * pulses + (FIRST if self.first else 0.0)
+            self.first = False
+            files.counts.points += pulses // 2
+        return {}
+
+
+@pytest.mark.parametrize("each", [0.0, EACH])
+def test_a_scan_of_a_fixed_time_and_a_rate_is_predicted_exactly(
+    each: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    scans = MadeUpScans(each)
+    monkeypatch.setattr("synthroads_addon.jobs.choose.trial.record_to_files", scans.record)
+    plan = planned(StandIns(), seconds=75.0)
+    trial = Trial(Site(Scenario.from_dict({"fidelity": "draft"}), plan.path), plan, clock=lambda: scans.now)
+    seconds, points = trial.time_scan(())
+    assert trial.pulses > 1e6
+    assert seconds == pytest.approx(each + RATE * trial.pulses, rel=1e-9)
+    assert points == pytest.approx(trial.pulses / 2, rel=1e-4)
