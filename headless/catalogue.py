@@ -10,7 +10,7 @@ from pathlib import Path
 
 from synthroads_addon.base.catalogue import Entry, Kind, figures, plain, preset, span
 from synthroads_addon.base.classes import class_scheme, scheme_names
-from synthroads_addon.base.files import PRESETS
+from synthroads_addon.base.files import PRESETS, preset_names
 from synthroads_addon.dataset.recipe import RECIPES, load_recipe, recipe_names
 from synthroads_addon.materials.table import material_table_path, read_material_table
 from synthroads_addon.scanning.devices.device import DEVICES, device_names, load_device
@@ -82,10 +82,6 @@ def _materials(name: str) -> Entry:
     return Entry(name, f"{len(made)} materials in place of the usual ones", material_table_path(name), told)
 
 
-def _table_names() -> list[str]:
-    return sorted(path.stem for path in (PRESETS / "material_tables").glob("*.json"))
-
-
 KINDS = {
     "scenarios": Kind(
         "Scenarios",
@@ -143,7 +139,7 @@ KINDS = {
     "material-tables": Kind(
         "Tables of materials",
         "--set materials_table=NAME",
-        _table_names,
+        lambda: preset_names(PRESETS / "material_tables"),
         _materials,
         (".json",),
         ("material", "reflectivity"),

@@ -9,7 +9,7 @@ from typing import Any
 from pydantic import model_validator
 
 from ..base.errors import InputError, nearest_name
-from ..base.schema import ClosedModel, quantity
+from ..base.schema import ClosedModel, optional
 
 LENGTHS = {"um": 1e-6, "µm": 1e-6, "mm": 1e-3, "cm": 1e-2, "m": 1.0}
 SHARES = {"": 1.0, "%": 0.01, "‰": 0.001}
@@ -54,28 +54,14 @@ class Tolerance(ClosedModel):
     As text each can have a unit: ``"5mm"``, ``"2 %"``.
     """
 
-    height: float | None = quantity(
-        None, ge=0, le=10, unit="m", description="Height of the road's surface, largest error."
-    )
-    position: float | None = quantity(
-        None, ge=0, le=10, unit="m", description="Position of the hits, error of 95 % of the pulses."
-    )
-    relief: float | None = quantity(
-        None, ge=0, le=10, unit="m", description="Micro-relief of the points, error of 95 % of them."
-    )
-    intensity: float | None = quantity(
-        None, ge=0, le=10, unit="1", description="Intensity, relative error of 95 % of the pulses."
-    )
-    colour: float | None = quantity(
-        None, ge=0, le=100, unit="1", description="Colour, CIEDE2000 of 95 % of the points."
-    )
-    layers: float | None = quantity(
-        None, ge=0, le=1, unit="1", description="Material layers, root mean square error of the worst."
-    )
-    labels: float | None = quantity(None, ge=0, le=1, unit="1", description="Share of the pulses of another class.")
-    density: float | None = quantity(
-        None, ge=0, le=1, unit="1", description="Share of the points that are missing or too many."
-    )
+    height: float | None = optional("m", (0, 10), "Height of the road's surface, largest error.")
+    position: float | None = optional("m", (0, 10), "Position of the hits, error of 95 % of the pulses.")
+    relief: float | None = optional("m", (0, 10), "Micro-relief of the points, error of 95 % of them.")
+    intensity: float | None = optional("1", (0, 10), "Intensity, relative error of 95 % of the pulses.")
+    colour: float | None = optional("1", (0, 100), "Colour, CIEDE2000 of 95 % of the points.")
+    layers: float | None = optional("1", (0, 1), "Material layers, root mean square error of the worst.")
+    labels: float | None = optional("1", (0, 1), "Share of the pulses of another class.")
+    density: float | None = optional("1", (0, 1), "Share of the points that are missing or too many.")
 
     @model_validator(mode="before")
     @classmethod

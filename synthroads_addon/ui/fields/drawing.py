@@ -18,6 +18,7 @@ from .fields import (
     FlagField,
     IntervalField,
     NumberField,
+    OwnField,
     TextField,
 )
 from .groups import GroupField, NamedOrByHandField
@@ -72,21 +73,17 @@ def _number(layout: bpy.types.UILayout, settings: Any, owner: Any, field: Number
         row.use_property_split = False
         row.prop(owner, field.name, text=field.label)
         return
-    row = _own(layout, settings, owner, field) if field.optional else value_row(layout, field.label)
-    if row:
-        row.prop(owner, field.name, text="")
+    _values(layout, settings, owner, field)
 
 
-def _interval(layout: bpy.types.UILayout, settings: Any, owner: Any, field: IntervalField) -> None:
+def _values(layout: bpy.types.UILayout, settings: Any, owner: Any, field: NumberField | IntervalField) -> None:
     row = _own(layout, settings, owner, field) if field.optional else value_row(layout, field.label)
     if row:
-        for name in field.ends:
+        for name in field.values:
             row.prop(owner, name, text="")
 
 
-def _own(
-    layout: bpy.types.UILayout, settings: Any, owner: Any, field: NumberField | IntervalField | GroupField
-) -> bpy.types.UILayout | None:
+def _own(layout: bpy.types.UILayout, settings: Any, owner: Any, field: OwnField) -> bpy.types.UILayout | None:
     """Draw the checkbox of a field that may be left out; return the place for its value if it is ticked."""
     row = value_row(layout, field.label)
     row.prop(owner, field.own, text="")
@@ -149,7 +146,7 @@ def _by_hand(layout: bpy.types.UILayout, settings: Any, owner: Any, field: Named
 _DRAWN: Mapping[type[Field], Callable[..., None]] = {
     FlagField: _flag,
     NumberField: _number,
-    IntervalField: _interval,
+    IntervalField: _values,
     ChoiceField: _choice,
     ChoicesField: _choices,
     TextField: _text,
