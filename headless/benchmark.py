@@ -63,7 +63,7 @@ def run(arguments: argparse.Namespace) -> Outcome:
             raise InputError("--cores", cores, f"must be 1 to {available_cores()}, the cores that are there")
     found: dict[str, Any] = {}
 
-    def measured() -> dict[str, str]:
+    def measure() -> dict[str, str]:
         found.update(_all(arguments))
         return {TABLE: markdown(found)}
 
@@ -71,7 +71,7 @@ def run(arguments: argparse.Namespace) -> Outcome:
         folder = None
         if arguments.output:
             folder = opened.enter_context(output_folder(arguments.output, _FILES, arguments.overwrite))
-        table = fill(arguments.document, [TABLE], measured)[TABLE]
+        table = fill(arguments.document, [TABLE], measure)[TABLE]
         if folder:
             (folder / _FILES[0]).write_text(canonical_json(found), encoding="utf-8")
             (folder / _FILES[1]).write_text(table, encoding="utf-8")

@@ -65,7 +65,7 @@ def run(arguments: argparse.Namespace) -> Outcome:
     progress = progress_bar(arguments)
     results = {}
 
-    def measured() -> dict[str, str]:
+    def measure() -> dict[str, str]:
         tables = {}
         for number, (scene, title) in enumerate(titles.items()):
             found = _measure_all(arguments, scene, title, _part(progress, number, len(titles)))
@@ -73,7 +73,7 @@ def run(arguments: argparse.Namespace) -> Outcome:
             _write(arguments, title, found, tables[_TABLE.format(title)])
         return tables
 
-    tables = fill(arguments.document, map(_TABLE.format, titles.values()), measured)
+    tables = fill(arguments.document, map(_TABLE.format, titles.values()), measure)
     return 0, {"scenes": results}, "\n".join([*tables.values(), f"written to {arguments.output}"])
 
 

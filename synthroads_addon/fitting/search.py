@@ -79,9 +79,9 @@ class Goal:
         return fit.rms <= self.rms and fit.p95 <= self.p95
 
     def score(self, fit: ChainFit) -> float:
-        return self.expected(fit.square, fit.chain, len(fit.residuals))
+        return self.expected_score(fit.square, fit.chain, len(fit.residuals))
 
-    def expected(self, square: float, chain: Chain, points: int) -> float:
+    def expected_score(self, square: float, chain: Chain, points: int) -> float:
         """Score of a chain with a sum of squares; an element costs half a parameter beyond its own."""
         misfit = np.log(max(square, 0.0) / points + self.floor**2)
         return self.count * misfit + (chain.freedom() + 0.5 * chain.size) * np.log(self.count)
@@ -151,7 +151,7 @@ def _lift(chain: Chain, new: Chain, keep: list[int]) -> FloatArray:
 def foresee(data: AxisData, fit: ChainFit, edits: Sequence[Edit], free_knots: bool, goal: Goal) -> tuple[Chain, float]:
     """Return the edited chain at the optimum of the linearised problem, and the sum of squares expected there."""
     new, keep = apply_edits(fit.chain, edits)
-    new = new.tied()
+    new = new.tie_values()
     basis, lift = new.basis(free_knots), _lift(fit.chain, new, keep)
     start = np.zeros(len(lift))  # the jump to the new chain's values
     values = fit.chain.value_columns
@@ -202,7 +202,7 @@ def options(data: AxisData, fit: ChainFit, free_knots: bool, goal: Goal) -> list
         square[np.diag_indices(len(square))] *= 1.0 + 1e-9
         if (np.diag(square) > 0).all():
             cost = float(violation @ np.linalg.solve(square, violation))
-            score = goal.expected(fit.square + cost, apply_edits(chain, [edit])[0], len(fit.residuals))
+            score = goal.expected_score(fit.square + cost, apply_edits(chain, [edit])[0], len(fit.residuals))
             result.append((score - present, edit))
     return sorted(result, key=lambda pair: pair[0])
 
@@ -280,7 +280,7 @@ def simplify_fit(data: AxisData, fit: ChainFit, free_knots: bool, goal: Goal) ->
 def _trials(data: AxisData, fit: ChainFit, edits: list[Edit], free_knots: bool, goal: Goal) -> Iterator[ChainFit]:
     """Foresee every edit and refine the most promising ones, best first."""
     foreseen = [foresee(data, fit, [edit], free_knots, goal) for edit in edits]
-    scores = [goal.expected(square, chain, len(fit.residuals)) for chain, square in foreseen]
+    scores = [goal.expected_score(square, chain, len(fit.residuals)) for chain, square in foreseen]
     for i in np.argsort(scores, kind="stable")[:_TRIALS]:
         yield _refine_again(data, fit, foreseen[i][0], free_knots)
 

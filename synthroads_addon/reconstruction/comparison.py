@@ -32,7 +32,7 @@ def compare(found: RoadParameters, truth: RoadParameters) -> dict[str, Any]:
     """
     there, here = RoadGeometry(truth), RoadGeometry(found)
     station = np.arange(0.0, there.length, _STEP)
-    point = there.alignment.position(station) + _apart(truth, found)
+    point = there.alignment.position(station) + _plan_shift(truth, found)
     at, offset = here.alignment.project(point)
     covered = (at > 0.0) & (at < here.length)
     turn = here.alignment.heading(at) - there.alignment.heading(station)
@@ -46,8 +46,8 @@ def compare(found: RoadParameters, truth: RoadParameters) -> dict[str, Any]:
         "profile": _figures(height[covered]),
         "carriageways": sides,
         "surface": _figures(_surface(there, here, station[covered], truth, found)),
-        "barriers": _barriers(there, here, _apart(truth, found)),
-        "delineators": _posts(there, here, _apart(truth, found)),
+        "barriers": _barriers(there, here, _plan_shift(truth, found)),
+        "delineators": _posts(there, here, _plan_shift(truth, found)),
     }
 
 
@@ -63,8 +63,8 @@ def compare_axis(found: RoadParameters, axis: Float) -> dict[str, Any]:
     return {"covered": round(float(covered.mean()), 4), "centreline": _figures(offset[covered])}
 
 
-def _apart(truth: RoadParameters, found: RoadParameters) -> Float:
-    """Return what turns local plan coordinates of the true set into those of the found one."""
+def _plan_shift(truth: RoadParameters, found: RoadParameters) -> Float:
+    """Return the shift (2,), m, from local plan coordinates of the true set to those of the found one."""
     return np.array(truth.transform.translate[:2]) - np.array(found.transform.translate[:2])
 
 
@@ -109,7 +109,7 @@ def _surface(
         for share in (0.1, 0.3, 0.5, 0.7, 0.9):
             bounds = side.distances(station)
             offset = float(side.carriageway.sign) * (bounds[:, 0] + share * (side.main_edge(station) - bounds[:, 0]))
-            at, beside = here.alignment.project(_place(there, station, offset) + _apart(truth, found))
+            at, beside = here.alignment.project(_place(there, station, offset) + _plan_shift(truth, found))
             high = here.elevation(at, beside) + found.transform.translate[2]
             result.append(high - there.elevation(station, offset) - truth.transform.translate[2])
     difference = np.concatenate(result)

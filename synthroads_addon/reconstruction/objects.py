@@ -148,12 +148,12 @@ def _barrier(part: StandingObject, kind: PointKind) -> FoundBarrier | None:
     upper = part.height > 0.4 * height
     middles = np.array([np.median(part.offset[upper & (index == i)]) for i in np.unique(index[upper])])
     offset, std = mean_with_std(middles)
-    told: BarrierKind = {PointKind.BARRIER: "concrete", PointKind.NOISE_BARRIER: "noise"}.get(kind, "guardrail")  # type: ignore[assignment]
+    barrier_kind: BarrierKind = {PointKind.BARRIER: "concrete", PointKind.NOISE_BARRIER: "noise"}.get(kind, "guardrail")  # type: ignore[assignment]
     if kind == PointKind.FURNITURE:
         if not _BARRIER_HEIGHTS[0] < height or np.std(part.offset[upper]) > 0.35:
             return None
-        told = "noise" if height > _NOISE_FROM else "guardrail"
-    return FoundBarrier(told, float(start), float(end), offset, height, "both", std, count)
+        barrier_kind = "noise" if height > _NOISE_FROM else "guardrail"
+    return FoundBarrier(barrier_kind, float(start), float(end), offset, height, "both", std, count)
 
 
 def facing(barrier: FoundBarrier, side: Literal["left", "right", "both"]) -> FoundBarrier:

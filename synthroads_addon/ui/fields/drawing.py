@@ -18,7 +18,7 @@ from .fields import (
     FlagField,
     IntervalField,
     NumberField,
-    OwnField,
+    OptionalField,
     TextField,
 )
 from .groups import GroupField, NamedOrByHandField
@@ -77,17 +77,17 @@ def _number(layout: bpy.types.UILayout, settings: Any, owner: Any, field: Number
 
 
 def _values(layout: bpy.types.UILayout, settings: Any, owner: Any, field: NumberField | IntervalField) -> None:
-    row = _own(layout, settings, owner, field) if field.optional else value_row(layout, field.label)
+    row = _draw_checkbox(layout, settings, owner, field) if field.optional else value_row(layout, field.label)
     if row:
         for name in field.values:
             row.prop(owner, name, text="")
 
 
-def _own(layout: bpy.types.UILayout, settings: Any, owner: Any, field: OwnField) -> bpy.types.UILayout | None:
+def _draw_checkbox(layout: bpy.types.UILayout, settings: Any, owner: Any, field: OptionalField) -> bpy.types.UILayout | None:
     """Draw the checkbox of a field that may be left out; return the place for its value if it is ticked."""
     row = value_row(layout, field.label)
-    row.prop(owner, field.own, text="")
-    if getattr(owner, field.own):
+    row.prop(owner, field.checkbox_name, text="")
+    if getattr(owner, field.checkbox_name):
         return row
     _draw_greyed(row, inherited_text(settings, field.path, field.unit))
     return None
@@ -129,8 +129,8 @@ def _files(layout: bpy.types.UILayout, settings: Any, owner: Any, field: FilesFi
 
 def _group(layout: bpy.types.UILayout, settings: Any, owner: Any, field: GroupField) -> None:
     if field.optional:
-        _own(layout, settings, owner, field)
-        if not getattr(owner, field.own):
+        _draw_checkbox(layout, settings, owner, field)
+        if not getattr(owner, field.checkbox_name):
             return
     for inner in field.fields_in_use(owner).values():
         draw_field(layout, settings, inner)

@@ -54,7 +54,7 @@ class Field:
         return (self.info.description or "").removesuffix(".")
 
     @property
-    def own(self) -> str:
+    def checkbox_name(self) -> str:
         """Return the name of the checkbox of a field that may be left out, where its kind has one."""
         return f"own_{self.name}"
 
@@ -84,8 +84,8 @@ class Field:
         return {"name": name or self.label, "description": self.tooltip, **hook}
 
 
-class OwnField(Field):
-    """A field of which a checkbox of its own, `own`, says whether it is given, where it may be left out."""
+class OptionalField(Field):
+    """A field of which a checkbox, `checkbox_name`, says whether it is given, where it may be left out."""
 
     @property
     def values(self) -> tuple[str, ...]:
@@ -95,11 +95,11 @@ class OwnField(Field):
     @property
     def names(self) -> tuple[str, ...]:
         """Return the names of its properties."""
-        return (self.own, *self.values) if self.optional else self.values
+        return (self.checkbox_name, *self.values) if self.optional else self.values
 
     def read(self, owner: Any, base: Any) -> Any:
         """Return the value, or None where the checkbox isn't ticked."""
-        return None if self.optional and not getattr(owner, self.own) else self.read_given(owner, base)
+        return None if self.optional and not getattr(owner, self.checkbox_name) else self.read_given(owner, base)
 
     def read_given(self, owner: Any, base: Any) -> Any:
         """Return the value that is given; see `read`."""
@@ -108,7 +108,7 @@ class OwnField(Field):
     def write(self, owner: Any, value: Any) -> None:
         """Have a property group show a value, or that none is given."""
         if self.optional:
-            setattr(owner, self.own, value is not None)
+            setattr(owner, self.checkbox_name, value is not None)
         if value is not None:
             self.write_given(owner, value)
 
@@ -129,7 +129,7 @@ class FlagField(Field):
         return bool(getattr(owner, self.name))
 
 
-class NumberField(OwnField):
+class NumberField(OptionalField):
     """A number with its limits."""
 
     @property
@@ -151,7 +151,7 @@ class NumberField(OwnField):
         setattr(owner, self.name, fitting(value) if self.kind is int else value)
 
 
-class IntervalField(OwnField):
+class IntervalField(OptionalField):
     """Two numbers, smallest and largest."""
 
     @property
@@ -345,13 +345,13 @@ def checkbox(field: Any, hooks: Hooks) -> dict[str, Any]:
     """Return the checkbox of a field that may be left out; none for others."""
     if not field.optional:
         return {}
-    hook = {"update": hooks[own_path]} if (own_path := own(field.path)) in hooks else {}
+    hook = {"update": hooks[own_path]} if (own_path := checkbox_path(field.path)) in hooks else {}
     text = f"{field.tooltip}. Tick to give a value of your own"
-    name = f"Own {field.label}"
-    return {field.own: bpy.props.BoolProperty(name=name, description=text, default=field.default is not None, **hook)}
+    about = {"name": f"Own {field.label}", "description": text, "default": field.default is not None}
+    return {field.checkbox_name: bpy.props.BoolProperty(**about, **hook)}
 
 
-def own(path: str) -> str:
+def checkbox_path(path: str) -> str:
     """Return the path of a field's checkbox."""
     head, dot, name = path.rpartition(".")
     return f"{head}{dot}own_{name}"

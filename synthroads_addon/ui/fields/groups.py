@@ -14,10 +14,10 @@ from ...scenario.road import Interval
 from . import fields as kinds
 from .choices import STANDARD_PARTS, Items
 from .declared import BY_HAND, BY_HAND_ENDING, is_constant
-from .fields import Field, FilesField, Hooks, OwnField, checkbox
+from .fields import Field, FilesField, Hooks, OptionalField, checkbox
 
 
-class GroupField(OwnField):
+class GroupField(OptionalField):
     """A part of the scenario: a property group of its own.
 
     Attributes:

@@ -140,12 +140,12 @@ def states(settings: Any) -> Iterator[None]:
         settings.scan.platform.kind, settings.scan.platform.path = kind, path
         settings.road.cross_section = BY_HAND
         for field in PATHS.values():
-            if field.optional and hasattr(field, "own") and field.path not in ("scan.attenuation",):
+            if field.optional and hasattr(field, "checkbox_name") and field.path not in ("scan.attenuation",):
                 owner = settings
                 for part in field.path.split(".")[:-1]:
                     owner = getattr(owner, part)
-                if hasattr(owner, field.own):
-                    setattr(owner, field.own, True)
+                if hasattr(owner, field.checkbox_name):
+                    setattr(owner, field.checkbox_name, True)
         settings.scan.weather.condition = "snow"
         settings.colour.source, settings.colour.lighting = "images", "path"
         yield
