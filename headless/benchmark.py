@@ -94,8 +94,8 @@ def _runs(arguments: argparse.Namespace, waves: dict[str, Any]) -> dict[str, Any
         measured: dict[str, Any] = {"lines": {}}
         for step, part in enumerate(parts):
             progress(f"{part}, {cores}", (number * len(parts) + step) / (len(parts) * len(arguments.cores)))
-            found = _in_own_process({**about, "part": part}, cores)
-            measured |= found | {"lines": measured["lines"] | found["lines"]}
+            result_of_part = _in_own_process({**about, "part": part}, cores)
+            measured |= result_of_part | {"lines": measured["lines"] | result_of_part["lines"]}
         runs.append(measured | {"cores": cores})
     versions = {"Blender": runs[0]["blender"], "Python": platform.python_version()}
     return {"machine": machine(versions), "quick": arguments.quick, "runs": runs}
@@ -123,11 +123,11 @@ def _measure_part(part: dict[str, Any]) -> dict[str, Any]:
     if part["part"] == "demo":
         from synthroads_addon.jobs.measure.benchmark import measure_demo
 
-        found = measure_demo(_scenario(part["scenario"], part["changes"], part["quick"]))
+        result = measure_demo(_scenario(part["scenario"], part["changes"], part["quick"]))
     else:
         rays = int(part["part"].removeprefix("waves_"))
-        found = {"lines": _waves(rays, Path(part["scene"]), part["triangles"])}
-    return found | {"blender": sys.modules["bpy"].app.version_string}
+        result = {"lines": _waves(rays, Path(part["scene"]), part["triangles"])}
+    return result | {"blender": sys.modules["bpy"].app.version_string}
 
 
 def _waves(rays: int, scene: Path, triangles: int) -> dict[str, float]:

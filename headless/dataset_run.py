@@ -170,13 +170,13 @@ class DatasetRun:
     def _make(self, submit: Submit) -> None:
         """Make the scenes that aren't there yet."""
         self._write_manifest()
-        wanted = [job for job in self.jobs if self.splits is None or job.split in self.splits]
-        missing = [job for job in wanted if not self._is_done(job)]
-        done = len(wanted) - len(missing)
-        self.progress("scenes", done / len(wanted))
+        chosen = [job for job in self.jobs if self.splits is None or job.split in self.splits]
+        missing = [job for job in chosen if not self._is_done(job)]
+        done = len(chosen) - len(missing)
+        self.progress("scenes", done / len(chosen))
         for number, outcome in enumerate(submit([self._write_task(job) for job in missing]), start=1):
             self._take(outcome)
-            self.progress("scenes", (done + number) / len(wanted))
+            self.progress("scenes", (done + number) / len(chosen))
 
     @contextmanager
     def _lock_folder(self) -> Iterator[None]:

@@ -95,11 +95,11 @@ def markdown(results: Sequence[Mapping[str, Any]], scenario: str) -> str:
     machines = dict.fromkeys(row["machine"] for row in results if "machine" in row)
     lines = [f"Scene `{scenario}`: `synthroads tradeoff --scenario {scenario} --output DIR`; {'; '.join(machines)}", ""]
     for table, costs in TABLES.items():
-        own = [row for row in results if KNOBS[row["knob"]].table == table]
-        measured = measured_rows(own)
+        in_table = [row for row in results if KNOBS[row["knob"]].table == table]
+        measured = measured_rows(in_table)
         if measured:
             lines += [f"{table.capitalize()}:", "", *_table(measured, costs), ""]
-        left_out = [f"- {row['knob']} {row['value']}: {row['left_out']}" for row in own if "left_out" in row]
+        left_out = [f"- {row['knob']} {row['value']}: {row['left_out']}" for row in in_table if "left_out" in row]
         lines += [*left_out, ""] if left_out else []
     front = front_lines(results)
     lines += [*front, ""] if front else []

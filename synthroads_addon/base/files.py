@@ -77,10 +77,10 @@ def stamp(path: str, wanted: str) -> tuple[int, int]:
         MissingFileError: it doesn't exist; ``wanted`` is said before the system's own words.
     """
     try:
-        found = Path(path).stat()
+        status = Path(path).stat()
     except (OSError, ValueError) as error:  # ValueError: its name holds a null byte
         raise MissingFileError(path, None, f"{wanted} ({getattr(error, 'strerror', None) or error})") from None
-    return found.st_mtime_ns, found.st_size
+    return status.st_mtime_ns, status.st_size
 
 
 def files_below(folder: Path) -> Iterator[Path]:

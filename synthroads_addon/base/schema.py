@@ -44,8 +44,8 @@ def notes(
         unset: the same in two or three words, where it is no number.
         labels: values of a choice, and what people call them.
     """
-    said = {"unit": unit, "only_with": only_with, "inherits": inherits, "unset": unset, "labels": labels}
-    return {name: value for name, value in said.items() if value}
+    given = {"unit": unit, "only_with": only_with, "inherits": inherits, "unset": unset, "labels": labels}
+    return {name: value for name, value in given.items() if value}
 
 
 def quantity(

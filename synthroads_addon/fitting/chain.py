@@ -192,8 +192,8 @@ class Plan:
     snaps: tuple[int, ...] = (EQUAL, ZERO)
 
     def measure(self, chain: Chain, stations: FloatArray) -> tuple[FloatArray, FloatArray]:
-        found, offset = chain.alignment.project_near(self.points, stations, self.reach)
-        return found, self.weights * offset
+        feet, offset = chain.alignment.project_near(self.points, stations, self.reach)
+        return feet, self.weights * offset
 
     def jacobian(self, chain: Chain, stations: FloatArray) -> FloatArray:
         """A change of curvature at s' turns the rest of the road about the point there.
@@ -323,10 +323,10 @@ def refine(data: AxisData, chain: Chain, stations: FloatArray, free_knots: bool,
     basis = chain.basis(free_knots)
     damping, system = 1.0, _system(data, fit, basis, free_knots)
     for _ in range(steps if basis.shape[1] else 0):
-        r, wanted, held, scale = system
+        r, target, held, scale = system
         weight = np.sqrt(damping * (fit.square + 1e-12 * len(fit.residuals)))
         rows = np.vstack((r, weight * held, np.sqrt(1e-7 * damping) * np.eye(r.shape[1])))
-        step = least_squares(rows, np.concatenate((wanted, np.zeros(len(rows) - len(wanted))))) / scale
+        step = least_squares(rows, np.concatenate((target, np.zeros(len(rows) - len(target))))) / scale
         trial_chain = apply_step(data, fit.chain, basis @ step)
         trial = ChainFit(trial_chain, *data.measure(trial_chain, fit.stations))
         if trial.square < fit.square:

@@ -118,11 +118,11 @@ def _surface(
 
 def _barriers(there: RoadGeometry, here: RoadGeometry, apart: Float) -> dict[str, Any]:
     """Return length, recall and precision of all barriers: shares of their metres with one of the other set near."""
-    true, mine = (
+    true, reconstructed = (
         [item for item in road.parameters.objects.values() if isinstance(item, _BARRIERS)] for road in (there, here)
     )
-    recalled, error = _match_barriers(there, true, here, mine, apart)
-    precise, _ = _match_barriers(here, mine, there, true, -apart)
+    recalled, error = _match_barriers(there, true, here, reconstructed, apart)
+    precise, _ = _match_barriers(here, reconstructed, there, true, -apart)
     return {
         "true_length": round(float(len(recalled)), 1),
         "found_length": round(float(len(precise)), 1),
@@ -163,18 +163,18 @@ def _posts(there: RoadGeometry, here: RoadGeometry, apart: Float) -> dict[str, A
     for road in (there, here):
         items = [item for item in road.parameters.of_type(Delineator).values() if item.station <= road.length]
         points.append(_place(road, np.array([i.station for i in items]), np.array([i.offset for i in items])))
-    true, mine = points[0] + apart, points[1]
-    if not len(true) or not len(mine):
-        return {"true": len(true), "found": len(mine), "recall": 0.0 if len(true) else None, "precision": None}
-    distance = cdist(true, mine)
+    true, reconstructed = points[0] + apart, points[1]
+    if not len(true) or not len(reconstructed):
+        return {"true": len(true), "found": len(reconstructed), "recall": 0.0 if len(true) else None, "precision": None}
+    distance = cdist(true, reconstructed)
     rows, columns = linear_sum_assignment(np.minimum(distance, 10.0 * POST_DISTANCE))
     matched = distance[rows, columns]
     matched = matched[matched <= POST_DISTANCE]
     return {
         "true": len(true),
-        "found": len(mine),
+        "found": len(reconstructed),
         "recall": round(len(matched) / len(true), 4),
-        "precision": round(len(matched) / len(mine), 4),
+        "precision": round(len(matched) / len(reconstructed), 4),
         "distance": _figures(matched),
     }
 

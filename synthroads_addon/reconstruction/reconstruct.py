@@ -233,13 +233,13 @@ def _height_difference(heights: tuple[Float, Float]) -> float:
 
 def _surface(profiles: Profiles, section: MeasuredSection, side: Side, rotation: RotationAxis) -> Surface:
     """Return one carriageway's surface along the alignment."""
-    own = section.sides[side]
-    count = len(own.usual)
-    inner = np.full(count, own.inner_offset.value)
-    outer = inner + own.paved_width.value
+    measured_side = section.sides[side]
+    count = len(measured_side.usual)
+    inner = np.full(count, measured_side.inner_offset.value)
+    outer = inner + measured_side.paved_width.value
     pivot = inner if rotation == "inner_edge" else 0.5 * (inner + outer)
-    low, high = (inner, outer) if own.sign > 0 else (-outer, -inner)
-    return surface(profiles, low, high, float(own.sign) * pivot)
+    low, high = (inner, outer) if measured_side.sign > 0 else (-outer, -inner)
+    return surface(profiles, low, high, float(measured_side.sign) * pivot)
 
 
 def _smooth_fall(measured: Surface) -> Float:

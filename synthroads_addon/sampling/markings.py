@@ -54,8 +54,8 @@ class _Painter:
 
     def lines(self) -> Iterator[tuple[str, LineMarking]]:
         """Yield the lines along lane boundaries: solid at the edges, dashed between lanes."""
-        lanes, wanted = self.carriageway.lanes, self.site.scenario.markings
-        dash, gap = wanted.lane_dash or LANE_DASH, wanted.lane_gap or LANE_GAP
+        lanes, limits = self.carriageway.lanes, self.site.scenario.markings
+        dash, gap = limits.lane_dash or LANE_DASH, limits.lane_gap or LANE_GAP
         blocks = sorted(_block_span(shape) for shape in self.section.turnouts if shape.turnout.ramp)
         for number, span in enumerate(_gaps_between(blocks, self.length)):
             name = f"{self.name}-line-0" + (f"-{number + 1}" if number else "")

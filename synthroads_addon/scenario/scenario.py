@@ -103,8 +103,8 @@ class Scenario(ClosedModel):
         """Return the length (m) of the sections by which a road of a length (m) is built and scanned; None: whole."""
         if not set(self.outputs) & {"cloud", "previews"}:
             return None
-        own = self.scan.section_length
-        section, longest = (SECTION_LENGTH, LONGEST_WHOLE) if own is None else (own, 2.0 * own)
+        given = self.scan.section_length
+        section, longest = (SECTION_LENGTH, LONGEST_WHOLE) if given is None else (given, 2.0 * given)
         return section if length > longest else None
 
     def settings(self) -> Settings:

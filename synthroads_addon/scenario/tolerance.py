@@ -93,17 +93,17 @@ def with_unit(field: str, text: str, units: dict[str, float]) -> float:
     Raises:
         InputError: it is no number, or lacks a unit where it needs one, or has another.
     """
-    found = _NUMBER.fullmatch(text)
+    match = _NUMBER.fullmatch(text)
     named = [unit for unit in units if unit]
-    wanted = f"a number with a unit of {', '.join(named)}" if named else "a number without a unit"
+    allowed = f"a number with a unit of {', '.join(named)}" if named else "a number without a unit"
     if "" in units and named:
-        wanted = f"a number, or one with a unit of {', '.join(named)}"
-    if not found:
-        raise InputError(field, text, f"must be {wanted}")
-    number, unit = found.groups()
+        allowed = f"a number, or one with a unit of {', '.join(named)}"
+    if not match:
+        raise InputError(field, text, f"must be {allowed}")
+    number, unit = match.groups()
     if unit not in units:
-        said = f"has the unit '{unit}'" if unit else "has no unit"
-        raise InputError(field, text, f"{said}: must be {wanted}{nearest_name(unit, named) if unit else ''}")
+        fault = f"has the unit '{unit}'" if unit else "has no unit"
+        raise InputError(field, text, f"{fault}: must be {allowed}{nearest_name(unit, named) if unit else ''}")
     # As a decimal, so that 5mm is the number that 0.005 is.
     return float(f"{float(number) * units[unit]:.15g}")
 

@@ -224,12 +224,12 @@ class Layout:
     @cached_property
     def tight_arcs(self) -> list[tuple[float, float, float]]:
         """Start and end (m) and curvature (1/m) of the arcs that are tight for the design class."""
-        found, start, tight = [], 0.0, 1.0 / (TIGHT_CURVE * self.site.limits.radius)
+        arcs, start, tight = [], 0.0, 1.0 / (TIGHT_CURVE * self.site.limits.radius)
         for element in self.site.alignment.horizontal:
             if element.kind == "arc" and abs(element.curvature_start) > tight:
-                found.append((start, start + element.length, element.curvature_start))
+                arcs.append((start, start + element.length, element.curvature_start))
             start += element.length
-        return found
+        return arcs
 
 
 def _least(width: AnyWidth) -> float:

@@ -77,13 +77,13 @@ def _number(layout: bpy.types.UILayout, settings: Any, owner: Any, field: Number
 
 
 def _values(layout: bpy.types.UILayout, settings: Any, owner: Any, field: NumberField | IntervalField) -> None:
-    row = _draw_checkbox(layout, settings, owner, field) if field.optional else value_row(layout, field.label)
+    row = _checkbox(layout, settings, owner, field) if field.optional else value_row(layout, field.label)
     if row:
         for name in field.values:
             row.prop(owner, name, text="")
 
 
-def _draw_checkbox(layout: bpy.types.UILayout, settings: Any, owner: Any, field: OptionalField) -> bpy.types.UILayout | None:
+def _checkbox(layout: bpy.types.UILayout, settings: Any, owner: Any, field: OptionalField) -> bpy.types.UILayout | None:
     """Draw the checkbox of a field that may be left out; return the place for its value if it is ticked."""
     row = value_row(layout, field.label)
     row.prop(owner, field.checkbox_name, text="")
@@ -129,7 +129,7 @@ def _files(layout: bpy.types.UILayout, settings: Any, owner: Any, field: FilesFi
 
 def _group(layout: bpy.types.UILayout, settings: Any, owner: Any, field: GroupField) -> None:
     if field.optional:
-        _draw_checkbox(layout, settings, owner, field)
+        _checkbox(layout, settings, owner, field)
         if not getattr(owner, field.checkbox_name):
             return
     for inner in field.fields_in_use(owner).values():

@@ -106,8 +106,8 @@ class SavedScene:
             return Scanned(**messages.done)
         if code < 0:
             raise InputError("Blender", None, f"was ended in the background by signal {-code} (too little memory?)")
-        said = (self.place / _ERRORS).read_text(encoding="utf-8", errors="replace").strip()
-        raise RuntimeError(f"Blender in the background ended with exit code {code}: {said or 'no message'}")
+        errors = (self.place / _ERRORS).read_text(encoding="utf-8", errors="replace").strip()
+        raise RuntimeError(f"Blender in the background ended with exit code {code}: {errors or 'no message'}")
 
 
 @dataclass
