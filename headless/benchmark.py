@@ -63,7 +63,7 @@ def run(arguments: argparse.Namespace) -> Outcome:
             raise InputError("--cores", cores, f"must be 1 to {available_cores()}, the cores that are there")
     found: dict[str, Any] = {}
 
-    def measured() -> dict[str, str]:
+    def measure() -> dict[str, str]:
         found.update(_all(arguments))
         return {TABLE: markdown(found)}
 
@@ -71,7 +71,7 @@ def run(arguments: argparse.Namespace) -> Outcome:
         folder = None
         if arguments.output:
             folder = opened.enter_context(output_folder(arguments.output, _FILES, arguments.overwrite))
-        table = fill(arguments.document, [TABLE], measured)[TABLE]
+        table = fill(arguments.document, [TABLE], measure)[TABLE]
         if folder:
             (folder / _FILES[0]).write_text(canonical_json(found), encoding="utf-8")
             (folder / _FILES[1]).write_text(table, encoding="utf-8")
@@ -94,8 +94,8 @@ def _runs(arguments: argparse.Namespace, waves: dict[str, Any]) -> dict[str, Any
         measured: dict[str, Any] = {"lines": {}}
         for step, part in enumerate(parts):
             progress(f"{part}, {cores}", (number * len(parts) + step) / (len(parts) * len(arguments.cores)))
-            found = _in_own_process({**about, "part": part}, cores)
-            measured |= found | {"lines": measured["lines"] | found["lines"]}
+            result_of_part = _in_own_process({**about, "part": part}, cores)
+            measured |= result_of_part | {"lines": measured["lines"] | result_of_part["lines"]}
         runs.append(measured | {"cores": cores})
     versions = {"Blender": runs[0]["blender"], "Python": platform.python_version()}
     return {"machine": machine(versions), "quick": arguments.quick, "runs": runs}
@@ -123,11 +123,11 @@ def _measure_part(part: dict[str, Any]) -> dict[str, Any]:
     if part["part"] == "demo":
         from synthroads_addon.jobs.measure.benchmark import measure_demo
 
-        found = measure_demo(_scenario(part["scenario"], part["changes"], part["quick"]))
+        result = measure_demo(_scenario(part["scenario"], part["changes"], part["quick"]))
     else:
         rays = int(part["part"].removeprefix("waves_"))
-        found = {"lines": _waves(rays, Path(part["scene"]), part["triangles"])}
-    return found | {"blender": sys.modules["bpy"].app.version_string}
+        result = {"lines": _waves(rays, Path(part["scene"]), part["triangles"])}
+    return result | {"blender": sys.modules["bpy"].app.version_string}
 
 
 def _waves(rays: int, scene: Path, triangles: int) -> dict[str, float]:

@@ -39,7 +39,7 @@ class Limit:
     most: bool
     digits: int = 2
 
-    def kept(self, value: float) -> bool:
+    def is_kept_by(self, value: float) -> bool:
         """Return whether a value keeps the limit."""
         return value <= self.limit if self.most else value >= self.limit
 
@@ -75,7 +75,7 @@ def judge_lines(result: dict[str, Any]) -> Iterator[tuple[str, float, bool]]:
     for name, limit in LIMITS.items():
         value = (run or {}).get("lines", {}).get(name)
         if value is not None:
-            yield name, value, limit.kept(value)
+            yield name, value, limit.is_kept_by(value)
 
 
 def _limits(result: dict[str, Any]) -> Iterator[str]:

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from synthroads_addon.base.catalogue import Entry, Kind, figures, plain, preset, span
 from synthroads_addon.base.classes import class_scheme, scheme_names
-from synthroads_addon.base.files import PRESETS
+from synthroads_addon.base.files import PRESETS, preset_names
 from synthroads_addon.dataset.recipe import RECIPES, load_recipe, recipe_names
 from synthroads_addon.materials.table import material_table_path, read_material_table
 from synthroads_addon.scanning.devices.device import DEVICES, device_names, load_device
@@ -21,7 +21,7 @@ from synthroads_addon.scenario.scenario import SCENARIOS, load_scenario, scenari
 def _scenario(name: str) -> Entry:
     made = load_scenario(name)
     section = made.road.cross_section
-    told = {
+    figures_by_name = {
         "cross_section": section if isinstance(section, str) else "by hand",
         "design_class": made.road.design_class,
         "length": made.road.length,
@@ -29,12 +29,12 @@ def _scenario(name: str) -> Entry:
         "device": made.scan.device,
         "fidelity": made.fidelity,
     }
-    return Entry(name, made.title, preset(SCENARIOS, ".json", name, scenario_names()), told)
+    return Entry(name, made.title, preset(SCENARIOS, ".json", name, scenario_names()), figures_by_name)
 
 
 def _device(name: str) -> Entry:
     made = load_device(name)
-    told = {
+    figures_by_name = {
         "pattern": made.pattern.name,
         "heads": len(made.heads),
         "beams": made.channels,
@@ -48,20 +48,20 @@ def _device(name: str) -> Entry:
         "minimum_range": made.minimum_range,
         "maximum_ranges": [mode.maximum_range for mode in made.modes],
     }
-    return Entry(name, made.title, preset(DEVICES, ".json", name, device_names()), told, made.source)
+    return Entry(name, made.title, preset(DEVICES, ".json", name, device_names()), figures_by_name, made.source)
 
 
 def _recipe(name: str) -> Entry:
     made = load_recipe(name)
     splits = Counter(split for group in made.groups for split in group.splits())
-    told = {
+    figures_by_name = {
         "scenes": sum(group.scenes for group in made.groups),
         "splits": dict(splits),
         "scenario": made.scenario,
         "layouts": list(made.layouts),
     }
     file = preset(RECIPES, ".yaml", name, recipe_names())
-    return Entry(name, made.title, file, told, " ".join(made.description.split()))
+    return Entry(name, made.title, file, figures_by_name, " ".join(made.description.split()))
 
 
 def _classes(name: str) -> Entry:
@@ -78,12 +78,8 @@ def _assets(name: str) -> Entry:
 
 def _materials(name: str) -> Entry:
     made = read_material_table(material_table_path(name))
-    told = {"materials": {key: round(row.reflectivity, 3) for key, row in made.items()}}
-    return Entry(name, f"{len(made)} materials in place of the usual ones", material_table_path(name), told)
-
-
-def _table_names() -> list[str]:
-    return sorted(path.stem for path in (PRESETS / "material_tables").glob("*.json"))
+    figures_by_name = {"materials": {key: round(row.reflectivity, 3) for key, row in made.items()}}
+    return Entry(name, f"{len(made)} materials in place of the usual ones", material_table_path(name), figures_by_name)
 
 
 KINDS = {
@@ -143,7 +139,7 @@ KINDS = {
     "material-tables": Kind(
         "Tables of materials",
         "--set materials_table=NAME",
-        _table_names,
+        lambda: preset_names(PRESETS / "material_tables"),
         _materials,
         (".json",),
         ("material", "reflectivity"),

@@ -70,11 +70,11 @@ class Parser(argparse.ArgumentParser):
 
     def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
         """Parse what is known; return it and the rest."""
-        found, rest = super().parse_known_args(args, namespace)
+        parsed, rest = super().parse_known_args(args, namespace)
         if self.words and not any(word.startswith("-") for word in rest):
-            setattr(found, self.words, [*(getattr(found, self.words) or ()), *rest])
+            setattr(parsed, self.words, [*(getattr(parsed, self.words) or ()), *rest])
             rest = []
-        return found, rest
+        return parsed, rest
 
     def error(self, message: str) -> Any:
         self.exit(2, f"{self.prog}: {message}\n")
@@ -131,15 +131,15 @@ def all_changes(arguments: argparse.Namespace, short: Mapping[str, str]) -> list
     Raises:
         InputError: an option and ``--set`` contradict each other.
     """
-    said: Any = {}
+    given: Any = {}
     for change in arguments.changes:
-        said = apply_change(said, change)
+        given = apply_change(given, change)
     changes = list(arguments.changes)
     for name, path in short.items():
         value = getattr(arguments, name)
         if value in (None, []):
             continue
-        other = said
+        other = given
         for key in path.split("."):
             other = other.get(key, value) if isinstance(other, dict) else value
         if other != value:

@@ -72,10 +72,14 @@ def _change_recipe(recipe: Recipe, changes: list[str]) -> Recipe:
 
 def _verify(folder: Path) -> Outcome:
     manifest = read_manifest(folder)
-    found = faults(folder, manifest.scenes)
+    faulty = faults(folder, manifest.scenes)
     files = sum(len(scene.files or {}) for scene in manifest.scenes)
-    text = "\n".join(found) if found else f"{files:,} files of {len(manifest.scenes)} scenes are as the manifest says"
-    return 3 if found else 0, {"files": files, "faults": found}, text
+    text = (
+        "\n".join(faulty)
+        if faulty
+        else f"{files:,} files of {len(manifest.scenes)} scenes are as the manifest says"
+    )
+    return 3 if faulty else 0, {"files": files, "faults": faulty}, text
 
 
 def summary(manifest: Manifest, folder: Path) -> str:

@@ -158,7 +158,7 @@ class DatasetRun:
             InputError: what is there was made from another recipe.
         """
         try:
-            with self._locked():
+            with self._lock_folder():
                 self._open()
                 self._make(submit)
                 self._close()
@@ -170,16 +170,16 @@ class DatasetRun:
     def _make(self, submit: Submit) -> None:
         """Make the scenes that aren't there yet."""
         self._write_manifest()
-        wanted = [job for job in self.jobs if self.splits is None or job.split in self.splits]
-        missing = [job for job in wanted if not self._is_done(job)]
-        done = len(wanted) - len(missing)
-        self.progress("scenes", done / len(wanted))
+        chosen = [job for job in self.jobs if self.splits is None or job.split in self.splits]
+        missing = [job for job in chosen if not self._is_done(job)]
+        done = len(chosen) - len(missing)
+        self.progress("scenes", done / len(chosen))
         for number, outcome in enumerate(submit([self._write_task(job) for job in missing]), start=1):
             self._take(outcome)
-            self.progress("scenes", (done + number) / len(wanted))
+            self.progress("scenes", (done + number) / len(chosen))
 
     @contextmanager
-    def _locked(self) -> Iterator[None]:
+    def _lock_folder(self) -> Iterator[None]:
         """Keep others out of the folder; the lock goes with the process however it ends."""
         try:
             self.folder.mkdir(parents=True, exist_ok=True)
@@ -208,7 +208,7 @@ class DatasetRun:
         """Take over the scenes of the set that is there, or have a new one take its place."""
         if self.overwrite:
             finish_removal(self.folder)
-            paths = [*made_by(self.folder, read_manifest(self.folder)), *self._published()]
+            paths = [*made_by(self.folder, read_manifest(self.folder)), *self._published_folders()]
             for path in self._unknown(set(paths)):
                 name = path.relative_to(self.folder).as_posix()
                 raise OutputError("--output", str(self.folder), f"holds {name}, which is no scene's; move it away")
@@ -223,7 +223,7 @@ class DatasetRun:
             raise OutputError("--output", str(self.folder), allowed)
         finish_removal(self.folder)
 
-    def _published(self) -> list[str]:
+    def _published_folders(self) -> list[str]:
         """Return the folders of scenes that a run before published, or was about to, when it was killed."""
         tasks = [json.loads(path.read_text(encoding="utf-8")) for path in (self.folder / WORK).glob(f"*/{DONE}")]
         return [name for task in tasks for name in task["folders"]]
@@ -277,7 +277,7 @@ class DatasetRun:
             logger.error("failed: %s: %s", job.name, outcome.error)
         self.entries[job.name] = entry
         self._write_manifest()
-        shutil.rmtree(outcome.folder, ignore_errors=True)  # until now `_published` knows what is where
+        shutil.rmtree(outcome.folder, ignore_errors=True)  # until now `_published_folders` knows what is where
 
     def _write_manifest(self) -> None:
         entries = [self.entries[job.name] for job in self.jobs if job.name in self.entries]

@@ -31,9 +31,9 @@ def run(arguments: argparse.Namespace) -> Outcome:
     trained = Run.open(arguments.run, kinds())
     evaluation = Evaluation(arguments.data, arguments.split, arguments.output, arguments.mapping)
     used = task(trained.configuration.task)
-    found = used.evaluate(trained, evaluation, progress_bar(arguments))
-    written = f"written to {arguments.output}: {', '.join(found['files'])}"
-    return 0, found, f"{used.report(found)}\n\n{written}"
+    scores = used.evaluate(trained, evaluation, progress_bar(arguments))
+    written = f"written to {arguments.output}: {', '.join(scores['files'])}"
+    return 0, scores, f"{used.report(scores)}\n\n{written}"
 
 
 if __name__ == "__main__":

@@ -39,10 +39,10 @@ def run(arguments: argparse.Namespace) -> Outcome:
 
     kinds = {"segmentation": SegmentationConfiguration}
     configuration = load_configuration(arguments.configuration, kinds, arguments.changes)
-    found = forecast(configuration, arguments.steps)
+    figures = forecast(configuration, arguments.steps)
     if arguments.output:
-        write_file(arguments.output, canonical_json(found).encode(), overwrite=True)
-    return 0, found, summary(found)
+        write_file(arguments.output, canonical_json(figures).encode(), overwrite=True)
+    return 0, figures, summary(figures)
 
 
 def summary(found: dict[str, Any]) -> str:

@@ -58,21 +58,21 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> Outcome:
     """Run `synthroads list`."""
     words = [*filter(None, [arguments.kind]), *arguments.names]  # after an option all of them are names
-    name, *wanted = words or [None]
+    name, *names = words or [None]
     if name != _FIELDS and arguments.of != "scenario":
         raise InputError("--of", arguments.of, f"is for {_FIELDS} only")
     if name is None:
         return _kinds()
     if name == _FIELDS:
-        return _fields(arguments.of, wanted)
+        return _fields(arguments.of, names)
     if name not in KINDS:
         known = [*KINDS, _FIELDS]
         raise InputError("KIND", name, f"must be one of {', '.join(known)}{nearest_name(name, known)}")
     kind = KINDS[name]
-    found = entries(kind, wanted)
-    rows = [(one.name, *row) for one in found for row in kind.rows(one)]
+    listed = entries(kind, names)
+    rows = [(one.name, *row) for one in listed for row in kind.rows(one)]
     lines = [*text_table(("name", *kind.head), rows), "", f"use: {kind.use}"]
-    return 0, {name: [one.to_dict() for one in found]}, "\n".join(lines)
+    return 0, {name: [one.to_dict() for one in listed]}, "\n".join(lines)
 
 
 def _kinds() -> Outcome:
@@ -89,11 +89,11 @@ def _fields(owner: str, wanted: Sequence[str]) -> Outcome:
     for text in wanted:
         if not any(one.path.startswith(text) for one in known):
             raise InputError(_FIELDS, text, f"no field of the {owner} begins so; `synthroads list fields` has them all")
-    found = [one for one in known if not wanted or one.path.startswith(tuple(wanted))]
-    intervals = tuple(f"{one.path}." for one in found if one.interval)
-    shown = [one for one in found if not (intervals and one.path.startswith(intervals))]
+    listed = [one for one in known if not wanted or one.path.startswith(tuple(wanted))]
+    intervals = tuple(f"{one.path}." for one in listed if one.interval)
+    shown = [one for one in listed if not (intervals and one.path.startswith(intervals))]
     rows = [_row(one) for one in shown]
-    return 0, {_FIELDS: [one.to_dict() for one in found]}, "\n".join(text_table(("path", "default", "meaning"), rows))
+    return 0, {_FIELDS: [one.to_dict() for one in listed]}, "\n".join(text_table(("path", "default", "meaning"), rows))
 
 
 def _row(one: FieldEntry) -> tuple[str, str, str]:

@@ -67,12 +67,12 @@ def run(arguments: argparse.Namespace) -> Outcome:
     names = [PARAMETERS, REPORT, CENTRELINE, *([] if arguments.no_picture else [PICTURE])]
     with output_folder(arguments.output, [*names, *twin_file_names(arguments.twin)], arguments.overwrite) as folder:
         cloud = read_road_cloud(arguments.cloud)
-        found = reconstruct(cloud, _options(arguments, cloud, folder), progress_bar(arguments))
-        result = _write(found, cloud, folder, arguments.no_picture)
+        road = reconstruct(cloud, _options(arguments, cloud, folder), progress_bar(arguments))
+        result = _write(road, cloud, folder, arguments.no_picture)
         if compared is not None:
-            result["comparison"] = compared(found.parameters)
+            result["comparison"] = compared(road.parameters)
         (folder / REPORT).write_text(canonical_json(result), encoding="utf-8")
-        write_twin(found.parameters, folder, arguments.twin)
+        write_twin(road.parameters, folder, arguments.twin)
     return 0, result, summary(result, arguments.output)
 
 

@@ -65,15 +65,15 @@ def run(arguments: argparse.Namespace) -> Outcome:
     progress = progress_bar(arguments)
     results = {}
 
-    def measured() -> dict[str, str]:
+    def measure() -> dict[str, str]:
         tables = {}
         for number, (scene, title) in enumerate(titles.items()):
-            found = _measure_all(arguments, scene, title, _part(progress, number, len(titles)))
-            results[title], tables[_TABLE.format(title)] = found, markdown(found, scene)
-            _write(arguments, title, found, tables[_TABLE.format(title)])
+            results_of_scene = _measure_all(arguments, scene, title, _part(progress, number, len(titles)))
+            results[title], tables[_TABLE.format(title)] = results_of_scene, markdown(results_of_scene, scene)
+            _write(arguments, title, results_of_scene, tables[_TABLE.format(title)])
         return tables
 
-    tables = fill(arguments.document, map(_TABLE.format, titles.values()), measured)
+    tables = fill(arguments.document, map(_TABLE.format, titles.values()), measure)
     return 0, {"scenes": results}, "\n".join([*tables.values(), f"written to {arguments.output}"])
 
 
@@ -106,14 +106,14 @@ def _part(progress: Progress, number: int, count: int) -> Progress:
 
 def _measure_all(arguments: argparse.Namespace, scene: str, title: str, progress: Progress) -> list[dict[str, Any]]:
     """Return the rows of the wanted knobs and those that were measured before, in the order of `KNOBS`."""
-    wanted = set(rows(arguments.knobs))
+    chosen = set(rows(arguments.knobs))
     results = []
     for number, (knob, value) in enumerate(rows(KNOBS)):
         progress(f"{title} {knob} {value}", number / len(list(rows(KNOBS))))
         path = arguments.output / _ROWS / title / f"{knob}-{_file_name(value)}.json"
         job = _fingerprint(scene, knob, value)
         result = _read_kept_row(path, job) if arguments.resume else None
-        if result is None and (knob, value) in wanted:
+        if result is None and (knob, value) in chosen:
             result = _measure_row(scene, knob, value)
             write_file(path, canonical_json({"job": job, "row": result}).encode(), overwrite=True)
         if result is not None:

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from headless.tradeoff_table import ROW_TITLES, measured_of
+from headless.tradeoff_table import ROW_TITLES, measured_rows
 from synthroads_addon.base.errors import InputError
 from synthroads_addon.jobs.measure.tradeoff import KNOBS
 
@@ -29,7 +29,7 @@ def plot(results: Sequence[Row], path: Path) -> None:
     mpl.use("Agg")
     from matplotlib import pyplot
 
-    measured = measured_of(results)
+    measured = measured_rows(results)
     panels = [name for name in ROW_TITLES if any(_varies(measured, knob, name) for knob in _knobs(measured))]
     columns = min(3, max(1, len(panels)))
     lines = -(-max(1, len(panels)) // columns)

@@ -44,7 +44,7 @@ TABLES: dict[str, tuple[str, ...]] = {
 """Table -> the columns of costs that it has, before those of the errors."""
 
 
-def measured_of(results: Iterable[Mapping[str, Any]]) -> list[Mapping[str, Any]]:
+def measured_rows(results: Iterable[Mapping[str, Any]]) -> list[Mapping[str, Any]]:
     """Return the rows that this Blender could measure."""
     return [row for row in results if "left_out" not in row]
 
@@ -54,7 +54,7 @@ def time_noise(results: Iterable[Mapping[str, Any]]) -> float | None:
 
     The largest such spread of the rows that were measured `REPEATED` times; None if there is none.
     """
-    several = [row["all_seconds"] for row in measured_of(results) if len(row.get("all_seconds", ())) > 1]
+    several = [row["all_seconds"] for row in measured_rows(results) if len(row.get("all_seconds", ())) > 1]
     return max(((max(times) - min(times)) * len(times) / sum(times) for times in several), default=None)
 
 
@@ -73,7 +73,7 @@ def better_row(row: Mapping[str, Any], others: Iterable[Mapping[str, Any]], nois
 
 def front_lines(results: Sequence[Mapping[str, Any]]) -> list[str]:
     """Return a table of the presets that says of each whether it lies on the front; nothing without presets."""
-    job = [row for row in measured_of(results) if KNOBS[row["knob"]].table == "presets"]
+    job = [row for row in measured_rows(results) if KNOBS[row["knob"]].table == "presets"]
     presets = [row for row in job if row["knob"] == "fidelity"]
     if not presets:
         return []
@@ -95,11 +95,11 @@ def markdown(results: Sequence[Mapping[str, Any]], scenario: str) -> str:
     machines = dict.fromkeys(row["machine"] for row in results if "machine" in row)
     lines = [f"Scene `{scenario}`: `synthroads tradeoff --scenario {scenario} --output DIR`; {'; '.join(machines)}", ""]
     for table, costs in TABLES.items():
-        own = [row for row in results if KNOBS[row["knob"]].table == table]
-        measured = measured_of(own)
+        in_table = [row for row in results if KNOBS[row["knob"]].table == table]
+        measured = measured_rows(in_table)
         if measured:
             lines += [f"{table.capitalize()}:", "", *_table(measured, costs), ""]
-        left_out = [f"- {row['knob']} {row['value']}: {row['left_out']}" for row in own if "left_out" in row]
+        left_out = [f"- {row['knob']} {row['value']}: {row['left_out']}" for row in in_table if "left_out" in row]
         lines += [*left_out, ""] if left_out else []
     front = front_lines(results)
     lines += [*front, ""] if front else []

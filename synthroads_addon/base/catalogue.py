@@ -30,8 +30,8 @@ class Entry:
 
     def to_dict(self) -> dict[str, Any]:
         """Return everything as JSON data."""
-        said = {"name": self.name, "title": self.title, **self.figures, "file": str(self.file)}
-        return said | ({"note": self.note} if self.note else {})
+        data = {"name": self.name, "title": self.title, **self.figures, "file": str(self.file)}
+        return data | ({"note": self.note} if self.note else {})
 
 
 def plain(value: Any) -> str:
@@ -98,8 +98,8 @@ def entries(kind: Kind, wanted: Sequence[str] = ()) -> list[Entry]:
     """
     if not wanted:
         return [kind.read(name) for name in kind.names()]
-    found = (name for text in wanted for name in _find_names(kind, text))
-    return [kind.read(name) for name in dict.fromkeys(found)]
+    names = (name for text in wanted for name in _find_names(kind, text))
+    return [kind.read(name) for name in dict.fromkeys(names)]
 
 
 def _find_names(kind: Kind, text: str) -> list[str]:

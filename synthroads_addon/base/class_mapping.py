@@ -57,8 +57,8 @@ class NameClasses:
 
     def find(self, kind: str, *names: str) -> int | None:
         """Return the class of the first of these names that has one; None if none has."""
-        found = [self._find(kind, name) for name in names]
-        return next((number for number in found if number is not None), None)
+        numbers = [self._find(kind, name) for name in names]
+        return next((number for number in numbers if number is not None), None)
 
     def unmatched(self) -> tuple[str, ...]:
         """Return the patterns that no name fitted so far, each as ``kind: pattern``."""

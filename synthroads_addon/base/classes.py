@@ -15,46 +15,12 @@ from pydantic import Field, model_validator
 
 from .errors import InputError, nearest_name
 from .files import PRESETS
-from .schema import Model, quantity, read_json
+from .schema import Model, first_repeated, quantity, read_json
 
 UNLABELLED = 255
 """`class_id` of faces that carry no label."""
 UNCLASSIFIED = 1
 """LAS code of what carries no label (ASPRS LAS 1.4 R15, table 17)."""
-ASPRS_NAMES = {
-    0: "never_classified",
-    1: "unclassified",
-    2: "ground",
-    3: "low_vegetation",
-    4: "medium_vegetation",
-    5: "high_vegetation",
-    6: "building",
-    7: "low_noise",
-    9: "water",
-    10: "rail",
-    11: "road_surface",
-    13: "wire_guard",
-    14: "wire_conductor",
-    15: "transmission_tower",
-    16: "wire_connector",
-    17: "bridge_deck",
-    18: "high_noise",
-    19: "overhead_structure",
-    20: "ignored_ground",
-    21: "snow",
-    22: "temporal_exclusion",
-}
-"""LAS codes that have a meaning of their own (ASPRS LAS 1.4 R15, table 17)."""
-_ASPRS_COLORS = {
-    2: (166, 130, 89),
-    3: (150, 190, 110),
-    4: (110, 170, 80),
-    5: (72, 148, 62),
-    6: (190, 80, 60),
-    9: (60, 130, 210),
-    11: (90, 90, 96),
-    17: (140, 70, 40),
-}
 
 
 @dataclass(frozen=True)
@@ -100,9 +66,7 @@ class ClassTable(Model):
     @model_validator(mode="after")
     def _distinct(self) -> ClassTable:
         for what in ("id", "name"):
-            values = [getattr(row, what) for row in self.classes]
-            twice = next((value for value in values if values.count(value) > 1), None)
-            if twice is not None:
+            if (twice := first_repeated([getattr(row, what) for row in self.classes])) is not None:
                 raise ValueError(f"two classes have the {what} {twice!r}")
         return self
 
@@ -195,12 +159,16 @@ def stored_scheme(data: object, source: str) -> ClassScheme:
 
 def asprs_scheme(codes: Iterable[int] = ()) -> ClassScheme:
     """Return the scheme whose ids are LAS codes, for clouds of others; given codes without a meaning included."""
-    known = sorted({*ASPRS_NAMES, *(int(code) for code in codes)})
-    rows = [
-        PointClass(code, ASPRS_NAMES.get(code, f"class_{code}"), code, _ASPRS_COLORS.get(code) or _distinct_color(code))
-        for code in known
-    ]
+    named = {row.id: row for row in _asprs_classes()}
+    every = sorted({*named, *(int(code) for code in codes)})
+    rows = (named.get(code) or PointClass(code, f"class_{code}", code, _distinct_color(code)) for code in every)
     return ClassScheme("asprs", tuple(rows), np.arange(256, dtype=np.uint8))
+
+
+@cache
+def _asprs_classes() -> tuple[PointClass, ...]:
+    """Return the LAS codes that have a meaning of their own (ASPRS LAS 1.4 R15, table 17)."""
+    return _read_rows(PRESETS / "classes_asprs.json")
 
 
 def _distinct_color(number: int) -> tuple[int, int, int]:
@@ -225,9 +193,8 @@ def _read_rows(path: Path) -> tuple[PointClass, ...]:
         if row.id == UNLABELLED:
             raise InputError(f"{path}: {row.name}.id", row.id, "must be 0 to 254: 255 is unlabelled")
         if 23 <= row.las <= 63:
-            raise InputError(
-                f"{path}: {row.name}.las", row.las, "must be 0 to 22 or 64 to 255: ASPRS reserves 23 to 63"
-            )
+            allowed = "must be 0 to 22 or 64 to 255: ASPRS reserves 23 to 63"
+            raise InputError(f"{path}: {row.name}.las", row.las, allowed)
     return _rows(table.classes)
 
 

@@ -154,11 +154,11 @@ def _field(name: str, rule: Rule, schema: Rule, inner: Sequence[Rule], outer: Fi
         outer: field that it lies in.
     """
     default, unit = rule.get("default"), rule.get("unit", "")
-    said = rule.get("description") or (inner[0].get("description", "").partition("\n")[0] if inner else "")
+    description = rule.get("description") or (inner[0].get("description", "").partition("\n")[0] if inner else "")
     if outer and isinstance(outer.default, dict):
         default = outer.default.get(name, default)
     if outer and outer.interval:
-        unit, said = outer.unit, f"{outer.description} {said}"
+        unit, description = outer.unit, f"{outer.description} {description}"
     choice = next((choice for choice in _choices(rule) if choice.get("type") != "null"), rule)
     return FieldEntry(
         path=f"{outer.path}.{name}" if outer else name,
@@ -166,7 +166,7 @@ def _field(name: str, rule: Rule, schema: Rule, inner: Sequence[Rule], outer: Fi
         unit="" if unit == "1" else unit,
         required=default is None and name in schema.get("required", ()),
         default=default,
-        description=said,
+        description=description,
         allowed=tuple(choice.get("enum", ())),
         limits=_limits(choice),
         interval=any(set(part["properties"]) == {"minimum", "maximum"} for part in inner),
@@ -186,5 +186,5 @@ def _limits(rule: Rule) -> dict[str, float]:
 
 def _limits_in_words(rule: Rule) -> str:
     """Return a number's limits in words."""
-    found = [f"{_LIMITS[key]} {value:g}" for key, value in _limits(rule).items()]
-    return f", {' '.join(found)}" if found else ""
+    words = [f"{_LIMITS[key]} {value:g}" for key, value in _limits(rule).items()]
+    return f", {' '.join(words)}" if words else ""

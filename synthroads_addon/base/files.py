@@ -6,11 +6,11 @@ import errno
 import os
 import shutil
 import tempfile
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
-from .errors import InputError, MissingFileError, OutputError
+from .errors import InputError, MissingFileError, OutputError, nearest_name
 
 PRESETS = Path(__file__).parents[1] / "presets"
 """Folder of the shipped data: classes, materials, signs, devices, scenarios, recipes, assets."""
@@ -43,6 +43,33 @@ def read_text(path: str | os.PathLike[str], kind: str, wanted: str = "", encodin
     raise MissingFileError(name, None, f"{wanted or 'cannot be read'} ({reason})")
 
 
+def preset_names(folder: Path, ending: str = ".json") -> list[str]:
+    """Return the names of the presets in a folder, which are its files of an ending."""
+    return sorted(path.stem for path in folder.glob(f"*{ending}"))
+
+
+def preset_path(folder: Path, name_or_file: str, field: str, endings: Sequence[str] = (".json",)) -> Path:
+    """Return the file of a preset, or the one that is named.
+
+    Args:
+        folder: of the presets.
+        name_or_file: a preset's name, or a file.
+        field: what the message calls it.
+        endings: that a file may have; the presets have the first.
+
+    Raises:
+        InputError: it is neither a preset's name nor has such an ending.
+    """
+    names = preset_names(folder, endings[0])
+    if name_or_file in names:
+        return folder / f"{name_or_file}{endings[0]}"
+    if Path(name_or_file).suffix.lower() not in endings:
+        kinds = " or ".join(ending for ending in endings if ending != ".yml")
+        allowed = f"must be a {kinds} file or one of {', '.join(names)}{nearest_name(name_or_file, names)}"
+        raise InputError(field, name_or_file, allowed)
+    return Path(name_or_file)
+
+
 def stamp(path: str, wanted: str) -> tuple[int, int]:
     """Return when a file was last changed (ns) and its size (bytes), by which one that was read is known again.
 
@@ -50,10 +77,10 @@ def stamp(path: str, wanted: str) -> tuple[int, int]:
         MissingFileError: it doesn't exist; ``wanted`` is said before the system's own words.
     """
     try:
-        found = Path(path).stat()
+        status = Path(path).stat()
     except (OSError, ValueError) as error:  # ValueError: its name holds a null byte
         raise MissingFileError(path, None, f"{wanted} ({getattr(error, 'strerror', None) or error})") from None
-    return found.st_mtime_ns, found.st_size
+    return status.st_mtime_ns, status.st_size
 
 
 def files_below(folder: Path) -> Iterator[Path]:

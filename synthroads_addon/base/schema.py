@@ -44,8 +44,8 @@ def notes(
         unset: the same in two or three words, where it is no number.
         labels: values of a choice, and what people call them.
     """
-    said = {"unit": unit, "only_with": only_with, "inherits": inherits, "unset": unset, "labels": labels}
-    return {name: value for name, value in said.items() if value}
+    given = {"unit": unit, "only_with": only_with, "inherits": inherits, "unset": unset, "labels": labels}
+    return {name: value for name, value in given.items() if value}
 
 
 def quantity(
@@ -72,6 +72,11 @@ def quantity(
         strict=True,
         json_schema_extra=notes(unit=unit, **further),
     )
+
+
+def optional(unit: str, limits: tuple[float, float], description: str, **further: Any) -> Any:
+    """Declare a numeric field that may be left out, within limits that are allowed themselves; see `quantity`."""
+    return quantity(None, unit=unit, description=description, ge=limits[0], le=limits[1], **further)
 
 
 def when(test: dict[str, Any], then: dict[str, Any], otherwise: dict[str, Any] | None = None) -> dict[str, Any]:
@@ -181,6 +186,11 @@ def canonical_json(data: object) -> str:
     return json.dumps(data, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
 
 
+def first_repeated(values: Sequence[Any]) -> Any:
+    """Return the first of some values that stands among them again; None if none does."""
+    return next((value for value in values if values.count(value) > 1), None)
+
+
 def compact_json(data: object) -> str:
     """Serialise without spaces and line ends."""
     return json.dumps(data, ensure_ascii=False, separators=(",", ":"), allow_nan=False)
@@ -259,8 +269,7 @@ def _refuse_key_twice(members: list[tuple[str, Any]]) -> dict[str, Any]:
     """Return an object; the usual reading keeps the last of two like keys and drops the other without a word."""
     data = dict(members)
     if len(data) < len(members):
-        keys = [key for key, _ in members]
-        raise ValueError(f"an object has the key {next(key for key in keys if keys.count(key) > 1)!r} twice")
+        raise ValueError(f"an object has the key {first_repeated([key for key, _ in members])!r} twice")
     return data
 
 

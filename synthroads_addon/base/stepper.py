@@ -168,12 +168,12 @@ def by_caller(function: Callable[[], R]) -> R:
     turns: Turns[object] | None = getattr(_here, "turns", None)
     if turns is None:
         return function()
-    found: list[R] = []
+    results: list[R] = []
     errors: list[BaseException] = []
 
     def run() -> None:
         try:
-            found.append(function())
+            results.append(function())
         except BaseException as error:
             errors.append(error)
 
@@ -181,4 +181,4 @@ def by_caller(function: Callable[[], R]) -> R:
     turns._wait()
     if errors:
         raise errors[0]
-    return found[0]
+    return results[0]

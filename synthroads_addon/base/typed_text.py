@@ -43,14 +43,14 @@ def declared_kinds(kind: Any, path: Sequence[str]) -> list[Any]:
     """
     if not path:
         return [kind]
-    found: list[Any] = []
+    kinds: list[Any] = []
     for one in alternatives(kind):
         if isinstance(one, type) and issubclass(one, BaseModel):
             named = (field for name, field in one.model_fields.items() if path[0] == (field.alias or name))
-            found += [inner for field in named for inner in declared_kinds(field.annotation, path[1:])]
+            kinds += [inner for field in named for inner in declared_kinds(field.annotation, path[1:])]
         elif get_origin(one) is dict:
-            found += declared_kinds(get_args(one)[1], path[1:])
-    return found
+            kinds += declared_kinds(get_args(one)[1], path[1:])
+    return kinds
 
 
 def alternatives(kind: Any) -> Iterator[Any]:

@@ -41,7 +41,7 @@ def _head(recipe: Recipe, manifest: Manifest) -> list[str]:
 
 def _how(recipe: Recipe, jobs: Sequence[SceneJob]) -> list[str]:
 
-    def named(values: Iterable[str]) -> str:
+    def count_names(values: Iterable[str]) -> str:
         return ", ".join(f"{name} ({count})" for name, count in sorted(Counter(values).items()))
 
     return [
@@ -50,9 +50,9 @@ def _how(recipe: Recipe, jobs: Sequence[SceneJob]) -> list[str]:
         "Each scene is a road drawn within the limits of a scenario by its own seed, built in Blender, and scanned by",
         "a simulated laser scanner. Class and instance of each point are those of the surface that the beam met.",
         "",
-        f"- Fidelity: {named(job.scenario.fidelity for job in jobs)}",
-        f"- Laser scanner: {named(job.scenario.scan.device for job in jobs)}",
-        f"- Platform: {named(job.scenario.scan.platform.kind for job in jobs)}",
+        f"- Fidelity: {count_names(job.scenario.fidelity for job in jobs)}",
+        f"- Laser scanner: {count_names(job.scenario.scan.device for job in jobs)}",
+        f"- Platform: {count_names(job.scenario.scan.platform.kind for job in jobs)}",
         "",
     ]
 

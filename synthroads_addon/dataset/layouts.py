@@ -121,9 +121,8 @@ class SemanticKittiWriter(LayoutWriter):
         known, inverse = np.unique(points.instance_id, return_inverse=True)
         compact = np.array([self._number(int(value)) for value in known], dtype=np.uint32)[inverse]
         semantic = np.where(points.class_id == UNLABELLED, 0, points.class_id.astype(np.uint32) + 1)
-        (semantic.astype("<u4") | (compact.astype("<u4") << 16)).tofile(
-            self._sequence / "labels" / f"{frame:06d}.label"
-        )
+        labels = semantic.astype("<u4") | (compact.astype("<u4") << 16)
+        labels.tofile(self._sequence / "labels" / f"{frame:06d}.label")
         self._corners.append(tile.corner)
 
     def close(self) -> None:
@@ -132,13 +131,12 @@ class SemanticKittiWriter(LayoutWriter):
         shifts = [(corner - origin).tolist() for corner in self._corners]
         poses = [f"1 0 0 {x!r} 0 1 0 {y!r} 0 0 1 {z!r}" for x, y, z in shifts]
         identity = "1 0 0 0 0 1 0 0 0 0 1 0"
+        place = {"scene": self.job.name, "split": self.job.split, "origin": [float(value) for value in origin]}
         texts = {
             "poses.txt": "".join(f"{line}\n" for line in poses),
             "times.txt": "".join(f"{frame:.6e}\n" for frame in range(len(poses))),
             "calib.txt": "".join(f"{name}: {identity}\n" for name in ("P0", "P1", "P2", "P3", "Tr")),
-            "sequence.json": canonical_json(
-                {"scene": self.job.name, "split": self.job.split, "origin": [float(value) for value in origin]}
-            ),
+            "sequence.json": canonical_json(place),
             "instances.json": canonical_json({str(number): value for value, number in self._numbers.items()}),
         }
         for name, text in texts.items():
@@ -203,12 +201,11 @@ def layout_descriptions(recipe: Recipe, jobs: Sequence[SceneJob]) -> dict[str, s
         root = layout_root(Path(), layout, scheme)
         if layout == "pointcept":
             names, ids = [row.name for row in scheme.rows], [row.id for row in scheme.rows]
-            texts[f"{root.as_posix()}/classes.json"] = canonical_json(
-                {"classes": names, "ids": ids, "ignore_index": -1}
-            )
+            table = {"classes": names, "ids": ids, "ignore_index": -1}
+            texts[f"{root.as_posix()}/classes.json"] = canonical_json(table)
         else:
-            own = [job for job in jobs if job.scenario.cloud.scheme().name == scheme.name]
-            texts[f"{root.as_posix()}/synthroads.yaml"] = _kitti_configuration(scheme, own)
+            with_scheme = [job for job in jobs if job.scenario.cloud.scheme().name == scheme.name]
+            texts[f"{root.as_posix()}/synthroads.yaml"] = _kitti_configuration(scheme, with_scheme)
     return texts
 
 

@@ -87,17 +87,17 @@ def file_entries(folder: Path) -> dict[str, dict[str, Any]]:
 
 def faults(folder: Path, scenes: Iterable[SceneEntry], checksums: bool = True) -> list[str]:
     """Return what is wrong with the files of scenes: missing, of another size, or (if asked) another checksum."""
-    found = []
+    sentences = []
     for scene in scenes:
         for name, entry in (scene.files or {}).items():
             path = folder / name
             if not path.is_file():
-                found.append(f"{name} is missing")
+                sentences.append(f"{name} is missing")
             elif path.stat().st_size != entry.bytes:
-                found.append(f"{name} has {path.stat().st_size:,} bytes, not {entry.bytes:,}")
+                sentences.append(f"{name} has {path.stat().st_size:,} bytes, not {entry.bytes:,}")
             elif checksums and checksum(path) != entry.sha256:
-                found.append(f"{name} has another checksum")
-    return found
+                sentences.append(f"{name} has another checksum")
+    return sentences
 
 
 def check_same_recipe(folder: Path, recipe_text: str, generator: str) -> Manifest:

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Annotated, Any, Literal
 
 from pydantic import Field, field_validator, model_validator
 
-from ..base.errors import InputError, nearest_name
-from ..base.files import PRESETS
+from ..base.errors import InputError
+from ..base.files import PRESETS, preset_names, preset_path
 from ..base.random_streams import stream
-from ..base.schema import ClosedModel, quantity, read_yaml
+from ..base.schema import ClosedModel, first_repeated, quantity, read_yaml
 from ..scenario.scenario import Scenario, load_scenario, with_changes
 
 RECIPES = PRESETS / "recipes"
@@ -75,9 +74,7 @@ class Recipe(ClosedModel):
     @field_validator("groups")
     @classmethod
     def _distinct(cls, groups: tuple[SceneGroup, ...]) -> tuple[SceneGroup, ...]:
-        names = [group.name for group in groups]
-        twice = next((name for name in names if names.count(name) > 1), None)
-        if twice is not None:
+        if (twice := first_repeated([group.name for group in groups])) is not None:
             raise ValueError(f"two groups are named {twice}")
         return groups
 
@@ -101,7 +98,7 @@ class SceneJob:
 
 def recipe_names() -> list[str]:
     """Return the names of the built-in recipes."""
-    return sorted(path.stem for path in RECIPES.glob("*.yaml"))
+    return preset_names(RECIPES, ".yaml")
 
 
 def load_recipe(name_or_file: str) -> Recipe:
@@ -111,13 +108,7 @@ def load_recipe(name_or_file: str) -> Recipe:
         MissingFileError: there is no such file.
         InputError: it isn't YAML, or a field is unknown or out of its limits.
     """
-    path = Path(name_or_file)
-    if name_or_file in recipe_names():
-        path = RECIPES / f"{name_or_file}.yaml"
-    elif path.suffix.lower() not in (".yaml", ".yml", ".json"):
-        known = ", ".join(recipe_names())
-        hint = nearest_name(name_or_file, recipe_names())
-        raise InputError("recipe", name_or_file, f"must be a .yaml or .json file or one of {known}{hint}")
+    path = preset_path(RECIPES, name_or_file, "recipe", (".yaml", ".yml", ".json"))
     return Recipe.from_dict(read_yaml(path), source=str(name_or_file))
 
 
@@ -154,8 +145,8 @@ def _scenario(recipe: Recipe, group: SceneGroup, name: str, place: int) -> Scena
     scenario = Scenario.from_dict(with_changes(data, pairs))
     if _UNSTABLE in group_outputs(group, recipe):
         raise InputError("outputs", list(scenario.outputs), f"a data set can't hold {_UNSTABLE}: it differs each time")
-    wanted = dict.fromkeys((*NEEDED_OUTPUTS, *(name for name in scenario.outputs if name != _UNSTABLE)))
-    return scenario.model_copy(update={"outputs": tuple(wanted)})
+    outputs = dict.fromkeys((*NEEDED_OUTPUTS, *(name for name in scenario.outputs if name != _UNSTABLE)))
+    return scenario.model_copy(update={"outputs": tuple(outputs)})
 
 
 def group_outputs(group: SceneGroup, recipe: Recipe) -> list[str]:

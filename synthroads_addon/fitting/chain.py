@@ -80,7 +80,7 @@ class Chain:
         names = np.unique(label[~held])
         return ((label[:, None] == names) & ~held[:, None]).astype(np.float64), given
 
-    def tied(self) -> Chain:
+    def tie_values(self) -> Chain:
         """Return the chain with values that obey the kinds: the mean of each group."""
         choice, given = self.groups
         mean = choice.T @ self.values / np.maximum(choice.sum(axis=0), 1.0)
@@ -132,7 +132,7 @@ class AxisData(Protocol):
     def jacobian(self, chain: Chain, stations: FloatArray) -> FloatArray:
         """Return (N, F) derivatives of the residuals by all parameters (see `Chain.basis`)."""
 
-    def moved(self, pose: FloatArray, step: FloatArray) -> FloatArray:
+    def move_pose(self, pose: FloatArray, step: FloatArray) -> FloatArray:
         """Return the pose after a step of its parameters."""
 
 
@@ -192,8 +192,8 @@ class Plan:
     snaps: tuple[int, ...] = (EQUAL, ZERO)
 
     def measure(self, chain: Chain, stations: FloatArray) -> tuple[FloatArray, FloatArray]:
-        found, offset = chain.alignment.project_near(self.points, stations, self.reach)
-        return found, self.weights * offset
+        feet, offset = chain.alignment.project_near(self.points, stations, self.reach)
+        return feet, self.weights * offset
 
     def jacobian(self, chain: Chain, stations: FloatArray) -> FloatArray:
         """A change of curvature at s' turns the rest of the road about the point there.
@@ -214,7 +214,7 @@ class Plan:
         across = -(tangent * np.exp(1j * alignment.start_heading)).real
         return self.weights[:, None] * assemble(np.column_stack((across, -lever)), rise, fall, chain.slopes)
 
-    def moved(self, pose: FloatArray, step: FloatArray) -> FloatArray:
+    def move_pose(self, pose: FloatArray, step: FloatArray) -> FloatArray:
         return pose + np.array([-np.sin(pose[2]) * step[0], np.cos(pose[2]) * step[0], step[1]])
 
 
@@ -236,7 +236,7 @@ class Heights:
         rise, fall = ramp_integrals(chain, stations, grid, np.ones(len(grid) - 1))
         return -self.weights[:, None] * assemble(np.ones((len(stations), 1)), rise, fall, chain.slopes)
 
-    def moved(self, pose: FloatArray, step: FloatArray) -> FloatArray:
+    def move_pose(self, pose: FloatArray, step: FloatArray) -> FloatArray:
         return pose + step
 
 
@@ -294,7 +294,7 @@ def apply_step(data: AxisData, chain: Chain, step: FloatArray) -> Chain:
     spare = _SHARE * np.maximum(np.diff(chain.knots) - data.least, 0.0)
     knots = chain.knots.copy()
     knots[1:-1] += np.clip(step[chain.value_columns.stop :], -spare[:-1], spare[1:])
-    return replace(chain, pose=data.moved(chain.pose, step[: chain.turns]), values=values, knots=knots).tied()
+    return replace(chain, pose=data.move_pose(chain.pose, step[: chain.turns]), values=values, knots=knots).tie_values()
 
 
 def least_squares(matrix: FloatArray, wanted: FloatArray) -> FloatArray:
@@ -323,10 +323,10 @@ def refine(data: AxisData, chain: Chain, stations: FloatArray, free_knots: bool,
     basis = chain.basis(free_knots)
     damping, system = 1.0, _system(data, fit, basis, free_knots)
     for _ in range(steps if basis.shape[1] else 0):
-        r, wanted, held, scale = system
+        r, target, held, scale = system
         weight = np.sqrt(damping * (fit.square + 1e-12 * len(fit.residuals)))
         rows = np.vstack((r, weight * held, np.sqrt(1e-7 * damping) * np.eye(r.shape[1])))
-        step = least_squares(rows, np.concatenate((wanted, np.zeros(len(rows) - len(wanted))))) / scale
+        step = least_squares(rows, np.concatenate((target, np.zeros(len(rows) - len(target))))) / scale
         trial_chain = apply_step(data, fit.chain, basis @ step)
         trial = ChainFit(trial_chain, *data.measure(trial_chain, fit.stations))
         if trial.square < fit.square:

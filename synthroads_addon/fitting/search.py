@@ -79,9 +79,9 @@ class Goal:
         return fit.rms <= self.rms and fit.p95 <= self.p95
 
     def score(self, fit: ChainFit) -> float:
-        return self.expected(fit.square, fit.chain, len(fit.residuals))
+        return self.expected_score(fit.square, fit.chain, len(fit.residuals))
 
-    def expected(self, square: float, chain: Chain, points: int) -> float:
+    def expected_score(self, square: float, chain: Chain, points: int) -> float:
         """Score of a chain with a sum of squares; an element costs half a parameter beyond its own."""
         misfit = np.log(max(square, 0.0) / points + self.floor**2)
         return self.count * misfit + (chain.freedom() + 0.5 * chain.size) * np.log(self.count)
@@ -103,14 +103,14 @@ def apply_edits(chain: Chain, edits: Sequence[Edit]) -> tuple[Chain, list[int]]:
     """
     gone = {edit.index for edit in edits if edit.kind == "merge"}
     snapped = {edit.index: edit.kind for edit in edits if edit.kind != "merge"}
-    keep, found = [0], set()
+    keep, merged_kinds = [0], set()
     kinds: list[int] = []
     for e, kind in enumerate(chain.kinds.tolist()):
-        found.add(snapped.get(e, kind))
+        merged_kinds.add(snapped.get(e, kind))
         if e + 1 in gone:
             continue
-        new = found.pop() if len(found) == 1 else FREE
-        found = set()
+        new = merged_kinds.pop() if len(merged_kinds) == 1 else FREE
+        merged_kinds = set()
         if new != FREE and kinds and kinds[-1] != FREE:
             kinds[-1] = max(new, kinds[-1])  # a line beside an arc is one with it
             keep[-1] = e + 1
@@ -151,19 +151,19 @@ def _lift(chain: Chain, new: Chain, keep: list[int]) -> FloatArray:
 def foresee(data: AxisData, fit: ChainFit, edits: Sequence[Edit], free_knots: bool, goal: Goal) -> tuple[Chain, float]:
     """Return the edited chain at the optimum of the linearised problem, and the sum of squares expected there."""
     new, keep = apply_edits(fit.chain, edits)
-    new = new.tied()
+    new = new.tie_values()
     basis, lift = new.basis(free_knots), _lift(fit.chain, new, keep)
     start = np.zeros(len(lift))  # the jump to the new chain's values
     values = fit.chain.value_columns
     start[values] = lift[values, new.value_columns] @ new.values - fit.chain.values
     r, projected = fit.linear(data)
-    matrix, wanted = r @ (lift @ basis), -(projected + r @ start)
+    matrix, target = r @ (lift @ basis), -(projected + r @ start)
     held = _allowance(fit, goal) * knot_penalty(data, new, basis.shape[1]) if free_knots else matrix[:0]
     scale = column_scale(matrix)
     rows = np.vstack((matrix / scale, held / scale, 1e-6 * np.eye(len(scale))))
-    scaled = least_squares(rows, np.concatenate((wanted, np.zeros(len(rows) - len(wanted)))))
+    scaled = least_squares(rows, np.concatenate((target, np.zeros(len(rows) - len(target)))))
     rest = rows @ scaled
-    rest[: len(wanted)] -= wanted
+    rest[: len(target)] -= target
     square = float(rest @ rest) - float(projected @ projected) + fit.square
     return apply_step(data, new, basis @ (scaled / scale)), square
 
@@ -196,13 +196,13 @@ def options(data: AxisData, fit: ChainFit, free_knots: bool, goal: Goal) -> list
     for edit, rows, violation in conditions:
         spread = root @ rows.T
         if edit.kind == "merge" and free_knots:  # the knot itself stays where it is until it is gone
-            own = root[:, basis.shape[1] - chain.size + edit.index]
-            spread = spread - own[:, None] * (own @ spread) / (own @ own)
+            knot_column = root[:, basis.shape[1] - chain.size + edit.index]
+            spread = spread - knot_column[:, None] * (knot_column @ spread) / (knot_column @ knot_column)
         square = spread.T @ spread
         square[np.diag_indices(len(square))] *= 1.0 + 1e-9
         if (np.diag(square) > 0).all():
             cost = float(violation @ np.linalg.solve(square, violation))
-            score = goal.expected(fit.square + cost, apply_edits(chain, [edit])[0], len(fit.residuals))
+            score = goal.expected_score(fit.square + cost, apply_edits(chain, [edit])[0], len(fit.residuals))
             result.append((score - present, edit))
     return sorted(result, key=lambda pair: pair[0])
 
@@ -280,7 +280,7 @@ def simplify_fit(data: AxisData, fit: ChainFit, free_knots: bool, goal: Goal) ->
 def _trials(data: AxisData, fit: ChainFit, edits: list[Edit], free_knots: bool, goal: Goal) -> Iterator[ChainFit]:
     """Foresee every edit and refine the most promising ones, best first."""
     foreseen = [foresee(data, fit, [edit], free_knots, goal) for edit in edits]
-    scores = [goal.expected(square, chain, len(fit.residuals)) for chain, square in foreseen]
+    scores = [goal.expected_score(square, chain, len(fit.residuals)) for chain, square in foreseen]
     for i in np.argsort(scores, kind="stable")[:_TRIALS]:
         yield _refine_again(data, fit, foreseen[i][0], free_knots)
 

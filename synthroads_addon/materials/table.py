@@ -30,7 +30,7 @@ from typing import Annotated
 from pydantic import Field
 
 from ..base.errors import InputError
-from ..base.files import PRESETS, write_file
+from ..base.files import PRESETS, preset_path, write_file
 from ..base.schema import Model, quantity, read_json
 from .reflectance import facet_slope, reflectivity
 
@@ -99,13 +99,7 @@ def material_table_path(name_or_file: str) -> Path:
     Raises:
         InputError: it is neither a shipped table's name nor ends in ``.json``.
     """
-    if Path(name_or_file).suffix.lower() == ".json":
-        return Path(name_or_file)
-    shipped = sorted(path.stem for path in (PRESETS / "material_tables").glob("*.json"))
-    if name_or_file not in shipped:
-        known = ", ".join(shipped)
-        raise InputError("materials_table", name_or_file, f"must be a .json file or one of {known}")
-    return PRESETS / "material_tables" / f"{name_or_file}.json"
+    return preset_path(PRESETS / "material_tables", name_or_file, "materials_table")
 
 
 def read_material_table(path: str | os.PathLike[str]) -> dict[str, Material]:

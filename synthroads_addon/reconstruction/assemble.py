@@ -181,14 +181,14 @@ def _markings(measured: Measured) -> Iterator[tuple[str, LineMarking]]:
     section = measured.section
     length = round_value(measured.fit.alignment.length)
     for side in _SIDES:
-        own = section.sides[side]
-        last = len(own.lines) - 1
-        for number, line in enumerate(own.lines):
+        measured_side = section.sides[side]
+        last = len(measured_side.lines) - 1
+        for number, line in enumerate(measured_side.lines):
             if number == 0 and section.kind == "single":
                 continue
-            if line is None and (number in (0, last) or own.assumed) and not own.mirrored:
+            if line is None and (number in (0, last) or measured_side.assumed) and not measured_side.mirrored:
                 continue
-            kind = _kind(number, last, own.closed)
+            kind = _kind(number, last, measured_side.closed)
             width = line_width(line, kind, section.kind, measured.marked)
             boundary = last - number
             name = f"carriageway-{side}-line-{boundary}"

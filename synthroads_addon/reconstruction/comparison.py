@@ -32,7 +32,7 @@ def compare(found: RoadParameters, truth: RoadParameters) -> dict[str, Any]:
     """
     there, here = RoadGeometry(truth), RoadGeometry(found)
     station = np.arange(0.0, there.length, _STEP)
-    point = there.alignment.position(station) + _apart(truth, found)
+    point = there.alignment.position(station) + _plan_shift(truth, found)
     at, offset = here.alignment.project(point)
     covered = (at > 0.0) & (at < here.length)
     turn = here.alignment.heading(at) - there.alignment.heading(station)
@@ -46,8 +46,8 @@ def compare(found: RoadParameters, truth: RoadParameters) -> dict[str, Any]:
         "profile": _figures(height[covered]),
         "carriageways": sides,
         "surface": _figures(_surface(there, here, station[covered], truth, found)),
-        "barriers": _barriers(there, here, _apart(truth, found)),
-        "delineators": _posts(there, here, _apart(truth, found)),
+        "barriers": _barriers(there, here, _plan_shift(truth, found)),
+        "delineators": _posts(there, here, _plan_shift(truth, found)),
     }
 
 
@@ -63,8 +63,8 @@ def compare_axis(found: RoadParameters, axis: Float) -> dict[str, Any]:
     return {"covered": round(float(covered.mean()), 4), "centreline": _figures(offset[covered])}
 
 
-def _apart(truth: RoadParameters, found: RoadParameters) -> Float:
-    """Return what turns local plan coordinates of the true set into those of the found one."""
+def _plan_shift(truth: RoadParameters, found: RoadParameters) -> Float:
+    """Return the shift (2,), m, from local plan coordinates of the true set to those of the found one."""
     return np.array(truth.transform.translate[:2]) - np.array(found.transform.translate[:2])
 
 
@@ -109,7 +109,7 @@ def _surface(
         for share in (0.1, 0.3, 0.5, 0.7, 0.9):
             bounds = side.distances(station)
             offset = float(side.carriageway.sign) * (bounds[:, 0] + share * (side.main_edge(station) - bounds[:, 0]))
-            at, beside = here.alignment.project(_place(there, station, offset) + _apart(truth, found))
+            at, beside = here.alignment.project(_place(there, station, offset) + _plan_shift(truth, found))
             high = here.elevation(at, beside) + found.transform.translate[2]
             result.append(high - there.elevation(station, offset) - truth.transform.translate[2])
     difference = np.concatenate(result)
@@ -118,11 +118,11 @@ def _surface(
 
 def _barriers(there: RoadGeometry, here: RoadGeometry, apart: Float) -> dict[str, Any]:
     """Return length, recall and precision of all barriers: shares of their metres with one of the other set near."""
-    true, mine = (
+    true, reconstructed = (
         [item for item in road.parameters.objects.values() if isinstance(item, _BARRIERS)] for road in (there, here)
     )
-    recalled, error = _match_barriers(there, true, here, mine, apart)
-    precise, _ = _match_barriers(here, mine, there, true, -apart)
+    recalled, error = _match_barriers(there, true, here, reconstructed, apart)
+    precise, _ = _match_barriers(here, reconstructed, there, true, -apart)
     return {
         "true_length": round(float(len(recalled)), 1),
         "found_length": round(float(len(precise)), 1),
@@ -163,18 +163,18 @@ def _posts(there: RoadGeometry, here: RoadGeometry, apart: Float) -> dict[str, A
     for road in (there, here):
         items = [item for item in road.parameters.of_type(Delineator).values() if item.station <= road.length]
         points.append(_place(road, np.array([i.station for i in items]), np.array([i.offset for i in items])))
-    true, mine = points[0] + apart, points[1]
-    if not len(true) or not len(mine):
-        return {"true": len(true), "found": len(mine), "recall": 0.0 if len(true) else None, "precision": None}
-    distance = cdist(true, mine)
+    true, reconstructed = points[0] + apart, points[1]
+    if not len(true) or not len(reconstructed):
+        return {"true": len(true), "found": len(reconstructed), "recall": 0.0 if len(true) else None, "precision": None}
+    distance = cdist(true, reconstructed)
     rows, columns = linear_sum_assignment(np.minimum(distance, 10.0 * POST_DISTANCE))
     matched = distance[rows, columns]
     matched = matched[matched <= POST_DISTANCE]
     return {
         "true": len(true),
-        "found": len(mine),
+        "found": len(reconstructed),
         "recall": round(len(matched) / len(true), 4),
-        "precision": round(len(matched) / len(mine), 4),
+        "precision": round(len(matched) / len(reconstructed), 4),
         "distance": _figures(matched),
     }
 

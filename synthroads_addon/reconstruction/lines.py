@@ -101,8 +101,8 @@ def _tracks(profiles: Profiles) -> list[tuple[Float, Float]]:
         peaks = _peaks(profiles, profiles.paint[row : row + _WINDOW])
         running, ended = _link_peaks(running, peaks, station)
         closed += ended
-    found = [np.array(track) for track in closed + running if len(track) >= 2]
-    return [(track[:, 0], track[:, 1]) for track in found]
+    tracks = [np.array(track) for track in closed + running if len(track) >= 2]
+    return [(track[:, 0], track[:, 1]) for track in tracks]
 
 
 def _peaks(profiles: Profiles, paint: Grid) -> list[float]:
@@ -326,9 +326,9 @@ def _dashes(stations: Float, cover: Float) -> tuple[float, float, float, float]:
     strength = np.abs((phasor * (wave - wave.mean())).mean(axis=1))
     best = int(strength.argmax())
     period, dash = float(periods[best]), share * float(periods[best])
-    for wanted, gap in _STANDARD_DASHES:
-        if abs(wanted + gap - period) < 0.5 * _DASH_TOLERANCE and abs(wanted - dash) < 2.0 * _DASH_TOLERANCE:
-            dash, period = wanted, wanted + gap
+    for standard, gap in _STANDARD_DASHES:
+        if abs(standard + gap - period) < 0.5 * _DASH_TOLERANCE and abs(standard - dash) < 2.0 * _DASH_TOLERANCE:
+            dash, period = standard, standard + gap
     angle = float(np.angle((np.exp(2j * np.pi * stations[known] / period) * (wave - wave.mean())).mean()))
     first = angle / (2.0 * np.pi) * period - 0.5 * dash  # half a dash before the middle of one
     first += period * np.ceil((stations[0] - first) / period)

@@ -88,18 +88,18 @@ class FoundPost:
 
 def find_barriers(standing: StandingObject) -> tuple[list[FoundBarrier], NDArray[np.bool_]]:
     """Return the barriers along the road, and which points (N,) belong to one."""
-    found: list[FoundBarrier] = []
+    barriers: list[FoundBarrier] = []
     used = np.zeros(len(standing.station), dtype=bool)
     for kind in (PointKind.GUARDRAIL, PointKind.BARRIER, PointKind.NOISE_BARRIER, PointKind.FURNITURE):
-        own = np.flatnonzero(standing.kind == kind)
-        for members in _linear(standing.station[own], standing.offset[own]):
-            part = standing.chosen(own[members])
+        of_kind = np.flatnonzero(standing.kind == kind)
+        for members in _linear(standing.station[of_kind], standing.offset[of_kind]):
+            part = standing.chosen(of_kind[members])
             for piece in _pieces(part):
                 barrier = _barrier(part.chosen(piece), kind)
                 if barrier is not None:
-                    found.append(barrier)
-                    used[own[members][piece]] = True
-    return sorted(found, key=lambda item: (item.start, item.offset)), used
+                    barriers.append(barrier)
+                    used[of_kind[members][piece]] = True
+    return sorted(barriers, key=lambda item: (item.start, item.offset)), used
 
 
 def _linear(station: Float, offset: Float) -> list[NDArray[np.intp]]:
@@ -114,8 +114,8 @@ def _linear(station: Float, offset: Float) -> list[NDArray[np.intp]]:
     filled = ndimage.binary_dilation(filled, np.ones((1, 2 * reach + 1)))
     filled = ndimage.binary_closing(filled, np.ones((_HOLE, 1)))
     label, count = ndimage.label(filled, np.ones((3, 3)))
-    own = label[row + _HOLE, column + reach]
-    groups = [np.flatnonzero(own == number) for number in range(1, count + 1)]
+    cluster = label[row + _HOLE, column + reach]
+    groups = [np.flatnonzero(cluster == number) for number in range(1, count + 1)]
     return [g for g in groups if len(g) >= _FEWEST_OF_BARRIER and np.ptp(station[g]) >= SHORTEST_BARRIER]
 
 
@@ -148,12 +148,12 @@ def _barrier(part: StandingObject, kind: PointKind) -> FoundBarrier | None:
     upper = part.height > 0.4 * height
     middles = np.array([np.median(part.offset[upper & (index == i)]) for i in np.unique(index[upper])])
     offset, std = mean_with_std(middles)
-    told: BarrierKind = {PointKind.BARRIER: "concrete", PointKind.NOISE_BARRIER: "noise"}.get(kind, "guardrail")  # type: ignore[assignment]
+    barrier_kind: BarrierKind = {PointKind.BARRIER: "concrete", PointKind.NOISE_BARRIER: "noise"}.get(kind, "guardrail")  # type: ignore[assignment]
     if kind == PointKind.FURNITURE:
         if not _BARRIER_HEIGHTS[0] < height or np.std(part.offset[upper]) > 0.35:
             return None
-        told = "noise" if height > _NOISE_FROM else "guardrail"
-    return FoundBarrier(told, float(start), float(end), offset, height, "both", std, count)
+        barrier_kind = "noise" if height > _NOISE_FROM else "guardrail"
+    return FoundBarrier(barrier_kind, float(start), float(end), offset, height, "both", std, count)
 
 
 def facing(barrier: FoundBarrier, side: Literal["left", "right", "both"]) -> FoundBarrier:

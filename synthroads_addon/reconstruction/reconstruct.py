@@ -179,7 +179,7 @@ def fit_axis_and_profile(
     """
     heights = {name: _heights(profiles, layout, centre, name) for name in ("carriageway_axis", "inner_edge")}
     rotation: RotationAxis = "carriageway_axis"
-    if _apart(heights["inner_edge"]) < 0.5 * _apart(heights["carriageway_axis"]) - 0.002:
+    if _height_difference(heights["inner_edge"]) < 0.5 * _height_difference(heights["carriageway_axis"]) - 0.002:
         rotation = "inner_edge"
     right, left = heights[rotation]
     height = np.where(np.isfinite(left) & np.isfinite(right), 0.5 * (left + right), np.fmin(left, right))
@@ -189,12 +189,12 @@ def fit_axis_and_profile(
     if not np.isfinite(height[kept]).any():
         raise InputError("road", None, "too few points of the road's surface to tell its height")
     smoothed = smooth(height, np.isfinite(height).astype(np.float64), STRETCH * SPACING, 30.0)
-    offset = _as_measured(centre.raw, centre.offsets)[kept]
+    offset = _replace_faults(centre.raw, centre.offsets)[kept]
     plan = profiles.path.place(centre.stations[kept], offset)
-    return fit_axis(np.column_stack([plan, _as_measured(height, smoothed.values)[kept]]), tolerance), rotation
+    return fit_axis(np.column_stack([plan, _replace_faults(height, smoothed.values)[kept]]), tolerance), rotation
 
 
-def _as_measured(raw: Float, smoothed: Float) -> Float:
+def _replace_faults(raw: Float, smoothed: Float) -> Float:
     """Return measured values (K,), the smoothed ones in place of those that are missing or faults.
 
     The fit smooths by itself: values that are smooth already would pass for exact and get an element for every bend.
@@ -225,7 +225,7 @@ def _heights(profiles: Profiles, layout: RoadLayout, centre: Centre, rotation: s
     return result[0], result[1]
 
 
-def _apart(heights: tuple[Float, Float]) -> float:
+def _height_difference(heights: tuple[Float, Float]) -> float:
     """Return the median difference of the heights of both carriageways, m."""
     difference = np.abs(heights[1] - heights[0])
     return float(np.nanmedian(difference)) if np.isfinite(difference).any() else 0.0
@@ -233,13 +233,13 @@ def _apart(heights: tuple[Float, Float]) -> float:
 
 def _surface(profiles: Profiles, section: MeasuredSection, side: Side, rotation: RotationAxis) -> Surface:
     """Return one carriageway's surface along the alignment."""
-    own = section.sides[side]
-    count = len(own.usual)
-    inner = np.full(count, own.inner_offset.value)
-    outer = inner + own.paved_width.value
+    measured_side = section.sides[side]
+    count = len(measured_side.usual)
+    inner = np.full(count, measured_side.inner_offset.value)
+    outer = inner + measured_side.paved_width.value
     pivot = inner if rotation == "inner_edge" else 0.5 * (inner + outer)
-    low, high = (inner, outer) if own.sign > 0 else (-outer, -inner)
-    return surface(profiles, low, high, float(own.sign) * pivot)
+    low, high = (inner, outer) if measured_side.sign > 0 else (-outer, -inner)
+    return surface(profiles, low, high, float(measured_side.sign) * pivot)
 
 
 def _smooth_fall(measured: Surface) -> Float:

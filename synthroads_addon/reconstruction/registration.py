@@ -46,7 +46,7 @@ def register_path(path: CloudPath, profiles: Profiles) -> CloudPath:
         return path
     first = _most_usual(blocks)
     fits = [_Fit(0.0, 0.0, 0.0)] * len(blocks)
-    fits[first] = _own(blocks[first])
+    fits[first] = _self_fit(blocks[first])
     _follow(blocks, fits, range(first + 1, len(blocks)), first)
     _follow(blocks, fits, range(first - 1, -1, -1), first)
     middles = SPACING * (starts + 0.5 * min(WINDOW, len(signal)))
@@ -63,8 +63,8 @@ def register_path(path: CloudPath, profiles: Profiles) -> CloudPath:
     return path.moved(inside)
 
 
-def _own(block: Float) -> _Fit:
-    """Return the shear under which a stretch's own rows lie over each other best."""
+def _self_fit(block: Float) -> _Fit:
+    """Return the fit of a stretch to itself: the shear under which its rows lie over each other best."""
     return _Fit(0.0, float(_SHEARS[int((block**2).sum(axis=1).argmax())]), 1.0)
 
 
@@ -72,7 +72,9 @@ def _most_usual(blocks: list[Float]) -> int:
     """Return the stretch that is most like its neighbours: no hatching, no arrows, no bridge above."""
     alike = np.zeros(len(blocks) + 1)
     for number in range(len(blocks) - 1):
-        fit = _best(blocks[number + 1], _shift_profile(blocks[number], _own(blocks[number])), 0.0, 2.0 * _REACH)
+        fit = _best(
+            blocks[number + 1], _shift_profile(blocks[number], _self_fit(blocks[number])), 0.0, 2.0 * _REACH
+        )
         alike[number + 1] = fit.score if fit is not None else 0.0
     return int(np.minimum(alike[:-1], alike[1:]).argmax())
 

@@ -99,11 +99,11 @@ def _surface(found: Reconstruction, cloud: RoadCloud, geometry: RoadGeometry) ->
     result: dict[str, Any] = {}
     for name, section in geometry.sections.items():
         inside = (station > 0.0) & (station < geometry.length) & (offset * section.carriageway.sign > 0.0)
-        own = np.flatnonzero(inside)
-        distance, bounds = np.abs(offset[own]), section.distances(station[own])
-        own = own[(distance > bounds[:, 0] + _FROM_EDGES) & (distance < bounds[:, -2] - _FROM_EDGES)]
-        above = cloud.xyz[chosen[own], 2] - geometry.elevation(station[own], offset[own])
-        result[name] = {"points": len(own), **_figures(above[np.abs(above) < _FAULT])}
+        on_side = np.flatnonzero(inside)
+        distance, bounds = np.abs(offset[on_side]), section.distances(station[on_side])
+        on_side = on_side[(distance > bounds[:, 0] + _FROM_EDGES) & (distance < bounds[:, -2] - _FROM_EDGES)]
+        above = cloud.xyz[chosen[on_side], 2] - geometry.elevation(station[on_side], offset[on_side])
+        result[name] = {"points": len(on_side), **_figures(above[np.abs(above) < _FAULT])}
     return result
 
 

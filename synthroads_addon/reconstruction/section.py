@@ -207,9 +207,9 @@ def _half(profiles: Profiles, layout: RoadLayout, band: Band, name: Side, marked
         apart.append(outer.apart)
         lines.append(None)
     inner = Edge(np.zeros(count), np.zeros(count))
-    found = _summarise_side(name, lines, (np.column_stack(columns), np.column_stack(apart)), inner, outer)
+    half = _summarise_side(name, lines, (np.column_stack(columns), np.column_stack(apart)), inner, outer)
     nothing = Estimate(0.0, 0.0)
-    return replace(found, inner_offset=nothing, inner_strip=nothing, mirrored=mirrored)
+    return replace(half, inner_offset=nothing, inner_strip=nothing, mirrored=mirrored)
 
 
 def _beside(band: Band, sign: int, marked: bool) -> list[Line]:
@@ -241,9 +241,9 @@ def _by_width(profiles: Profiles, layout: RoadLayout, band: Band, name: Side) ->
     columns = [first + sum(row.lanes[::-1][:i]) for i in range(len(row.lanes) + 1)]
     lines: list[Line | None] = [None] * len(columns)
     apart = np.tile(inner.apart[:, None], len(columns))
-    found = _summarise_side(name, lines, (np.column_stack(columns), apart), inner, outer)
+    measured_side = _summarise_side(name, lines, (np.column_stack(columns), apart), inner, outer)
     lanes = [Estimate(lane, np.inf) for lane in reversed(row.lanes)]
-    return replace(found, lanes=lanes, inner_strip=Estimate(row.inner_edge_strip, np.inf), assumed=name_of)
+    return replace(measured_side, lanes=lanes, inner_strip=Estimate(row.inner_edge_strip, np.inf), assumed=name_of)
 
 
 def _open(line: Line | None, outer: Edge) -> bool:

@@ -117,9 +117,9 @@ def check_conflicts(scenario: RoadScenario, with_axis: bool = False) -> None:
         scenario: the limits.
         with_axis: the road has an axis of its own, so that limits of the alignment don't matter.
     """
-    found = conflicts(scenario, with_axis)
-    if found:
-        raise InputError("road", None, f"limits conflict: {'; '.join(found)}")
+    sentences = conflicts(scenario, with_axis)
+    if sentences:
+        raise InputError("road", None, f"limits conflict: {'; '.join(sentences)}")
 
 
 @lru_cache(maxsize=16)

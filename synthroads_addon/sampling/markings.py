@@ -54,15 +54,15 @@ class _Painter:
 
     def lines(self) -> Iterator[tuple[str, LineMarking]]:
         """Yield the lines along lane boundaries: solid at the edges, dashed between lanes."""
-        lanes, wanted = self.carriageway.lanes, self.site.scenario.markings
-        dash, gap = wanted.lane_dash or LANE_DASH, wanted.lane_gap or LANE_GAP
+        lanes, limits = self.carriageway.lanes, self.site.scenario.markings
+        dash, gap = limits.lane_dash or LANE_DASH, limits.lane_gap or LANE_GAP
         blocks = sorted(_block_span(shape) for shape in self.section.turnouts if shape.turnout.ramp)
-        for number, span in enumerate(_between(blocks, self.length)):
+        for number, span in enumerate(_gaps_between(blocks, self.length)):
             name = f"{self.name}-line-0" + (f"-{number + 1}" if number else "")
             yield name, self._line("outer_edge", span, boundary=0, width=BROAD)
         for boundary in range(1, len(lanes)):
             # Only an outermost or innermost lane ends: one of the two beside a boundary.
-            span = _overlap(*(_there(lane.width, self.length) for lane in lanes[boundary - 1 : boundary + 1]))
+            span = _overlap(*(_lane_stretch(lane.width, self.length) for lane in lanes[boundary - 1 : boundary + 1]))
             line = self._line("lane", span, boundary=boundary, dash_length=dash, gap_length=gap)
             yield f"{self.name}-line-{boundary}", line
         span = (0.0, self.length)
@@ -139,7 +139,7 @@ def _block_span(shape: TurnoutShape) -> _Span:
     return _stations(shape, 0.0, taper + max(0.0, turnout.lane_length - SOLID_BEFORE_GORE))
 
 
-def _between(spans: list[_Span], length: float) -> Iterator[_Span]:
+def _gaps_between(spans: list[_Span], length: float) -> Iterator[_Span]:
     """Yield what sorted spans leave of a length, m."""
     reached = 0.0
     for start, end in spans:
@@ -150,7 +150,7 @@ def _between(spans: list[_Span], length: float) -> Iterator[_Span]:
         yield reached, length
 
 
-def _there(width: AnyWidth, length: float) -> _Span:
+def _lane_stretch(width: AnyWidth, length: float) -> _Span:
     """Return the stations (m) between which a lane that at most begins or ends once is there."""
     if not isinstance(width, tuple):
         return 0.0, length

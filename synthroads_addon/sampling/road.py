@@ -135,8 +135,8 @@ def _sample_site(scenario: RoadScenario, seed: int, axis: AlignmentObject) -> Pl
     carriageways: dict[Side, Carriageway] = {}
     turnouts: dict[str, Turnout] = {}
     for side in SIDES:
-        carriageways[side], own = sampler.draw(side)
-        turnouts |= own
+        carriageways[side], of_side = sampler.draw(side)
+        turnouts |= of_side
     return PlacementSite(scenario, seed, axis, carriageways, turnouts, sample_terrain(scenario, seed))
 
 

@@ -38,7 +38,7 @@ def cross_section_of(scenario: RoadScenario) -> StandardCrossSection:
 
     Lanes beyond the cross-section's own are as wide as its innermost one.
     """
-    section = _own_cross_section(scenario.cross_section)
+    section = _unchanged_cross_section(scenario.cross_section)
     lanes = section.lanes
     if scenario.lanes is not None:
         lanes = (lanes + lanes[-1:] * scenario.lanes)[: scenario.lanes]
@@ -48,7 +48,7 @@ def cross_section_of(scenario: RoadScenario) -> StandardCrossSection:
     return replace(section, lanes=lanes, median=median)
 
 
-def _own_cross_section(cross_section: str | FreeCrossSection) -> StandardCrossSection:
+def _unchanged_cross_section(cross_section: str | FreeCrossSection) -> StandardCrossSection:
     if isinstance(cross_section, str):
         return STANDARD_CROSS_SECTIONS[cross_section]
     return StandardCrossSection(**{name: getattr(cross_section, name) for name in FreeCrossSection.model_fields})
@@ -74,7 +74,7 @@ class CarriagewaySampler:
         lanes = tuple(Lane(width=width) for width in self.section.lanes)
         for place in arrange(self.features, self.length, rng):
             if place.kind == "lane_change":
-                lanes = self._changed(lanes, place, direction, rng)
+                lanes = self._change_lane(lanes, place, direction, rng)
                 continue
             name = f"{place.kind.replace('_', '-')}-{side}"
             number = sum(other.startswith(name) for other in turnouts) + 1
@@ -82,7 +82,7 @@ class CarriagewaySampler:
             turnouts[name if number == 1 else f"{name}-{number}"] = turnout
         return self._carriageway(side, lanes, rng), turnouts
 
-    def _changed(
+    def _change_lane(
         self, lanes: tuple[Lane, ...], place: TurnoutPlace, direction: Direction, rng: np.random.Generator
     ) -> tuple[Lane, ...]:
         """Return the lanes with the outermost or innermost one ending, or beginning, over the taper of a place."""

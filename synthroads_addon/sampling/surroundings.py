@@ -232,8 +232,8 @@ def _closures(side: Side, objects: Mapping[str, RoadObject]) -> Float:
             places.append((item.station, item.offset))
         elif isinstance(item, TemporaryBarrier):
             places += [(item.start_station, item.offset), (item.end_station, item.end_offset)]
-    found = np.array(places, dtype=np.float64).reshape(-1, 2) * (1.0, 1.0 if side == "left" else -1.0)
-    return found[found[:, 1] > 0.0]
+    closures = np.array(places, dtype=np.float64).reshape(-1, 2) * (1.0, 1.0 if side == "left" else -1.0)
+    return closures[closures[:, 1] > 0.0]
 
 
 def _open_stretches(section: CarriagewaySection, length: float, closures: Float) -> Float:

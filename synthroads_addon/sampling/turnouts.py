@@ -165,14 +165,14 @@ def arrange(features: tuple[Feature, ...], length: float, rng: np.random.Generat
 
     Where they don't all fit, the certain ones (of share 1) come first.
     """
-    wanted = [
+    candidates = [
         (feature.share < 1.0, slot, rng.random(), feature)
         for feature in features
         for slot in range(1 + int(length / feature.every))
         if rng.random() < feature.share
     ]
     order: list[tuple[float, Feature]] = []
-    for *_, feature in sorted(wanted, key=lambda item: item[:3]):
+    for *_, feature in sorted(candidates, key=lambda item: item[:3]):
         longer = sorted([*order, (rng.random(), feature)], key=lambda item: item[0])
         if closest([(chosen, chosen.least) for _, chosen in longer])[-1] <= length:
             order = longer
@@ -181,15 +181,15 @@ def arrange(features: tuple[Feature, ...], length: float, rng: np.random.Generat
     extras = [[(high - low) * rng.random() for low, high in feature.lengths] for feature in chosen]
     granted = min(1.0, spare / max(math.fsum(map(math.fsum, extras)), 1e-9))
     lengths = [
-        tuple(round_value(low + extra * granted) for (low, _), extra in zip(feature.lengths, own, strict=True))
-        for feature, own in zip(chosen, extras, strict=True)
+        tuple(round_value(low + extra * granted) for (low, _), extra in zip(feature.lengths, parts, strict=True))
+        for feature, parts in zip(chosen, extras, strict=True)
     ]
-    begins = closest([(f, f.fixed + math.fsum(own)) for f, own in zip(chosen, lengths, strict=True)])
+    begins = closest([(f, f.fixed + math.fsum(parts)) for f, parts in zip(chosen, lengths, strict=True)])
     spare = max(0.0, length - begins.pop())
     shifts = sorted(spare * rng.random() for _ in chosen)
     return [
-        TurnoutPlace(feature.kind, begin + shift, own)
-        for feature, begin, shift, own in zip(chosen, begins, shifts, lengths, strict=True)
+        TurnoutPlace(feature.kind, begin + shift, parts)
+        for feature, begin, shift, parts in zip(chosen, begins, shifts, lengths, strict=True)
     ]
 
 

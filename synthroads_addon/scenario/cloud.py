@@ -7,7 +7,7 @@ from typing import Literal
 from pydantic import Field, model_validator
 
 from ..base.classes import ClassScheme, class_scheme
-from ..base.schema import ClosedModel, quantity
+from ..base.schema import ClosedModel, first_repeated, optional, quantity
 from ..cloud.layers import DEFAULT_ATTRIBUTES, LAYERS, Attribute
 
 CloudFormat = Literal["laz", "las", "ply", "e57", "npz"]
@@ -22,13 +22,11 @@ class CloudScenario(ClosedModel):
         DEFAULT_ATTRIBUTES, description="What is kept of each point beyond what every cloud holds."
     )
     classes: str = Field("17", min_length=1, description="17, 5, or a JSON file of classes of one's own.")
-    point_spacing: float | None = quantity(
-        None,
-        ge=0.001,
-        le=10,
-        unit="m",
+    point_spacing: float | None = optional(
+        "m",
+        (0.001, 10),
+        "Grid of which one point per cell is kept; all if not given.",
         title="Thin Out to",
-        description="Grid of which one point per cell is kept; all if not given.",
         unset="All points",
     )
     intensity: Intensity = Field(
@@ -45,9 +43,7 @@ class CloudScenario(ClosedModel):
     @model_validator(mode="after")
     def _nothing_twice(self) -> CloudScenario:
         for name in ("formats", "attributes"):
-            values = getattr(self, name)
-            twice = next((value for value in values if values.count(value) > 1), None)
-            if twice is not None:
+            if (twice := first_repeated(getattr(self, name))) is not None:
                 raise ValueError(f"{name} names {twice} twice")
         return self
 

@@ -6,7 +6,7 @@ from typing import Any
 
 from pydantic import Field, model_validator
 
-from ..base.schema import ClosedModel, notes, quantity
+from ..base.schema import ClosedModel, notes, optional, quantity
 from ..scanning.colour.settings import ColourMode, ColourSettings, ColourSource, Engine, Lighting
 
 USUAL_RANGE = 60.0
@@ -50,30 +50,24 @@ class ColourScenario(ClosedModel):
         description="Sun with shadows and an open sky, without noise; or whole light paths, which need more samples.",
         json_schema_extra=notes(only_with={"source": ("auto", "images", "returns")}),
     )
-    image_spacing: float | None = quantity(
-        None,
-        ge=0.5,
-        le=1000,
-        unit="m",
-        description="Distance between two images along the path.",
+    image_spacing: float | None = optional(
+        "m",
+        (0.5, 1000),
+        "Distance between two images along the path.",
         inherits="images.image_spacing",
         only_with={"source": ("auto", "images")},
     )
-    ground_sampling_distance: float | None = quantity(
-        None,
-        ge=0.002,
-        le=10,
-        unit="m",
-        description="Width of a pixel on the ground, or at the platform's usual range.",
+    ground_sampling_distance: float | None = optional(
+        "m",
+        (0.002, 10),
+        "Width of a pixel on the ground, or at the platform's usual range.",
         inherits="images.ground_sampling_distance",
         only_with={"source": ("auto", "images")},
     )
-    samples: int | None = quantity(
-        None,
-        ge=1,
-        le=4096,
-        unit="1",
-        description="Samples per pixel of the lit colours.",
+    samples: int | None = optional(
+        "1",
+        (1, 4096),
+        "Samples per pixel of the lit colours.",
         inherits="images.samples",
         only_with={"source": ("auto", "images", "returns"), "lighting": ("path",)},
     )
@@ -104,22 +98,15 @@ class ColourScenario(ClosedModel):
             fidelity: draft, standard or high.
             typical_range: the platform's usual range, m: images from farther away are farther apart and coarser.
         """
-        preset = COLOUR_FIDELITIES[fidelity]
-        scale = image_scale(typical_range)
-
-        def pick(own: Any, otherwise: Any) -> Any:
-            return otherwise if own is None else own
-
-        return ColourSettings(
-            image_spacing=pick(self.image_spacing, preset.image_spacing * scale),
-            ground_sampling_distance=pick(self.ground_sampling_distance, preset.ground_sampling_distance * scale),
-            samples=pick(self.samples, 1 if self.lighting == "direct" else preset.samples),
-            source=self.source,
-            engine=self.engine,
-            mode=self.mode,
-            lighting=self.lighting,
-            max_resolution=self.max_resolution,
-        )
+        preset, scale = COLOUR_FIDELITIES[fidelity], image_scale(typical_range)
+        usual: dict[str, Any] = {
+            "image_spacing": preset.image_spacing * scale,
+            "ground_sampling_distance": preset.ground_sampling_distance * scale,
+            "samples": 1 if self.lighting == "direct" else preset.samples,
+        }
+        names = (*usual, "source", "engine", "mode", "lighting", "max_resolution")
+        given = {name: value for name in names if (value := getattr(self, name)) is not None}
+        return ColourSettings(**(usual | given))
 
 
 COLOUR_FIDELITIES = {

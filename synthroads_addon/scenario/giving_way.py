@@ -54,8 +54,8 @@ def _begin_anew(
 
 
 def _kind(data: Mapping[str, Any], part: str, tag: str) -> Any:
-    found = (data.get("scan") or {}).get(part) or {}
-    return found.get(tag) if isinstance(found, dict) else None
+    parts = (data.get("scan") or {}).get(part) or {}
+    return parts.get(tag) if isinstance(parts, dict) else None
 
 
 def _misfit_of_road(road: dict[str, Any], named: AbstractSet[str]) -> str | None:
@@ -69,20 +69,20 @@ def _misfit_of_road(road: dict[str, Any], named: AbstractSet[str]) -> str | None
 
 def _misfits_of_device(scan: dict[str, Any], named: AbstractSet[str]) -> list[str]:
     """Return the settings of a scan that its device can't do and no change names."""
-    found: list[str] = []
+    misfits: list[str] = []
     try:
         ScanScenario.from_dict(scan)
     except InputError:
-        return found
+        return misfits
     while True:
         try:
-            scanner_setting(ScanScenario.from_dict(_without(scan, *found)))
+            scanner_setting(ScanScenario.from_dict(_without(scan, *misfits)))
         except InputError as error:
             name = error.field.removeprefix("scan.")
-            if name in _DEVICE_SETTINGS and name not in found and error.field not in named and name in scan:
-                found.append(name)
+            if name in _DEVICE_SETTINGS and name not in misfits and error.field not in named and name in scan:
+                misfits.append(name)
                 continue
-        return found
+        return misfits
 
 
 def _without(data: dict[str, Any], *names: str | None) -> dict[str, Any]:

@@ -6,7 +6,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Discriminator, Field, Tag, model_validator
 
-from ..base.schema import ClosedModel, Finite, notes, quantity
+from ..base.schema import ClosedModel, Finite, notes, optional, quantity
 from ..road.guidelines import SECTIONS_OF_CLASS, STANDARD_CROSS_SECTIONS, USUAL_SECTION, design_class_of
 from ..road.section import SHORTEST_DASH
 from ..road.surroundings import GRASSES, SHRUBS, TREES
@@ -104,21 +104,11 @@ class PavementLimits(ClosedModel):
 class MarkingLimits(ClosedModel):
     """Line markings; what isn't given follows the RMS."""
 
-    lane_dash: float | None = quantity(
-        None,
-        ge=SHORTEST_DASH,
-        le=100,
-        unit="m",
-        description="Dash of lane lines; 6 m by the RMS.",
-        inherits="rms.lane_dash",
+    lane_dash: float | None = optional(
+        "m", (SHORTEST_DASH, 100), "Dash of lane lines; 6 m by the RMS.", inherits="rms.lane_dash"
     )
-    lane_gap: float | None = quantity(
-        None,
-        ge=SHORTEST_DASH,
-        le=100,
-        unit="m",
-        description="Gap of lane lines; 12 m by the RMS.",
-        inherits="rms.lane_gap",
+    lane_gap: float | None = optional(
+        "m", (SHORTEST_DASH, 100), "Gap of lane lines; 12 m by the RMS.", inherits="rms.lane_gap"
     )
     film_thickness: Interval = interval(0.0015, 0.004, "m", "Thickness of the film.")
 
@@ -146,13 +136,8 @@ class FurnitureLimits(ClosedModel):
     signs: bool = Field(True, description="Traffic signs.")
     delineators: bool = Field(True, description="Delineator posts.")
     gantries: float = share(0.3, "Probability of a gantry, where no spacing is given.")
-    gantry_spacing: float | None = quantity(
-        None,
-        ge=1,
-        le=10_000,
-        unit="m",
-        description="Spacing of gantries; they then stand all along.",
-        unset="Single ones",
+    gantry_spacing: float | None = optional(
+        "m", (1, 10_000), "Spacing of gantries; they then stand all along.", unset="Single ones"
     )
     gantry_clearance: Interval = interval(5.0, 5.8, "m", "Clearance under gantries.")
     lighting: float = share(0.15, "Probability of lighting poles.", title="Lighting Poles")
@@ -228,30 +213,18 @@ class RoadScenario(ClosedModel):
         title="Cross-Section",
         description="Standard cross-section, or one by hand; if not given, EKA2 has RQ28 and EKA3 RQ25.",
     )
-    lanes: int | None = quantity(
-        None,
-        ge=1,
-        le=8,
-        unit="1",
+    lanes: int | None = optional(
+        "1",
+        (1, 8),
+        "Lanes per direction; the cross-section's if not given.",
         title="Lanes Each Way",
-        description="Lanes per direction; the cross-section's if not given.",
         inherits="section.lanes",
     )
-    lane_width: float | None = quantity(
-        None,
-        ge=2,
-        le=6,
-        unit="m",
-        description="Width of every lane; the cross-section's if not given.",
-        inherits="section.lane_width",
+    lane_width: float | None = optional(
+        "m", (2, 6), "Width of every lane; the cross-section's if not given.", inherits="section.lane_width"
     )
-    median_width: float | None = quantity(
-        None,
-        ge=0.5,
-        le=40,
-        unit="m",
-        description="Width of the median; the cross-section's if not given.",
-        inherits="section.median_width",
+    median_width: float | None = optional(
+        "m", (0.5, 40), "Width of the median; the cross-section's if not given.", inherits="section.median_width"
     )
     length: float = quantity(600.0, ge=1, le=200_000, unit="m", description="Length of the centreline.")
     radius: Interval | None = Field(
@@ -293,7 +266,8 @@ class RoadScenario(ClosedModel):
     )
     map_origin: tuple[Finite, Finite, Finite] = Field(
         (294_000.0, 5_628_000.0, 180.0),
-        title="Map Origin", description="Map coordinates (east, north, elevation) of the local origin, m.",
+        title="Map Origin",
+        description="Map coordinates (east, north, elevation) of the local origin, m.",
     )
     grass_density: float = quantity(
         0.8, ge=0, le=50, unit="1/m2", title="Grass (per m²)", description="Tufts of grass per area."

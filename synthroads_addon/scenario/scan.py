@@ -6,7 +6,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, model_validator
 
-from ..base.schema import notes, quantity
+from ..base.schema import notes, optional, quantity
 from ..scanning.devices.device import DeviceChoice, ScannerSetting, load_device, setting_of
 from ..scanning.noise import Noise
 from ..scanning.platforms.registry import PlatformModel, make_platform
@@ -28,22 +28,12 @@ class ScanScenario(DeviceChoice):
         title="Micro-Relief",
         description="Strength of the surfaces' micro-relief in the cloud; 0 is none.",
     )
-    relief_octaves: int | None = quantity(
-        None,
-        ge=1,
-        le=8,
-        unit="1",
-        description="Octaves of the micro-relief; the fidelity's if not given.",
-        inherits="fidelity.relief_octaves",
+    relief_octaves: int | None = optional(
+        "1", (1, 8), "Octaves of the micro-relief; the fidelity's if not given.", inherits="fidelity.relief_octaves"
     )
     reflection: Literal["lambert", "oren_nayar"] = Field("lambert", description="How rough surfaces reflect.")
-    attenuation: float | None = quantity(
-        None,
-        ge=0,
-        le=1,
-        unit="1/m",
-        description="Attenuation per metre of range (there and back); else the weather's.",
-        unset="The weather's",
+    attenuation: float | None = optional(
+        "1/m", (0, 1), "Attenuation per metre of range (there and back); else the weather's.", unset="The weather's"
     )
     weather: WeatherModel | None = Field(
         None, description="Weather; the road's own if not given.", json_schema_extra=notes(unset="The road's")
@@ -70,13 +60,12 @@ class ScanScenario(DeviceChoice):
         title="Speed of Traffic",
         description="Factor on the vehicles' speeds; 0 stops the traffic.",
     )
-    section_length: float | None = quantity(
-        None,
-        ge=20,
-        le=1e6,
-        unit="m",
-        description="Roads longer than two of these are built and scanned section by section; if not given, roads of "
-        "more than 5 km by sections of 500 m.", unset="500 m beyond 5 km",
+    section_length: float | None = optional(
+        "m",
+        (20, 1e6),
+        "Roads longer than two of these are built and scanned section by section; if not given, roads of "
+        "more than 5 km by sections of 500 m.",
+        unset="500 m beyond 5 km",
     )
     caster: Literal["auto", "embree", "bvhtree"] = Field("auto", description="How rays are cast.")
     threads: int = quantity(0, ge=0, le=1024, unit="1", description="Threads; 0 uses every core.")

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
-from pathlib import Path
+from dataclasses import dataclass, replace
 from typing import Any, Literal, get_args
 
 from pydantic import Field, field_validator
 
-from ..base.errors import InputError, nearest_name
-from ..base.files import PRESETS
-from ..base.schema import ClosedModel, Model, notes, quantity, read_json
+from ..base.errors import InputError
+from ..base.files import PRESETS, preset_names, preset_path
+from ..base.schema import ClosedModel, Model, notes, optional, quantity, read_json
 from ..base.typed_text import typed_value
 from ..materials.table import Material, material_table_path, read_material_table
 from ..twin.formats import TwinFormat
@@ -40,22 +39,18 @@ class Scenario(ClosedModel):
     title: str = Field("", description="Title for people.")
     seed: int = quantity(1, ge=0, le=2**63 - 1, unit="1", description="Seed of everything random.")
     fidelity: Literal["draft", "standard", "high"] = Field("standard", description="Point on the trade-off.")
-    geometric_tolerance: float | None = quantity(
-        None,
-        ge=1e-4,
-        le=1,
-        unit="m",
+    geometric_tolerance: float | None = optional(
+        "m",
+        (1e-4, 1),
+        "Chord error of the model; the fidelity's if not given.",
         title="Model's Tolerance",
-        description="Chord error of the model; the fidelity's if not given.",
         inherits="fidelity.tolerance",
     )
-    vegetation_detail: float | None = quantity(
-        None,
-        ge=0,
-        le=1,
-        unit="1",
+    vegetation_detail: float | None = optional(
+        "1",
+        (0, 1),
+        "Share of the vegetation built; the fidelity's if not given.",
         title="Plants Built",
-        description="Share of the vegetation built; the fidelity's if not given.",
         inherits="fidelity.vegetation_detail",
     )
     tolerance: Tolerance | None = Field(
@@ -77,7 +72,6 @@ class Scenario(ClosedModel):
     outputs: tuple[Output, ...] = Field(
         OUTPUTS, title="Files", description="Files wanted; nothing is computed that none of them needs."
     )
-
     twin: tuple[TwinFormat, ...] = Field(
         (), title="Semantic Model", description="Formats of the geometric-semantic model that are wanted."
     )
@@ -112,23 +106,20 @@ class Scenario(ClosedModel):
         """Return the length (m) of the sections by which a road of a length (m) is built and scanned; None: whole."""
         if not set(self.outputs) & {"cloud", "previews"}:
             return None
-        own = self.scan.section_length
-        section, longest = (SECTION_LENGTH, LONGEST_WHOLE) if own is None else (own, 2.0 * own)
+        given = self.scan.section_length
+        section, longest = (SECTION_LENGTH, LONGEST_WHOLE) if given is None else (given, 2.0 * given)
         return section if length > longest else None
 
     def settings(self) -> Settings:
         """Return the numbers that the fidelity stands for, after the scenario's own."""
-        preset = FIDELITIES[self.fidelity]
-
-        def pick(own: Any, otherwise: Any) -> Any:
-            return otherwise if own is None else own
-
-        return Settings(
-            tolerance=pick(self.geometric_tolerance, preset.tolerance),
-            vegetation_detail=pick(self.vegetation_detail, preset.vegetation_detail),
-            rays_per_pulse=pick(self.scan.rays_per_pulse, preset.rays_per_pulse),
-            relief_octaves=pick(self.scan.relief_octaves, preset.relief_octaves),
-        )
+        values: dict[str, Any] = {
+            "tolerance": self.geometric_tolerance,
+            "vegetation_detail": self.vegetation_detail,
+            "rays_per_pulse": self.scan.rays_per_pulse,
+            "relief_octaves": self.scan.relief_octaves,
+        }
+        given = {name: value for name, value in values.items() if value is not None}
+        return replace(FIDELITIES[self.fidelity], **given)
 
 
 @dataclass(frozen=True)
@@ -157,7 +148,7 @@ FIDELITIES = {
 
 def scenario_names() -> list[str]:
     """Return the names of the built-in scenarios."""
-    return sorted(path.stem for path in SCENARIOS.glob("*.json"))
+    return preset_names(SCENARIOS)
 
 
 def load_scenario(name_or_file: str, changes: list[str] | None = None) -> Scenario:
@@ -166,14 +157,7 @@ def load_scenario(name_or_file: str, changes: list[str] | None = None) -> Scenar
     Raises:
         InputError: there is no such scenario, or a field is unknown or out of its limits.
     """
-    path = Path(name_or_file)
-    if name_or_file in scenario_names():
-        path = SCENARIOS / f"{name_or_file}.json"
-    elif path.suffix != ".json":
-        hint = nearest_name(name_or_file, scenario_names())
-        raise InputError(
-            "--scenario", name_or_file, f"must be a .json file or one of {', '.join(scenario_names())}{hint}"
-        )
+    path = preset_path(SCENARIOS, name_or_file, "--scenario")
     scenario = Scenario.from_dict(read_json(path), source=str(name_or_file))
     if not changes:
         return scenario

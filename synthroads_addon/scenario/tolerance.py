@@ -9,7 +9,7 @@ from typing import Any
 from pydantic import model_validator
 
 from ..base.errors import InputError, nearest_name
-from ..base.schema import ClosedModel, quantity
+from ..base.schema import ClosedModel, optional
 
 LENGTHS = {"um": 1e-6, "µm": 1e-6, "mm": 1e-3, "cm": 1e-2, "m": 1.0}
 SHARES = {"": 1.0, "%": 0.01, "‰": 0.001}
@@ -54,28 +54,14 @@ class Tolerance(ClosedModel):
     As text each can have a unit: ``"5mm"``, ``"2 %"``.
     """
 
-    height: float | None = quantity(
-        None, ge=0, le=10, unit="m", description="Height of the road's surface, largest error."
-    )
-    position: float | None = quantity(
-        None, ge=0, le=10, unit="m", description="Position of the hits, error of 95 % of the pulses."
-    )
-    relief: float | None = quantity(
-        None, ge=0, le=10, unit="m", description="Micro-relief of the points, error of 95 % of them."
-    )
-    intensity: float | None = quantity(
-        None, ge=0, le=10, unit="1", description="Intensity, relative error of 95 % of the pulses."
-    )
-    colour: float | None = quantity(
-        None, ge=0, le=100, unit="1", description="Colour, CIEDE2000 of 95 % of the points."
-    )
-    layers: float | None = quantity(
-        None, ge=0, le=1, unit="1", description="Material layers, root mean square error of the worst."
-    )
-    labels: float | None = quantity(None, ge=0, le=1, unit="1", description="Share of the pulses of another class.")
-    density: float | None = quantity(
-        None, ge=0, le=1, unit="1", description="Share of the points that are missing or too many."
-    )
+    height: float | None = optional("m", (0, 10), "Height of the road's surface, largest error.")
+    position: float | None = optional("m", (0, 10), "Position of the hits, error of 95 % of the pulses.")
+    relief: float | None = optional("m", (0, 10), "Micro-relief of the points, error of 95 % of them.")
+    intensity: float | None = optional("1", (0, 10), "Intensity, relative error of 95 % of the pulses.")
+    colour: float | None = optional("1", (0, 100), "Colour, CIEDE2000 of 95 % of the points.")
+    layers: float | None = optional("1", (0, 1), "Material layers, root mean square error of the worst.")
+    labels: float | None = optional("1", (0, 1), "Share of the pulses of another class.")
+    density: float | None = optional("1", (0, 1), "Share of the points that are missing or too many.")
 
     @model_validator(mode="before")
     @classmethod
@@ -107,17 +93,17 @@ def with_unit(field: str, text: str, units: dict[str, float]) -> float:
     Raises:
         InputError: it is no number, or lacks a unit where it needs one, or has another.
     """
-    found = _NUMBER.fullmatch(text)
+    match = _NUMBER.fullmatch(text)
     named = [unit for unit in units if unit]
-    wanted = f"a number with a unit of {', '.join(named)}" if named else "a number without a unit"
+    allowed = f"a number with a unit of {', '.join(named)}" if named else "a number without a unit"
     if "" in units and named:
-        wanted = f"a number, or one with a unit of {', '.join(named)}"
-    if not found:
-        raise InputError(field, text, f"must be {wanted}")
-    number, unit = found.groups()
+        allowed = f"a number, or one with a unit of {', '.join(named)}"
+    if not match:
+        raise InputError(field, text, f"must be {allowed}")
+    number, unit = match.groups()
     if unit not in units:
-        said = f"has the unit '{unit}'" if unit else "has no unit"
-        raise InputError(field, text, f"{said}: must be {wanted}{nearest_name(unit, named) if unit else ''}")
+        fault = f"has the unit '{unit}'" if unit else "has no unit"
+        raise InputError(field, text, f"{fault}: must be {allowed}{nearest_name(unit, named) if unit else ''}")
     # As a decimal, so that 5mm is the number that 0.005 is.
     return float(f"{float(number) * units[unit]:.15g}")
 

@@ -51,5 +51,5 @@ def unregister() -> None:
 
 def _classes_of(module: ModuleType) -> list[type]:
     """Return the classes of a module that Blender is to know, in the order in which they are defined."""
-    own = [c for c in vars(module).values() if isinstance(c, type) and c.__module__ == module.__name__]
-    return list(getattr(module, "CLASSES", ())) or [c for c in own if issubclass(c, bpy.types.bpy_struct)]
+    defined = [c for c in vars(module).values() if isinstance(c, type) and c.__module__ == module.__name__]
+    return list(getattr(module, "CLASSES", ())) or [c for c in defined if issubclass(c, bpy.types.bpy_struct)]

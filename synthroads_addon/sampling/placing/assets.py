@@ -56,15 +56,15 @@ def _places(
         stations = _stations(rng, placement, site.length)
         half = rng.integers(len(group), size=len(stations))
         for number, side in enumerate(group):
-            section, own = site.sections[side], stations[half == number]
-            edge, room = _room(site, section, in_median, own, field, placement.distance.minimum)
-            distance = _draw_places(rng, placement.distance, len(own), np.minimum(placement.distance.maximum, room))
+            section, at = site.sections[side], stations[half == number]
+            edge, room = _room(site, section, in_median, at, field, placement.distance.minimum)
+            distance = _draw_places(rng, placement.distance, len(at), np.minimum(placement.distance.maximum, room))
             away = edge - distance if in_median else edge + distance
-            turn = _draw_places(rng, placement.rotation_deg, len(own), placement.rotation_deg.maximum)
+            turn = _draw_places(rng, placement.rotation_deg, len(at), placement.rotation_deg.maximum)
             turn += 0.0 if section.carriageway.traffic > 0 else 180.0
             there = room >= placement.distance.minimum
             offset = section.carriageway.sign * away
-            yield from zip(own[there], offset[there], ((turn + 180.0) % 360.0 - 180.0)[there], strict=True)
+            yield from zip(at[there], offset[there], ((turn + 180.0) % 360.0 - 180.0)[there], strict=True)
 
 
 def _draw_places(rng: np.random.Generator, limits: Interval, number: int, highest: Float | float) -> Float:

@@ -116,8 +116,8 @@ def roadside_barriers(layout: Layout, roadside: Roadside, rng: np.random.Generat
     system = BarrierSystem.draw(rng, limits, limits.concrete_roadside)
     if not limits.roadside:
         return
-    wanted = [*roadside.protected, *_by_the_road(layout, roadside), *_elsewhere(roadside, rng)]
-    roadside.pieces = list(_pieces(roadside, merge_ranges(wanted, _JOIN)))
+    stretches = [*roadside.protected, *_by_the_road(layout, roadside), *_elsewhere(roadside, rng)]
+    roadside.pieces = list(_pieces(roadside, merge_ranges(stretches, _JOIN)))
     borders = {segment.end for segment in roadside.edge.segments[:-1]}
     for number, piece in enumerate(roadside.pieces, start=1):
         terminal = SHORT_TERMINAL if borders & {piece.start, piece.end} else TERMINAL

@@ -75,16 +75,16 @@ def construction_zones(layout: Layout, rng: np.random.Generator) -> tuple[dict[S
 def closed_lanes(objects: Iterable[RoadObject], site: PlacementSite) -> dict[Side, tuple[int, float, float]]:
     """Return the lane that a construction zone closes, and from where to where (m), by side."""
     beacons = [item for item in objects if isinstance(item, ConstructionBeacon)]
-    found: dict[Side, tuple[int, float, float]] = {}
+    closures: dict[Side, tuple[int, float, float]] = {}
     for side, section in site.sections.items():
-        own = [beacon for beacon in beacons if beacon.offset * section.carriageway.sign > 0.0]
-        if own:
-            innermost = min(own, key=lambda beacon: abs(beacon.offset))
+        on_side = [beacon for beacon in beacons if beacon.offset * section.carriageway.sign > 0.0]
+        if on_side:
+            innermost = min(on_side, key=lambda beacon: abs(beacon.offset))
             boundaries = section.lane_boundaries(innermost.station)[0]
             lane = int(np.count_nonzero(boundaries > abs(innermost.offset))) - 1
-            stations = [beacon.station for beacon in own]
-            found[side] = lane, min(stations), max(stations)
-    return found
+            stations = [beacon.station for beacon in on_side]
+            closures[side] = lane, min(stations), max(stations)
+    return closures
 
 
 def _zone(layout: Layout, roadside: Roadside, rng: np.random.Generator) -> Zone | None:
@@ -117,8 +117,8 @@ def _zone(layout: Layout, roadside: Roadside, rng: np.random.Generator) -> Zone 
 
 def _changes(carriageway: Carriageway) -> Iterator[Range]:
     """Yield stretches along which a width of the carriageway changes."""
-    own = (carriageway.inner_offset, carriageway.inner_edge_strip_width, *(lane.width for lane in carriageway.lanes))
-    for width in (*own, carriageway.outer_edge_strip_width, carriageway.hard_shoulder_width):
+    widths = (carriageway.inner_offset, carriageway.inner_edge_strip_width, *(lane.width for lane in carriageway.lanes))
+    for width in (*widths, carriageway.outer_edge_strip_width, carriageway.hard_shoulder_width):
         marks = width_kinks(width)
         if marks:
             yield min(marks), max(marks)

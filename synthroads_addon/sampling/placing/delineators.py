@@ -47,11 +47,11 @@ def delineator_stations(elements: tuple[HorizontalElement, ...]) -> NDArray[np.f
         first = min(widest, length) / 2.0
         return first + widest * np.arange(int((length - first) / widest) + 1)
     spacing = _PostSpacing(elements, widest)
-    found, station = [], min(spacing.at(0.0), spacing.length) / 2.0
+    stations, station = [], min(spacing.at(0.0), spacing.length) / 2.0
     while station <= spacing.length:
-        found.append(station)
+        stations.append(station)
         station += spacing.at(station)
-    return np.array(found)
+    return np.array(stations)
 
 
 class _PostSpacing:

@@ -161,22 +161,22 @@ def _segments(stations: Float, line: Float, paved: Float) -> list[Segment]:
     runs = [Segment(borders[i], borders[i + 1], bases[i], not levels[i]) for i in range(len(bases))]
     # A taper belongs to its wider side; what is wider than both sides lies beside a gore.
     around = [-np.inf, *bases, -np.inf]
-    found = [
+    segments = [
         run._replace(ramp=run.ramp and run.base > max(around[i], around[i + 2]) + _LEVEL) for i, run in enumerate(runs)
     ]
-    return _join_segments(_raise_short_segments(_join_segments(found), stations[in_island].tolist()))
+    return _join_segments(_raise_short_segments(_join_segments(segments), stations[in_island].tolist()))
 
 
 def _join_segments(segments: list[Segment]) -> list[Segment]:
     """Join neighbours whose bases differ too little for two lines of barriers."""
-    found: list[Segment] = []
+    joined: list[Segment] = []
     for segment in segments:
-        found.append(segment)
-        while len(found) > 1 and _in_line(*found[-2:]):
-            after, before = found.pop(), found.pop()
+        joined.append(segment)
+        while len(joined) > 1 and _in_line(*joined[-2:]):
+            after, before = joined.pop(), joined.pop()
             ramp = before.ramp and after.ramp
-            found.append(Segment(before.start, after.end, max(before.base, after.base), ramp))
-    return found
+            joined.append(Segment(before.start, after.end, max(before.base, after.base), ramp))
+    return joined
 
 
 def _in_line(before: Segment, after: Segment) -> bool:
@@ -188,7 +188,7 @@ def _raise_short_segments(segments: list[Segment], beside_island: list[float]) -
 
     Beside an island (stations, m) a barrier can't stand farther out: that part of the segment falls away.
     """
-    found = segments[:1]
+    raised = segments[:1]
     for before, segment, after in zip(segments, segments[1:], segments[2:], strict=False):
         wider = [s.base for s in (before, after) if not s.ramp]
         short = segment.end - segment.start < SHORTEST_BARRIER and segment.base < min(before.base, after.base)
@@ -196,7 +196,7 @@ def _raise_short_segments(segments: list[Segment], beside_island: list[float]) -
             inside = [s for s in beside_island if segment.start <= s <= segment.end]
             start = max(inside) + _BEHIND_RAMP if inside and before.ramp else segment.start
             end = min(inside) - _BEHIND_RAMP if inside and after.ramp else segment.end
-            found.append(Segment(start, max(start, end), min(wider)))
+            raised.append(Segment(start, max(start, end), min(wider)))
         else:
-            found.append(segment)
-    return [*found, *segments[1:][-1:]]
+            raised.append(segment)
+    return [*raised, *segments[1:][-1:]]

@@ -118,8 +118,8 @@ def plan_surveillance(layout: Layout, rng: np.random.Generator) -> None:
 def plan_cabinets(layout: Layout, rng: np.random.Generator) -> None:
     """Put utility cabinets at random stations, as many per km as drawn."""
     sides = list(layout.sides.values())
-    wanted = draw(rng, layout.site.scenario.furniture.cabinets_per_km) * layout.length / 1000.0
-    for _ in range(int(wanted + rng.random())):
+    number = draw(rng, layout.site.scenario.furniture.cabinets_per_km) * layout.length / 1000.0
+    for _ in range(int(number + rng.random())):
         roadside = pick(rng, sides)
         width, depth, height = pick(rng, UTILITY_SIZES)
         start = draw_start(rng, free_ranges(0.0, layout.length, roadside.near), 2.0 * _CABINET_HALF)

@@ -112,10 +112,10 @@ def _kind(layout: Layout, rng: np.random.Generator) -> tuple[Kind, tuple[Side, .
 
 def _in_the_way(layout: Layout, kind: Kind, sides: tuple[Side, ...]) -> list[Taken]:
     """Return what a gantry has to keep clear of."""
-    found = [] if kind == "cantilever" else [layout.median.taken]
+    obstacles = [] if kind == "cantilever" else [layout.median.taken]
     for roadside in (layout.sides[side] for side in sides):
-        found += [roadside.near, roadside.crossed, roadside.restless]
-    return found
+        obstacles += [roadside.near, roadside.crossed, roadside.restless]
+    return obstacles
 
 
 def _at(layout: Layout, rng: np.random.Generator, station: float, half: float) -> GantryPlan | None:

@@ -125,7 +125,7 @@ class Roadside:
 
     def protect(self, start: float, end: float) -> None:
         """Ask for a barrier before an obstacle that stands between two stations."""
-        self.protected.append(self._protected(start, end))
+        self.protected.append(self._barrier_stretch(start, end))
 
     def put(self, spot: Spot) -> None:
         """Put a thing into the small zone, and ask for its barrier."""
@@ -151,7 +151,7 @@ class Roadside:
 
     def front_of_obstacle(self, start: float, end: float, depth: float) -> float:
         """Return the distance (m) from which zones are counted for an obstacle: behind all of the barrier before it."""
-        first, last = self._protected(start, end)
+        first, last = self._barrier_stretch(start, end)
         along = [p.base for p in self.pieces if p.start < last and p.end > first and not p.ramp]
         return max(self.front(start, end, depth), *along, 0.0)
 
@@ -173,7 +173,7 @@ class Roadside:
         front = self.front_of_obstacle(low, high, depth) if spot.obstacle else self.front(low, high, depth, spot.outer)
         return front + SMALL_ZONE + spot.width / 2.0 + spot.shift
 
-    def _protected(self, start: float, end: float) -> Range:
+    def _barrier_stretch(self, start: float, end: float) -> Range:
         """Return the stretch of the barrier before an obstacle that stands between two stations."""
         lead, tail = OBSTACLE_LEAD + _MARGIN, OBSTACLE_TAIL + _MARGIN
         return (start - lead, end + tail) if self.traffic > 0 else (start - tail, end + lead)
@@ -224,12 +224,12 @@ class Layout:
     @cached_property
     def tight_arcs(self) -> list[tuple[float, float, float]]:
         """Start and end (m) and curvature (1/m) of the arcs that are tight for the design class."""
-        found, start, tight = [], 0.0, 1.0 / (TIGHT_CURVE * self.site.limits.radius)
+        arcs, start, tight = [], 0.0, 1.0 / (TIGHT_CURVE * self.site.limits.radius)
         for element in self.site.alignment.horizontal:
             if element.kind == "arc" and abs(element.curvature_start) > tight:
-                found.append((start, start + element.length, element.curvature_start))
+                arcs.append((start, start + element.length, element.curvature_start))
             start += element.length
-        return found
+        return arcs
 
 
 def _least(width: AnyWidth) -> float:

@@ -45,14 +45,14 @@ class Taken:
 
 def free_ranges(low: float, high: float, *taken: Taken) -> list[Range]:
     """Return the parts of low to high (m) that none has taken, in order."""
-    found, reached = [], low
+    free, reached = [], low
     for start, end in sorted(stretch for item in taken for stretch in item.within(low, high)):
         if start > reached:
-            found.append((reached, start))
+            free.append((reached, start))
         reached = max(reached, end)
     if high > reached:
-        found.append((reached, high))
-    return found
+        free.append((reached, high))
+    return free
 
 
 def draw_start(rng: np.random.Generator, ranges: list[Range], length: float) -> float | None:
@@ -81,23 +81,23 @@ def nearest_free(station: float, half: float, room: float, length: float, *taken
     if all(item.is_free(station - half, station + half) for item in taken):
         return station
     low, high = max(0.0, station - room) - half, min(length, station + room) + half
-    found = [
+    places = [
         min(max(station, start + half), end - half)
         for start, end in free_ranges(low, high, *taken)
         if end - start >= 2.0 * half
     ]
-    return min(found, key=lambda place: abs(place - station), default=None)
+    return min(places, key=lambda place: abs(place - station), default=None)
 
 
 def merge_ranges(ranges: Iterable[Range], gap: float) -> list[Range]:
     """Return the ranges in order, those joined that overlap or lie less than a gap (m) apart."""
-    found: list[Range] = []
+    merged: list[Range] = []
     for start, end in sorted(ranges):
-        if found and start - found[-1][1] < gap:
-            found[-1] = found[-1][0], max(found[-1][1], end)
+        if merged and start - merged[-1][1] < gap:
+            merged[-1] = merged[-1][0], max(merged[-1][1], end)
         else:
-            found.append((start, end))
-    return found
+            merged.append((start, end))
+    return merged
 
 
 def lengthen_range(start: float, end: float, least: float, low: float, high: float) -> Range:

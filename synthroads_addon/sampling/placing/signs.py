@@ -160,8 +160,8 @@ def _gore_station(shape: TurnoutShape, width: float) -> float:
     """Return where the island is wide enough for a sign (m), or else the last station on it."""
     ramp = shape.turnout.ramp
     assert ramp is not None
-    wanted = island_begin(shape, ramp, width + 2.0 * (SIGN_DISTANCE + _GORE_MARGIN))
-    return ramp_station(shape, min(max(wanted, shape.nose + 2.0 * STEP), ramp.length - STEP))
+    wide_enough = island_begin(shape, ramp, width + 2.0 * (SIGN_DISTANCE + _GORE_MARGIN))
+    return ramp_station(shape, min(max(wide_enough, shape.nose + 2.0 * STEP), ramp.length - STEP))
 
 
 def _behind_entry(

@@ -41,8 +41,8 @@ def declaration(settings: Any, path: str) -> Declaration | None:
         owner = getattr(owner, part)
         info = model.model_fields[part.removesuffix(BY_HAND_ENDING)]
         model = _chosen_model([kind for kind in alternatives(info.annotation) if _is_part(kind)], owner)
-    found = model.model_fields.get(name)
-    return None if found is None else Declaration(found, model, owner)
+    info_of_field = model.model_fields.get(name)
+    return None if info_of_field is None else Declaration(info_of_field, model, owner)
 
 
 def _chosen_model(models: list[type[BaseModel]], owner: Any) -> type[BaseModel]:

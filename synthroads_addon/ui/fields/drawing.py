@@ -18,6 +18,7 @@ from .fields import (
     FlagField,
     IntervalField,
     NumberField,
+    OptionalField,
     TextField,
 )
 from .groups import GroupField, NamedOrByHandField
@@ -72,25 +73,21 @@ def _number(layout: bpy.types.UILayout, settings: Any, owner: Any, field: Number
         row.use_property_split = False
         row.prop(owner, field.name, text=field.label)
         return
-    row = _own(layout, settings, owner, field) if field.optional else value_row(layout, field.label)
-    if row:
-        row.prop(owner, field.name, text="")
+    _values(layout, settings, owner, field)
 
 
-def _interval(layout: bpy.types.UILayout, settings: Any, owner: Any, field: IntervalField) -> None:
-    row = _own(layout, settings, owner, field) if field.optional else value_row(layout, field.label)
+def _values(layout: bpy.types.UILayout, settings: Any, owner: Any, field: NumberField | IntervalField) -> None:
+    row = _checkbox(layout, settings, owner, field) if field.optional else value_row(layout, field.label)
     if row:
-        for name in field.ends:
+        for name in field.values:
             row.prop(owner, name, text="")
 
 
-def _own(
-    layout: bpy.types.UILayout, settings: Any, owner: Any, field: NumberField | IntervalField | GroupField
-) -> bpy.types.UILayout | None:
+def _checkbox(layout: bpy.types.UILayout, settings: Any, owner: Any, field: OptionalField) -> bpy.types.UILayout | None:
     """Draw the checkbox of a field that may be left out; return the place for its value if it is ticked."""
     row = value_row(layout, field.label)
-    row.prop(owner, field.own, text="")
-    if getattr(owner, field.own):
+    row.prop(owner, field.checkbox_name, text="")
+    if getattr(owner, field.checkbox_name):
         return row
     _draw_greyed(row, inherited_text(settings, field.path, field.unit))
     return None
@@ -132,8 +129,8 @@ def _files(layout: bpy.types.UILayout, settings: Any, owner: Any, field: FilesFi
 
 def _group(layout: bpy.types.UILayout, settings: Any, owner: Any, field: GroupField) -> None:
     if field.optional:
-        _own(layout, settings, owner, field)
-        if not getattr(owner, field.own):
+        _checkbox(layout, settings, owner, field)
+        if not getattr(owner, field.checkbox_name):
             return
     for inner in field.fields_in_use(owner).values():
         draw_field(layout, settings, inner)
@@ -149,7 +146,7 @@ def _by_hand(layout: bpy.types.UILayout, settings: Any, owner: Any, field: Named
 _DRAWN: Mapping[type[Field], Callable[..., None]] = {
     FlagField: _flag,
     NumberField: _number,
-    IntervalField: _interval,
+    IntervalField: _values,
     ChoiceField: _choice,
     ChoicesField: _choices,
     TextField: _text,

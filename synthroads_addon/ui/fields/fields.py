@@ -54,7 +54,7 @@ class Field:
         return (self.info.description or "").removesuffix(".")
 
     @property
-    def own(self) -> str:
+    def checkbox_name(self) -> str:
         """Return the name of the checkbox of a field that may be left out, where its kind has one."""
         return f"own_{self.name}"
 
@@ -84,6 +84,39 @@ class Field:
         return {"name": name or self.label, "description": self.tooltip, **hook}
 
 
+class OptionalField(Field):
+    """A field of which a checkbox, `checkbox_name`, says whether it is given, where it may be left out."""
+
+    @property
+    def values(self) -> tuple[str, ...]:
+        """Return the names of the properties beside the checkbox."""
+        return (self.name,)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Return the names of its properties."""
+        return (self.checkbox_name, *self.values) if self.optional else self.values
+
+    def read(self, owner: Any, base: Any) -> Any:
+        """Return the value, or None where the checkbox isn't ticked."""
+        return None if self.optional and not getattr(owner, self.checkbox_name) else self.read_given(owner, base)
+
+    def read_given(self, owner: Any, base: Any) -> Any:
+        """Return the value that is given; see `read`."""
+        raise NotImplementedError
+
+    def write(self, owner: Any, value: Any) -> None:
+        """Have a property group show a value, or that none is given."""
+        if self.optional:
+            setattr(owner, self.checkbox_name, value is not None)
+        if value is not None:
+            self.write_given(owner, value)
+
+    def write_given(self, owner: Any, value: Any) -> None:
+        """Show a value that is given."""
+        raise NotImplementedError
+
+
 class FlagField(Field):
     """Yes or no."""
 
@@ -96,13 +129,8 @@ class FlagField(Field):
         return bool(getattr(owner, self.name))
 
 
-class NumberField(Field):
-    """A number with its limits. One that isn't given shows in a checkbox of its own, `own`, that isn't ticked."""
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Return the names of its properties."""
-        return (self.own, self.name) if self.optional else (self.name,)
+class NumberField(OptionalField):
+    """A number with its limits."""
 
     @property
     def is_share(self) -> bool:
@@ -114,32 +142,24 @@ class NumberField(Field):
         number = number_property(self.info, self.kind is int, self.default, **self._common(hooks))
         return checkbox(self, hooks) | {self.name: number}
 
-    def read(self, owner: Any, base: Any) -> float | None:
-        """Return the number, or None where the checkbox isn't ticked."""
-        if self.optional and not getattr(owner, self.own):
-            return None
+    def read_given(self, owner: Any, base: Any) -> float:
+        """Return the number."""
         return exact(getattr(owner, self.name), base)
 
-    def write(self, owner: Any, value: Any) -> None:
+    def write_given(self, owner: Any, value: Any) -> None:
         """Show a number, as far as Blender's numbers reach."""
-        if self.optional:
-            setattr(owner, self.own, value is not None)
-        if value is not None:
-            setattr(owner, self.name, fitting(value) if self.kind is int else value)
+        setattr(owner, self.name, fitting(value) if self.kind is int else value)
 
 
-class IntervalField(Field):
-    """Two numbers, smallest and largest; a checkbox `own` where none need be given."""
+class IntervalField(OptionalField):
+    """Two numbers, smallest and largest."""
 
     @property
     def ends(self) -> tuple[str, str]:
         """Return the names of the two numbers."""
         return f"{self.name}_minimum", f"{self.name}_maximum"
 
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Return the names of its properties."""
-        return (self.own, *self.ends) if self.optional else self.ends
+    values = ends
 
     def properties(self, hooks: Hooks) -> dict[str, Any]:
         """Return the two numbers, of which the one pushes the other along."""
@@ -155,21 +175,16 @@ class IntervalField(Field):
             result[name] = number_property(info, False, default[end], self.unit, beside, **arguments)
         return result
 
-    def read(self, owner: Any, base: Any) -> dict[str, float] | None:
-        """Return the interval, or None where the checkbox isn't ticked."""
-        if self.optional and not getattr(owner, self.own):
-            return None
+    def read_given(self, owner: Any, base: Any) -> dict[str, float]:
+        """Return the interval."""
         loaded = base if isinstance(base, dict) else {}
         ends = zip(("minimum", "maximum"), self.ends, strict=True)
         return {end: exact(getattr(owner, name), loaded.get(end)) for end, name in ends}
 
-    def write(self, owner: Any, value: Any) -> None:
+    def write_given(self, owner: Any, value: Any) -> None:
         """Show an interval: its minimum first, which may push the maximum that is written next."""
-        if self.optional:
-            setattr(owner, self.own, value is not None)
         for name, end in zip(self.ends, ("minimum", "maximum"), strict=True):
-            if value is not None:
-                setattr(owner, name, value[end])
+            setattr(owner, name, value[end])
 
 
 class ChoiceField(Field):
@@ -233,8 +248,11 @@ class TextField(Field):
     def properties(self, hooks: Hooks) -> dict[str, Any]:
         """Return a line of text, with a button to choose a file where it names one."""
         file = {"subtype": "FILE_PATH", "options": {"PATH_SUPPORTS_BLEND_RELATIVE"}} if self.names_file else {}
-        default = self.default or ""
-        return {self.name: bpy.props.StringProperty(**self._common(hooks), **file, default=default)}
+        return {self.name: bpy.props.StringProperty(**self._common(hooks), **file, default=self.text(self.default))}
+
+    def text(self, value: Any) -> str:
+        """Return a value as text; nothing at all for None."""
+        return value or ""
 
     @property
     def names_file(self) -> bool:
@@ -249,8 +267,8 @@ class TextField(Field):
         return bpy.path.abspath(text) if text.startswith("//") and self.names_file else text
 
     def write(self, owner: Any, value: Any) -> None:
-        """Show a text."""
-        setattr(owner, self.name, value or "")
+        """Show a value as text."""
+        setattr(owner, self.name, self.text(value))
 
 
 class NumbersField(TextField):
@@ -259,10 +277,9 @@ class NumbersField(TextField):
     choice = False
     names_file = False
 
-    def properties(self, hooks: Hooks) -> dict[str, Any]:
-        """Return a line of text."""
-        default = list_as_text(self.default or ())
-        return {self.name: bpy.props.StringProperty(**self._common(hooks), default=default)}
+    def text(self, value: Any) -> str:
+        """Return numbers as text."""
+        return list_as_text(value or ())
 
     def read(self, owner: Any, base: Any) -> list[float] | None:
         """Return the numbers; raise `InputError` if there is something else among them."""
@@ -274,10 +291,6 @@ class NumbersField(TextField):
         except ValueError:
             raise InputError(self.path, text, "must be numbers, separated by commas") from None
 
-    def write(self, owner: Any, value: Any) -> None:
-        """Show numbers."""
-        setattr(owner, self.name, list_as_text(value or ()))
-
 
 class JsonField(TextField):
     """Whatever else the schema may hold: its JSON text."""
@@ -285,10 +298,9 @@ class JsonField(TextField):
     choice = False
     names_file = False
 
-    def properties(self, hooks: Hooks) -> dict[str, Any]:
-        """Return a line of text."""
-        default = "" if self.default is None else json.dumps(self.default)
-        return {self.name: bpy.props.StringProperty(**self._common(hooks), default=default)}
+    def text(self, value: Any) -> str:
+        """Return data as JSON."""
+        return "" if value is None else json.dumps(value)
 
     def read(self, owner: Any, base: Any) -> Any:
         """Return the data; raise `InputError` if it isn't JSON."""
@@ -297,10 +309,6 @@ class JsonField(TextField):
             return json.loads(text) if text else None
         except ValueError:
             raise InputError(self.path, text, "must be JSON") from None
-
-    def write(self, owner: Any, value: Any) -> None:
-        """Show data."""
-        setattr(owner, self.name, "" if value is None else json.dumps(value))
 
 
 class SYNTHROADS_PG_file(bpy.types.PropertyGroup):
@@ -337,13 +345,13 @@ def checkbox(field: Any, hooks: Hooks) -> dict[str, Any]:
     """Return the checkbox of a field that may be left out; none for others."""
     if not field.optional:
         return {}
-    hook = {"update": hooks[own_path]} if (own_path := own(field.path)) in hooks else {}
+    hook = {"update": hooks[own_path]} if (own_path := checkbox_path(field.path)) in hooks else {}
     text = f"{field.tooltip}. Tick to give a value of your own"
-    name = f"Own {field.label}"
-    return {field.own: bpy.props.BoolProperty(name=name, description=text, default=field.default is not None, **hook)}
+    about = {"name": f"Own {field.label}", "description": text, "default": field.default is not None}
+    return {field.checkbox_name: bpy.props.BoolProperty(**about, **hook)}
 
 
-def own(path: str) -> str:
+def checkbox_path(path: str) -> str:
     """Return the path of a field's checkbox."""
     head, dot, name = path.rpartition(".")
     return f"{head}{dot}own_{name}"

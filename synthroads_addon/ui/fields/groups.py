@@ -14,11 +14,11 @@ from ...scenario.road import Interval
 from . import fields as kinds
 from .choices import STANDARD_PARTS, Items
 from .declared import BY_HAND, BY_HAND_ENDING, is_constant
-from .fields import Field, FilesField, Hooks, checkbox
+from .fields import Field, FilesField, Hooks, OptionalField, checkbox
 
 
-class GroupField(Field):
-    """A part of the scenario: a property group of its own; a checkbox `own` where it may be left out.
+class GroupField(OptionalField):
+    """A part of the scenario: a property group of its own.
 
     Attributes:
         fields: what it holds, by name.
@@ -29,36 +29,25 @@ class GroupField(Field):
         super().__init__(path, info, kind, optional, default)
         self.fields = make_fields(kind, _defaults(kind) | (default or {}), path, hooks)
         annotations = {name: p for field in self.fields.values() for name, p in field.properties(hooks).items()}
-        self.group = type(
-            f"SYNTHROADS_PG_{path.replace('.', '_')}", (bpy.types.PropertyGroup,), {"__annotations__": annotations}
-        )
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Return the names of its properties."""
-        return (self.own, self.name) if self.optional else (self.name,)
+        name = f"SYNTHROADS_PG_{path.replace('.', '_')}"
+        self.group = type(name, (bpy.types.PropertyGroup,), {"__annotations__": annotations})
 
     def properties(self, hooks: Hooks) -> dict[str, Any]:
         """Return a pointer to its group, and its checkbox."""
         pointer = bpy.props.PointerProperty(type=self.group, name=self.label, description=self.tooltip)
         return checkbox(self, hooks) | {self.name: pointer}
 
-    def read(self, owner: Any, base: Any) -> dict[str, Any] | None:
+    def read_given(self, owner: Any, base: Any) -> dict[str, Any]:
         """Return the part's data without fields that aren't given."""
-        if self.optional and not getattr(owner, self.own):
-            return None
         return read_fields(self.fields_in_use(owner), getattr(owner, self.name), base)
 
     def fields_in_use(self, owner: Any) -> Mapping[str, Field]:
         """Return the fields that have a meaning as the part is set."""
         return self.fields
 
-    def write(self, owner: Any, value: Any) -> None:
+    def write_given(self, owner: Any, value: Any) -> None:
         """Show the part's data."""
-        if self.optional:
-            setattr(owner, self.own, value is not None)
-        if value is not None:
-            write_fields(self.fields, getattr(owner, self.name), value)
+        write_fields(self.fields, getattr(owner, self.name), value)
 
     def classes(self) -> Iterator[type]:
         """Yield the group's class after those in it."""
@@ -87,10 +76,8 @@ class KindField(GroupField):
         first = models[0].model_fields[tag]
         labels = {kind: model.label for kind, model in self.kinds.items() if hasattr(model, "label")}
         tips = {kind: (model.__doc__ or "").partition("\n")[0].removesuffix(".") for kind, model in self.kinds.items()}
-        said: dict[str, Any] = {"labels": labels, "tooltips": tips}
-        choice = FieldInfo(
-            default=first.default, title=first.title, description=first.description, json_schema_extra=said
-        )
+        about: dict[str, Any] = {"title": first.title, "description": first.description}
+        choice = FieldInfo(default=first.default, **about, json_schema_extra={"labels": labels, "tooltips": tips})
         fields[tag] = (Literal[tuple(self.kinds)], choice)
         super().__init__(path, info, create_model(models[0].__name__, **fields), optional, default, hooks)
 
@@ -98,9 +85,9 @@ class KindField(GroupField):
         """Return the fields of the kind that is chosen."""
         return {name: field for name, field in self.fields.items() if name in self.kind_of(owner).model_fields}
 
-    def write(self, owner: Any, value: Any) -> None:
+    def write_given(self, owner: Any, value: Any) -> None:
         """Show the part's data; the fields of other kinds are as at first."""
-        super().write(owner, None if value is None else _defaults(self.kind) | value)
+        super().write_given(owner, _defaults(self.kind) | value)
 
     def kind_of(self, owner: Any) -> type[BaseModel]:
         """Return the model of the kind that is chosen."""
@@ -157,10 +144,8 @@ NOT_HERE = ("tolerance", "time_budget")
 
 def make_fields(model: type[BaseModel], default: dict[str, Any], path: str, hooks: Hooks) -> dict[str, Field]:
     """Return the fields of a model by name, except those that can have one value only."""
-    made = (
-        make_field(f"{path}.{name}" if path else name, info, default.get(name), hooks)
-        for name, info in model.model_fields.items()
-    )
+    infos, before = model.model_fields.items(), f"{path}." if path else ""
+    made = (make_field(f"{before}{name}", info, default.get(name), hooks) for name, info in infos)
     return {field.name: field for field in made if field}
 
 

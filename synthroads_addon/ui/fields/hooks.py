@@ -7,7 +7,7 @@ from typing import Any
 
 from ...road.guidelines import SECTIONS_OF_CLASS, design_class_of
 from .declared import BY_HAND, optional_fields
-from .fields import AUTOMATIC, own
+from .fields import AUTOMATIC, checkbox_path
 from .inherited import begin_with_inherited
 
 Hook = Callable[[Any, Any], None]
@@ -70,11 +70,11 @@ def _in_turn(first: Hook, second: Hook) -> Hook:
     return both
 
 
-HOOKS: dict[str, Hook] = {own(path): begin_with_inherited(path) for path in optional_fields()} | {
+HOOKS: dict[str, Hook] = {checkbox_path(path): begin_with_inherited(path) for path in optional_fields()} | {
     "road.cross_section": _class_for_section,
     "road.design_class": _section_for_class,
     # A pulse rate and angles are those of one device, strips and heights those of one platform.
-    "scan.device": _clear(*map(own, _DEVICE_SETTINGS)),
+    "scan.device": _clear(*map(checkbox_path, _DEVICE_SETTINGS)),
     "scan.platform.kind": _clear("own_height", "own_speed", "lateral_offsets", "stations", "file"),
     "scan.own_weather": _instead("own_weather", "own_attenuation"),
     "scan.own_attenuation": _instead("own_attenuation", "own_weather"),

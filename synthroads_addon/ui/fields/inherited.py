@@ -73,12 +73,12 @@ def section_of(settings: Any) -> StandardCrossSection | None:
     road = settings.road
     if road.cross_section != BY_HAND:
         return STANDARD_CROSS_SECTIONS[road.cross_section]
-    own = road.cross_section_by_hand
+    part = road.cross_section_by_hand
     try:
-        lanes = tuple(numbers_in(own.lanes))
+        lanes = tuple(numbers_in(part.lanes))
     except ValueError:
         return None
-    return StandardCrossSection(lanes, own.hard_shoulder, own.outer_edge_strip, own.inner_edge_strip, own.median)
+    return StandardCrossSection(lanes, part.hard_shoulder, part.outer_edge_strip, part.inner_edge_strip, part.median)
 
 
 def scanner_setting(settings: Any, without: str = "") -> ScannerSetting | None:
@@ -87,9 +87,9 @@ def scanner_setting(settings: Any, without: str = "") -> ScannerSetting | None:
     if device is None:
         return None
     scan, names = settings.scan, ("pulse_rate_khz", "field_of_view_deg", "lines_per_second", "angle_step_deg")
-    own = [name for name in names if name != without and getattr(scan, f"own_{name}")]
+    given = [name for name in names if name != without and getattr(scan, f"own_{name}")]
     try:
-        return setting_of(device, ScanScenario.from_dict({name: exact(getattr(scan, name), None) for name in own}))
+        return setting_of(device, ScanScenario.from_dict({name: exact(getattr(scan, name), None) for name in given}))
     except InputError:
         return None
 

@@ -69,9 +69,9 @@ def push_along(name: str, other: str, limit: Callable[[float, float], float]) ->
     """Return what keeps the other end of an interval on its side."""
 
     def push(group: Any, context: Any) -> None:
-        wanted = limit(getattr(group, name), getattr(group, other))
-        if wanted != getattr(group, other):
-            setattr(group, other, wanted)
+        pushed = limit(getattr(group, name), getattr(group, other))
+        if pushed != getattr(group, other):
+            setattr(group, other, pushed)
 
     return push
 

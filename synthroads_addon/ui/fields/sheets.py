@@ -13,8 +13,6 @@ from functools import cache
 from .fields import Field
 from .properties import PATHS
 
-TOP = "SYNTHROADS_PT_main"
-
 
 @dataclass(frozen=True)
 class Sheet:
@@ -25,7 +23,7 @@ class Sheet:
         title: shown in its header.
         parent: name of the panel that it lies in; empty for the one that holds all.
         order: place among the panels beside it.
-        rows: paths of fields, or of parts with ``.*``.
+        rows: paths of fields, or of parts with ``.*``, with blanks between them.
         closed: whether it is closed at first.
     """
 
@@ -33,7 +31,7 @@ class Sheet:
     title: str
     parent: str
     order: int
-    rows: tuple[str, ...]
+    rows: str = ""
     closed: bool = True
 
     @property
@@ -43,70 +41,48 @@ class Sheet:
 
 
 SHEETS = (
-    Sheet("main", "SynthRoads", "", 0, ("fidelity",), closed=False),
-    Sheet("road", "Road", "main", 10, ("road.cross_section", "road.length", "seed"), closed=False),
+    Sheet("main", "SynthRoads", "", 0, "fidelity", closed=False),
+    Sheet("road", "Road", "main", 10, "road.cross_section road.length seed", closed=False),
     Sheet(
         "section",
         "Alignment and Section",
         "road",
         1,
-        (
-            "road.design_class",
-            "road.lanes",
-            "road.lane_width",
-            "road.median_width",
-            "road.radius",
-            "road.grade_percent",
-            "road.lane_changes.*",
-            "geometric_tolerance",
-            "road.*",
-        ),
+        "road.design_class road.lanes road.lane_width road.median_width road.radius road.grade_percent "
+        "road.lane_changes.* geometric_tolerance road.*",
     ),
-    Sheet("turnouts", "Turnouts", "road", 2, ("road.turnouts.*",)),
-    Sheet("pavement", "Pavement", "road", 3, ("road.pavement.*",)),
-    Sheet("markings", "Markings", "road", 4, ("road.markings.*",)),
-    Sheet("materials", "Materials", "road", 5, ("road.materials.*", "materials_table")),
-    Sheet("map", "Map", "road", 6, ("title", "road.epsg", "road.map_origin")),
+    Sheet("turnouts", "Turnouts", "road", 2, "road.turnouts.*"),
+    Sheet("pavement", "Pavement", "road", 3, "road.pavement.*"),
+    Sheet("markings", "Markings", "road", 4, "road.markings.*"),
+    Sheet("materials", "Materials", "road", 5, "road.materials.* materials_table"),
+    Sheet("map", "Map", "road", 6, "title road.epsg road.map_origin"),
     Sheet(
         "objects",
         "Objects",
         "main",
         20,
-        (
-            "road.placement",
-            "road.vehicles.per_km",
-            "road.trees_per_hectare",
-            "road.shrubs_per_hectare",
-            "road.grass_density",
-        ),
+        "road.placement road.vehicles.per_km road.trees_per_hectare road.shrubs_per_hectare road.grass_density",
     ),
-    Sheet("barriers", "Barriers", "objects", 1, ("road.barriers.*",)),
-    Sheet("furniture", "Furniture", "objects", 2, ("road.furniture.*",)),
-    Sheet("vehicles", "Vehicles", "objects", 3, ("road.vehicles.*", "scan.traffic_speed_factor")),
-    Sheet("vegetation", "Vegetation", "objects", 4, ("vegetation_detail", "road.vegetation.*")),
-    Sheet("assets", "Assets of Your Own", "objects", 5, ("road.assets",)),
-    Sheet("environment", "Environment", "main", 30, ()),
-    Sheet("weather", "Sun and Weather", "environment", 1, ("road.environment.*",), closed=False),
+    Sheet("barriers", "Barriers", "objects", 1, "road.barriers.*"),
+    Sheet("furniture", "Furniture", "objects", 2, "road.furniture.*"),
+    Sheet("vehicles", "Vehicles", "objects", 3, "road.vehicles.* scan.traffic_speed_factor"),
+    Sheet("vegetation", "Vegetation", "objects", 4, "vegetation_detail road.vegetation.*"),
+    Sheet("assets", "Assets of Your Own", "objects", 5, "road.assets"),
+    Sheet("environment", "Environment", "main", 30),
+    Sheet("weather", "Sun and Weather", "environment", 1, "road.environment.*", closed=False),
     Sheet(
         "terrain",
         "Terrain",
         "environment",
         2,
-        (
-            "road.embankment_height",
-            "road.batter_slope",
-            "road.undulation",
-            "road.wavelength",
-            "road.half_width",
-            "road.elevation_model",
-        ),
+        "road.embankment_height road.batter_slope road.undulation road.wavelength road.half_width road.elevation_model",
     ),
     Sheet(
         "scanner",
         "Scanner",
         "main",
         40,
-        ("scan.device", "scan.platform.kind", "scan.platform.file", "scan.platform.height", "scan.platform.speed"),
+        "scan.device scan.platform.kind scan.platform.file scan.platform.height scan.platform.speed",
         closed=False,
     ),
     Sheet(
@@ -114,23 +90,23 @@ SHEETS = (
         "Pulses and Lines",
         "scanner",
         1,
-        ("scan.pulse_rate_khz", "scan.field_of_view_deg", "scan.lines_per_second", "scan.angle_step_deg"),
+        "scan.pulse_rate_khz scan.field_of_view_deg scan.lines_per_second scan.angle_step_deg",
     ),
     Sheet(
         "platform",
         "Platform and Path",
         "scanner",
         2,
-        ("scan.platform.*", "scan.platform.roll_deg", "scan.platform.pitch_deg", "scan.platform.yaw_deg"),
+        "scan.platform.* scan.platform.roll_deg scan.platform.pitch_deg scan.platform.yaw_deg",
     ),
-    Sheet("beam", "Beam", "scanner", 3, ("scan.rays_per_pulse", "scan.beam_rings", "scan.beam", "scan.*")),
-    Sheet("air", "Air", "scanner", 4, ("scan.weather", "scan.attenuation")),
-    Sheet("noise", "Noise", "scanner", 5, ("scan.noise.*",)),
-    Sheet("performance", "Performance", "scanner", 6, ("scan.caster", "scan.threads")),
-    Sheet("colour", "Colour", "main", 50, ("colour.source", "colour.rgb", "colour.mode")),
-    Sheet("images", "Rendering", "colour", 1, ("colour.*",)),
-    Sheet("output", "Output", "main", 60, ("outputs", "cloud.formats", "twin")),
-    Sheet("attributes", "Point Attributes", "output", 1, ("cloud.*",)),
+    Sheet("beam", "Beam", "scanner", 3, "scan.rays_per_pulse scan.beam_rings scan.beam scan.*"),
+    Sheet("air", "Air", "scanner", 4, "scan.weather scan.attenuation"),
+    Sheet("noise", "Noise", "scanner", 5, "scan.noise.*"),
+    Sheet("performance", "Performance", "scanner", 6, "scan.caster scan.threads"),
+    Sheet("colour", "Colour", "main", 50, "colour.source colour.rgb colour.mode"),
+    Sheet("images", "Rendering", "colour", 1, "colour.*"),
+    Sheet("output", "Output", "main", 60, "outputs cloud.formats twin"),
+    Sheet("attributes", "Point Attributes", "output", 1, "cloud.*"),
 )
 """All panels made of the scenario's fields."""
 
@@ -138,7 +114,7 @@ SHEETS = (
 @cache
 def fields_of(sheet: Sheet) -> tuple[Field, ...]:
     """Return the fields that a panel shows, in their order."""
-    return tuple(field for row in sheet.rows for field in _fields(row))
+    return tuple(field for row in sheet.rows.split() for field in _fields(row))
 
 
 def _fields(row: str) -> Iterator[Field]:
@@ -155,7 +131,7 @@ def _fields(row: str) -> Iterator[Field]:
 @cache
 def _place_of(path: str) -> str:
     """Return the row that a field has its place in: its own, or that of the innermost part."""
-    rows = {row for sheet in SHEETS for row in sheet.rows}
+    rows = {row for sheet in SHEETS for row in sheet.rows.split()}
     if path in rows:
         return path
     parts = path.split(".")[:-1]

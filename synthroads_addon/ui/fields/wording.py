@@ -76,9 +76,9 @@ def label(path: str, info: FieldInfo) -> str:
 
 def value_name(path: str, value: str, info: FieldInfo | None = None) -> str:
     """Return what the panel calls a value of a choice, by its declaration in the schema if that says it."""
-    said = (note_of(info, "labels") or {}) if info else {}
-    if value in said:
-        return str(said[value])
+    labels = (note_of(info, "labels") or {}) if info else {}
+    if value in labels:
+        return str(labels[value])
     if path == "cloud.attributes":
         return LAYERS[value].label
     if path == "twin":

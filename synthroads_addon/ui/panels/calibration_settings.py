@@ -121,9 +121,9 @@ class SYNTHROADS_PG_calibration(bpy.types.PropertyGroup):
             spans = tuple(_pair(text) for text in self.paved.split(";") if text.strip())
             road = RoadClasses(Path(file_of(self.axis) or ""), spans, _numbers("Lines", self.lines), self.line_width)
         names = [row.material for row in self.classes]
-        here = _of_scene(names)
+        scene = _scene_materials(names)
         job = CalibrationJob(
-            targets=tuple(_material_target(row, here, bool(self.real)) for row in self.classes),
+            targets=tuple(_material_target(row, scene, bool(self.real)) for row in self.classes),
             table=table if table is not None and table.exists() else None,
             real=file_of(self.real),
             class_field=self.class_field or None,
@@ -138,7 +138,7 @@ class SYNTHROADS_PG_calibration(bpy.types.PropertyGroup):
             fit=fit,
             parts=cast("frozenset[Part]", frozenset(self.parts)),
             gain=self.gain or None,
-            scene=here,
+            scene=scene,
         )
         check(job)
         return job
@@ -149,13 +149,13 @@ def textured_materials() -> set[str]:
     return {table_name(item) for item in bpy.data.materials if color_image_node(item) is not None}
 
 
-def _of_scene(names: list[str]) -> dict[str, Material]:
+def _scene_materials(names: list[str]) -> dict[str, Material]:
     """Return the properties of the scene's materials of these names."""
     there = {table_name(item) for item in bpy.data.materials}
     return dict(constants(name for name in names if name in there))
 
 
-def _material_target(row: Any, here: dict[str, Material], compared: bool) -> MaterialTarget:
+def _material_target(row: Any, scene: dict[str, Material], compared: bool) -> MaterialTarget:
     real_class = row.told if compared else None
     if not row.texture:
         return MaterialTarget(row.material, real_class)
@@ -163,7 +163,7 @@ def _material_target(row: Any, here: dict[str, Material], compared: bool) -> Mat
     pixels = None if item is None else base_color_image(item)
     if pixels is None:
         raise InputError("Texture", row.material, "the scene's material has no image as its base colour")
-    texture = texture_of(pixels, row.texture_width, here[row.material])
+    texture = texture_of(pixels, row.texture_width, scene[row.material])
     return MaterialTarget(row.material, real_class, texture, row.texture_width)
 
 

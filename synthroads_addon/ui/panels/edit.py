@@ -59,12 +59,12 @@ def sections(parameters: RoadParameters, item: bpy.types.Object) -> Iterator[Sec
     if modifier is None:
         return
     carried = carried_inputs(parameters, str(item[ROLE]), modifier)
-    found: dict[str, list[tuple[str, str]]] = {}
+    by_heading: dict[str, list[tuple[str, str]]] = {}
     for socket in modifier.node_group.interface.items_tree:
         if socket.item_type == "SOCKET" and socket.in_out == "INPUT" and socket.name in carried:
             heading = socket.parent.name
-            found.setdefault(heading, []).append((_without_heading(socket.name, heading), socket.identifier))
-    yield from found.items()
+            by_heading.setdefault(heading, []).append((_without_heading(socket.name, heading), socket.identifier))
+    yield from by_heading.items()
 
 
 def _without_heading(name: str, heading: str) -> str:
@@ -87,8 +87,8 @@ _items: list[tuple[str, str, str, str, int]] = []
 
 
 def _part_items(state: Any, context: Any) -> list[tuple[str, str, str, str, int]]:
-    found = parts(context.scene)
-    _items[:] = [_NOTHING, *((role, part_name(role), "", "NONE", i) for i, role in enumerate(found, 1))]
+    by_role = parts(context.scene)
+    _items[:] = [_NOTHING, *((role, part_name(role), "", "NONE", i) for i, role in enumerate(by_role, 1))]
     return _items
 
 

@@ -89,8 +89,8 @@ class SYNTHROADS_OT_load_axis(_Load, bpy.types.Operator):
         parameters, report = RoadSource(scenario, axis=path).read()
         fit = report["axis"]
         across, up = (fit[name]["worst"] for name in ("horizontal", "height"))
-        said = f"{fit['points']:,} points, {fit['elements']} elements, within {across:.3f} m, heights {up:.3f} m"
-        return parameters, f"Built {parameters.alignment.length:,.0f} m of road along {path.name}: {said}"
+        deviations = f"{fit['points']:,} points, {fit['elements']} elements, within {across:.3f} m, heights {up:.3f} m"
+        return parameters, f"Built {parameters.alignment.length:,.0f} m of road along {path.name}: {deviations}"
 
 
 class SYNTHROADS_OT_save_road(JsonFileChooser, bpy.types.Operator):

@@ -52,7 +52,7 @@ class Checked:
         self.take(None)
         self.marker.hide()
 
-    def outdated(self, scene: bpy.types.Scene) -> bool:
+    def is_outdated(self, scene: bpy.types.Scene) -> bool:
         """Return whether the road has changed; reading it takes long enough to do so after changes only."""
         if self.asked and self.parameters is not None:
             try:
@@ -232,7 +232,7 @@ class SYNTHROADS_PT_rules(Sidebar, bpy.types.Panel):
         if checked.parameters is None:
             return
         row.operator(SYNTHROADS_OT_clear_rules.bl_idname, text="", icon="X")
-        if checked.outdated(context.scene):
+        if checked.is_outdated(context.scene):
             layout.label(text="The road has changed since", icon="INFO")
         count = len(rules.violations)
         layout.label(text=_count(count), icon="ERROR" if count else "CHECKMARK")

@@ -163,14 +163,14 @@ class PanelJob(Generic[T]):
             return
         answer, failure, self._answer, self._failure = self._answer, self._failure, None, None
         try:
-            found = self._work.send(answer) if failure is None else self._work.throw(failure)
+            outcome = self._work.send(answer) if failure is None else self._work.throw(failure)
         except StopIteration as end:
             self.result, self.share = end.value, 1.0
             self._end()
         except BaseException as error:
             self._close(error)
         else:
-            self._note(found, begin)
+            self._note(outcome, begin)
 
     def _note(self, found: float | Step | Aside | None, begin: Callable[[Aside], None]) -> None:
         """Take over what the work says at a `yield`."""

@@ -55,11 +55,11 @@ class SavedScene:
             Cancelled: by `report`; the other Blender is ended.
             RuntimeError: a defect in the other Blender.
         """
-        told = _Told()
+        messages = _Messages()
         try:
             with self._process() as process:
-                self._watch(process, told, report)
-            return self._result(process.returncode, told)
+                self._watch(process, messages, report)
+            return self._result(process.returncode, messages)
         finally:
             shutil.rmtree(self.place, ignore_errors=True)
 
@@ -87,31 +87,31 @@ class SavedScene:
                 finally:
                     process.kill()
 
-    def _watch(self, process: subprocess.Popen[bytes], told: _Told, report: Report) -> None:
+    def _watch(self, process: subprocess.Popen[bytes], messages: _Messages, report: Report) -> None:
         """Pass on what the other Blender says until it ends."""
         with (self.place / _LINES).open(encoding="utf-8", errors="replace") as lines:
             ended = False
             while not ended:
                 # Asked before reading: its last lines are read as well.
                 ended = process.poll() is not None
-                told.take(lines.read())
-                report(told.share)
+                messages.take(lines.read())
+                report(messages.share)
                 if not ended:
                     _wait(process)
 
-    def _result(self, code: int, told: _Told) -> Scanned:
-        if told.error is not None:
-            raise InputError(told.error[0], None, told.error[1])
-        if told.done is not None:
-            return Scanned(**told.done)
+    def _result(self, code: int, messages: _Messages) -> Scanned:
+        if messages.error is not None:
+            raise InputError(messages.error[0], None, messages.error[1])
+        if messages.done is not None:
+            return Scanned(**messages.done)
         if code < 0:
             raise InputError("Blender", None, f"was ended in the background by signal {-code} (too little memory?)")
-        said = (self.place / _ERRORS).read_text(encoding="utf-8", errors="replace").strip()
-        raise RuntimeError(f"Blender in the background ended with exit code {code}: {said or 'no message'}")
+        errors = (self.place / _ERRORS).read_text(encoding="utf-8", errors="replace").strip()
+        raise RuntimeError(f"Blender in the background ended with exit code {code}: {errors or 'no message'}")
 
 
 @dataclass
-class _Told:
+class _Messages:
     """Messages of the other Blender so far.
 
     Attributes:

@@ -112,10 +112,10 @@ def _save_copy(scan: RoadScan, folder: Path, timer: StageTimer) -> Generator[Ste
     with timer.stage("scene copy"):
         saved = save_open_scene(scan.scenario, scan.parameters, folder)
     yield Step(_READ)
-    return lambda output: _scan_saved(saved, output)
+    return lambda output: _scan_saved_copy(saved, output)
 
 
-def _scan_saved(saved: SavedScene, output: _Output) -> dict[str, Any]:
+def _scan_saved_copy(saved: SavedScene, output: _Output) -> dict[str, Any]:
     done = saved.scan(output.report)
     output.timer.stages.update(done.stages)
     return done.counts
@@ -128,7 +128,7 @@ def _read_open_scene(scan: RoadScan, timer: StageTimer) -> Generator[Step, None,
         steps = scanned_scene_steps(geometry=scan.road, speed_factor=speed_factor)
         copied = yield from _shares(steps)
     services = SnapshotServices(copied.materials)
-    return lambda output: _scan_copied(scan, copied, services, output)
+    return lambda output: _scan_snapshot(scan, copied, services, output)
 
 
 def _shares(steps: Generator[float, None, CopiedScene]) -> Generator[Step, None, CopiedScene]:
@@ -143,7 +143,7 @@ def _shares(steps: Generator[float, None, CopiedScene]) -> Generator[Step, None,
             raise
 
 
-def _scan_copied(scan: RoadScan, copied: CopiedScene, services: SnapshotServices, output: _Output) -> dict[str, Any]:
+def _scan_snapshot(scan: RoadScan, copied: CopiedScene, services: SnapshotServices, output: _Output) -> dict[str, Any]:
     """Scan what was read."""
     site, timer = Site.of_road(scan.scenario, scan.road), output.timer
     with timer.stage("scene mesh"):

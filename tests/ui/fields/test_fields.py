@@ -450,7 +450,7 @@ def test_a_value_of_ones_own_begins_with_what_was_shown(panel: Any, path: str) -
     field, owner, value = PATHS[path], owner_of(panel, path), inherited_value(panel, path)
     shown = inherited_text(panel, path, field.unit)
     assert shown not in ("", "Automatic"), "says nothing of what it has while it isn't given"
-    setattr(owner, field.own, True)
+    setattr(owner, field.checkbox_name, True)
     if value is not None:
         got = field.read(owner, None)
         got = tuple(got.values()) if isinstance(got, dict) else got

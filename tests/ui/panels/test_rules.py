@@ -128,18 +128,18 @@ def test_the_place_of_any_object_is_beside_the_road(found: Any) -> None:
 def test_the_list_says_when_the_road_has_changed(found: Any) -> None:
     scene = bpy.context.scene
     bpy.ops.synthroads.check_rules()
-    assert not rules.checked.outdated(scene)
+    assert not rules.checked.is_outdated(scene)
     narrow_lane()
-    assert rules.checked.outdated(scene)
+    assert rules.checked.is_outdated(scene)
     bpy.ops.synthroads.check_rules()
-    assert not rules.checked.outdated(scene)
+    assert not rules.checked.is_outdated(scene)
     bpy.ops.mesh.primitive_cube_add()
     bpy.context.view_layer.update()
     assert not rules.checked.asked  # the user's own objects are none of the road's
     for item in [item for item in bpy.data.objects if ROLE in item]:
         bpy.data.objects.remove(item)
     rules._look_for_changes(scene)
-    assert rules.checked.outdated(scene)
+    assert rules.checked.is_outdated(scene)
     assert not bpy.ops.synthroads.check_rules.poll()
 
 

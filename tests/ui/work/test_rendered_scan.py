@@ -18,17 +18,17 @@ from synthroads_addon.jobs.generate import Job as PipelineJob
 from synthroads_addon.jobs.generate import generate
 from synthroads_addon.jobs.job_files import FILES
 from synthroads_addon.scenario.scenario import load_scenario
-from synthroads_addon.ui.fields.fields import own
+from synthroads_addon.ui.fields.fields import checkbox_path
 from synthroads_addon.ui.work import rendered_scan, scan
 from synthroads_addon.ui.work.job import PanelJob
-from synthroads_addon.ui.work.rendered_scan import MARK, SavedScene, _Told
+from synthroads_addon.ui.work.rendered_scan import MARK, SavedScene, _Messages
 from synthroads_addon.ui.work.scan import Written, scan_work
 from tests.helpers.scenes.panel_road import SAME, block_counts, cheap, choose, road, road_file, settings  # noqa: F401
 from tests.helpers.scenes.scene_hash import lines
 
 COARSE = {"colour.image_spacing": 60.0, "colour.ground_sampling_distance": 1.0}
 # Ticking a field fills in its usual value: it is ticked first.
-RENDERED = {"colour.source": "images"} | dict.fromkeys(map(own, COARSE), True) | COARSE
+RENDERED = {"colour.source": "images"} | dict.fromkeys(map(checkbox_path, COARSE), True) | COARSE
 NO_PICTURES = RENDERED | {"outputs": {"cloud"}}
 WRITTEN = sorted([n for o in ("parameters", "cloud", "centerline", "previews") for n in FILES[o]] + ["report.json"])
 
@@ -166,7 +166,7 @@ def test_the_other_blender_ends_with_this_one(road: Any, tmp_path: Path) -> None
 
 
 def test_what_it_says_is_read_however_it_comes_in() -> None:
-    told = _Told()
+    told = _Messages()
     for part in ("Fra:1 Mem", f'ory\nunfinished{MARK}{{"sha', 're": 0.5}\n', f"{MARK}", '{"share": 0.75', "}"):
         told.take(part)
     assert told.share == 0.5
