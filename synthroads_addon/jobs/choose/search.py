@@ -19,8 +19,7 @@ from ...scanning.beam import RINGS
 from ...scanning.scene.motion import ScannedScene
 from ...scenario.scenario import FIDELITIES, Scenario
 from ..measure.errors import CONVERGED, Errors, beam_errors
-from ..scan.plan import coloured_layers, may_render
-from ..scan.site import Site
+from ..scan.plan import Site, coloured_layers, may_render
 from . import knobs as choices
 from .knobs import ModelKnobs
 from .options import Choice, Knobs, Option, best_in_time, cheapest, too_short

@@ -29,9 +29,17 @@ from ...scanning.relief import micro_relief
 from ...scanning.scan import BlockResult, joined_results
 from ...scenario.scenario import load_scenario
 from ..road_scene import RoadScene
-from ..scan.site import Site
-from .errors import CONVERGED, FINEST, beam_errors, errors_by_source, relief_errors, shift_points, truest_settings
-from .mesh_errors import mesh_height_errors
+from ..scan.plan import Site
+from .errors import (
+    CONVERGED,
+    FINEST,
+    beam_errors,
+    errors_by_source,
+    mesh_height_errors,
+    relief_errors,
+    shift_points,
+    truest_settings,
+)
 from .tradeoff import KNOBS, TRUE_SAMPLES, Knob, row_scenario
 
 _STRETCHES, _SECONDS = 16, 0.08
