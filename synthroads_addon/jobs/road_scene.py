@@ -20,7 +20,7 @@ from ..scanning.scene.motion import ScannedScene
 from ..scenario.scenario import Scenario
 from .job_files import OF_POINTS
 from .scan.by_section import scan_by_section
-from .scan.site import Site
+from .scan.plan import Site
 
 
 @dataclass

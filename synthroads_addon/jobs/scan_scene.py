@@ -34,7 +34,7 @@ from ..scenario.scan import scanner_setting
 from ..scenario.scenario import Scenario
 from .choose.knobs import check_choice
 from .job_files import OF_POINTS, JobFiles
-from .scan.site import Site, road_view
+from .scan.plan import Site, road_view
 
 if TYPE_CHECKING:
     from ..blender.scene.foreign import UpAxis

@@ -16,7 +16,7 @@ from synthroads_addon.blender.nodes.builder import Tree, node_group
 from synthroads_addon.blender.scene.evaluated import scanned_scene, scene_mesh
 from synthroads_addon.blender.scene.reading import MeshPart, Places, SceneTables, join_parts
 from synthroads_addon.blender.services import BlenderServices
-from synthroads_addon.jobs.scan.site import Site
+from synthroads_addon.jobs.scan.plan import Site
 from synthroads_addon.road.geometry import RoadGeometry
 from synthroads_addon.road.tessellation import MAXIMUM_SPACING
 from synthroads_addon.sampling.road import sample_road

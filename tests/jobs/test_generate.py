@@ -17,7 +17,7 @@ from synthroads_addon.blender.services import BlenderServices
 from synthroads_addon.cloud.points import concatenate
 from synthroads_addon.jobs.generate import Job, generate
 from synthroads_addon.jobs.job_files import FILES
-from synthroads_addon.jobs.scan.site import Site
+from synthroads_addon.jobs.scan.plan import Site
 from synthroads_addon.road.geometry import RoadGeometry
 from synthroads_addon.road.parameters import read_parameters
 from synthroads_addon.scenario.scenario import load_scenario

@@ -49,11 +49,9 @@ class Choice:
 
     Attributes:
         options: by name of the knob.
-        fixed_seconds: of what no knob changes.
     """
 
     options: Mapping[str, Option]
-    fixed_seconds: float = 0.0
 
     @property
     def changes(self) -> dict[str, Any]:
@@ -68,11 +66,11 @@ class Choice:
     @property
     def seconds(self) -> float:
         """Return the expected time."""
-        return self.fixed_seconds + sum(option.seconds for option in self.options.values())
+        return sum(option.seconds for option in self.options.values())
 
 
 Knobs = Mapping[str, Sequence[Option]]
-"""Options by name of the knob."""
+"""Options by name of the knob; what no knob changes is one without a choice."""
 
 
 def options_within(knobs: Knobs, limits: Mapping[str, float]) -> dict[str, list[Option]]:
@@ -101,23 +99,18 @@ def _impossible(options: Sequence[Option], limits: Mapping[str, float]) -> Input
     return InputError("tolerance", None, f"{' and '.join(kinds)} can't be kept together: the nearest is {said}")
 
 
-def cheapest(knobs: Knobs, limits: Mapping[str, float], fixed_seconds: float = 0.0) -> Choice:
+def cheapest(knobs: Knobs, limits: Mapping[str, float]) -> Choice:
     """Return the cheapest settings that keep a tolerance.
 
     Raises:
         InputError: there are none; says what is the best to be had.
     """
     kept = options_within(knobs, limits)
-    best = {name: min(options, key=lambda option: option.cost) for name, options in kept.items()}
-    return Choice(best, fixed_seconds)
+    return Choice({name: min(options, key=lambda option: option.cost) for name, options in kept.items()})
 
 
 def best_in_time(
-    knobs: Knobs,
-    seconds: float,
-    reference: Mapping[str, float],
-    limits: Mapping[str, float] | None = None,
-    fixed_seconds: float = 0.0,
+    knobs: Knobs, seconds: float, reference: Mapping[str, float], limits: Mapping[str, float] | None = None
 ) -> Choice:
     """Return the best settings that fit a time: their largest error, as a multiple of a reference, is the smallest.
 
@@ -128,15 +121,12 @@ def best_in_time(
         seconds: that the job may take.
         reference: error of each kind that is as bad as the others'; a kind without one doesn't count.
         limits: a tolerance that is to be kept as well.
-        fixed_seconds: see `Choice`.
 
     Raises:
         InputError: not even the fastest settings fit, or none keeps the tolerance.
     """
     kept = options_within(knobs, limits or {})
-    choices = [
-        Choice(dict(zip(kept, options, strict=True)), fixed_seconds) for options in itertools.product(*kept.values())
-    ]
+    choices = [Choice(dict(zip(kept, options, strict=True))) for options in itertools.product(*kept.values())]
     fitting = [choice for choice in choices if choice.seconds <= seconds]
     if not fitting:
         raise too_short(seconds, min(choice.seconds for choice in choices), bool(limits))

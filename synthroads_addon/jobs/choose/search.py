@@ -19,8 +19,7 @@ from ...scanning.beam import RINGS
 from ...scanning.scene.motion import ScannedScene
 from ...scenario.scenario import FIDELITIES, Scenario
 from ..measure.errors import CONVERGED, Errors, beam_errors
-from ..scan.plan import coloured_layers, may_render
-from ..scan.site import Site
+from ..scan.plan import Site, coloured_layers, may_render
 from . import knobs as choices
 from .knobs import ModelKnobs
 from .options import Choice, Knobs, Option, best_in_time, cheapest, too_short
@@ -131,23 +130,22 @@ class _Search:
         found = self._measure()
         rays = int(cheapest(self._options(found), self.limits).changes.get("scan.rays_per_pulse", max(self.rays)))
         self.times.calibrate(rays, *self._trial.time_scan(self.rays[rays]))
-        return found, cheapest(self._options(found), self.limits, self.times.fixed(self.scenario))
+        return found, cheapest(self._options(found), self.limits)
 
     def _choose_by_time(self, budget: float) -> tuple[_Findings, Choice]:
         def left() -> float:
             return budget - (time.perf_counter() - self.begun)
 
-        fewest, fixed = min(self.rays), self.times.fixed(self.scenario)
-        seconds = self.times.model(0) + self.times.scan(fewest) + fixed
+        fewest, times = min(self.rays), self.times
+        seconds = times.model(0) + times.scan(fewest) + times.fixed(self.scenario)
         if seconds > _HOPELESS * left():  # by the shipped table, before anything is built
             raise too_short(left(), seconds)
-        self.times.calibrate(fewest, *self._try(self.models[0]).time_scan(self.rays[fewest]))
-        fixed = self.times.fixed(self.scenario)
-        if (fastest := self.times.scan(fewest) + fixed) > left():
+        times.calibrate(fewest, *self._try(self.models[0]).time_scan(self.rays[fewest]))
+        if (fastest := times.scan(fewest) + times.fixed(self.scenario)) > left():
             raise too_short(left(), fastest)
         # The error of the height follows from the model, without a measurement.
         found = self._measure() if set(self.limits) - {"height"} else self._look_up()
-        return found, best_in_time(self._options(found), _SURE * left(), self._reference(), self.limits, fixed)
+        return found, best_in_time(self._options(found), _SURE * left(), self._reference(), self.limits)
 
     def _measure(self) -> _Findings:
         """Return errors as trials show them: of the beam and of colours only if they are limited."""
@@ -192,15 +190,17 @@ class _Search:
 
     def _options(self, found: _Findings) -> Knobs:
         """Return the options of every knob, with the times that are expected by what is known of this machine."""
-        knobs = {"beam": [self._beam_option(*knobs, errors) for knobs, errors in found.beam.items()]}
-        if found.relief:
-            knobs["relief"] = [
-                Option({"scan.relief_octaves": octaves}, errors, octaves, self.times.relief(octaves))
-                for octaves, errors in found.relief.items()
-            ]
-        if found.colour:
-            knobs["colour"] = [self._colour_option(name, errors) for name, errors in found.colour.items()]
-        return knobs
+        relief = [
+            Option({"scan.relief_octaves": octaves}, errors, octaves, self.times.relief(octaves))
+            for octaves, errors in found.relief.items()
+        ]
+        knobs = {
+            "beam": [self._beam_option(*knobs, errors) for knobs, errors in found.beam.items()],
+            "relief": relief,
+            "colour": [self._colour_option(name, errors) for name, errors in found.colour.items()],
+            "rest": [Option({}, {}, 0.0, self.times.fixed(self.scenario))],
+        }
+        return {name: options for name, options in knobs.items() if options}
 
     def _beam_option(self, model: ModelKnobs | None, rays: int, errors: Errors) -> Option:
         """Return an option of rays and a model; its time is that of the scan, and of building if it doesn't stand."""

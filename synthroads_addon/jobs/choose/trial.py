@@ -33,7 +33,7 @@ from ...scanning.scan import BlockResult, joined_results
 from ...scanning.scene.motion import ScannedScene
 from ..measure.errors import CONVERGED, FINEST, Errors, colour_errors, relief_errors, shift_points, truest_settings
 from ..scan.files import record_to_files
-from ..scan.site import Site
+from ..scan.plan import Site
 
 LINES, PULSES = 64, 1024
 """Stretches that errors are taken of, and the pulses of each."""

@@ -2,6 +2,7 @@
 
 - *beam*: position and intensity of first returns against those of the same pulses with 61 rays among all plants, 95th
   percentile; share of the first returns whose class is another; and how many points are missing or too many;
+- *height*: distance of a road's mesh from the analytic surface that it was made from;
 - *relief*: distance of the shifted points from those that all octaves shift, 95th percentile;
 - *colour*: CIEDE2000 from colours rendered as well as can be, 95th percentile;
 - *layers*: the largest root mean square error of a material layer.
@@ -18,9 +19,11 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ...base.classes import class_id
 from ...base.random_streams import stream
 from ...blender.cameras import HAS_RETURN_CAMERA
 from ...cloud.points import PointBlock
+from ...road.geometry import RoadGeometry
 from ...scanning.beam import RINGS
 from ...scanning.colour.colour import FROM_MATERIAL, MATERIAL_LAYERS, NEARBY, LayerValues, source_name
 from ...scanning.colour.difference import cie_lab, ciede2000
@@ -28,6 +31,7 @@ from ...scanning.colour.request import LayerRequest
 from ...scanning.colour.settings import ColourSettings
 from ...scanning.relief import MicroRelief, shift_along_normals
 from ...scanning.scan import BlockResult
+from ...scanning.scene.mesh import SceneMesh
 from ...scenario.colour import image_scale
 
 Float = NDArray[np.float64]
@@ -47,6 +51,38 @@ _DRAWS = 400
 _STEPS = 512
 """Places at which a distribution's shares are counted."""
 _LEAST = 1e-9
+_BESIDE_STEPS = 0.01
+"""To either side of a step, m: faces at it may begin a little aside."""
+
+
+def mesh_height_errors(
+    mesh: SceneMesh, geometry: RoadGeometry, samples: int = 100_000, names: tuple[str, ...] = ("road", "roadside")
+) -> Float:
+    """Return signed height errors (N,) in metres of random points of the mesh's road surface.
+
+    Without the centimetres along which the pavement changes at once, at noses and ends of ramps: faces there go
+    slantwise from one cross-section to quite another one.
+
+    Args:
+        mesh: scene mesh in local coordinates.
+        geometry: the analytic road.
+        samples: points, drawn evenly by area with a fixed seed.
+        names: classes of the faces that belong to the analytic surface.
+    """
+    rng = stream(0, "mesh height errors")
+    faces = np.flatnonzero(np.isin(mesh.class_id, [class_id(name) for name in names]))
+    area = mesh.areas()[faces]
+    chosen = faces[rng.choice(len(faces), size=samples, p=area / area.sum())]
+    corners = mesh.vertices[mesh.triangles[chosen]].astype(np.float64)
+    u, v = rng.random((2, samples))
+    u, v = np.where(u + v > 1, 1 - u, u), np.where(u + v > 1, 1 - v, v)
+    points = corners[:, 0] + u[:, None] * (corners[:, 1] - corners[:, 0]) + v[:, None] * (corners[:, 2] - corners[:, 0])
+    station, offset = geometry.alignment.project(points[:, :2])
+    inside = (station >= 0) & (station <= geometry.length)
+    for low, high in (step for section in geometry.sections.values() for step in section.steps()):
+        inside &= (station < low - _BESIDE_STEPS) | (station > high + _BESIDE_STEPS)
+    error = points[inside, 2] - geometry.elevation(station[inside], offset[inside])
+    return np.asarray(error[np.isfinite(error)])
 
 
 def match_pulses(mine: PointBlock, truth: PointBlock) -> tuple[PointBlock, PointBlock]:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import sys
 import tempfile
 import time
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -28,12 +27,19 @@ from ...scanning.platforms.stretches import middle_stretches, spread_stretches
 from ...scanning.record import RETURNS_AT_ONCE, record_as_measured, scan_blocks
 from ...scanning.relief import micro_relief
 from ...scanning.scan import BlockResult, joined_results
-from ...scanning.scene.motion import ScannedScene
-from ...scenario.scenario import Scenario, load_scenario
+from ...scenario.scenario import load_scenario
 from ..road_scene import RoadScene
-from ..scan.site import Site
-from .errors import CONVERGED, FINEST, beam_errors, errors_by_source, relief_errors, shift_points, truest_settings
-from .mesh_errors import mesh_height_errors
+from ..scan.plan import Site
+from .errors import (
+    CONVERGED,
+    FINEST,
+    beam_errors,
+    errors_by_source,
+    mesh_height_errors,
+    relief_errors,
+    shift_points,
+    truest_settings,
+)
 from .tradeoff import KNOBS, TRUE_SAMPLES, Knob, row_scenario
 
 _STRETCHES, _SECONDS = 16, 0.08
@@ -69,8 +75,13 @@ def measure_row(scenario_name: str, knob: str, value: Any) -> dict[str, Any]:
     built = time.process_time()
     plan = shown.site.plan(scene, BlenderServices())
     ready = time.process_time()
-    costs, sample = _measure_stretches(shown.site, KNOBS[knob], scene, plan)
-    whole = load_scenario(scenario_name).vegetation_detail or 1.0
+    costs, sample = _measure_stretches(shown.site, KNOBS[knob], plan)
+    errors, more = _errors(KNOBS[knob], sample)
+    if "height" in KNOBS[knob].errors:
+        errors["height_mm"] = 1e3 * float(np.abs(mesh_height_errors(scene.static, road)).max())
+    if "beam" in KNOBS[knob].errors:  # last, as its truth may be another scene
+        plants = load_scenario(scenario_name).vegetation_detail or 1.0
+        errors |= _beam_errors(sample, _true_plan(shown, sample.plan, plants))
     return {
         "knob": knob,
         "value": value,
@@ -80,7 +91,8 @@ def measure_row(scenario_name: str, knob: str, value: Any) -> dict[str, Any]:
         "triangles": plan.target.triangles,
         "machine": machine({"Blender": sys.modules["bpy"].app.version_string}),
         **{name: round(cost, 3) if isinstance(cost, float) else cost for name, cost in costs.items()},
-        **_errors(KNOBS[knob], sample, road, lambda: _true_plan(scenario, road, sample.plan, whole)),
+        "errors": {name: round(error, 6) for name, error in errors.items()},
+        **more,
     }
 
 
@@ -89,7 +101,6 @@ class Sample:
     """Points of stretches of a path, of which a row's errors are taken.
 
     Attributes:
-        scene: that was scanned.
         plan: of the stretches.
         request: for the colours and layers of all of the path.
         result: the points as measured, with normals and materials, and where they were seen.
@@ -97,7 +108,6 @@ class Sample:
         written: points in the file.
     """
 
-    scene: ScannedScene
     plan: ScanPlan
     request: LayerRequest
     result: BlockResult
@@ -105,9 +115,7 @@ class Sample:
     written: int
 
 
-def _measure_stretches(
-    site: Site, knob: Knob, scene: ScannedScene, plan: ScanPlan
-) -> tuple[dict[str, Any], Sample]:
+def _measure_stretches(site: Site, knob: Knob, plan: ScanPlan) -> tuple[dict[str, Any], Sample]:
     """Do the job on stretches of the path; return what it costs after the caster is built, and the points.
 
     Returns:
@@ -145,63 +153,49 @@ def _measure_stretches(
         "megapixels": rendered.get("pixels", 0) / 1e6,
         "shares": shares_by_source(counts.by_source),
     }
-    return costs, Sample(scene, part, request, result, values, counts.points)
+    return costs, Sample(part, request, result, values, counts.points)
 
 
-def _true_plan(scenario: Scenario, road: RoadGeometry, part: ScanPlan, plants: float) -> ScanPlan | None:
+def _true_plan(shown: RoadScene, part: ScanPlan, plants: float) -> ScanPlan | None:
     """Return the plan of a plan's stretches with the converged footprint among all plants; None if it is that itself.
 
     The road is built anew, in place of the one scanned, if it lacks plants.
 
     Args:
-        scenario: that was scanned.
-        road: the road.
+        shown: that was scanned.
         part: the plan of the stretches.
         plants: share of the plants that the truth has.
     """
-    detail = scenario.settings().vegetation_detail
+    detail = shown.scenario.settings().vegetation_detail
     if detail == plants and part.rays_per_pulse == CONVERGED:
         return None
     if detail == plants and part.target.caster.name == "embree":
         return replace(part, rings=RINGS[CONVERGED])
-    scan = scenario.scan.model_copy(update={"caster": "auto"})
-    shown = RoadScene(scenario.model_copy(update={"scan": scan, "vegetation_detail": plants}), road)
+    scan = shown.scenario.scan.model_copy(update={"caster": "auto"})
+    true = RoadScene(shown.scenario.model_copy(update={"scan": scan, "vegetation_detail": plants}), shown.road)
     if detail != plants:
-        shown.build()
-    plan = shown.site.plan(shown.read(), BlenderServices())
+        true.build()
+    plan = true.site.plan(true.read(), BlenderServices())
     return replace(plan, path=part.path, rings=RINGS[CONVERGED])
 
 
-def _errors(
-    knob: Knob, sample: Sample, road: RoadGeometry, true_plan: Callable[[], ScanPlan | None]
-) -> dict[str, Any]:
-    """Return ``errors`` by name of `tradeoff.ROW_TITLES`, and of colours ``colour_truth`` and ``errors_by_source``.
+def _errors(knob: Knob, sample: Sample) -> tuple[dict[str, float], dict[str, Any]]:
+    """Return errors of relief and colours by name of `tradeoff.ROW_TITLES`, and what more there is to say of colours.
 
-    The former is what they were compared with, the latter their errors by what gave them to the points.
-
-    Args:
-        knob: says which errors.
-        sample: the points.
-        road: the analytic road.
-        true_plan: see `_true_plan`.
+    That is ``colour_truth``, what they were compared with, and ``errors_by_source``, their errors by what gave them to
+    the points.
     """
     errors: dict[str, float] = {}
     more: dict[str, Any] = {}
-    if "height" in knob.errors:
-        heights = mesh_height_errors(sample.scene.static, road)
-        errors["height_mm"] = 1e3 * float(np.abs(heights).max())
     if "relief" in knob.errors:
         errors["relief_mm"] = 1e3 * _relief_error(sample)
     if "colour" in knob.errors:
-        truth, more["colour_truth"], chosen = _true_colours(knob, sample)
         assert sample.values is not None
+        truth, more["colour_truth"], chosen = _true_colours(knob, sample)
         mine = {name: array[chosen] for name, array in sample.values.arrays.items()}
-        mine_there = LayerValues(mine, sample.values.source[chosen])
-        of_all, more["errors_by_source"] = errors_by_source(mine_there, truth)
+        of_all, more["errors_by_source"] = errors_by_source(LayerValues(mine, sample.values.source[chosen]), truth)
         errors |= of_all
-    if "beam" in knob.errors:  # last, as its truth may be another scene
-        errors |= _beam_errors(sample, true_plan())
-    return {"errors": {name: round(error, 6) for name, error in errors.items()}, **more}
+    return errors, more
 
 
 def _beam_errors(sample: Sample, plan: ScanPlan | None) -> dict[str, float]:

@@ -27,8 +27,7 @@ from ...scanning.platforms.stretches import PathStretches
 from ...scanning.scene.motion import LaneMotion, ScannedScene, ShiftedMotion, lane_motions
 from ...scanning.sections import Section, sections, shadow_length, strip_parts
 from .files import record_to_files
-from .plan import may_render
-from .site import Site
+from .plan import Site, may_render
 
 Float = NDArray[np.float64]
 

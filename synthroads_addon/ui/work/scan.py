@@ -25,8 +25,7 @@ from ...jobs.generate import Job as PipelineJob
 from ...jobs.generate import check
 from ...jobs.job_files import OF_POINTS, JobFiles
 from ...jobs.scan.files import record_to_files
-from ...jobs.scan.plan import may_render
-from ...jobs.scan.site import Site
+from ...jobs.scan.plan import Site, may_render
 from ...road.geometry import RoadGeometry
 from ...road.parameters import RoadParameters
 from ...scenario.scenario import Scenario

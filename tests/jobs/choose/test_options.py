@@ -103,7 +103,7 @@ def test_what_no_settings_keep_is_said_with_the_best() -> None:
     with pytest.raises(InputError, match="position and intensity can't be kept together"):
         cheapest(knobs, {"position": 0.02, "intensity": 0.02})
     with pytest.raises(InputError, match=r"time_budget: too short: 4 s .* take about 7 s"):
-        best_in_time(knobs, 4.0, {}, fixed_seconds=2.0)
+        best_in_time(knobs | {"rest": [Option({}, {}, 0.0, 2.0)]}, 4.0, {})
     with pytest.raises(InputError, match="that keep the tolerance take about 9 s"):
         best_in_time(knobs, 6.0, {}, {"position": 0.02})
     assert best_in_time(knobs, 6.0, {}).changes == {"a": 1}

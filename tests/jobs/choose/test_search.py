@@ -20,8 +20,7 @@ from synthroads_addon.jobs.choose.knobs import ModelKnobs
 from synthroads_addon.jobs.choose.table import table_of
 from synthroads_addon.jobs.choose.trial import Trial
 from synthroads_addon.jobs.generate import Job, generate
-from synthroads_addon.jobs.measure.errors import beam_errors
-from synthroads_addon.jobs.measure.mesh_errors import mesh_height_errors
+from synthroads_addon.jobs.measure.errors import beam_errors, mesh_height_errors
 from synthroads_addon.jobs.road_scene import RoadScene
 from synthroads_addon.jobs.scan_scene import SceneScan, scan_scene
 from synthroads_addon.road.geometry import RoadGeometry

@@ -11,7 +11,7 @@ import pytest
 from synthroads_addon.base.progress import StageTimer
 from synthroads_addon.jobs.choose.trial import Trial
 from synthroads_addon.jobs.scan.files import CloudFiles
-from synthroads_addon.jobs.scan.site import Site
+from synthroads_addon.jobs.scan.plan import Site
 from synthroads_addon.scanning.plan import ScanPlan
 from synthroads_addon.scenario.scenario import Scenario
 from tests.jobs.scan.test_plan import StandIns, planned

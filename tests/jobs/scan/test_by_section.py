@@ -14,7 +14,7 @@ from synthroads_addon.blender.cameras import HAS_RETURN_CAMERA
 from synthroads_addon.blender.model.build import build_road
 from synthroads_addon.blender.scene.evaluated import scene_mesh
 from synthroads_addon.jobs.generate import Job, generate
-from synthroads_addon.jobs.scan.site import Site
+from synthroads_addon.jobs.scan.plan import Site
 from synthroads_addon.road.geometry import RoadGeometry
 from synthroads_addon.road.parameters import (
     ConcreteBarrier,

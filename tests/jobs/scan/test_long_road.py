@@ -19,7 +19,7 @@ from synthroads_addon.base.classes import class_id
 from synthroads_addon.base.progress import StageTimer
 from synthroads_addon.blender.model.build import remove_road
 from synthroads_addon.jobs.scan.by_section import SectionScan
-from synthroads_addon.jobs.scan.site import Site
+from synthroads_addon.jobs.scan.plan import Site
 from synthroads_addon.road.geometry import RoadGeometry
 from synthroads_addon.road.parameters import read_parameters
 from synthroads_addon.road.tessellation import sample_stations

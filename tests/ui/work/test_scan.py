@@ -16,7 +16,7 @@ from synthroads_addon.blender.things.model_builder import ROLE
 from synthroads_addon.jobs.generate import Job as PipelineJob
 from synthroads_addon.jobs.generate import generate
 from synthroads_addon.jobs.job_files import FILES
-from synthroads_addon.jobs.scan.site import Site
+from synthroads_addon.jobs.scan.plan import Site
 from synthroads_addon.road.parameters import read_parameters
 from synthroads_addon.scenario.scenario import load_scenario
 from synthroads_addon.ui.work import scan
