@@ -15,6 +15,7 @@ from synthroads_addon.base.files import PRESETS
 from synthroads_addon.cloud.formats.registry import open_cloud, open_writer
 from synthroads_addon.cloud.tools.convert import convert
 from synthroads_addon.scenario.cloud import CloudScenario
+from tests.helpers.page_modules import block_of_page
 
 ROWS = [
     {"id": 3, "name": "paved", "las": 11, "color": [90, 90, 96], "of": ["road", "road_marking", 40]},
@@ -64,6 +65,15 @@ def test_own_table_merges_by_name_and_number(tmp_path: Path) -> None:
 def test_wrong_table_is_refused_by_name(tmp_path: Path, change: dict, message: str) -> None:
     with pytest.raises(InputError, match=message):
         class_scheme(write_table(tmp_path / "mine.json", [ROWS[0] | change, ROWS[1]]))
+
+
+def test_the_table_of_the_page_merges_five_classes_into_two(tmp_path: Path) -> None:
+    (tmp_path / "paved.json").write_text(block_of_page("extend/class-scheme.md", "json"), encoding="utf-8")
+    scheme = class_scheme(str(tmp_path / "paved.json"))
+    assert scheme.names() == {0: "paved", 1: "beside", 255: "unlabelled"}
+    merged = {row.name: int(scheme.ids[row.id]) for row in classes()}
+    assert {name for name, number in merged.items() if number == 0} == {"road", "road_marking"}
+    assert {name for name, number in merged.items() if number == 1} == {"ground", "roadside", "vegetation"}
 
 
 def test_unknown_scheme() -> None:

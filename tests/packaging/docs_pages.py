@@ -67,6 +67,12 @@ def saved_files(page: Path) -> set[str]:
     return set(re.findall(r"[Ss]ave (?:this|it)(?: \w+)? as\s+`([^`]+)`", page.read_text(encoding="utf-8")))
 
 
+def adds_fields(page: Path) -> bool:
+    """Return whether a reader is told to write a module, or to declare a field, which scenarios then have."""
+    declared = re.search(r"(?m)^ +\w+: .* = quantity\($", page.read_text(encoding="utf-8"))
+    return bool(declared) or any(name.endswith(".py") for name in saved_files(page))
+
+
 def links(text: str) -> list[str]:
     """Return where a page's links and pictures lead, but for those to other sites."""
     return [target for target in _LINK.findall(prose(text)) if not re.match(r"https?:|mailto:", target)]

@@ -27,6 +27,7 @@ from tests.packaging.docs_pages import (
     MADE_BY_THE_BUILD,
     PAGES,
     ROOT,
+    adds_fields,
     anchors,
     commands,
     current,
@@ -105,8 +106,7 @@ def test_commands_are_understood(page: Path, capsys: pytest.CaptureFixture[str])
     for words in command_lines(page.read_text(encoding="utf-8")):
         arguments = parsed(words)
         changes = getattr(arguments, "changes", [])
-        adds_fields = any(name.endswith(".py") for name in saved_files(page))
-        if words[0] == "generate" and arguments.scenario in scenario_names() and not adds_fields:
+        if words[0] == "generate" and arguments.scenario in scenario_names() and not adds_fields(page):
             load_scenario(arguments.scenario, changes)  # refuses fields that aren't there and values out of limits
 
 

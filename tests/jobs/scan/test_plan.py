@@ -89,6 +89,18 @@ def test_every_default_is_filled_in_once() -> None:
         plan.seed = 2  # type: ignore[misc]
 
 
+def test_the_effects_of_the_weather_are_in_the_plan_unless_an_attenuation_is_given(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    effect = object()
+    monkeypatch.setattr(WEATHERS["rain"], "effects", lambda weather: (effect, weather))
+    rain = {"condition": "rain", "visibility": 900.0}
+    assert planned(StandIns(), scan={"weather": rain}).effects == (effect, WEATHERS["rain"].from_dict(rain))
+    wet = ScanConditions(Environment(weather="rain", visibility=900.0))
+    assert planned(StandIns(), wet).effects == (effect, WEATHERS["rain"].from_dict(rain)), "that of the road"
+    assert planned(StandIns(), wet, scan={"attenuation": 0.01}).effects == ()
+
+
 def test_it_asks_the_services_for_what_the_scenario_wants() -> None:
     services = StandIns()
     points = recorded(planned(services, cloud={"attributes": ["normal", "noise_free", "roughness"]}))

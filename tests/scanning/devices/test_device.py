@@ -24,6 +24,7 @@ from synthroads_addon.scanning.devices.shots import shots
 from synthroads_addon.scanning.patterns.registry import PATTERNS
 from synthroads_addon.scanning.patterns.wedge_prism import Wedge
 from synthroads_addon.scenario.scan import ScanScenario, scanner_setting
+from tests.helpers.page_modules import block_of_page
 from tests.helpers.scenes.scanners import custom, device, mode, preset
 
 DOCS = Path(__file__).parents[3] / "docs"
@@ -221,8 +222,17 @@ def test_own_device_from_a_file(tmp_path: Path) -> None:
 @pytest.mark.parametrize("name", device_names())
 def test_presets_are_documented(name: str) -> None:
     """The documentation's table has the preset's own numbers."""
-    d = load_device(name)
-    text = (DOCS / "devices.md").read_text(encoding="utf-8")
+    assert_documented(name, load_device(name), (DOCS / "devices.md").read_text(encoding="utf-8"))
+
+
+def test_the_device_of_the_page_is_documented_as_it_says() -> None:
+    device = Device.from_dict(json.loads(block_of_page("extend/device.md", "json")))
+    assert_documented("example-handheld", device, block_of_page("extend/device.md", "text"))
+    assert shots(setting_of(device, ScanScenario()), 0, 10).direction.shape == (3, 10)
+
+
+def assert_documented(name: str, d: Device, text: str) -> None:
+    """Check the row and the line of a device."""
     assert f"- `{name}` ({d.title}): {d.source}\n" in text
     row = next(line for line in text.splitlines() if line.startswith(f"| `{name}` |"))
     cells = [cell.strip() for cell in row.strip("|").split("|")]
