@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any, ClassVar, TypeVar
+from typing import Any, ClassVar, Self, TypeVar
 
-from pydantic import Field, model_validator
+from pydantic import Field, ModelWrapValidatorHandler, model_validator
 
 from synthroads_addon.base.errors import InputError, nearest_name
 from synthroads_addon.base.schema import Model, quantity, read_yaml
@@ -18,9 +18,22 @@ _LARGEST_SEED = 2**63 - 1
 
 
 class Part(Model):
-    """Base of a configuration's parts: immutable, no unknown keys, no NaN."""
+    """Base of a configuration's parts: immutable, no unknown keys, no NaN.
+
+    Attributes:
+        renamed: names that fields had before, which are still read, and the names that they have.
+    """
 
     vendor_keys_allowed: ClassVar[bool] = False
+    renamed: ClassVar[Mapping[str, str]] = {}
+
+    @model_validator(mode="wrap")
+    @classmethod
+    def _read_old_names(cls, data: Any, read: ModelWrapValidatorHandler[Self]) -> Self:
+        if isinstance(data, dict):
+            renamed = {old: new for old, new in cls.renamed.items() if new not in data}
+            data = {renamed.get(name, name): value for name, value in data.items()}
+        return read(data)
 
 
 class Schedule(Part):

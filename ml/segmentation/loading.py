@@ -21,7 +21,7 @@ from .adaptation import laid_over
 from .data.crops import CropDataset, Draw, Item, Seeds, collate
 from .data.sources import Source, read_tiles
 from .data.tiles import CloudTile, Scaling, scalings
-from .network import on_device, plan_of, prepare_batch
+from .network import on_device
 from .recipes import SegmentationConfiguration, mapped_intensities, plan
 
 SMALLEST_SHARE = 0.25
@@ -156,7 +156,7 @@ class Collate:
         batch = collate(items)
         if self.mix3d and self._chance(items[0]) < self.mix3d:
             batch = laid_over(batch)
-        return prepare_batch(batch, plan_of(self.configuration).neighbourhood)
+        return self.configuration.network.prepare(batch)
 
     def _chance(self, first: Item) -> float:
         """Return a number from 0 to 1 that follows from the batch itself: workers don't know how many came before."""
