@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any, ClassVar, Self, TypeVar
+from typing import Any, ClassVar, Literal, Self, TypeVar
 
 from pydantic import Field, ModelWrapValidatorHandler, model_validator
 
@@ -64,6 +64,10 @@ class Configuration(Part):
     seed: int = quantity(1, ge=0, le=_LARGEST_SEED, unit="1", description="Seed of everything random.")
     threads: int = quantity(0, ge=0, le=1024, unit="1", description="Threads of PyTorch; 0: one per core.")
     device: str = Field("auto", pattern=r"^(auto|cpu|cuda(:\d+)?)$", description="auto: CUDA where there is one.")
+    precision: Literal["float32", "bfloat16"] = Field(
+        "float32", description="Of the training's steps; weights, gradients and geometry stay float32."
+    )
+    processes: int = quantity(1, ge=1, le=1024, unit="1", description="Processes that train, each on other batches.")
     schedule: Schedule = Field(default=Schedule(), description="How the weights are learned.")
 
 

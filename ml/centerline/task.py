@@ -17,6 +17,7 @@ from synthroads_addon.base.progress import Progress, silent
 from synthroads_addon.base.schema import canonical_json, read_json
 
 from ..configuration import Configuration
+from ..processes import helpers
 from ..registry import network_union
 from ..runs import CALIBRATION, Run, plain, stream_seed
 from ..tasks import Evaluation, Prediction
@@ -68,6 +69,20 @@ def configuration_kind() -> type[CenterlineConfiguration]:
 
 def train(run: Run[CenterlineConfiguration], progress: Progress = silent) -> dict[str, Any]:
     """Train a model, calibrate its deviations on the validation roads, save both and return the figures."""
+    with helpers(run, train_network, chosen_device(run.configuration)):
+        model, roads = train_network(run, progress)
+    progress("calibrating", 0.0)
+    metrics = calibrate(run, model, roads)
+    run.write_metrics(metrics)
+    return metrics
+
+
+def train_network(run: Run[CenterlineConfiguration], progress: Progress = silent) -> tuple[CenterlineModel, Roads]:
+    """Train a run; return the model with its last weights, and the roads.
+
+    Raises:
+        InputError: data are missing, or don't fit the configuration.
+    """
     configuration = run.configuration
     device = chosen_device(configuration)
     roads = read_roads(configuration.data, configuration.slices.truth, progress)
@@ -90,10 +105,7 @@ def train(run: Run[CenterlineConfiguration], progress: Progress = silent) -> dic
         validate=_validation(configuration, roads, device),
         progress=progress,
     )
-    progress("calibrating", 0.0)
-    metrics = calibrate(run, model, roads)
-    run.write_metrics(metrics)
-    return metrics
+    return model, roads
 
 
 def evaluate(run: Run[CenterlineConfiguration], evaluation: Evaluation, progress: Progress = silent) -> dict[str, Any]:

@@ -27,10 +27,9 @@ def network() -> nn.Module:
     return nn.Sequential(nn.Linear(3, 8), nn.Dropout(0.3), nn.ReLU(), nn.Linear(8, 1))
 
 
-def batches(epoch: int) -> Iterator[Tensor]:
+def batches(epoch: int, share: slice = slice(None)) -> Iterator[Tensor]:
     generator = torch.Generator().manual_seed(stream_seed(7, "toy", epoch))
-    for _ in range(STEPS):
-        yield torch.randn(16, 3, generator=generator)
+    yield from [torch.randn(16, 3, generator=generator) for _ in range(STEPS)][share]
 
 
 def loss(model: nn.Module, batch: Tensor) -> tuple[Tensor, dict[str, float]]:
@@ -43,8 +42,8 @@ def train(folder: Path, *, stop_after: int | None = None, resume: bool = False, 
     model = network()
     run = Run.start(folder, configuration(seed=seed), resume=resume)
 
-    def interrupted(epoch: int) -> Iterator[Tensor]:
-        for step, batch in enumerate(batches(epoch)):
+    def interrupted(epoch: int, share: slice) -> Iterator[Tensor]:
+        for step, batch in enumerate(batches(epoch, share)):
             if stop_after is not None and epoch == stop_after and step == 2:
                 raise KeyboardInterrupt
             yield batch
