@@ -23,7 +23,7 @@ from ..loading import adaptation_batches, thin_tiles, watched_workers
 from ..network import adapt_network, build, on_device, scores_of
 from ..recipes import SegmentationConfiguration
 from .metrics import Confusion
-from .scoring import Classifier, label_tile, score_tile
+from .scoring import Classifier, label_tile
 
 
 def trained_model(run: Run[SegmentationConfiguration], device: torch.device) -> nn.Module:
@@ -106,7 +106,7 @@ def score(
             scaling = scalings(scene, configuration.intensity, configuration.voxel)
             for tile in scene:
                 labels = label_tile(tile, scaling[tile.scene], scores, configuration.crop_settings())
-                score_tile(confusion, tile, labels, groups)
+                confusion.add(tile.segment, groups[labels])
                 if shown is None or len(tile) > len(shown[0]):
                     shown = (tile, groups[labels])
             progress("scoring", 0.5)
