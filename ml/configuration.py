@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any, ClassVar, TypeVar
+from typing import Any, ClassVar, Literal, Self, TypeVar
 
-from pydantic import Field, model_validator
+from pydantic import Field, ModelWrapValidatorHandler, model_validator
 
 from synthroads_addon.base.errors import InputError, nearest_name
 from synthroads_addon.base.schema import Model, quantity, read_yaml
@@ -18,9 +18,22 @@ _LARGEST_SEED = 2**63 - 1
 
 
 class Part(Model):
-    """Base of a configuration's parts: immutable, no unknown keys, no NaN."""
+    """Base of a configuration's parts: immutable, no unknown keys, no NaN.
+
+    Attributes:
+        renamed: names that fields had before, which are still read, and the names that they have.
+    """
 
     vendor_keys_allowed: ClassVar[bool] = False
+    renamed: ClassVar[Mapping[str, str]] = {}
+
+    @model_validator(mode="wrap")
+    @classmethod
+    def _read_old_names(cls, data: Any, read: ModelWrapValidatorHandler[Self]) -> Self:
+        if isinstance(data, dict):
+            renamed = {old: new for old, new in cls.renamed.items() if new not in data}
+            data = {renamed.get(name, name): value for name, value in data.items()}
+        return read(data)
 
 
 class Schedule(Part):
@@ -51,6 +64,10 @@ class Configuration(Part):
     seed: int = quantity(1, ge=0, le=_LARGEST_SEED, unit="1", description="Seed of everything random.")
     threads: int = quantity(0, ge=0, le=1024, unit="1", description="Threads of PyTorch; 0: one per core.")
     device: str = Field("auto", pattern=r"^(auto|cpu|cuda(:\d+)?)$", description="auto: CUDA where there is one.")
+    precision: Literal["float32", "bfloat16"] = Field(
+        "float32", description="Of the training's steps; weights, gradients and geometry stay float32."
+    )
+    processes: int = quantity(1, ge=1, le=1024, unit="1", description="Processes that train, each on other batches.")
     schedule: Schedule = Field(default=Schedule(), description="How the weights are learned.")
 
 

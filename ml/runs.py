@@ -6,6 +6,7 @@ import io
 import math
 import shutil
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Generic, TypeVar
@@ -18,6 +19,7 @@ from synthroads_addon.base.random_streams import stream
 from synthroads_addon.base.schema import canonical_json, read_json
 
 from .configuration import Configuration, from_data
+from .processes import process_number
 
 CONFIGURATION = "configuration.json"
 CHECKPOINT = "checkpoint.pt"
@@ -56,6 +58,8 @@ class Run(Generic[C]):
             InputError: the run to resume was made with another configuration.
         """
         run = cls(folder, configuration)
+        if process_number():
+            return run  # the first process's, which alone writes
         there = (folder / CONFIGURATION).exists()
         if there and resume:
             run._resume(read_json(folder / CONFIGURATION))
@@ -124,6 +128,8 @@ class Run(Generic[C]):
         if not isinstance(before, dict):
             raise InputError(str(self.folder / CONFIGURATION), None, "must be a JSON object")
         now = self.configuration.to_dict()
+        with suppress(InputError):  # fields may be called otherwise by now, or be new
+            before = self.configuration.from_dict(before).to_dict()
         begun, wanted = lasting(before), lasting(now)
         different = [name for name in {**begun, **wanted} if begun.get(name) != wanted.get(name)]
         if different:

@@ -1,8 +1,9 @@
-"""The training loop that all tasks share: AdamW, warm-up and cosine, clipping, exact resuming."""
+"""The training loop of all tasks: AdamW, warm-up and cosine, clipping, exact resuming, bfloat16, several processes."""
 
 from __future__ import annotations
 
 import math
+import os
 import time
 from collections.abc import Callable, Iterable
 from typing import Any, TypeVar
@@ -14,10 +15,13 @@ from synthroads_addon.base.errors import InputError
 from synthroads_addon.base.progress import Progress, silent
 
 from .configuration import Configuration, Schedule
+from .processes import average, process_count, process_number
 from .runs import Run, stream_seed
 
 M = TypeVar("M", bound=nn.Module)
 Figures = dict[str, float]
+Batches = Callable[[int, slice], Iterable[Any]]
+"""Gives those batches of an epoch whose numbers a slice names; the same for the same epoch and number."""
 Loss = Callable[[M, Any], tuple[Tensor, Figures]]
 """Returns what is minimised and further figures, which are averaged over the epoch."""
 
@@ -30,8 +34,12 @@ def chosen_device(configuration: Configuration) -> torch.device:
     """
     if configuration.threads:
         torch.set_num_threads(configuration.threads)
-    if configuration.device == "auto":
-        return torch.device("cuda" if torch.cuda.is_available() else "cpu")
+    elif configuration.processes > 1:
+        torch.set_num_threads(max(1, (os.cpu_count() or 1) // configuration.processes))
+    if configuration.device == "auto" and not torch.cuda.is_available():
+        return torch.device("cpu")
+    if configuration.device in ("auto", "cuda") and torch.cuda.is_available():
+        return torch.device("cuda", process_number())
     if configuration.device.startswith("cuda") and not torch.cuda.is_available():
         raise InputError("device", configuration.device, "this PyTorch sees no CUDA device; cpu and auto are possible")
     return torch.device(configuration.device)
@@ -40,8 +48,8 @@ def chosen_device(configuration: Configuration) -> torch.device:
 def fit(
     model: M,
     run: Run[Any],
-    batches: Callable[[int], Iterable[Any]],
-    steps_per_epoch: int,
+    batches: Batches,
+    batches_per_epoch: int,
     loss: Loss[M],
     *,
     validate: Callable[[M, int], Figures] | None = None,
@@ -49,22 +57,29 @@ def fit(
 ) -> None:
     """Train a model in place, beginning after the run's last checkpoint.
 
-    The result depends on the configuration alone: epoch ``e`` draws its batches from ``batches(e)`` and its dropout
-    from a stream keyed by seed and epoch, so that an interrupted training ends with the same weights.
+    The result depends on the configuration alone: epoch ``e`` draws its batches from ``batches(e, ...)`` and its
+    dropout from a stream keyed by seed and epoch, so that an interrupted training ends with the same weights.
+
+    Of N processes each takes every N-th batch; gradients are averaged, as if the N batches of a step were one. Batches
+    that don't make up a whole step are left out. The first process alone validates and saves.
 
     Args:
         model: on the device it is trained on.
         run: keeps checkpoint and history.
-        batches: the batches of one epoch; the same for the same epoch.
-        steps_per_epoch: how many those are.
+        batches: the batches of one epoch.
+        batches_per_epoch: how many those are.
         loss: of one batch; NaN or infinity ends the training.
         validate: further figures of an epoch, computed after it.
         progress: told the share of all steps that is done.
 
     Raises:
-        InputError: the loss is no longer finite.
+        InputError: the loss is no longer finite, or an epoch has fewer batches than there are processes.
     """
-    configuration = run.configuration
+    configuration, number, count = run.configuration, process_number(), process_count()
+    steps_per_epoch = batches_per_epoch // count
+    if steps_per_epoch == 0 and count > 1:
+        raise InputError("processes", count, f"must not exceed the batches of an epoch, {batches_per_epoch}")
+    share = slice(number, steps_per_epoch * count, count)
     schedule: Schedule = configuration.schedule
     optimizer = optimizer_of(model, schedule)
     state = run.saved(next(model.parameters()).device)
@@ -75,14 +90,17 @@ def fit(
         first = int(state["epoch"])
     for epoch in range(first, schedule.epochs):
         begin = time.perf_counter()
-        torch.manual_seed(stream_seed(configuration.seed, "epoch", epoch))
+        torch.manual_seed(stream_seed(configuration.seed, "epoch", epoch, *([number] if number else [])))
         model.train()
         figures: list[Figures] = []
-        for step, batch in enumerate(batches(epoch), start=epoch * steps_per_epoch):
+        for step, batch in enumerate(batches(epoch, share), start=epoch * steps_per_epoch):
             rate = learning_rate(schedule, step, schedule.epochs * steps_per_epoch)
-            figures.append(train_step(model, optimizer, rate, schedule.clip, loss, batch))
+            figures.append(train_step(model, optimizer, rate, configuration, loss, batch))
             progress("training", step / (schedule.epochs * steps_per_epoch))
         summary = {"epoch": epoch + 1, **_means(figures), "learning_rate": optimizer.param_groups[0]["lr"]}
+        average([buffer for buffer in model.buffers() if buffer.is_floating_point()])  # statistics of norms
+        if number:
+            continue
         if validate is not None:
             model.eval()
             summary |= validate(model, epoch + 1)
@@ -112,9 +130,9 @@ def optimizer_of(model: nn.Module, schedule: Schedule) -> torch.optim.AdamW:
 
 
 def train_step(
-    model: M, optimizer: torch.optim.Optimizer, rate: float, clip: float, loss: Loss[M], batch: Any
+    model: M, optimizer: torch.optim.Optimizer, rate: float, configuration: Configuration, loss: Loss[M], batch: Any
 ) -> Figures:
-    """Change the weights by one batch; return the loss and its further figures.
+    """Change the weights by one batch of each process; return the mean loss and this process's further figures.
 
     Raises:
         InputError: the loss is no longer finite.
@@ -122,13 +140,21 @@ def train_step(
     for group in optimizer.param_groups:
         group["lr"] = rate
     optimizer.zero_grad(set_to_none=True)
-    value, figures = loss(model, batch)
-    if not torch.isfinite(value):
-        raise InputError("schedule.learning_rate", rate, f"the loss became {value.item()}; a smaller rate may help")
+    half = configuration.precision == "bfloat16"
+    with torch.autocast(next(model.parameters()).device.type, torch.bfloat16, enabled=half):
+        value, figures = loss(model, batch)
+    mean = value.detach().clone()
+    average([mean])  # not finite in one process, it is in none: all end
+    if not torch.isfinite(mean):
+        raise InputError("schedule.learning_rate", rate, f"the loss became {mean.item()}; a smaller rate may help")
     value.backward()
-    nn.utils.clip_grad_norm_(model.parameters(), clip)
+    if process_count() > 1:
+        for weight in model.parameters():
+            weight.grad = torch.zeros_like(weight) if weight.grad is None else weight.grad
+        average([weight.grad for weight in model.parameters() if weight.grad is not None])
+    nn.utils.clip_grad_norm_(model.parameters(), configuration.schedule.clip)
     optimizer.step()
-    return {"loss": value.item(), **figures}
+    return {"loss": mean.item(), **figures}
 
 
 def _means(figures: list[Figures]) -> Figures:

@@ -45,10 +45,11 @@ from ml.centerline.scores.evaluation import (  # noqa: E402
     trivial_predictors,
     truth_of,
 )
-from ml.centerline.scores.metrics import Spread, over_seeds  # noqa: E402
+from ml.centerline.scores.metrics import over_seeds  # noqa: E402
 from ml.centerline.scores.paint import with_painted_line  # noqa: E402
 from ml.centerline.scores.skeleton import SkeletonSettings  # noqa: E402
 from ml.configuration import Part  # noqa: E402
+from ml.results import Spread  # noqa: E402
 from ml.runs import Run  # noqa: E402
 from ml.tasks import kinds  # noqa: E402
 from synthroads_addon.base.errors import SynthRoadsError  # noqa: E402

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 import numpy as np
 import torch
@@ -17,6 +17,8 @@ from synthroads_addon.base.progress import Progress, silent
 from synthroads_addon.base.schema import canonical_json, read_json
 
 from ..configuration import Configuration
+from ..processes import helpers
+from ..registry import network_union
 from ..runs import CALIBRATION, Run, plain, stream_seed
 from ..tasks import Evaluation, Prediction
 from ..training_loop import chosen_device, fit
@@ -24,7 +26,8 @@ from .data.batches import Batches, BatchOptions, DataOptions, Roads, fixed_batch
 from .data.effects import SequenceEffects
 from .data.slices import Batch, SliceSettings
 from .networks.losses import LossOptions, centerline_loss
-from .networks.models import TARGETS, CenterlineModel, ModelOptions, build
+from .networks.models import TARGETS, CenterlineModel, ModelOptions
+from .networks.transformer import TransformerOptions
 from .scores import tables
 from .scores.evaluation import Cropping, case
 from .scores.measuring import measure_run
@@ -33,11 +36,18 @@ from .use.find_road import find_road
 from .use.predictor import CenterlinePredictor, UseOptions
 from .use.writing import corridor_json, geojson
 
+if TYPE_CHECKING:
+    NetworkModel = ModelOptions
+else:
+    NetworkModel = network_union("centerline", "transformer")
+
 _FIRST_WEIGHTS = "first weights"
 
 
 class CenterlineConfiguration(Configuration):
     """Everything that a centreline model depends on."""
+
+    renamed: ClassVar[Mapping[str, str]] = {"model": "network"}
 
     task: Literal["centerline"] = Field("centerline", description="What is learned.")
     data: DataOptions = Field(description="What is learned from.")
@@ -45,7 +55,7 @@ class CenterlineConfiguration(Configuration):
     effects: SequenceEffects = Field(
         default=SequenceEffects(), description="What is done to the samples of the training."
     )
-    model: ModelOptions = Field(default=ModelOptions(), description="Which model.")
+    network: NetworkModel = Field(default=TransformerOptions(), description="The network.")
     loss: LossOptions = Field(default=LossOptions(), description="What it is trained with.")
     batches: BatchOptions = Field(default=BatchOptions(), description="How much an epoch sees.")
     use: UseOptions = Field(default=UseOptions(), description="How the trained model is used.")
@@ -59,6 +69,20 @@ def configuration_kind() -> type[CenterlineConfiguration]:
 
 def train(run: Run[CenterlineConfiguration], progress: Progress = silent) -> dict[str, Any]:
     """Train a model, calibrate its deviations on the validation roads, save both and return the figures."""
+    with helpers(run, train_network, chosen_device(run.configuration)):
+        model, roads = train_network(run, progress)
+    progress("calibrating", 0.0)
+    metrics = calibrate(run, model, roads)
+    run.write_metrics(metrics)
+    return metrics
+
+
+def train_network(run: Run[CenterlineConfiguration], progress: Progress = silent) -> tuple[CenterlineModel, Roads]:
+    """Train a run; return the model with its last weights, and the roads.
+
+    Raises:
+        InputError: data are missing, or don't fit the configuration.
+    """
     configuration = run.configuration
     device = chosen_device(configuration)
     roads = read_roads(configuration.data, configuration.slices.truth, progress)
@@ -81,10 +105,7 @@ def train(run: Run[CenterlineConfiguration], progress: Progress = silent) -> dic
         validate=_validation(configuration, roads, device),
         progress=progress,
     )
-    progress("calibrating", 0.0)
-    metrics = calibrate(run, model, roads)
-    run.write_metrics(metrics)
-    return metrics
+    return model, roads
 
 
 def evaluate(run: Run[CenterlineConfiguration], evaluation: Evaluation, progress: Progress = silent) -> dict[str, Any]:
@@ -150,7 +171,7 @@ def predictor(run: Run[CenterlineConfiguration]) -> CenterlinePredictor:
 
 
 def _empty_model(configuration: CenterlineConfiguration) -> CenterlineModel:
-    return build(configuration.model, configuration.slices.half_width, configuration.slices.slices)
+    return configuration.network.build(configuration.slices.half_width, configuration.slices.slices)
 
 
 def _first_model(configuration: CenterlineConfiguration) -> CenterlineModel:
@@ -169,7 +190,9 @@ def _first_model(configuration: CenterlineConfiguration) -> CenterlineModel:
         try:
             model.load_state_dict(state["model"])
         except RuntimeError:
-            raise InputError("begin_with", configuration.begin_with, "holds another model than `model` says") from None
+            raise InputError(
+                "begin_with", configuration.begin_with, "holds another model than `network` says"
+            ) from None
     return model
 
 

@@ -17,6 +17,8 @@ import torch
 import torch.nn.functional as F  # noqa: N812 (its name everywhere)
 from torch import Tensor, nn
 
+from .base import full_precision
+
 _CHUNK = {"cpu": 1 << 18}
 """Gathered numbers at once: what a CPU's cache holds, or what a GPU needs to be busy."""
 _CHUNK_ELSEWHERE = 1 << 26
@@ -159,6 +161,7 @@ def _first_column(values: Tensor, largest: Tensor) -> Tensor:
     return (limit - first.long()).clamp_(max=limit - 1)  # NaN equals nothing: any will do then
 
 
+@full_precision
 def normalised_max(features: Tensor, weight: Tensor, norm: Norm, grouping: Grouping) -> Tensor:
     """Return the maximum over neighbours of a norm of a convolution, without activation (M, C).
 
@@ -179,6 +182,7 @@ def normalised_max(features: Tensor, weight: Tensor, norm: Norm, grouping: Group
     return torch.addcmul(offset, top, scale)
 
 
+@full_precision
 def normalised_max_of_two(
     features: Tensor, weights: tuple[Tensor, Tensor], norms: tuple[Norm, Norm], grouping: Grouping
 ) -> Tensor:
@@ -298,6 +302,7 @@ def _pairs(support: Tensor, offset: Tensor, index: Tensor) -> Tensor:
     return F.relu_(gathered.add_(offset[:, None])).view(-1, support.shape[1])
 
 
+@full_precision
 def interpolate(values: Tensor, nearest: Tensor, weight: Tensor) -> Tensor:
     """Return weighted sums (N, C) of the rows of `values` (M, C) that `nearest` (N, 3) names."""
     return F.embedding_bag(nearest, values, mode="sum", per_sample_weights=weight.to(values.dtype))

@@ -15,12 +15,16 @@ from typing import Literal
 
 import torch
 import torch.nn.functional as F  # noqa: N812 (its name everywhere)
+from pydantic import Field
 from torch import Tensor, nn
 
 from synthroads_addon.base.errors import InputError, nearest_name
+from synthroads_addon.base.schema import quantity
 
+from ..registry import network
+from .base import Batch, SegmentationNetwork
 from .grouping import Grouping, Norm, interpolate, normalised_max, normalised_max_of_two
-from .neighbours import Neighbourhood, Neighbours
+from .neighbours import Neighbourhood, Neighbours, build_neighbours
 
 
 @dataclass(frozen=True)
@@ -121,7 +125,7 @@ def architecture(
 
 
 class PointNeXt(nn.Module):
-    """The network; `architecture` and `preset` give the published sizes."""
+    """The network; `architecture` gives the published sizes."""
 
     def __init__(self, plan: Architecture) -> None:
         super().__init__()
@@ -138,32 +142,6 @@ class PointNeXt(nn.Module):
             nn.Dropout(plan.dropout),
             nn.Linear(channels[0], plan.num_classes),
         )
-
-    @classmethod
-    def preset(
-        cls,
-        name: str,
-        *,
-        in_channels: int,
-        num_classes: int,
-        width: int | None = None,
-        dropout: float = 0.5,
-        radius: float = 0.3,
-        neighbours: int = 32,
-        sampling: Literal["grid", "farthest"] = "grid",
-    ) -> PointNeXt:
-        """Return a network of a published size: see `architecture`."""
-        plan = architecture(
-            name,
-            in_channels=in_channels,
-            num_classes=num_classes,
-            width=width,
-            dropout=dropout,
-            radius=radius,
-            neighbours=neighbours,
-            sampling=sampling,
-        )
-        return cls(plan)
 
     def forward(self, feat: Tensor, neighbours: Neighbours) -> Tensor:
         """Return the classes' scores of each point (N, classes), before the softmax.
@@ -197,6 +175,32 @@ class PointNeXt(nn.Module):
         if self.plan.blocks[number - 1] == 1:
             return group, None
         return group, Grouping(neighbours[f"inner{number}"], own / 2, own / 2)
+
+
+@network("segmentation")
+class PointNeXtOptions(SegmentationNetwork):
+    """PointNeXt in one of its sizes."""
+
+    name: Literal["pointnext"] = Field("pointnext", description="Network.")
+    preset: Literal["S", "B", "L", "XL"] = Field("B", description="Size.")
+    width: int | None = quantity(None, ge=4, le=512, unit="1", description="Channels of the first stage; the size's.")
+    radius: float = quantity(0.3, gt=0, le=100, unit="m", description="Radius of the first neighbourhoods.")
+    neighbours: int = quantity(32, ge=2, le=128, unit="1", description="Neighbours that are looked at.")
+    dropout: float = quantity(0.5, ge=0, lt=1, unit="1", description="Dropout of the head.")
+    sampling: Literal["grid", "farthest"] = Field("grid", description="How each stage's points are chosen.")
+
+    def plan(self, features: int, classes: int) -> Architecture:
+        """Return what the network is made of."""
+        sizes = self.model_dump(exclude={"name", "preset"})
+        return architecture(self.preset, in_channels=features, num_classes=classes, **sizes)
+
+    def build(self, features: int, classes: int) -> nn.Module:
+        """See `SegmentationNetwork.build`."""
+        return PointNeXt(self.plan(features, classes))
+
+    def prepare(self, batch: Batch) -> Batch:
+        """Return a batch with the indices of all stages' points and neighbours."""
+        return batch | build_neighbours(batch["coord"], batch["offset"], self.plan(1, 1).neighbourhood)
 
 
 class Stage(nn.Module):

@@ -47,7 +47,7 @@ def forecast(configuration: SegmentationConfiguration, steps: int) -> dict[str, 
     sources = [source for found in configuration.needed().values() for source in found]
     count = sum(tile_count(source, configuration) for source in sources)
     wall, cpu = timed_steps(configuration, _first_tiles(sources, configuration), steps, device)
-    per_epoch = math.ceil(configuration.crops_per_tile * count / configuration.batch)
+    per_epoch = math.ceil(configuration.crops_per_tile * count / configuration.batch) // configuration.processes
     whole = per_epoch * configuration.schedule.epochs
     return {
         "title": configuration.title,
@@ -99,7 +99,7 @@ def timed_steps(
     for _ in range(steps + 1):
         begin = time.perf_counter(), time.process_time()
         batch = next(batches)
-        train_step(model, optimizer, configuration.schedule.learning_rate, configuration.schedule.clip, loss, batch)
+        train_step(model, optimizer, configuration.schedule.learning_rate, configuration, loss, batch)
         wall.append(time.perf_counter() - begin[0])
         cpu.append(time.process_time() - begin[1])
     return median(wall[1:]), median(cpu[1:])
@@ -112,5 +112,5 @@ def _endless(configuration: SegmentationConfiguration, tiles: list[CloudTile], d
     scaling = scalings(tiles, configuration.intensity)
     epoch = 0
     while True:
-        yield from epoch_batches(enough, tiles, [len(tiles)], scaling, seeds, device, epoch)
+        yield from epoch_batches(enough, tiles, [len(tiles)], scaling, seeds, device, epoch, slice(None))
         epoch += 1

@@ -21,7 +21,7 @@ from .adaptation import laid_over
 from .data.crops import CropDataset, Draw, Item, Seeds, collate
 from .data.sources import Source, read_tiles
 from .data.tiles import CloudTile, Scaling, scalings
-from .network import on_device, plan_of, prepare_batch
+from .network import on_device
 from .recipes import SegmentationConfiguration, mapped_intensities, plan
 
 SMALLEST_SHARE = 0.25
@@ -66,8 +66,9 @@ def epoch_batches(
     seeds: Seeds,
     device: torch.device,
     epoch: int,
+    share: slice,
 ) -> Iterator[Item]:
-    """Yield the batches of an epoch, which depend on seed and epoch alone."""
+    """Yield those batches of an epoch whose numbers a slice names; they depend on seed and epoch alone."""
     draws = plan(domains, configuration.crops_per_tile, configuration.synthetic_share, configuration.seed, epoch)
     dataset = CropDataset(
         tiles,
@@ -79,7 +80,7 @@ def epoch_batches(
         seed=configuration.seed,
         epoch=epoch,
     )
-    yield from _load_crops(dataset, configuration, device, epoch, configuration.adaptation.mix3d)
+    yield from _load_crops(dataset, configuration, device, epoch, configuration.adaptation.mix3d, share)
 
 
 @contextmanager
@@ -100,11 +101,17 @@ def watched_workers(configuration: SegmentationConfiguration) -> Iterator[None]:
 
 
 def _load_crops(
-    dataset: CropDataset, configuration: SegmentationConfiguration, device: torch.device, epoch: int, mix3d: float
+    dataset: CropDataset,
+    configuration: SegmentationConfiguration,
+    device: torch.device,
+    epoch: int,
+    mix3d: float,
+    share: slice,
 ) -> Iterator[Item]:
+    numbers, size = range(len(dataset)), configuration.batch
     loader: DataLoader[Item] = DataLoader(
         dataset,
-        batch_size=configuration.batch,
+        batch_sampler=[[*numbers[first : first + size]] for first in numbers[::size][share]],
         num_workers=configuration.workers,
         collate_fn=Collate(configuration, epoch, mix3d),
         pin_memory=device.type == "cuda",
@@ -156,7 +163,7 @@ class Collate:
         batch = collate(items)
         if self.mix3d and self._chance(items[0]) < self.mix3d:
             batch = laid_over(batch)
-        return prepare_batch(batch, plan_of(self.configuration).neighbourhood)
+        return self.configuration.network.prepare(batch)
 
     def _chance(self, first: Item) -> float:
         """Return a number from 0 to 1 that follows from the batch itself: workers don't know how many came before."""
@@ -180,4 +187,4 @@ def adaptation_batches(tiles: list[CloudTile], configuration: SegmentationConfig
         Seeds(tiles, 0, balanced=False),
         seed=configuration.seed,
     )
-    yield from _load_crops(dataset, configuration, torch.device("cpu"), 0, 0.0)
+    yield from _load_crops(dataset, configuration, torch.device("cpu"), 0, 0.0, slice(None))

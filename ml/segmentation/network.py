@@ -1,4 +1,4 @@
-"""PointNeXt as the recipes build it, and what its batches need beyond their points."""
+"""The network that a configuration names: built, called, and adapted to other points."""
 
 from __future__ import annotations
 
@@ -8,37 +8,15 @@ from copy import deepcopy
 import torch
 from torch import Tensor, nn
 
-from ..networks.neighbours import Neighbourhood, build_neighbours
-from ..networks.pointnext import Architecture, PointNeXt, architecture
 from .adaptation import adapt_norms
 from .data.classes import class_names
 from .data.crops import Item
 from .recipes import SegmentationConfiguration
 
 
-def plan_of(configuration: SegmentationConfiguration) -> Architecture:
-    """Return what a configuration's network is made of."""
-    chosen = configuration.network
-    return architecture(
-        chosen.preset,
-        in_channels=len(configuration.features),
-        num_classes=len(class_names(configuration.scheme())),
-        width=chosen.width,
-        dropout=chosen.dropout,
-        radius=chosen.radius,
-        neighbours=chosen.neighbours,
-        sampling=chosen.sampling,
-    )
-
-
-def build(configuration: SegmentationConfiguration) -> PointNeXt:
+def build(configuration: SegmentationConfiguration) -> nn.Module:
     """Return the network of a configuration, with random weights."""
-    return PointNeXt(plan_of(configuration))
-
-
-def prepare_batch(batch: Item, neighbourhood: Neighbourhood) -> Item:
-    """Return a batch with the indices of all stages' points and neighbours; runs on the CPU, in workers."""
-    return batch | build_neighbours(batch["coord"], batch["offset"], neighbourhood)
+    return configuration.network.build(len(configuration.features), len(class_names(configuration.scheme())))
 
 
 def scores_of(model: nn.Module, batch: Item) -> Tensor:

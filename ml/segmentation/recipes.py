@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,23 +17,20 @@ from synthroads_addon.base.schema import quantity
 from synthroads_addon.cloud.tools.quantile_mapping import LEVELS, QuantileMap
 
 from ..configuration import Configuration, Part, Schedule
+from ..networks.base import SegmentationNetwork
+from ..networks.pointnext import PointNeXtOptions
+from ..registry import network_union
 from .data.crops import FEATURES, CropSettings, Draw, Feature
 from .data.effects import Effects
 from .data.sources import FULL, Source
 from .data.tiles import CloudTile
 
+if TYPE_CHECKING:
+    NetworkModel = SegmentationNetwork
+else:
+    NetworkModel = network_union("segmentation", "pointnext")
+
 SetUp = Literal["real", "synthetic", "mixed", "mixed_mapped", "fine_tuned"]
-
-
-class Network(Part):
-    """PointNeXt in one of its sizes."""
-
-    preset: Literal["S", "B", "L", "XL"] = Field("B", description="Size.")
-    width: int | None = quantity(None, ge=4, le=512, unit="1", description="Channels of the first stage; the size's.")
-    radius: float = quantity(0.3, gt=0, le=100, unit="m", description="Radius of the first neighbourhoods.")
-    neighbours: int = quantity(32, ge=2, le=128, unit="1", description="Neighbours that are looked at.")
-    dropout: float = quantity(0.5, ge=0, lt=1, unit="1", description="Dropout of the head.")
-    sampling: Literal["grid", "farthest"] = Field("grid", description="How each stage's points are chosen.")
 
 
 class Adaptation(Part):
@@ -58,7 +55,7 @@ class SegmentationConfiguration(Configuration):
 
     task: Literal["segmentation"] = Field("segmentation", description="What is learned.")
     classes: str = Field("5", min_length=1, description="5, 17, or a JSON file of classes.")
-    network: Network = Field(Network(), description="The network.")
+    network: NetworkModel = Field(PointNeXtOptions(), description="The network.")
     features: tuple[Feature, ...] = Field(FEATURES, min_length=1, description="What the network sees of each point.")
     intensity: Literal["share", "robust"] = Field(
         "share", description="Share of 16 bits as it stands, or scaled scene by scene to median 0 and span 1."

@@ -13,6 +13,7 @@ from synthroads_addon.base.progress import Progress, peak_memory_mb, silent
 from synthroads_addon.cloud.formats.registry import ENDINGS, open_cloud
 
 from ..configuration import Configuration
+from ..processes import helpers
 from ..runs import Run
 from ..tasks import Evaluation, Prediction
 from ..training_loop import chosen_device
@@ -42,8 +43,9 @@ def train(run: SegmentationRun, progress: Progress = silent) -> dict[str, Any]:
     """
     configuration = run.configuration
     check_tests(configuration)
-    model, domains = train_network(run, progress)
-    device = next(model.parameters()).device
+    device = chosen_device(configuration)
+    with helpers(run, train_network, device):
+        model, domains = train_network(run, progress)
     tests = score_all(model, configuration, device, progress)
     metrics = {
         **{f"{name}_mean_iou": result["mean_iou"] for name, result in tests.items()},

@@ -46,7 +46,7 @@ def configuration(kind: str, data: Path, **changes: Any) -> dict[str, Any]:
         plain: dict[str, Any] = {
             "data": {"data_sets": [str(data / "roads")]},
             "slices": {"half_width": 20.0, "points_per_slice": 96},
-            "model": {
+            "network": {
                 "name": "transformer", "cells": 4, "point_width": 8, "width": 16, "context": 16,
                 "layers": 1, "heads": 2, "dropout": 0.1,
             },

@@ -2,15 +2,19 @@
 
 import json
 import math
+import os
+import signal
 from collections.abc import Iterator
 from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
 import pytest
 import torch
-from torch import Tensor, nn
+from torch import Tensor, distributed, nn
 
 from ml.configuration import Configuration, Schedule, load_configuration
+from ml.processes import helpers
 from ml.runs import CHECKPOINT, CURVES, METRICS, Run, stream_seed
 from ml.training_loop import fit, learning_rate
 from synthroads_addon.base.errors import InputError, MissingFileError, OutputError
@@ -27,10 +31,9 @@ def network() -> nn.Module:
     return nn.Sequential(nn.Linear(3, 8), nn.Dropout(0.3), nn.ReLU(), nn.Linear(8, 1))
 
 
-def batches(epoch: int) -> Iterator[Tensor]:
+def batches(epoch: int, share: slice = slice(None)) -> Iterator[Tensor]:
     generator = torch.Generator().manual_seed(stream_seed(7, "toy", epoch))
-    for _ in range(STEPS):
-        yield torch.randn(16, 3, generator=generator)
+    yield from [torch.randn(16, 3, generator=generator) for _ in range(STEPS)][share]
 
 
 def loss(model: nn.Module, batch: Tensor) -> tuple[Tensor, dict[str, float]]:
@@ -43,8 +46,8 @@ def train(folder: Path, *, stop_after: int | None = None, resume: bool = False, 
     model = network()
     run = Run.start(folder, configuration(seed=seed), resume=resume)
 
-    def interrupted(epoch: int) -> Iterator[Tensor]:
-        for step, batch in enumerate(batches(epoch)):
+    def interrupted(epoch: int, share: slice) -> Iterator[Tensor]:
+        for step, batch in enumerate(batches(epoch, share)):
             if stop_after is not None and epoch == stop_after and step == 2:
                 raise KeyboardInterrupt
             yield batch
@@ -52,6 +55,43 @@ def train(folder: Path, *, stop_after: int | None = None, resume: bool = False, 
     fit(model, run, interrupted, STEPS, loss)
     run.write_metrics({"done": 1, "undefined": math.nan})
     return model
+
+
+def learn(run: Run[Any], size: int = 16) -> tuple[nn.Module, list[Tensor]]:
+    """Train the toy without dropout on batches of some size; return it and its last gradients."""
+    model = network().requires_grad_()
+    model[1].p = 0.0
+
+    def drawn(epoch: int, share: slice) -> list[Tensor]:
+        generator = torch.Generator().manual_seed(stream_seed(7, "toy", epoch))
+        return list(torch.randn(64, 3, generator=generator).split(size))[share]
+
+    fit(model, run, drawn, 64 // size, loss)
+    return model, [weight.grad for weight in model.parameters()]
+
+
+@pytest.mark.slow
+def test_two_processes_have_the_gradients_of_one_with_batches_twice_as_large(tmp_path: Path) -> None:
+    one, gradients = learn(Run.start(tmp_path / "one", configuration(epochs=2)), size=32)
+    run = Run.start(tmp_path / "two", configuration(epochs=2).model_copy(update={"processes": 2}))
+    with helpers(run, learn, torch.device("cpu")):
+        two, averaged = learn(run)
+    assert not distributed.is_initialized()
+    torch.testing.assert_close(averaged, gradients, rtol=1e-4, atol=1e-6)
+    torch.testing.assert_close(weights(two), weights(one), rtol=1e-4, atol=1e-5)
+    assert (weights(learn(Run.start(tmp_path / "other", configuration(epochs=2)))[0]) - weights(one)).abs().max() > 0.01
+
+
+@pytest.mark.slow
+def test_a_lost_process_is_said_in_one_line(tmp_path: Path) -> None:
+    run = Run.start(tmp_path / "run", configuration(epochs=2).model_copy(update={"processes": 2}))
+    with pytest.raises(InputError, match="processes is 2: one was lost"), helpers(run, lose, torch.device("cpu")):
+        learn(run)
+
+
+def lose(run: Run[Any]) -> None:
+    """End a helper as the system does where memory is short."""
+    os.kill(os.getpid(), signal.SIGKILL)
 
 
 def weights(model: nn.Module) -> Tensor:

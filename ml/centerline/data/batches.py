@@ -143,21 +143,18 @@ class Batches:
         random = stream(self.seed, "kinds of road", epoch)
         return random.choice(len(self.shares), self.drawn_per_epoch, p=self.shares)
 
-    def __call__(self, epoch: int) -> Iterator[Batch]:
-        """Yield the batches of an epoch, counted from 0."""
-        kept: list[Sample] = []
+    def __call__(self, epoch: int, share: slice = slice(None)) -> Iterator[Batch]:
+        """Yield those batches of an epoch, counted from 0, whose numbers a slice names."""
+        kept: dict[int, Sample] = {}
         kind = self.kinds(epoch)
-        for turn in range(self.options.passes):
+        size, each = self.options.size, self.options.steps // self.options.passes
+        for turn, place in (divmod(number, each) for number in range(self.options.steps)[share]):
             order = stream(self.seed, "order", epoch, turn).permutation(self.drawn_per_epoch)
-            for first in range(0, self.drawn_per_epoch, self.options.size):
-                if turn == 0:
-                    numbers = range(first, first + self.options.size)
-                    chosen = [self.datasets[kind[number]].drawn(epoch, number) for number in numbers]
-                    kept.extend(chosen if self.options.passes > 1 else [])
-                else:
-                    chosen = [kept[number] for number in order[first : first + self.options.size]]
-                batch = collate(chosen)
-                yield mirror_batch(batch) if turn % 2 else batch
+            numbers = [int(n) for n in (order if turn else np.arange(len(order)))[place * size : (place + 1) * size]]
+            drawn = {n: kept.get(n) or self.datasets[kind[n]].drawn(epoch, n) for n in numbers}
+            kept |= drawn if self.options.passes > 1 else {}
+            batch = collate([drawn[n] for n in numbers])
+            yield mirror_batch(batch) if turn % 2 else batch
 
 
 def fixed_batches(

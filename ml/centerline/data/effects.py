@@ -6,6 +6,9 @@ whatever worker makes it.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from typing import ClassVar
+
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
@@ -13,6 +16,7 @@ from pydantic import Field, model_validator
 from synthroads_addon.base.schema import quantity
 
 from ...configuration import Part
+from ...effects import PointEffects, usually
 from .frames import Frames
 from .lighting import relight
 from .stretch import HEADING, HEIGHT, LEFT, RIGHT, Stretch
@@ -49,10 +53,14 @@ class SequenceCrop(Part):
         return self
 
 
-class SequenceEffects(Part):
+class SequenceEffects(PointEffects):
     """Effects on a sequence while training. Strengths are the largest; each sample draws its own below them."""
 
-    mirror: float = quantity(0.5, ge=0, le=1, unit="1", description="Probability of left and right being swapped.")
+    renamed: ClassVar[Mapping[str, str]] = {"colorless": "color_drop"}
+
+    mirror: float = usually("mirror", 0.5)
+    dropout: float = usually("dropout", 0.3)
+    color_drop: float = usually("color_drop", 0.3)
     turn_round: float = quantity(0.5, ge=0, le=1, unit="1", description="Probability of running against the path.")
     crop: SequenceCrop = Field(default=SequenceCrop(), description="Sides cut off.")
     alone: float = quantity(
@@ -62,7 +70,6 @@ class SequenceEffects(Part):
         unit="1",
         description="Probability that a carriageway without shoulders has no other beside it: ground on both sides.",
     )
-    dropout: float = quantity(0.3, ge=0, lt=1, unit="1", description="Share of the points that are left out.")
     hidden: float = quantity(0.2, ge=0, le=1, unit="1", description="Probability of a hole as behind a vehicle.")
     empty: float = quantity(0.02, ge=0, le=1, unit="1", description="Probability of a slice without any point.")
     jitter: float = quantity(0.02, ge=0, le=1, unit="m", description="Standard deviation of the points' noise.")
@@ -89,7 +96,6 @@ class SequenceEffects(Part):
     stripes: float = quantity(0.15, ge=0, le=2, unit="1", description="As speckle, of wheel tracks, joints and lanes.")
     speckle: float = quantity(0.3, ge=0, le=2, unit="1", description="Noise of intensities by their own p90 - p10.")
     patches: float = quantity(0.2, ge=0, le=2, unit="1", description="The same of patches some metres long and wide.")
-    colorless: float = quantity(0.3, ge=0, le=1, unit="1", description="Probability of the colours being left out.")
     tint: float = quantity(0.2, ge=0, le=1, unit="1", description="Log of the factor on each colour channel.")
 
     @model_validator(mode="after")
@@ -175,7 +181,7 @@ def crop_sides(stretch: Stretch, crop: SequenceCrop, rng: Generator) -> None:
 def drop(stretch: Stretch, effects: SequenceEffects, rng: Generator) -> None:
     """Leave out single points, whole slices, and a hole of some metres."""
     slices, points = len(stretch.center), len(stretch.number)
-    keep = rng.random(points) >= rng.uniform(0.0, effects.dropout)
+    keep = effects.kept_points(points, rng)
     keep &= (rng.random(slices) >= effects.empty)[stretch.number]
     if rng.random() < effects.hidden and points:
         at, length, width = rng.integers(points), rng.uniform(2.0, 12.0), rng.uniform(1.5, 3.0)

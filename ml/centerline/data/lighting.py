@@ -34,7 +34,7 @@ def relight(stretch: Stretch, effects: SequenceEffects, rng: Generator) -> None:
     """Change intensities and colours as another scanner, other materials and another camera would have."""
     if rng.random() >= effects.plain and stretch.intensity.any():
         _relight_intensities(stretch, effects, rng)
-    if rng.random() < effects.colorless:
+    if effects.loses_colors(rng):
         stretch.has_color = False
     elif stretch.has_color:
         factors = np.exp(effects.tint * (rng.uniform(-1.0, 1.0) + rng.uniform(-1.0, 1.0, 3)))

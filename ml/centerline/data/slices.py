@@ -317,19 +317,3 @@ def _features(cut: Stretch, rng: np.random.Generator) -> Float:
         brightness = MISSING_NOISE * rng.standard_normal((count, 2))
     colors = cut.rgb if cut.has_color else MISSING_NOISE * rng.standard_normal((count, 3))
     return np.column_stack([brightness, colors, np.full(count, float(cut.has_color))])
-
-
-__all__ = [
-    "FEATURES",
-    "Batch",
-    "FrameSlices",
-    "IterableSlices",
-    "LearningRoad",
-    "Sample",
-    "SliceDataset",
-    "SliceSettings",
-    "collate",
-    "sample",
-    "stretch",
-    "thin",
-]

@@ -16,6 +16,8 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
+from ...networks.base import full_precision
+
 FAR = 3.0
 """Heights of points beyond this, m, look alike to a model."""
 _FEW = 0.25
@@ -141,6 +143,7 @@ class DeformableKernelPoints(nn.Module):
         self.mix = nn.Linear(3 * inputs + 2, width)
         self.norm = nn.LayerNorm(width)
 
+    @full_precision
     def forward(self, coord: Tensor, mask: Tensor, features: Tensor, seen: Tensor) -> Tokens:
         """Gather the features (N, P, inputs) of points (N, P, 3), m.
 

@@ -1,9 +1,4 @@
-"""Three models that find a road's centreline and corridor in sequences of slices.
-
-- `Single`: deformable kernel points and self-attention; each slice by itself.
-- `Sequence`: fixed kernel points, and an LSTM that runs along the slices at every kernel point, both ways.
-- `Transformer`: convolutions over slices x kernel points, a transformer over the slices, at every kernel point and for
-  all of them together, soft-argmax; the heading is that of a parabola through the centres, in the frames' geometry.
+"""Base of the models that find a road's centreline and corridor in sequences of slices; each is a file beside this one.
 
 All take a batch (see `slices.collate`) of B sequences of S slices with P points, use its ``coord``, ``feat``, ``mask``
 and ``frame``, and return a dictionary:
@@ -32,15 +27,7 @@ from ...configuration import Part
 from ..data.corridor import CORRIDOR
 from ..data.mirroring import mirror_batch, mirrored_corridor, with_sides_swapped
 from ..data.slices import FEATURES, Batch
-from .layers import (
-    AttentionPool,
-    DeformableKernelPoints,
-    FixedKernelPoints,
-    GridConvolution,
-    PointFeatures,
-    RelativeAttention,
-    Tokens,
-)
+from .layers import AttentionPool, FixedKernelPoints, PointFeatures, Tokens
 from .refinement import Refinement, parabola
 
 Output = dict[str, Tensor]
@@ -58,9 +45,9 @@ _LARGEST_LOG = 5.0
 
 
 class ModelOptions(Part):
-    """Which model, and how large."""
+    """Base of a model's options: its name, its sizes, and how it is built."""
 
-    name: Literal["single", "sequence", "transformer"] = Field("transformer", description="Which of the models.")
+    name: str
     features: tuple[Literal["intensity", "contrast", "red", "green", "blue", "has_color"], ...] = Field(
         ("intensity", "contrast"), description="Attributes of a point beside its place."
     )
@@ -75,6 +62,15 @@ class ModelOptions(Part):
     layers: int = quantity(3, ge=0, le=50, unit="1", description="Layers over the tokens.")
     heads: int = quantity(4, ge=1, le=64, unit="1", description="Heads of each attention.")
     dropout: float = quantity(0.0, ge=0, lt=1, unit="1", description="Share left out in the attention's layers.")
+
+    def build(self, half_width: float, slices: int) -> CenterlineModel:
+        """Return the model with weights from PyTorch's global generator.
+
+        Args:
+            half_width: what a slice sees to either side, m.
+            slices: of a sequence.
+        """
+        raise NotImplementedError
 
     @model_validator(mode="after")
     def _divisible(self) -> ModelOptions:
@@ -169,30 +165,6 @@ class CenterlineModel(nn.Module):
         raise NotImplementedError
 
 
-class Single(CenterlineModel):
-    """Deformable kernel points and self-attention over them, one slice at a time."""
-
-    def __init__(self, options: ModelOptions, half_width: float) -> None:
-        super().__init__(options, half_width, slices=1)
-        width, count = options.width, options.kernel_points
-        self.deformable = DeformableKernelPoints(count, half_width, options.point_width, width)
-        self.attention = nn.ModuleList(
-            RelativeAttention(count, width, options.heads, options.dropout) for _ in range(options.layers)
-        )
-
-    def look(self, tokens: Tokens, coord: Tensor, mask: Tensor, features: Tensor, slices: int) -> tuple[Tokens, Tensor]:
-        """See `CenterlineModel.look`."""
-        moved = self.deformable(coord, mask, features, tokens.features)
-        mixed = tokens.features + moved.features
-        for layer in self.attention:
-            mixed = layer(mixed)
-        return Tokens(mixed, moved.places, moved.heights), self.pool(mixed)
-
-    def line(self, center: Tensor, found: Output, context: Tensor, frame: Tensor) -> tuple[Tensor, Tensor]:
-        """See `CenterlineModel.line`: one slice knows no more than its own centre and direction."""
-        return center, found["corridor"][..., CORRIDOR.index("heading")]
-
-
 class SequenceModel(CenterlineModel):
     """A model whose slices know of each other: the line is a parabola through the centres of all."""
 
@@ -206,79 +178,6 @@ class SequenceModel(CenterlineModel):
         weight = torch.exp(2.0 * torch.tanh(0.5 * self.trust(context)[..., 0]))
         guess, heading = parabola(frame, center, weight, torch.exp(self.stiffness))
         return guess, heading + found["corridor"][..., CORRIDOR.index("heading")]
-
-
-class Sequence(SequenceModel):
-    """Fixed kernel points, convolutions across each slice, and an LSTM along the slices at every kernel point."""
-
-    def __init__(self, options: ModelOptions, half_width: float, slices: int) -> None:
-        super().__init__(options, half_width, slices)
-        width = options.width
-        self.across = nn.ModuleList(GridConvolution(width, 1, 5) for _ in range(options.layers))
-        self.along = nn.LSTM(width, width // 2, batch_first=True, bidirectional=True)
-        self.after = nn.ModuleList(GridConvolution(width, 1, 5) for _ in range(min(1, options.layers)))
-        self.summary = nn.LSTM(options.context, options.context // 2, batch_first=True, bidirectional=True)
-
-    def look(self, tokens: Tokens, coord: Tensor, mask: Tensor, features: Tensor, slices: int) -> tuple[Tokens, Tensor]:
-        """See `CenterlineModel.look`."""
-        grid = tokens.features.unflatten(0, (-1, slices))
-        for layer in self.across:
-            grid = layer(grid)
-        sequences, _, count, width = grid.shape
-        memory, _ = self.along(grid.transpose(1, 2).reshape(-1, slices, width))
-        grid = grid + memory.view(sequences, count, slices, width).transpose(1, 2)
-        for layer in self.after:
-            grid = layer(grid)
-        mixed = grid.flatten(0, 1)
-        context = self.pool(mixed)
-        context = context + self.summary(context.unflatten(0, (-1, slices)))[0].flatten(0, 1)
-        return Tokens(mixed, tokens.places, tokens.heights), context
-
-
-class Transformer(SequenceModel):
-    """Convolutions over slices x kernel points in turn with attention along the slices at every kernel point.
-
-    What a slice knows as a whole goes through attention along the slices as well. Where paint is missing, other slices
-    say where the line would be.
-    """
-
-    def __init__(self, options: ModelOptions, half_width: float, slices: int) -> None:
-        super().__init__(options, half_width, slices)
-        width, heads, dropout = options.width, options.heads, options.dropout
-        self.grid = nn.ModuleList(GridConvolution(width, 3, 5) for _ in range(options.layers))
-        self.along = nn.ModuleList(
-            RelativeAttention(slices, width, heads, dropout) for _ in range(max(0, options.layers - 1))
-        )
-        self.summary = nn.ModuleList(RelativeAttention(slices, options.context, heads, dropout) for _ in range(2))
-
-    def look(self, tokens: Tokens, coord: Tensor, mask: Tensor, features: Tensor, slices: int) -> tuple[Tokens, Tensor]:
-        """See `CenterlineModel.look`."""
-        grid = tokens.features.unflatten(0, (-1, slices))
-        for number, layer in enumerate(self.grid):
-            grid = layer(grid)
-            if number < len(self.along):
-                at_each = grid.transpose(1, 2)
-                grid = self.along[number](at_each.flatten(0, 1)).view(at_each.shape).transpose(1, 2)
-        mixed = grid.flatten(0, 1)
-        context = self.pool(mixed).unflatten(0, (-1, slices))
-        for layer in self.summary:
-            context = layer(context)
-        return Tokens(mixed, tokens.places, tokens.heights), context.flatten(0, 1)
-
-
-def build(options: ModelOptions, half_width: float, slices: int) -> CenterlineModel:
-    """Return a model with weights from PyTorch's global generator.
-
-    Args:
-        options: which one.
-        half_width: what a slice sees to either side, m.
-        slices: of a sequence.
-    """
-    if options.name == "single":
-        return Single(options, half_width)
-    if options.name == "sequence":
-        return Sequence(options, half_width, slices)
-    return Transformer(options, half_width, slices)
 
 
 def both_ways(model: nn.Module, batch: Batch) -> Output:

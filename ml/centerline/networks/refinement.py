@@ -9,6 +9,7 @@ from __future__ import annotations
 import torch
 from torch import Tensor, nn
 
+from ...networks.base import full_precision
 from .layers import GridConvolution, RelativeAttention, cell_features, cell_sums
 
 _APART = (1, 3, 6)
@@ -84,6 +85,7 @@ class Refinement(nn.Module):
         return step, self.spread(nn.functional.gelu(seen))[..., 0] + _FIRST_LOG_STD, logits
 
 
+@full_precision
 def parabola(frame: Tensor, center: Tensor, weight: Tensor, stiffness: Tensor) -> tuple[Tensor, Tensor]:
     """Fit a parabola through the centres of each sequence, by weighted least squares in its middle slice's frame.
 

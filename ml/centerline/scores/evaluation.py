@@ -30,12 +30,13 @@ from synthroads_addon.base.errors import InputError
 from synthroads_addon.base.random_streams import stream
 
 from ...points import ROAD_CLASSES
+from ...results import Spread
 from ..data.corridor import CORRIDOR, Truth
 from ..data.frames import Frames, along, displace_frames, estimated_path, stretches
 from ..data.roads import LearningRoad, Slices, crop_road, cut_beside_median
 from ..data.slices import SliceSettings
 from . import skeleton, trivial
-from .metrics import Spread, figures, over_roads, over_seeds
+from .metrics import figures, over_roads, over_seeds
 
 Float = NDArray[np.float64]
 Predictor = Callable[[LearningRoad, Frames], Float]

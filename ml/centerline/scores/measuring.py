@@ -65,7 +65,7 @@ def measure_run(
         ``files`` the names of what was written.
     """
     shown = read_cases(configuration, evaluation, progress)
-    name = f"{configuration.model.name}, seed {configuration.seed}"
+    name = f"{configuration.network.name}, seed {configuration.seed}"
     width = configuration.slices.half_width
     predictors: dict[str, Sequence[Predictor]] = {name: [predictor]}
     predictors |= {"skeleton": [skeleton_predictor(SkeletonSettings())], **trivial_predictors(width)}

@@ -28,6 +28,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 from scipy.special import ndtri
 
+from ...results import Spread
 from ..use.calibration import LEVELS
 
 Float = NDArray[np.float64]
@@ -59,15 +60,6 @@ class Chamfer:
     common: float
     compared: float
     windows: int
-
-
-@dataclass(frozen=True)
-class Spread:
-    """A figure over several seeds: mean, standard deviation (ddof 1; NaN for one seed), number of seeds."""
-
-    mean: float
-    std: float
-    count: int
 
 
 def figures(
@@ -234,12 +226,7 @@ def over_seeds(rows: Sequence[Mapping[str, float]]) -> dict[str, Spread]:
     A figure that is NaN or missing in one of them has a NaN mean: nothing is left out silently.
     """
     names = list(dict.fromkeys(name for row in rows for name in row))
-    result = {}
-    for name in names:
-        values = np.array([row.get(name, np.nan) for row in rows], dtype=np.float64)
-        std = float(values.std(ddof=1)) if len(values) > 1 else np.nan
-        result[name] = Spread(float(values.mean()), std, len(values))
-    return result
+    return {name: Spread.over([row.get(name, np.nan) for row in rows]) for name in names}
 
 
 def over_roads(rows: Iterable[Mapping[str, float]]) -> dict[str, float]:

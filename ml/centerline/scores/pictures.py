@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import io
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
-from PIL import Image
 from scipy.stats import rankdata
 
+from ...results import small_png
 from ..data.corridor import CORRIDOR
 from ..data.frames import Frames
 from ..use.calibration import DEVIATIONS, LEVELS
@@ -29,7 +28,6 @@ CENTER = "#1e88e5"
 _MOST_POINTS = 60_000
 _LINEAR = 0.1
 """Offsets from the true axis are drawn to a linear scale up to this and to a logarithmic one beyond, m."""
-_COLORS = 256
 _APART = 4.0
 """Predictions farther apart than this, m, are not joined."""
 
@@ -70,7 +68,7 @@ def lines_picture(
     panels[1].set_yticks([0.0, *ticks], [f"{tick:g}" for tick in (0.0, *ticks)])
     panels[1].set(ylabel="offset from it, m", ylim=(-limit, limit))
     panels[0].legend(loc="upper right", ncols=3, fontsize=8, framealpha=0.9)
-    return _png(figure)
+    return small_png(figure, dpi=110)
 
 
 def corridor_picture(shown: Case, prediction: Float, view: PictureView, title: str, height: float = 16.0) -> bytes:
@@ -95,7 +93,7 @@ def corridor_picture(shown: Case, prediction: Float, view: PictureView, title: s
     _center_error(panels[1], shown, view, column)
     if with_lanes:
         _lanes(panels[2], shown, view, column)
-    return _png(figure)
+    return small_png(figure, dpi=110)
 
 
 def _panels(title: str, heights: Sequence[float], view: PictureView, height: float) -> tuple[Any, Sequence[Any]]:
@@ -220,12 +218,3 @@ def _lanes(axes: Axes, shown: Case, view: PictureView, column: Mapping[str, Floa
         axes.plot(station, true, color="black", lw=1.0, ls="--", label="true" if name == "lanes" else None)
     axes.set(ylabel="lanes")
     axes.legend(loc="upper right", ncols=3, fontsize=8)
-
-
-def _png(figure: Any) -> bytes:
-    """Return a figure as a PNG of few colours; with all of them a cloud's points make it four times as large."""
-    drawn, content = io.BytesIO(), io.BytesIO()
-    figure.savefig(drawn, format="png", dpi=110, metadata={"Software": None})
-    image = Image.open(drawn).convert("RGB").quantize(_COLORS, dither=Image.Dither.NONE)
-    image.save(content, format="png", optimize=True)
-    return content.getvalue()

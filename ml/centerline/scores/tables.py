@@ -12,7 +12,7 @@ from synthroads_addon.base.files import write_file
 from synthroads_addon.base.schema import canonical_json
 from synthroads_addon.base.text_table import text_table
 
-from .metrics import Spread
+from ...results import Spread
 
 Measured = Mapping[str, Mapping[str, Mapping[str, Spread]]]
 """Figures by predictor, road (or `all`) and name, as `evaluation.measure` returns them."""
@@ -109,12 +109,10 @@ def road_table(measured: Measured, roads: Mapping[str, str], columns: Sequence[T
 
 def cell(spread: Spread | None, column: TableColumn) -> str:
     """Return ``mean (std)``; the mean alone where there is one seed or nothing differs, a dash where there is none."""
-    if spread is None or math.isnan(spread.mean):
+    if spread is None:
         return "–"
-    mean = f"{column.factor * spread.mean:.{column.decimals}f}"
-    if math.isnan(spread.std) or spread.std == 0.0:
-        return mean
-    return f"{mean} ({column.factor * spread.std:.{column.decimals}f})"
+    told = Spread(spread.mean, spread.std or math.nan, spread.count)
+    return told.text(column.decimals, "–", column.factor)
 
 
 def as_data(measured: Measured) -> dict[str, Any]:

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field, model_validator
+from pydantic import Field, field_validator, model_validator
 
 from synthroads_addon.base.schema import quantity
 
-from ...configuration import Part
+from ...effects import PointEffects, usually
 from .tiles import CloudTile
 
 FloatArray = NDArray[np.float32]
@@ -45,23 +46,25 @@ class Crop:
         )
 
 
-class Effects(Part):
+class Effects(PointEffects):
     """Effects on crops. All of it off leaves them as they are; the defaults are the recipe's."""
 
     rotation: bool = Field(True, description="Turn about the vertical by any angle.")
     smallest_scale: float = quantity(0.9, gt=0, le=1, unit="1", description="Smallest factor on the coordinates.")
     largest_scale: float = quantity(1.1, ge=1, le=10, unit="1", description="Largest factor on the coordinates.")
-    mirror: bool = Field(
-        False, description="Mirror every second crop, so that right-hand traffic becomes left-hand traffic."
-    )
     jitter: float = quantity(0.005, ge=0, le=1, unit="m", description="Noise of each coordinate, one sigma.")
     jitter_limit: float = quantity(0.02, ge=0, le=5, unit="m", description="Largest noise of a coordinate.")
-    color_drop: float = quantity(0.2, ge=0, le=1, unit="1", description="Share of crops that lose their colours.")
+    color_drop: float = usually("color_drop", 0.2)
     intensity_drop: float = quantity(0.0, ge=0, le=1, unit="1", description="Share that loses its intensities.")
-    dropout: float = quantity(0.0, ge=0, lt=1, unit="1", description="Largest share of points that is lost.")
     intensity_gain: float = quantity(
         0.0, ge=0, le=3, unit="1", description="Another intensity model: sigma of the logarithm of gain and exponent."
     )
+
+    @field_validator("mirror", mode="before")
+    @classmethod
+    def _every_second(cls, mirror: Any) -> Any:
+        """Read true, which was every second crop."""
+        return 0.5 * mirror if isinstance(mirror, bool) else mirror
 
     @model_validator(mode="after")
     def _limit_is_no_less(self) -> Effects:
@@ -72,11 +75,11 @@ class Effects(Part):
     def apply(self, crop: Crop, random: np.random.Generator) -> Crop:
         """Return a crop with all effects, in a fixed order."""
         if self.dropout:
-            crop = crop.select(random.random(len(crop.coord)) >= self.dropout * random.random())
+            crop = crop.select(self.kept_points(len(crop.coord), random))
         crop = replace(crop, coord=self._moved(crop.coord, random))
         if crop.strength is not None and self.intensity_gain:
             crop = replace(crop, strength=self._other_intensities(crop.strength, random))
-        if random.random() < self.color_drop:
+        if self.loses_colors(random):
             crop = replace(crop, color=None)
         if random.random() < self.intensity_drop:
             crop = replace(crop, strength=None)
@@ -86,7 +89,7 @@ class Effects(Part):
         angle = random.uniform(0.0, 2.0 * np.pi) if self.rotation else 0.0
         scale = random.uniform(self.smallest_scale, self.largest_scale)
         turn = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
-        if self.mirror and random.random() < 0.5:
+        if self.mirror and random.random() < self.mirror:
             turn[:, 0] *= -1.0
         middle = coord.mean(axis=0, dtype=np.float64)
         moved = coord - middle

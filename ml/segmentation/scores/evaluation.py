@@ -20,10 +20,10 @@ from ..data.crops import Item
 from ..data.sources import Source, read_tiles
 from ..data.tiles import CloudTile, scalings
 from ..loading import adaptation_batches, thin_tiles, watched_workers
-from ..network import adapt_network, build, on_device, plan_of, prepare_batch, scores_of
+from ..network import adapt_network, build, on_device, scores_of
 from ..recipes import SegmentationConfiguration
 from .metrics import Confusion
-from .scoring import Classifier, label_tile, score_tile
+from .scoring import Classifier, label_tile
 
 
 def trained_model(run: Run[SegmentationConfiguration], device: torch.device) -> nn.Module:
@@ -46,12 +46,10 @@ def trained_model(run: Run[SegmentationConfiguration], device: torch.device) -> 
 def classifier(model: nn.Module, configuration: SegmentationConfiguration, device: torch.device) -> Classifier:
     """Return what scores the points of an item."""
 
-    neighbourhood = plan_of(configuration).neighbourhood
-
     def scores(batch: Item) -> Tensor:
         model.eval()
         with torch.inference_mode():
-            return scores_of(model, on_device(prepare_batch(batch, neighbourhood), device))
+            return scores_of(model, on_device(configuration.network.prepare(batch), device))
 
     return scores
 
@@ -108,7 +106,7 @@ def score(
             scaling = scalings(scene, configuration.intensity, configuration.voxel)
             for tile in scene:
                 labels = label_tile(tile, scaling[tile.scene], scores, configuration.crop_settings())
-                score_tile(confusion, tile, labels, groups)
+                confusion.add(tile.segment, groups[labels])
                 if shown is None or len(tile) > len(shown[0]):
                     shown = (tile, groups[labels])
             progress("scoring", 0.5)

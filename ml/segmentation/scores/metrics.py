@@ -118,13 +118,6 @@ def mean(values: FloatArray) -> float:
     return float(defined.mean()) if len(defined) else float("nan")
 
 
-def mean_and_deviation(values: Sequence[float]) -> tuple[float, float]:
-    """Return mean and standard deviation (ddof = 1) over seeds of what is defined; NaN of fewer than one or two."""
-    defined = np.array([value for value in values if np.isfinite(value)])
-    deviation = float(defined.std(ddof=1)) if len(defined) > 1 else float("nan")
-    return mean(defined), deviation
-
-
 def _ratio(part: Any, whole: Any) -> Any:
     whole = np.asarray(whole, dtype=np.float64)
     return np.divide(part, whole, out=np.full_like(whole, np.nan), where=whole > 0)

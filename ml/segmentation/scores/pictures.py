@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import io
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from PIL import Image
 
 from synthroads_addon.base.classes import class_scheme
 
+from ...results import small_png
 from ..data.classes import IGNORED
 from ..data.tiles import CloudTile
 
@@ -47,16 +45,7 @@ def comparison(tile: CloudTile, predicted: NDArray[np.int16], names: Sequence[st
         axes.set(title=title, xticks=[], yticks=[])
     patches = [Patch(facecolor=color, edgecolor="0.5", label=name) for name, color in zip(names, colors, strict=True)]
     figure.legend(handles=patches, loc="outside lower center", ncols=min(len(patches), 9), frameon=False)
-    return _small_png(figure)
-
-
-def _small_png(figure: Any) -> bytes:
-    """Return a figure as a PNG of at most 256 colours."""
-    content = io.BytesIO()
-    figure.savefig(content, format="png")
-    reduced = io.BytesIO()
-    Image.open(content).convert("RGB").quantize(256, dither=Image.Dither.NONE).save(reduced, "PNG", optimize=True)
-    return reduced.getvalue()
+    return small_png(figure)
 
 
 def class_colors(names: Sequence[str]) -> NDArray[np.float64]:

@@ -18,7 +18,6 @@ from ..data.classes import IGNORED
 from ..data.crops import CropSettings, Item, item
 from ..data.effects import crop_of
 from ..data.tiles import CloudTile, Scaling
-from .metrics import Confusion
 
 EDGE = 24.0
 """Edge of the pieces that are predicted at a time, m: about as wide as a crop of training."""
@@ -135,15 +134,3 @@ def carry(known: NDArray[np.float32], labels: NDArray[np.int16], points: NDArray
         return np.zeros(0, dtype=np.int16)
     _, nearest = cKDTree(known).query(points)
     return labels[nearest]
-
-
-def score_tile(confusion: Confusion, tile: CloudTile, labels: NDArray[np.int16], group_of: NDArray[np.int16]) -> None:
-    """Count a tile's points in a confusion matrix.
-
-    Args:
-        confusion: over what the truth tells apart.
-        tile: with its truth.
-        labels: (N,) predicted places in the scheme.
-        group_of: (C,) from these to what the truth tells apart.
-    """
-    confusion.add(tile.segment, group_of[labels])

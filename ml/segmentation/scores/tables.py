@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from .metrics import mean_and_deviation
+from ...results import Spread, defined
 
 Scores = Mapping[str, Any]
 """Result of `Confusion.to_dict`."""
@@ -57,13 +56,9 @@ def by_class(runs: Sequence[Scores]) -> str:
 
 def percent(values: Sequence[float | None]) -> str:
     """Return shares as ``mean (standard deviation)`` in percent; None is undefined and left out."""
-    return cell([math.nan if value is None else 100.0 * value for value in values], decimals=1)
+    return Spread.over([100.0 * value for value in defined(values)]).text(1, "-")
 
 
 def cell(values: Sequence[float], decimals: int = 0) -> str:
     """Return numbers as ``mean (standard deviation)``, without the latter of a single one."""
-    middle, deviation = mean_and_deviation(values)
-    if math.isnan(middle):
-        return "-"
-    text = f"{middle:,.{decimals}f}"
-    return text if math.isnan(deviation) else f"{text} ({deviation:,.{decimals}f})"
+    return Spread.over(defined(values)).text(decimals, "-")

@@ -9,7 +9,8 @@ import torch
 
 from ml.centerline.data.effects import SequenceEffects
 from ml.centerline.data.slices import Batch, SliceDataset, SliceSettings, collate
-from ml.centerline.networks.models import CenterlineModel, ModelOptions, build
+from ml.centerline.networks.models import CenterlineModel
+from ml.registry import networks
 from tests.helpers.roads import analytic_roads
 
 torch.set_num_threads(1)
@@ -32,7 +33,7 @@ def small(name: str, **changes: Any) -> CenterlineModel:
     """Return a small model with weights that are always the same."""
     torch.manual_seed(3)
     options = {"cells": 4, "point_width": 8, "width": 16, "context": 16, "layers": 1, "heads": 2, "fine_width": 8}
-    return build(ModelOptions(name=name, **(options | changes)), SETTINGS.half_width, SETTINGS.slices)
+    return networks("centerline")[name](**(options | changes)).build(SETTINGS.half_width, SETTINGS.slices)
 
 
 def moved(one: Batch, by: float) -> Batch:

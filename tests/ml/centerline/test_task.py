@@ -41,7 +41,7 @@ def configuration(folder: Path, name: str = "transformer", **changes: Any) -> ta
         "threads": 1,
         "data": {"data_sets": [str(folder)], "cache": str(folder / "cache")},
         "slices": {"half_width": 20.0, "points_per_slice": 96},
-        "model": SMALL | {"name": name, "dropout": 0.1},
+        "network": SMALL | {"name": name, "dropout": 0.1},
         "batches": {"size": 4, "steps": 4, "passes": 2, "validation": 4},
         "schedule": {"epochs": 2, "learning_rate": 0.003, "warmup": 0.2},
     }
@@ -245,8 +245,8 @@ def test_measured_roads_by_stations(data: Path, tmp_path: Path):
     [
         ("name data_sets, or measured", {"data": {"data_sets": []}}),
         ("steps is 3: must be a multiple of passes", {"batches": {"steps": 3, "passes": 2}}),
-        ("model.name", {"model": {"name": "lstm"}}),
-        ("kernel_point", {"model": {"kernel_point": 25}}),
+        ("network.name", {"network": {"name": "lstm"}}),
+        ("kernel_point", {"network": {"kernel_point": 25}}),
         (
             "last must be larger than first, 5",
             {"data": {"measured": [{"cloud": "a", "axis": "b", "first": 5.0, "last": 1.0}]}},
@@ -266,8 +266,8 @@ def test_missing_splits_are_refused(data: Path):
 @pytest.mark.parametrize("name", ["single", "sequence", "transformer"])
 def test_shipped_configurations(name: str):
     shipped = load_configuration(f"centerline-{name}", KINDS)
-    assert shipped.model.name == name
-    assert shipped.model.kernel_points == 25
+    assert shipped.network.name == name
+    assert shipped.network.kernel_points == 25
     assert shipped.slices.slices == 10
 
 
@@ -276,7 +276,7 @@ def _trained(data: Path, folder: Path, name: str) -> dict[str, Any]:
         data,
         name,
         slices={"half_width": 20.0, "points_per_slice": 192},
-        model={"name": name, "cells": 6, "width": 32, "context": 32, "layers": 2},
+        network={"name": name, "cells": 6, "width": 32, "context": 32, "layers": 2},
         batches={"size": 16, "steps": 50, "passes": 2, "validation": 32},
         schedule={"epochs": 6, "learning_rate": 0.004, "warmup": 0.1, "weight_decay": 0.001},
         # What other scanners and roads look like takes thousands of steps to learn.

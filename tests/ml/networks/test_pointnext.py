@@ -149,13 +149,13 @@ def largest_difference(mine: dict[str, Tensor], other: dict[str, Tensor]) -> flo
 
 @pytest.mark.parametrize(("name", "count"), PUBLISHED.items())
 def test_has_as_many_parameters_as_published(name: str, count: int) -> None:
-    model = PointNeXt.preset(name, in_channels=INPUTS, num_classes=CLASSES)
+    model = PointNeXt(architecture(name, in_channels=INPUTS, num_classes=CLASSES))
     assert sum(weight.numel() for weight in model.parameters()) == count
 
 
 def test_what_is_linear_is_done_where_points_are_few() -> None:
     """B at 15,000 points: 8.82 GFLOP pair by pair, 2.36 with the neighbours' convolutions once per support point."""
-    model = PointNeXt.preset("B", in_channels=INPUTS, num_classes=CLASSES, sampling="farthest")
+    model = PointNeXt(architecture("B", in_channels=INPUTS, num_classes=CLASSES, sampling="farthest"))
     coord, feat = random_cloud(15_000)
     neighbours = build_neighbours(coord.float() * 4, torch.tensor([15_000]), model.plan.neighbourhood)
     with FlopCounterMode(display=False) as counter:
@@ -370,7 +370,7 @@ def test_a_single_value_leaves_the_statistics() -> None:
 def test_wrong_values_are_refused(changes: dict[str, object], field: str) -> None:
     values = {"name": "B", "in_channels": 4, "num_classes": 13} | changes
     with pytest.raises(InputError, match=field):
-        PointNeXt.preset(values.pop("name"), **values)
+        architecture(values.pop("name"), **values)
 
 
 def test_an_architecture_must_fit_itself() -> None:

@@ -39,7 +39,7 @@ NONE = SequenceEffects(
     **dict.fromkeys(("alone", "dropout", "hidden", "empty", "jitter", "tilt"), 0.0),
     **dict.fromkeys(("plain", "contrast", "verge", "paint", "repaint"), 0.0),
     gamma=(1.0, 1.0),
-    **dict.fromkeys(("falloff", "speckle", "patches", "stripes", "footprint", "colorless", "tint"), 0.0),
+    **dict.fromkeys(("falloff", "speckle", "patches", "stripes", "footprint", "color_drop", "tint"), 0.0),
 )
 SETTINGS = SliceSettings(points_per_slice=100_000, half_width=18.0)
 
@@ -445,7 +445,7 @@ def test_patches_are_smooth_and_speckle_is_not(name: str) -> None:
 
 def test_colours() -> None:
     one = cut()
-    relight(one, NONE.model_copy(update={"colorless": 1.0}), rng())
+    relight(one, NONE.model_copy(update={"color_drop": 1.0}), rng())
     assert not one.has_color
     one = cut()
     before = one.rgb.copy()

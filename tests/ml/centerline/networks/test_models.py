@@ -11,9 +11,10 @@ from ml.centerline.data.corridor import CORRIDOR
 from ml.centerline.data.frames import along, displace_frames
 from ml.centerline.data.mirroring import mirror_batch
 from ml.centerline.networks.layers import DeformableKernelPoints, PointFeatures, cell_features, cell_sums
-from ml.centerline.networks.models import TARGETS, ModelOptions, both_ways, build
+from ml.centerline.networks.models import TARGETS, both_ways
 from ml.centerline.networks.refinement import parabola
 from ml.configuration import from_data
+from ml.registry import networks
 from synthroads_addon.base.errors import InputError
 from tests.helpers.clouds.centerline_batches import MODELS, batch, moved, select, small
 
@@ -223,12 +224,12 @@ def test_deformable_kernel_points_learn_to_move():
 
 def test_build_makes_what_is_named():
     for name in MODELS:
-        assert type(build(ModelOptions(name=name), 14.0, 10)).__name__.lower() == name
+        assert type(networks("centerline")[name]().build(14.0, 10)).__name__.lower() == name
 
 
 def test_odd_widths_are_refused():
     from ml.centerline.task import configuration_kind
 
-    data = {"task": "centerline", "data": {"data_sets": ["x"]}, "model": {"width": 30, "heads": 4}}
-    with pytest.raises(InputError, match=r"model.*width must be even and a multiple of heads, 4"):
+    data = {"task": "centerline", "data": {"data_sets": ["x"]}, "network": {"width": 30, "heads": 4}}
+    with pytest.raises(InputError, match=r"network.*width must be even and a multiple of heads, 4"):
         from_data(data, {"centerline": configuration_kind()}, "test")

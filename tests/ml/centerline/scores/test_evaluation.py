@@ -29,10 +29,10 @@ from ml.centerline.scores.evaluation import (
     trivial_predictors,
     truth_of,
 )
-from ml.centerline.scores.metrics import Spread
 from ml.centerline.scores.pictures import PictureView, corridor_picture, lines_picture
 from ml.centerline.scores.skeleton import SkeletonSettings
 from ml.centerline.scores.tables import COLUMNS, as_data, cell, report, road_table, table, write_tables
+from ml.results import Spread
 from synthroads_addon.base.errors import InputError
 from tests.helpers.clouds.centerline_roads import REAL, strip_road
 from tests.helpers.roads import analytic_roads

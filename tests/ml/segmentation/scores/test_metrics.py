@@ -7,8 +7,9 @@ import json
 import numpy as np
 import pytest
 
+from ml.results import Spread, defined
 from ml.segmentation.data.classes import IGNORED
-from ml.segmentation.scores.metrics import Confusion, mean, mean_and_deviation, score_table
+from ml.segmentation.scores.metrics import Confusion, mean, score_table
 from ml.segmentation.scores.tables import by_class, by_test
 from synthroads_addon.base.errors import InputError
 from tests.judges import require
@@ -97,9 +98,9 @@ def test_wrong_labels_are_refused() -> None:
 
 
 def test_deviation_over_seeds_is_that_of_a_sample() -> None:
-    found = mean_and_deviation([1.0, 2.0, float("nan"), 4.0])
-    assert found == pytest.approx((7 / 3, np.std([1, 2, 4], ddof=1)))
-    assert np.isnan(mean_and_deviation([1.0])[1])
+    found = Spread.over(defined([1.0, 2.0, float("nan"), None, 4.0]))
+    assert (found.mean, found.std) == pytest.approx((7 / 3, np.std([1, 2, 4], ddof=1)))
+    assert np.isnan(Spread.over([1.0]).std)
     assert np.isnan(mean(np.array([np.nan])))
 
 

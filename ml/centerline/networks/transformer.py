@@ -1,0 +1,58 @@
+"""`Transformer`: convolutions over slices x kernel points, and a transformer over the slices.
+
+The latter runs at every kernel point and for all of them together; lines are found by soft-argmax, and the heading is
+that of a parabola through the centres, in the frames' geometry.
+"""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from pydantic import Field
+from torch import Tensor, nn
+
+from ...registry import network
+from .layers import GridConvolution, RelativeAttention, Tokens
+from .models import ModelOptions, SequenceModel
+
+
+@network("centerline")
+class TransformerOptions(ModelOptions):
+    """A sequence of slices, with a transformer over them."""
+
+    name: Literal["transformer"] = Field("transformer", description="Network.")
+
+    def build(self, half_width: float, slices: int) -> SequenceModel:
+        """See `ModelOptions.build`."""
+        return Transformer(self, half_width, slices)
+
+
+class Transformer(SequenceModel):
+    """Convolutions over slices x kernel points in turn with attention along the slices at every kernel point.
+
+    What a slice knows as a whole goes through attention along the slices as well. Where paint is missing, other slices
+    say where the line would be.
+    """
+
+    def __init__(self, options: ModelOptions, half_width: float, slices: int) -> None:
+        super().__init__(options, half_width, slices)
+        width, heads, dropout = options.width, options.heads, options.dropout
+        self.grid = nn.ModuleList(GridConvolution(width, 3, 5) for _ in range(options.layers))
+        self.along = nn.ModuleList(
+            RelativeAttention(slices, width, heads, dropout) for _ in range(max(0, options.layers - 1))
+        )
+        self.summary = nn.ModuleList(RelativeAttention(slices, options.context, heads, dropout) for _ in range(2))
+
+    def look(self, tokens: Tokens, coord: Tensor, mask: Tensor, features: Tensor, slices: int) -> tuple[Tokens, Tensor]:
+        """See `CenterlineModel.look`."""
+        grid = tokens.features.unflatten(0, (-1, slices))
+        for number, layer in enumerate(self.grid):
+            grid = layer(grid)
+            if number < len(self.along):
+                at_each = grid.transpose(1, 2)
+                grid = self.along[number](at_each.flatten(0, 1)).view(at_each.shape).transpose(1, 2)
+        mixed = grid.flatten(0, 1)
+        context = self.pool(mixed).unflatten(0, (-1, slices))
+        for layer in self.summary:
+            context = layer(context)
+        return Tokens(mixed, tokens.places, tokens.heights), context.flatten(0, 1)

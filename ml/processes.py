@@ -1,0 +1,107 @@
+"""Several processes that train one model together, each on batches of its own, joined by torch.distributed.
+
+The first one is the command's own. It starts the others, which read the same run, do as it does, and write nothing.
+"""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, suppress
+from datetime import timedelta
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import torch
+from torch import Tensor, distributed, multiprocessing
+from torch._C._distributed_c10d import FileStore
+
+from synthroads_addon.base.errors import InputError, SynthRoadsError
+
+if TYPE_CHECKING:
+    from .runs import Run
+
+_MEETING = timedelta(minutes=10)
+"""How long one waits for the others to begin."""
+_PATIENCE = timedelta(days=2)
+"""How long for each later step: the first scores the validation data alone."""
+
+
+def process_number() -> int:
+    """Return which of the processes this is, from 0."""
+    return distributed.get_rank() if distributed.is_initialized() else 0
+
+
+def process_count() -> int:
+    """Return how many processes train together."""
+    return distributed.get_world_size() if distributed.is_initialized() else 1
+
+
+def average(tensors: Sequence[Tensor]) -> None:
+    """Replace tensors of one device and type, in place, by their means over all processes."""
+    if process_count() == 1 or not tensors:
+        return
+    flat = torch.cat([tensor.reshape(-1) for tensor in tensors])
+    distributed.all_reduce(flat)
+    flat /= process_count()
+    for tensor, mean in zip(tensors, flat.split([tensor.numel() for tensor in tensors]), strict=True):
+        tensor.copy_(mean.view_as(tensor))
+
+
+@contextmanager
+def helpers(run: Run[Any], learn: Callable[[Run[Any]], object], device: torch.device) -> Iterator[None]:
+    """Have further processes call ``learn(run)`` while this one does, as many as the configuration asks for.
+
+    Args:
+        run: its ``processes`` says how many take part, this one included.
+        learn: a function of a module.
+        device: that this process trains on.
+
+    Raises:
+        InputError: one of them was lost, or there are fewer CUDA devices than processes.
+    """
+    count = run.configuration.processes
+    if count == 1:
+        yield
+        return
+    if device.type == "cuda" and count > torch.cuda.device_count():
+        raise InputError("processes", count, f"must not exceed the CUDA devices, {torch.cuda.device_count()}")
+    context = multiprocessing.get_context("spawn")
+    with tempfile.TemporaryDirectory(prefix="synthroads-") as folder:
+        meeting = Path(folder) / "meeting"
+        others = [
+            context.Process(target=_help, args=(learn, run, meeting, number, device.type)) for number in range(1, count)
+        ]
+        for other in others:
+            other.start()
+        try:
+            _join(meeting, 0, count, device.type)
+            yield
+            for other in others:
+                other.join()
+        except RuntimeError as error:
+            for other in others:
+                other.join(1.0)
+            if all(other.is_alive() for other in others):
+                raise
+            raise InputError("processes", count, "one was lost: is memory short? --resume goes on") from error
+        finally:
+            for other in others:
+                other.kill()
+            if distributed.is_initialized():
+                distributed.destroy_process_group()
+
+
+def _join(meeting: Path, number: int, count: int, device: str) -> None:
+    store = FileStore(str(meeting), count)
+    store.set_timeout(_MEETING)
+    backend = "nccl" if device == "cuda" else "gloo"
+    distributed.init_process_group(backend, store=store, rank=number, world_size=count, timeout=_PATIENCE)
+
+
+def _help(learn: Callable[[Run[Any]], object], run: Run[Any], meeting: Path, number: int, device: str) -> None:
+    """Do in another process what the first does; what goes wrong in all of them, the first one says."""
+    with suppress(SynthRoadsError, KeyboardInterrupt):
+        _join(meeting, number, run.configuration.processes, device)
+        learn(run)
+        distributed.destroy_process_group()
