@@ -22,7 +22,7 @@ _LENS = (0.095, 0.075)
 _HEXADECAGON = 16
 
 
-class _Beacon(OnSurface):
+class _BeaconInputs(OnSurface):
     points = socket("Geometry", "One point per beacon, at any height; pass_side +1 is left")
     road = socket("Object", "Surface that the beacons stand on")
     red_material = material_of("the red stripes")
@@ -35,7 +35,7 @@ class _Beacon(OnSurface):
 @makes_group("SR Beacon")
 def beacon_group(tree: Tree) -> None:
     """A beacon on each point; points carry ``heading`` (rad), ``elevation``, ``width``, ``height``, ``pass_side``."""
-    beacon = _Beacon(tree)
+    beacon = _BeaconInputs(tree)
 
     with tree.frame("Foot and its tenon"):
         foot = paint_faces(op.join(_foot(tree), box(tree, (0.07, 0.05, 0.1), (0.0, 0.0, 0.12))), beacon.rubber_material)

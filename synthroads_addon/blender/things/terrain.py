@@ -73,7 +73,7 @@ def terrain_group(tree: Tree) -> None:
     tree.output("Mesh", mesh, description="Terrain; its points carry their distance from the road")
 
 
-class _Side(Inputs):
+class _TerrainInputs(Inputs):
     backbone = backbone_socket()
     edge = socket("Geometry", "Points of the road's edge, one per row of the backbone")
     ground = socket("Geometry", "Surface of the ground before the road was built")
@@ -86,7 +86,7 @@ class _Side(Inputs):
 @makes_group("SR Terrain Side")
 def _side_group(tree: Tree) -> None:
     """Terrain on one side: from the road's edge outwards, between the batter's two planes."""
-    inputs = _Side(tree)
+    inputs = _TerrainInputs(tree)
     backbone, side, columns = inputs.backbone, inputs.side, inputs.columns
 
     with tree.frame("Columns from left to right, rows as the backbone's"):

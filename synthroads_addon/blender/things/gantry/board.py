@@ -15,7 +15,7 @@ _BEFORE = 0.002
 """Distance between a board and the back of its face, m."""
 
 
-class _Sign(Inputs):
+class _BoardInputs(Inputs):
     gantry = socket("Object", "The gantry, whose points tell where its signs are")
     number = integer(1, (1, 100), "Which of its signs, from 1 on")
 
@@ -23,7 +23,7 @@ class _Sign(Inputs):
 @makes_group("SR Gantry Sign")
 def gantry_sign_group(tree: Tree) -> None:
     """The face of one sign of a gantry, before its board."""
-    sign, face = _Sign(tree), Face(tree)
+    sign, face = _BoardInputs(tree), Face(tree)
     instance = tree.integer("Instance", 0, INSTANCES, description="Instance number of the faces")
     with tree.frame("Middle of the sign"):
         points = op.separate(

@@ -5,7 +5,7 @@ from __future__ import annotations
 from ...nodes import operations as op
 from ...nodes.builder import Tree, makes_group
 from ...nodes.inputs import Inputs, metres, number
-from .line import Marking, marking_group
+from .line import MarkingInputs, marking_group
 
 
 class _Section(Inputs):
@@ -37,7 +37,7 @@ def carriageway_marking_group(tree: Tree) -> None:
     backbone = tree.input("Backbone", "Geometry", description="Polyline along the axis with its attributes")
     section = _Section(tree)
     width = tree.number("Width", 0.15, (0.05, 1.0), unit="m", description="Width of the line")
-    marking = Marking(tree)
+    marking = MarkingInputs(tree)
     with tree.frame("Both edges of the line"):
         half = width * (section.side * 0.5)
         # Left is outwards on the left carriageway and inwards on the right one.

@@ -14,7 +14,7 @@ SNAP = 1e-3
 """End of a dash this near (m) to a row of the backbone: it is that row."""
 
 
-class Marking(Inputs):
+class MarkingInputs(Inputs):
     """Inputs of a line that don't say where it lies across the road."""
 
     start_station = metres(0.0, (0.0, 1e6), "Beginning of the first dash")
@@ -27,7 +27,7 @@ class Marking(Inputs):
     material = material_of("the faces")
 
 
-class _Edges(Inputs):
+class _EdgeInputs(Inputs):
     backbone = backbone_socket()
     left_offset = metres(0.1, FAR, "Offset of the left edge, positive to the left")
     right_offset = metres(-0.1, FAR, "Offset of the right edge")
@@ -41,7 +41,7 @@ def marking_group(tree: Tree) -> None:
 
     Offsets and heights may be fields on the backbone's points.
     """
-    edges, line = _Edges(tree), Marking(tree)
+    edges, line = _EdgeInputs(tree), MarkingInputs(tree)
     backbone, first, film = edges.backbone, line.start_station, line.film_thickness
 
     with tree.frame("Dashes: a solid line is one dash"):

@@ -30,7 +30,7 @@ _PLAY = 0.0005  # m between rails and what is before and behind them
 _CLAMP = (0.006, 0.05)  # m beyond the post, and in height
 
 
-class _Sign(Inputs):
+class _SignInputs(Inputs):
     lower_edge = metres(2.0, (0.0, 10.0), "Lower edge of the face above the surface")
     posts = integer(1, (1, MOST_POSTS), "Number of posts")
     post_diameter = metres(0.076, (0.02, 0.5), "Diameter of a post")
@@ -41,7 +41,7 @@ class _Sign(Inputs):
 @makes_group("SR Sign")
 def sign_group(tree: Tree) -> None:
     """A traffic sign on its posts, facing those who drive along +y; points carry ``heading`` and ``elevation``."""
-    standing, face, sign = Standing(tree), Face(tree), _Sign(tree)
+    standing, face, sign = Standing(tree), Face(tree), _SignInputs(tree)
 
     with tree.frame("What is behind the face, by its shape"):
         behind = op.choose(face.shape, [_BEHIND[shape] for shape in SHAPES])
@@ -72,7 +72,7 @@ def sign_group(tree: Tree) -> None:
     tree.output("Mesh", mesh, description="Sign with its posts")
 
 
-def _mounting(tree: Tree, face: Face, sign: _Sign, spread: Value, long: Value) -> Value:
+def _mounting(tree: Tree, face: Face, sign: _SignInputs, spread: Value, long: Value) -> Value:
     """Return the rails behind the face, and the clamps that hold them to the posts."""
     with tree.frame("Rails behind the face, one above the other"):
         count = op.round_up(op.maximum(face.height / _RAIL_SPACING, 2.0))

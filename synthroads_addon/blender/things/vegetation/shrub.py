@@ -28,7 +28,7 @@ _DEFAULTS = {
 _STAND = {"density": 0.006, "smallest_height": 0.5, "largest_height": 3.0, "band_start": 2.0, "band_end": 60.0}
 
 
-class _Shape(Crown):
+class _ShrubInputs(Crown):
     stem_radius = metres(0.015, (0.0005, 0.2), "Radius of the thickest stem")
 
 
@@ -37,7 +37,7 @@ def shrub_group(tree: Tree) -> None:
     """Shrubs of one species in a band beside the road, of three kinds, with gaps between their leaves."""
     stand = Stand(tree, **_STAND)
     with tree.panel("Shape at height 1"):
-        shape = _Shape(tree, **_DEFAULTS)
+        shape = _ShrubInputs(tree, **_DEFAULTS)
     with tree.panel("Materials"):
         materials = PlantMaterials(tree)
     with tree.frame("Places"):
@@ -60,7 +60,7 @@ def _kind(tree: Tree, inputs: dict[str, Value], seed: int, wider: float) -> Valu
 @makes_group("SR Shrub Shape")
 def shape_group(tree: Tree) -> None:
     """One shrub of height 1: stems and leaves."""
-    shape, plant = _Shape(tree, **_DEFAULTS), Plant(tree)
+    shape, plant = _ShrubInputs(tree, **_DEFAULTS), Plant(tree)
     with tree.frame("Stems and leaves"):
         shrub = tree.call(
             crown_group(), **shape.crown(), **plant.values, branch_radius=shape.stem_radius, from_ground=True

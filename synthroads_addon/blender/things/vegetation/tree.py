@@ -21,7 +21,7 @@ _LEAN = 0.04
 _STAND = {"density": 0.005, "smallest_height": 5.0, "largest_height": 14.0, "band_start": 12.0, "band_end": 60.0}
 
 
-class _Shape(Crown):
+class _TreeInputs(Crown):
     trunk_radius = metres(0.02, (0.001, 0.2), "Radius of the trunk at its foot")
 
 
@@ -30,7 +30,7 @@ def tree_group(tree: Tree) -> None:
     """Trees of one species in a band beside the road, of three kinds, with gaps between their leaves."""
     stand = Stand(tree, **_STAND)
     with tree.panel("Shape at height 1"):
-        shape = _Shape(tree)
+        shape = _TreeInputs(tree)
     with tree.panel("Materials"):
         materials = PlantMaterials(tree)
     with tree.frame("Places"):
@@ -54,7 +54,7 @@ def _kind(tree: Tree, inputs: dict[str, Value], seed: int, lower: float, wider: 
 @makes_group("SR Tree Shape")
 def shape_group(tree: Tree) -> None:
     """One tree of height 1: trunk, branches and leaves."""
-    shape, plant = _Shape(tree), Plant(tree)
+    shape, plant = _TreeInputs(tree), Plant(tree)
     radius = shape.trunk_radius
     with tree.frame("Trunk, with a wider foot"):
         trunk = _trunk(tree, radius)
