@@ -112,5 +112,5 @@ def _endless(configuration: SegmentationConfiguration, tiles: list[CloudTile], d
     scaling = scalings(tiles, configuration.intensity)
     epoch = 0
     while True:
-        yield from epoch_batches(enough, tiles, [len(tiles)], scaling, seeds, device, epoch, slice(None))
+        yield from epoch_batches(enough, tiles, [len(tiles)], scaling, seeds, device, epoch)
         epoch += 1

@@ -66,7 +66,7 @@ def epoch_batches(
     seeds: Seeds,
     device: torch.device,
     epoch: int,
-    share: slice,
+    share: slice = slice(None),
 ) -> Iterator[Item]:
     """Yield those batches of an epoch whose numbers a slice names; they depend on seed and epoch alone."""
     draws = plan(domains, configuration.crops_per_tile, configuration.synthetic_share, configuration.seed, epoch)

@@ -14,7 +14,7 @@ from ml.segmentation.data.crops import CropSettings, Item
 from ml.segmentation.data.tiles import Scaling
 from ml.segmentation.prediction import PREDICTED, Labelling, predict_file
 from ml.segmentation.scores.metrics import Confusion
-from ml.segmentation.scores.scoring import carry, label_tile, pieces, score_tile
+from ml.segmentation.scores.scoring import carry, label_tile, pieces
 from synthroads_addon.base.classes import class_scheme
 from synthroads_addon.base.errors import InputError, MissingFileError, OutputError
 from tests.helpers.clouds.segmentation_data import road_block, road_tile, write_cloud
@@ -73,11 +73,11 @@ def test_a_tile_is_labelled_and_scored_on_all_its_points() -> None:
     labels = label_tile(tile, Scaling(), by_brightness, CropSettings(voxel=0.3))
     assert labels.shape == (60_000,)
     confusion = Confusion(tuple("abcde"))
-    score_tile(confusion, tile, labels, np.arange(5, dtype=np.int16))
+    confusion.add(tile.segment, labels)
     assert confusion.counts.sum() == 60_000
     assert confusion.iou[1] > 0.8
     grouped = Confusion(tuple("abcde"))
-    score_tile(grouped, road_tile(100), np.zeros(100, dtype=np.int16), np.array([3, 0, 0, 0, 0], dtype=np.int16))
+    grouped.add(road_tile(100).segment, np.full(100, 3, dtype=np.int16))
     assert grouped.counts[:, 3].sum() == 100
 
 
