@@ -11,14 +11,15 @@ import json
 import os
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-from headless import was_stopped
+from headless import INTERRUPTED, was_stopped
 from headless.messages import messages
 from synthroads_addon.base.errors import InputError
+from synthroads_addon.base.scratch.folders import remove_own, temporary_files_in_scratch
 
 
 def _missing(error: ModuleNotFoundError) -> str:
@@ -236,6 +237,8 @@ def run(action: Callable[[argparse.Namespace], Outcome], arguments: argparse.Nam
         sys.stdout.flush()
         return code
     except InputError as error:
+        if was_stopped():  # and lost its workers by that
+            return report_interrupt()
         print(f"error: {error}", file=sys.stderr)
         return 2
     except ModuleNotFoundError as error:
@@ -253,7 +256,8 @@ def run(action: Callable[[argparse.Namespace], Outcome], arguments: argparse.Nam
 
 def report_interrupt() -> int:
     """Say that the user stopped the work; return the exit code."""
-    print("interrupted; nothing was left half-written", file=sys.stderr)
+    with suppress(OSError):  # the terminal is gone
+        print(INTERRUPTED, file=sys.stderr, flush=True)
     return 130
 
 
@@ -274,7 +278,8 @@ def leave(action: Callable[[], int]) -> None:
         if isinstance(stream, io.TextIOWrapper):  # names of files may hold what the terminal's encoding doesn't
             stream.reconfigure(errors="backslashreplace")
     try:
-        code = action()
+        with temporary_files_in_scratch():
+            code = action()
     except KeyboardInterrupt:  # before the command's own work began, or at its very end
         code = report_interrupt()
     except SystemExit as error:
@@ -287,8 +292,10 @@ def leave(action: Callable[[], int]) -> None:
 
             traceback.print_exc()
             code = 1
-    sys.stdout.flush()
-    sys.stderr.flush()
+    remove_own()
+    for stream in (sys.stdout, sys.stderr):
+        with suppress(OSError):  # the terminal is gone
+            stream.flush()
     os._exit(code)
 
 

@@ -47,6 +47,8 @@ WORK = ".work"
 LOCK = ".lock"
 ATTEMPTS = 3
 """A scene whose process is killed (too little memory, a lost node) is tried this often."""
+INTERRUPTED = 130
+"""Exit code of a process that was told to end, as where a node is given back."""
 _TICK = 0.1
 """Seconds between two looks at a process."""
 _MODULE = Path(__file__).with_name("dataset_scene.py")
@@ -87,7 +89,7 @@ def run_task(folder: str, threads: int, stopping: Event) -> Outcome:
         if (path / FAILED).is_file():
             return Outcome(path, str(json.loads((path / FAILED).read_text(encoding="utf-8"))["error"]))
         outcome = Outcome(path, _reason(code, path / "log.txt"))
-        if code > 0:  # a fault of its own: it would come again
+        if code > 0 and code != INTERRUPTED:  # a fault of its own: it would come again
             return outcome
     return outcome
 
@@ -107,6 +109,8 @@ def _run_process(path: Path, threads: int, stopping: Event) -> int:
 
 
 def _reason(code: int, log: Path) -> str:
+    if code == INTERRUPTED:
+        return f"its process was told to end, {ATTEMPTS} times"
     if code < 0:
         return f"its process was killed by signal {-code}, {ATTEMPTS} times (too little memory?)"
     lines = log.read_text(encoding="utf-8", errors="replace").strip().splitlines()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import resource
 import signal
 import subprocess
@@ -187,7 +188,7 @@ def whole(inputs: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str, t
 
 def stopped(arguments: list[str], after: float, sign: signal.Signals) -> tuple[int, str]:
     """Run a command and send it a signal after some seconds; return its exit code and what it said."""
-    hearing = ["env", "--default-signal=INT", *arguments]  # a shell's background jobs are deaf to interrupts
+    hearing = ["env", "--default-signal=INT,HUP", *arguments]  # a shell's background jobs are deaf to interrupts
     with subprocess.Popen(hearing, cwd=ROOT, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True) as process:
         time.sleep(after)
         process.send_signal(sign)
@@ -228,21 +229,31 @@ def test_interrupted_at_any_moment_it_says_so_and_leaves_nothing(
 @pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES)
 def test_killed_at_any_moment_every_file_in_sight_is_whole(
-    name: str, inputs: Path, whole: dict[str, tuple[float, dict[str, bytes]]], tmp_path: Path
+    name: str,
+    inputs: Path,
+    whole: dict[str, tuple[float, dict[str, bytes]]],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """And the next run ends as if nothing had been."""
+    """And the next run ends as if nothing had been: what the killed ones left is gone, from the system's folder too."""
     seconds, complete = whole[name]
     rng, output, killed = np.random.default_rng(6), tmp_path / "out", 0
     (tmp_path / "out").mkdir()
-    for _ in range(10):
+    (temporary := tmp_path / "temporary").mkdir()
+    monkeypatch.setenv("TMPDIR", str(temporary))
+    signs = (signal.SIGKILL, signal.SIGTERM, signal.SIGKILL, signal.SIGHUP, signal.SIGKILL)
+    for number in range(10):
         arguments = [*command(name, inputs, output), "--overwrite"]
-        code, _ = stopped(arguments, float(rng.uniform(0.2, 1.1) * seconds), signal.SIGKILL)
-        killed += code == -signal.SIGKILL
+        sign = signs[number % len(signs)]
+        code, _ = stopped(arguments, float(rng.uniform(0.2, 1.1) * seconds), sign)
+        killed += code in (130, -sign)
         if code == 0:  # the machine has become faster meanwhile
             seconds *= 0.8
         check_whole(output)
     assert killed >= 4
     assert ran([*command(name, inputs, output), "--overwrite"]).returncode == 0
+    assert list(temporary.iterdir()) == []
+    assert sorted(path.name for path in output.iterdir()) == sorted(complete)
     now = files(output)
     same = [file for file in complete if file not in ("report.json", "scene.blend")]  # these hold times
     assert [file for file in same if now[file] != complete[file]] == []
@@ -256,6 +267,47 @@ def test_a_command_that_is_still_loading_ends_quietly() -> None:
     code = "import sys; sys.argv = ['other']; import headless; raise ValueError('mine')"
     done = ran([sys.executable, "-c", code])
     assert (done.returncode, "ValueError: mine" in done.stderr) == (1, True)
+
+
+WAITING = """
+import sys; sys.argv = ["-m"]
+import argparse, sys, tempfile, time
+from headless.commands import leave, run
+
+def work(arguments):
+    tempfile.mkdtemp()
+    print("at work", file=sys.stderr, flush=True)
+    time.sleep(20.0)
+
+leave(lambda: run(work, argparse.Namespace(json=False, quiet=False)))
+"""
+
+
+@pytest.mark.parametrize("sign", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+def test_each_end_from_outside_is_one_line_and_leaves_nothing(sign: signal.Signals, tmp_path: Path) -> None:
+    """A container that is stopped, Slurm, a connection that is lost; some send their signal twice."""
+    environment = {**os.environ, "TMPDIR": str(tmp_path), "PYTHONPATH": str(ROOT)}
+    hearing = ["env", "--default-signal=INT,TERM,HUP", sys.executable, "-c", WAITING]
+    with subprocess.Popen(hearing, env=environment, stderr=subprocess.PIPE, text=True) as process:
+        assert process.stderr is not None
+        assert process.stderr.readline() == "at work\n"
+        assert len(list(tmp_path.iterdir())) == 1
+        for _ in range(2):
+            process.send_signal(sign)
+        _, said = process.communicate(timeout=30)
+    assert (process.returncode, said) == (130, "interrupted; nothing was left half-written\n")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_command_that_nohup_began_goes_on_without_its_terminal(tmp_path: Path) -> None:
+    code = WAITING.replace("time.sleep(20.0)", "time.sleep(0.3)\n    return 0, {}, 'done'")
+    with subprocess.Popen(
+        ["env", "--ignore-signal=HUP", sys.executable, "-c", code], cwd=ROOT, stderr=subprocess.PIPE, text=True
+    ) as process:
+        assert process.stderr is not None
+        process.stderr.readline()
+        process.send_signal(signal.SIGHUP)
+        assert process.wait(timeout=30) == 0
 
 
 @pytest.mark.parametrize("kind", ["RuntimeError", "ModuleNotFoundError"])

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import sys
-import tempfile
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
@@ -15,6 +14,7 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
+from ...base.scratch.folders import scratch_folder
 from ...scanning.colour.colour import MATERIAL_LAYERS
 from .exr import read_layers
 from .surfaces import NUMBER, prepared_materials
@@ -143,7 +143,7 @@ def stage(
     """
     known = {item.name for item in bpy.data.images}
     with ExitStack() as stack:
-        folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="synthroads-")))
+        folder = stack.enter_context(scratch_folder())
         stack.enter_context(prepared_materials(materials, passes.layers, engine == "eevee"))
         stack.callback(_forget_images, known)
         scene = bpy.data.scenes.new(NAME)

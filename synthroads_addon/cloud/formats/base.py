@@ -7,7 +7,7 @@ import json
 import re
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator
-from contextlib import suppress
+from contextlib import ExitStack, suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Self
@@ -18,6 +18,8 @@ from numpy.typing import NDArray
 from ...base.classes import ClassScheme, asprs_scheme, class_scheme, stored_scheme
 from ...base.crs import wkt
 from ...base.errors import InputError, OutputError
+from ...base.files import sync_file
+from ...base.scratch.folders import scratch_folder
 from ..layers import ATTRIBUTES, DEFAULT_ATTRIBUTES, LAYERS, Attribute, Column, attributes_of, columns
 from ..points import PointBlock
 
@@ -49,6 +51,8 @@ class CloudWriter(ABC):
     """Errors that the library beneath raises where it can't write."""
     _file: Any
     """Open temporary file, or the library's handle of it."""
+    _temporary: Path
+    """File that is written, in a scratch folder beside the final place."""
 
     def __init__(
         self,
@@ -70,16 +74,20 @@ class CloudWriter(ABC):
         self.scheme = scheme or class_scheme("17")
         self.count = 0
         self.clipped = 0
-        self._temporary = path.with_name(f".{path.name}.partial")
+        self._scratch = ExitStack()
         if not np.isfinite(self.offset).all() or not (0 < self.intensity_scale < np.inf):
             raise InputError("offset, intensity_scale", [*self.offset, intensity_scale], "must be finite numbers")
 
     def __enter__(self) -> Self:
         try:
+            self._temporary = self._scratch.enter_context(scratch_folder(self.path.parent)) / self.path.name
             self._open()
         except self.faults as problem:
             self._abandon()
             raise self._unwritable(problem) from None
+        except BaseException:
+            self._abandon()
+            raise
         return self
 
     def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
@@ -87,12 +95,15 @@ class CloudWriter(ABC):
         try:
             if kind is None:
                 self._finish()
+                sync_file(self._temporary)
                 self._temporary.replace(self.path)
                 done = True
         except self.faults as problem:
             raise self._unwritable(problem) from None
         finally:
-            if not done:
+            if done:
+                self._scratch.close()
+            else:
                 self._abandon()
 
     def write(self, block: PointBlock) -> None:
@@ -182,11 +193,10 @@ class CloudWriter(ABC):
         self._file.close()
 
     def _abandon(self) -> None:
-        """Close and remove the temporary file; doesn't raise."""
+        """Close what is open and remove the temporary file; doesn't raise."""
         with suppress(Exception):
             self._close()
-        with suppress(OSError):
-            self._temporary.unlink(missing_ok=True)
+        self._scratch.close()
 
     def refused(self, value: object, allowed: str) -> OutputError:
         """Return the error of a value that the file can't hold."""
