@@ -285,6 +285,8 @@ class DatasetRun:
                 (outcome.folder / FILES / name).rename(target)
             entry = SceneEntry.from_dict({**about, "status": "done", **done}, "scene")
             (outcome.folder / "report.json").replace(self.folder / "logs" / f"{job.name}.json")
+            if not entry.points:
+                logger.warning("warning: %s: not one pulse came back", job.name)
             logger.debug("%s is done: %s points", job.name, f"{entry.points:,}")
         else:
             entry = SceneEntry.from_dict({**about, "status": "failed", "error": outcome.error}, "scene")

@@ -72,7 +72,7 @@ def run(arguments: argparse.Namespace) -> Outcome:
 def summary(report: dict[str, Any], output: Path) -> str:
     """Return the report for people: what was made, how long each stage took, where it lies."""
     counts = report.get("counts", {})
-    lines = choice_summary(report)
+    lines = [*(f"warning: {text}" for text in report.get("warnings", [])), *choice_summary(report)]
     if "axis" in report:
         fit = report["axis"]["horizontal"]
         lines.append(

@@ -121,7 +121,6 @@ def summary(report: dict[str, Any], output: Path) -> str:
     counts = report["counts"]
     rows = sorted(counts["points_by_class"].items(), key=lambda row: -row[1])
     lines = [f"  {name:<20} {number:>12,} points" for name, number in rows]
-    lines += [f"warning: {text}" for text in report["warnings"]]
     return "\n".join([*lines, generate.summary(report, output)])
 
 

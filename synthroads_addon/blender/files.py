@@ -2,6 +2,12 @@
 
 from __future__ import annotations
 
+import os
+import shutil
+import sys
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 import bpy
@@ -30,7 +36,41 @@ def save_scene(path: Path, compress: bool = True) -> None:
 
 
 def complaint(error: Exception) -> str:
-    """Return what Blender complains of in one line, without its prefix; of a traceback the last line."""
+    """Return what Blender complains of in one line, without its prefix; of a traceback the error and not its place."""
     lines = [line.strip() for line in str(error).splitlines() if line.strip()]
-    text = lines[-1] if any("Traceback" in line for line in lines) else " ".join(lines)
+    if any("Traceback" in line for line in lines):
+        lines = [line for line in lines if not line.startswith("Location:")][-1:]
+    text = " ".join(lines)
     return text.removeprefix("Error:").strip() or type(error).__name__
+
+
+@contextmanager
+def stderr_if_it_succeeds() -> Iterator[None]:
+    """Hold back what is written to standard error meanwhile, and drop it where an error is raised that says it all.
+
+    Blender prints the whole traceback of an importer in Python besides raising it.
+    """
+    try:
+        saved = os.dup(2)
+    except OSError:  # no standard error at all
+        yield
+        return
+    with tempfile.TemporaryFile() as held, os.fdopen(saved, "wb", closefd=True) as before:
+        _flush_stderr()
+        os.dup2(held.fileno(), 2)
+        try:
+            yield
+            _flush_stderr()
+            held.seek(0)
+            with suppress(OSError):  # whoever read it has left
+                shutil.copyfileobj(held, before)
+        finally:
+            _flush_stderr()
+            os.dup2(before.fileno(), 2)
+
+
+def _flush_stderr() -> None:
+    """Write out what Python still holds back for standard error, if there is one."""
+    if sys.stderr is not None:
+        with suppress(OSError, ValueError):  # it is gone, or closed
+            sys.stderr.flush()

@@ -18,7 +18,7 @@ from ..sampling.road import sample_road
 from ..scenario.scan import scanner_setting
 from ..scenario.scenario import Scenario
 from ..twin.formats import check_formats, twin_file_names
-from .report import FILES, file_names, report_footer, report_header, write_report
+from .report import FILES, empty_scan_warnings, file_names, report_footer, report_header, write_report
 from .road_files import write_road_files
 
 if TYPE_CHECKING:
@@ -62,6 +62,8 @@ def generate(job: Job, progress: Progress = silent) -> dict[str, Any]:
         job, built = choose_settings(job, road, timer, report)
         write_road_files(folder, job.scenario, road, timer)
         scan_and_save(job, road, folder, timer, report, built)
+        if warnings := empty_scan_warnings(report.get("counts", {})):
+            report["warnings"] = warnings
         return write_report(folder, report | report_footer(job.scenario, timer))
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import platform as machine
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -57,6 +57,13 @@ def report_footer(scenario: Scenario, timer: StageTimer) -> dict[str, Any]:
         },
         "cores": available_cores(),
     }
+
+
+def empty_scan_warnings(counts: Mapping[str, Any]) -> list[str]:
+    """Return what to warn of where a scan has no point; nothing where nothing was scanned."""
+    if counts.get("points", 1):
+        return []
+    return ["not one pulse came back: is the scene within the scanner's range and field of view?"]
 
 
 def write_report(folder: Path, report: dict[str, Any]) -> dict[str, Any]:

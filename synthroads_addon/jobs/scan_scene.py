@@ -33,7 +33,7 @@ from ..scanning.scene.mesh import SceneMesh
 from ..scanning.scene.motion import ScannedScene
 from ..scenario.scan import scanner_setting
 from ..scenario.scenario import Output, Scenario
-from .report import file_names, report_footer, report_header, write_report
+from .report import empty_scan_warnings, file_names, report_footer, report_header, write_report
 from .scan.files import CloudFiles, record_to_files
 from .scan.plan import plan_scan, road_view
 
@@ -223,7 +223,5 @@ def scene_view(mesh: SceneMesh) -> TopView:
 
 
 def _warnings_of_counts(counts: dict[str, Any]) -> list[str]:
-    if not counts["points"]:
-        return ["not one pulse came back: is the scene within the scanner's range and field of view?"]
     unlabelled = int(counts["points_by_class"].get("unlabelled", 0))
-    return [f"{unlabelled:,} points have no class"] if unlabelled else []
+    return [*empty_scan_warnings(counts), *([f"{unlabelled:,} points have no class"] if unlabelled else [])]

@@ -217,6 +217,18 @@ def test_tripods_stand_on_the_surface_or_where_they_are_put(scene: Callable[[str
     assert np.allclose(scene_path(job, scene_mesh(), None).positions, [[-15, -5, 1.0 + Tripod.usual["height"]]])
 
 
+def test_a_scan_without_a_point_is_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """As of a tripod that stands in the plane of the only wall."""
+    wall = "v 5 -5 -5\nv 5 5 -5\nv 5 5 5\nv 5 -5 5\nf 1 2 3 4\n"
+    (tmp_path / "wall.obj").write_text(wall)
+    words = [str(tmp_path / "wall.obj"), "--up", "z", "--output", str(tmp_path / "out"), *DRAFT, "--tripod", "5,8,0"]
+    words += ["--set", "scan.platform.turn_seconds=0.2"]
+    assert command("scan", words) == 0
+    told = capsys.readouterr().out
+    assert "warning: not one pulse came back" in told
+    assert "not one pulse came back" in json.loads((tmp_path / "out" / "report.json").read_text())["warnings"][0]
+
+
 @pytest.fixture
 def road_scene(tmp_path: Path) -> tuple[Path, RoadGeometry]:
     """Return a .blend that holds a road of ours with the set that it was built from, and its geometry."""
@@ -326,6 +338,8 @@ def test_a_scan_leaves_a_road_of_ours_as_it_was(road_scene: tuple[Path, RoadGeom
 
 BROKEN = {"broken.glb": b"glTF\x02\x00\x00\x00junk", "broken.blend": b"hello", "broken.ply": b"hello", "a.txt": b""}
 BROKEN |= {"empty.obj": b"# nothing\n", "points.obj": b"v 0 0 0\nv 1 0 0\nv 1 1 0\n", "broken.gltf": b'{"asset":'}
+_SPARSE = b'"accessors":[{"componentType":5126,"count":1,"type":"VEC3","sparse":{}}]'
+BROKEN |= {"nodes.gltf": b'{"asset":{"version":"2.0"},' + _SPARSE + b"}"}
 BROKEN |= {"flat.obj": b"v 0 0 0\nv 1 0 0\nv 2 0 0\nf 1 2 3\n", "cut.stl": b"solid x\nfacet normal 0 0"}
 
 
@@ -336,7 +350,8 @@ BROKEN |= {"flat.obj": b"v 0 0 0\nv 1 0 0\nv 2 0 0\nf 1 2 3\n", "cut.stl": b"sol
         ("missing.glb", [], "SCENE is '{place}': no such file"),
         ("a.txt", [], "SCENE is '{place}': must end in one of .blend, .glb"),
         ("broken.glb", [], "{place}: is damaged ("),
-        ("broken.gltf", [], "SCENE is '{place}': can't be read by Blender: "),
+        ("broken.gltf", [], "{place}: is damaged ("),
+        ("nodes.gltf", [], "SCENE is '{place}': can't be read by Blender: Couldn't parse glTF"),
         ("broken.blend", [], "SCENE is '{place}': can't be read by Blender: "),
         ("broken.ply", [], "{place}: is damaged ("),
         ("cut.stl", [], "SCENE is '{place}': can't be read by Blender: "),

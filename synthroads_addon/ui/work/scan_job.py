@@ -19,7 +19,7 @@ from ...blender.scene.evaluated import CopiedScene, scanned_scene_steps
 from ...blender.services import SnapshotServices
 from ...jobs.generate import Job as PipelineJob
 from ...jobs.generate import check
-from ...jobs.report import file_names, report_footer, report_header, write_report
+from ...jobs.report import empty_scan_warnings, file_names, report_footer, report_header, write_report
 from ...jobs.road_files import write_road_files
 from ...jobs.road_scene import refuse_empty, road_cloud_files
 from ...jobs.scan.files import record_to_files
@@ -166,5 +166,7 @@ def _write_files(scan: RoadScan, measure: _Measure, output: _Output) -> int:
     if set(scenario.outputs) & {"cloud", "previews"}:
         report["counts"] = measure(output)
     points = report.get("counts", {}).get("points", 0)
+    if warnings := empty_scan_warnings(report.get("counts", {})):
+        report["warnings"] = warnings
     write_report(output.folder, report | report_footer(scenario, output.timer))
     return int(points)
