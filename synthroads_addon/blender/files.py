@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
+import io
 import os
 import shutil
-import sys
 import tempfile
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager, redirect_stderr, suppress
 from pathlib import Path
 
 import bpy
@@ -55,22 +55,14 @@ def stderr_if_it_succeeds() -> Iterator[None]:
     except OSError:  # no standard error at all
         yield
         return
-    with tempfile.TemporaryFile() as held, os.fdopen(saved, "wb", closefd=True) as before:
-        _flush_stderr()
+    with tempfile.TemporaryFile() as held, os.fdopen(saved, "wb") as before:
+        text = io.TextIOWrapper(held, encoding="utf-8", errors="backslashreplace", write_through=True)
         os.dup2(held.fileno(), 2)
         try:
-            yield
-            _flush_stderr()
+            with redirect_stderr(text):  # which needn't be the system's standard error
+                yield
             held.seek(0)
             with suppress(OSError):  # whoever read it has left
                 shutil.copyfileobj(held, before)
         finally:
-            _flush_stderr()
             os.dup2(before.fileno(), 2)
-
-
-def _flush_stderr() -> None:
-    """Write out what Python still holds back for standard error, if there is one."""
-    if sys.stderr is not None:
-        with suppress(OSError, ValueError):  # it is gone, or closed
-            sys.stderr.flush()
