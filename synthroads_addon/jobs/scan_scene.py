@@ -28,7 +28,7 @@ from ..scanning.platforms.path import Path as ScanPath
 from ..scanning.platforms.polyline import PolylineGuide
 from ..scanning.platforms.trajectory import RecordedTrajectory, read_trajectory
 from ..scanning.platforms.tripod import Tripod, TripodPath
-from ..scanning.scene.extent import bounds, elevation_at, middle_line
+from ..scanning.scene.extent import body_bounds, elevation_at, middle_line, strays_of
 from ..scanning.scene.mesh import SceneMesh
 from ..scanning.scene.motion import ScannedScene
 from ..scenario.scan import scanner_setting
@@ -175,7 +175,12 @@ def _read_scene(job: SceneScan, mapping: ClassMapping | None) -> _Read:
     if job.origin is not None:
         scene = replace(scene, static=replace(scene.static, origin=np.array(job.origin, dtype=np.float64)))
     unused = [f"{job.classes}: nothing in the scene is named as in {entry}" for entry in scene.unmatched]
-    return _Read(scene, road, open_scene_warnings() + unused)
+    return _Read(scene, road, open_scene_warnings() + unused + _stray_warnings(scene.static))
+
+
+def _stray_warnings(mesh: SceneMesh) -> list[str]:
+    strays = strays_of(mesh) if len(mesh) else None
+    return [f"{strays.count():,} vertices lie far from all others: path and previews leave them out"] if strays else []
 
 
 def scene_path(job: SceneScan, mesh: SceneMesh, geometry: RoadGeometry | None) -> ScanPath:
@@ -213,7 +218,7 @@ def _scanner_place(job: SceneScan, place: tuple[float, ...], mesh: SceneMesh) ->
 
 def scene_view(mesh: SceneMesh) -> TopView:
     """Return a raster that holds the scene, its longer side from left to right."""
-    low, high = bounds(mesh)
+    low, high = body_bounds(mesh)
     start, end = (low + mesh.origin)[:2], (high + mesh.origin)[:2]
     axis = int(np.argmax(end - start))
     reach = float((end - start)[1 - axis]) / 2.0 + _BORDER

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from ..base.classes import ClassScheme
 from ..base.errors import InputError
+from ..base.strays import Strays
 from ..cloud.formats.registry import open_cloud
 from .ground import above_ground
 from .path import CloudPath
@@ -77,6 +78,7 @@ class RoadCloud:
         marked: whether markings are told from pavement by class.
         read: points in the file.
         classes: number of points in the file by class name.
+        strays: points far from all others, which aren't used.
     """
 
     xyz: Float
@@ -88,6 +90,7 @@ class RoadCloud:
     marked: bool
     read: int
     classes: dict[str, int]
+    strays: int = 0
 
     @cached_property
     def surface(self) -> NDArray[np.intp]:
@@ -129,10 +132,24 @@ def read_road_cloud(path: FilePath) -> RoadCloud:
         known = ", ".join(KIND_OF_CLASS)
         raise InputError(str(path), None, f"holds no points of a class that a road is made from ({known})")
     xyz, intensity, kind = (np.concatenate([part[i] for part in parts]) for i in range(3))
+    xyz, intensity, kind, strays = _without_strays(xyz, intensity, kind)
     origin = np.round(np.append(xyz[:, :2].mean(axis=0), xyz[:, 2].min()))
     xyz = xyz - origin
     found = {names.get(int(c), f"class_{c}"): int(counts[c]) for c in np.flatnonzero(counts)}
-    return _sorted_cloud(path, xyz, intensity, kind, (origin, header.epsg, found))
+    return replace(_sorted_cloud(path, xyz, intensity, kind, (origin, header.epsg, found)), strays=strays)
+
+
+def _without_strays(
+    xyz: Float, intensity: NDArray[np.float32], kind: NDArray[np.uint8]
+) -> tuple[Float, NDArray[np.float32], NDArray[np.uint8], int]:
+    """Return the points without those that lie far from all others, and how many these are."""
+    strays = Strays()
+    strays.add(xyz)
+    count = strays.count()
+    if not count:
+        return xyz, intensity, kind, 0
+    stay = strays.stay(xyz)
+    return xyz[stay], intensity[stay], kind[stay], count
 
 
 def kind_table(scheme: ClassScheme) -> NDArray[np.uint8]:

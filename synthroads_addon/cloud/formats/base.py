@@ -20,6 +20,7 @@ from ...base.crs import wkt
 from ...base.errors import InputError, OutputError
 from ...base.files import sync_file
 from ...base.scratch.folders import scratch_folder
+from ...base.strays import FARTHEST
 from ..layers import ATTRIBUTES, DEFAULT_ATTRIBUTES, LAYERS, Attribute, Column, attributes_of, columns
 from ..points import PointBlock
 
@@ -263,15 +264,23 @@ class CloudReader(ABC):
     def __exit__(self, *_: object) -> None:
         self.close()
 
-    @abstractmethod
     def blocks(self, size: int = BLOCK) -> Iterator[PointBlock]:
         """Yield all points in the file's order, at most ``size`` at a time.
 
         What the file doesn't hold is 0, or NaN for range and incidence.
 
         Raises:
-            InputError: the file is truncated or damaged.
+            InputError: the file is truncated or damaged, or holds a coordinate that lies on no map, or an intensity
+                that is no number.
         """
+        done = 0
+        for block in self._stored_blocks(size):
+            yield _checked(self.header.path, done, block)
+            done += len(block)
+
+    @abstractmethod
+    def _stored_blocks(self, size: int) -> Iterator[PointBlock]:
+        """Yield what the file holds; see `blocks`."""
 
     def close(self) -> None:
         """Close the file; it may be closed already."""
@@ -361,6 +370,21 @@ def finite_coordinates(path: Path, done: int, xyz: NDArray[np.float64]) -> NDArr
         point, axis = np.argwhere(~np.isfinite(xyz))[0]
         raise InputError(f"{path}: {'xyz'[axis]} of point {done + point:,}", xyz[point, axis], "must be finite")
     return xyz
+
+
+def _checked(path: Path, done: int, block: PointBlock) -> PointBlock:
+    """Return a block as it is; raise `InputError` if a coordinate or intensity can't be one."""
+    if not len(block):
+        return block
+    xyz = finite_coordinates(path, done, block.xyz)
+    if max(xyz.max(), -xyz.min()) > FARTHEST:
+        point, axis = divmod(int(np.abs(xyz).argmax()), 3)
+        allowed = f"must be a map coordinate, at most {FARTHEST:g} m"
+        raise InputError(f"{path}: {'xyz'[axis]} of point {done + point:,}", float(xyz[point, axis]), allowed)
+    if not np.isfinite(block.intensity).all():
+        point = int(np.argmin(np.isfinite(block.intensity)))
+        raise InputError(f"{path}: intensity of point {done + point:,}", block.intensity[point], "must be finite")
+    return block
 
 
 def damage_error(path: Path, at: int, count: int) -> InputError:

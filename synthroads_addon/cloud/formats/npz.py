@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 from ...base.errors import InputError
 from ..layers import columns, layer_arrays, make_points
 from ..points import POINT_TYPES, PointBlock
-from .base import BLOCK, CloudReader, CloudWriter, damage_error, finite_coordinates, header_from_notes
+from .base import CloudReader, CloudWriter, damage_error, finite_coordinates, header_from_notes
 
 _ON_REQUEST = {name: (np.dtype(kind).str, width) for name, (kind, width) in layer_arrays().items()}
 ARCHIVE_FAULTS = (
@@ -114,8 +114,8 @@ class NpzReader(CloudReader):
             has_color="rgb" in arrays,
         )
 
-    def blocks(self, size: int = BLOCK) -> Iterator[PointBlock]:
-        """Yield all points in the file's order; see `CloudReader.blocks`."""
+    def _stored_blocks(self, size: int) -> Iterator[PointBlock]:
+        """See `CloudReader._stored_blocks`."""
         members = {name: self._file.open(f"{name}.npy") for name in self._kinds}
         try:
             for member in members.values():
