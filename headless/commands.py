@@ -36,6 +36,7 @@ def _missing(error: ModuleNotFoundError) -> str:
 
 try:
     from synthroads_addon.base.schema import canonical_json
+    from synthroads_addon.scenario.scan import MOST_POSSIBLE
     from synthroads_addon.scenario.scenario import apply_change
     from synthroads_addon.scenario.tolerance import KINDS, TIMES, parse_tolerance, with_unit, written_error
     from synthroads_addon.twin.formats import TWIN_FORMATS
@@ -144,6 +145,12 @@ def all_changes(arguments: argparse.Namespace, short: Mapping[str, str]) -> list
             raise InputError(option, value, f"contradicts --set {path}={other}; leave one of the two out")
         changes.append(f"{path}={json.dumps(value)}")
     return changes
+
+
+def add_allow_large_argument(parser: argparse.ArgumentParser) -> None:
+    """Add ``--allow-large``, short for a value of the field ``scan.most_pulses``."""
+    text = "do a scan of any size: without it one of more pulses than scan.most_pulses is refused"
+    parser.add_argument("--allow-large", action="store_const", const=MOST_POSSIBLE, help=text)
 
 
 def add_choice_arguments(parser: argparse.ArgumentParser) -> None:

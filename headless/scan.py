@@ -15,6 +15,7 @@ if __name__ == "__main__":
 from headless import generate
 from headless.commands import (
     Outcome,
+    add_allow_large_argument,
     add_changes_argument,
     add_choice_arguments,
     add_common_arguments,
@@ -34,6 +35,7 @@ _FIELDS = {
     "rays": "scan.rays_per_pulse",
     "seed": "seed",
     "fidelity": "fidelity",
+    "allow_large": "scan.most_pulses",
 }
 """Arguments that are short for fields of the scenario."""
 
@@ -68,6 +70,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     text = "point on the trade-off (the scenario's own)"
     parser.add_argument("--fidelity", choices=("draft", "standard", "high"), help=text)
     add_choice_arguments(parser)
+    add_allow_large_argument(parser)
     parser.add_argument("--epsg", type=int, metavar="N", help="coordinate system of the map (that of the scene's road)")
     parser.add_argument("--origin", type=_origin, metavar="X,Y,Z", help="map coordinates of the scene's origin (0,0,0)")
     parser.add_argument("--up", choices=("y", "z"), help="what points up in .obj (y), .ply and .stl (z)")

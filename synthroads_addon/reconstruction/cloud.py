@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from ..base.classes import ClassScheme
 from ..base.errors import InputError
-from ..base.strays import Strays
 from ..cloud.formats.registry import open_cloud
+from ..cloud.strays import Strays
 from .ground import above_ground
 from .path import CloudPath
 

@@ -20,6 +20,7 @@ from .colour.colour import LayerSource
 from .colour.request import LayerRequest
 from .devices.device import ScannerSetting
 from .effects import EchoEffect
+from .forecast import ScanForecast, forecast_scan
 from .noise import Noise
 from .platforms.path import Path, Strip
 from .relief import MicroRelief
@@ -159,6 +160,10 @@ class ScanPlan:
     def blocks(self) -> Iterator[Block]:
         """Yield (strip, number) of every block that is scanned, in the order of time."""
         return self.cut.all() if self.only is None else iter(self.only)
+
+    def forecast(self) -> ScanForecast:
+        """Return what the scan of the whole path will take."""
+        return forecast_scan(self.cut, self.target.triangles, self.threads)
 
     def block_count(self) -> int:
         """Return how many blocks are scanned."""

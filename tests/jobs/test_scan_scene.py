@@ -217,6 +217,45 @@ def test_tripods_stand_on_the_surface_or_where_they_are_put(scene: Callable[[str
     assert np.allclose(scene_path(job, scene_mesh(), None).positions, [[-15, -5, 1.0 + Tripod.usual["height"]]])
 
 
+def test_a_scene_with_a_vertex_astray_is_scanned_where_it_is(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Its path and previews are those of the scene without it; one that lies on no map is refused."""
+    ground = "".join(f"v {x} {y} 0\n" for x in range(-12, 13, 3) for y in range(-12, 13, 3))
+    corners = [9 * i + j + 1 for i in range(8) for j in range(8)]
+    faces = "".join(f"f {at} {at + 9} {at + 10} {at + 1}\n" for at in corners)
+    points = []
+    for name, far in (("plain", ""), ("stray", "v 5e5 0 0\nf 1 2 82\n")):
+        (tmp_path / f"{name}.obj").write_text(ground + faces + far)
+        las = scan(tmp_path / f"{name}.obj", tmp_path / name, "--up", "z", "--height", "30", "--speed", "30")
+        points.append(len(las))
+    assert points[1] == pytest.approx(points[0], rel=0.1)
+    report = json.loads((tmp_path / "stray" / "report.json").read_text())
+    assert report["warnings"][0] == "1 vertices lie far from all others: path and previews leave them out"
+    (tmp_path / "far.obj").write_text(ground + faces + "v 4e8 0 0\nf 1 2 82\n")
+    capsys.readouterr()
+    words = [str(tmp_path / "far.obj"), "--up", "z", "--output", str(tmp_path / "out"), "--quiet"]
+    assert command("scan", words) == 2
+    assert "must lie within 1e+08 m of the scene's origin" in capsys.readouterr().err
+
+
+def test_a_scan_larger_than_anyone_can_have_meant_is_refused(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A yard in millimetres: 20 km long."""
+    (tmp_path / "yard.obj").write_text("v -1e7 -20 0\nv 1e7 -20 0\nv 1e7 20 0\nv -1e7 20 0\nf 1 2 3 4\n")
+    words = [str(tmp_path / "yard.obj"), "--up", "z", "--output", str(tmp_path / "out"), "--quiet", "--height", "30"]
+    assert command("scan", words) == 2
+    told = capsys.readouterr().err
+    assert "scan.most_pulses is 5000000000: " in told
+    assert "--allow-large" in told
+    assert len(told.splitlines()) == 1
+    (tmp_path / "yard.obj").write_text("v -5 -5 0\nv 5 -5 0\nv 5 5 0\nv -5 5 0\nf 1 2 3 4\n")
+    assert command("scan", [*words, *DRAFT, "--set", "scan.most_pulses=10"]) == 2
+    assert "scan.most_pulses is 10: " in capsys.readouterr().err
+    assert command("scan", [*words, *DRAFT, "--allow-large"]) == 0
+
+
 def test_a_scan_without_a_point_is_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """As of a tripod that stands in the plane of the only wall."""
     wall = "v 5 -5 -5\nv 5 5 -5\nv 5 5 5\nv 5 -5 5\nf 1 2 3 4\n"

@@ -20,9 +20,9 @@ from ...base.crs import wkt
 from ...base.errors import InputError, OutputError
 from ...base.files import sync_file
 from ...base.scratch.folders import scratch_folder
-from ...base.strays import FARTHEST
 from ..layers import ATTRIBUTES, DEFAULT_ATTRIBUTES, LAYERS, Attribute, Column, attributes_of, columns
 from ..points import PointBlock
+from ..strays import FARTHEST
 
 
 class CloudWriter(ABC):

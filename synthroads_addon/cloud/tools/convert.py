@@ -15,10 +15,10 @@ from ...base.errors import InputError, OutputError
 from ...base.files import output_folder
 from ...base.progress import Progress, silent
 from ...base.schema import read_json
-from ...base.strays import Strays
 from ..formats.base import BLOCK, CloudReader, CloudWriter
 from ..formats.registry import check_ending, open_cloud, open_writer
 from ..points import PointBlock, concatenate
+from ..strays import Strays
 from .previews import CrossSection, TopView
 from .quantile_mapping import IntensityMapping, steps_per_unit
 from .subsample import GridSubsampler

@@ -9,8 +9,10 @@ from ...cloud.tools.previews import TopView
 from ...materials.surfaces import surfaces_of
 from ...materials.variation import vary_material
 from ...road.geometry import RoadGeometry
-from ...scanning.beam import RINGS
+from ...scanning.beam import RINGS, beam_pattern
+from ...scanning.blocks import Blocks
 from ...scanning.colour.request import LayerRequest
+from ...scanning.forecast import forecast_scan, refuse_large
 from ...scanning.plan import ScanConditions, ScanPlan, SceneServices
 from ...scanning.platforms.guides import RoadGuide
 from ...scanning.platforms.path import Path as ScanPath
@@ -51,6 +53,9 @@ def plan_scan(
         for name, mean in zip(materials, means, strict=True)
     ]
     loss, weather = scan.attenuation, scan.weather or weather_of(conditions.environment)
+    rings = RINGS[settings.rays_per_pulse] if scan.beam_rings is None else scan.beam_rings
+    cut = Blocks(setting, path, len(beam_pattern(rings).weights))
+    refuse_large(forecast_scan(cut, len(scene.static), scan.threads), scan.most_pulses)
     coloured, shifts = coloured_layers(scenario), scan.relief > 0.0
     colour = scenario.colour.settings(scenario.fidelity, path.typical_range)
     return ScanPlan(
@@ -59,7 +64,7 @@ def plan_scan(
         surfaces=surfaces_of(scanned, scan.reflection, spread=not by_layers),
         setting=setting,
         path=path,
-        rings=RINGS[settings.rays_per_pulse] if scan.beam_rings is None else scan.beam_rings,
+        rings=rings,
         seed=scenario.seed,
         noise=scan.noise,
         attenuation=weather.attenuation(setting.device.wavelength_nm) if loss is None else loss,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ...base.strays import Strays
+from ...cloud.strays import Strays
 from .mesh import SceneMesh
 
 Float = NDArray[np.float64]

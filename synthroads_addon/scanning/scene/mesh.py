@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...base.errors import InputError
-from ...base.strays import FARTHEST
+from ...cloud.strays import FARTHEST
 
 _BLOCK = 1 << 18
 _SHAPES: dict[str, tuple[type, tuple[int | None, ...]]] = {

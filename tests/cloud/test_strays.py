@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from synthroads_addon.base import strays as module
-from synthroads_addon.base.strays import Strays
+from synthroads_addon.cloud import strays as module
+from synthroads_addon.cloud.strays import Strays
 
 
 def around(middle: tuple[float, float, float], count: int = 5000, size: float = 300.0) -> np.ndarray:
