@@ -16,7 +16,7 @@ INTERRUPTED = "interrupted; nothing was left half-written"
 _stopped = False
 _AGAIN = 0.05
 """Seconds until an interrupt that came inside a callback is tried again."""
-_ONCE = 1.0
+_ONCE = 3.0
 """Seconds in which several signals are one: `timeout` and Slurm send theirs to a process and to its group."""
 _ended_at = -math.inf
 _OPERATORS = str(Path("modules", "bpy", "ops.py"))
@@ -43,6 +43,13 @@ def _stop(number: int, frame: FrameType | None) -> None:
         return
     _ended_at = time.monotonic()
     signal.default_int_handler(signal.SIGINT, frame)
+
+
+def finish_in_peace() -> None:
+    """Hear no more signals: the process has nothing left to do but to clean up and end."""
+    for name in filter(partial(hasattr, signal), _ENDS):
+        with suppress(ValueError):  # not in the main thread
+            signal.signal(getattr(signal, name), signal.SIG_IGN)
 
 
 def _in_callback(frame: FrameType | None) -> bool:

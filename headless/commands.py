@@ -6,6 +6,7 @@ Exit codes: 0 done; 1 a defect of ours; 2 bad input; 3 violations found, or scen
 from __future__ import annotations
 
 import argparse
+import errno
 import io
 import json
 import os
@@ -16,7 +17,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-from headless import INTERRUPTED, was_stopped
+from headless import INTERRUPTED, finish_in_peace, was_stopped
 from headless.messages import messages
 from synthroads_addon.base.errors import InputError
 from synthroads_addon.base.scratch.folders import remove_own, temporary_files_in_scratch
@@ -257,8 +258,30 @@ def run(action: Callable[[argparse.Namespace], Outcome], arguments: argparse.Nam
         # Whoever read our output has left (`| head`): nothing more to say, not even when the process ends.
         os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
         return 130
+    except (MemoryError, OSError, RuntimeError) as error:
+        if not (reason := _shortage(error)):
+            raise
+        if was_stopped():
+            return report_interrupt()
+        print(f"error: {reason}", file=sys.stderr)
+        return 2
     except KeyboardInterrupt:
         return report_interrupt()
+
+
+def _shortage(error: Exception) -> str | None:
+    """Return what to say of an error by which a machine tells that it is too small; None of any other."""
+    text = " ".join(str(error).split())
+    if isinstance(error, MemoryError) or any(sign in text for sign in _MEMORY_SIGNS):
+        return f"too little memory ({text[:200] or 'it is full'}); nothing was left half-written"
+    if isinstance(error, OSError) and error.errno in _NO_ROOM:
+        return f"{error.filename or 'a temporary file'} cannot be written ({error.strerror}); TMPDIR names another folder"
+    return None
+
+
+_MEMORY_SIGNS = ("can't allocate memory", "out of memory", "can't start new thread", "bad_alloc")
+"""Parts of the errors by which libraries in other languages tell that memory is short."""
+_NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EMFILE, errno.ENFILE)
 
 
 def report_interrupt() -> int:
@@ -299,6 +322,7 @@ def leave(action: Callable[[], int]) -> None:
 
             traceback.print_exc()
             code = 1
+    finish_in_peace()
     remove_own()
     for stream in (sys.stdout, sys.stderr):
         with suppress(OSError):  # the terminal is gone

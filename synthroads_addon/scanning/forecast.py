@@ -1,4 +1,4 @@
-"""What a scan will take, told before it begins; and the refusal of one that nobody can have meant."""
+"""Forecast of a scan before it begins: pulses, time, memory; and the refusal of one that nobody can have meant."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _POINT = 10.0
 
 @dataclass(frozen=True)
 class ScanForecast:
-    """What a scan is expected to take, to the order of magnitude.
+    """Expected size and cost of a scan, to the order of magnitude.
 
     Attributes:
         pulses: of all strips.

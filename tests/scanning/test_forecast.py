@@ -1,4 +1,4 @@
-"""What a scan will take, before it begins: told, and refused where it is more than anyone can have meant."""
+"""Forecasts of scans: near what they take, and a refusal of what is more than anyone can have meant."""
 
 from __future__ import annotations
 

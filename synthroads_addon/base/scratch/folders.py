@@ -15,6 +15,7 @@ from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 
+from ..errors import OutputError
 from .locks import try_lock
 from .owner import is_dead, read_owner, this_process
 
@@ -74,6 +75,14 @@ def _use_for_temporary_files(variables: dict[str, str | None], folder: str | Non
     tempfile.tempdir = folder
 
 
+def unwritable_temporary(folder: Path, error: Exception) -> OutputError:
+    """Return the error of a temporary folder to which something couldn't be written."""
+    reason, place = getattr(error, "strerror", None) or "is the disk full?", folder
+    while _NAME.fullmatch(place.name):
+        place = place.parent
+    return OutputError("temporary folder", str(place), f"cannot be written ({reason}); TMPDIR names another")
+
+
 def remove_leftovers(parent: Path) -> None:
     """Remove the scratch folders in a folder whose owners are known to be dead; doesn't raise."""
     with suppress(OSError), os.scandir(parent) as entries:
@@ -122,11 +131,12 @@ def _remove(folder: Path) -> None:
             elif entry.name != LOCK:
                 with suppress(OSError):
                     Path(entry.path).unlink()
-    lock = _mine.pop(folder, None)
+    lock = _mine.get(folder)
     if lock is not None:
         with suppress(OSError):
             os.close(lock)
     shutil.rmtree(folder, ignore_errors=True)
+    _mine.pop(folder, None)  # not before: where this is cut off `remove_own` goes on with it
 
 
 def _remove_leftover(folder: Path) -> None:

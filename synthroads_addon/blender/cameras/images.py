@@ -10,7 +10,7 @@ import bpy
 import numpy as np
 from mathutils import Matrix
 
-from ...base.scratch.folders import scratch_folder
+from ...base.scratch.folders import scratch_folder, unwritable_temporary
 from ...scanning.colour.colour import MaterialLayers
 from ...scanning.colour.images import ImageLayers
 from ...scanning.colour.views import RenderedImage, View
@@ -67,7 +67,10 @@ class RenderedLayers(ImageLayers):
 
     def _map_file(self, name: str, array: np.ndarray[Any, Any]) -> np.ndarray[Any, Any]:
         path = self._folder / f"{name}.npy"
-        np.save(path, array)
+        try:
+            np.save(path, array)
+        except OSError as error:
+            raise unwritable_temporary(self._folder, error) from None
         # An empty array can't be mapped.
         return np.load(path, mmap_mode="r" if array.size else None)
 

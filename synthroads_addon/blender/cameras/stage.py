@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import errno
 import os
+import shutil
 import sys
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
@@ -14,13 +16,15 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from ...base.scratch.folders import scratch_folder
+from ...base.scratch.folders import scratch_folder, unwritable_temporary
 from ...scanning.colour.colour import MATERIAL_LAYERS
 from .exr import read_layers
 from .surfaces import NUMBER, prepared_materials
 from .versions import eevee_engine, multilayer_exr
 
 NAME = "SR Stage"
+_LEAST_FREE = 1 << 16
+"""Bytes that are free on a disk to which an image could be written to its end."""
 SUN_GROUP, SKY_GROUP = "sun", "sky"
 """Light groups of the lit image, where both are rendered."""
 _POSITION, _DEPTH = "Position", "Depth"
@@ -89,14 +93,25 @@ class RenderStage:
         self.images = self.pixels = 0
 
     def render(self, width: int, height: int) -> RenderedPasses:
-        """Render an image through the camera as it is; must run on Blender's main thread."""
+        """Render an image through the camera as it is; must run on Blender's main thread.
+
+        Raises:
+            OutputError: the image can't be written to the temporary folder.
+        """
         render, path = self.scene.render, self.folder / "image.exr"
         render.resolution_x, render.resolution_y, render.resolution_percentage = width, height, 100
         render.filepath = str(path)
+        path.unlink(missing_ok=True)  # where the new one can't be written the old one isn't taken for it
         with _silence():
             bpy.ops.render.render(write_still=True, scene=self.scene.name)
         self.images, self.pixels = self.images + 1, self.pixels + width * height
-        return self._read(read_layers(path))
+        full = shutil.disk_usage(self.folder).free < _LEAST_FREE  # Blender says nothing of an image that is cut
+        try:
+            if full:
+                raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+            return self._read(read_layers(path))
+        except (OSError, LookupError, StopIteration, RuntimeError) as error:
+            raise unwritable_temporary(self.folder, error) from None
 
     def forget(self) -> None:
         """Have the renderer drop what it keeps from image to image."""

@@ -200,3 +200,22 @@ def test_a_system_without_boot_ids_still_knows_its_own(monkeypatch: pytest.Monke
     assert not is_dead(mine, None)
     assert is_dead(replace(mine, pid=mine.pid + 1), None)
     assert json.loads(mine.to_json())["boot"] == ""
+
+
+def test_a_removal_that_is_cut_off_is_ended_before_the_process_does(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As by a second signal."""
+    tree, cuts = folders.shutil.rmtree, ["once"]
+
+    def cut(folder: Path, ignore_errors: bool) -> None:
+        if cuts:
+            cuts.pop()
+            raise KeyboardInterrupt
+        tree(folder, ignore_errors=ignore_errors)
+
+    monkeypatch.setattr(folders.shutil, "rmtree", cut)
+    with pytest.raises(KeyboardInterrupt), scratch_folder(tmp_path):
+        pass
+    remove_own()
+    assert list(tmp_path.iterdir()) == []
