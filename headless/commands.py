@@ -244,29 +244,30 @@ def run(action: Callable[[argparse.Namespace], Outcome], arguments: argparse.Nam
                 print(line)
         sys.stdout.flush()
         return code
-    except InputError as error:
-        if was_stopped():  # and lost its workers by that
-            return report_interrupt()
-        print(f"error: {error}", file=sys.stderr)
-        return 2
-    except ModuleNotFoundError as error:
-        if was_stopped():
-            return report_interrupt()
-        print(_missing(error), file=sys.stderr)
-        return 2
     except BrokenPipeError:
         # Whoever read our output has left (`| head`): nothing more to say, not even when the process ends.
         os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
         return 130
-    except (MemoryError, OSError, RuntimeError) as error:
-        if not (reason := _shortage(error)):
-            raise
-        if was_stopped():
-            return report_interrupt()
-        print(f"error: {reason}", file=sys.stderr)
-        return 2
     except KeyboardInterrupt:
         return report_interrupt()
+    except Exception as error:
+        if was_stopped():  # which libraries turn into errors of their own, and workers into the loss of them
+            return report_interrupt()
+        told = _line_of(error)
+        if told is None:
+            raise
+        print(told, file=sys.stderr)
+        return 2
+
+
+def _line_of(error: Exception) -> str | None:
+    """Return the line that an error is told in; None where it is a defect of ours."""
+    if isinstance(error, InputError):
+        return f"error: {error}"
+    if isinstance(error, ModuleNotFoundError):
+        return _missing(error)
+    reason = _shortage(error)
+    return reason and f"error: {reason}"
 
 
 def _shortage(error: Exception) -> str | None:
@@ -275,7 +276,8 @@ def _shortage(error: Exception) -> str | None:
     if isinstance(error, MemoryError) or any(sign in text for sign in _MEMORY_SIGNS):
         return f"too little memory ({text[:200] or 'it is full'}); nothing was left half-written"
     if isinstance(error, OSError) and error.errno in _NO_ROOM:
-        return f"{error.filename or 'a temporary file'} cannot be written ({error.strerror}); TMPDIR names another folder"
+        name = error.filename or "a temporary file"
+        return f"{name} cannot be written ({error.strerror}); TMPDIR names another folder"
     return None
 
 

@@ -124,6 +124,41 @@ def test_a_disk_that_is_full(name: str, kilobytes: int, inputs: Path, tmp_path: 
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("kilobytes", [60, 400])
+def test_a_folder_for_temporary_files_that_is_full(
+    kilobytes: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """While images are rendered."""
+    images = [word if word != 'colour.source="material"' else 'colour.source="images"' for word in SETTINGS]
+    arguments = [sys.executable, "-m", "headless.generate", *images, "--quiet", "--output", str(tmp_path / "out")]
+    with small_disk(tmp_path / "disk", kilobytes) as disk:
+        monkeypatch.setenv("TMPDIR", str(disk))
+        done = ran(arguments)
+        refused(done)
+        assert str(disk) in done.stderr
+        assert list(disk.iterdir()) == []
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(
+    ("error", "says"),
+    [
+        ("MemoryError('Unable to allocate 537. TiB')", "error: too little memory (Unable to allocate 537. TiB)"),
+        ("RuntimeError(\"DefaultCPUAllocator: can't allocate memory: 8 bytes\")", "error: too little memory (Default"),
+        ("RuntimeError(\"can't start new thread\")", "error: too little memory (can't start new thread); nothing"),
+        ("OSError(28, 'No space left on device', '/tmp/x')", "error: /tmp/x cannot be written (No space left"),
+    ],
+)
+def test_a_machine_that_is_too_small_is_told_in_a_line(error: str, says: str) -> None:
+    code = "import argparse; from headless.commands import leave, run\n"
+    code += f"def work(arguments):\n    raise {error}\n"
+    code += "leave(lambda: run(work, argparse.Namespace(json=False, quiet=False)))"
+    done = ran([sys.executable, "-c", code])
+    assert (done.returncode, len(done.stderr.splitlines())) == (2, 1), done.stderr
+    assert done.stderr.startswith(says)
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize("output", ["scene", "cloud", "previews", "parameters"])
 @pytest.mark.parametrize("size", [100, 3000])
 def test_files_that_may_not_grow(output: str, size: int, inputs: Path, tmp_path: Path) -> None:

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from ...base.scratch.folders import scratch_folder, unwritable_temporary
 from ...scanning.colour.colour import MATERIAL_LAYERS
+from ..files import stderr_if_it_succeeds
 from .exr import read_layers
 from .surfaces import NUMBER, prepared_materials
 from .versions import eevee_engine, multilayer_exr
@@ -102,13 +103,12 @@ class RenderStage:
         render.resolution_x, render.resolution_y, render.resolution_percentage = width, height, 100
         render.filepath = str(path)
         path.unlink(missing_ok=True)  # where the new one can't be written the old one isn't taken for it
-        with _silence():
-            bpy.ops.render.render(write_still=True, scene=self.scene.name)
         self.images, self.pixels = self.images + 1, self.pixels + width * height
-        full = shutil.disk_usage(self.folder).free < _LEAST_FREE  # Blender says nothing of an image that is cut
         try:
-            if full:
-                raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+            with _silence(), stderr_if_it_succeeds():
+                bpy.ops.render.render(write_still=True, scene=self.scene.name)
+                if shutil.disk_usage(self.folder).free < _LEAST_FREE:  # Blender raises nothing where an image is cut
+                    raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
             return self._read(read_layers(path))
         except (OSError, LookupError, StopIteration, RuntimeError) as error:
             raise unwritable_temporary(self.folder, error) from None
