@@ -1,33 +1,55 @@
 """Thin command lines over `synthroads_addon`; each module is one sub-command."""
 
 import _thread
+import math
 import os
 import signal
 import sys
 import threading
+import time
+from contextlib import suppress
+from functools import partial
 from pathlib import Path
 from types import FrameType, TracebackType
 
+INTERRUPTED = "interrupted; nothing was left half-written"
 _stopped = False
 _AGAIN = 0.05
 """Seconds until an interrupt that came inside a callback is tried again."""
+_ONCE = 3.0
+"""Seconds in which several signals are one: `timeout` and Slurm send theirs to a process and to its group."""
+_ended_at = -math.inf
 _OPERATORS = str(Path("modules", "bpy", "ops.py"))
 
 
+_ENDS = ("SIGINT", "SIGTERM", "SIGHUP")
+"""Signals by which a command is ended: Ctrl-C; a container, Slurm or `kill`; a terminal or connection that goes."""
+
+
 def was_stopped() -> bool:
-    """Return whether the user has stopped the command, whatever error came of it: libraries turn Ctrl-C into others."""
+    """Return whether the command was told to end, whatever error came of it: libraries turn Ctrl-C into others."""
     return _stopped
 
 
 def _stop(number: int, frame: FrameType | None) -> None:
-    global _stopped
+    global _stopped, _ended_at
     _stopped = True
+    if time.monotonic() < _ended_at + _ONCE:
+        return
     if _in_callback(frame):
         again = threading.Timer(_AGAIN, _thread.interrupt_main)
         again.daemon = True
         again.start()
         return
-    signal.default_int_handler(number, frame)
+    _ended_at = time.monotonic()
+    signal.default_int_handler(signal.SIGINT, frame)
+
+
+def finish_in_peace() -> None:
+    """Hear no more signals: the process has nothing left to do but to clean up and end."""
+    for name in filter(partial(hasattr, signal), _ENDS):
+        with suppress(ValueError):  # not in the main thread
+            signal.signal(getattr(signal, name), signal.SIG_IGN)
 
 
 def _in_callback(frame: FrameType | None) -> bool:
@@ -45,12 +67,15 @@ def _end_quietly(kind: type[BaseException], error: BaseException, trace: Traceba
     if not issubclass(kind, KeyboardInterrupt) and not _stopped:
         sys.__excepthook__(kind, error, trace)
         return
-    print("interrupted; nothing was left half-written", file=sys.stderr, flush=True)
+    with suppress(OSError):  # the terminal is gone
+        print(INTERRUPTED, file=sys.stderr, flush=True)
     os._exit(130)
 
 
 _started = Path(sys.argv[0]) if sys.argv else Path()
 if _started.name in ("-m", "synthroads") or _started.parent.name == "headless":  # a command, not a library
     sys.excepthook = _end_quietly
-    if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
-        signal.signal(signal.SIGINT, _stop)
+    for _name in filter(partial(hasattr, signal), _ENDS):
+        # One that is ignored stays so: `nohup` and a shell's background jobs ask for that.
+        if signal.getsignal(getattr(signal, _name)) in (signal.default_int_handler, signal.SIG_DFL):
+            signal.signal(getattr(signal, _name), _stop)

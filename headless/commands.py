@@ -6,19 +6,21 @@ Exit codes: 0 done; 1 a defect of ours; 2 bad input; 3 violations found, or scen
 from __future__ import annotations
 
 import argparse
+import errno
 import io
 import json
 import os
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-from headless import was_stopped
+from headless import INTERRUPTED, finish_in_peace, was_stopped
 from headless.messages import messages
 from synthroads_addon.base.errors import InputError
+from synthroads_addon.base.scratch.folders import remove_own, temporary_files_in_scratch
 
 
 def _missing(error: ModuleNotFoundError) -> str:
@@ -35,6 +37,7 @@ def _missing(error: ModuleNotFoundError) -> str:
 
 try:
     from synthroads_addon.base.schema import canonical_json
+    from synthroads_addon.scenario.scan import MOST_POSSIBLE
     from synthroads_addon.scenario.scenario import apply_change
     from synthroads_addon.scenario.tolerance import KINDS, TIMES, parse_tolerance, with_unit, written_error
     from synthroads_addon.twin.formats import TWIN_FORMATS
@@ -147,6 +150,12 @@ def all_changes(arguments: argparse.Namespace, short: Mapping[str, str]) -> list
             raise InputError(option, value, f"contradicts --set {path}={other}; leave one of the two out")
         changes.append(f"{path}={json.dumps(value)}")
     return changes
+
+
+def add_allow_large_argument(parser: argparse.ArgumentParser) -> None:
+    """Add ``--allow-large``, short for a value of the field ``scan.most_pulses``."""
+    text = "do a scan of any size: without it one of more pulses than scan.most_pulses is refused"
+    parser.add_argument("--allow-large", action="store_const", const=MOST_POSSIBLE, help=text)
 
 
 def add_choice_arguments(parser: argparse.ArgumentParser) -> None:
@@ -265,25 +274,52 @@ def run(action: Callable[[argparse.Namespace], Outcome], arguments: argparse.Nam
                 print(line)
         sys.stdout.flush()
         return code
-    except InputError as error:
-        print(f"error: {error}", file=sys.stderr)
-        return 2
-    except ModuleNotFoundError as error:
-        if was_stopped():
-            return report_interrupt()
-        print(_missing(error), file=sys.stderr)
-        return 2
     except BrokenPipeError:
         # Whoever read our output has left (`| head`): nothing more to say, not even when the process ends.
         os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
         return 130
     except KeyboardInterrupt:
         return report_interrupt()
+    except Exception as error:
+        if was_stopped():  # which libraries turn into errors of their own, and workers into the loss of them
+            return report_interrupt()
+        told = _line_of(error)
+        if told is None:
+            raise
+        print(told, file=sys.stderr)
+        return 2
+
+
+def _line_of(error: Exception) -> str | None:
+    """Return the line that an error is told in; None where it is a defect of ours."""
+    if isinstance(error, InputError):
+        return f"error: {error}"
+    if isinstance(error, ModuleNotFoundError):
+        return _missing(error)
+    reason = _shortage(error)
+    return reason and f"error: {reason}"
+
+
+def _shortage(error: Exception) -> str | None:
+    """Return what to say of an error by which a machine tells that it is too small; None of any other."""
+    text = " ".join(str(error).split())
+    if isinstance(error, MemoryError) or any(sign in text for sign in _MEMORY_SIGNS):
+        return f"too little memory ({text[:200] or 'it is full'}); nothing was left half-written"
+    if isinstance(error, OSError) and error.errno in _NO_ROOM:
+        name = error.filename or "a temporary file"
+        return f"{name} cannot be written ({error.strerror}); TMPDIR names another folder"
+    return None
+
+
+_MEMORY_SIGNS = ("can't allocate memory", "out of memory", "can't start new thread", "bad_alloc")
+"""Parts of the errors by which libraries in other languages tell that memory is short."""
+_NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EMFILE, errno.ENFILE)
 
 
 def report_interrupt() -> int:
     """Say that the user stopped the work; return the exit code."""
-    print("interrupted; nothing was left half-written", file=sys.stderr)
+    with suppress(OSError):  # the terminal is gone
+        print(INTERRUPTED, file=sys.stderr, flush=True)
     return 130
 
 
@@ -304,7 +340,8 @@ def leave(action: Callable[[], int]) -> None:
         if isinstance(stream, io.TextIOWrapper):  # names of files may hold what the terminal's encoding doesn't
             stream.reconfigure(errors="backslashreplace")
     try:
-        code = action()
+        with temporary_files_in_scratch():
+            code = action()
     except KeyboardInterrupt:  # before the command's own work began, or at its very end
         code = report_interrupt()
     except SystemExit as error:
@@ -317,8 +354,11 @@ def leave(action: Callable[[], int]) -> None:
 
             traceback.print_exc()
             code = 1
-    sys.stdout.flush()
-    sys.stderr.flush()
+    finish_in_peace()
+    remove_own()
+    for stream in (sys.stdout, sys.stderr):
+        with suppress(OSError):  # the terminal is gone
+            stream.flush()
     os._exit(code)
 
 

@@ -1,8 +1,9 @@
 """Making the scenes of a data set side by side, and publishing each as a whole: on this machine or on a Dask cluster.
 
 Whoever runs this is the only one that publishes. A scene is made in a folder of its own below ``.work``, by a process
-of its own; when that has ended well, its folders are moved to their places and the manifest is written anew. What the
-manifest doesn't name isn't there: after a crash it is removed and made again, with the same bytes.
+of its own; when that has ended well, its folders are moved to their places and it is recorded, in one line beside the
+manifest, which is written at the end. What neither names isn't there: after a crash it is removed and made again, with
+the same bytes.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ import tempfile
 import time
 from collections.abc import Callable, Iterator, Set
 from concurrent.futures import ThreadPoolExecutor, as_completed
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from threading import Event
@@ -26,6 +27,7 @@ from headless.messages import logger
 from synthroads_addon.base.errors import InputError, OutputError
 from synthroads_addon.base.machine import available_cores
 from synthroads_addon.base.progress import Progress, silent
+from synthroads_addon.base.scratch.exclusive import TakenError, exclusive
 from synthroads_addon.base.version import generator
 from synthroads_addon.dataset.data_card import data_card
 from synthroads_addon.dataset.layouts import layout_descriptions
@@ -34,11 +36,14 @@ from synthroads_addon.dataset.manifest import (
     PUBLISHED,
     Manifest,
     SceneEntry,
+    append_record,
     check_same_recipe,
     faults,
-    manifest_text,
+    fold_records,
+    manifest_of,
     read_manifest,
     write_atomically,
+    write_manifest,
 )
 from synthroads_addon.dataset.recipe import Recipe, SceneJob, scene_jobs
 from synthroads_addon.dataset.replacing import begin_removal, finish_removal, made_by, remove
@@ -47,6 +52,8 @@ WORK = ".work"
 LOCK = ".lock"
 ATTEMPTS = 3
 """A scene whose process is killed (too little memory, a lost node) is tried this often."""
+INTERRUPTED = 130
+"""Exit code of a process that was told to end, as where a node is given back."""
 _TICK = 0.1
 """Seconds between two looks at a process."""
 _MODULE = Path(__file__).with_name("dataset_scene.py")
@@ -87,7 +94,7 @@ def run_task(folder: str, threads: int, stopping: Event) -> Outcome:
         if (path / FAILED).is_file():
             return Outcome(path, str(json.loads((path / FAILED).read_text(encoding="utf-8"))["error"]))
         outcome = Outcome(path, _reason(code, path / "log.txt"))
-        if code > 0:  # a fault of its own: it would come again
+        if code > 0 and code != INTERRUPTED:  # a fault of its own: it would come again
             return outcome
     return outcome
 
@@ -107,6 +114,8 @@ def _run_process(path: Path, threads: int, stopping: Event) -> int:
 
 
 def _reason(code: int, log: Path) -> str:
+    if code == INTERRUPTED:
+        return f"its process was told to end, {ATTEMPTS} times"
     if code < 0:
         return f"its process was killed by signal {-code}, {ATTEMPTS} times (too little memory?)"
     lines = log.read_text(encoding="utf-8", errors="replace").strip().splitlines()
@@ -144,6 +153,8 @@ class DatasetRun:
         known = sorted({job.split for job in self.jobs})
         for split in sorted((self.splits or frozenset()) - set(known)):
             raise InputError("--splits", split, f"must be of the recipe's: {', '.join(known)}")
+        self._names = {job.name for job in self.jobs}
+        self._sequences = {f"{job.number:02d}" for job in self.jobs}
         self._recipe_text = self.recipe.to_json()
         self._generator = generator()
 
@@ -160,16 +171,20 @@ class DatasetRun:
         try:
             with self._lock_folder():
                 self._open()
-                self._make(submit)
-                self._close()
+                try:
+                    self._make(submit)
+                    self._close()
+                except BaseException:
+                    self._abandon()
+                    raise
         except OSError as error:
             again = "; what is done stays, --resume continues" if self.entries else ""
             raise OutputError("--output", str(self.folder), f"cannot be written ({error.strerror}){again}") from None
-        return read_manifest(self.folder)
+        return self._manifest()
 
     def _make(self, submit: Submit) -> None:
         """Make the scenes that aren't there yet."""
-        self._write_manifest()
+        write_manifest(self.folder, self._manifest())
         chosen = [job for job in self.jobs if self.splits is None or job.split in self.splits]
         missing = [job for job in chosen if not self._is_done(job)]
         done = len(chosen) - len(missing)
@@ -181,14 +196,12 @@ class DatasetRun:
     @contextmanager
     def _lock_folder(self) -> Iterator[None]:
         """Keep others out of the folder; the lock goes with the process however it ends."""
-        try:
-            self.folder.mkdir(parents=True, exist_ok=True)
-            lock = (self.folder / LOCK).open("a+")
-        except OSError as error:
-            raise OutputError("--output", str(self.folder), f"cannot be written ({error.strerror})") from None
-        with lock:
-            if not _lock(lock.fileno()):
-                raise OutputError("--output", str(self.folder), "another run is at work in it")
+        with ExitStack() as stack:
+            try:
+                self.folder.mkdir(parents=True, exist_ok=True)
+                stack.enter_context(exclusive(self.folder / LOCK))
+            except TakenError as taken:
+                raise OutputError("--output", str(self.folder), _other_run(taken, self.folder / LOCK)) from None
             yield
 
     def _open(self) -> None:
@@ -206,6 +219,8 @@ class DatasetRun:
 
     def _open_again(self) -> None:
         """Take over the scenes of the set that is there, or have a new one take its place."""
+        if self.overwrite or self.resume:
+            fold_records(self.folder)
         if self.overwrite:
             finish_removal(self.folder)
             paths = [*made_by(self.folder, read_manifest(self.folder)), *self._published_folders()]
@@ -213,7 +228,7 @@ class DatasetRun:
                 name = path.relative_to(self.folder).as_posix()
                 raise OutputError("--output", str(self.folder), f"holds {name}, which is no scene's; move it away")
             begin_removal(self.folder, paths)
-            self._write_manifest()
+            write_manifest(self.folder, self._manifest())
         elif self.resume:
             manifest = check_same_recipe(self.folder, self._recipe_text, self._generator)
             done = [scene for scene in manifest.scenes if scene.status == "done"]
@@ -238,8 +253,8 @@ class DatasetRun:
         """Return whether a folder's name is one that a scene of the recipe has in its place."""
         top = path.relative_to(self.folder).parts[0]
         if top == "semantickitti":
-            return path.name in {f"{job.number:02d}" for job in self.jobs}
-        return (path.name if top == "scenes" else path.name.rpartition("-")[0]) in {job.name for job in self.jobs}
+            return path.name in self._sequences
+        return (path.name if top == "scenes" else path.name.rpartition("-")[0]) in self._names
 
     def _is_done(self, job: SceneJob) -> bool:
         return job.name in self.entries
@@ -270,23 +285,34 @@ class DatasetRun:
                 (outcome.folder / FILES / name).rename(target)
             entry = SceneEntry.from_dict({**about, "status": "done", **done}, "scene")
             (outcome.folder / "report.json").replace(self.folder / "logs" / f"{job.name}.json")
+            if not entry.points:
+                logger.warning("warning: %s: not one pulse came back", job.name)
             logger.debug("%s is done: %s points", job.name, f"{entry.points:,}")
         else:
             entry = SceneEntry.from_dict({**about, "status": "failed", "error": outcome.error}, "scene")
             (outcome.folder / "log.txt").replace(self.folder / "logs" / f"{job.name}.txt")
             logger.error("failed: %s: %s", job.name, outcome.error)
+        append_record(self.folder, entry)
         self.entries[job.name] = entry
-        self._write_manifest()
         shutil.rmtree(outcome.folder, ignore_errors=True)  # until now `_published_folders` knows what is where
 
-    def _write_manifest(self) -> None:
+    def _manifest(self) -> Manifest:
+        """Return the manifest of the scenes that are done or failed so far, in the recipe's order."""
         entries = [self.entries[job.name] for job in self.jobs if job.name in self.entries]
-        text = manifest_text(self.recipe.title, self._generator, self._recipe_text, entries, len(self.jobs))
-        write_atomically(self.folder / MANIFEST, text)
+        return manifest_of(self.recipe.title, self._generator, self._recipe_text, entries, len(self.jobs))
+
+    def _abandon(self) -> None:
+        """Leave a folder with nothing half-done in it where the work ends early; doesn't raise for a full disk."""
+        with suppress(OSError):
+            for path in self._unknown():
+                remove(path)
+            shutil.rmtree(self.folder / WORK, ignore_errors=True)
+            fold_records(self.folder)
 
     def _close(self) -> None:
         """Write what describes the whole."""
-        manifest = read_manifest(self.folder)
+        manifest = self._manifest()
+        write_manifest(self.folder, manifest)
         texts = layout_descriptions(self.recipe, self.jobs)
         texts["DATA_CARD.md"] = data_card(self.recipe, manifest, self.jobs)
         for name, text in texts.items():
@@ -367,17 +393,9 @@ def _results(client: Any, futures: list[Any], address: str) -> Iterator[Outcome]
             raise InputError("--scheduler", address, "was lost; --resume continues with what is done")
 
 
-def _lock(descriptor: int) -> bool:
-    """Lock an open file against other processes; return whether that was possible."""
-    try:
-        if sys.platform == "win32":
-            import msvcrt
-
-            msvcrt.locking(descriptor, msvcrt.LK_NBLCK, 1)
-        else:
-            import fcntl
-
-            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except OSError:
-        return False
-    return True
+def _other_run(taken: TakenError, lock: Path) -> str:
+    """Return what to say of a folder that another run holds, or may hold."""
+    owner = f": process {taken.owner.pid} of {taken.owner.host}" if taken.owner else ""
+    if taken.certain:
+        return f"another run is at work in it{owner}"
+    return f"another run may be at work in it{owner} (its disk knows no locks); if that has ended, remove {lock}"

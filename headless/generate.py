@@ -13,6 +13,7 @@ if __name__ == "__main__":
 
 from headless.commands import (
     Outcome,
+    add_allow_large_argument,
     add_changes_argument,
     add_choice_arguments,
     add_device_argument,
@@ -26,7 +27,13 @@ from headless.commands import (
 from headless.messages import detail, progress_bar
 from synthroads_addon.scenario.scenario import load_scenario, scenario_names
 
-_FIELDS = {"device": "scan.device", "seed": "seed", "fidelity": "fidelity", "twin": "twin"}
+_FIELDS = {
+    "device": "scan.device",
+    "seed": "seed",
+    "fidelity": "fidelity",
+    "twin": "twin",
+    "allow_large": "scan.most_pulses",
+}
 """Arguments that are short for fields of the scenario."""
 
 
@@ -44,6 +51,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--parameters", type=Path, metavar="FILE", help="take this road instead of sampling one")
     parser.add_argument("--axis", type=Path, metavar="FILE", help="centreline, CSV (x, y, z in order) or GeoJSON")
     add_choice_arguments(parser)
+    add_allow_large_argument(parser)
     add_twin_argument(parser)
     add_changes_argument(parser)
     parser.add_argument("--overwrite", action="store_true", help="replace files that are already there")
@@ -65,7 +73,7 @@ def run(arguments: argparse.Namespace) -> Outcome:
 def summary(report: dict[str, Any], output: Path) -> str:
     """Return the report for people: what was made, how long each stage took, where it lies."""
     counts = report.get("counts", {})
-    lines = choice_summary(report)
+    lines = [*(f"warning: {text}" for text in report.get("warnings", [])), *choice_summary(report)]
     if "axis" in report:
         fit = report["axis"]["horizontal"]
         lines.append(

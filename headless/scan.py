@@ -15,6 +15,7 @@ if __name__ == "__main__":
 from headless import generate
 from headless.commands import (
     Outcome,
+    add_allow_large_argument,
     add_changes_argument,
     add_choice_arguments,
     add_device_argument,
@@ -34,6 +35,7 @@ _FIELDS = {
     "rays": "scan.rays_per_pulse",
     "seed": "seed",
     "fidelity": "fidelity",
+    "allow_large": "scan.most_pulses",
 }
 """Arguments that are short for fields of the scenario."""
 _SAME = ("output", "scene", "path", "classes", "epsg", "origin", "up", "overwrite")
@@ -65,6 +67,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     text = "point on the trade-off (the scenario's own)"
     parser.add_argument("--fidelity", choices=("draft", "standard", "high"), help=text)
     add_choice_arguments(parser)
+    add_allow_large_argument(parser)
     parser.add_argument("--epsg", type=int, metavar="N", help="coordinate system of the map (that of the scene's road)")
     text = "map coordinates of the scene's origin (0,0,0)"
     parser.add_argument("--origin", type=numbers((3,), "X,Y,Z"), metavar="X,Y,Z", help=text)
@@ -107,7 +110,6 @@ def summary(report: dict[str, Any], output: Path) -> str:
     counts = report["counts"]
     rows = sorted(counts["points_by_class"].items(), key=lambda row: -row[1])
     lines = [f"  {name:<20} {number:>12,} points" for name, number in rows]
-    lines += [f"warning: {text}" for text in report["warnings"]]
     return "\n".join([*lines, generate.summary(report, output)])
 
 

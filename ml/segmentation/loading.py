@@ -126,6 +126,8 @@ def _load_crops(
 def leave_quietly(_worker: int) -> None:
     """Let a worker whose trainer has left say nothing of the ends of their pipes; its own errors go another way."""
     said = sys.excepthook
+    if hasattr(signal, "pthread_sigmask"):
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGTERM})  # its end by PyTorch, put off by `defer_interrupt`
 
     def hook(kind: type[BaseException], error: BaseException, trace: TracebackType | None) -> None:
         if not issubclass(kind, (EOFError, ConnectionError)):
@@ -136,14 +138,15 @@ def leave_quietly(_worker: int) -> None:
 
 @contextmanager
 def defer_interrupt() -> Iterator[None]:
-    """Put Ctrl-C off while processes are started: Python drops one that comes between a fork and what runs after it.
+    """Put an end from outside off while processes are started: Python drops one between a fork and what runs after it.
 
-    The processes go on putting it off; they end when the one that started them does.
+    The processes go on putting off Ctrl-C and a lost connection, until the one that started them ends; PyTorch has them
+    end at once where they are told to by SIGTERM.
     """
     if not hasattr(signal, "pthread_sigmask"):
         yield
         return
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT, signal.SIGTERM, signal.SIGHUP})
     try:
         yield
     finally:

@@ -6,10 +6,9 @@ the file is copied record by record, with the class as one more attribute. Memor
 
 from __future__ import annotations
 
-import tempfile
 import time
 from collections.abc import Iterator
-from contextlib import suppress
+from contextlib import ExitStack
 from copy import deepcopy
 from dataclasses import dataclass
 from pathlib import Path
@@ -21,7 +20,9 @@ from numpy.typing import NDArray
 
 from synthroads_addon.base.classes import ClassScheme
 from synthroads_addon.base.errors import InputError, OutputError
+from synthroads_addon.base.files import sync_file
 from synthroads_addon.base.progress import Progress, silent
+from synthroads_addon.base.scratch.folders import scratch_folder
 from synthroads_addon.cloud.formats.base import damage_error
 from synthroads_addon.cloud.formats.las import open_to_copy
 from synthroads_addon.cloud.formats.registry import open_cloud
@@ -94,10 +95,10 @@ def predict_file(
     """
     _check(source, target, overwrite, classification)
     begin = time.perf_counter()
-    with tempfile.TemporaryDirectory(prefix=".predict-", dir=target.parent) as name:
-        store = TileStore(Path(name))
+    with scratch_folder(target.parent) as folder:
+        store = TileStore(folder)
         count = store.fill(source, progress)
-        labels = np.memmap(Path(name) / "labels", dtype=np.uint8, mode="w+", shape=(max(count, 1),))
+        labels = np.memmap(folder / "labels", dtype=np.uint8, mode="w+", shape=(max(count, 1),))
         scaling = store.scaling(labelling.intensity, labelling.settings.voxel)
         done = 0
         for tile, core, index in store.tiles():
@@ -252,9 +253,10 @@ def write_copy(
         progress: told the share that is written.
     """
     counts = np.zeros(len(ids), dtype=np.int64)
-    temporary = target.with_name(f".{target.name}.partial")
     try:
-        with open_to_copy(source) as reader:
+        with ExitStack() as stack:
+            temporary = stack.enter_context(scratch_folder(target.parent)) / target.name
+            reader = stack.enter_context(open_to_copy(source))
             header = extended_header(reader.header, codes is not None)
             compress = target.suffix.lower() == ".laz"
             with laspy.open(temporary, "w", header=header, do_compress=compress) as writer:
@@ -269,15 +271,13 @@ def write_copy(
                     raise damage_error(source, done, len(labels))
                 if kept := [record for record in reader.evlrs or () if record.user_id != _COPC]:
                     writer.write_evlrs(type(reader.evlrs)(kept))
-        copy_header_texts(source, temporary)
-        temporary.replace(target)
+            copy_header_texts(source, temporary)
+            sync_file(temporary)
+            temporary.replace(target)
     except UnicodeError:
         raise InputError(str(source), None, "has records whose names aren't ASCII, which LAS doesn't allow") from None
     except OSError as error:
         raise OutputError("--output", str(target), f"cannot be written ({error.strerror})") from None
-    finally:
-        with suppress(OSError):
-            temporary.unlink(missing_ok=True)
     return counts
 
 

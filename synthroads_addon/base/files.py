@@ -4,16 +4,18 @@ from __future__ import annotations
 
 import errno
 import os
-import shutil
-import tempfile
 from collections.abc import Iterable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 
 from .errors import InputError, MissingFileError, OutputError, nearest_name
+from .scratch.folders import scratch_folder
 
 PRESETS = Path(__file__).parents[1] / "presets"
 """Folder of the shipped data: classes, materials, signs, devices, scenarios, recipes, assets."""
+
+REPORT = "report.json"
+"""File that is moved to its place last: where it stands, the others stand too."""
 
 
 def read_text(path: str | os.PathLike[str], kind: str, wanted: str = "", encoding: str = "utf-8") -> str:
@@ -106,7 +108,9 @@ def files_below(folder: Path) -> Iterator[Path]:
 def output_folder(target: Path, names: Iterable[str], overwrite: bool) -> Iterator[Path]:
     """Yield a temporary folder inside ``target``; at the end its files are moved into ``target``.
 
-    When the work fails or is stopped, the temporary folder is removed and ``target`` is as it was.
+    When the work fails or is stopped, the temporary folder is removed and ``target`` is as it was. ``report.json``,
+    where there is one, is moved last and one that is there is removed first: where it stands, all that it tells of
+    stands as well, even after a power cut.
 
     Args:
         target: folder for the files; made if it isn't there.
@@ -120,39 +124,112 @@ def output_folder(target: Path, names: Iterable[str], overwrite: bool) -> Iterat
     present = [name for name in names if (target / name).exists()]
     if present and not overwrite:
         raise OutputError("--output", str(target), f"already holds {present[0]}; --overwrite replaces it")
-    try:
-        target.mkdir(parents=True, exist_ok=True)
-        temporary = Path(tempfile.mkdtemp(prefix=".partial-", dir=target))
-    except OSError as error:
-        raise OutputError("--output", str(target), f"cannot be written ({error.strerror})") from None
-    try:
-        yield temporary
-        _move_all(temporary, target)
-    except OSError as error:
-        if error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EACCES, errno.EROFS):
-            raise OutputError("--output", str(target), f"cannot be written ({error.strerror})") from None
-        raise
-    finally:
-        shutil.rmtree(temporary, ignore_errors=True)
-        if made and target.exists() and not any(target.iterdir()):
-            target.rmdir()
-
-
-def _move_all(source: Path, target: Path) -> None:
-    """Move a folder's files; where the user stops the work meanwhile all the same, as a part of them fits nothing."""
-    stopped: KeyboardInterrupt | None = None
-    while paths := sorted(source.iterdir()):
+    with ExitStack() as stack:
         try:
-            for path in paths:
-                path.replace(target / path.name)
+            target.mkdir(parents=True, exist_ok=True)
+            if made:
+                stack.callback(_remove_if_empty, target)
+            scratch = stack.enter_context(scratch_folder(target))
+            (work := scratch / "new").mkdir()
+            (aside := scratch / "old").mkdir()
+        except OSError as error:
+            raise OutputError("--output", str(target), f"cannot be written ({error.strerror})") from None
+        try:
+            yield work
+            _move_all(work, target, aside)
+        except OSError as error:
+            if error.errno in _UNWRITABLE:
+                raise OutputError("--output", str(target), f"cannot be written ({error.strerror})") from None
+            raise
+
+
+_UNWRITABLE = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EACCES, errno.EPERM, errno.EROFS, errno.EIO)
+"""Errors of the system that say that a place can't be written to."""
+_NO_SYNC = (errno.EINVAL, errno.ENOSYS, errno.ENOTSUP)
+"""Errors of file systems that can't be told to write to the disk."""
+
+
+def _remove_if_empty(folder: Path) -> None:
+    with suppress(OSError):
+        folder.rmdir()
+
+
+def _move_all(source: Path, target: Path, aside: Path) -> None:
+    """Move a folder's files to their places, all or none.
+
+    Where the user stops the work meanwhile all are moved all the same, as a part of them fits nothing; where one can't
+    be moved, those that stood there before are put back.
+    """
+    for path in source.rglob("*"):
+        if path.is_file():
+            sync_file(path)
+    names = sorted((path.name for path in source.iterdir()), key=lambda name: (name == REPORT, name))
+    stopped: KeyboardInterrupt | None = None
+    while True:
+        try:
+            _move_once(names, source, target, aside)
+            break
         except KeyboardInterrupt as signal:
             stopped = signal
+        except OSError:
+            _put_back(names, source, target, aside)
+            raise
     if stopped is not None:
         raise stopped
 
 
+def _move_once(names: list[str], source: Path, target: Path, aside: Path) -> None:
+    """Move what isn't moved yet: old reports away first, new ones in last."""
+    for name in reversed(names):
+        if (source / name).exists() and (target / name).exists():
+            (target / name).replace(aside / name)
+    sync_folder(target)
+    for name in names:
+        if (source / name).exists():
+            if name == REPORT:
+                sync_folder(target)
+            (source / name).replace(target / name)
+    sync_folder(target)
+
+
+def _put_back(names: list[str], source: Path, target: Path, aside: Path) -> None:
+    """Undo what `_move_once` did, as far as that is possible."""
+    for name in names:
+        with suppress(OSError):
+            if not (source / name).exists():
+                (target / name).replace(source / name)
+        with suppress(OSError):
+            if (aside / name).exists():
+                (aside / name).replace(target / name)
+
+
+def sync_file(path: Path) -> None:
+    """Have the system write a file to the disk, so that it is whole after a power cut once it has its name."""
+    with path.open("rb+") as file:
+        _sync(file.fileno())
+
+
+def sync_folder(folder: Path) -> None:
+    """Have the system write a folder's names to the disk, where it can."""
+    if os.name == "nt":  # it opens no folders
+        return
+    descriptor = os.open(folder, os.O_RDONLY)
+    try:
+        _sync(descriptor)
+    finally:
+        os.close(descriptor)
+
+
+def _sync(descriptor: int) -> None:
+    try:
+        os.fsync(descriptor)
+    except OSError as error:
+        if error.errno not in _NO_SYNC:
+            raise
+
+
 def write_file(path: Path, content: bytes, field: str = "--output", overwrite: bool = False) -> None:
-    """Write one file under a temporary name beside it and rename it.
+    """Write one file in a temporary folder beside it and rename it; it is on the disk before it has its name.
 
     Args:
         path: of the file; its folder is made if it isn't there.
@@ -165,16 +242,13 @@ def write_file(path: Path, content: bytes, field: str = "--output", overwrite: b
     """
     if path.exists() and not overwrite:
         raise OutputError(field, str(path), "is there already; --overwrite replaces it")
-    temporary = None
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        with tempfile.NamedTemporaryFile(prefix=".partial-", dir=path.parent, delete=False) as file:
-            temporary = Path(file.name)
-            file.write(content)
-        temporary.chmod(0o644)
-        temporary.replace(path)
+        with scratch_folder(path.parent) as folder:
+            temporary = folder / path.name
+            temporary.write_bytes(content)
+            sync_file(temporary)
+            temporary.replace(path)
+            sync_folder(path.parent)
     except OSError as error:
         raise OutputError(field, str(path), f"cannot be written ({error.strerror})") from None
-    finally:  # also where the user stops the work meanwhile
-        if temporary is not None:
-            temporary.unlink(missing_ok=True)

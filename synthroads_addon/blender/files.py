@@ -2,6 +2,12 @@
 
 from __future__ import annotations
 
+import io
+import os
+import shutil
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager, redirect_stderr, suppress
 from pathlib import Path
 
 import bpy
@@ -30,7 +36,33 @@ def save_scene(path: Path, compress: bool = True) -> None:
 
 
 def complaint(error: Exception) -> str:
-    """Return what Blender complains of in one line, without its prefix; of a traceback the last line."""
+    """Return what Blender complains of in one line, without its prefix; of a traceback the error and not its place."""
     lines = [line.strip() for line in str(error).splitlines() if line.strip()]
-    text = lines[-1] if any("Traceback" in line for line in lines) else " ".join(lines)
+    if any("Traceback" in line for line in lines):
+        lines = [line for line in lines if not line.startswith("Location:")][-1:]
+    text = " ".join(lines)
     return text.removeprefix("Error:").strip() or type(error).__name__
+
+
+@contextmanager
+def stderr_if_it_succeeds() -> Iterator[None]:
+    """Hold back what is written to standard error meanwhile, and drop it where an error is raised that says it all.
+
+    Blender prints the whole traceback of an importer in Python besides raising it.
+    """
+    try:
+        saved = os.dup(2)
+    except OSError:  # no standard error at all
+        yield
+        return
+    with tempfile.TemporaryFile() as held, os.fdopen(saved, "wb") as before:
+        text = io.TextIOWrapper(held, encoding="utf-8", errors="backslashreplace", write_through=True)
+        os.dup2(held.fileno(), 2)
+        try:
+            with redirect_stderr(text):  # which needn't be the system's standard error
+                yield
+            held.seek(0)
+            with suppress(OSError):  # whoever read it has left
+                shutil.copyfileobj(held, before)
+        finally:
+            os.dup2(before.fileno(), 2)

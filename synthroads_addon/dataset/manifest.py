@@ -3,17 +3,22 @@
 from __future__ import annotations
 
 import hashlib
+import json
 import os
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import suppress
 from pathlib import Path
 from typing import Any, Literal
 
 from pydantic import Field
 
 from ..base.errors import InputError
+from ..base.files import read_text
 from ..base.schema import ClosedModel, canonical_json, quantity, read_json
 
 MANIFEST = "manifest.json"
+RECORDS = ".scenes.jsonl"
+"""Scenes that came to be since the manifest was written, a line for each; gone when the run has ended."""
 PUBLISHED = ("scenes/*", "pointcept/*/*/*", "semantickitti/*/sequences/*")
 """Folders of a scene that are published whole: its own, its tiles and its sequence."""
 _BLOCK = 1 << 20
@@ -54,18 +59,58 @@ class Manifest(ClosedModel):
 
 
 def read_manifest(folder: Path) -> Manifest:
-    """Return the manifest of a data set; raise `InputError` if there is none or it is damaged."""
-    return Manifest.from_dict(read_json(folder / MANIFEST), source=str(folder / MANIFEST))
+    """Return the manifest of a data set, with what a run that is at work or was stopped has recorded since.
+
+    Raises:
+        InputError: there is none, or it is damaged.
+    """
+    manifest = Manifest.from_dict(read_json(folder / MANIFEST), source=str(folder / MANIFEST))
+    recorded = {entry.name: entry for entry in _read_records(folder)}
+    if not recorded:
+        return manifest
+    entries = {entry.name: entry for entry in manifest.scenes} | recorded
+    return manifest.model_copy(update={"scenes": tuple(entries.values())})
+
+
+def append_record(folder: Path, entry: SceneEntry) -> None:
+    """Record one more scene beside the manifest, at a cost that doesn't grow with their number."""
+    line = json.dumps(entry.to_dict(), ensure_ascii=False, separators=(",", ":"))
+    with (folder / RECORDS).open("a", encoding="utf-8", newline="\n") as file:
+        file.write(f"{line}\n")
+        file.flush()
+        os.fsync(file.fileno())
+
+
+def fold_records(folder: Path) -> None:
+    """Write what was recorded into the manifest, and remove the records; nothing if there are none."""
+    if (folder / RECORDS).exists():
+        write_manifest(folder, read_manifest(folder))
+
+
+def _read_records(folder: Path) -> Iterator[SceneEntry]:
+    """Yield the recorded scenes, up to a line that isn't whole: its run was killed meanwhile."""
+    if not (folder / RECORDS).is_file():
+        return
+    for line in read_text(folder / RECORDS, "must be text in UTF-8").splitlines():
+        try:
+            yield SceneEntry.from_dict(json.loads(line), "scene")
+        except (ValueError, InputError):
+            return
 
 
 def write_atomically(path: Path, text: str) -> None:
     """Write a text file so that it is there wholly or not at all, even after a power cut."""
     temporary = path.with_name(f".{path.name}.part")
-    with temporary.open("w", encoding="utf-8", newline="\n") as file:
-        file.write(text)
-        file.flush()
-        os.fsync(file.fileno())
-    temporary.replace(path)
+    try:
+        with temporary.open("w", encoding="utf-8", newline="\n") as file:
+            file.write(text)
+            file.flush()
+            os.fsync(file.fileno())
+        temporary.replace(path)
+    except BaseException:
+        with suppress(OSError):
+            temporary.unlink(missing_ok=True)
+        raise
 
 
 def checksum(path: Path) -> str:
@@ -111,14 +156,19 @@ def check_same_recipe(folder: Path, recipe_text: str, generator: str) -> Manifes
     return manifest
 
 
-def manifest_text(title: str, generator: str, recipe_text: str, scenes: Iterable[SceneEntry], expected: int) -> str:
-    """Return the manifest's text."""
+def manifest_of(title: str, generator: str, recipe_text: str, scenes: Iterable[SceneEntry], expected: int) -> Manifest:
+    """Return the manifest of scenes, of which a number is expected."""
     entries = tuple(scenes)
-    manifest = Manifest(
+    return Manifest(
         title=title,
         generator=generator,
         recipe_sha256=hashlib.sha256(recipe_text.encode()).hexdigest(),
         complete=len(entries) == expected and all(entry.status == "done" for entry in entries),
         scenes=entries,
     )
-    return canonical_json(manifest.to_dict())
+
+
+def write_manifest(folder: Path, manifest: Manifest) -> None:
+    """Write the manifest, which from then on has all that was recorded."""
+    write_atomically(folder / MANIFEST, canonical_json(manifest.to_dict()))
+    (folder / RECORDS).unlink(missing_ok=True)

@@ -19,7 +19,7 @@ from ..scenario.scan import scanner_setting
 from ..scenario.scenario import Scenario
 from ..twin.formats import check_formats
 from .choose.knobs import check_choice
-from .job_files import FILES, OF_POINTS, JobFiles
+from .job_files import FILES, OF_POINTS, JobFiles, empty_scan_warnings
 
 if TYPE_CHECKING:
     from .road_scene import RoadScene
@@ -92,6 +92,8 @@ def generate(job: Job, progress: Progress = silent) -> dict[str, Any]:
         files.write_road(folder, road, timer)
         if scene:
             report["counts"] = scene.write_files(folder, timer)
+            if warnings := empty_scan_warnings(report["counts"]):
+                report["warnings"] = warnings
         return files.write_report(folder, report, timer)
 
 

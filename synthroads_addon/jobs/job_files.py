@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import platform as machine
 import sys
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -98,3 +99,10 @@ class JobFiles:
         }
         (folder / "report.json").write_text(canonical_json(report), encoding="utf-8")
         return report
+
+
+def empty_scan_warnings(counts: Mapping[str, Any]) -> list[str]:
+    """Return what to warn of where a scan has no point; nothing where nothing was scanned."""
+    if counts.get("points", 1):
+        return []
+    return ["not one pulse came back: is the scene within the scanner's range and field of view?"]

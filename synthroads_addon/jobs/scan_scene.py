@@ -27,13 +27,13 @@ from ..scanning.platforms.path import Path as ScanPath
 from ..scanning.platforms.polyline import PolylineGuide
 from ..scanning.platforms.trajectory import RecordedTrajectory, read_trajectory
 from ..scanning.platforms.tripod import Tripod, TripodPath
-from ..scanning.scene.extent import bounds, elevation_at, middle_line
+from ..scanning.scene.extent import body_bounds, elevation_at, middle_line, strays_of
 from ..scanning.scene.mesh import SceneMesh
 from ..scanning.scene.motion import ScannedScene
 from ..scenario.scan import scanner_setting
 from ..scenario.scenario import Scenario
 from .choose.knobs import check_choice
-from .job_files import OF_POINTS, JobFiles
+from .job_files import OF_POINTS, JobFiles, empty_scan_warnings
 from .scan.plan import Site, road_view
 
 if TYPE_CHECKING:
@@ -153,7 +153,7 @@ def _read_scene(
     if job.origin is not None:
         scene = replace(scene, static=replace(scene.static, origin=np.array(job.origin, dtype=np.float64)))
     unused = [f"{job.classes}: nothing in the scene is named as in {entry}" for entry in scene.unmatched]
-    return scene, road, open_scene_warnings() + unused
+    return scene, road, open_scene_warnings() + unused + _stray_warnings(scene.static)
 
 
 def scene_site(job: SceneScan, mesh: SceneMesh, road: RoadGeometry | None) -> Site:
@@ -165,6 +165,11 @@ def scene_site(job: SceneScan, mesh: SceneMesh, road: RoadGeometry | None) -> Si
     if "previews" in job.scenario.outputs:
         view = road_view(road) if road else scene_view(mesh)
     return Site(job.scenario, scene_path(job, mesh, road), conditions, view)
+
+
+def _stray_warnings(mesh: SceneMesh) -> list[str]:
+    strays = strays_of(mesh) if len(mesh) else None
+    return [f"{strays.count():,} vertices lie far from all others: path and previews leave them out"] if strays else []
 
 
 def scene_path(job: SceneScan, mesh: SceneMesh, geometry: RoadGeometry | None) -> ScanPath:
@@ -202,7 +207,7 @@ def _scanner_place(job: SceneScan, place: tuple[float, ...], mesh: SceneMesh) ->
 
 def scene_view(mesh: SceneMesh) -> TopView:
     """Return a raster that holds the scene, its longer side from left to right."""
-    low, high = bounds(mesh)
+    low, high = body_bounds(mesh)
     start, end = (low + mesh.origin)[:2], (high + mesh.origin)[:2]
     axis = int(np.argmax(end - start))
     reach = float((end - start)[1 - axis]) / 2.0 + _BORDER
@@ -212,7 +217,5 @@ def scene_view(mesh: SceneMesh) -> TopView:
 
 
 def _warnings_of_counts(counts: dict[str, Any]) -> list[str]:
-    if not counts["points"]:
-        return ["not one pulse came back: is the scene within the scanner's range and field of view?"]
     unlabelled = int(counts["points_by_class"].get("unlabelled", 0))
-    return [f"{unlabelled:,} points have no class"] if unlabelled else []
+    return [*empty_scan_warnings(counts), *([f"{unlabelled:,} points have no class"] if unlabelled else [])]

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ..base.errors import InputError
 from .layout import RoadLayout
 from .lines import USUAL, Line
 from .path import SPACING
@@ -44,12 +45,17 @@ def centre_of(layout: RoadLayout) -> Centre:
     want of lines the pavement's edges take their place. All lines vote for how it moves along the road: each tells the
     axis from its own mean distance to it, and counts by how steady that is. Where the lines in the middle are missing
     the others carry on.
+
+    Raises:
+        InputError: no line and no edge was seen anywhere.
     """
     guides = axis_guides(layout)
     lines = list(guides) + [line for band in layout.bands for line in band.lines if line not in guides]
     stations = lines[0].stations
     given = np.mean([line.measured for line in guides], axis=0)
     raw, start = given, given
+    if not any(np.isfinite(line.measured).any() for line in lines):
+        raise InputError("road", None, "neither lines nor edges of a carriageway can be made out in the cloud")
     if not np.isfinite(given).any():
         start = np.nanmean(np.array([line.measured for line in lines]), axis=0)
     axis = _fill_gaps(start)

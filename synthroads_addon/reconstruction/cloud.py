@@ -14,6 +14,7 @@ from scipy import ndimage
 from ..base.classes import ClassScheme
 from ..base.errors import InputError
 from ..cloud.formats.registry import open_cloud
+from ..cloud.strays import Strays
 from .path import CloudPath
 
 Float = NDArray[np.float64]
@@ -28,6 +29,10 @@ WINDOW = 9
 """Cells (m) whose lowest points make the ground, and the cells across which nothing that stands may fill: what is
 narrower than ``CELL * WINDOW`` falls off the ground."""
 _STEP = 0.15  # m: what rises more than this above the opened surface is no ground
+_MOST_CELLS = 1 << 24
+"""Cells of one grid; points over more are worked on tile by tile, of which only those with points in them are made."""
+_TILE, _MARGIN = 1024, 128
+"""Cells along an edge of a tile, and around it those whose points count for its ground as well."""
 
 
 class PointKind(IntEnum):
@@ -83,6 +88,7 @@ class RoadCloud:
         marked: whether markings are told from pavement by class.
         read: points in the file.
         classes: number of points in the file by class name.
+        strays: points far from all others, which aren't used.
     """
 
     xyz: Float
@@ -94,6 +100,7 @@ class RoadCloud:
     marked: bool
     read: int
     classes: dict[str, int]
+    strays: int = 0
 
     @cached_property
     def surface(self) -> NDArray[np.intp]:
@@ -135,8 +142,20 @@ def read_road_cloud(path: FilePath) -> RoadCloud:
         known = ", ".join(KIND_OF_CLASS)
         raise InputError(str(path), None, f"holds no points of a class that a road is made from ({known})")
     xyz, intensity, kind = map(np.concatenate, zip(*parts, strict=True))
+    points, strays = _without_strays((xyz, intensity, kind))
     classes = {names.get(int(c), f"class_{c}"): int(counts[c]) for c in np.flatnonzero(counts)}
-    return _sort_by_height(path, (xyz, intensity, kind), header.epsg, classes)
+    return replace(_sort_by_height(path, points, header.epsg, classes), strays=strays)
+
+
+def _without_strays(points: _Points) -> tuple[_Points, int]:
+    """Return the points without those that lie far from all others, and how many these are."""
+    strays = Strays()
+    strays.add(points[0])
+    count = strays.count()
+    if not count:
+        return points, 0
+    stay = strays.stay(points[0])
+    return (points[0][stay], points[1][stay], points[2][stay]), count
 
 
 def kind_table(scheme: ClassScheme) -> NDArray[np.uint8]:
@@ -178,8 +197,32 @@ def above_ground(xyz: Float) -> Float:
     """Return the height (N,) of points (N, 3) above the ground below them, m.
 
     The ground is the lowest point of each cell, opened by a window (so that cars, barriers and bushes fall off),
-    gaps filled from the nearest cell, and smoothed.
+    gaps filled from the nearest cell, and smoothed. Memory is bounded by the cells that hold points, not by what lies
+    between them.
     """
+    if not len(xyz):
+        return np.zeros(0)
+    span = np.ptp(np.floor(xyz[:, :2] / CELL), axis=0) + 1.0
+    if span.prod() <= _MOST_CELLS:
+        return _above_grid(xyz)
+    result = np.empty(len(xyz))
+    tile = np.floor(xyz[:, :2] / (CELL * _TILE)).astype(np.int64)
+    order = np.lexsort(tile.T)
+    starts = np.flatnonzero(np.r_[True, np.any(np.diff(tile[order], axis=0) != 0, axis=1)])
+    groups = {(int(tile[part[0], 0]), int(tile[part[0], 1])): part for part in np.split(order, starts[1:])}
+    for (column, row), own in groups.items():
+        corner = np.array([column, row]) * CELL * _TILE
+        beside = [groups.get((column + i, row + j)) for i in (-1, 0, 1) for j in (-1, 0, 1) if i or j]
+        around = np.concatenate([own, *(part for part in beside if part is not None)])
+        reach = xyz[around, :2] - corner
+        near = np.all((reach >= -_MARGIN * CELL) & (reach < (_TILE + _MARGIN) * CELL), axis=1)
+        near[: len(own)] = True
+        result[own] = _above_grid(xyz[around[near]])[: len(own)]
+    return result
+
+
+def _above_grid(xyz: Float) -> Float:
+    """Return the height (N,) of points above the ground of one grid."""
     low = np.floor(xyz[:, :2].min(axis=0) / CELL)
     cell = (np.floor(xyz[:, :2] / CELL) - low).astype(np.int64)
     shape = tuple(cell.max(axis=0) + 1)

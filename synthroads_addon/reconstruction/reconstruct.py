@@ -253,6 +253,8 @@ def _smooth_fall(measured: Surface) -> Float:
 def _notes(cloud: RoadCloud, section: MeasuredSection, measured: Measured) -> list[str]:
     """Return what a reader of the parameter set must know."""
     notes = []
+    if cloud.strays:
+        notes.append(f"{cloud.strays:,} points lie far from all others and weren't used")
     if cloud.epsg is None:
         notes.append("the cloud doesn't say its map system: EPSG:25832 was written")
     if not cloud.labelled:

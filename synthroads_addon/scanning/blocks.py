@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 from .devices.device import ScannerSetting
@@ -38,15 +39,19 @@ class Blocks:
 
     def pulses(self, strip: Strip) -> int:
         """Return how many pulses a strip has."""
-        return shot_count(self.setting, strip.duration)
+        return shot_count(self.setting, strip.duration, strip.ends)
 
     def block_numbers(self, strip: Strip) -> range:
         """Return the numbers of a strip's blocks."""
         return range(-(-self.pulses(strip) // self.size))
 
-    def all(self) -> list[Block]:
-        """Return every block, in the order of time."""
-        return [(strip, block) for strip in self.path.strips for block in self.block_numbers(strip)]
+    def all(self) -> Iterator[Block]:
+        """Yield every block, in the order of time."""
+        return ((strip, block) for strip in self.path.strips for block in self.block_numbers(strip))
+
+    def count(self) -> int:
+        """Return how many blocks there are."""
+        return sum(len(self.block_numbers(strip)) for strip in self.path.strips)
 
     def pulses_of(self, strip: Strip, block: int) -> tuple[int, int]:
         """Return the first pulse of a block, counted within its strip, and how many it has."""

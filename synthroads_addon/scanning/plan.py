@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
 from typing import Any, Literal, Protocol
@@ -20,6 +20,7 @@ from .colour.colour import LayerSource
 from .colour.request import LayerRequest
 from .devices.device import ScannerSetting
 from .effects import EchoEffect
+from .forecast import ScanForecast, forecast_scan
 from .noise import Noise
 from .platforms.path import Path, Strip
 from .relief import MicroRelief
@@ -156,9 +157,17 @@ class ScanPlan:
         """Return how many pulses a strip has."""
         return self.cut.pulses(strip)
 
-    def blocks(self) -> list[Block]:
-        """Return (strip, number) of every block that is scanned, in the order of time."""
-        return self.cut.all() if self.only is None else list(self.only)
+    def blocks(self) -> Iterator[Block]:
+        """Yield (strip, number) of every block that is scanned, in the order of time."""
+        return self.cut.all() if self.only is None else iter(self.only)
+
+    def forecast(self) -> ScanForecast:
+        """Return what the scan of the whole path will take."""
+        return forecast_scan(self.cut, self.target.triangles, self.threads)
+
+    def block_count(self) -> int:
+        """Return how many blocks are scanned."""
+        return self.cut.count() if self.only is None else len(self.only)
 
     def summary(self) -> dict[str, Any]:
         """Return the figures that are known before the scan begins, as JSON data."""

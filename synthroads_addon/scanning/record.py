@@ -58,7 +58,7 @@ def record(plan: ScanPlan, sink: Sink, timer: StageTimer | None = None) -> dict[
         what was rendered, as JSON data.
     """
     timer, (begin, end) = timer or StageTimer(), plan.progress
-    total, done = len(plan.blocks()), 0
+    total, done = plan.block_count(), 0
     with ExitStack() as stack:
         source = _open_layers(plan, stack, timer)
         with timer.stage("scan"):
@@ -101,7 +101,7 @@ def scan_blocks(plan: ScanPlan, source: LayerSource | None = None) -> Iterator[B
         result = scan.block(*block)
         return result if finish is None or renders else finish.block(result)
 
-    blocks = iter(plan.blocks())
+    blocks = plan.blocks()
     if plan.target.caster.main_thread_only:
         results: Iterator[BlockResult] = map(work, blocks)
     else:

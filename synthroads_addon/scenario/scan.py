@@ -12,6 +12,8 @@ from ..scanning.noise import Noise
 from ..scanning.platforms.registry import PlatformModel, make_platform
 from ..scanning.weather.registry import WeatherModel
 
+MOST_POSSIBLE = 10**15
+"""Pulses that no scan can have more of: what `--allow-large` allows."""
 _RingRays = Annotated[int, Field(ge=3, le=60)]
 
 
@@ -66,6 +68,16 @@ class ScanScenario(DeviceChoice):
         "Roads longer than two of these are built and scanned section by section; if not given, roads of "
         "more than 5 km by sections of 500 m.",
         unset="500 m beyond 5 km",
+    )
+    most_pulses: int | None = quantity(
+        None,
+        ge=1,
+        le=MOST_POSSIBLE,
+        unit="1",
+        title="Most Pulses",
+        description="Pulses beyond which the scan is refused before it begins; 5 thousand million if not given, and "
+        "the scene must then fit into the machine's memory too.",
+        unset="5 thousand million",
     )
     caster: Literal["auto", "embree", "bvhtree"] = Field("auto", description="How rays are cast.")
     threads: int = quantity(0, ge=0, le=1024, unit="1", description="Threads; 0 uses every core.")

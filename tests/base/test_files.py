@@ -1,6 +1,7 @@
 """Output folders: nothing half-written, nothing of the user's touched."""
 
 import errno
+import os
 from pathlib import Path
 
 import pytest
@@ -51,6 +52,64 @@ def test_work_that_is_stopped_while_its_files_appear_leaves_all_of_them(
     assert sorted(path.name for path in (tmp_path / "out").iterdir()) == ["a.txt", "b.txt", "c.txt"]
 
 
+def test_the_report_is_the_mark_that_all_is_there(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """An old one goes before anything else, the new one comes last; each file is on the disk before it has its name."""
+    replace, sync, done = Path.replace, os.fsync, []
+
+    def moved(self: Path, target: Path) -> Path:
+        done.append(f"{self.name} {'away' if target.parent.name == 'old' else 'there'}")
+        return replace(self, target)
+
+    def synced(descriptor: int) -> None:
+        done.append(f"{Path(f'/proc/self/fd/{descriptor}').readlink().name} synced")
+        sync(descriptor)
+
+    names = ["a.txt", "report.json", "z.txt"]
+    for name in names:
+        (tmp_path / name).write_text("old")
+    monkeypatch.setattr(Path, "replace", moved)
+    if Path("/proc/self/fd").exists():
+        monkeypatch.setattr(os, "fsync", synced)
+    with output_folder(tmp_path, names, True) as folder:
+        for name in names:
+            (folder / name).write_text("new")
+    moves = [line for line in done if not line.endswith("synced")]
+    assert moves[0] == "report.json away"
+    assert moves[-1] == "report.json there"
+    assert {name: (tmp_path / name).read_text() for name in names} == dict.fromkeys(names, "new")
+    assert sorted(path.name for path in tmp_path.iterdir()) == names
+    if Path("/proc/self/fd").exists():
+        assert sorted(done[:3]) == [f"{name} synced" for name in names]
+        assert done[-3:] == [f"{tmp_path.name} synced", "report.json there", f"{tmp_path.name} synced"]
+
+
+@pytest.mark.parametrize("at", range(5))
+def test_where_one_file_cannot_be_moved_all_stands_as_it_was(
+    at: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    replace, calls = Path.replace, []
+
+    def moved(self: Path, target: Path) -> Path:
+        calls.append(self.name)
+        if len(calls) == at + 1:
+            raise OSError(errno.ENOSPC, "No space left on device")
+        return replace(self, target)
+
+    for name in ("b.txt", "c.txt", "report.json"):
+        (tmp_path / name).write_text("old")
+    monkeypatch.setattr(Path, "replace", moved)
+
+    def work() -> None:
+        with output_folder(tmp_path, [], True) as folder:
+            for name in ("a.txt", "b.txt", "report.json"):
+                (folder / name).write_text("new")
+
+    with pytest.raises(OutputError, match="No space"):
+        work()
+    there = {path.name: path.read_text() for path in tmp_path.iterdir()}
+    assert there == {"b.txt": "old", "c.txt": "old", "report.json": "old"}
+
+
 def test_present_files_need_overwrite_and_others_stay(tmp_path: Path) -> None:
     (tmp_path / "a.txt").write_text("old")
     (tmp_path / "mine.txt").write_text("mine")
@@ -78,11 +137,11 @@ def test_full_disk_is_one_clear_line(tmp_path: Path) -> None:
 def test_a_file_whose_writing_is_stopped_leaves_nothing(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, fault: type[BaseException]
 ) -> None:
-    def stopped(self: Path, mode: int) -> None:
+    def stopped(descriptor: int) -> None:
         raise fault
 
     (tmp_path / "a.txt").write_text("old")
-    monkeypatch.setattr(Path, "chmod", stopped)
+    monkeypatch.setattr(os, "fsync", stopped)
     with pytest.raises((KeyboardInterrupt, OutputError)):
         write_file(tmp_path / "a.txt", b"new", overwrite=True)
     assert [path.name for path in tmp_path.iterdir()] == ["a.txt"]

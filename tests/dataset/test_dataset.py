@@ -23,7 +23,8 @@ from synthroads_addon.dataset.manifest import (
     check_same_recipe,
     faults,
     file_entries,
-    manifest_text,
+    manifest_of,
+    write_manifest,
 )
 from synthroads_addon.dataset.recipe import Recipe, load_recipe, recipe_names, scene_jobs
 from synthroads_addon.materials.table import materials
@@ -171,7 +172,7 @@ def test_faults_are_found(tmp_path: Path) -> None:
 
 
 def test_another_recipe_or_version_is_not_continued(tmp_path: Path) -> None:
-    (tmp_path / "manifest.json").write_text(manifest_text("T", "SynthRoads 1", "recipe", [], 1))
+    write_manifest(tmp_path, manifest_of("T", "SynthRoads 1", "recipe", [], 1))
     assert not check_same_recipe(tmp_path, "recipe", "SynthRoads 1").complete
     with pytest.raises(InputError, match="begun with another recipe"):
         check_same_recipe(tmp_path, "other recipe", "SynthRoads 1")
@@ -215,9 +216,7 @@ def cloud(tmp_path: Path) -> tuple[Path, PointBlock]:
 
 
 def made(cloud: Path, folder: Path, **changes: Any) -> None:
-    whole = recipe(
-        layouts=["pointcept", "semantickitti"], smallest_tile=1, set={"cloud.classes": "5"}, **changes
-    )
+    whole = recipe(layouts=["pointcept", "semantickitti"], smallest_tile=1, set={"cloud.classes": "5"}, **changes)
     job = scene_jobs(whole)[1]
     folder.mkdir()
     write_layouts(cloud, folder, whole, job, ORIGIN)

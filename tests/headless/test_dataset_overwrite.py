@@ -6,7 +6,11 @@ The scenes are made by a stand-in that writes small files: no Blender.
 from __future__ import annotations
 
 import json
+import os
+import statistics
+import time
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -17,8 +21,18 @@ from headless.commands import command
 from headless.dataset_run import DatasetRun, Outcome
 from headless.dataset_scene import DONE, FILES, published_folders
 from synthroads_addon.base.errors import InputError, OutputError
+from synthroads_addon.base.scratch import exclusive
+from synthroads_addon.base.scratch.owner import this_process
 from synthroads_addon.dataset import replacing
-from synthroads_addon.dataset.manifest import faults, file_entries, read_manifest
+from synthroads_addon.dataset.manifest import (
+    RECORDS,
+    Manifest,
+    append_record,
+    faults,
+    file_entries,
+    read_manifest,
+    write_manifest,
+)
 from synthroads_addon.dataset.recipe import Recipe
 
 OLD = {"title": "Old", "seed": 1, "layouts": ["pointcept"], "groups": [{"name": "a", "scenes": 3}]}
@@ -168,19 +182,25 @@ class Crash(BaseException):
 
 def crashing(what: Callable[..., Any], after: int) -> Callable[..., Any]:
     """Return a function that works some times and then crashes for good."""
+    return raising(what, after, Crash)
+
+
+def raising(what: Callable[..., Any], after: int, fault: type[BaseException]) -> Callable[..., Any]:
+    """Return a function that works some times and then raises a fault."""
     calls: list[int] = []
 
     def called(*arguments: Any, **options: Any) -> Any:
         calls.append(1)
         if len(calls) > after:
-            raise Crash
+            raise fault
         return what(*arguments, **options)
 
     return called
 
 
-CRASHES = [("begin_removal", 0), ("finish_removal", 1), *(("write_atomically", after) for after in (0, 1, 3, 4))]
+CRASHES = [("begin_removal", 0), ("finish_removal", 1), *(("write_atomically", after) for after in (0, 1))]
 CRASHES += [("remove", after) for after in (0, 1, 5)]
+CRASHES += [*(("write_manifest", after) for after in (0, 1, 2)), *(("append_record", after) for after in (0, 1))]
 """Where it crashes: in which function, after how many calls."""
 
 
@@ -193,6 +213,7 @@ def test_after_a_crash_no_scene_that_the_manifest_names_is_missing(
     before = content(old)
     with monkeypatch.context() as patched:
         patched.setattr(home, place, crashing(getattr(home, place), after))
+        patched.setattr(DatasetRun, "_abandon", lambda self: None)  # nobody cleans up
         with pytest.raises(Crash):
             make(old, NEW, overwrite=True)
     manifest = read_manifest(old)
@@ -218,6 +239,95 @@ def test_nothing_is_removed_where_the_scheduler_does_not_answer(
     assert command("dataset", words) == 2
     assert "nobody answers there" in capsys.readouterr().err
     assert content(old) == before
+
+
+def test_a_scene_is_recorded_when_it_is_done_and_what_stands_is_told_at_any_time(tmp_path: Path) -> None:
+    """Also to whoever reads the folder meanwhile; a record that isn't whole counts for nothing."""
+    folder, seen = tmp_path / "set", []
+
+    def watched(folders: list[str]) -> Iterator[Outcome]:
+        for outcome in small_scenes(folders):
+            seen.append([scene.name for scene in read_manifest(folder).scenes])
+            yield outcome
+
+    DatasetRun(Recipe.from_dict(OLD), folder).run(watched)
+    assert seen == [[], ["a-01"], ["a-01", "a-02"]]
+    assert not (folder / RECORDS).exists()
+    whole = content(folder)
+    scenes = read_manifest(folder).scenes
+    data = json.loads((folder / "manifest.json").read_text())
+    (folder / "manifest.json").write_text(json.dumps({**data, "scenes": data["scenes"][:1], "complete": False}))
+    append_record(folder, scenes[1])
+    with (folder / RECORDS).open("a") as file:
+        file.write(json.dumps(scenes[2].to_dict())[:-9])
+    assert [scene.name for scene in read_manifest(folder).scenes] == ["a-01", "a-02"]
+    make(folder, OLD, resume=True)
+    assert content(folder) == whole
+
+
+@pytest.mark.parametrize("fault", [KeyboardInterrupt, OSError])
+def test_a_run_that_is_stopped_leaves_whole_scenes_and_nothing_else(
+    tmp_path: Path, fault: type[BaseException], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder = tmp_path / "set"
+    with monkeypatch.context() as patched:
+        patched.setattr(dataset_run, "append_record", raising(dataset_run.append_record, 2, fault))
+        with pytest.raises((KeyboardInterrupt, OutputError)):
+            make(folder, OLD)
+    assert [scene.name for scene in read_manifest(folder).scenes] == ["a-01", "a-02"]
+    assert {path.name for path in (folder / "scenes").iterdir()} == {"a-01", "a-02"}
+    assert {path.name for path in folder.glob(".*")} == {".lock"}
+    make(folder, OLD, resume=True)
+    make(tmp_path / "whole", OLD)
+    assert content(folder) == content(tmp_path / "whole")
+
+
+def test_the_manifest_is_written_twice_however_many_scenes_there_are(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    written: list[int] = []
+
+    def counted(folder: Path, manifest: Manifest) -> None:
+        written.append(len(manifest.scenes))
+        write_manifest(folder, manifest)
+
+    monkeypatch.setattr(dataset_run, "write_manifest", counted)
+    make(tmp_path / "set", {**OLD, "groups": [{"name": "a", "scenes": 5}]})
+    assert written == [0, 5]
+
+
+@pytest.mark.slow
+def test_the_last_quarter_of_a_thousand_scenes_takes_no_longer_than_the_first(tmp_path: Path) -> None:
+    times: list[float] = []
+
+    def timed(folders: list[str]) -> Iterator[Outcome]:
+        for outcome in small_scenes(folders):
+            begun = time.perf_counter()
+            yield outcome
+            times.append(time.perf_counter() - begun)
+
+    recipe = {**OLD, "groups": [{"name": "a", "scenes": 1000}]}
+    DatasetRun(Recipe.from_dict(recipe), tmp_path / "set").run(timed)
+    quarters = [statistics.median(times[first : first + 250]) for first in (0, 750)]
+    assert quarters[1] <= 1.5 * quarters[0], quarters
+
+
+def test_a_disk_without_locks_still_keeps_another_run_out(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """As Lustre and some NFS mounts are: not every fault of a lock is another run."""
+    monkeypatch.setattr(exclusive, "try_lock", lambda descriptor: None)
+    folder = tmp_path / "set"
+
+    def disturbed(folders: list[str]) -> Iterator[Outcome]:
+        with pytest.raises(OutputError, match=f"another run is at work in it: process {os.getpid()} of "):
+            make(folder, OLD, resume=True)
+        yield from small_scenes(folders)
+
+    DatasetRun(Recipe.from_dict(OLD), folder).run(disturbed)
+    (folder / ".lock").write_text(replace(this_process(), host="node7").to_json())
+    with pytest.raises(OutputError, match=r"another run may be at work in it: process \d+ of node7 .*remove .*\.lock"):
+        make(folder, OLD, resume=True)
+    (folder / ".lock").write_text(replace(this_process(), pid=2**22 + 5).to_json())
+    make(folder, OLD, resume=True)
 
 
 @pytest.mark.parametrize("other", ["--resume", "--verify"])

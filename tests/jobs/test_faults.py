@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import resource
 import signal
 import subprocess
@@ -123,6 +124,41 @@ def test_a_disk_that_is_full(name: str, kilobytes: int, inputs: Path, tmp_path: 
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("kilobytes", [60, 400])
+def test_a_folder_for_temporary_files_that_is_full(
+    kilobytes: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """While images are rendered."""
+    images = [word if word != 'colour.source="material"' else 'colour.source="images"' for word in SETTINGS]
+    arguments = [sys.executable, "-m", "headless.generate", *images, "--quiet", "--output", str(tmp_path / "out")]
+    with small_disk(tmp_path / "disk", kilobytes) as disk:
+        monkeypatch.setenv("TMPDIR", str(disk))
+        done = ran(arguments)
+        refused(done)
+        assert str(disk) in done.stderr
+        assert list(disk.iterdir()) == []
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(
+    ("error", "says"),
+    [
+        ("MemoryError('Unable to allocate 537. TiB')", "error: too little memory (Unable to allocate 537. TiB)"),
+        ("RuntimeError(\"DefaultCPUAllocator: can't allocate memory: 8 bytes\")", "error: too little memory (Default"),
+        ("RuntimeError(\"can't start new thread\")", "error: too little memory (can't start new thread); nothing"),
+        ("OSError(28, 'No space left on device', '/tmp/x')", "error: /tmp/x cannot be written (No space left"),
+    ],
+)
+def test_a_machine_that_is_too_small_is_told_in_a_line(error: str, says: str) -> None:
+    code = "import argparse; from headless.commands import leave, run\n"
+    code += f"def work(arguments):\n    raise {error}\n"
+    code += "leave(lambda: run(work, argparse.Namespace(json=False, quiet=False)))"
+    done = ran([sys.executable, "-c", code])
+    assert (done.returncode, len(done.stderr.splitlines())) == (2, 1), done.stderr
+    assert done.stderr.startswith(says)
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize("output", ["scene", "cloud", "previews", "parameters"])
 @pytest.mark.parametrize("size", [100, 3000])
 def test_files_that_may_not_grow(output: str, size: int, inputs: Path, tmp_path: Path) -> None:
@@ -187,7 +223,7 @@ def whole(inputs: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str, t
 
 def stopped(arguments: list[str], after: float, sign: signal.Signals) -> tuple[int, str]:
     """Run a command and send it a signal after some seconds; return its exit code and what it said."""
-    hearing = ["env", "--default-signal=INT", *arguments]  # a shell's background jobs are deaf to interrupts
+    hearing = ["env", "--default-signal=INT,HUP", *arguments]  # a shell's background jobs are deaf to interrupts
     with subprocess.Popen(hearing, cwd=ROOT, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True) as process:
         time.sleep(after)
         process.send_signal(sign)
@@ -228,21 +264,31 @@ def test_interrupted_at_any_moment_it_says_so_and_leaves_nothing(
 @pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES)
 def test_killed_at_any_moment_every_file_in_sight_is_whole(
-    name: str, inputs: Path, whole: dict[str, tuple[float, dict[str, bytes]]], tmp_path: Path
+    name: str,
+    inputs: Path,
+    whole: dict[str, tuple[float, dict[str, bytes]]],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """And the next run ends as if nothing had been."""
+    """And the next run ends as if nothing had been: what the killed ones left is gone, from the system's folder too."""
     seconds, complete = whole[name]
     rng, output, killed = np.random.default_rng(6), tmp_path / "out", 0
     (tmp_path / "out").mkdir()
-    for _ in range(10):
+    (temporary := tmp_path / "temporary").mkdir()
+    monkeypatch.setenv("TMPDIR", str(temporary))
+    signs = (signal.SIGKILL, signal.SIGTERM, signal.SIGKILL, signal.SIGHUP, signal.SIGKILL)
+    for number in range(10):
         arguments = [*command(name, inputs, output), "--overwrite"]
-        code, _ = stopped(arguments, float(rng.uniform(0.2, 1.1) * seconds), signal.SIGKILL)
-        killed += code == -signal.SIGKILL
+        sign = signs[number % len(signs)]
+        code, _ = stopped(arguments, float(rng.uniform(0.2, 1.1) * seconds), sign)
+        killed += code in (130, -sign)
         if code == 0:  # the machine has become faster meanwhile
             seconds *= 0.8
         check_whole(output)
     assert killed >= 4
     assert ran([*command(name, inputs, output), "--overwrite"]).returncode == 0
+    assert list(temporary.iterdir()) == []
+    assert sorted(path.name for path in output.iterdir()) == sorted(complete)
     now = files(output)
     same = [file for file in complete if file not in ("report.json", "scene.blend")]  # these hold times
     assert [file for file in same if now[file] != complete[file]] == []
@@ -256,6 +302,47 @@ def test_a_command_that_is_still_loading_ends_quietly() -> None:
     code = "import sys; sys.argv = ['other']; import headless; raise ValueError('mine')"
     done = ran([sys.executable, "-c", code])
     assert (done.returncode, "ValueError: mine" in done.stderr) == (1, True)
+
+
+WAITING = """
+import sys; sys.argv = ["-m"]
+import argparse, sys, tempfile, time
+from headless.commands import leave, run
+
+def work(arguments):
+    tempfile.mkdtemp()
+    print("at work", file=sys.stderr, flush=True)
+    time.sleep(20.0)
+
+leave(lambda: run(work, argparse.Namespace(json=False, quiet=False)))
+"""
+
+
+@pytest.mark.parametrize("sign", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+def test_each_end_from_outside_is_one_line_and_leaves_nothing(sign: signal.Signals, tmp_path: Path) -> None:
+    """A container that is stopped, Slurm, a connection that is lost; some send their signal twice."""
+    environment = {**os.environ, "TMPDIR": str(tmp_path), "PYTHONPATH": str(ROOT)}
+    hearing = ["env", "--default-signal=INT,TERM,HUP", sys.executable, "-c", WAITING]
+    with subprocess.Popen(hearing, env=environment, stderr=subprocess.PIPE, text=True) as process:
+        assert process.stderr is not None
+        assert process.stderr.readline() == "at work\n"
+        assert len(list(tmp_path.iterdir())) == 1
+        for _ in range(2):
+            process.send_signal(sign)
+        _, said = process.communicate(timeout=30)
+    assert (process.returncode, said) == (130, "interrupted; nothing was left half-written\n")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_command_that_nohup_began_goes_on_without_its_terminal(tmp_path: Path) -> None:
+    code = WAITING.replace("time.sleep(20.0)", "time.sleep(0.3)\n    return 0, {}, 'done'")
+    with subprocess.Popen(
+        ["env", "--ignore-signal=HUP", sys.executable, "-c", code], cwd=ROOT, stderr=subprocess.PIPE, text=True
+    ) as process:
+        assert process.stderr is not None
+        process.stderr.readline()
+        process.send_signal(signal.SIGHUP)
+        assert process.wait(timeout=30) == 0
 
 
 @pytest.mark.parametrize("kind", ["RuntimeError", "ModuleNotFoundError"])

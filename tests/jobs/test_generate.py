@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from headless import commands
+from headless.generate import summary
 from synthroads_addon.base.errors import InputError
 from synthroads_addon.blender.services import BlenderServices
 from synthroads_addon.cloud.points import concatenate
@@ -44,6 +45,13 @@ def command(*arguments: str | Path) -> subprocess.CompletedProcess:
         check=False,
         stdin=subprocess.DEVNULL,
     )
+
+
+def test_a_road_that_no_pulse_comes_back_from_is_told(tmp_path: Path) -> None:
+    report = generate(job(tmp_path, "road.length=20", "scan.attenuation=1", 'outputs=["cloud"]'))
+    assert report["counts"]["points"] == 0
+    assert "not one pulse came back" in json.loads((tmp_path / "report.json").read_text())["warnings"][0]
+    assert summary(report, tmp_path).startswith("warning: not one pulse came back")
 
 
 def test_every_file_is_written_and_agrees(tmp_path: Path) -> None:

@@ -217,6 +217,57 @@ def test_tripods_stand_on_the_surface_or_where_they_are_put(scene: Callable[[str
     assert np.allclose(scene_path(job, scene_mesh(), None).positions, [[-15, -5, 1.0 + Tripod.usual["height"]]])
 
 
+def test_a_scene_with_a_vertex_astray_is_scanned_where_it_is(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Its path and previews are those of the scene without it; one that lies on no map is refused."""
+    ground = "".join(f"v {x} {y} 0\n" for x in range(-12, 13, 3) for y in range(-12, 13, 3))
+    corners = [9 * i + j + 1 for i in range(8) for j in range(8)]
+    faces = "".join(f"f {at} {at + 9} {at + 10} {at + 1}\n" for at in corners)
+    points = []
+    for name, far in (("plain", ""), ("stray", "v 5e5 0 0\nf 1 2 82\n")):
+        (tmp_path / f"{name}.obj").write_text(ground + faces + far)
+        las = scan(tmp_path / f"{name}.obj", tmp_path / name, "--up", "z", "--height", "30", "--speed", "30")
+        points.append(len(las))
+    assert points[1] == pytest.approx(points[0], rel=0.1)
+    report = json.loads((tmp_path / "stray" / "report.json").read_text())
+    assert report["warnings"][0] == "1 vertices lie far from all others: path and previews leave them out"
+    (tmp_path / "far.obj").write_text(ground + faces + "v 4e8 0 0\nf 1 2 82\n")
+    capsys.readouterr()
+    words = [str(tmp_path / "far.obj"), "--up", "z", "--output", str(tmp_path / "out"), "--quiet"]
+    assert command("scan", words) == 2
+    assert "must lie within 1e+08 m of the scene's origin" in capsys.readouterr().err
+
+
+def test_a_scan_larger_than_anyone_can_have_meant_is_refused(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A yard in millimetres: 20 km long."""
+    (tmp_path / "yard.obj").write_text("v -1e7 -20 0\nv 1e7 -20 0\nv 1e7 20 0\nv -1e7 20 0\nf 1 2 3 4\n")
+    words = [str(tmp_path / "yard.obj"), "--up", "z", "--output", str(tmp_path / "out"), "--quiet", "--height", "30"]
+    assert command("scan", words) == 2
+    told = capsys.readouterr().err
+    assert "scan.most_pulses is 5000000000: " in told
+    assert "--allow-large" in told
+    assert len(told.splitlines()) == 1
+    (tmp_path / "yard.obj").write_text("v -5 -5 0\nv 5 -5 0\nv 5 5 0\nv -5 5 0\nf 1 2 3 4\n")
+    assert command("scan", [*words, *DRAFT, "--set", "scan.most_pulses=10"]) == 2
+    assert "scan.most_pulses is 10: " in capsys.readouterr().err
+    assert command("scan", [*words, *DRAFT, "--allow-large"]) == 0
+
+
+def test_a_scan_without_a_point_is_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """As of a tripod that stands in the plane of the only wall."""
+    wall = "v 5 -5 -5\nv 5 5 -5\nv 5 5 5\nv 5 -5 5\nf 1 2 3 4\n"
+    (tmp_path / "wall.obj").write_text(wall)
+    words = [str(tmp_path / "wall.obj"), "--up", "z", "--output", str(tmp_path / "out"), *DRAFT, "--tripod", "5,8,0"]
+    words += ["--set", "scan.platform.turn_seconds=0.2"]
+    assert command("scan", words) == 0
+    told = capsys.readouterr().out
+    assert "warning: not one pulse came back" in told
+    assert "not one pulse came back" in json.loads((tmp_path / "out" / "report.json").read_text())["warnings"][0]
+
+
 @pytest.fixture
 def road_scene(tmp_path: Path) -> tuple[Path, RoadGeometry]:
     """Return a .blend that holds a road of ours with the set that it was built from, and its geometry."""
@@ -326,6 +377,8 @@ def test_a_scan_leaves_a_road_of_ours_as_it_was(road_scene: tuple[Path, RoadGeom
 
 BROKEN = {"broken.glb": b"glTF\x02\x00\x00\x00junk", "broken.blend": b"hello", "broken.ply": b"hello", "a.txt": b""}
 BROKEN |= {"empty.obj": b"# nothing\n", "points.obj": b"v 0 0 0\nv 1 0 0\nv 1 1 0\n", "broken.gltf": b'{"asset":'}
+_SPARSE = b'"accessors":[{"componentType":5126,"count":1,"type":"VEC3","sparse":{}}]'
+BROKEN |= {"nodes.gltf": b'{"asset":{"version":"2.0"},' + _SPARSE + b"}"}
 BROKEN |= {"flat.obj": b"v 0 0 0\nv 1 0 0\nv 2 0 0\nf 1 2 3\n", "cut.stl": b"solid x\nfacet normal 0 0"}
 
 
@@ -336,7 +389,8 @@ BROKEN |= {"flat.obj": b"v 0 0 0\nv 1 0 0\nv 2 0 0\nf 1 2 3\n", "cut.stl": b"sol
         ("missing.glb", [], "SCENE is '{place}': no such file"),
         ("a.txt", [], "SCENE is '{place}': must end in one of .blend, .glb"),
         ("broken.glb", [], "{place}: is damaged ("),
-        ("broken.gltf", [], "SCENE is '{place}': can't be read by Blender: "),
+        ("broken.gltf", [], "{place}: is damaged ("),
+        ("nodes.gltf", [], "SCENE is '{place}': can't be read by Blender: Couldn't parse glTF"),
         ("broken.blend", [], "SCENE is '{place}': can't be read by Blender: "),
         ("broken.ply", [], "{place}: is damaged ("),
         ("cut.stl", [], "SCENE is '{place}': can't be read by Blender: "),

@@ -29,6 +29,8 @@ pytestmark = [
 ROOT = Path(__file__).resolve().parents[2]
 KINDS = ("centerline", "segmentation")
 ROUNDS = 4
+ENDS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+"""To all processes of a training: from a terminal, from Slurm or a container, from a lost connection."""
 
 
 @pytest.fixture(scope="module")
@@ -79,7 +81,7 @@ class Training:
     @contextmanager
     def begun(self) -> Iterator[subprocess.Popen[str]]:
         """Begin it or go on with it, in a group of processes of its own; wait until its folder is made."""
-        arguments = ["env", "--default-signal=INT", sys.executable, "-m", "headless.train", str(self.file)]
+        arguments = ["env", "--default-signal=INT,HUP", sys.executable, "-m", "headless.train", str(self.file)]
         arguments += ["--output", str(self.folder), "--resume", "--quiet"]
         pipes: dict[str, Any] = {"stdout": subprocess.DEVNULL, "stderr": subprocess.PIPE, "text": True}
         before = self._stamp()
@@ -185,7 +187,8 @@ def test_interrupted_at_any_moment_it_says_so_and_goes_on(kind: str, data: Path,
     rng, codes = np.random.default_rng(9), []
     for number in range(ROUNDS):
         disturbed = training(kind, data, tmp_path / str(number))
-        code, said = disturbed.stopped(float(rng.uniform(0.0, 0.8) * seconds), signal.SIGINT)
+        sign = ENDS[number % len(ENDS)]
+        code, said = disturbed.stopped(float(rng.uniform(0.0, 0.8) * seconds), sign)
         codes.append(code)
         assert code in (0, 130), said
         assert "Traceback" not in said, said

@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 import json
 import shutil
-import tempfile
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
@@ -17,6 +16,7 @@ from numpy.typing import NDArray
 
 from synthroads_addon.base.errors import InputError, MissingFileError, OutputError
 from synthroads_addon.base.random_streams import stream
+from synthroads_addon.base.scratch.folders import scratch_folder
 from synthroads_addon.cloud.formats.npz import ARCHIVE_FAULTS
 from synthroads_addon.dataset.manifest import checksum, read_manifest
 from synthroads_addon.road.parameters import read_parameters
@@ -285,8 +285,8 @@ def _keep(road: LearningRoad, folder: Path, cache: Path) -> None:
     notes = {"origin": road.origin.tolist(), "classes": road.class_names, "has_color": road.has_color}
     try:
         cache.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryDirectory(prefix=".partial-", dir=cache, ignore_cleanup_errors=True) as name:
-            made = Path(name) / place.name
+        with scratch_folder(cache) as scratch:
+            made = scratch / place.name
             made.mkdir()
             for array in _CACHED:
                 np.save(made / f"{array}.npy", getattr(road, array))

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Callable, Sequence
-from pathlib import Path
+from contextlib import ExitStack
 from typing import Any
 
 import bpy
 import numpy as np
 from mathutils import Matrix
 
+from ...base.scratch.folders import scratch_folder, unwritable_temporary
 from ...scanning.colour.colour import MaterialLayers
 from ...scanning.colour.images import ImageLayers
 from ...scanning.colour.views import RenderedImage, View
@@ -31,7 +31,8 @@ class RenderedLayers(ImageLayers):
         """Begin without an image; `render` makes them."""
         super().__init__((), stage.passes.channels, fallback)
         self._stage, self._views, self._exposure = stage, views, exposure
-        self._folder = tempfile.TemporaryDirectory(prefix="synthroads-")
+        self._scratch = ExitStack()
+        self._folder = self._scratch.enter_context(scratch_folder())
 
     def render(self, progress: Callable[[float], None]) -> None:
         """Render all images; must run on Blender's main thread. Calls `progress` with the share that is done."""
@@ -65,15 +66,18 @@ class RenderedLayers(ImageLayers):
         )
 
     def _map_file(self, name: str, array: np.ndarray[Any, Any]) -> np.ndarray[Any, Any]:
-        path = Path(self._folder.name) / f"{name}.npy"
-        np.save(path, array)
+        path = self._folder / f"{name}.npy"
+        try:
+            np.save(path, array)
+        except OSError as error:
+            raise unwritable_temporary(self._folder, error) from None
         # An empty array can't be mapped.
         return np.load(path, mmap_mode="r" if array.size else None)
 
     def close(self) -> None:
         """Remove the files."""
         self.images.clear()
-        self._folder.cleanup()
+        self._scratch.close()
 
 
 def aim(camera: bpy.types.Object, view: View) -> None:

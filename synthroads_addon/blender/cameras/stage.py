@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import errno
 import os
+import shutil
 import sys
-import tempfile
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
@@ -15,12 +16,16 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
+from ...base.scratch.folders import scratch_folder, unwritable_temporary
 from ...scanning.colour.colour import MATERIAL_LAYERS
+from ..files import stderr_if_it_succeeds
 from .exr import read_layers
 from .surfaces import NUMBER, prepared_materials
 from .versions import eevee_engine, multilayer_exr
 
 NAME = "SR Stage"
+_LEAST_FREE = 1 << 16
+"""Bytes that are free on a disk to which an image could be written to its end."""
 SUN_GROUP, SKY_GROUP = "sun", "sky"
 """Light groups of the lit image, where both are rendered."""
 _POSITION, _DEPTH = "Position", "Depth"
@@ -89,14 +94,24 @@ class RenderStage:
         self.images = self.pixels = 0
 
     def render(self, width: int, height: int) -> RenderedPasses:
-        """Render an image through the camera as it is; must run on Blender's main thread."""
+        """Render an image through the camera as it is; must run on Blender's main thread.
+
+        Raises:
+            OutputError: the image can't be written to the temporary folder.
+        """
         render, path = self.scene.render, self.folder / "image.exr"
         render.resolution_x, render.resolution_y, render.resolution_percentage = width, height, 100
         render.filepath = str(path)
-        with _silence():
-            bpy.ops.render.render(write_still=True, scene=self.scene.name)
+        path.unlink(missing_ok=True)  # where the new one can't be written the old one isn't taken for it
         self.images, self.pixels = self.images + 1, self.pixels + width * height
-        return self._read(read_layers(path))
+        try:
+            with _silence(), stderr_if_it_succeeds():
+                bpy.ops.render.render(write_still=True, scene=self.scene.name)
+                if shutil.disk_usage(self.folder).free < _LEAST_FREE:  # Blender raises nothing where an image is cut
+                    raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+            return self._read(read_layers(path))
+        except (OSError, LookupError, StopIteration, RuntimeError) as error:
+            raise unwritable_temporary(self.folder, error) from None
 
     def forget(self) -> None:
         """Have the renderer drop what it keeps from image to image."""
@@ -143,7 +158,7 @@ def stage(
     """
     known = {item.name for item in bpy.data.images}
     with ExitStack() as stack:
-        folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="synthroads-")))
+        folder = stack.enter_context(scratch_folder())
         stack.enter_context(prepared_materials(materials, passes.layers, engine == "eevee"))
         stack.callback(_forget_images, known)
         scene = bpy.data.scenes.new(NAME)

@@ -11,7 +11,7 @@ import bpy
 
 from ...base.errors import InputError, MissingFileError
 from ...scanning.scene.mesh_files import check_mesh_file
-from ..files import complaint, empty_file
+from ..files import complaint, empty_file, stderr_if_it_succeeds
 
 UpAxis = Literal["y", "z"]
 
@@ -80,7 +80,8 @@ def open_scene(path: Path, up: UpAxis | None = None) -> None:
             _try_in_a_process(path, f"{module}.{name}")
         empty_file()
         options: dict[str, Any] = dict(_AXES[up]) if up else {}
-        getattr(getattr(bpy.ops, module), name)(filepath=place, **options)
+        with stderr_if_it_succeeds():
+            getattr(getattr(bpy.ops, module), name)(filepath=place, **options)
     except (AttributeError, RuntimeError) as error:
         raise InputError("SCENE", str(path), f"can't be read by Blender: {complaint(error)}") from None
 

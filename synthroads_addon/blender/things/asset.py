@@ -16,7 +16,7 @@ from ...road.parameters import Asset
 from ...road.surface import surface_elevation
 from ...scanning.scene.mesh_files import check_mesh_file
 from ...scenario.assets import LibraryAsset, library_file, read_asset_library
-from ..files import complaint
+from ..files import complaint, stderr_if_it_succeeds
 from ..labels import CLASS_PROPERTY, INSTANCE_PROPERTY
 from .meshes import on_plan
 from .model_builder import ModelBuilder
@@ -61,7 +61,8 @@ def _collection(path: Path, asset: LibraryAsset) -> bpy.types.Collection:
     check_mesh_file(path)
     read = {".blend": _read_blend, ".glb": _read_glb, ".obj": _read_obj}[path.suffix.lower()]
     try:
-        objects = by_caller(lambda: read(path, asset.object))  # importers need Blender's main thread
+        with stderr_if_it_succeeds():
+            objects = by_caller(lambda: read(path, asset.object))  # importers need Blender's main thread
     except (OSError, RuntimeError) as error:
         raise InputError(str(path), None, f"cannot be read as an asset ({complaint(error)})") from None
     if not objects:

@@ -7,7 +7,7 @@ import json
 import re
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator
-from contextlib import suppress
+from contextlib import ExitStack, suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Self
@@ -18,8 +18,11 @@ from numpy.typing import NDArray
 from ...base.classes import ClassScheme, asprs_scheme, class_scheme, stored_scheme
 from ...base.crs import wkt
 from ...base.errors import InputError, OutputError
+from ...base.files import sync_file
+from ...base.scratch.folders import scratch_folder
 from ..layers import ATTRIBUTES, DEFAULT_ATTRIBUTES, LAYERS, Attribute, Column, attributes_of, columns
 from ..points import PointBlock
+from ..strays import FARTHEST
 
 
 class CloudWriter(ABC):
@@ -49,6 +52,8 @@ class CloudWriter(ABC):
     """Errors that the library beneath raises where it can't write."""
     _file: Any
     """Open temporary file, or the library's handle of it."""
+    _temporary: Path
+    """File that is written, in a scratch folder beside the final place."""
 
     def __init__(
         self,
@@ -70,16 +75,20 @@ class CloudWriter(ABC):
         self.scheme = scheme or class_scheme("17")
         self.count = 0
         self.clipped = 0
-        self._temporary = path.with_name(f".{path.name}.partial")
+        self._scratch = ExitStack()
         if not np.isfinite(self.offset).all() or not (0 < self.intensity_scale < np.inf):
             raise InputError("offset, intensity_scale", [*self.offset, intensity_scale], "must be finite numbers")
 
     def __enter__(self) -> Self:
         try:
+            self._temporary = self._scratch.enter_context(scratch_folder(self.path.parent)) / self.path.name
             self._open()
         except self.faults as problem:
             self._abandon()
             raise self._unwritable(problem) from None
+        except BaseException:
+            self._abandon()
+            raise
         return self
 
     def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
@@ -87,12 +96,15 @@ class CloudWriter(ABC):
         try:
             if kind is None:
                 self._finish()
+                sync_file(self._temporary)
                 self._temporary.replace(self.path)
                 done = True
         except self.faults as problem:
             raise self._unwritable(problem) from None
         finally:
-            if not done:
+            if done:
+                self._scratch.close()
+            else:
                 self._abandon()
 
     def write(self, block: PointBlock) -> None:
@@ -182,11 +194,10 @@ class CloudWriter(ABC):
         self._file.close()
 
     def _abandon(self) -> None:
-        """Close and remove the temporary file; doesn't raise."""
+        """Close what is open and remove the temporary file; doesn't raise."""
         with suppress(Exception):
             self._close()
-        with suppress(OSError):
-            self._temporary.unlink(missing_ok=True)
+        self._scratch.close()
 
     def refused(self, value: object, allowed: str) -> OutputError:
         """Return the error of a value that the file can't hold."""
@@ -253,15 +264,23 @@ class CloudReader(ABC):
     def __exit__(self, *_: object) -> None:
         self.close()
 
-    @abstractmethod
     def blocks(self, size: int = BLOCK) -> Iterator[PointBlock]:
         """Yield all points in the file's order, at most ``size`` at a time.
 
         What the file doesn't hold is 0, or NaN for range and incidence.
 
         Raises:
-            InputError: the file is truncated or damaged.
+            InputError: the file is truncated or damaged, or holds a coordinate that lies on no map, or an intensity
+                that is no number.
         """
+        done = 0
+        for block in self._stored_blocks(size):
+            yield _checked(self.header.path, done, block)
+            done += len(block)
+
+    @abstractmethod
+    def _stored_blocks(self, size: int) -> Iterator[PointBlock]:
+        """Yield what the file holds; see `blocks`."""
 
     def close(self) -> None:
         """Close the file; it may be closed already."""
@@ -351,6 +370,21 @@ def finite_coordinates(path: Path, done: int, xyz: NDArray[np.float64]) -> NDArr
         point, axis = np.argwhere(~np.isfinite(xyz))[0]
         raise InputError(f"{path}: {'xyz'[axis]} of point {done + point:,}", xyz[point, axis], "must be finite")
     return xyz
+
+
+def _checked(path: Path, done: int, block: PointBlock) -> PointBlock:
+    """Return a block as it is; raise `InputError` if a coordinate or intensity can't be one."""
+    if not len(block):
+        return block
+    xyz = finite_coordinates(path, done, block.xyz)
+    if max(xyz.max(), -xyz.min()) > FARTHEST:
+        point, axis = divmod(int(np.abs(xyz).argmax()), 3)
+        allowed = f"must be a map coordinate, at most {FARTHEST:g} m"
+        raise InputError(f"{path}: {'xyz'[axis]} of point {done + point:,}", float(xyz[point, axis]), allowed)
+    if not np.isfinite(block.intensity).all():
+        point = int(np.argmin(np.isfinite(block.intensity)))
+        raise InputError(f"{path}: intensity of point {done + point:,}", block.intensity[point], "must be finite")
+    return block
 
 
 def damage_error(path: Path, at: int, count: int) -> InputError:

@@ -19,7 +19,7 @@ from ...base.errors import InputError
 from ...base.rotations import matrices
 from ..layers import Column, columns, make_points
 from ..points import PointBlock
-from .base import BLOCK, CloudReader, CloudWriter, damage_error, finite_coordinates, header_from_notes
+from .base import CloudReader, CloudWriter, damage_error, finite_coordinates, header_from_notes
 
 SCALE = 1e-4
 """Size of a coordinate's step, m."""
@@ -256,8 +256,8 @@ class E57Reader(CloudReader):
             path, "E57", sum(counts), names, notes, name_of=e57_name, usual=_STANDARD, has_color="colorRed" in names
         )
 
-    def blocks(self, size: int = BLOCK) -> Iterator[PointBlock]:
-        """Yield all points in the file's order; see `CloudReader.blocks`."""
+    def _stored_blocks(self, size: int) -> Iterator[PointBlock]:
+        """See `CloudReader._stored_blocks`."""
         done = 0
         for scan, fields, count in zip(self._scans, self._fields, self._counts, strict=True):
             names = [name for name in sorted(_STANDARD | self._layer_names()) if name in fields]

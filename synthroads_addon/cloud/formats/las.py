@@ -25,7 +25,7 @@ from ...base.errors import InputError, OutputError
 from ...base.schema import canonical_json
 from ..layers import Column, attributes_of, columns, make_points
 from ..points import PointBlock
-from .base import BLOCK, CloudHeader, CloudReader, CloudWriter, damage_error, epsg_of, intensity_scale
+from .base import CloudHeader, CloudReader, CloudWriter, damage_error, epsg_of, intensity_scale
 from .laz_chunks import check_chunks
 
 SCALE = 0.001
@@ -209,8 +209,8 @@ class LasReader(CloudReader):
             self._file.close()
             raise InputError(str(path), None, f"is not a LAS file that can be read ({problem})") from None
 
-    def blocks(self, size: int = BLOCK) -> Iterator[PointBlock]:
-        """Yield all points in the file's order; see `CloudReader.blocks`."""
+    def _stored_blocks(self, size: int) -> Iterator[PointBlock]:
+        """See `CloudReader._stored_blocks`."""
         done, path = 0, self.header.path
         if self._reader.points_read:
             self._reader.seek(0)

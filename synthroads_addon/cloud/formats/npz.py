@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 from ...base.errors import InputError
 from ..layers import columns, layer_arrays, make_points
 from ..points import POINT_TYPES, PointBlock
-from .base import BLOCK, CloudReader, CloudWriter, damage_error, finite_coordinates, header_from_notes
+from .base import CloudReader, CloudWriter, damage_error, finite_coordinates, header_from_notes
 
 _ON_REQUEST = {name: (np.dtype(kind).str, width) for name, (kind, width) in layer_arrays().items()}
 ARCHIVE_FAULTS = (
@@ -44,9 +44,8 @@ class NpzWriter(CloudWriter):
     def _open(self) -> None:
         names = {column.array for column in self.columns}
         self._arrays = POINT_TYPES | {name: kind for name, kind in _ON_REQUEST.items() if name in names}
-        self._parts = self.path.with_name(f".{self.path.name}.parts")
+        self._parts = self._temporary.with_name("parts")
         self._files: dict[str, IO[bytes]] = {}
-        shutil.rmtree(self._parts, ignore_errors=True)
         self._parts.mkdir()
         for name in self._arrays:
             self._files[name] = (self._parts / name).open("wb")
@@ -71,13 +70,11 @@ class NpzWriter(CloudWriter):
                 (self._parts / name).unlink()
             with archive.open(zipfile.ZipInfo("notes.npy", _TIME), "w") as member:
                 npy.write_array(member, np.array(json.dumps(self.placed_notes())), allow_pickle=False)
-        self._parts.rmdir()
 
     def _close(self) -> None:
         for file in self._files.values():
             with suppress(OSError):
                 file.close()
-        shutil.rmtree(self._parts, ignore_errors=True)
 
 
 class NpzReader(CloudReader):
@@ -117,8 +114,8 @@ class NpzReader(CloudReader):
             has_color="rgb" in arrays,
         )
 
-    def blocks(self, size: int = BLOCK) -> Iterator[PointBlock]:
-        """Yield all points in the file's order; see `CloudReader.blocks`."""
+    def _stored_blocks(self, size: int) -> Iterator[PointBlock]:
+        """See `CloudReader._stored_blocks`."""
         members = {name: self._file.open(f"{name}.npy") for name in self._kinds}
         try:
             for member in members.values():

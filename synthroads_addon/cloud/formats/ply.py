@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from ...base.errors import InputError
 from ..layers import Column, columns, make_points
 from ..points import PointBlock
-from .base import BLOCK, CloudReader, CloudWriter, damage_error, finite_coordinates, header_from_notes
+from .base import CloudReader, CloudWriter, damage_error, finite_coordinates, header_from_notes
 
 _NAMES = {"NormalX": "nx", "NormalY": "ny", "NormalZ": "nz"}
 """Columns that PLY has names of its own for."""
@@ -140,8 +140,8 @@ class PlyReader(CloudReader):
             path, "PLY", count, self._names, notes, name_of=ply_name, usual=usual, has_color=colored
         )
 
-    def blocks(self, size: int = BLOCK) -> Iterator[PointBlock]:
-        """Yield all points in the file's order; see `CloudReader.blocks`."""
+    def _stored_blocks(self, size: int) -> Iterator[PointBlock]:
+        """See `CloudReader._stored_blocks`."""
         self._file.seek(self._start)
         for done in range(0, self.header.count, size):
             rows = min(size, self.header.count - done)

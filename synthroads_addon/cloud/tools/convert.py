@@ -18,6 +18,7 @@ from ...base.schema import read_json
 from ..formats.base import BLOCK, CloudReader, CloudWriter
 from ..formats.registry import check_ending, open_cloud, open_writer
 from ..points import PointBlock, concatenate
+from ..strays import Strays
 from .previews import CrossSection, TopView
 from .quantile_mapping import IntensityMapping, steps_per_unit
 from .subsample import GridSubsampler
@@ -125,14 +126,15 @@ def draw_previews(
         OutputError: a picture is there already or can't be written.
     """
     with open_cloud(source) as cloud:
-        extent = _Extent(cloud)
+        strays = _strays_of(cloud)
+        extent = _Extent(cloud.header.path, _staying_blocks(cloud, strays))
         start, end = (extent.start, extent.end) if centerline is None else (centerline[0], centerline[-1])
         low, high = extent.across(start, end)
         view = TopView(start, end, low, high, cloud.header.scheme)
         path = extent.axis() if centerline is None else centerline
         middle, right, reach = _cross_cut(line, station, path, max(1.0, (high - low) / 2), extent)
         slab: list[PointBlock] = []
-        for block in cloud.blocks():
+        for block in _staying_blocks(cloud, strays):
             view.add(block)
             away = (block.xyz[:, :2] - middle) @ np.array([-right[1], right[0]])
             slab.append(block.select(np.abs(away) <= depth / 2))
@@ -149,7 +151,22 @@ def draw_previews(
             paths = view.save(temporary, cloud.header.epsg, cloud.header.has_color)
             paths.append(section.save(temporary / PREVIEWS[3]))
             names = [path.name for path in paths]
-    return {"file": source.name, "points": int(view.raster.count.sum()), "pictures": names, "section_points": len(cut)}
+    drawn = {"file": source.name, "points": int(view.raster.count.sum()), "pictures": names, "section_points": len(cut)}
+    return drawn | ({"strays_left_out": strays.count()} if strays else {})
+
+
+def _strays_of(cloud: CloudReader) -> Strays | None:
+    """Return the points far from all others, which would make pictures of nothing but them; None if there are none."""
+    strays = Strays()
+    for block in cloud.blocks():
+        strays.add(block.xyz)
+    return strays if strays.count() else None
+
+
+def _staying_blocks(cloud: CloudReader, strays: Strays | None) -> Iterator[PointBlock]:
+    """Yield a cloud's blocks without strays."""
+    for block in cloud.blocks():
+        yield block if strays is None else block.select(np.flatnonzero(strays.stay(block.xyz)))
 
 
 def read_centerline(path: Path) -> NDArray[np.float64]:
@@ -175,13 +192,15 @@ class _Extent:
 
     _SLACK = 0.003
 
-    def __init__(self, cloud: CloudReader) -> None:
+    def __init__(self, path: Path, blocks: Iterable[PointBlock]) -> None:
         angle = np.arange(24) * (np.pi / 24)
         directions = np.stack([np.cos(angle), np.sin(angle)])
         count, origin = 0, np.zeros(2)
         total, products = np.zeros(2), np.zeros((2, 2))
         outermost = []
-        for block in cloud.blocks():
+        for block in blocks:
+            if not len(block):
+                continue
             origin = origin if count else block.xyz[0, :2].copy()
             local = block.xyz[:, :2] - origin
             count += len(local)
@@ -190,7 +209,7 @@ class _Extent:
             along = local @ directions
             outermost.append(local[np.r_[along.argmin(axis=0), along.argmax(axis=0)]])
         if count == 0:
-            raise InputError(str(cloud.header.path), None, "has no points")
+            raise InputError(str(path), None, "has no points")
         self._outermost = np.concatenate(outermost) + origin
         self.middle = origin + total / count
         spread = products / count - np.outer(total / count, total / count)

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-import shutil
-import tempfile
 from collections.abc import Iterator
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ...base.scratch.folders import scratch_folder
 from ..points import PointBlock, make_block
 
 
@@ -22,16 +22,16 @@ class TileFiles:
     """
 
     def __init__(self, folder: Path) -> None:
-        self._folder = folder
+        self._folder, self._scratch = folder, ExitStack()
         self._type: np.dtype[Any] | None = None
         self._paths: dict[tuple[int, int], Path] = {}
 
     def __enter__(self) -> Self:
-        self._made = Path(tempfile.mkdtemp(prefix=".tiles-", dir=self._folder))
+        self._made = self._scratch.enter_context(scratch_folder(self._folder))
         return self
 
     def __exit__(self, *_: object) -> None:
-        shutil.rmtree(self._made, ignore_errors=True)
+        self._scratch.close()
 
     def append(self, block: PointBlock, tile: NDArray[np.int64]) -> None:
         """Append a block's points to their tiles (N, 2); all blocks must have the same attributes."""

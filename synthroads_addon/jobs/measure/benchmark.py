@@ -95,7 +95,7 @@ def measure_demo(scenario: Scenario) -> dict[str, Any]:
 
 def _spread_blocks(plan: ScanPlan, count: int) -> list[Any]:
     """Return so many whole blocks, spread over a scan."""
-    blocks = plan.blocks()
+    blocks = list(plan.blocks())
     return [blocks[i] for i in np.unique(np.linspace(0, len(blocks) - 1, count + 2).astype(int)[1:-1])]
 
 

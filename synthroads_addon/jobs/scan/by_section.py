@@ -84,7 +84,7 @@ class SectionScan:
 
     def plans(self, timer: StageTimer) -> Generator[ScanPlan, None, None]:
         """Build one section after the other and yield its plan; afterwards the section is dropped."""
-        done, total = 0, len(self.cut.all())
+        done, total = 0, self.cut.count()
         for section in self.sections():
             shares = done / total, (done + len(section.blocks)) / total
             try:

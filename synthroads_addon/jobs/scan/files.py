@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from dataclasses import asdict, dataclass, field
@@ -23,6 +24,10 @@ from ...scanning.plan import ScanPlan
 from ...scanning.record import record
 from ...scanning.scan import BlockResult
 from ...scenario.scenario import Scenario
+
+_logger = logging.getLogger("synthroads")
+_LONG = 300.0
+"""Seconds from which on a scan's forecast is told unasked."""
 
 
 @dataclass
@@ -145,7 +150,9 @@ def record_to_files(plans: Iterable[ScanPlan], files: CloudFiles, timer: StageTi
     rendered: dict[str, Any] = {}
     with ExitStack() as stack:
         stack.enter_context(files.opened())
-        for plan in plans:
+        for number, plan in enumerate(plans):
+            if number == 0:  # the path is the whole scan's, whatever section the plan is of
+                _tell_forecast(plan)
             largest = {name: max(figures[name], plan.summary()[name]) for name in ("triangles", "vertices")}
             figures = plan.summary() | largest
             _add_up(rendered, record(plan, files, timer))
@@ -153,6 +160,12 @@ def record_to_files(plans: Iterable[ScanPlan], files: CloudFiles, timer: StageTi
         with timer.stage("files"):
             stack.close()
     return figures | files.summary() | {"rendered": rendered}
+
+
+def _tell_forecast(plan: ScanPlan) -> None:
+    """Say what a scan will take; of a short one only where details are asked for."""
+    forecast = plan.forecast()
+    _logger.log(logging.INFO if forecast.seconds >= _LONG else logging.DEBUG, "scan: %s", forecast.text())
 
 
 def _add_up(sums: dict[str, Any], figures: Mapping[str, Any]) -> None:

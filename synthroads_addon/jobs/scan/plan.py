@@ -22,6 +22,7 @@ from ...road.geometry import RoadGeometry
 from ...scanning.beam import RINGS
 from ...scanning.blocks import Blocks
 from ...scanning.colour.request import LayerRequest
+from ...scanning.forecast import forecast_scan, refuse_large
 from ...scanning.plan import ScanConditions, ScanPlan, SceneServices
 from ...scanning.platforms.guides import RoadGuide
 from ...scanning.platforms.path import Path as ScanPath
@@ -63,6 +64,9 @@ def plan_scan(
         for name, mean in zip(materials, means, strict=True)
     ]
     loss, weather = scan.attenuation, scan.weather or weather_of(conditions.environment)
+    rings = beam_rings(scenario)
+    forecast = forecast_scan(Blocks(setting, path, 1 + sum(rings)), len(scene.static), scan.threads)
+    refuse_large(forecast, scan.most_pulses)
     coloured, shifts = coloured_layers(scenario), scan.relief > 0.0
     colour = scenario.colour.settings(scenario.fidelity, path.typical_range)
     return ScanPlan(
@@ -71,7 +75,7 @@ def plan_scan(
         surfaces=surfaces_of(scanned, scan.reflection, spread=not by_layers),
         setting=setting,
         path=path,
-        rings=beam_rings(scenario),
+        rings=rings,
         seed=scenario.seed,
         noise=scan.noise,
         attenuation=weather.attenuation(setting.device.wavelength_nm) if loss is None else loss,

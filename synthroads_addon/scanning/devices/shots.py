@@ -16,14 +16,22 @@ _LARGEST_TABLE = 2**18
 """Shots of a cycle that are kept at most: with the axes across the beam 23 MB."""
 
 
-def shot_count(setting: ScannerSetting, duration: float) -> int:
+def shot_count(setting: ScannerSetting, duration: float, ends: bool = False) -> int:
     """Return how many pulses all heads together fire in a duration (s): whole lines only, and at least one.
 
     A wedge prism has no lines: whole pulses.
+
+    Args:
+        setting: the scanner's.
+        duration: s.
+        ends: whether nothing can be fired after it: of the only line, then, the pulses within it, and at least one.
     """
     heads = len(setting.device.heads)
     if setting.device.pattern.cycle_lines == 0:
         return heads * max(1, math.floor(duration * setting.pulse_rate + 1e-9))
+    if ends and duration * setting.lines_per_second + 1e-9 < 1.0:
+        line = shots(setting, 0, heads * setting.pulses_per_line).time
+        return max(1, int(np.searchsorted(line, duration, side="right")))
     return heads * max(1, math.floor(duration * setting.lines_per_second + 1e-9)) * setting.pulses_per_line
 
 

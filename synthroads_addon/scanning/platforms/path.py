@@ -33,11 +33,14 @@ class Strip:
         index: number of the strip, from 0.
         start_time: time of its first pulse since the first strip's, s.
         duration: s.
+        ends: whether nothing is known beyond its end, as of a recorded trajectory: where it is shorter than a line,
+            only those pulses are fired that leave within it. Else a strip has one whole line at least.
     """
 
     index: int
     start_time: float
     duration: float
+    ends: bool = False
 
 
 class Path(Protocol):

@@ -17,7 +17,7 @@ from ...base.files import read_text
 from ...base.rotations import angle_between, matrices, quaternions, rotation_matrix, slerp
 from ...road.centerline import FARTHEST, fields_of
 from .guides import Float, Guide
-from .path import KNOT_RANGE, Strip, knots_for, strips_of
+from .path import KNOT_RANGE, Strip, knots_for
 from .platform import Platform
 
 COLUMNS = ("time", "x", "y", "z", "roll", "pitch", "heading")
@@ -73,7 +73,7 @@ class TrajectoryPath:
         self._attitude = quaternions(rotation_matrix(*angles))
         _refuse_wide_turns(platform.file, rows, self._attitude)
         self._mounting = platform.mounting()
-        self.strips = strips_of([float(self._time[-1])])
+        self.strips = (Strip(0, 0.0, float(self._time[-1]), ends=True),)
         self.knot_spacing = self._knots()
         self.typical_range = max(_NEAREST, float(np.median(self._height_above(guide))))
 

@@ -5,12 +5,15 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from ...cloud.strays import Strays
 from .mesh import SceneMesh
 
 Float = NDArray[np.float64]
 
 _BLOCK = 1 << 17
 _SHORTEST = 1.0  # m
+WIDE = 20_000.0
+"""Extent, m, beyond which a scene may be one of usual size with a vertex astray."""
 
 
 def bounds(mesh: SceneMesh) -> Float:
@@ -21,12 +24,35 @@ def bounds(mesh: SceneMesh) -> Float:
     return np.array([vertices.min(axis=0), vertices.max(axis=0)], dtype=np.float64)
 
 
+def body_bounds(mesh: SceneMesh) -> Float:
+    """Return `bounds`; of a scene wider than `WIDE` without the vertices that lie far from all others."""
+    strays = strays_of(mesh)
+    if strays is None:
+        return bounds(mesh)
+    vertices = mesh.vertices[np.unique(mesh.triangles)]
+    stay = strays.stay(vertices)
+    return np.array([vertices[stay].min(axis=0), vertices[stay].max(axis=0)], dtype=np.float64)
+
+
+def strays_of(mesh: SceneMesh) -> Strays | None:
+    """Return which vertices of a scene lie far from all others; None where it isn't wider than `WIDE` or all do.
+
+    In a smaller scene the far corners of a large face are as good as any others.
+    """
+    if float(np.ptp(bounds(mesh), axis=0).max()) <= WIDE:
+        return None
+    vertices, strays = mesh.vertices[np.unique(mesh.triangles)], Strays()
+    for start in range(0, len(vertices), _BLOCK):
+        strays.add(vertices[start : start + _BLOCK])
+    return strays if strays.count() else None
+
+
 def middle_line(mesh: SceneMesh) -> Float:
     """Return both ends (2, 3) of the line over the middle of the scene along the longer of x and y, local, m.
 
-    It spans the scene's extent, but a metre at least, at the scene's `median_elevation`.
+    It spans the scene's extent, without what strays from it, but a metre at least, at the scene's `median_elevation`.
     """
-    low, high = bounds(mesh)
+    low, high = body_bounds(mesh)
     ends = np.repeat(((low + high) / 2.0)[None], 2, axis=0)
     axis = int(np.argmax((high - low)[:2]))
     reach = max(high[axis] - low[axis], _SHORTEST) / 2.0

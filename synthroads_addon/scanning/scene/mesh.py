@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...base.errors import InputError
+from ...cloud.strays import FARTHEST
 
 _BLOCK = 1 << 18
 _SHAPES: dict[str, tuple[type, tuple[int | None, ...]]] = {
@@ -61,8 +62,15 @@ class SceneMesh:
         for name in ("vertices", "origin"):
             if not np.isfinite(getattr(self, name)).all():
                 raise InputError(f"scene mesh: {name}", None, "must be finite numbers")
+        self._check_extent()
         self._check_indices("triangles", len(self.vertices), "vertices")
         self._check_indices("material", len(self.materials), "materials")
+
+    def _check_extent(self) -> None:
+        """Refuse vertices that lie on no map: a file in another unit, or a vertex that a converter forgot."""
+        if self.vertices.size and (worst := float(max(self.vertices.max(), -self.vertices.min()))) > FARTHEST:
+            allowed = f"must lie within {FARTHEST:g} m of the scene's origin: is its unit another, or a vertex astray?"
+            raise InputError("scene mesh: vertices", worst, allowed)
 
     def _check_indices(self, name: str, count: int, target: str) -> None:
         array = getattr(self, name)

@@ -2,16 +2,19 @@
 
 Blender's reader of PLY ends the process where a face names a vertex that isn't there, and its reader of STL takes what
 is left of a truncated file without a word. Its reader of glTF, in Python, makes room for as many values as a header
-says.
+says, and reads whatever an address in the file names, also outside of its folder.
 """
 
 from __future__ import annotations
 
 import json
+import os
+import re
 import struct
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any, BinaryIO
+from urllib.parse import unquote
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,6 +29,11 @@ _LONGEST_HEADER = 1 << 20
 _FEW = 16
 _FAULTS = (ValueError, LookupError, TypeError, ArithmeticError, AttributeError, RecursionError, struct.error)
 """Errors of looking into a file whose content isn't what it should be."""
+_DEEPEST = 256
+"""Levels of nodes in a glTF at most: Blender's reader calls itself for each."""
+_SHOWN = 100
+_SCHEME = re.compile(r"[A-Za-z][A-Za-z0-9+.-]*:")
+"""Beginning of an address with a scheme, as of the network, or with a drive's letter."""
 _MOST_VALUES = 1 << 24
 """Values of a glTF accessor without a buffer, which are all zero."""
 
@@ -37,14 +45,18 @@ def check_mesh_file(path: Path) -> None:
     """Refuse a mesh file that is truncated, or whose faces name vertices that aren't there.
 
     Args:
-        path: a .ply, .stl or .glb that exists; files of other kinds aren't looked into.
+        path: a .ply, .stl, .glb or .gltf that exists; files of other kinds aren't looked into.
 
     Raises:
-        InputError: it is damaged.
+        InputError: it is damaged, or its address of a part leaves its folder or names no regular file.
     """
-    look: dict[str, Callable[[Path], None]] = {".ply": _check_ply, ".stl": _check_stl, ".glb": _check_glb}
+    look: dict[str, Callable[[Path], None]] = {
+        ".ply": _check_ply, ".stl": _check_stl, ".glb": _check_glb, ".gltf": _check_gltf,
+    }  # fmt: skip
     try:
         look.get(path.suffix.lower(), lambda _: None)(path)
+    except RecursionError:
+        raise InputError(str(path), None, "is damaged (it is nested too deeply)") from None
     except _FAULTS as problem:
         raise InputError(str(path), None, f"is damaged ({problem})") from None
 
@@ -170,13 +182,51 @@ def _check_glb(path: Path) -> None:
         if length > size or chunk > size - 20:
             raise ValueError(f"{size:,} bytes are left of {length:,}")
         text = file.read(chunk)
-    content = json.loads(text)
-    binary = max(0, size - 20 - chunk - 8)
-    for buffer in content.get("buffers", [])[:1]:
-        if "uri" not in buffer and buffer["byteLength"] > binary:
-            raise ValueError(f"its buffer has {binary:,} bytes of {buffer['byteLength']:,}")
+    _check_content(path, json.loads(text), max(0, size - 20 - chunk - 8))
+
+
+def _check_gltf(path: Path) -> None:
+    _check_content(path, json.loads(path.read_bytes()), 0)
+
+
+def _check_content(path: Path, content: dict[str, Any], binary: int) -> None:
+    """Refuse a glTF whose content can't be read.
+
+    Args:
+        path: the file.
+        content: what its JSON holds.
+        binary: bytes of the file's own buffer.
+    """
+    for number, buffer in enumerate(content.get("buffers", [])):
+        there = _part_size(path, buffer["uri"]) if "uri" in buffer else binary if number == 0 else None
+        if there is not None and buffer["byteLength"] > there:
+            raise ValueError(f"its buffer has {there:,} bytes of {buffer['byteLength']:,}")
+    for image in content.get("images", []):
+        if "uri" in image:
+            _part_size(path, image["uri"], optional=True)
     _check_views(content)
     _check_nodes(content.get("nodes", []))
+
+
+def _part_size(path: Path, address: str, optional: bool = False) -> int:
+    """Return the size, bytes, of what a glTF's address holds or names; of one that isn't there 0 if it is optional.
+
+    Raises:
+        InputError: it leaves the folder, links that are followed included, or names no regular file.
+    """
+    if address[:5].lower() == "data:":
+        return 3 * len(address.partition(",")[2]) // 4
+    shown = address if len(address) < _SHOWN else f"{address[:_SHOWN]}..."
+    name = unquote(address).replace("\\", "/")
+    folder = path.parent.resolve()
+    place = Path(os.path.realpath(folder / name))
+    if _SCHEME.match(name) or not place.is_relative_to(folder):
+        raise InputError(str(path), shown, "an address in a glTF must stay in the file's folder")
+    if not place.exists() and optional:
+        return 0
+    if not place.is_file():
+        raise InputError(str(path), shown, "a regular file is needed at this address")
+    return place.stat().st_size
 
 
 def _check_views(content: dict[str, Any]) -> None:
@@ -206,12 +256,14 @@ def _check_nodes(nodes: list[dict[str, Any]]) -> None:
             if child in parents or not 0 <= child < len(nodes):
                 raise ValueError(f"node {child} isn't the child of exactly one")
             parents[child] = number
-    sound: set[int] = set()
+    depths: dict[int, int] = {}
     for number in range(len(nodes)):
-        way = {number}
-        while (above := parents.get(number)) is not None and above not in sound:
-            if above in way:
+        way = [number]
+        while way[-1] in parents and way[-1] not in depths:
+            if len(way) > len(nodes):
                 raise ValueError(f"node {number} lies below itself")
-            way.add(above)
-            number = above  # noqa: PLW2901 (upwards)
-        sound |= way
+            way.append(parents[way[-1]])
+        for below, passed in enumerate(reversed(way)):
+            depths[passed] = depths.get(way[-1], 0) + below
+        if depths[number] > _DEEPEST:
+            raise ValueError(f"its nodes lie more than {_DEEPEST} deep")

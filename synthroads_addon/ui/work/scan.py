@@ -23,7 +23,7 @@ from ...blender.scene.evaluated import CopiedScene, scanned_scene_steps
 from ...blender.services import SnapshotServices
 from ...jobs.generate import Job as PipelineJob
 from ...jobs.generate import check
-from ...jobs.job_files import OF_POINTS, JobFiles
+from ...jobs.job_files import OF_POINTS, JobFiles, empty_scan_warnings
 from ...jobs.scan.files import record_to_files
 from ...jobs.scan.plan import Site, may_render
 from ...road.geometry import RoadGeometry
@@ -160,7 +160,9 @@ def _write_files(scan: RoadScan, measure: _Measure, output: _Output) -> int:
     """Write all files; return the number of points. Runs in a thread: it touches no data of Blender."""
     files = JobFiles(scan.scenario)
     files.write_road(output.folder, scan.road, output.timer)
-    told = {"counts": measure(output)} if set(files.outputs) & set(OF_POINTS) else {}
+    told: dict[str, Any] = {"counts": measure(output)} if set(files.outputs) & set(OF_POINTS) else {}
+    if warnings := empty_scan_warnings(told.get("counts", {})):
+        told["warnings"] = warnings
     files.write_report(output.folder, told, output.timer)
     return int(told["counts"]["points"]) if told else 0
 

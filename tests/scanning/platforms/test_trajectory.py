@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import tracemalloc
+from itertools import islice
 from pathlib import Path
 
 import numpy as np
@@ -12,10 +14,14 @@ from scipy.spatial.transform import Rotation, Slerp
 
 from synthroads_addon.base.errors import InputError, MissingFileError
 from synthroads_addon.base.rotations import matrices, quaternions, rotation_matrix, slerp
+from synthroads_addon.scanning.blocks import Blocks
+from synthroads_addon.scanning.devices.shots import shots
 from synthroads_addon.scanning.platforms.path import KNOT_ERROR
 from synthroads_addon.scanning.platforms.polyline import PolylineGuide
 from synthroads_addon.scanning.platforms.registry import make_platform
 from synthroads_addon.scanning.platforms.trajectory import COLUMNS, TrajectoryPath, read_trajectory
+from synthroads_addon.scenario.scan import scanner_setting
+from synthroads_addon.scenario.scenario import load_scenario
 from tests.scanning.platforms.test_path import knot_error
 
 ORIGIN = (500_000.0, 5_600_000.0, 100.0)
@@ -51,6 +57,33 @@ def attitudes(rows: np.ndarray) -> Rotation:
     enu = Rotation.from_matrix([[0, 1, 0], [1, 0, 0], [0, 0, -1]])
     flu = Rotation.from_matrix(np.diag([1.0, -1.0, -1.0]))
     return enu * ned * flu
+
+
+def test_no_pulse_leaves_after_the_trajectory_has_ended(tmp_path: Path) -> None:
+    """Of a flight that is shorter than a line only the pulses within it; longer ones have whole lines as ever."""
+    setting = scanner_setting(load_scenario("rq31-600m").scan)
+    line = 1.0 / setting.lines_per_second
+    for duration, count in ((1e-9, 1), (0.3 * line, None), (line, setting.pulses_per_line)):
+        path = trajectory(tmp_path, rows_of(np.array([0.0, duration])))
+        pulses = Blocks(setting, path, 1).pulses(path.strips[0])
+        after = shots(setting, 0, pulses + 1).time
+        assert after[-2] <= duration < after[-1] + 1e-12
+        assert count in (None, pulses)
+    path = trajectory(tmp_path, rows_of(np.array([0.0, 2.5 * line])))
+    assert Blocks(setting, path, 1).pulses(path.strips[0]) == 2 * setting.pulses_per_line
+
+
+def test_the_blocks_of_a_flight_of_thirty_years_are_counted_and_not_listed(tmp_path: Path) -> None:
+    setting = scanner_setting(load_scenario("rq31-600m").scan)
+    rows = rows_of(np.array([0.0, 1.0]))
+    rows[1, 0] = 1e9
+    path = trajectory(tmp_path, rows)
+    tracemalloc.start()
+    blocks = Blocks(setting, path, 1)
+    assert blocks.count() > 3e8
+    assert [number for _, number in islice(blocks.all(), 3)] == [0, 1, 2]
+    assert tracemalloc.get_traced_memory()[1] < 1e6
+    tracemalloc.stop()
 
 
 def test_a_file_comes_back_at_its_rows_and_between_them(tmp_path) -> None:

@@ -1,0 +1,1 @@
+"""Files of a job that is at work: kept in folders that say whose they are, so that those of dead processes can go."""

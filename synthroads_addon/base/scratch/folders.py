@@ -1,0 +1,168 @@
+"""Scratch folders: removed at the end of the work, and after a process that couldn't do so by the next one's.
+
+Each has a lock file that names its owner. A folder whose owner is known to be dead is removed by whoever makes one
+beside it.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import tempfile
+import time
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager, suppress
+from pathlib import Path
+
+from ..errors import OutputError
+from .locks import try_lock
+from .owner import is_dead, read_owner, this_process
+
+LOCK = ".owner.json"
+"""File in each scratch folder that names the process which works in it, and is locked by it."""
+_IN_OUTPUT, _IN_SYSTEM = ".partial-", "synthroads-"
+_NAME = re.compile(rf"({re.escape(_IN_OUTPUT)}|{_IN_SYSTEM})\d+-[a-z0-9_]{{8}}")
+_VARIABLES = ("TMPDIR", "TEMP", "TMP")
+_UNREADABLE = 60.0
+"""Age, s, at which a lock file without an owner is one whose process was killed in the moment of writing it."""
+_mine: dict[Path, int] = {}
+"""This process's scratch folders that still stand, and the descriptors of their locks."""
+
+
+@contextmanager
+def scratch_folder(parent: Path | None = None) -> Iterator[Path]:
+    """Yield a new folder that is removed at the end, and remove what dead processes have left beside it.
+
+    Args:
+        parent: folder in which it is made, under a hidden name; the system's folder for temporary files if None.
+
+    Raises:
+        OSError: it can't be made.
+    """
+    place = Path(tempfile.gettempdir()) if parent is None else parent
+    remove_leftovers(place)
+    folder = _make_folder(place, _IN_SYSTEM if parent is None else _IN_OUTPUT)
+    try:
+        yield folder
+    finally:
+        if _is_ours(folder):  # and not in a process that was forked meanwhile
+            _remove(folder)
+
+
+@contextmanager
+def temporary_files_in_scratch() -> Iterator[None]:
+    """Have this process, the libraries in it and its children put their temporary files into a scratch folder.
+
+    Blender's own, for one, which it leaves behind where it is killed. Where none can be made, all stays as it is.
+    """
+    with ExitStack() as stack:
+        with suppress(OSError):
+            folder = stack.enter_context(scratch_folder())
+            before = {name: os.environ.get(name) for name in _VARIABLES}, tempfile.tempdir
+            stack.callback(_use_for_temporary_files, *before)
+            _use_for_temporary_files(dict.fromkeys(_VARIABLES, str(folder)), str(folder))
+        yield
+
+
+def _use_for_temporary_files(variables: dict[str, str | None], folder: str | None) -> None:
+    """Set the environment's variables (None: take away) and Python's folder for temporary files."""
+    for name, value in variables.items():
+        if value is None:
+            os.environ.pop(name, None)
+        else:
+            os.environ[name] = value
+    tempfile.tempdir = folder
+
+
+def unwritable_temporary(folder: Path, error: Exception) -> OutputError:
+    """Return the error of a temporary folder to which something couldn't be written."""
+    reason, place = getattr(error, "strerror", None) or "is the disk full?", folder
+    while _NAME.fullmatch(place.name):
+        place = place.parent
+    return OutputError("temporary folder", str(place), f"cannot be written ({reason}); TMPDIR names another")
+
+
+def remove_leftovers(parent: Path) -> None:
+    """Remove the scratch folders in a folder whose owners are known to be dead; doesn't raise."""
+    with suppress(OSError), os.scandir(parent) as entries:
+        for folder in [Path(entry.path) for entry in entries if _NAME.fullmatch(entry.name)]:
+            if folder not in _mine:
+                _remove_leftover(folder)
+
+
+def remove_own() -> None:
+    """Remove the scratch folders of this process that still stand, before it ends without unwinding its stack."""
+    for folder in filter(_is_ours, list(_mine)):
+        _remove(folder)
+
+
+def _is_ours(folder: Path) -> bool:
+    """Return whether this process made a scratch folder, and not the one that it was forked from."""
+    return f"{os.getpid()}-" in folder.name
+
+
+def _make_folder(parent: Path, prefix: str) -> Path:
+    """Make a scratch folder with its lock file; one that is empty still may be taken for a leftover: then anew."""
+    while True:
+        folder = Path(tempfile.mkdtemp(prefix=f"{prefix}{os.getpid()}-", dir=parent))
+        try:
+            lock = os.open(folder / LOCK, os.O_RDWR | os.O_CREAT | os.O_EXCL, 0o644)
+        except FileNotFoundError:
+            continue
+        except OSError:
+            folder.rmdir()
+            raise
+        _mine[folder] = lock
+        try:
+            os.write(lock, this_process(try_lock(lock) is True).to_json().encode())
+        except OSError:  # the disk is full
+            _remove(folder)
+            raise
+        return folder
+
+
+def _remove(folder: Path) -> None:
+    """Remove a folder of this process: its lock last, so that it is known as a leftover if this is cut off."""
+    with suppress(OSError), os.scandir(folder) as entries:
+        for entry in entries:
+            if entry.is_dir(follow_symlinks=False):
+                shutil.rmtree(entry.path, ignore_errors=True)
+            elif entry.name != LOCK:
+                with suppress(OSError):
+                    Path(entry.path).unlink()
+    lock = _mine.get(folder)
+    if lock is not None:
+        with suppress(OSError):
+            os.close(lock)
+    shutil.rmtree(folder, ignore_errors=True)
+    _mine.pop(folder, None)  # not before: where this is cut off `remove_own` goes on with it
+
+
+def _remove_leftover(folder: Path) -> None:
+    """Remove a folder if its owner is dead, or if it is empty: its owner was killed before it named itself."""
+    try:
+        lock = os.open(folder / LOCK, os.O_RDWR)
+    except FileNotFoundError:
+        with suppress(OSError):
+            folder.rmdir()
+        return
+    except OSError:
+        return
+    try:
+        dead = _owner_is_dead(lock)
+        if dead:
+            _remove(folder)
+    finally:
+        os.close(lock)
+    if dead:  # Windows removes no file that is open
+        _remove(folder)
+
+
+def _owner_is_dead(lock: int) -> bool:
+    taken = try_lock(lock)
+    owner = read_owner(os.read(lock, 4096).decode(errors="replace"))
+    if owner is None:
+        age = time.time() - os.fstat(lock).st_mtime  # noqa: TID251 - files are dated by the wall clock
+        return taken is not False and age > _UNREADABLE
+    return is_dead(owner, taken)

@@ -1,0 +1,93 @@
+"""Strays: the few places far from all others, as of a bird, a mirror, or a vertex that a converter forgot.
+
+Places are counted in cubes of a quarter of a kilometre, of which only those that hold any are kept; cubes that touch
+make a part. What lies in parts with hardly anything in them strays from the rest.
+"""
+
+from __future__ import annotations
+
+from itertools import product
+
+import numpy as np
+from numpy.typing import NDArray
+
+Float = NDArray[np.float64]
+Keys = NDArray[np.int64]
+
+EDGE = 256.0
+"""Edge of a cube, m."""
+FARTHEST = 1e8
+"""Largest coordinate, m: no map has larger ones, and cubes are numbered up to it."""
+_FEW, _SHARE = 10, 1e-4
+"""A part with at most so many places, or at most this share of all, strays, unless no part has more."""
+_MOST_CUBES = 50_000
+"""Cubes of larger edges are taken where there are more: the places lie too far apart to be told apart so finely."""
+_BITS = 21
+_STEPS = [step for step in product((-1, 0, 1), repeat=3) if any(step)]
+
+
+class Strays:
+    """Places gathered block by block, and which of them stray from the rest."""
+
+    def __init__(self) -> None:
+        self._edge = EDGE
+        self._keys, self._counts = np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64)
+        self._body: Keys | None = None
+
+    def add(self, xyz: NDArray[np.floating]) -> None:
+        """Add places (N, 3), m, of at most `FARTHEST`."""
+        keys, counts = np.unique(self._keys_of(xyz), return_counts=True)
+        self._merge(np.concatenate([self._keys, keys]), np.concatenate([self._counts, counts]))
+        while len(self._keys) > _MOST_CUBES:
+            self._edge *= 4.0
+            parts = [self._keys >> (_BITS * axis) & (2**_BITS - 1) for axis in range(3)]
+            numbers = [(part - 2 ** (_BITS - 1)) >> 2 for part in parts]
+            self._merge(_joined(np.stack(numbers, axis=1)), self._counts)
+        self._body = None
+
+    def count(self) -> int:
+        """Return how many of the places stray."""
+        return int(self._counts.sum() - self._counts[np.isin(self._keys, self._of_body())].sum())
+
+    def stay(self, xyz: NDArray[np.floating]) -> NDArray[np.bool_]:
+        """Return which of some of the places (N, 3) don't stray."""
+        return np.isin(self._keys_of(xyz), self._of_body())
+
+    def _keys_of(self, xyz: NDArray[np.floating]) -> Keys:
+        return _joined(np.floor(np.asarray(xyz, dtype=np.float64) / self._edge).astype(np.int64))
+
+    def _merge(self, keys: Keys, counts: Keys) -> None:
+        self._keys, owner = np.unique(keys, return_inverse=True)
+        self._counts = np.bincount(owner.ravel(), counts, len(self._keys)).astype(np.int64)
+
+    def _of_body(self) -> Keys:
+        """Return the cubes that don't stray."""
+        if self._body is None:
+            parts = self._parts()
+            sizes = np.bincount(parts, self._counts, parts.max(initial=-1) + 1)
+            kept = sizes > max(_FEW, _SHARE * self._counts.sum())
+            self._body = self._keys[kept[parts]] if kept.any() else self._keys
+        return self._body
+
+    def _parts(self) -> NDArray[np.intp]:
+        """Return the number of the part that each cube belongs to."""
+        place = {int(key): number for number, key in enumerate(self._keys)}
+        steps = _joined(np.array(_STEPS)) - _joined(np.zeros((1, 3), dtype=np.int64))
+        part = np.full(len(self._keys), -1, dtype=np.intp)
+        for first in range(len(part)):
+            if part[first] >= 0:
+                continue
+            number, waiting = part.max() + 1, [first]
+            part[first] = number
+            while waiting:
+                near = (place.get(int(self._keys[at]) + step) for at in [waiting.pop()] for step in steps.tolist())
+                new = [at for at in near if at is not None and part[at] < 0]
+                part[new] = number
+                waiting += new
+        return part
+
+
+def _joined(numbers: NDArray[np.int64]) -> Keys:
+    """Return one number (N,) for each cube's three (N, 3)."""
+    shifted = numbers + 2 ** (_BITS - 1)
+    return np.asarray(shifted[:, 0] | shifted[:, 1] << _BITS | shifted[:, 2] << 2 * _BITS)
