@@ -128,11 +128,12 @@ class Objects:
         deep, half = item.beam_depth / 2.0, item.post_width / 2.0
         bodies = [(_rectangle((-deep, deep), (right, left)), bottom - foot, item.beam_height)]
         ends = {"left": [left], "right": [right]}[item.post_side]
+        middle = -item.offset if item.kind == "two_sided" else None
         if item.kind != "cantilever":
-            ends = [left, right] + ([0.0] if item.kind == "two_sided" else [])
+            ends = [left, right] + ([] if middle is None else [middle])
         ground = self.ground.height(np.full(len(ends), item.station), np.array(ends) + item.offset)
         for v, base in zip(ends, (ground + item.elevation - foot).tolist(), strict=True):
-            top = bottom - foot + (0.0 if v == 0.0 and item.kind == "two_sided" else item.beam_height)
+            top = bottom - foot + (0.0 if v == middle else item.beam_height)
             bodies.append((_rectangle((-deep, deep), (v - half, v + half)), base, max(top - base, 0.0)))
         size: dict[str, Value] = {
             "length": item.beam_depth,
@@ -259,8 +260,7 @@ class Objects:
 
 def gantry_levels(ground: Ground, item: Gantry) -> tuple[float, float]:
     """Return the heights of a gantry's lowest part and of its beam's lower edge above the reference line, m."""
-    deep = item.beam_depth / 2.0
-    span = (item.station - deep, item.station + deep)
+    span = (item.station - item.reach(1.0), item.station + item.reach(-1.0))
     low = ground.pavement_below(span, (item.right_offset, item.left_offset)) + item.clearance
     return low, item.beam_bottom(low)
 

@@ -80,7 +80,7 @@ def _hung(
 ) -> None:
     """Add a sign on a gantry; it faces the traffic that drives below it, and hangs before its beam."""
     (name, item), (number, sign), (low, bottom) = named, numbered, levels
-    lower = low if item.ends_in_beam(sign, low) else bottom + (item.beam_height - sign.height) / 2.0
+    lower = bottom + (item.beam_height - sign.height) / 2.0 if item.ends_in_beam(sign, low) else low
     turned = item.model_copy(update={"rotation_deg": item.rotation_deg + (180.0 if sign.offset > 0.0 else 0.0)})
     about: dict[str, Value] = {"id": f"{item.instance}-{number}", "name": f"{name}-{number}"}
     about |= _place(turned, sign.offset, lower)

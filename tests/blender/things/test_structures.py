@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from xml.etree import ElementTree
+from xml.etree.ElementTree import Element
 
 import bpy
 import numpy as np
@@ -14,6 +16,8 @@ from synthroads_addon.blender.things.gantry.gantry import gantry_group
 from synthroads_addon.blender.things.overpass.overpass import overpass_group
 from synthroads_addon.road import stretches
 from synthroads_addon.scanning.scene.mesh import SceneMesh
+from synthroads_addon.twin.bodies.at import bodies_at, places_of
+from synthroads_addon.twin.opendrive.writer import write_opendrive
 from tests.helpers.scenes.furnished_road import (
     MEASURE,
     Data,
@@ -93,6 +97,22 @@ def bridge(station: float, **more: object) -> Data:
 def road() -> FurnishedRoad:
     bridges = {name: bridge(60.0 + 150.0 * i, **item) for i, (name, item) in enumerate(BRIDGES.items())}
     return FurnishedRoad(GANTRIES | bridges | BEACONS, PARTS)
+
+
+@pytest.fixture(scope="module")
+def drawn(road: FurnishedRoad, tmp_path_factory: pytest.TempPathFactory) -> Element:
+    """Return the road of its OpenDRIVE file."""
+    path = tmp_path_factory.mktemp("drawn") / "road.xodr"
+    write_opendrive(road.parameters, path, 0.005)
+    (read,) = ElementTree.parse(path).getroot().findall("road")
+    return read
+
+
+def _height(road: FurnishedRoad, drawn: Element, path: str) -> float:
+    """Return the local elevation of an object's or a signal's place in OpenDRIVE, m."""
+    (made,) = drawn.findall(path)
+    level = float(road.geometry.profile.elevation(float(made.attrib["s"])))
+    return level + float(made.attrib["zOffset"])
 
 
 def frame(road: FurnishedRoad, name: str, points: Float) -> Float:
@@ -202,6 +222,35 @@ class TestGantry:
 
     def _forwards(self, road: FurnishedRoad, name: str) -> Float:
         return np.array(road.model.objects[name].matrix_world)[:2, 1]
+
+    @pytest.mark.parametrize("name", ["boards", "against", "both", "cantilever"])
+    def test_boards_of_the_solids_hang_where_the_model_has_them(self, road: FurnishedRoad, name: str) -> None:
+        item = road.parameters.objects[name]
+        (place,) = places_of(road.geometry, [item])
+        boards = bodies_at(place, item)[-len(item.signs) :]
+        for number, (board, body) in enumerate(zip(item.signs, boards, strict=True), 1):
+            solid = frame(road, name, body.points - road.origin)
+            face = frame(road, name, road.mesh(f"{name}/sign-{number}").vertices)
+            wanted = (face.min(axis=0) + face.max(axis=0)) / 2
+            assert (solid[:, 2].min() + solid[:, 2].max()) / 2 == pytest.approx(wanted[2], abs=MEASURE)
+            assert np.ptp(solid[:, 2]) == pytest.approx(board.height, abs=MEASURE)
+
+    @pytest.mark.parametrize("name", ["boards", "against", "both", "cantilever"])
+    def test_signals_hang_where_the_model_has_them(self, road: FurnishedRoad, drawn: Element, name: str) -> None:
+        item = road.parameters.objects[name]
+        for number, board in enumerate(item.signs, 1):
+            face = frame(road, name, road.mesh(f"{name}/sign-{number}").vertices)
+            middle = world(road, name, (face.min(axis=0) + face.max(axis=0))[None] / 2)[0, 2] + road.origin[2]
+            lower = _height(road, drawn, f"signals/signal[@name='{name}-{number}']")
+            assert lower + board.height / 2 == pytest.approx(middle, abs=MEASURE)
+
+    def test_posts_of_the_outlines_stand_where_the_model_has_them(self, road: FurnishedRoad, drawn: Element) -> None:
+        for name in GANTRIES:
+            plinths = sorted(-float(p[..., 0].mean()) for p in self._plinths(road, name))
+            (made,) = drawn.findall(f"objects/object[@name='{name}']")
+            outlines = made.findall("outlines/outline")[1:]
+            places = [[float(corner.attrib["v"]) for corner in outline] for outline in outlines]
+            assert sorted((min(v) + max(v)) / 2 for v in places) == pytest.approx(plinths, abs=MEASURE)
 
     def test_a_display_that_shows_nothing_has_no_face(self, road: FurnishedRoad) -> None:
         assert faces_of(road, "cantilever-left") == ["cantilever-left"]
