@@ -23,4 +23,4 @@ def write_road_files(folder: Path, scenario: Scenario, road: RoadGeometry, timer
         (folder / "centerline.geojson").write_text(text, encoding="utf-8")
     if scenario.twin:
         with timer.stage("twin"):
-            write_twin(road.parameters, folder, scenario.twin, tolerance)
+            write_twin(road.parameters, folder, scenario.twin, tolerance, scenario.ifc)
