@@ -8,12 +8,30 @@ import numpy as np
 
 from ...base.errors import InputError
 from ...road.geometry import RoadGeometry
-from ...road.parameters import LineObject, PointObject
+from ...road.objects import RoadObject
+from ...road.parameters import Carriageway, GantrySign, Hatching, LineObject, PointObject, Turnout
+from ...road.things.furniture import Side
 from ...road.surface import highest_pavement, known_elevation
 from ..surfaces import height_share, ramp_length
 from .pieces import CLOSE, Float, chords, merged_stations
 
 _COLUMNS, _ROWS = 240, 7
+
+
+def side_of(geometry: RoadGeometry, item: RoadObject | GantrySign) -> Side:
+    """Return the carriageway that something is written with: the one on its side of the centreline, or the only one.
+
+    What is painted belongs to the carriageway whose pavement it is on.
+    """
+    if len(geometry.sections) == 1:
+        return next(iter(geometry.sections))
+    if isinstance(item, Hatching):
+        turnout = geometry.parameters.objects[item.turnout]
+        assert isinstance(turnout, Turnout)
+        carriageway = geometry.parameters.objects[turnout.carriageway]
+        assert isinstance(carriageway, Carriageway)
+        return carriageway.side
+    return "left" if getattr(item, "offset", 0.0) > 0.0 else "right"
 
 
 class Ground:
