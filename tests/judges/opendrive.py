@@ -129,7 +129,7 @@ def _away(
     resolution: float,
     limit: float,
 ) -> list[str]:
-    """Return the lines (N, 3) of which a point lies off every strip's boundary, by its offsets, by more than a limit (m).
+    """Return the lines (N, 3) of which a point lies off all boundaries, at ``offsets``, by more than a limit (m).
 
     Where boundaries run obliquely they may be off by what they move on within the reader's resolution (m).
     """

@@ -202,8 +202,8 @@ def _wrong_traffic(edge: ElementTree.Element) -> list[str]:
 def _off(samples: Samples, side: str, number: int, points: np.ndarray) -> tuple[np.ndarray, float, float]:
     """Return points' stations, and how far (m) they are at most beside a lane's middle and off its road's line.
 
-    SUMO doesn't know that the road is tilted: it takes t, which lies in the tilted plane, for an offset in plan, and the
-    elevation profile, the plane's line below the centreline, for the height of all.
+    SUMO doesn't know that the road is tilted: it takes t, which lies in the tilted plane, for an offset in plan, and
+    the elevation profile, the plane's line at the centreline, for the height of all.
     """
     geometry = samples.geometry
     station, offset = geometry.alignment.project(points[:, :2])

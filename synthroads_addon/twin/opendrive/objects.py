@@ -31,8 +31,8 @@ from ...road.parameters import (
     TrafficSign,
 )
 from ...road.things import body_shapes as shapes
-from .pieces import CLOSE, Float
 from .numbers import Numbers
+from .pieces import CLOSE, Float
 from .places import Ground, side_of
 from .surface import RoadFrame
 from .xml import Element, Value, element, notes

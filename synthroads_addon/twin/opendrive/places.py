@@ -10,8 +10,8 @@ from ...base.errors import InputError
 from ...road.geometry import RoadGeometry
 from ...road.objects import RoadObject
 from ...road.parameters import Carriageway, GantrySign, Hatching, LineObject, PointObject, Turnout
-from ...road.things.furniture import Side
 from ...road.surface import highest_pavement, known_elevation
+from ...road.things.furniture import Side
 from ..surfaces import height_share, ramp_length
 from .pieces import CLOSE, Float, chords, merged_stations
 

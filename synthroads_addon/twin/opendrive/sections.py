@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ...road.geometry import RoadGeometry
 from ...road.parameters import Median
 from ...road.things.furniture import Side
 from ...road.turnout_geometry import TURNOUT_STRIPS, TurnoutShape
@@ -110,7 +109,8 @@ class LanePlan:
 
     def __init__(self, frame: RoadFrame) -> None:
         self.frame, self.geometry, self.side = frame, frame.geometry, frame.side
-        self._columns: list[tuple[Side, int, str]] = [(self.side, i, kind) for i, kind in enumerate(frame.section.kinds)]
+        self._columns: list[tuple[Side, int, str]] = []
+        self._columns += [(self.side, i, kind) for i, kind in enumerate(frame.section.kinds)]
         if frame.has_median:
             self._columns.append((_OTHER[self.side], -1, "median"))
         self.widths: Cubics = cubics(self._widths, frame.borders)
@@ -167,8 +167,8 @@ class LanePlan:
             first = piece
         return sections
 
-    def _long_enough(self, sections: list[LaneSection]) -> Iterator[LaneSection]:
-        """Yield the sections without those that are too short for readers.
+    def _long_enough(self, sections: list[LaneSection]) -> list[LaneSection]:
+        """Return the sections without those that are too short for readers.
 
         A short one is part of the next (or the last), in which what it has begins at once, with its width there.
         """
@@ -178,11 +178,9 @@ class LanePlan:
             if section.end - section.start < SHORTEST_SECTION and section is not sections[-1]:
                 waiting = waiting or section
                 continue
-            if waiting is not None:
-                section = self._begin_earlier(section, waiting)
-                waiting = None
-            kept.append(section)
-        yield from kept
+            kept.append(section if waiting is None else self._begin_earlier(section, waiting))
+            waiting = None
+        return kept
 
     def _begin_earlier(self, section: LaneSection, short: LaneSection) -> LaneSection:
         """Return a section that begins where a short one before it did."""

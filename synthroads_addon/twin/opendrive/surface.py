@@ -161,7 +161,7 @@ class RoadFrame:
 
 
 def elevation_profile(road: Element, frame: RoadFrame) -> None:
-    """Add the elevation profile: the line in which the carriageway's plane meets the upright plane of the centreline."""
+    """Add the elevation profile: the line in which the carriageway's plane meets the upright one of the centreline."""
     _cubics(element(road, "elevationProfile"), "elevation", frame.elevation)
 
 

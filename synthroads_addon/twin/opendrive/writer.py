@@ -35,7 +35,8 @@ def write_opendrive(parameters: RoadParameters, path: Path, tolerance: float) ->
     """Write a road's geometric-semantic model as an OpenDRIVE file.
 
     Coordinates in it are local; the header's offset adds the map origin, and its ``geoReference`` names the map's
-    coordinate system. Each carriageway is a road of its own along the same line, with its own superelevation. Lanes, line and surface don't depend on the tolerance.
+    coordinate system. Each carriageway is a road of its own along the same line, with its own superelevation. Lanes,
+    line and surface don't depend on the tolerance.
 
     Args:
         parameters: the road.
@@ -135,7 +136,7 @@ def geo_reference(epsg: int) -> str:
 
 
 def _list_rest(root: Element, parameters: RoadParameters) -> None:
-    """Name what has no element of its own: the centreline, parts whose lanes bear their number, ground, plants, traffic."""
+    """Name what has no element of its own: centreline, parts whose lanes bear their number, ground, plants, traffic."""
     kinds = (AlignmentObject, Carriageway, Median, Turnout, LineMarking, Terrain, Vegetation, Vehicle)
     for name, item in parameters.objects.items():
         if isinstance(item, kinds):

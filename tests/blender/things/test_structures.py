@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from xml.etree import ElementTree
-from xml.etree.ElementTree import Element
 
 import bpy
 import numpy as np
@@ -18,6 +16,7 @@ from synthroads_addon.road import stretches
 from synthroads_addon.scanning.scene.mesh import SceneMesh
 from synthroads_addon.twin.bodies.at import bodies_at, places_of
 from synthroads_addon.twin.opendrive.writer import write_opendrive
+from tests.helpers.files.opendrive_reader import Roads, corners_local
 from tests.helpers.scenes.furnished_road import (
     MEASURE,
     Data,
@@ -100,19 +99,11 @@ def road() -> FurnishedRoad:
 
 
 @pytest.fixture(scope="module")
-def drawn(road: FurnishedRoad, tmp_path_factory: pytest.TempPathFactory) -> Element:
-    """Return the road of its OpenDRIVE file."""
+def drawn(road: FurnishedRoad, tmp_path_factory: pytest.TempPathFactory) -> Roads:
+    """Return the roads of its OpenDRIVE file."""
     path = tmp_path_factory.mktemp("drawn") / "road.xodr"
     write_opendrive(road.parameters, path, 0.005)
-    (read,) = ElementTree.parse(path).getroot().findall("road")
-    return read
-
-
-def _height(road: FurnishedRoad, drawn: Element, path: str) -> float:
-    """Return the local elevation of an object's or a signal's place in OpenDRIVE, m."""
-    (made,) = drawn.findall(path)
-    level = float(road.geometry.profile.elevation(float(made.attrib["s"])))
-    return level + float(made.attrib["zOffset"])
+    return Roads.read(path)
 
 
 def frame(road: FurnishedRoad, name: str, points: Float) -> Float:
@@ -236,21 +227,21 @@ class TestGantry:
             assert np.ptp(solid[:, 2]) == pytest.approx(board.height, abs=MEASURE)
 
     @pytest.mark.parametrize("name", ["boards", "against", "both", "cantilever"])
-    def test_signals_hang_where_the_model_has_them(self, road: FurnishedRoad, drawn: Element, name: str) -> None:
+    def test_signals_hang_where_the_model_has_them(self, road: FurnishedRoad, drawn: Roads, name: str) -> None:
         item = road.parameters.objects[name]
         for number, board in enumerate(item.signs, 1):
             face = frame(road, name, road.mesh(f"{name}/sign-{number}").vertices)
             middle = world(road, name, (face.min(axis=0) + face.max(axis=0))[None] / 2)[0, 2] + road.origin[2]
-            lower = _height(road, drawn, f"signals/signal[@name='{name}-{number}']")
+            (made,) = [item for item in drawn.signals().values() if item.get("name") == f"{name}-{number}"]
+            lower = (drawn.place(made) - road.parameters.transform.translate)[2]
             assert lower + board.height / 2 == pytest.approx(middle, abs=MEASURE)
 
-    def test_posts_of_the_outlines_stand_where_the_model_has_them(self, road: FurnishedRoad, drawn: Element) -> None:
+    def test_posts_of_the_outlines_stand_where_the_model_has_them(self, road: FurnishedRoad, drawn: Roads) -> None:
         for name in GANTRIES:
             plinths = sorted(-float(p[..., 0].mean()) for p in self._plinths(road, name))
-            (made,) = drawn.findall(f"objects/object[@name='{name}']")
-            outlines = made.findall("outlines/outline")[1:]
-            places = [[float(corner.attrib["v"]) for corner in outline] for outline in outlines]
-            assert sorted((min(v) + max(v)) / 2 for v in places) == pytest.approx(plinths, abs=MEASURE)
+            (made,) = [item for item in drawn.objects().values() if item.get("name") == name]
+            places = [outline[:, 1] for outline in corners_local(made)[1:]]
+            assert sorted((v.min() + v.max()) / 2 for v in places) == pytest.approx(plinths, abs=MEASURE)
 
     def test_a_display_that_shows_nothing_has_no_face(self, road: FurnishedRoad) -> None:
         assert faces_of(road, "cantilever-left") == ["cantilever-left"]

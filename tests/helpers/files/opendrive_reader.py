@@ -160,7 +160,8 @@ class OpenDrive:
     def point(self, s: Float, t: Float, height: Float | float = 0.0) -> Float:
         """Return map points (N, 3) at s, t and h: turned with the grade first, then tilted."""
         position, heading = self.reference(s)
-        climb, roll = np.arctan(Cubics.of(self.road.findall("elevationProfile/elevation")).slope(s)), self.superelevation(s)
+        profile = Cubics.of(self.road.findall("elevationProfile/elevation"))
+        climb, roll = np.arctan(profile.slope(s)), self.superelevation(s)
         ahead = np.stack([np.cos(heading), np.sin(heading), np.zeros(len(s))], axis=1)
         left = np.stack([-np.sin(heading), np.cos(heading), np.zeros(len(s))], axis=1)
         up = np.column_stack([-np.sin(climb)[:, None] * ahead[:, :2], np.cos(climb)])

@@ -31,7 +31,16 @@ from synthroads_addon.road.parameters import (
 from synthroads_addon.sampling.road import sample_road
 from synthroads_addon.twin.opendrive.pieces import chords, cubics, runs
 from synthroads_addon.twin.opendrive.writer import geo_reference, write_opendrive
-from tests.helpers.files.opendrive_reader import Lane, OpenDrive, Roads, Section, corners_local, corners_road, notes_of, number
+from tests.helpers.files.opendrive_reader import (
+    Lane,
+    OpenDrive,
+    Roads,
+    Section,
+    corners_local,
+    corners_road,
+    notes_of,
+    number,
+)
 from tests.helpers.roads.checker_full_road import full
 from tests.helpers.roads.sampled_parts import PAIRS, full_roads, scenario
 from tests.judges import require
@@ -261,7 +270,8 @@ def test_lanes_are_linked_both_ways_if_they_go_on(read: Roads) -> None:
             if (lane.notes["strip"], lane.notes.get("lane")) not in kinds:
                 assert other is None
                 continue
-            assert (other is not None) == (width > 1e-6 and float(after.lanes[twin(after, lane)].width.at(border)[0]) > 1e-6)
+            begun = float(after.lanes[twin(after, lane)].width.at(border)[0])
+            assert (other is not None) == (width > 1e-6 and begun > 1e-6)
             if other is not None:
                 assert after.lanes[other].links["predecessor"] == i
                 assert after.lanes[other].notes["strip"] == lane.notes["strip"]
