@@ -211,7 +211,7 @@ class Objects:
         subtype = "hatching" if isinstance(item, Hatching) else f"arrow_{item.kind}"
         attributes: dict[str, Value] = {"type": "roadMark", "subtype": subtype, "hdg": _turn(item)}
         made = self._object(name, item, {**attributes, "height": item.film_thickness}, (*at, z))
-        place = self.frame.place(*corners.T, heights)
+        place = self.frame.place(corners[:, 0], corners[:, 1], heights)
         rows = np.column_stack([place.s, place.t, place.h])
         outlines = element(made, "outlines")
         for number, part in enumerate(np.split(rows, np.cumsum([len(part) for part in parts])[:-1])):

@@ -144,7 +144,7 @@ class LanePlan:
     def _widths(self, station: Float) -> Float:
         own = self.offsets(station)
         sign = self.frame.section.carriageway.sign
-        widths = sign * np.diff(own, axis=1)
+        widths = sign * (own[:, 1:] - own[:, :-1])
         if self.frame.has_median:
             far = self.frame.across(station, self._far_edge(station), self.median_fall(station))
             widths = np.column_stack([widths, sign * (own[:, 0] - far)])

@@ -34,7 +34,7 @@ _HEAD, _LIGHT = 1.3, 1.25
 
 @dataclass(frozen=True)
 class Signals:
-    """What the writers of signals share.
+    """The signals of one road, and all that is needed to write them.
 
     Attributes:
         parent: the element that they are added to.
