@@ -75,13 +75,10 @@ class Objects:
 
     def barrier(self, name: str, item: LineObject) -> None:
         """Add what runs along the road: repeats with distance 0, linear from one to the next."""
-        rows = self.ground.along(item)
+        subtype, width, beside = _cross_section(item)
+        rows = self.ground.along(item, self.frame, beside)
         if not len(rows):
             return
-        subtype, width, beside = _cross_section(item)
-        rows[:, 1] += beside
-        place = self.frame.place(*rows[:, :3].T)
-        rows[:, :3] = np.column_stack([place.s, place.t, place.h])
         attributes: dict[str, Value] = {"type": "barrier", "subtype": subtype, "hdg": 0.0}
         attributes |= {"length": float(rows[-1, 0] - rows[0, 0]), "width": width, "height": _tall(item)}
         made = self._placed(name, item, attributes, rows[0, :3])

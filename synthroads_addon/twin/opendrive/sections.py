@@ -148,7 +148,7 @@ class LanePlan:
         if self.frame.has_median:
             far = self.frame.across(station, self._far_edge(station), self.median_fall(station))
             widths = np.column_stack([widths, sign * (own[:, 0] - far)])
-        return widths
+        return np.asarray(widths, dtype=np.float64)
 
     def width_at_start(self, piece: int) -> Float:
         """Return all widths (F,) at the beginning of a piece."""

@@ -7,11 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ...road.alignment import left_vectors
 from ...road.geometry import RoadGeometry
 from ...road.things.furniture import Side
 from .pieces import Cubics, Float, cubics, merged_stations, piecewise, runs
 from .xml import PLAN_DIGITS, Element, Value, cubic, element
 
+_APPROXIMATIONS = 2
 SIDES: tuple[Side, ...] = ("right", "left")
 """From right to left, as t grows."""
 _LINE_APART = 1e-4  # m, between the end of a line that stands for several and where it should be
@@ -135,14 +137,25 @@ class RoadFrame:
         station, offset, height = (np.asarray(values, dtype=np.float64) for values in (station, offset, height))
         station = np.clip(station, 0.0, geometry.length)
         level = height + geometry.profile.elevation(station)
+        origin, heading, _ = geometry.alignment.frame(station)
+        plan = origin + offset[:, None] * left_vectors(heading)
+        s = station
         # A point above the line lies at right angles to a place of it farther on, where it climbs.
-        grade = self.elevation.slope(station)
-        onwards = (level - self.elevation.at(station)) * grade / (1.0 + grade**2)
-        s = station + onwards / (1.0 - geometry.alignment.curvature(station) * offset)
-        s = np.clip(s, 0.0, geometry.length)
+        for _ in range(_APPROXIMATIONS):
+            ahead, _, above = self._beside(s, plan, level)
+            bend = 1.0 - geometry.alignment.curvature(s) * offset
+            s = np.clip(s + ahead * self._cosine(s) / bend, 0.0, geometry.length)
+        _, left, above = self._beside(s, plan, level)
         tilt = self.superelevation.at(s)
-        above = (level - self.elevation.at(station)) / np.sqrt(1.0 + grade**2)
-        return Place(s, offset * np.cos(tilt) + above * np.sin(tilt), above * np.cos(tilt) - offset * np.sin(tilt))
+        return Place(s, left * np.cos(tilt) + above * np.sin(tilt), above * np.cos(tilt) - left * np.sin(tilt))
+
+    def _beside(self, s: Float, plan: Float, level: Float) -> tuple[Float, Float, Float]:
+        """Return how far (N,) points lie ahead of a place of the line along it, to its left, and above it, m."""
+        origin, heading, _ = self.geometry.alignment.frame(s)
+        away, left = plan - origin, left_vectors(heading)
+        forwards = away[:, 0] * left[:, 1] - away[:, 1] * left[:, 0]
+        rise, grade, cosine = level - self.elevation.at(s), self.elevation.slope(s), self._cosine(s)
+        return (forwards + grade * rise) * cosine, (away * left).sum(axis=1), (rise - grade * forwards) * cosine
 
     def _cosine(self, station: Float) -> Float:
         return np.asarray(1.0 / np.sqrt(1.0 + self.elevation.slope(station) ** 2))
