@@ -322,6 +322,68 @@ def test_lane_types_and_owners(tmp_path: Path) -> None:
     assert owners["bay"] == {objects["bay"].instance}
 
 
+# --- as readers read it -------------------------------------------------------------------------------------------
+
+
+def test_ids_are_numbers_and_names_are_the_sets(road: RoadParameters, read: Roads) -> None:
+    for tag in ("road", "object", "signal", "tunnel"):
+        ids = [item.attrib["id"] for item in read.root.iter(tag)]
+        assert all(text.isdigit() for text in ids)
+        assert len(set(ids)) == len(ids), tag
+    for part in read.roads:
+        assert road.objects[part.road.attrib["name"]].instance == int(part.road.attrib["id"])
+
+
+def test_no_section_is_too_short_for_readers(read: Roads) -> None:
+    sections = [section for part in read.roads for section in part.sections[:-1]]
+    assert min((section.end - section.start for section in sections), default=1.0) > 0.2
+
+
+def test_hard_shoulders_are_for_emergencies(read: Roads) -> None:
+    for lane in (lane for part in read.roads for section in part.sections for lane in section.lanes.values()):
+        found = [(item.get("rule"), item.get("restriction")) for item in lane.item.findall("access")]
+        assert found == ([("allow", "emergency")] if lane.type == "stop" else [])
+
+
+def speeds(part: OpenDrive, s: float) -> set[float]:
+    """Return the speeds of a road's driving lanes at a station, km/h."""
+    (section,) = [item for item in part.sections if item.start <= s < item.end]
+    found = set()
+    for lane in (lane for lane in section.lanes.values() if lane.type == "driving"):
+        (speed,) = [v for v in lane.item.findall("speed") if section.start + number(v, "sOffset") <= s][-1:]
+        assert speed.get("unit") == "km/h"
+        found.add(number(speed, "max"))
+    return found
+
+
+def test_speeds_are_those_of_the_signs(tmp_path: Path) -> None:
+    data = everything().to_dict()
+    objects = data["objects"]
+    sign = next(item for item in objects.values() if item["type"] == "TrafficSign")
+    for name in [name for name, item in objects.items() if item["type"] == "TrafficSign"]:
+        del objects[name]
+    for i, (code, station, turn) in enumerate(
+        [("274-100", 500.0, 0.0), ("282", 900.0, 0.0), ("274-80", 1200.0, 180.0), ("274-120", 700.0, 180.0)]
+    ):
+        side = -14.0 if turn == 0.0 else 14.0
+        place = {"code": code, "station": station, "rotation_deg": turn, "offset": side, "instance": 5000 + i}
+        objects[f"limit-{i}"] = sign | place
+    read = written(RoadParameters.from_dict(data), tmp_path)
+    for part in read.roads:
+        (kind,) = part.road.findall("type/speed")
+        assert kind.get("max") == "no limit"
+        found = [speeds(part, s) for s in (300.0, 600.0, 800.0, 1000.0, 1500.0)]
+        right, left = [{130.0}, {100.0}, {100.0}, {130.0}, {130.0}], [{120.0}, {120.0}, {80.0}, {80.0}, {130.0}]
+        assert found == (right if part.side == "right" else left)
+
+
+def test_urban_motorways_have_a_limit(tmp_path: Path) -> None:
+    road = sample_road(scenario(design_class="EKA3", cross_section="RQ25", length=100.0), 3)
+    bare = {name: item for name, item in road.to_dict()["objects"].items() if item["type"] != "TrafficSign"}
+    read = written(RoadParameters.from_dict(road.to_dict() | {"objects": bare}), tmp_path)
+    assert {item.get("max") for item in read.root.iter("speed")} == {"100"}
+
+
 # --- paint --------------------------------------------------------------------------------------------------------
 
 
