@@ -37,7 +37,8 @@ def lanes(road: Element, plan: LanePlan, limits: SpeedLimits, marks: RoadMarks) 
 def _lane_offset(parent: Element, plan: LanePlan) -> None:
     """Shift the centre lane to the carriageway's inner edge."""
     offsets = cubics(lambda station: plan.offsets(station)[:, :1], plan.frame.borders)
-    for start, coefficients in runs(offsets.borders, offsets.coefficients[:, 0]):
+    rows = runs(offsets.borders, offsets.coefficients[:, 0])
+    for start, coefficients in distinct(rows, float(offsets.borders[-1])):
         cubic(parent, "laneOffset", {"s": start}, coefficients)
 
 

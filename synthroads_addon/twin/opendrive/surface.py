@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from ...road.alignment import left_vectors
 from ...road.geometry import RoadGeometry
 from ...road.things.furniture import Side
-from .pieces import Cubics, Float, cubics, merged_stations, piecewise, runs
+from .pieces import Cubics, Float, cubics, distinct, merged_stations, piecewise, runs
 from .xml import PLAN_DIGITS, Element, Value, cubic, element
 
 _APPROXIMATIONS = 2
@@ -184,7 +184,8 @@ def lateral_profile(road: Element, frame: RoadFrame) -> None:
 
 
 def _cubics(parent: Element, tag: str, function: Cubics) -> None:
-    for start, coefficients in runs(function.borders, function.coefficients[:, 0]):
+    rows = runs(function.borders, function.coefficients[:, 0])
+    for start, coefficients in distinct(rows, float(function.borders[-1])):
         cubic(parent, tag, {"s": start}, coefficients)
 
 

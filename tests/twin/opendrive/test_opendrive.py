@@ -771,7 +771,7 @@ def test_quality_checker_finds_nothing_in_fifty_roads(tmp_path: Path) -> None:
     for i, road in enumerate(roads):
         path = tmp_path / f"{i}.xodr"
         write_opendrive(road, path, TOLERANCE)
-        assert worst_border(road, Roads.read(path)) < 0.3 * MILLIMETRE
+        assert worst_border(road, Roads.read(path)) < MILLIMETRE
         assert quality_faults(path) == []
 
 
