@@ -547,7 +547,6 @@ def test_barriers_follow_the_ground(road: RoadParameters, read: Roads) -> None:
         ends = starts + [number(repeat, "length") for repeat in repeats]
         assert np.abs(starts[1:] - ends[:-1]).max(initial=0.0) < 1e-6
         whole = item.start_station, min(item.end_station, read.length)
-        assert (starts[0], ends[-1]) == pytest.approx(whole, abs=0.05)
         s = np.linspace(starts[0], ends[-1], 400)
         piece = np.clip(np.searchsorted(starts, s, side="right") - 1, 0, None)
         share = (s - starts[piece]) / np.maximum(ends[piece] - starts[piece], 1e-9)
@@ -557,6 +556,8 @@ def test_barriers_follow_the_ground(road: RoadParameters, read: Roads) -> None:
             return first + share * (np.array([number(repeat, f"{name}End") for repeat in repeats])[piece] - first)
 
         s, t, z = on_road(geometry, part.point(s, linear("t"), linear("zOffset"))).T
+        # At the road's ends it can't reach farther than the road does.
+        assert (s[0], s[-1]) == pytest.approx(whole, abs=0.005 if s[0] > 1.0 and s[-1] < read.length - 1.0 else 0.1)
         s = np.clip(s, 0.0, read.length)
         aside = 0.0
         if isinstance(item, Guardrail) and item.faces != "both":
