@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import sys
 from pathlib import Path
+from typing import get_args
 
 if __name__ == "__main__":
     sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
@@ -13,7 +14,15 @@ from headless.commands import Outcome, add_renamed_argument, add_twin_argument, 
 from synthroads_addon.base.errors import InputError
 from synthroads_addon.base.files import output_folder
 from synthroads_addon.road.parameters import read_parameters
-from synthroads_addon.twin.formats import TOLERANCE, TWIN_FORMATS, check_formats, twin_file_names, write_twin
+from synthroads_addon.twin.formats import (
+    TOLERANCE,
+    TWIN_FORMATS,
+    IfcPlacement,
+    IfcSettings,
+    check_formats,
+    twin_file_names,
+    write_twin,
+)
 
 _LIMITS = (1e-4, 1.0)
 
@@ -26,6 +35,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     text = f"largest distance of chords from curved lines and surfaces, m ({TOLERANCE:g})"
     parser.add_argument("--max-deviation", type=float, default=TOLERANCE, metavar="M", help=text)
     add_renamed_argument(parser, "--tolerance", "--max-deviation")
+    text = "where IFC's objects stand: along the alignment, or by coordinates for viewers that know none (%(default)s)"
+    placements = get_args(IfcPlacement)
+    parser.add_argument("--ifc-placement", choices=placements, default=IfcSettings().placement, help=text)
     parser.add_argument("--overwrite", action="store_true", help="replace files that are already there")
 
 
@@ -39,7 +51,7 @@ def run(arguments: argparse.Namespace) -> Outcome:
     parameters = read_parameters(arguments.parameters)
     names = twin_file_names(formats)
     with output_folder(arguments.output, names, arguments.overwrite) as folder:
-        write_twin(parameters, folder, formats, deviation)
+        write_twin(parameters, folder, formats, deviation, IfcSettings(placement=arguments.ifc_placement))
     written = [arguments.output / name for name in names]
     result = {"files": {kind: str(path) for kind, path in zip(formats, written, strict=True)}}
     return 0, result, "\n".join(f"written {path} ({path.stat().st_size / 1e6:.2f} MB)" for path in written)

@@ -151,14 +151,15 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "road.xodr"
         write_opendrive(sample_road(RoadScenario.from_dict(SCENARIO), SEED), path, 0.005)
-        road = OpenDrive.read(path)
+        roads = OpenDrive.read(path)
     figure, panels = plt.subplots(len(STRETCHES), 1, figsize=(14.0, 11.5), dpi=100)
     types: set[str] = set()
     for axes, stretch in zip(panels, STRETCHES, strict=True):
-        turned = Turned(road, stretch)
-        types |= lanes(axes, turned, stretch)
-        paint(axes, turned, stretch)
-        furniture(axes, turned, stretch)
+        for road in roads:
+            turned = Turned(road, stretch)
+            types |= lanes(axes, turned, stretch)
+            paint(axes, turned, stretch)
+            furniture(axes, turned, stretch)
         axes.set_aspect("equal")
         axes.autoscale_view()
         axes.set(xlabel="along, m", ylabel="across, m", title=f"Station {stretch[0]:g} m to {stretch[1]:g} m")

@@ -68,7 +68,7 @@ class JobFiles:
             (folder / "centerline.geojson").write_text(text, encoding="utf-8")
         if self.scenario.twin:
             with timer.stage("twin"):
-                write_twin(road.parameters, folder, self.scenario.twin, tolerance)
+                write_twin(road.parameters, folder, self.scenario.twin, tolerance, self.scenario.ifc)
 
     def write_report(self, folder: Path, told: dict[str, Any], timer: StageTimer) -> dict[str, Any]:
         """Write ``report.json`` and return what it holds.

@@ -13,7 +13,7 @@ from ..base.files import PRESETS, preset_names, preset_path
 from ..base.schema import ClosedModel, Model, notes, optional, quantity, read_json
 from ..base.typed_text import typed_value
 from ..materials.table import Material, material_table_path, read_material_table
-from ..twin.formats import TwinFormat
+from ..twin.formats import IfcSettings, TwinFormat
 from .cloud import CloudScenario
 from .colour import ColourScenario
 from .giving_way import without_what_gives_way
@@ -74,6 +74,12 @@ class Scenario(ClosedModel):
     )
     twin: tuple[TwinFormat, ...] = Field(
         (), title="Semantic Model", description="Formats of the geometric-semantic model that are wanted."
+    )
+    ifc: IfcSettings | None = Field(
+        None,
+        title="IFC",
+        description="How the geometric-semantic model is written as IFC.",
+        json_schema_extra=notes(unset="Along the alignment"),
     )
 
     @field_validator("time_budget", mode="before")

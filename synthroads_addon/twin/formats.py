@@ -13,7 +13,10 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
+from pydantic import Field
+
 from ..base.errors import InputError, nearest_name
+from ..base.schema import ClosedModel
 from ..road.parameters import RoadParameters
 
 
@@ -67,7 +70,20 @@ TWIN_FORMATS: tuple[TwinFormat, ...] = tuple(FORMATS)
 TOLERANCE = 0.005
 """Chord error of curved surfaces and lines that isn't asked for otherwise, m."""
 
-_Writer = Callable[[RoadParameters, Path, float], None]
+_Writer = Callable[..., None]
+"""Parameters, path and tolerance (m) -> nothing; what a format's own settings are is handed to it by their names."""
+
+IfcPlacement = Literal["linear", "local"]
+
+
+class IfcSettings(ClosedModel):
+    """How a road is written as IFC."""
+
+    placement: IfcPlacement = Field(
+        "linear",
+        title="Placement",
+        description="Where objects stand: along the alignment, or by coordinates for viewers that know no alignment.",
+    )
 
 
 def twin_file_names(formats: Iterable[str]) -> tuple[str, ...]:
@@ -112,7 +128,13 @@ def check_formats(formats: Iterable[str]) -> None:
             raise InputError("twin", name, f"needs the package {package}: pip install 'synthroads[twin]'")
 
 
-def write_twin(parameters: RoadParameters, folder: Path, formats: Sequence[str], tolerance: float = TOLERANCE) -> None:
+def write_twin(
+    parameters: RoadParameters,
+    folder: Path,
+    formats: Sequence[str],
+    tolerance: float = TOLERANCE,
+    ifc: IfcSettings | None = None,
+) -> None:
     """Write a road's geometric-semantic model into a folder, one file per format (`twin_file_names`).
 
     Args:
@@ -120,6 +142,7 @@ def write_twin(parameters: RoadParameters, folder: Path, formats: Sequence[str],
         folder: where the files go; it must be there.
         formats: of `TWIN_FORMATS`.
         tolerance: largest chord error (m) of curved surfaces and lines; their vertices are exact.
+        ifc: settings of the format ``ifc``; the usual ones if None.
 
     Raises:
         InputError: a format is unknown or its package isn't installed, or a road can't be said in it.
@@ -127,4 +150,5 @@ def write_twin(parameters: RoadParameters, folder: Path, formats: Sequence[str],
     check_formats(formats)
     for name, file_name in zip(formats, twin_file_names(formats), strict=True):
         writer: _Writer = getattr(import_module(FORMATS[name].module, __package__), f"write_{name}")
-        writer(parameters, folder / file_name, tolerance)
+        further = (ifc or IfcSettings()).to_dict() if name == "ifc" else {}
+        writer(parameters, folder / file_name, tolerance, **further)

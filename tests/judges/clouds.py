@@ -79,7 +79,7 @@ def pye57_verdict(samples: Samples) -> list[str]:
     import pye57
 
     with pye57.E57(str(samples.file("cloud.e57"))) as file:
-        scan = file.read_scan(0, intensity=True, colors=True, ignore_missing_fields=True)
+        scan = file.read_scan(0, intensity=True, colors=True)
     xyz = np.stack([scan[f"cartesian{axis}"] for axis in "XYZ"], axis=1)
     return _compared(samples, xyz, _E57_STEP, {"red": (scan["colorRed"], samples.points.rgb[:, 0] >> 8)})
 

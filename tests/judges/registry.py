@@ -107,7 +107,7 @@ _ALL = (
     ),
     _with_pip(
         "eclipse-sumo",
-        "OpenDRIVE: lanes and profile, and vehicles that drive along each through lane",
+        "OpenDRIVE: lanes, speeds and profile, and vehicles that drive along each through lane, none on a shoulder",
         sumo.verdict,
         sumo.with_an_arc_the_wrong_way,
     ),
@@ -115,7 +115,7 @@ _ALL = (
     _with_pip("ad-map-access", "OpenDRIVE: edges of all lanes", opendrive.ad_map_verdict, opendrive.with_a_wide_lane),
     Judge(
         "libOpenDRIVE",
-        "OpenDRIVE: the surface, lane by lane, but for the lateral shape, which it doesn't read",
+        "OpenDRIVE: the surface, lane by lane",
         "cmake",
         f"its source and README in {libopendrive.SOURCE}; apt install cmake g++ libpugixml-dev",
         libopendrive.version,

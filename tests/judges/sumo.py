@@ -22,15 +22,15 @@ _OPTIONS = (
     "--no-internal-links",
 )
 _KNOWN = (
-    # A ramp's nose and its end are steps of 5 cm: SUMO wants sections of 10 cm and more.
-    r"Almost duplicate s-value '[\d.]+' for lane sections occurred at edge '1'; first entry was removed\.",
     # So it is where a lane begins.
     r"Lane '[^']+' is not connected from any incoming edge at junction '[^']+'\.",
     r"\d+ total messages of type: Lane '%' is not connected from any incoming edge at junction '%'\.",
 )
 _MILLIMETRE = 1e-3
-_ACROSS, _HIGH = 2.0 * _MILLIMETRE, 2.0 * _MILLIMETRE
-"""How far (m) lanes and paths may be off: chords of a metre and SUMO's own positions cost about half of it."""
+_LANE, _ACROSS, _HIGH = _MILLIMETRE, 2.0 * _MILLIMETRE, 2.0 * _MILLIMETRE
+"""How far (m) lanes and paths may be beside ours, and off in height: chords of a metre, and SUMO's own positions."""
+_ADVISORY = 130.0 / 3.6
+"""Speed on a motorway without a limit, m/s."""
 _END = 1.0
 """How near (m) to the road's ends a vehicle has to begin and to arrive."""
 _TURNED = np.radians(0.1)
@@ -108,6 +108,24 @@ def drive(net: Net, folder: Path) -> dict[str, np.ndarray]:
     return {name: np.array(rows) for name, rows in paths.items()}
 
 
+def crowd(net: Net, folder: Path) -> set[str]:
+    """Return the types of the lanes that cars drive on, in dense traffic that may choose its lanes."""
+    routes = ElementTree.Element("routes")
+    ElementTree.SubElement(routes, "vType", {"id": "car", "length": str(_CAR), "vClass": "passenger"})
+    for side, ahead in (("right", True), ("left", False)):
+        for edges in [" ".join(edge.attrib["id"] for edge in net.way(ahead))]:
+            about = {"id": side, "type": "car", "begin": "0", "end": "20", "number": "20", "departLane": "random"}
+            ElementTree.SubElement(ElementTree.SubElement(routes, "flow", about), "route", {"edges": edges})
+    ElementTree.ElementTree(routes).write(folder / "crowd.rou.xml")
+    seen = folder / "crowd.xml"
+    files = ["--net-file", str(net.path), "--route-files", str(folder / "crowd.rou.xml"), "--fcd-output", str(seen)]
+    done = _run("sumo", *files, "--step-length", "0.5", "--no-step-log")
+    if done.returncode != 0 or "Error" in done.stderr:
+        raise RuntimeError(done.stderr[-1000:])
+    types = {lane.attrib["id"]: lane.get("type", "") for lane in net.root.iter("lane")}
+    return {types[item.attrib["lane"]] for item in ElementTree.parse(seen).getroot().iter("vehicle")}
+
+
 def _run(program: str, *arguments: str) -> subprocess.CompletedProcess[str]:
     import sumo
 
@@ -131,7 +149,10 @@ def verdict(samples: Samples) -> list[str]:
         for side, ahead in (("right", True), ("left", False)):
             for edge in net.way(ahead):
                 found += _wrong_lanes(samples, side, edge)
+                found += _wrong_traffic(edge)
         paths = drive(net, folder)
+        if (types := crowd(net, folder)) != {"driving"}:
+            found.append(f"cars drove on lanes of the types {sorted(types)}")
     wanted = {f"{side}-{n}" for side, section in samples.geometry.sections.items() for n in range(_lanes(section))}
     if set(paths) != wanted:
         found.append(f"vehicles drove in {sorted(paths)} and not in {sorted(wanted)}")
@@ -160,21 +181,42 @@ def _wrong_lanes(samples: Samples, side: str, edge: ElementTree.Element) -> list
     for number, lane in enumerate(through):
         points = np.array([[float(value) for value in point.split(",")] for point in lane.attrib["shape"].split()])
         station, across, high = _off(samples, side, number, points)
-        if across > _ACROSS or high > _HIGH:
+        if across > _LANE or high > _HIGH:
             where = f"{station[0]:.0f} m to {station[-1]:.0f} m"
             away = f"{across:.4f} m beside ours and {high:.4f} m off in height"
             found.append(f"lane {lane.attrib['id']}, {where}: up to {away}")
     return found
 
 
+def _wrong_traffic(edge: ElementTree.Element) -> list[str]:
+    """Return the lanes of an edge that cars drive on at other speeds than on a motorway, or shouldn't drive on."""
+    found = []
+    for lane in edge.findall("lane"):
+        if lane.get("type") == "driving" and abs(float(lane.attrib["speed"]) - _ADVISORY) > 0.01:
+            found.append(f"lane {lane.attrib['id']} is for {lane.attrib['speed']} m/s")
+        if lane.get("type") == "stop" and not set(lane.get("allow", "").split()) <= {"emergency", "authority"}:
+            found.append(f"lane {lane.attrib['id']} is for {lane.get('allow')}")
+    return found
+
+
 def _off(samples: Samples, side: str, number: int, points: np.ndarray) -> tuple[np.ndarray, float, float]:
-    """Return points' stations, and how far (m) they are at most beside a lane's middle and off the profile."""
+    """Return points' stations, and how far (m) they are at most beside a lane's middle and off its road's line.
+
+    SUMO doesn't know that the road is tilted: it takes t, which lies in the tilted plane, for an offset in plan, and
+    the elevation profile, the plane's line at the centreline, for the height of all.
+    """
     geometry = samples.geometry
     station, offset = geometry.alignment.project(points[:, :2])
     inside = np.clip(station, 0.0, geometry.length)
-    across = np.abs(offset - _middle(samples, side, number, inside)).max()
-    # SUMO reads the profile, and neither lateral shape nor superelevation.
-    return station, float(across), float(np.abs(points[:, 2] - geometry.profile.elevation(inside)).max())
+    section = geometry.sections[side]
+    rise = geometry.crossfall(section.carriageway, inside)
+    middle = _middle(samples, side, number, inside)
+    # Of lanes whose width changes with the tilt it takes one width: they lie between those without and with all of it.
+    most = max(abs(point.crossfall_percent) for point in section.carriageway.crossfall) / 100.0
+    ends = np.sort(np.stack([middle, middle * np.sqrt(1.0 + most**2)]), axis=0)
+    across = np.maximum(ends[0] - offset, offset - ends[1]).max()
+    line = geometry.profile.elevation(inside) - rise * section.carriageway.sign * section.pivot(inside)
+    return station, float(across), float(np.abs(points[:, 2] - line).max())
 
 
 def _wrong_path(samples: Samples, name: str, path: np.ndarray) -> list[str]:

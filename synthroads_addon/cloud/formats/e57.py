@@ -31,9 +31,12 @@ NORMALS = {"NormalX": "nor:normalX", "NormalY": "nor:normalY", "NormalZ": "nor:n
 _NORMALS_URI = "http://www.libe57.org/E57_EXT_surface_normals.txt"
 _CAPACITY = 65_536
 """Points that are handed to the library at a time."""
+_VALID, _INVALID = 0, 2
+"""Values of the field that says whether a point's coordinates mean something: all of them do, none of them does."""
 _ENDS = ("Minimum", "Maximum")
 _FIXED = {
     **dict.fromkeys(("cartesianX", "cartesianY", "cartesianZ"), "i4"),
+    "cartesianInvalidState": "u1",
     "intensity": "f4",
     **dict.fromkeys(("colorRed", "colorGreen", "colorBlue"), "u1"),
     "timeStamp": "f8",
@@ -144,6 +147,8 @@ class E57Writer(CloudWriter):
             "returnCount": self.integers(part.number_of_returns, "uint8", "number_of_returns"),
             f"{EXTENSION}:scan_angle": self.finite(part.scan_angle_deg, "scan_angle"),
             f"{EXTENSION}:strip": self.integers(part.strip, "uint16", "strip"),
+            # Readers such as pye57's `read_scan` insist on it.
+            "cartesianInvalidState": np.full(len(part), _VALID, dtype=np.uint8),
         }
         return packed | {e57_name(column): self.stored(column, part) for column in self.columns}
 
@@ -193,6 +198,8 @@ class E57Writer(CloudWriter):
             elif kind == "f4":
                 limit = float(np.finfo(np.float32).max)
                 node = e57.FloatNode(image, 0.0, e57.E57_SINGLE, -limit, limit)
+            elif name == "cartesianInvalidState":
+                node = e57.IntegerNode(image, _VALID, _VALID, _INVALID)
             elif scale is None:
                 node = e57.IntegerNode(image, 0, int(np.iinfo(kind).min), int(np.iinfo(kind).max))
             else:

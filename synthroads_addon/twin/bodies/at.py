@@ -37,6 +37,8 @@ _POST_TOPS = {"round": 0.9, "triangle": 0.6, "rectangle": 0.97, "octagon": 0.93,
 _ARM = 0.06
 _LUMINAIRE = (0.6, 0.26, 0.09)
 _SHORTEST_ARM = 0.05
+_ACROSS = 0.05
+"""Distance (m) of the points across the road at which the pavement is looked at: 3.5 mm at 7 % crossfall."""
 
 
 @dataclass(frozen=True)
@@ -119,7 +121,7 @@ def pavement_below(place: Place, x: tuple[float, float], y: tuple[float, float],
 
     Where nothing below is paved it is the frame's origin.
     """
-    across = np.linspace(*x, max(2, int(np.ceil((x[1] - x[0]) / 0.25)) + 1))
+    across = np.linspace(*x, max(2, int(np.ceil((x[1] - x[0]) / _ACROSS)) + 1))
     beside, forth = (grid.ravel() for grid in np.meshgrid(across, np.linspace(*y, 7)))
     plan = place.origin[:2] + beside[:, None] * place.right + (forth + shear * beside)[:, None] * place.along
     station, offset = place.geometry.alignment.project(plan)
@@ -212,7 +214,8 @@ def _gantry_posts(place: Place, item: Gantry, ends: tuple[float, float], bottom:
 
 def _board(place: Place, item: Gantry, sign: GantrySign, low: float) -> Faces:
     """Return a board's body, in front of the beam as the traffic below it sees it."""
-    z = low + sign.height / 2.0 if item.ends_in_beam(sign, low) else item.beam_bottom(low) + item.beam_height / 2.0
+    before_beam = item.beam_bottom(low) + item.beam_height / 2.0
+    z = before_beam if item.ends_in_beam(sign, low) else low + sign.height / 2.0
     y = -sign.facing * (item.beam_depth / 2.0 + shapes.GANTRY_HANGER + sign.depth / 2.0)
     return place.box((sign.width, sign.depth, sign.height), (item.offset - sign.offset, y, z))
 

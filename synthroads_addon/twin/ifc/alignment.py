@@ -17,7 +17,7 @@ from ...road.alignment import Alignment
 from ...road.geometry import RoadGeometry
 from ...road.parameters import Carriageway
 from ...road.profile import Profile
-from .entities import Entity, IfcFile, short
+from .entities import Entity, Float, IfcFile, short
 
 _HORIZONTAL = {"line": "LINE", "arc": "CIRCULARARC", "clothoid": "CLOTHOID"}
 _SHORTEST = 1e-6
@@ -364,3 +364,8 @@ def linear_placement(
     )
     relative = ifc.add("IfcAxis2PlacementLinear", place, ifc.direction(0.0, 0.0, 1.0), None)
     return ifc.add("IfcLinearPlacement", None, relative, ifc.axes_3d((x, y, z), angle))
+
+
+def local_placement(ifc: IfcFile, origin: Float, angle: float) -> Entity:
+    """Place something at local coordinates (3,), its x axis at an angle (rad) from the local frame's, z up."""
+    return ifc.add("IfcLocalPlacement", None, ifc.axes_3d(origin.tolist(), angle))

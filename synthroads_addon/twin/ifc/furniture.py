@@ -1,6 +1,6 @@
 """Furniture at one place in IFC 4.3: signs, posts, poles, lights, cabinets, beacons, assets.
 
-Each stands on an IfcLinearPlacement at its station, offset and height. Objects of the same size and rotation share one
+Each stands on a placement at its station, offset and height. Objects of the same size and rotation share one
 body.
 """
 
@@ -42,7 +42,7 @@ _ARM = 0.06
 _ARM_RISE = 0.12
 _CABINETS = {
     "emergency_phone": ("IfcCommunicationsAppliance", "USERDEFINED", "plastic_orange"),
-    "utility": ("IfcElectricDistributionBoard", "DISTRIBUTIONBOARD", "cabinet_grey"),
+    "utility": ("IfcDistributionBoard", "DISTRIBUTIONBOARD", "cabinet_grey"),
 }
 """Kind of cabinet -> its entity, predefined type and material."""
 _POLE_HEADS = {

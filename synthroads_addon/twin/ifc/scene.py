@@ -15,7 +15,7 @@ from ...road.objects import PointObject, RoadObject
 from ...road.surface import highest_pavement
 from ...road.things.furniture import Asset
 from ..surfaces import on_ground
-from .alignment import Axis, linear_placement
+from .alignment import Axis, linear_placement, local_placement
 from .entities import Entity, Float, IfcFile
 
 _ACROSS, _ROWS = 0.05, 7
@@ -28,7 +28,7 @@ class IfcPlace:
     """An upright frame on the road: x along it, y to the left, z up.
 
     Attributes:
-        placement: the IfcLinearPlacement.
+        placement: the IfcLinearPlacement or IfcLocalPlacement.
         origin: (3,) local point.
         heading: of its x axis, rad.
     """
@@ -63,6 +63,7 @@ class Scene:
         tolerance: largest chord error of its surfaces, m.
         stations: (N,) where its surfaces have rows, m.
         site, road: IfcSite and IfcRoad.
+        along_axis: whether objects are placed along the alignment; else by coordinates.
         parts: IfcRoadParts by name: ``carriageway-left``, ``roadside-left``, ..., ``median``.
     """
 
@@ -73,6 +74,7 @@ class Scene:
     stations: NDArray[np.float64]
     site: Entity
     road: Entity
+    along_axis: bool = True
     parts: dict[str, Entity] = field(default_factory=dict)
     _known: dict[tuple[float, float], tuple[float, int]] = field(default_factory=dict)
 
@@ -115,7 +117,10 @@ class Scene:
         position, heading, _ = self.geometry.alignment.frame(at)
         left = np.array([-math.sin(heading[0]), math.cos(heading[0])])
         origin = np.array([*(position[0] + offset * left), height])
-        placement = linear_placement(self.ifc, self.geometry, self.axis, station, offset, height)
+        if self.along_axis:
+            placement = linear_placement(self.ifc, self.geometry, self.axis, station, offset, height)
+        else:
+            placement = local_placement(self.ifc, origin, float(heading[0]))
         return IfcPlace(placement, origin, float(heading[0]))
 
     def place_of(self, item: PointObject) -> IfcPlace:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
+from typing import Literal
 
 from ...base.crs import wkt
 from ...base.errors import InputError
@@ -29,13 +30,17 @@ _SHORTEST = 1e-3
 """Shortest road, m: lengths have six decimals."""
 
 
-def write_ifc(parameters: RoadParameters, path: Path, tolerance: float = 0.005) -> None:
+def write_ifc(
+    parameters: RoadParameters, path: Path, tolerance: float = 0.005, placement: Literal["linear", "local"] = "linear"
+) -> None:
     """Write a road as IFC 4.3. The same road gives the same bytes.
 
     Args:
         parameters: the road.
         path: the file.
         tolerance: largest chord error of the road's surfaces, m; their vertices are exact.
+        placement: what says where an object stands: a place along the alignment (``linear``), which few viewers read,
+            or coordinates (``local``).
 
     Raises:
         InputError: ifcopenshell isn't installed, the map coordinate system is unknown, or the road is too long or too
@@ -56,6 +61,7 @@ def write_ifc(parameters: RoadParameters, path: Path, tolerance: float = 0.005) 
         stations=road_stations(geometry, tolerance),
         site=site,
         road=write_road(ifc, parameters, site),
+        along_axis=placement == "linear",
     )
     scene.look_up((item.station, item.offset) for item in parameters.of_type(PointObject).values())
     write_carriageways(scene)

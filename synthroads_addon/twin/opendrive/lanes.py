@@ -7,38 +7,42 @@ import numpy as np
 from ...road.parameters import Lane
 from ...road.things.furniture import Side
 from .marks import RoadMarks
-from .pieces import Float, chords, cubics, runs
+from .pieces import Float, chords, cubics, distinct, runs
 from .sections import LanePlan, LaneSection, LaneStrip
-from .surface import LateralShape
+from .speeds import SpeedLimits
 from .xml import Element, cubic, element, note
 
 HEIGHT_TOLERANCE = 1e-4
 """Largest distance (m) of a verge's edge from what is interpolated between two lane heights."""
 
 
-def lanes(road: Element, plan: LanePlan, shape: LateralShape, marks: RoadMarks) -> None:
+_WITH_LIMIT = ("driving", "exit", "entry")
+"""Types of the lanes to which the carriageway's speed limits apply."""
+_CLOSED = "stop"
+"""Type of the lanes that only emergency vehicles may drive on."""
+
+
+def lanes(road: Element, plan: LanePlan, limits: SpeedLimits, marks: RoadMarks) -> None:
     """Add the lanes of a road, section by section."""
     parent = element(road, "lanes")
-    if not plan.divided:
-        _lane_offset(parent, plan)
+    _lane_offset(parent, plan)
     for number, section in enumerate(plan.sections):
         item = element(parent, "laneSection", {"s": section.start})
-        _side(item, plan, shape, marks, (number, "left"))
+        _side(item, plan, limits, marks, (number, "left"))
         centre = element(element(item, "center"), "lane", {"id": 0, "type": "none", "level": False})
         marks.write(centre, number, 0)
-        _side(item, plan, shape, marks, (number, "right"))
+        _side(item, plan, limits, marks, (number, "right"))
 
 
 def _lane_offset(parent: Element, plan: LanePlan) -> None:
-    """Shift the centre lane of a single carriageway to its inner edge."""
-    (section,) = plan.geometry.sections.values()
-    sign = section.carriageway.sign
-    offsets = cubics(lambda station: sign * section.distances(station)[:, :1], plan.column_kinks())
-    for start, coefficients in runs(offsets.borders, offsets.coefficients[:, 0]):
+    """Shift the centre lane to the carriageway's inner edge."""
+    offsets = cubics(lambda station: plan.offsets(station)[:, :1], plan.frame.borders)
+    rows = runs(offsets.borders, offsets.coefficients[:, 0])
+    for start, coefficients in distinct(rows, float(offsets.borders[-1])):
         cubic(parent, "laneOffset", {"s": start}, coefficients)
 
 
-def _side(parent: Element, plan: LanePlan, shape: LateralShape, marks: RoadMarks, where: tuple[int, Side]) -> None:
+def _side(parent: Element, plan: LanePlan, limits: SpeedLimits, marks: RoadMarks, where: tuple[int, Side]) -> None:
     """Add one side's lanes, from left to right."""
     number, side = where
     section = plan.sections[number]
@@ -52,8 +56,9 @@ def _side(parent: Element, plan: LanePlan, shape: LateralShape, marks: RoadMarks
         _links(lane, plan, number, side, strip)
         _widths(lane, plan, section, strip)
         marks.write(lane, number, sign * lane_number)
-        if strip.kind == "verge":
-            _heights(lane, plan, shape, section, side)
+        _traffic(lane, limits, section, strip)
+        if strip.kind in ("verge", "median"):
+            _heights(lane, plan, section, strip)
         _notes(lane, plan, side, strip)
 
 
@@ -74,25 +79,29 @@ def _widths(lane: Element, plan: LanePlan, section: LaneSection, strip: LaneStri
     first, last = section.pieces
     borders = plan.widths.borders[first : last + 1]
     pieces = plan.widths.coefficients[first:last, strip.column]
-    for start, coefficients in runs(borders, pieces):
-        cubic(lane, "width", {"sOffset": start - section.start}, coefficients)
+    rows = [(start - section.start, coefficients) for start, coefficients in runs(borders, pieces)]
+    for start, coefficients in distinct(rows, section.end - section.start):
+        cubic(lane, "width", {"sOffset": start}, coefficients)
 
 
-def _heights(lane: Element, plan: LanePlan, shape: LateralShape, section: LaneSection, side: Side) -> None:
-    """Add the heights of a verge: it falls away from the pavement's plane, from its inner edge on."""
-    geometry = plan.geometry
+def _traffic(lane: Element, limits: SpeedLimits, section: LaneSection, strip: LaneStrip) -> None:
+    """Say how fast a lane may be driven on, and who may: a hard shoulder is no lane to drive on."""
+    if strip.type in _WITH_LIMIT:
+        for start, speed in limits.between(section.start, section.end):
+            element(lane, "speed", {"sOffset": start - section.start, "max": speed, "unit": "km/h"})
+    elif strip.type == _CLOSED:
+        element(lane, "access", {"sOffset": 0.0, "rule": "allow", "restriction": "emergency"})
+
+
+def _heights(lane: Element, plan: LanePlan, section: LaneSection, strip: LaneStrip) -> None:
+    """Add the heights of a verge or the median: it leaves the pavement's plane, from its inner edge on."""
+    fall = plan.verge_fall if strip.kind == "verge" else plan.median_fall
 
     def drop(station: Float) -> Float:
-        edge = 0 if side == "left" else -1
-        offset = geometry.offsets(station)[:, edge]
-        level = geometry.boundary_elevations(station)[:, edge] - geometry.profile.elevation(station)
-        return np.asarray(level - shape.plane(side, station, offset))[:, None]
+        return plan.frame.above(station, fall(station))[:, None]
 
-    points = [point.station for point in geometry.sections[side].carriageway.crossfall]
-    inside = [s for s in points if section.start < s < section.end]
     first, last = section.pieces
-    borders = np.unique(np.concatenate([plan.widths.borders[first : last + 1], inside]))
-    stations = chords(drop, borders, HEIGHT_TOLERANCE)
+    stations = chords(drop, plan.widths.borders[first : last + 1], HEIGHT_TOLERANCE)
     values = drop(stations)[:, 0]
     if np.ptp(values) <= HEIGHT_TOLERANCE / 10.0:
         stations, values = stations[:1], values[:1]
@@ -105,7 +114,7 @@ def _notes(lane: Element, plan: LanePlan, side: Side, strip: LaneStrip) -> None:
     note(lane, "instance", strip.instance)
     note(lane, "strip", strip.kind)
     if strip.kind == "lane":
-        section = plan.geometry.sections[side]
+        section = plan.frame.section
         index = len(section.carriageway.lanes) - 1 - (strip.index - section.kinds.index("lane"))
         carriageway_lane: Lane = section.carriageway.lanes[index]
         note(lane, "lane", index)

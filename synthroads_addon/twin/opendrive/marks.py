@@ -56,7 +56,8 @@ class RoadMarks:
         self._of: dict[tuple[int, int], list[_Stretch]] = {}
         self.loose: list[tuple[str, LineMarking, float, float]] = []
         for name, line in plan.geometry.parameters.of_type(LineMarking).items():
-            self._place(name, line)
+            if plan.geometry.parameters.carriageway_of(line).side == plan.side:
+                self._place(name, line)
         for stretches in self._of.values():
             stretches.sort(key=lambda item: item.start)
 
@@ -64,7 +65,7 @@ class RoadMarks:
         start, end = line.start_station, min(line.end_station, self._plan.geometry.length)
         if end - start <= CLOSE:
             return
-        side = self._plan.geometry.parameters.carriageway_of(line).side
+        side = self._plan.side
         index = _border(self._plan.geometry, side, line)
         for number, section in enumerate(self._plan.sections):
             low, high = max(start, section.start), min(end, section.end)
@@ -102,7 +103,7 @@ class RoadMarks:
 
 
 def _border(geometry: RoadGeometry, side: Side, line: LineMarking) -> int | None:
-    """Return the strip of a side whose outer border a line lies beside; -1 is the median, None no border."""
+    """Return the strip of a side whose outer border a line lies beside; -1 is its inner edge, None no border."""
     section = geometry.sections[side]
     if line.kind == "free":
         return None

@@ -31,8 +31,10 @@ from ...road.parameters import (
     TrafficSign,
 )
 from ...road.things import body_shapes as shapes
+from .numbers import Numbers
 from .pieces import CLOSE, Float
-from .places import Ground
+from .places import Ground, side_of
+from .surface import RoadFrame
 from .xml import Element, Value, element, notes
 
 LIGHT_POST, BOARD_POST = 0.12, 0.06
@@ -48,16 +50,21 @@ class Objects:
     Attributes:
         parent: the element that they are added to.
         ground: what they stand on.
+        frame: the carriageway that is the road: it has what stands on its side of the centreline.
+        numbers: ids of parts.
     """
 
-    def __init__(self, parent: Element, ground: Ground) -> None:
+    def __init__(self, parent: Element, ground: Ground, frame: RoadFrame, numbers: Numbers) -> None:
         self.parent = parent
         self.ground = ground
+        self.frame = frame
+        self.numbers = numbers
 
     def write(self, loose: Iterable[tuple[str, LineMarking, float, float]]) -> None:
-        """Add all objects in the order of the parameter set, then the lines that follow no lane."""
+        """Add its objects in the order of the parameter set, then the lines that follow no lane."""
         for name, item in self.ground.geometry.parameters.objects.items():
-            if make := _MAKERS.get(type(item)):
+            make = _MAKERS.get(type(item))
+            if make and side_of(self.ground.geometry, item) == self.frame.side:
                 make(self, name, item)
         parts: dict[str, int] = {}
         for name, line, start, end in loose:
@@ -68,14 +75,13 @@ class Objects:
 
     def barrier(self, name: str, item: LineObject) -> None:
         """Add what runs along the road: repeats with distance 0, linear from one to the next."""
-        rows = self.ground.along(item)
+        subtype, width, beside = _cross_section(item)
+        rows = self.ground.along(item, self.frame, beside)
         if not len(rows):
             return
-        subtype, width, beside = _cross_section(item)
-        rows[:, 1] += beside
         attributes: dict[str, Value] = {"type": "barrier", "subtype": subtype, "hdg": 0.0}
         attributes |= {"length": float(rows[-1, 0] - rows[0, 0]), "width": width, "height": _tall(item)}
-        made = self._object(name, item, attributes, (rows[0, 0], rows[0, 1], rows[0, 2]))
+        made = self._placed(name, item, attributes, rows[0, :3])
         for (s0, t0, z0, h0), (s1, t1, z1, h1) in zip(rows[:-1].tolist(), rows[1:].tolist(), strict=True):
             repeat: dict[str, Value] = {"s": s0, "length": s1 - s0, "distance": 0.0, "tStart": t0, "tEnd": t1}
             repeat |= {"heightStart": h0, "heightEnd": h1, "zOffsetStart": _fine(z0), "zOffsetEnd": _fine(z1)}
@@ -112,7 +118,7 @@ class Objects:
         if count > 1:
             size = {"height": top, "length": diameter, "width": item.width}  # type: ignore[union-attr]
         attributes: dict[str, Value] = {"type": "pole", "subtype": "signalPost", "hdg": _turn(item), **size}
-        made = self._object(name, item, attributes, suffix="-posts")
+        made = self._object(name, item, attributes)
         if count > 1:
             places = [((i + 0.5) / count - 0.5) * item.width for i in range(count)]  # type: ignore[union-attr]
             half = diameter / 2.0
@@ -128,11 +134,12 @@ class Objects:
         deep, half = item.beam_depth / 2.0, item.post_width / 2.0
         bodies = [(_rectangle((-deep, deep), (right, left)), bottom - foot, item.beam_height)]
         ends = {"left": [left], "right": [right]}[item.post_side]
+        middle = -item.offset if item.kind == "two_sided" else None
         if item.kind != "cantilever":
-            ends = [left, right] + ([0.0] if item.kind == "two_sided" else [])
+            ends = [left, right] + ([] if middle is None else [middle])
         ground = self.ground.height(np.full(len(ends), item.station), np.array(ends) + item.offset)
         for v, base in zip(ends, (ground + item.elevation - foot).tolist(), strict=True):
-            top = bottom - foot + (0.0 if v == 0.0 and item.kind == "two_sided" else item.beam_height)
+            top = bottom - foot + (0.0 if v == middle else item.beam_height)
             bodies.append((_rectangle((-deep, deep), (v - half, v + half)), base, max(top - base, 0.0)))
         size: dict[str, Value] = {
             "length": item.beam_depth,
@@ -168,12 +175,13 @@ class Objects:
         notes(made, name, item.instance, object_type="Overpass", **details)
 
     def underpasses(self) -> None:
-        """Add the stretches below bridges as tunnels open to the sides; they follow all objects."""
+        """Add the stretches below bridges as tunnels open to the sides, of each road; they follow all objects."""
+        first = self.frame.side == next(iter(self.ground.geometry.sections))
         for name, item in self.ground.geometry.parameters.of_type(Overpass).items():
             start = max(item.station - item.width / 2.0, 0.0)
             end = min(item.station + item.width / 2.0, self.ground.geometry.length)
             attributes: dict[str, Value] = {
-                "id": f"{item.instance}-underpass",
+                "id": item.instance if first else self.numbers.next(),
                 "name": name,
                 "s": start,
                 "length": end - start,
@@ -200,7 +208,8 @@ class Objects:
         subtype = "hatching" if isinstance(item, Hatching) else f"arrow_{item.kind}"
         attributes: dict[str, Value] = {"type": "roadMark", "subtype": subtype, "hdg": _turn(item)}
         made = self._object(name, item, {**attributes, "height": item.film_thickness}, (*at, z))
-        rows = np.column_stack([corners, heights])
+        place = self.frame.place(corners[:, 0], corners[:, 1], heights)
+        rows = np.column_stack([place.s, place.t, place.h])
         outlines = element(made, "outlines")
         for number, part in enumerate(np.split(rows, np.cumsum([len(part) for part in parts])[:-1])):
             _road_outline(outlines, number, part, item.film_thickness)
@@ -213,8 +222,7 @@ class Objects:
         corners = self._axis(line, *span)
         attributes: dict[str, Value] = {"type": "roadMark", "subtype": f"line_{line.kind}", "hdg": 0.0}
         attributes |= {"length": span[1] - span[0], "width": line.width, "height": line.film_thickness}
-        suffix = "" if part == 1 else f"-{part}"
-        made = self._object(name, line, attributes, tuple(corners[0].tolist()), suffix)
+        made = self._placed(name, line, attributes, corners[0], None if part == 1 else self.numbers.next())
         _road_outline(element(made, "outlines"), 0, corners, 0.0, closed=False)
         marking: dict[str, Value] = {"color": line.color, "width": line.width, "zOffset": line.film_thickness}
         dash = line.dash_length or geometry.length
@@ -228,7 +236,7 @@ class Objects:
         notes(made, name, line.instance, object_type="LineMarking", kind=line.kind)
 
     def _axis(self, line: LineMarking, start: float, end: float) -> Float:
-        """Return (N, 3) station, offset and height of points along a line's axis, as close as the tolerance asks."""
+        """Return (N, 3) s, t and h of points along a line's axis, as close as the tolerance asks."""
         geometry = self.ground.geometry
         bend = np.abs(geometry.alignment.curvature(np.linspace(start, end, 50))).max()
         step = min(math.sqrt(8.0 * self.ground.tolerance / max(float(bend), 1e-9)), 50.0)
@@ -238,7 +246,8 @@ class Objects:
         stations = np.unique(np.concatenate([np.linspace(start, end, count), inside]))
         left, right = geometry.marking_edges(line, stations)
         middle = (left + right) / 2.0
-        return np.column_stack([stations, middle, self.ground.height(stations, middle)])
+        place = self.frame.place(stations, middle, self.ground.height(stations, middle))
+        return np.column_stack([place.s, place.t, place.h])
 
     def _object(
         self,
@@ -246,21 +255,27 @@ class Objects:
         item: RoadObject,
         attributes: dict[str, Value],
         place: tuple[float, ...] | None = None,
-        suffix: str = "",
     ) -> Element:
         """Add an object; without a place (station, offset, height) it stands on its foot."""
         if place is None:
             assert isinstance(item, PointObject)
             place = (item.station, item.offset, self.ground.foot(name))
-        s, t, z = (float(value) for value in place)
-        about: dict[str, Value] = {"id": f"{item.instance}{suffix}", "name": name, "s": s, "t": t, "zOffset": _fine(z)}
+        found = self.frame.place(*(np.array([value]) for value in place))
+        return self._placed(name, item, attributes, np.array([found.s[0], found.t[0], found.h[0]]))
+
+    def _placed(
+        self, name: str, item: RoadObject, attributes: dict[str, Value], place: Float, number: int | None = None
+    ) -> Element:
+        """Add an object at s, t and h, with a number of its own or its instance number."""
+        s, t, h = place.tolist()
+        ids: dict[str, Value] = {"id": item.instance if number is None else number, "name": name}
+        about = {**ids, "s": s, "t": t, "zOffset": _fine(h)}
         return element(self.parent, "object", {**about, "orientation": "none", "dynamic": "no", **attributes})
 
 
 def gantry_levels(ground: Ground, item: Gantry) -> tuple[float, float]:
     """Return the heights of a gantry's lowest part and of its beam's lower edge above the reference line, m."""
-    deep = item.beam_depth / 2.0
-    span = (item.station - deep, item.station + deep)
+    span = (item.station - item.reach(1.0), item.station + item.reach(-1.0))
     low = ground.pavement_below(span, (item.right_offset, item.left_offset)) + item.clearance
     return low, item.beam_bottom(low)
 

@@ -15,6 +15,7 @@ Function = Callable[[Float], Float]
 CLOSE = 1e-6
 """Stations closer than this (m) are one, and widths (m) below it none: the standard's checker has the same limit."""
 _EXACT = 1e-8  # m, of a cubic from the function that it stands for
+_TAKEN_FOR_ONE = 1e-6
 _SAME = 5e-7  # m, between a cubic and the one before it, if that is to go on in its place
 _STEP_DIGITS = 10  # decimals (m) of what a coefficient adds to a width
 _SHORTEST = 1e-4  # m
@@ -33,6 +34,21 @@ class Cubics:
 
     borders: Float
     coefficients: Float
+
+    def at(self, station: Float) -> Float:
+        """Return the values (N,) of a single function at stations (N,)."""
+        piece = self._piece(station)
+        return _value(self.coefficients[piece, 0], station - self.borders[piece])
+
+    def slope(self, station: Float) -> Float:
+        """Return the slopes (N,) of a single function at stations (N,); at a border that of the piece behind it."""
+        piece = self._piece(station)
+        _, b, c, d = self.coefficients[piece, 0].T
+        u = station - self.borders[piece]
+        return np.asarray(b + u * (2.0 * c + 3.0 * d * u))
+
+    def _piece(self, station: Float) -> NDArray[np.intp]:
+        return np.clip(np.searchsorted(self.borders, station, side="right") - 1, 0, len(self.borders) - 2)
 
     def at_end(self, piece: int) -> Float:
         """Return the values (F,) at the end of a piece."""
@@ -68,20 +84,23 @@ def cubics(function: Function, borders: Float) -> Cubics:
         borders = np.sort(np.append(borders, (borders[:-1] + length / 2.0)[wrong]))
 
 
+def piecewise(function: Callable[[Float, NDArray[np.intp]], Float], borders: Float) -> Cubics:
+    """Return the cubics through a function that may jump at borders (P + 1,): it is asked with the piece's number."""
+    length = np.diff(borders)
+    stations = borders[:-1, None] + length[:, None] * _SHARES
+    piece = np.repeat(np.arange(len(length)), len(_SHARES))
+    values = function(stations.ravel(), piece).reshape(len(length), len(_SHARES), 1)
+    return Cubics(borders, _through(values, length))
+
+
 def _through(values: Float, length: Float) -> Float:
     """Return the coefficients (P, F, 4) through the values at the first four shares, of as low a degree as will do."""
     f = values[:, :4].transpose(0, 2, 1)
     f0, f1, f2, f3 = (f[..., i] for i in range(4))
     h = length[:, None]
     line = (f3 - f0) / h
-    cubic = (
-        f0,
-        (-11.0 * f0 + 18.0 * f1 - 9.0 * f2 + 2.0 * f3) / (2.0 * h),
-        9.0 * (2.0 * f0 - 5.0 * f1 + 4.0 * f2 - f3) / (2.0 * h**2),
-        9.0 * (f3 - f0 + 3.0 * (f1 - f2)) / (2.0 * h**3),
-    )
     none = np.zeros(f0.shape)
-    best = np.stack(cubic, axis=-1)
+    best = _cubic_through(values, length)
     # A parabola: the third differences vanish.
     bend = 4.5 * (f0 - f1 - f2 + f3) / (2.0 * h**2)
     for lower in ((f0, line - bend * h, bend, none), (f0, line, none, none), (f0, none, none, none)):
@@ -89,6 +108,20 @@ def _through(values: Float, length: Float) -> Float:
         fits = np.abs(_sample_cubics(trial, length) - values).max(axis=1) <= _EXACT / 10.0
         best = np.where(fits[..., None], trial, best)
     return _round_coefficients(best, length)
+
+
+def _cubic_through(values: Float, length: Float) -> Float:
+    """Return the coefficients (P, F, 4) of the cubics through the values (P, S, F) at the first four shares."""
+    f = values[:, :4].transpose(0, 2, 1)
+    f0, f1, f2, f3 = (f[..., i] for i in range(4))
+    h = length[:, None]
+    cubic = (
+        f0,
+        (-11.0 * f0 + 18.0 * f1 - 9.0 * f2 + 2.0 * f3) / (2.0 * h),
+        9.0 * (2.0 * f0 - 5.0 * f1 + 4.0 * f2 - f3) / (2.0 * h**2),
+        9.0 * (f3 - f0 + 3.0 * (f1 - f2)) / (2.0 * h**3),
+    )
+    return np.stack(cubic, axis=-1)
 
 
 def _round_coefficients(coefficients: Float, length: Float) -> Float:
@@ -132,6 +165,31 @@ def runs(borders: Float, coefficients: Float) -> list[tuple[float, list[float]]]
         joined.append((float(borders[first]), _round_coefficients(run[None, None], whole)[0, 0].tolist()))
         first = last
     return joined
+
+
+def distinct(rows: list[tuple[float, list[float]]], end: float) -> list[tuple[float, list[float]]]:
+    """Return cubics, each with the place that it begins at, of which no two neighbours are as good as one.
+
+    The standard's checker takes two for one if, counted from place 0, their coefficients differ by less than a
+    millionth. Such are replaced by one through both.
+
+    Args:
+        rows: place (m) from which a cubic holds, and its coefficients.
+        end: place at which the last ends, m.
+    """
+    kept = rows[:1]
+    ends = [start for start, _ in rows[1:]] + [end]
+    for (start, coefficients), until in zip(rows[1:], ends[1:], strict=True):
+        before_start, before = kept[-1]
+        apart = _shift_cubic(np.array(before), -before_start) - _shift_cubic(np.array(coefficients), -start)
+        if np.abs(apart).max() >= _TAKEN_FOR_ONE:
+            kept.append((start, coefficients))
+            continue
+        at = before_start + (until - before_start) * _SHARES[:4]
+        first, second = _value(np.array(before), at - before_start), _value(np.array(coefficients), at - start)
+        values = np.where(at < start, first, second)[None, :, None]
+        kept[-1] = (before_start, _cubic_through(values, np.array([until - before_start]))[0, 0].tolist())
+    return kept
 
 
 def _goes_on(cubic: Float, borders: Float, coefficients: Float, pieces: tuple[int, int]) -> bool:

@@ -8,12 +8,31 @@ import numpy as np
 
 from ...base.errors import InputError
 from ...road.geometry import RoadGeometry
-from ...road.parameters import LineObject, PointObject
+from ...road.objects import RoadObject
+from ...road.parameters import Carriageway, GantrySign, Hatching, LineObject, PointObject, Turnout
 from ...road.surface import highest_pavement, known_elevation
+from ...road.things.furniture import Side
 from ..surfaces import height_share, ramp_length
 from .pieces import CLOSE, Float, chords, merged_stations
+from .surface import RoadFrame
 
 _COLUMNS, _ROWS = 240, 7
+
+
+def side_of(geometry: RoadGeometry, item: RoadObject | GantrySign) -> Side:
+    """Return the carriageway that something is written with: the one on its side of the centreline, or the only one.
+
+    What is painted belongs to the carriageway whose pavement it is on.
+    """
+    if len(geometry.sections) == 1:
+        return next(iter(geometry.sections))
+    if isinstance(item, Hatching):
+        turnout = geometry.parameters.objects[item.turnout]
+        assert isinstance(turnout, Turnout)
+        carriageway = geometry.parameters.objects[turnout.carriageway]
+        assert isinstance(carriageway, Carriageway)
+        return carriageway.side
+    return "left" if getattr(item, "offset", 0.0) > 0.0 else "right"
 
 
 class Ground:
@@ -46,10 +65,15 @@ class Ground:
         along = np.clip(station, 0.0, self.geometry.length)
         return known_elevation(self.geometry, along, offset) - self.geometry.profile.elevation(along)
 
-    def along(self, item: LineObject) -> Float:
-        """Return rows (N, 4) of station, offset, height of the ground and height of an object along the road, m.
+    def along(self, item: LineObject, frame: RoadFrame, beside: float) -> Float:
+        """Return rows (N, 4) of s, t, h and height of an object along the road, m.
 
         Between two of them all is linear within the tolerance.
+
+        Args:
+            item: the object; it stands on the ground below its axis.
+            frame: the carriageway that is its road.
+            beside: how far its middle lies to the left of its axis, m.
         """
         start, end = item.start_station, min(item.end_station, self.geometry.length)
         if end - start <= CLOSE:
@@ -62,10 +86,14 @@ class Ground:
 
         def rows(station: Float) -> Float:
             offset = item.offset_at(station)
-            return np.column_stack([offset, self.height(station, offset), tall * height_share(item, end, station)])
+            place = frame.place(station, offset + beside, self.height(station, offset))
+            share = height_share(item, end, station)
+            return np.column_stack([place.s - station, place.t, place.h, tall * share])
 
         stations = chords(rows, merged_stations(bends, start, end), self.tolerance, shortest=0.05)
-        return np.column_stack([stations, rows(stations)])
+        found = rows(stations)
+        found[:, 0] += stations
+        return found
 
     def pavement_below(self, stations: tuple[float, float], offsets: tuple[float, float], lean: float = 0.0) -> float:
         """Return the height of the pavement's highest point within a rectangle above the profile at its middle, m.

@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ...road.geometry import RoadGeometry
 from ...road.parameters import Median
 from ...road.things.furniture import Side
 from ...road.turnout_geometry import TURNOUT_STRIPS, TurnoutShape
-from .pieces import CLOSE, Cubics, Float, cubics, merged_stations
+from .pieces import CLOSE, Cubics, Float, cubics
+from .surface import RoadFrame
 
 SIDES: tuple[Side, ...] = ("left", "right")
+_OTHER: dict[Side, Side] = {"left": "right", "right": "left"}
+SHORTEST_SECTION = 0.25
+"""Shortest lane section, m: SUMO drops those of 10 cm and less."""
 
 TYPES = {
     "median": "median",
@@ -32,6 +36,17 @@ TYPES = {
 """Kind of a strip -> type of the lane that it is; that of a turnout's lane depends on where it is."""
 _BESIDE = {"exit": "exit", "entry": "entry"}
 _RAMP = {"exit": "offRamp", "entry": "onRamp"}
+
+
+def _changing(before: set[int], after: set[int], count: int) -> list[list[int]]:
+    """Return the columns that are there before or after a border and not both, those beside each other together."""
+    runs: list[list[int]] = [[]]
+    for column in range(count):
+        if column in before and column in after:
+            runs.append([])
+        elif column in before or column in after:
+            runs[-1].append(column)
+    return [run for run in runs if run]
 
 
 @dataclass(frozen=True)
@@ -81,34 +96,59 @@ class LaneSection:
 class LanePlan:
     """A road's strips as lanes.
 
+    The centre lane lies at the carriageway's inner edge, all its strips to one side; the median, if it belongs to the
+    road, is the one lane to the other.
+
     Attributes:
-        geometry: the road.
-        widths: of all strips of both sides, a column each.
+        frame: the carriageway as a road.
+        geometry: the road that it is a carriageway of.
+        side: which one.
+        widths: of its strips and the median, in its plane, a column each.
         sections: the lane sections in order.
-        divided: whether both sides have a carriageway, so that the centre lane lies in the median.
     """
 
-    def __init__(self, geometry: RoadGeometry) -> None:
-        self.geometry = geometry
-        self.divided = len(geometry.sections) == 2
+    def __init__(self, frame: RoadFrame) -> None:
+        self.frame, self.geometry, self.side = frame, frame.geometry, frame.side
         self._columns: list[tuple[Side, int, str]] = []
-        for side in SIDES:
-            if side in geometry.sections:
-                if self.divided:
-                    self._columns.append((side, -1, "median"))
-                self._columns += [(side, i, kind) for i, kind in enumerate(geometry.sections[side].kinds)]
-        kinks = [s for section in geometry.sections.values() for s in section.kinks()]
-        borders = merged_stations(kinks, 0.0, geometry.length)
-        self.widths: Cubics = cubics(self._widths, borders)
-        self.sections = tuple(self._sections())
+        self._columns += [(self.side, i, kind) for i, kind in enumerate(frame.section.kinds)]
+        if frame.has_median:
+            self._columns.append((_OTHER[self.side], -1, "median"))
+        self.widths: Cubics = cubics(self._widths, frame.borders)
+        self.sections = tuple(self._long_enough(self._sections()))
+
+    def offsets(self, station: Float) -> Float:
+        """Return t (N, M) of the borders of the carriageway's strips, from the inside out, at stations (N,), m."""
+        sign = self.frame.section.carriageway.sign
+        distances = sign * self.frame.section.distances(station)
+        below = np.zeros(distances.shape)
+        below[:, -1] = self.verge_fall(station)
+        columns = range(distances.shape[1])
+        return np.stack([self.frame.across(station, distances[:, i], below[:, i]) for i in columns], axis=1)
+
+    def verge_fall(self, station: Float) -> Float:
+        """Return how far (N,) the verge's outer edge lies below the carriageway's plane, m."""
+        edge = 0 if self.side == "left" else -1
+        offset, level = self.geometry.offsets(station)[:, edge], self.geometry.boundary_elevations(station)[:, edge]
+        return np.asarray(self.frame.plane(station, offset) - level)
+
+    def median_fall(self, station: Float) -> Float:
+        """Return how far (N,) the other carriageway's inner edge lies below this one's plane, m."""
+        other = RoadFrame.plane_of(self.geometry, _OTHER[self.side], station, self._far_edge(station))
+        return np.asarray(self.frame.plane(station, self._far_edge(station)) - other)
+
+    def _far_edge(self, station: Float) -> Float:
+        """Return the offset (N,) of the other carriageway's inner edge, m."""
+        other = self.geometry.sections[_OTHER[self.side]]
+        return np.asarray(other.carriageway.sign * other.distances(station)[:, 0])
 
     def _widths(self, station: Float) -> Float:
-        parts = []
-        for side in SIDES:
-            if section := self.geometry.sections.get(side):
-                distances = section.distances(station)
-                parts.append(np.diff(distances, axis=1, prepend=0.0) if self.divided else np.diff(distances, axis=1))
-        return np.hstack(parts)
+        own = self.offsets(station)
+        sign = self.frame.section.carriageway.sign
+        widths = sign * (own[:, 1:] - own[:, :-1])
+        if self.frame.has_median:
+            far = self.frame.across(station, self._far_edge(station), self.median_fall(station))
+            widths = np.column_stack([widths, sign * (own[:, 0] - far)])
+        return np.asarray(widths, dtype=np.float64)
 
     def width_at_start(self, piece: int) -> Float:
         """Return all widths (F,) at the beginning of a piece."""
@@ -127,6 +167,45 @@ class LanePlan:
             first = piece
         return sections
 
+    def _long_enough(self, sections: list[LaneSection]) -> list[LaneSection]:
+        """Return the sections without those that are too short for readers.
+
+        A short one is part of the next (or the last), in which what it has begins at once, with its width there.
+        """
+        kept: list[LaneSection] = []
+        waiting: LaneSection | None = None
+        for section in sections:
+            if section.end - section.start < SHORTEST_SECTION and section is not sections[-1]:
+                waiting = waiting or section
+                continue
+            kept.append(section if waiting is None else self._begin_earlier(section, waiting))
+            waiting = None
+        return kept
+
+    def _begin_earlier(self, section: LaneSection, short: LaneSection) -> LaneSection:
+        """Return a section that begins where a short one before it did."""
+        first, last = short.pieces[0], section.pieces[0]
+        before = self._columns_of(self._lanes(first - 1) if first > 0 else section.lanes)
+        after = self._columns_of(section.lanes)
+        for run in _changing(before, after, len(self._columns)):
+            self._take_over(run, [column for column in run if column in after], (first, last))
+        return replace(section, start=short.start, pieces=(first, section.pieces[1]))
+
+    @staticmethod
+    def _columns_of(lanes: Mapping[Side, Iterable[LaneStrip]]) -> set[int]:
+        return {lane.column for strips in lanes.values() for lane in strips}
+
+    def _take_over(self, columns: list[int], new: list[int], pieces: tuple[int, int]) -> None:
+        """Give the space of neighbouring columns, on some pieces, to those of them that are new behind these."""
+        if not new:
+            return
+        first, last = pieces
+        coefficients = self.widths.coefficients
+        room = coefficients[first:last, columns].sum(axis=1)
+        for column in new[:-1]:
+            coefficients[first:last, column] = (coefficients[last, column, 0], 0.0, 0.0, 0.0)
+        coefficients[first:last, new[-1]] = room - coefficients[first:last, new[:-1]].sum(axis=1)
+
     def _pinched(self, piece: int, lanes: dict[Side, tuple[LaneStrip, ...]]) -> bool:
         widths = self.width_at_start(piece)
         return any(widths[lane.column] < CLOSE for side in lanes.values() for lane in side)
@@ -144,7 +223,7 @@ class LanePlan:
 
     def _lane(self, column: int, station: float) -> LaneStrip:
         side, index, kind = self._columns[column]
-        section = self.geometry.sections[side]
+        section = self.frame.section
         instance = section.carriageway.instance
         if kind == "median":
             medians = self.geometry.parameters.of_type(Median).values()

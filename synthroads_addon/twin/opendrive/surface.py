@@ -1,17 +1,19 @@
-"""The reference line and the surface around it: plan view, elevation profile and lateral shape."""
+"""The reference line and the plane of a carriageway through it: plan view, elevation profile, superelevation."""
 
 from __future__ import annotations
 
-import numpy as np
+from dataclasses import dataclass
 
+import numpy as np
+from numpy.typing import NDArray
+
+from ...road.alignment import left_vectors
 from ...road.geometry import RoadGeometry
 from ...road.things.furniture import Side
-from .pieces import Float, merged_stations, runs
+from .pieces import Cubics, Float, cubics, distinct, merged_stations, piecewise, runs
 from .xml import PLAN_DIGITS, Element, Value, cubic, element
 
-SHAPE_TOLERANCE = 1e-4
-"""Largest distance (m) of the surface from what is interpolated between two lateral shapes."""
-_HALVINGS = 20
+_APPROXIMATIONS = 2
 SIDES: tuple[Side, ...] = ("right", "left")
 """From right to left, as t grows."""
 _LINE_APART = 1e-4  # m, between the end of a line that stands for several and where it should be
@@ -69,107 +71,122 @@ def _joined_lines(geometry: RoadGeometry, position: Float, heading: Float) -> li
     return joined
 
 
-def elevation_profile(road: Element, geometry: RoadGeometry) -> None:
-    """Add the elevation profile: grades and the parabolas between them are cubics as they are."""
-    profile, length = geometry.profile, geometry.length
-    borders = merged_stations(profile.breakpoints.tolist(), 0.0, length)
-    parent = element(road, "elevationProfile")
-    middle = (borders[:-1] + borders[1:]) / 2.0
-    bend, grade_there = profile.curvature(middle), profile.grade(middle)
-    half = np.diff(borders) / 2.0
-    start = grade_there - bend * half
-    level = profile.elevation(middle) - half * (start + bend * half / 2.0)
-    coefficients = np.stack([level, start, bend / 2.0, np.zeros(len(half))], axis=1)
-    for begin, parabola in runs(borders, coefficients):
-        cubic(parent, "elevation", {"s": begin}, parabola)
+@dataclass(frozen=True)
+class Place:
+    """Places in a road's own coordinates: s and t, and h at right angles to its tilted surface, (N,) each, m."""
+
+    s: Float
+    t: Float
+    h: Float
 
 
-class LateralShape:
-    """The road's surface across, relative to the profile: a plane for each carriageway and the median between them.
+class RoadFrame:
+    """One carriageway as a road: its surface is a plane across, through a line above or below the centreline.
 
-    The planes go on beyond the pavement; verges fall away from them as lanes with a height.
+    That line is the road's elevation profile, the plane's tilt its superelevation: what readers of OpenDRIVE know.
+    By the standard t lies in the tilted plane and h at right angles to it, both turned with the grade as well.
+
+    Attributes:
+        geometry: the road that it is a carriageway of.
+        side: which one.
+        has_median: whether the median belongs to it.
+        borders: (B,) stations between which all is smooth, m.
     """
 
-    def __init__(self, geometry: RoadGeometry) -> None:
-        self.geometry = geometry
-        stations = self._kinks()
-        self.reach = float(np.ceil(np.abs(geometry.offsets(stations)).max())) + 1.0
-        """Distance (m) from the reference line up to which the shape is given."""
-
-    def plane(self, side: Side, station: Float, offset: Float) -> Float:
-        """Return the height (N,) of a carriageway's plane above the profile at stations and offsets (N,)."""
-        section = self.geometry.sections[side]
-        sign = section.carriageway.sign
-        crossfall = self.geometry.crossfall(section.carriageway, station)
-        return np.asarray(sign * crossfall * (sign * offset - section.pivot(station)))
-
-    def corners(self, station: Float) -> tuple[Float, Float]:
-        """Return t and the height (N, C) of the polyline across at stations (N,), from right to left."""
-        offsets, heights = [], []
-        for side in SIDES:
-            section = self.geometry.sections.get(side)
-            if section is None:
-                continue
-            inner = section.carriageway.sign * section.distances(station)[:, 0]
-            edges = [np.full(station.shape, section.carriageway.sign * self.reach), inner]
-            for offset in edges if side == "right" else edges[::-1]:
-                offsets.append(offset)
-                heights.append(self.plane(side, station, offset))
-        return np.stack(offsets, axis=1), np.stack(heights, axis=1)
-
-    def stations(self) -> list[float]:
-        """Return the stations between which the shape may be interpolated at any offset, as few as will do."""
-        borders = self._kinks().tolist()
-        stations = borders[:1]
-        for end in borders[1:]:
-            stations += self._split(stations[-1], end, _HALVINGS)
-        kept = stations[:1]
-        for i in range(1, len(stations) - 1):
-            if self._off(kept[-1], stations[i + 1], [stations[i]]) > SHAPE_TOLERANCE / 100.0:
-                kept.append(stations[i])
-        return [*kept, stations[-1]]
-
-    def _split(self, start: float, end: float, halvings: int) -> list[float]:
-        """Return the stations after a start up to an end that are needed."""
-        samples = [start + share * (end - start) for share in (0.25, 0.5, 0.75)]
-        if halvings == 0 or self._off(start, end, samples) <= SHAPE_TOLERANCE:
-            return [end]
-        return self._split(start, samples[1], halvings - 1) + self._split(samples[1], end, halvings - 1)
-
-    def _off(self, start: float, end: float, samples: list[float]) -> float:
-        """Return how far (m) the surface is off at samples if the shape is interpolated from start to end.
-
-        It is looked at where it bends across, at either end and at the samples: in between it is straight.
-        """
-        t, z = self.corners(np.array([start, end, *samples]))
-        worst = 0.0
-        for row, station in enumerate(samples, 2):
-            share = (station - start) / (end - start)
-            offset = np.concatenate([t[0], t[1], t[row]])
-            first, last, exact = (np.interp(offset, t[i], z[i]) for i in (0, 1, row))
-            within = (offset >= t[:, 0].max()) & (offset <= t[:, -1].min())
-            worst = max(worst, float(np.abs(first + share * (last - first) - exact)[within].max()))
-        return worst
-
-    def _kinks(self) -> Float:
-        stations = [s for section in self.geometry.sections.values() for s in section.kinks()]
-        for section in self.geometry.sections.values():
+    def __init__(self, geometry: RoadGeometry, side: Side) -> None:
+        self.geometry, self.side = geometry, side
+        self.section = geometry.sections[side]
+        self.has_median = side == "right" and len(geometry.sections) == 2
+        stations = [s for section in geometry.sections.values() for s in section.kinks()]
+        for section in geometry.sections.values():
             stations += [point.station for point in section.carriageway.crossfall]
-        return merged_stations(stations, 0.0, self.geometry.length)
+        self.borders = merged_stations(stations, 0.0, geometry.length)
+        stations += geometry.profile.breakpoints.tolist()
+        levels = merged_stations(stations, 0.0, geometry.length)
+        self.elevation: Cubics = cubics(lambda s: self.plane(s, np.zeros(len(s)))[:, None], levels)
+        self.superelevation: Cubics = self._tilt()
+
+    def crossfall(self, station: Float) -> Float:
+        """Return the plane's rise to the left (N,) at stations (N,)."""
+        return np.asarray(self.geometry.crossfall(self.section.carriageway, station))
+
+    def plane(self, station: Float, offset: Float) -> Float:
+        """Return the elevation (N,) of the carriageway's plane at stations and offsets (N,), m."""
+        return self.plane_of(self.geometry, self.side, station, offset)
+
+    @staticmethod
+    def plane_of(geometry: RoadGeometry, side: Side, station: Float, offset: Float) -> Float:
+        """Return the elevation (N,) of one of a road's carriageways' planes at stations and offsets (N,), m."""
+        section = geometry.sections[side]
+        rise = geometry.crossfall(section.carriageway, station)
+        pivot = section.carriageway.sign * section.pivot(station)
+        return np.asarray(geometry.profile.elevation(station) + rise * (offset - pivot))
+
+    def across(self, station: Float, offset: Float, below: Float | float = 0.0) -> Float:
+        """Return t (N,) of points at offsets (N,) that lie ``below`` the plane, m."""
+        rise = self.crossfall(station)
+        return np.asarray(offset * np.sqrt(1.0 + rise**2) - below * rise / np.sqrt(1.0 + rise**2))
+
+    def above(self, station: Float, below: Float) -> Float:
+        """Return h (N,) of points that lie ``below`` the plane, m: at right angles to it."""
+        return np.asarray(-below * np.cos(np.arctan(self.crossfall(station))) * self._cosine(station))
+
+    def place(self, station: Float, offset: Float, height: Float) -> Place:
+        """Return the road's coordinates of points (N,) at stations, offsets and heights above the profile, m."""
+        geometry = self.geometry
+        station, offset, height = (np.asarray(values, dtype=np.float64) for values in (station, offset, height))
+        station = np.clip(station, 0.0, geometry.length)
+        level = height + geometry.profile.elevation(station)
+        origin, heading, _ = geometry.alignment.frame(station)
+        plan = origin + offset[:, None] * left_vectors(heading)
+        s = station
+        # A point above the line lies at right angles to a place of it farther on, where it climbs.
+        for _ in range(_APPROXIMATIONS):
+            ahead, _, above = self._beside(s, plan, level)
+            bend = 1.0 - geometry.alignment.curvature(s) * offset
+            s = np.clip(s + ahead * self._cosine(s) / bend, 0.0, geometry.length)
+        _, left, above = self._beside(s, plan, level)
+        tilt = self.superelevation.at(s)
+        return Place(s, left * np.cos(tilt) + above * np.sin(tilt), above * np.cos(tilt) - left * np.sin(tilt))
+
+    def _beside(self, s: Float, plan: Float, level: Float) -> tuple[Float, Float, Float]:
+        """Return how far (N,) points lie ahead of a place of the line along it, to its left, and above it, m."""
+        origin, heading, _ = self.geometry.alignment.frame(s)
+        away, left = plan - origin, left_vectors(heading)
+        forwards = away[:, 0] * left[:, 1] - away[:, 1] * left[:, 0]
+        rise, grade, cosine = level - self.elevation.at(s), self.elevation.slope(s), self._cosine(s)
+        return (forwards + grade * rise) * cosine, (away * left).sum(axis=1), (rise - grade * forwards) * cosine
+
+    def _cosine(self, station: Float) -> Float:
+        return np.asarray(1.0 / np.sqrt(1.0 + self.elevation.slope(station) ** 2))
+
+    def _tilt(self) -> Cubics:
+        """Return the superelevation, rad: the angle in a section at right angles to the line, not an upright one."""
+        levels = self.elevation
+
+        def tilt(station: Float, piece: NDArray[np.intp]) -> Float:
+            _, b, c, d = levels.coefficients[piece, 0].T
+            u = station - levels.borders[piece]
+            grade = b + u * (2.0 * c + 3.0 * d * u)
+            return np.asarray(np.arctan(self.crossfall(station) / np.sqrt(1.0 + grade**2)))
+
+        return piecewise(tilt, levels.borders)
 
 
-def lateral_profile(road: Element, shape: LateralShape) -> None:
-    """Add the lateral profile: at each of its stations a straight line per carriageway, and one over the median."""
-    parent = element(road, "lateralProfile")
-    stations = shape.stations()
-    offsets, heights = shape.corners(np.array(stations))
-    for row, station in enumerate(stations):
-        t, z = offsets[row], heights[row]
-        for i in range(len(t) - 1):
-            width = t[i + 1] - t[i]
-            if width > 1e-9:
-                slope = (z[i + 1] - z[i]) / width
-                cubic(parent, "shape", {"s": station, "t": float(t[i])}, (z[i], slope, 0.0, 0.0))
+def elevation_profile(road: Element, frame: RoadFrame) -> None:
+    """Add the elevation profile: the line in which the carriageway's plane meets the upright one of the centreline."""
+    _cubics(element(road, "elevationProfile"), "elevation", frame.elevation)
+
+
+def lateral_profile(road: Element, frame: RoadFrame) -> None:
+    """Add the superelevation."""
+    _cubics(element(road, "lateralProfile"), "superelevation", frame.superelevation)
+
+
+def _cubics(parent: Element, tag: str, function: Cubics) -> None:
+    rows = runs(function.borders, function.coefficients[:, 0])
+    for start, coefficients in distinct(rows, float(function.borders[-1])):
+        cubic(parent, tag, {"s": start}, coefficients)
 
 
 def bounds(geometry: RoadGeometry) -> dict[str, float]:

@@ -1,31 +1,32 @@
-"""A road as OpenDRIVE 1.8: reference line, surface, lanes, road marks, objects and signals.
+"""A road as OpenDRIVE 1.8, a road per carriageway: line, surface, lanes, road marks, objects and signals.
 
 The elements are written by small functions of ours: the library `scenariogeneration` puts the time of day into the
-header and knows neither its offset nor heights of lanes, rows of shapes, skeletons and user data of lanes.
+header and knows neither its offset nor heights of lanes, skeletons and user data of lanes.
 """
 
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 from pathlib import Path
 
 from ...base.crs import wkt
 from ...road.geometry import RoadGeometry
-from ...road.parameters import LineMarking, RoadParameters, Turnout, Vehicle
+from ...road.parameters import AlignmentObject, LineMarking, RoadParameters, Turnout, Vehicle
 from ...road.section import Carriageway, Median
 from ...road.surroundings import Terrain, Vegetation
 from .lanes import lanes
 from .marks import RoadMarks
+from .numbers import Numbers
 from .objects import Objects
 from .places import Ground
 from .sections import LanePlan
-from .signals import signals
-from .surface import LateralShape, bounds, elevation_profile, lateral_profile, plan_view
+from .signals import Signals, number_hung
+from .speeds import ADVISORY, SpeedLimits
+from .surface import RoadFrame, bounds, elevation_profile, lateral_profile, plan_view
 from .xml import Element, Value, element, note, verbatim, write
 
 REVISION = (1, 8)
-ROAD = "1"
-"""Id of the road."""
 _GROUND = 0.001
 """Largest distance (m) of barriers from the ground that they stand on, whatever the tolerance."""
 
@@ -34,7 +35,8 @@ def write_opendrive(parameters: RoadParameters, path: Path, tolerance: float) ->
     """Write a road's geometric-semantic model as an OpenDRIVE file.
 
     Coordinates in it are local; the header's offset adds the map origin, and its ``geoReference`` names the map's
-    coordinate system. Lanes, reference line and surface don't depend on the tolerance.
+    coordinate system. Each carriageway is a road of its own along the same line, with its own superelevation. Lanes,
+    line and surface don't depend on the tolerance.
 
     Args:
         parameters: the road.
@@ -47,24 +49,42 @@ def write_opendrive(parameters: RoadParameters, path: Path, tolerance: float) ->
     geometry = RoadGeometry(parameters)
     root = element(None, "OpenDRIVE")
     _header(root, geometry)
-    attributes: dict[str, Value] = {"id": ROAD, "junction": "-1", "length": geometry.length, "rule": "RHT"}
-    road = element(root, "road", {"name": parameters.metadata.identifier, **attributes})
-    element(road, "type", {"s": 0.0, "type": "motorway", "country": "DE"})
-    plan_view(road, geometry)
-    elevation_profile(road, geometry)
-    shape = LateralShape(geometry)
-    lateral_profile(road, shape)
-    plan = LanePlan(geometry)
-    marks = RoadMarks(plan)
-    lanes(road, plan, shape, marks)
     ground = Ground(geometry, min(tolerance, _GROUND))
-    objects = Objects(element(road, "objects"), ground)
-    objects.write(marks.loose)
-    objects.underpasses()
-    signals(element(road, "signals"), ground)
-    note(road, "instance", parameters.alignment.instance)
+    numbers = Numbers(parameters)
+    hung = number_hung(parameters, numbers)
+    for name, item in parameters.of_type(Carriageway).items():
+        road = element(root, "road", {"name": name, "id": item.instance, **_attributes(geometry)})
+        _road(road, RoadFrame(geometry, item.side), ground, numbers, hung)
     _list_rest(root, parameters)
     write(root, path)
+
+
+def _attributes(geometry: RoadGeometry) -> dict[str, Value]:
+    return {"junction": "-1", "length": geometry.length, "rule": "RHT"}
+
+
+def _road(
+    road: Element, frame: RoadFrame, ground: Ground, numbers: Numbers, hung: Mapping[tuple[str, int], int]
+) -> None:
+    """Fill in the road of one carriageway."""
+    geometry, limits = frame.geometry, SpeedLimits(frame.geometry, frame.side)
+    kind = element(road, "type", {"s": 0.0, "type": "motorway", "country": "DE"})
+    if limits.without == ADVISORY:
+        element(kind, "speed", {"max": "no limit"})
+    else:
+        element(kind, "speed", {"max": limits.without, "unit": "km/h"})
+    plan_view(road, geometry)
+    elevation_profile(road, frame)
+    lateral_profile(road, frame)
+    plan = LanePlan(frame)
+    marks = RoadMarks(plan)
+    lanes(road, plan, limits, marks)
+    objects = Objects(element(road, "objects"), ground, frame, numbers)
+    objects.write(marks.loose)
+    objects.underpasses()
+    Signals(element(road, "signals"), ground, frame, hung).write()
+    note(road, "instance", frame.section.carriageway.instance)
+    note(road, "side", frame.side)
 
 
 def _header(root: Element, geometry: RoadGeometry) -> None:
@@ -116,8 +136,8 @@ def geo_reference(epsg: int) -> str:
 
 
 def _list_rest(root: Element, parameters: RoadParameters) -> None:
-    """Name what has no element of its own: parts of the road whose lanes bear their number, ground, plants, traffic."""
-    kinds = (Carriageway, Median, Turnout, LineMarking, Terrain, Vegetation, Vehicle)
+    """Name what has no element of its own: centreline, parts whose lanes bear their number, ground, plants, traffic."""
+    kinds = (AlignmentObject, Carriageway, Median, Turnout, LineMarking, Terrain, Vegetation, Vehicle)
     for name, item in parameters.objects.items():
         if isinstance(item, kinds):
             entry = element(root, "userData", {"code": "instance", "value": item.instance})

@@ -105,7 +105,7 @@ SHEETS = (
     Sheet("performance", "Performance", "scanner", 6, "scan.caster scan.threads"),
     Sheet("colour", "Colour", "main", 50, "colour.source colour.rgb colour.mode"),
     Sheet("images", "Rendering", "colour", 1, "colour.*"),
-    Sheet("output", "Output", "main", 60, "outputs cloud.formats twin"),
+    Sheet("output", "Output", "main", 60, "outputs cloud.formats twin ifc"),
     Sheet("attributes", "Point Attributes", "output", 1, "cloud.*"),
 )
 """All panels made of the scenario's fields."""

@@ -22,6 +22,7 @@ from ...twin.formats import (
     FORMATS,
     TOLERANCE,
     TWIN_FORMATS,
+    IfcSettings,
     check_formats,
     missing_packages,
     twin_file_names,
@@ -55,13 +56,19 @@ def export_cloud(source: Path, output: Path, classes: str | None, spacing: float
 
 
 def export_twin(
-    parameters: RoadParameters, folder: Path, formats: Sequence[str], tolerance: float, overwrite: bool, report: Report
+    parameters: RoadParameters,
+    folder: Path,
+    formats: Sequence[str],
+    tolerance: float,
+    ifc: IfcSettings,
+    overwrite: bool,
+    report: Report,
 ) -> tuple[str, ...]:
     """Write a road's model in some formats, all or none; return the files' names; see `write_twin`."""
     names = twin_file_names(formats)
     with output_folder(folder, names, overwrite) as temporary:
         for number, name in enumerate(formats, 1):
-            write_twin(parameters, temporary, [name], tolerance)
+            write_twin(parameters, temporary, [name], tolerance, ifc)
             report(number / len(formats))
     return names
 
@@ -160,6 +167,14 @@ class SYNTHROADS_OT_export_twin(FileOperator, bpy.types.Operator):
         step=0.1,
         unit="LENGTH",
     )
+    ifc_placement: bpy.props.EnumProperty(
+        name="IFC Placement",
+        items=[
+            ("linear", "Along the Alignment", "Objects stand at distances along the alignment, as the standard has it"),
+            ("local", "Coordinates", "Objects stand at coordinates, for viewers that don't know alignments"),
+        ],
+        description="What says in IFC where an object stands",
+    )
     overwrite: bpy.props.BoolProperty(name="Replace Files", description="Replace files that are already there")
 
     @classmethod
@@ -178,6 +193,9 @@ class SYNTHROADS_OT_export_twin(FileOperator, bpy.types.Operator):
         layout = column(self)
         _draw_formats(layout, context, self)
         layout.prop(self, "tolerance")
+        row = layout.row()
+        row.enabled = "ifc" in self.formats
+        row.prop(self, "ifc_placement")
         layout.prop(self, "overwrite")
 
     def job(self, context: bpy.types.Context) -> PanelJob[tuple[str, ...]]:
@@ -191,7 +209,8 @@ class SYNTHROADS_OT_export_twin(FileOperator, bpy.types.Operator):
             raise InputError("Folder", None, "choose a folder for the files")
         check_formats(formats)
         folder, tolerance = Path(bpy.path.abspath(self.directory)), exact(self.tolerance, None)
-        work = partial(export_twin, parameters, folder, formats, tolerance, self.overwrite)
+        ifc = IfcSettings(placement=self.ifc_placement)
+        work = partial(export_twin, parameters, folder, formats, tolerance, ifc, self.overwrite)
         return PanelJob.aside("Export", work)
 
     def succeed(self, context: bpy.types.Context, job: PanelJob[tuple[str, ...]]) -> str:

@@ -326,11 +326,14 @@ def test_e57_is_read_by_pye57_in_map_coordinates(tmp_path: Path, points) -> None
     write(tmp_path / "cloud.e57", points, attributes=DEFAULT_ATTRIBUTES)
     with pye57.E57(str(tmp_path / "cloud.e57")) as file:
         assert file.get_header(0).point_count == len(points)
-        scan = file.read_scan(0, intensity=True, colors=True, ignore_missing_fields=True)
+        plain = file.read_scan(0)
+        scan = file.read_scan(0, intensity=True, colors=True)
         bounds = file.get_header(0)["cartesianBounds"]
         low = [bounds[f"{axis}Minimum"].value() for axis in "xyz"]
     found = np.stack([scan[f"cartesian{axis}"] for axis in "XYZ"], axis=1)
     assert np.abs(found - points.xyz).max() <= 5e-5 + 1e-9
+    for name, values in plain.items():
+        np.testing.assert_array_equal(values, scan[name])
     assert np.abs(low + np.floor(ORIGIN) - points.xyz.min(axis=0)).max() <= 5e-5 + 1e-9
     np.testing.assert_array_equal(scan["colorRed"], points.rgb[:, 0] >> 8)
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from functools import cached_property
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -41,6 +40,12 @@ class Cubics:
         a, b, c, d = self.coefficients[piece].T
         u = s - self.start[piece]
         return a + b * u + c * u**2 + d * u**3
+
+    def slope(self, s: Float) -> Float:
+        piece = np.searchsorted(self.start, np.asarray(s) + SAME, side="right") - 1
+        _, b, c, d = self.coefficients[piece].T
+        u = s - self.start[piece]
+        return b + 2.0 * c * u + 3.0 * d * u**2
 
 
 @dataclass
@@ -100,11 +105,15 @@ class OpenDrive:
     sections: list[Section] = field(default_factory=list)
 
     @classmethod
-    def read(cls, path: Path) -> OpenDrive:
+    def read(cls, path: Path) -> list[OpenDrive]:
+        """Return the roads of a file."""
         root = ElementTree.parse(path).getroot()
-        header, road, shift = root.find("header"), root.find("road"), root.find("header/offset")
+        return [cls._read(root, road) for road in root.findall("road")]
+
+    @classmethod
+    def _read(cls, root: ElementTree.Element, road: ElementTree.Element) -> OpenDrive:
+        header, shift = root.find("header"), root.find("header/offset")
         assert header is not None
-        assert road is not None
         assert shift is not None
         assert (header.get("revMajor"), header.get("revMinor")) == ("1", "8")
         assert number(shift, "hdg") == 0.0
@@ -135,40 +144,31 @@ class OpenDrive:
             heading[own] = h + turn
         return position, heading
 
+    @property
+    def side(self) -> str:
+        return notes_of(self.road)["side"]
+
     def elevation(self, s: Float) -> Float:
         return Cubics.of(self.road.findall("elevationProfile/elevation")).at(s)
 
-    def shape(self, s: Float, t: Float) -> Float:
-        """Return the lateral shape (N,): cubics of t, linear between two stations at the same t."""
-        stations, items = self._shapes
-        piece = np.clip(np.searchsorted(stations, s + SAME, side="right") - 1, 0, None)
-        found = np.empty(len(s))
-        for i in np.unique(piece):
-            own = piece == i
-            found[own] = _across(items[i], t[own])
-            if i + 1 < len(items):
-                share = np.clip((s[own] - stations[i]) / (stations[i + 1] - stations[i]), 0.0, 1.0)
-                found[own] += share * (_across(items[i + 1], t[own]) - found[own])
-        return found
-
-    @cached_property
-    def _shapes(self) -> tuple[Float, list[Float]]:
-        """Return the stations of the shapes, and at each of them t, a, b, c, d (N, 5)."""
-        rows: dict[float, list[list[float]]] = {}
-        for item in self.road.findall("lateralProfile/shape"):
-            rows.setdefault(number(item, "s"), []).append([number(item, name) for name in "tabcd"])
-        stations = np.array(list(rows))
-        assert np.all(np.diff(stations) > 0.0)
-        return stations, [np.array(own) for own in rows.values()]
+    def superelevation(self, s: Float) -> Float:
+        return Cubics.of(self.road.findall("lateralProfile/superelevation")).at(s)
 
     def lane_offset(self, s: Float) -> Float:
         return Cubics.of(self.road.findall("lanes/laneOffset")).at(s)
 
     def point(self, s: Float, t: Float, height: Float | float = 0.0) -> Float:
-        """Return map points (N, 3) at stations and offsets; heights are those above the reference line."""
+        """Return map points (N, 3) at s, t and h: turned with the grade first, then tilted."""
         position, heading = self.reference(s)
-        left = np.stack([-np.sin(heading), np.cos(heading)], axis=1)
-        return np.column_stack([position + t[:, None] * left, self.elevation(s) + height]) + self.offset
+        profile = Cubics.of(self.road.findall("elevationProfile/elevation"))
+        climb, roll = np.arctan(profile.slope(s)), self.superelevation(s)
+        ahead = np.stack([np.cos(heading), np.sin(heading), np.zeros(len(s))], axis=1)
+        left = np.stack([-np.sin(heading), np.cos(heading), np.zeros(len(s))], axis=1)
+        up = np.column_stack([-np.sin(climb)[:, None] * ahead[:, :2], np.cos(climb)])
+        cosine, sine = np.cos(roll)[:, None], np.sin(roll)[:, None]
+        across, above = cosine * left + sine * up, cosine * up - sine * left
+        line = np.column_stack([position, self.elevation(s)])
+        return line + t[:, None] * across + np.broadcast_to(height, s.shape)[:, None] * above + self.offset
 
     def section_of(self, s: Float) -> list[tuple[Section, Float]]:
         """Return every section with the stations that lie in it."""
@@ -183,8 +183,7 @@ class OpenDrive:
             borders = section.borders(own, self.lane_offset(own))
             points = {}
             for i, t in borders.items():
-                above = self.shape(own, t) + (section.lanes[i].height(own)[1] if i else 0.0)
-                points[i] = self.point(own, t, above)
+                points[i] = self.point(own, t, section.lanes[i].height(own)[1] if i else 0.0)
             found.append((section, own, points))
         return found
 
@@ -219,6 +218,51 @@ class OpenDrive:
         """Return the map point (3,) of an object's or a signal's origin."""
         s, t = np.array([number(item, "s")]), np.array([number(item, "t")])
         return self.point(s, t, number(item, "zOffset"))[0]
+
+
+@dataclass
+class Roads:
+    """All roads of a file."""
+
+    roads: list[OpenDrive]
+
+    @classmethod
+    def read(cls, path: Path) -> Roads:
+        return cls(OpenDrive.read(path))
+
+    @property
+    def root(self) -> ElementTree.Element:
+        return self.roads[0].root
+
+    @property
+    def offset(self) -> Float:
+        return self.roads[0].offset
+
+    @property
+    def length(self) -> float:
+        return self.roads[0].length
+
+    def marks(self) -> list[tuple[OpenDrive, Mark]]:
+        return [(road, mark) for road in self.roads for mark in road.marks()]
+
+    def objects(self) -> dict[str, ElementTree.Element]:
+        return self._all([road.objects() for road in self.roads])
+
+    def signals(self) -> dict[str, ElementTree.Element]:
+        return self._all([road.signals() for road in self.roads])
+
+    def _all(self, parts: list[dict[str, ElementTree.Element]]) -> dict[str, ElementTree.Element]:
+        assert sum(map(len, parts)) == len({key for part in parts for key in part})
+        return {key: item for part in parts for key, item in part.items()}
+
+    def road_of(self, item: ElementTree.Element) -> OpenDrive:
+        """Return the road that an object or a signal belongs to."""
+        (road,) = [road for road in self.roads if any(other is item for other in road.road.iter())]
+        return road
+
+    def place(self, item: ElementTree.Element) -> Float:
+        """Return the map point (3,) of an object's or a signal's origin."""
+        return self.road_of(item).place(item)
 
 
 def notes_of(item: ElementTree.Element) -> dict[str, str]:
@@ -273,15 +317,6 @@ def _geometry(item: ElementTree.Element, length: float, u: Float) -> tuple[Float
     along = real * np.cos(back) - imaginary * np.sin(back)
     across = real * np.sin(back) + imaginary * np.cos(back)
     return along, across, k0 * u + rate * u**2 / 2.0
-
-
-def _across(rows: Float, t: Float) -> Float:
-    start = rows[:, 0]
-    assert np.all(np.diff(start) > 0.0)
-    piece = np.clip(np.searchsorted(start, t + SAME, side="right") - 1, 0, None)
-    _, a, b, c, d = rows[piece].T
-    u = t - start[piece]
-    return a + b * u + c * u**2 + d * u**3
 
 
 def _pieces(mark: ElementTree.Element, lane: int, start: float, end: float) -> list[Mark]:

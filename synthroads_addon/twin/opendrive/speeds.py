@@ -1,0 +1,63 @@
+"""Speed limits along a carriageway: those of its traffic signs, each up to the next one that the traffic passes."""
+
+from __future__ import annotations
+
+import re
+
+from ...road.geometry import RoadGeometry
+from ...road.parameters import TrafficSign
+from ...road.things.furniture import Side
+from .pieces import CLOSE
+
+ADVISORY = 130.0
+"""Speed on motorways without a limit, km/h: the one that German law advises."""
+_URBAN, _URBAN_CLASS = 100.0, "EKA3"
+"""Limit of urban motorways where no sign says another, km/h."""
+_LIMIT = re.compile(r"274-(\d+)")
+_ENDS = re.compile(r"278|282")
+"""Signs at which a limit ends."""
+
+
+class SpeedLimits:
+    """Speed limits along one carriageway.
+
+    Attributes:
+        without: km/h where no sign says another.
+        stretches: (start, end, km/h) in the order of the stations, m.
+    """
+
+    def __init__(self, geometry: RoadGeometry, side: Side) -> None:
+        urban = geometry.parameters.design_class == _URBAN_CLASS
+        self.without = _URBAN if urban else ADVISORY
+        ahead = geometry.sections[side].carriageway.traffic > 0
+        changes = _changes(geometry, ahead, self.without)
+        if not ahead:
+            changes = changes[::-1]
+        # With the stations a sign holds from its place on, against them up to it.
+        borders = [0.0, *(station for station, _ in changes), geometry.length]
+        speeds = [self.without, *(speed for _, speed in changes)] if ahead else [*(v for _, v in changes), self.without]
+        rows = zip(borders[:-1], borders[1:], speeds, strict=True)
+        self.stretches = [(start, end, speed) for start, end, speed in rows if end - start > CLOSE]
+
+    def between(self, start: float, end: float) -> list[tuple[float, float]]:
+        """Return where limits begin between two stations (m), the first at the start, and the limits, km/h."""
+        found: list[tuple[float, float]] = []
+        for first, last, speed in self.stretches:
+            low, high = max(first, start), min(last, end)
+            if high - low > CLOSE and (not found or found[-1][1] != speed):
+                found.append((low, speed))
+        return found
+
+
+def _changes(geometry: RoadGeometry, ahead: bool, without: float) -> list[tuple[float, float]]:
+    """Return the stations (m) at which signs change the limit, and to what (km/h), in the order of the traffic."""
+    found: dict[float, float] = {}
+    for item in geometry.parameters.of_type(TrafficSign).values():
+        with_stations = abs((item.rotation_deg + 180.0) % 360.0 - 180.0) <= 90.0
+        if with_stations != ahead or not 0.0 < item.station < geometry.length:
+            continue
+        if match := _LIMIT.fullmatch(item.code):
+            found[item.station] = float(match[1])
+        elif _ENDS.match(item.code):
+            found[item.station] = without
+    return sorted(found.items(), reverse=not ahead)
