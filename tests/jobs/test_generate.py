@@ -127,7 +127,7 @@ def test_labels_of_the_pavement_agree_with_the_parameters(demo, sigma: float, ra
     scenario, geometry, scene = demo
     changed = scenario.scan.model_copy(update={"noise": scenario.scan.noise.model_copy(update={"range_sigma": sigma})})
     scan = scan_of(scenario.model_copy(update={"scan": changed}), geometry, scene)
-    points = concatenate([scan_block(scan, *task).points for task in scan.blocks()[::5]])
+    points = concatenate([scan_block(scan, *task).points for task in list(scan.blocks())[::5]])
     wrong = misplaced_points(points, geometry, 0.02 + 3 * sigma)
     print(f"{wrong.mean():.4%} of {len(wrong)} points of the pavement lie outside the strips of their class")
     assert len(wrong) > 100_000
@@ -140,7 +140,7 @@ def test_labels_of_the_pavement_agree_with_the_parameters(demo, sigma: float, ra
 def test_points_of_the_road_lie_on_the_analytic_surface(demo) -> None:
     scenario, geometry, scene = demo
     scan = scan_of(scenario, geometry, scene)
-    points = concatenate([scan_block(scan, *task).points for task in scan.blocks()[::3]])
+    points = concatenate([scan_block(scan, *task).points for task in list(scan.blocks())[::3]])
     road = points.select(points.class_id == 1)
     local = road.xyz - scene.static.origin
     station, offset = geometry.alignment.project(local[:, :2])
