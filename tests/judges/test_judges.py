@@ -10,8 +10,12 @@ from pathlib import Path
 import pytest
 from packaging.utils import canonicalize_name
 
+from synthroads_addon.road.geometry import RoadGeometry
+from synthroads_addon.sampling.road import sample_road
 from synthroads_addon.twin.ifc.writer import write_ifc
-from tests.judges import JUDGES, Judge, registry, require, web_ifc
+from synthroads_addon.twin.opendrive.writer import write_opendrive
+from tests.helpers.roads.sampled_parts import PAIRS, scenario
+from tests.judges import JUDGES, Judge, libopendrive, registry, require, web_ifc
 from tests.judges.__main__ import exit_code, judged, main, table
 from tests.judges.samples import Samples
 
@@ -50,6 +54,16 @@ def test_a_wrong_file_is_found(judge: Judge, samples: Samples) -> None:
     require(judge.name)
     assert judge.spoil is not None
     assert judged(judge, judge.spoil(samples)).issues
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("design_class", "section"), PAIRS)
+def test_libopendrive_sees_the_pavement_of_every_cross_section(design_class: str, section: str, tmp_path: Path) -> None:
+    require("libOpenDRIVE")
+    limits = {"turnouts": {"exits": 1, "entries": 1, "emergency_bays": 1}}
+    road = sample_road(scenario(design_class=design_class, cross_section=section, length=1000.0, **limits), 3)
+    write_opendrive(road, tmp_path / "twin.xodr", 0.005)
+    assert libopendrive.surface_faults(tmp_path / "twin.xodr", RoadGeometry(road)) == []
 
 
 @pytest.mark.slow
