@@ -242,8 +242,8 @@ def test_a_scene_with_a_vertex_astray_is_scanned_where_it_is(
 def test_a_scan_larger_than_anyone_can_have_meant_is_refused(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """A yard in millimetres: 20 km long."""
-    (tmp_path / "yard.obj").write_text("v -1e7 -20 0\nv 1e7 -20 0\nv 1e7 20 0\nv -1e7 20 0\nf 1 2 3 4\n")
+    """A yard of 1 km in millimetres."""
+    (tmp_path / "yard.obj").write_text("v -5e5 -20 0\nv 5e5 -20 0\nv 5e5 20 0\nv -5e5 20 0\nf 1 2 3 4\n")
     words = [str(tmp_path / "yard.obj"), "--up", "z", "--output", str(tmp_path / "out"), "--quiet", "--height", "30"]
     assert command("scan", words) == 2
     told = capsys.readouterr().err
