@@ -54,6 +54,8 @@ ATTEMPTS = 3
 """A scene whose process is killed (too little memory, a lost node) is tried this often."""
 INTERRUPTED = 130
 """Exit code of a process that was told to end, as where a node is given back."""
+_ANSWER = 10.0
+"""Seconds that a scheduler has for its answer."""
 _TICK = 0.1
 """Seconds between two looks at a process."""
 _MODULE = Path(__file__).with_name("dataset_scene.py")
@@ -369,7 +371,7 @@ def dask_workers(address: str) -> Submit:
     except ImportError:
         raise InputError("--scheduler", address, "needs Dask: pip install 'synthroads[cluster]'") from None
     try:
-        client = distributed.Client(address, timeout="10s", set_as_default=False)
+        client = distributed.Client(address, timeout=_ANSWER, set_as_default=False)
     except (OSError, ValueError, TimeoutError) as error:
         raise InputError("--scheduler", address, f"nobody answers there ({error})") from None
 

@@ -220,7 +220,7 @@ def test_a_wider_tolerance_needs_no_more_elements() -> None:
     assert counts[0] > counts[2] > counts[3] == 1
 
 
-@pytest.mark.parametrize(("height", "width"), [(30.0, 100.0), (0.3, 60.0)])
+@pytest.mark.parametrize(("height", "width"), [pytest.param(30.0, 100.0, marks=pytest.mark.slow), (0.3, 60.0)])
 def test_a_smooth_curve_is_not_taken_for_a_chain_of_many_elements(height: float, width: float) -> None:
     """Points on a sinusoid have no noise, but no elements of their own either."""
     s = np.arange(0.0, 320.0)
@@ -381,7 +381,7 @@ def check_jacobian(data: Plan | Heights, chain: Chain, stations: np.ndarray, tol
             knots = chain.knots.copy()
             knots[1:-1] += step[chain.value_columns.stop :]
             moved = Chain(
-                data.moved(chain.pose, step[: chain.turns]),
+                data.move_pose(chain.pose, step[: chain.turns]),
                 knots,
                 chain.values + step[chain.value_columns],
                 chain.kinds,

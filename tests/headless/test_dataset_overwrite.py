@@ -229,9 +229,10 @@ def test_after_a_crash_no_scene_that_the_manifest_names_is_missing(
 
 
 def test_nothing_is_removed_where_the_scheduler_does_not_answer(
-    old: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    old: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     pytest.importorskip("distributed")
+    monkeypatch.setattr("headless.dataset_run._ANSWER", 1.0)
     recipe = tmp_path / "new.json"
     recipe.write_text(json.dumps(NEW))
     before = content(old)

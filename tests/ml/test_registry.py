@@ -89,6 +89,7 @@ def code_of_page(file: str) -> str:
     return re.split(r"```\w+\n|```\n", PAGE[PAGE.index(f"`{file}`") :])[1]
 
 
+@pytest.mark.slow
 def test_the_network_of_the_page_is_trained_and_used_by_its_configuration(tmp_path: Path) -> None:
     """The file stands in a folder beside the network's own, as only a new process looks for networks anew."""
     (tmp_path / "pointnet.py").write_text(code_of_page("ml/networks/pointnet.py"), encoding="utf-8")
