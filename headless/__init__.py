@@ -37,7 +37,7 @@ def _stop(number: int, frame: FrameType | None) -> None:
     if time.monotonic() < _ended_at + _ONCE:
         return
     if _in_callback(frame):
-        again = threading.Timer(_AGAIN, _thread.interrupt_main)
+        again = threading.Timer(_AGAIN, _thread.interrupt_main, (number,))
         again.daemon = True
         again.start()
         return

@@ -305,6 +305,8 @@ def _shortage(error: Exception) -> str | None:
     text = " ".join(str(error).split())
     if isinstance(error, MemoryError) or any(sign in text for sign in _MEMORY_SIGNS):
         return f"too little memory ({text[:200] or 'it is full'}); nothing was left half-written"
+    if isinstance(error, OSError) and error.errno in (errno.EMFILE, errno.ENFILE):
+        return f"{error.filename or 'a file'} cannot be opened ({error.strerror}); ulimit -n raises the limit"
     if isinstance(error, OSError) and error.errno in _NO_ROOM:
         name = error.filename or "a temporary file"
         return f"{name} cannot be written ({error.strerror}); TMPDIR names another folder"
@@ -313,7 +315,7 @@ def _shortage(error: Exception) -> str | None:
 
 _MEMORY_SIGNS = ("can't allocate memory", "out of memory", "can't start new thread", "bad_alloc")
 """Parts of the errors by which libraries in other languages tell that memory is short."""
-_NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EMFILE, errno.ENFILE)
+_NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EROFS)
 
 
 def report_interrupt() -> int:

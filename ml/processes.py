@@ -58,14 +58,14 @@ def helpers(run: Run[Any], learn: Callable[[Run[Any]], object], device: torch.de
         device: that this process trains on.
 
     Raises:
-        InputError: one of them was lost, or there are fewer CUDA devices than processes.
+        InputError: one of them was lost, there are fewer CUDA devices than processes, or one device is named.
     """
     count = run.configuration.processes
     if count == 1:
         yield
         return
-    if device.type == "cuda" and count > torch.cuda.device_count():
-        raise InputError("processes", count, f"must not exceed the CUDA devices, {torch.cuda.device_count()}")
+    if device.type == "cuda":
+        _check_devices(count, run.configuration.device)
     context = multiprocessing.get_context("spawn")
     with tempfile.TemporaryDirectory(prefix="synthroads-") as folder:
         meeting = Path(folder) / "meeting"
@@ -90,6 +90,14 @@ def helpers(run: Run[Any], learn: Callable[[Run[Any]], object], device: torch.de
                 other.kill()
             if distributed.is_initialized():
                 distributed.destroy_process_group()
+
+
+def _check_devices(count: int, device: str) -> None:
+    """Refuse more processes than CUDA devices, and a device that all would share."""
+    if count > torch.cuda.device_count():
+        raise InputError("processes", count, f"must not exceed the CUDA devices, {torch.cuda.device_count()}")
+    if device not in ("auto", "cuda"):
+        raise InputError("device", device, "must be cuda or auto for several processes: one GPU each")
 
 
 def _join(meeting: Path, number: int, count: int, device: str) -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import os
 import time
 from collections.abc import Callable, Iterable
 from typing import Any, TypeVar
@@ -12,6 +11,7 @@ import torch
 from torch import Tensor, nn
 
 from synthroads_addon.base.errors import InputError
+from synthroads_addon.base.machine import available_cores
 from synthroads_addon.base.progress import Progress, silent
 
 from .configuration import Configuration, Schedule
@@ -35,7 +35,7 @@ def chosen_device(configuration: Configuration) -> torch.device:
     if configuration.threads:
         torch.set_num_threads(configuration.threads)
     elif configuration.processes > 1:
-        torch.set_num_threads(max(1, (os.cpu_count() or 1) // configuration.processes))
+        torch.set_num_threads(max(1, available_cores() // configuration.processes))
     if configuration.device == "auto" and not torch.cuda.is_available():
         return torch.device("cpu")
     if configuration.device in ("auto", "cuda") and torch.cuda.is_available():

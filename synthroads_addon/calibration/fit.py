@@ -63,14 +63,14 @@ def fit_level_and_spreads(
     beside: tuple[Material, float] | None = None,
     spread: bool = True,
 ) -> Fit:
-    """Return level and spreads with which the expected quantiles come nearest to the wanted ones.
+    """Return level and spreads with which the expected quantiles come nearest to the cloud's.
 
     Levenberg and Marquardt's method on the differences over the interquartile range.
 
     Args:
         expectation: the places of the class.
         material: to begin with.
-        wanted: (4,) `FITTED` quantiles as stored.
+        quantiles: (4,) `FITTED` quantiles as stored.
         receiver: the device.
         beside: for a strip, the material beside it and its level.
         spread: whether the spreads are fitted as well; else they are the material's.

@@ -74,7 +74,8 @@ def read_manifest(folder: Path) -> Manifest:
 
 def append_record(folder: Path, entry: SceneEntry) -> None:
     """Record one more scene beside the manifest, at a cost that doesn't grow with their number."""
-    line = json.dumps(entry.to_dict(), ensure_ascii=False, separators=(",", ":"))
+    # In ASCII, so that a line that was cut off is text all the same, and no character in it ends a line.
+    line = json.dumps(entry.to_dict(), separators=(",", ":"))
     with (folder / RECORDS).open("a", encoding="utf-8", newline="\n") as file:
         file.write(f"{line}\n")
         file.flush()

@@ -81,7 +81,7 @@ def generate(job: Job, progress: Progress = silent) -> dict[str, Any]:
         refuse_sections(job.scenario, road.length)
         if set(job.scenario.outputs) & {"scene", *OF_POINTS}:
             from ..blender.files import empty_file  # Blender takes a second to start: other outputs need none
-            from .road_scene import RoadScene  # as well
+            from .road_scene import RoadScene
 
             if job.new_file:
                 empty_file()
@@ -139,7 +139,7 @@ def refuse_sections(scenario: Scenario, length: float) -> None:
 
 
 def choose_settings(scene: RoadScene, begun: float, timer: StageTimer) -> tuple[RoadScene, dict[str, Any]]:
-    """Return the scene as the settings ask for it that its scenario leaves open, and what to report of their choice."""
+    """Choose the settings that a scene's scenario leaves open; return the scene with them, and the choice's report."""
     from .choose.search import decide  # loads Blender
 
     with timer.stage("choice"):

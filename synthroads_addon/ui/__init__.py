@@ -1,7 +1,7 @@
 """The sidebar panel "SynthRoads": properties from the schema, operators that call the library, panels.
 
-Blender is to know every class of its own that a module defines, and those in its `CLASSES`, which were made of data. A
-module can have `ATTACHED`, an owner and the name and class of a property group that is attached to it, `HANDLERS` by
+Blender is to know every class of its own that a module defines, or those in its `CLASSES` where they are made of data.
+A module can have `ATTACHED`, an owner and the name and class of a property group that is attached to it, `HANDLERS` by
 the event that calls them, and functions `register` and `unregister` for what else it keeps in Blender. Panels come in
 the order of their `bl_order`, but a parent before its children.
 """

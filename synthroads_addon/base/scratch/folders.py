@@ -88,7 +88,8 @@ def remove_leftovers(parent: Path) -> None:
     with suppress(OSError), os.scandir(parent) as entries:
         for folder in [Path(entry.path) for entry in entries if _NAME.fullmatch(entry.name)]:
             if folder not in _mine:
-                _remove_leftover(folder)
+                with suppress(OSError):  # the others' turn comes all the same
+                    _remove_leftover(folder)
 
 
 def remove_own() -> None:
@@ -99,7 +100,7 @@ def remove_own() -> None:
 
 def _is_ours(folder: Path) -> bool:
     """Return whether this process made a scratch folder, and not the one that it was forked from."""
-    return f"{os.getpid()}-" in folder.name
+    return folder.name.split("-")[1] == str(os.getpid())
 
 
 def _make_folder(parent: Path, prefix: str) -> Path:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import os
 import sys
 
 _TAKEN = (errno.EWOULDBLOCK, errno.EAGAIN, errno.EACCES, errno.EDEADLK)
@@ -19,6 +20,7 @@ def try_lock(descriptor: int) -> bool | None:
         if sys.platform == "win32":
             import msvcrt  # only Windows has it
 
+            os.lseek(descriptor, 0, os.SEEK_SET)  # it locks a byte at the file's place, which must be one for all
             msvcrt.locking(descriptor, msvcrt.LK_NBLCK, 1)
         else:
             import fcntl  # Windows has none

@@ -60,7 +60,8 @@ def is_dead(owner: Owner, lock: bool | None) -> bool:
     """
     if lock is False:
         return False
-    if owner.locked and lock and owner.boot == _boot_id():  # one kernel, if in another container: it frees locks itself
+    # One kernel, if in another container: it frees locks itself.
+    if owner.locked and lock and owner.boot and owner.boot == _boot_id():
         return True
     if owner.host != socket.gethostname():
         return False

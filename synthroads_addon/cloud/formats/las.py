@@ -32,8 +32,6 @@ SCALE = 0.001
 """Size of a coordinate's step, m."""
 SCAN_ANGLE_STEP = 0.006
 """Degrees per step of the scan angle (LAS 1.4 R15, table 14)."""
-NO_STRIP = 65535
-"""`PointBlock.strip` of points of no strip, which LAS numbers 0; strips count from 1 there."""
 _CHUNK = 50_000
 """Points in a chunk of LAZ, the unit of its compression: whole ones are compressed side by side."""
 _BUFFER = 8 * _CHUNK

@@ -6,7 +6,6 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...road.parameters import Median
 from ...road.things.furniture import Side
@@ -261,7 +260,3 @@ class LanePlan:
         if self.width_at_start(border)[column] < CLOSE or self.widths.at_end(border - 1)[column] < CLOSE:
             return None
         return self.sections[other].find(side, column)
-
-    def column_kinks(self) -> NDArray[np.float64]:
-        """Return the stations between which all widths are single cubics, m."""
-        return self.widths.borders

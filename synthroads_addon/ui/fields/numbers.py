@@ -35,7 +35,8 @@ def number_property(
     """
     unit = unit_of(info) if unit is None else unit
     low, high = _limits(info)
-    first = min(max(default or 0, low), high)
+    unlimited = default is None and whole and high > LARGEST_INTEGER  # a limit that begins where it does no harm
+    first = LARGEST_INTEGER if unlimited else min(max(default or 0, low), high)
     share = is_share(info)
     if whole:
         pixels = {"subtype": "PIXEL"} if unit == "px" else {}

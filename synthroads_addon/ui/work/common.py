@@ -83,6 +83,7 @@ def refusing(execute: Callable[[Any, bpy.types.Context], None]) -> Execute:
 def refuse(operator: bpy.types.Operator, error: InputError) -> set[str]:
     """Show what is wrong in the panel's words."""
     message = str(error).replace("--overwrite replaces it", "tick Replace Files, or choose another folder")
+    message = message.replace("--allow-large", "the command's --allow-large")
     operator.report({"ERROR"}, message.replace("--output", "Output"))
     return {"CANCELLED"}
 
