@@ -186,7 +186,6 @@ class DatasetRun:
 
     def _make(self, submit: Submit) -> None:
         """Make the scenes that aren't there yet."""
-        write_manifest(self.folder, self._manifest())
         chosen = [job for job in self.jobs if self.splits is None or job.split in self.splits]
         missing = [job for job in chosen if not self._is_done(job)]
         done = len(chosen) - len(missing)
@@ -210,8 +209,9 @@ class DatasetRun:
         """Take over what is done or remove it, as is wanted, and remove what a run before left unfinished."""
         if (self.folder / MANIFEST).exists():
             self._open_again()
-        elif any(path.name != LOCK for path in self.folder.iterdir()):
+        elif {path.name for path in self.folder.iterdir()} - {LOCK, f".{MANIFEST}.part"}:
             raise OutputError("--output", str(self.folder), "holds other files; choose an empty folder")
+        write_manifest(self.folder, self._manifest())  # first: a folder without one could never be resumed
         shutil.rmtree(self.folder / WORK, ignore_errors=True)
         for path in self._unknown():
             remove(path)

@@ -4,18 +4,16 @@ from __future__ import annotations
 
 import errno
 import os
+import shutil
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 
 from .errors import InputError, MissingFileError, OutputError, nearest_name
-from .scratch.folders import scratch_folder
+from .scratch.folders import ASIDE, NEW, REPORT, names_to_move, scratch_folder
 
 PRESETS = Path(__file__).parents[1] / "presets"
 """Folder of the shipped data: classes, materials, signs, devices, scenarios, recipes, assets."""
-
-REPORT = "report.json"
-"""File that is moved to its place last: where it stands, the others stand too."""
 
 
 def read_text(path: str | os.PathLike[str], kind: str, wanted: str = "", encoding: str = "utf-8") -> str:
@@ -130,13 +128,12 @@ def output_folder(target: Path, names: Iterable[str], overwrite: bool) -> Iterat
             if made:
                 stack.callback(_remove_if_empty, target)
             scratch = stack.enter_context(scratch_folder(target))
-            (work := scratch / "new").mkdir()
-            (aside := scratch / "old").mkdir()
+            (work := scratch / NEW).mkdir()
         except OSError as error:
             raise OutputError("--output", str(target), f"cannot be written ({error.strerror})") from None
         try:
             yield work
-            _move_all(work, target, aside)
+            _move_all(work, target, scratch / ASIDE)
         except OSError as error:
             if error.errno in _UNWRITABLE:
                 raise OutputError("--output", str(target), f"cannot be written ({error.strerror})") from None
@@ -163,7 +160,8 @@ def _move_all(source: Path, target: Path, aside: Path) -> None:
     for path in source.rglob("*"):
         if path.is_file():
             sync_file(path)
-    names = sorted((path.name for path in source.iterdir()), key=lambda name: (name == REPORT, name))
+    names = names_to_move(source)
+    aside.mkdir()  # from now on the move is finished by the next process if this one is killed
     stopped: KeyboardInterrupt | None = None
     while True:
         try:
@@ -201,6 +199,7 @@ def _put_back(names: list[str], source: Path, target: Path, aside: Path) -> None
         with suppress(OSError):
             if (aside / name).exists():
                 (aside / name).replace(target / name)
+    shutil.rmtree(source, ignore_errors=True)  # what is still aside is put back by whoever removes the folder
 
 
 def sync_file(path: Path) -> None:

@@ -8,6 +8,7 @@ import pytest
 
 from synthroads_addon.base.errors import OutputError
 from synthroads_addon.base.files import files_below, output_folder, write_file
+from synthroads_addon.base.scratch.folders import ASIDE, scratch_folder
 
 
 def test_files_appear_at_the_end(tmp_path: Path) -> None:
@@ -108,6 +109,48 @@ def test_where_one_file_cannot_be_moved_all_stands_as_it_was(
         work()
     there = {path.name: path.read_text() for path in tmp_path.iterdir()}
     assert there == {"b.txt": "old", "c.txt": "old", "report.json": "old"}
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="needs fork")
+@pytest.mark.parametrize("moves", range(8))
+def test_a_move_that_was_killed_is_finished_by_the_next_work(tmp_path: Path, moves: int) -> None:
+    """Killed after each of its moves: three old files go aside, four new ones come in."""
+    for name in ("a.txt", "b.txt", "report.json"):
+        (tmp_path / name).write_text("old")
+    child = os.fork()
+    if child == 0:
+        replace, done = Path.replace, []
+
+        def killed(self: Path, target: Path) -> Path:
+            if len(done) == moves:
+                os._exit(9)
+            done.append(target)
+            return replace(self, target)
+
+        Path.replace = killed  # type: ignore[method-assign, assignment]
+        with output_folder(tmp_path, [], overwrite=True) as folder:
+            for name in ("a.txt", "b.txt", "c.txt", "report.json"):
+                (folder / name).write_text("new")
+        os._exit(0)
+    assert os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == (9 if moves < 7 else 0)
+    with output_folder(tmp_path, [], overwrite=True):
+        pass
+    texts = {path.name: path.read_text() for path in tmp_path.iterdir()}
+    assert texts == dict.fromkeys(("a.txt", "b.txt", "c.txt", "report.json"), "new")
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="needs fork")
+def test_what_was_aside_is_put_back_where_the_new_file_is_gone(tmp_path: Path) -> None:
+    child = os.fork()
+    if child == 0:
+        with scratch_folder(tmp_path) as folder:
+            (folder / ASIDE).mkdir()
+            (folder / ASIDE / "a.txt").write_text("old")
+            os._exit(9)
+    os.waitpid(child, 0)
+    with output_folder(tmp_path, [], overwrite=True):
+        pass
+    assert {path.name: path.read_text() for path in tmp_path.iterdir()} == {"a.txt": "old"}
 
 
 def test_present_files_need_overwrite_and_others_stay(tmp_path: Path) -> None:

@@ -283,6 +283,23 @@ def test_a_run_that_is_stopped_leaves_whole_scenes_and_nothing_else(
     assert content(folder) == content(tmp_path / "whole")
 
 
+def test_a_run_that_is_killed_before_its_first_scene_can_be_resumed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Killed before its recipe stands in the folder, and with a manifest that was being written."""
+    folder = tmp_path / "set"
+    with monkeypatch.context() as patched:
+        patched.setattr(dataset_run, "write_atomically", raising(dataset_run.write_atomically, 0, KeyboardInterrupt))
+        with pytest.raises(KeyboardInterrupt):
+            make(folder, OLD)
+    make(folder, OLD, resume=True)
+    other = tmp_path / "other"
+    other.mkdir()
+    (other / ".manifest.json.part").write_text('{"type"')
+    make(other, OLD)
+    assert content(folder) == content(other)
+
+
 def test_the_manifest_is_written_twice_however_many_scenes_there_are(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

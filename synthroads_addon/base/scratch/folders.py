@@ -21,6 +21,11 @@ from .owner import is_dead, read_owner, this_process
 
 LOCK = ".owner.json"
 """File in each scratch folder that names the process which works in it, and is locked by it."""
+NEW, ASIDE = "new", "old"
+"""Folders in a scratch folder whose files belong beside it: those that are moved there, and those that stood there
+before. The second is made when all new files are whole, and so says that the move has begun."""
+REPORT = "report.json"
+"""File that is moved to its place last: where it stands, the others stand too."""
 _IN_OUTPUT, _IN_SYSTEM = ".partial-", "synthroads-"
 _NAME = re.compile(rf"({re.escape(_IN_OUTPUT)}|{_IN_SYSTEM})\d+-[a-z0-9_]{{8}}")
 _VARIABLES = ("TMPDIR", "TEMP", "TMP")
@@ -124,7 +129,9 @@ def _make_folder(parent: Path, prefix: str) -> Path:
 
 
 def _remove(folder: Path) -> None:
-    """Remove a folder of this process: its lock last, so that it is known as a leftover if this is cut off."""
+    """Remove a folder that is this process's by now: its lock last, so that it is a leftover if this is cut off."""
+    if not _finish_move(folder):
+        return
     with suppress(OSError), os.scandir(folder) as entries:
         for entry in entries:
             if entry.is_dir(follow_symlinks=False):
@@ -138,6 +145,26 @@ def _remove(folder: Path) -> None:
             os.close(lock)
     shutil.rmtree(folder, ignore_errors=True)
     _mine.pop(folder, None)  # not before: where this is cut off `remove_own` goes on with it
+
+
+def names_to_move(folder: Path) -> list[str]:
+    """Return the names of what is in a folder in the order in which it is moved: `REPORT` last."""
+    return sorted((path.name for path in folder.glob("*")), key=lambda name: (name == REPORT, name))
+
+
+def _finish_move(folder: Path) -> bool:
+    """Finish a move out of a scratch folder that was cut off; return whether no old file is in it alone."""
+    aside, target = folder / ASIDE, folder.parent
+    if not folder.name.startswith(_IN_OUTPUT) or not aside.is_dir():
+        return True
+    for name in names_to_move(folder / NEW):
+        with suppress(OSError):
+            (folder / NEW / name).replace(target / name)
+    for name in names_to_move(aside):
+        with suppress(OSError):
+            if not (target / name).exists():
+                (aside / name).replace(target / name)
+    return all((target / name).exists() for name in names_to_move(aside))
 
 
 def _remove_leftover(folder: Path) -> None:

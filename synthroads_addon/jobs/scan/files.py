@@ -137,11 +137,19 @@ class CloudFiles:
         }
 
 
-def record_to_files(plans: Iterable[ScanPlan], files: CloudFiles, timer: StageTimer) -> dict[str, Any]:
+def record_to_files(
+    plans: Iterable[ScanPlan], files: CloudFiles, timer: StageTimer, announce: bool = True
+) -> dict[str, Any]:
     """Scan one plan after the other into the cloud and the previews.
 
     The stage ``files`` is what is left to be written at the end. Where something is rendered, it must run in the main
     thread.
+
+    Args:
+        plans: the sections, or the one scan.
+        files: the sink.
+        timer: of the job's stages.
+        announce: say beforehand what the whole scan will take; not of stretches that are tried.
 
     Returns:
         the counts, as JSON data; triangles and vertices are those of the largest scene.
@@ -151,7 +159,7 @@ def record_to_files(plans: Iterable[ScanPlan], files: CloudFiles, timer: StageTi
     with ExitStack() as stack:
         stack.enter_context(files.opened())
         for number, plan in enumerate(plans):
-            if number == 0:  # the path is the whole scan's, whatever section the plan is of
+            if announce and number == 0:  # the path is the whole scan's, whatever section the plan is of
                 _tell_forecast(plan)
             largest = {name: max(figures[name], plan.summary()[name]) for name in ("triangles", "vertices")}
             figures = plan.summary() | largest

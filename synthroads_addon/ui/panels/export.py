@@ -5,6 +5,7 @@ Annotations are not postponed here: Blender reads the properties from them.
 
 import os
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -187,6 +188,9 @@ class SYNTHROADS_OT_export_twin(FileOperator, bpy.types.Operator):
         folder = context.scene.synthroads.folder_to_open()
         if folder is not None and not self.directory:
             self.directory = f"{folder}{os.sep}"
+        with suppress(InputError):  # a setting of the panel is wrong, which is its own buttons' business
+            if chosen := context.scene.synthroads.scenario().ifc:
+                self.ifc_placement = chosen.placement
 
     def draw(self, context: bpy.types.Context) -> None:
         """Draw the settings beside the file browser; formats whose package is missing can't be chosen."""

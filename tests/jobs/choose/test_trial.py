@@ -28,7 +28,7 @@ class MadeUpScans:
     now: float = 100.0
     first: bool = True
 
-    def record(self, plans: Iterable[ScanPlan], files: CloudFiles, timer: StageTimer) -> dict[str, Any]:
+    def record(self, plans: Iterable[ScanPlan], files: CloudFiles, timer: StageTimer, announce: bool) -> dict[str, Any]:
         for plan in plans:
             pulses = sum(map(plan.pulses, plan.path.strips))
             self.now += self.each + RATE * pulses + (FIRST if self.first else 0.0)
