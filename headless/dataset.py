@@ -74,11 +74,7 @@ def _verify(folder: Path) -> Outcome:
     manifest = read_manifest(folder)
     faulty = faults(folder, manifest.scenes)
     files = sum(len(scene.files or {}) for scene in manifest.scenes)
-    text = (
-        "\n".join(faulty)
-        if faulty
-        else f"{files:,} files of {len(manifest.scenes)} scenes are as the manifest says"
-    )
+    text = "\n".join(faulty) if faulty else f"{files:,} files of {len(manifest.scenes)} scenes are as the manifest says"
     return 3 if faulty else 0, {"files": files, "faults": faulty}, text
 
 

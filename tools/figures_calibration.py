@@ -1,6 +1,6 @@
 """Calibrate asphalt and white paint against real clouds; print the table of docs/calibration.md and draw its pictures.
 
-    python tools/figures_calibration.py REAL_FOLDER --output docs/pictures --tables out/tables
+python tools/figures_calibration.py REAL_FOLDER --output docs/pictures --tables out/tables
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Print the table of docs/dataset.md: scenes, points, classes, time and memory of a data set, by group.
 
-    synthroads dataset reference --output out/reference --jobs 2
-    python tools/figures_dataset.py out/reference
+synthroads dataset reference --output out/reference --jobs 2
+python tools/figures_dataset.py out/reference
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Pictures and tables of beam, reflection and weather for the documentation.
 
-    python tools/figures_radiometry.py --output docs/pictures
-    python tools/figures_radiometry.py --tables
+python tools/figures_radiometry.py --output docs/pictures
+python tools/figures_radiometry.py --tables
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Pictures and tables of the scanner for the documentation: platforms, reflection models, rays per pulse.
 
-    python tools/figures_scanner.py --output docs/pictures
+python tools/figures_scanner.py --output docs/pictures
 """
 
 from __future__ import annotations

@@ -133,9 +133,7 @@ def check_scene_scan(job: SceneScan) -> ClassMapping | None:
     return ClassMapping.from_dict(read_json(job.classes), source=str(job.classes))
 
 
-def _read_scene(
-    job: SceneScan, mapping: ClassMapping | None
-) -> tuple[ScannedScene, RoadGeometry | None, list[str]]:
+def _read_scene(job: SceneScan, mapping: ClassMapping | None) -> tuple[ScannedScene, RoadGeometry | None, list[str]]:
     """Return the open scene, its road, and warnings; refuse a scene in which there is nothing to scan."""
     from ..blender.model.store import open_road  # see `scan_scene`
     from ..blender.scene.evaluated import scanned_scene

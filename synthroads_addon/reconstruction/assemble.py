@@ -18,7 +18,6 @@ from ..road.parameters import (
     EPSG_URI,
     Carriageway,
     CrossfallPoint,
-    Delineator,
     Lane,
     LineMarking,
     Median,
@@ -28,7 +27,10 @@ from ..road.parameters import (
     Terrain,
     Transform,
 )
-from ..road.things.furniture import ConcreteBarrier, Guardrail, NoiseBarrier
+from ..road.things.concrete_barrier import ConcreteBarrier
+from ..road.things.delineator import Delineator
+from ..road.things.guardrail import Guardrail
+from ..road.things.noise_barrier import NoiseBarrier
 from .lines import Line
 from .objects import FoundBarrier, FoundPost
 from .section import MeasuredSection, Side, SideSection, line_width

@@ -10,9 +10,12 @@ from scipy.optimize import linear_sum_assignment
 from scipy.spatial.distance import cdist
 
 from ..road.geometry import RoadGeometry
-from ..road.objects import width_at
-from ..road.parameters import ConcreteBarrier, Delineator, Guardrail, LineObject, NoiseBarrier, RoadParameters
-from ..road.things.furniture import Side
+from ..road.objects import Side, width_at
+from ..road.parameters import LineObject, RoadParameters
+from ..road.things.concrete_barrier import ConcreteBarrier
+from ..road.things.delineator import Delineator
+from ..road.things.guardrail import Guardrail
+from ..road.things.noise_barrier import NoiseBarrier
 
 Float = NDArray[np.float64]
 

@@ -13,7 +13,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-from ..road.things.body_shapes import GUARDRAIL_BEAM, GUARDRAIL_POST, GUARDRAIL_SPACER
+from ..road.things.guardrail import GUARDRAIL_BEAM, GUARDRAIL_POST, GUARDRAIL_SPACER
 from .cloud import PointKind
 from .smoothing import mean_with_std
 

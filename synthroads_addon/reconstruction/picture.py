@@ -11,7 +11,8 @@ from scipy import ndimage
 
 from ..road.geometry import RoadGeometry
 from ..road.objects import LineObject
-from ..road.parameters import Delineator, LineMarking
+from ..road.parameters import LineMarking
+from ..road.things.delineator import Delineator
 from .cloud import RoadCloud
 from .profiles import Profiles
 from .reconstruct import Reconstruction

@@ -72,9 +72,7 @@ def _most_usual(blocks: list[Float]) -> int:
     """Return the stretch that is most like its neighbours: no hatching, no arrows, no bridge above."""
     alike = np.zeros(len(blocks) + 1)
     for number in range(len(blocks) - 1):
-        fit = _best(
-            blocks[number + 1], _shift_profile(blocks[number], _self_fit(blocks[number])), 0.0, 2.0 * _REACH
-        )
+        fit = _best(blocks[number + 1], _shift_profile(blocks[number], _self_fit(blocks[number])), 0.0, 2.0 * _REACH)
         alike[number + 1] = fit.score if fit is not None else 0.0
     return int(np.minimum(alike[:-1], alike[1:]).argmax())
 

@@ -13,11 +13,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from .alignment import Alignment, Element
 from .damage import damage_depth
-from .objects import width_at
+from .objects import Side, width_at
 from .parameters import AlignmentObject, Carriageway, LineMarking, Median, RoadParameters, Turnout
 from .profile import IntersectionPoint, Profile
 from .section_geometry import CarriagewaySection
-from .things.furniture import Side
 from .turnout_geometry import TURNOUT_STRIPS
 
 Float = NDArray[np.float64]

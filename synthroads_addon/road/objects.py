@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import pairwise
-from typing import Annotated, Any, ClassVar, TypeVar
+from typing import Annotated, Any, ClassVar, Literal, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -13,6 +13,16 @@ from pydantic import AfterValidator, Discriminator, Field, Tag
 from ..base.schema import Model, quantity
 
 StrictFinite = Annotated[float, Field(strict=True, ge=-1e8, le=1e8)]
+Side = Literal["left", "right"]
+Color = Annotated[
+    tuple[
+        Annotated[float, Field(strict=True, ge=0, le=1)],
+        Annotated[float, Field(strict=True, ge=0, le=1)],
+        Annotated[float, Field(strict=True, ge=0, le=1)],
+    ],
+    Field(description="Red, green, blue, 0 to 1, linear.", json_schema_extra={"unit": "1"}),
+]
+"""A base colour."""
 
 
 class RoadObject(Model):

@@ -11,7 +11,7 @@ import builtins
 import math
 import re
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal, Union
 
 from pydantic import Field, model_validator
 
@@ -33,23 +33,7 @@ from .section import (
     Turnout,
 )
 from .surroundings import Environment, MaterialVariation, Terrain, Vegetation, Vehicle
-from .things.furniture import (
-    Asset,
-    Cabinet,
-    ConcreteBarrier,
-    ConstructionBeacon,
-    Delineator,
-    Gantry,
-    GantrySign,
-    Guardrail,
-    KilometreBoard,
-    NoiseBarrier,
-    Overpass,
-    Pole,
-    TemporaryBarrier,
-    TrafficLight,
-    TrafficSign,
-)
+from .things.registry import THINGS
 
 __all__ = [
     "DESIGN_CLASSES",
@@ -58,40 +42,25 @@ __all__ = [
     "AlignmentObject",
     "AnyObject",
     "Arrow",
-    "Asset",
-    "Cabinet",
     "Carriageway",
-    "ConcreteBarrier",
-    "ConstructionBeacon",
     "CrossfallPoint",
-    "Delineator",
     "Environment",
-    "Gantry",
-    "GantrySign",
-    "Guardrail",
     "Hatching",
     "HorizontalElement",
-    "KilometreBoard",
     "Lane",
     "LineMarking",
     "LineObject",
     "MaterialVariation",
     "Median",
     "Metadata",
-    "NoiseBarrier",
-    "Overpass",
     "Pavement",
     "PointObject",
-    "Pole",
     "Pothole",
     "Ramp",
     "RoadObject",
     "RoadParameters",
     "Rut",
-    "TemporaryBarrier",
     "Terrain",
-    "TrafficLight",
-    "TrafficSign",
     "Transform",
     "Turnout",
     "Vegetation",
@@ -194,33 +163,12 @@ class AlignmentObject(RoadObject):
         return math.fsum(element.length for element in self.horizontal)
 
 
-AnyObject = Annotated[
-    AlignmentObject
-    | Carriageway
-    | Median
-    | Turnout
-    | LineMarking
-    | Hatching
-    | Arrow
-    | Guardrail
-    | ConcreteBarrier
-    | NoiseBarrier
-    | TemporaryBarrier
-    | Delineator
-    | TrafficSign
-    | Gantry
-    | Pole
-    | TrafficLight
-    | KilometreBoard
-    | Cabinet
-    | ConstructionBeacon
-    | Overpass
-    | Asset
-    | Terrain
-    | Vegetation
-    | Vehicle,
-    Field(discriminator="type"),
-]
+if TYPE_CHECKING:
+    AnyObject = RoadObject
+else:
+    _PARTS = (AlignmentObject, Carriageway, Median, Turnout, LineMarking, Hatching, Arrow)
+    _AROUND = (Terrain, Vegetation, Vehicle)
+    AnyObject = Annotated[Union[(*_PARTS, *THINGS.values(), *_AROUND)], Field(discriminator="type")]
 
 
 OBJECT_ID = r"[A-Za-z0-9_.-]{1,64}"

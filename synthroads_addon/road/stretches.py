@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 
 from .geometry import RoadGeometry
 from .objects import RoadObject
-from .parameters import LineMarking, LineObject, PointObject, RoadParameters, TemporaryBarrier, Vehicle
+from .parameters import LineMarking, LineObject, PointObject, RoadParameters, Vehicle
+from .things.temporary_barrier import TemporaryBarrier
 
 LONGEST = 500.0
 """Length of a stretch unless something else is asked for, m."""

@@ -7,8 +7,7 @@ from typing import ClassVar, Literal
 from pydantic import Field, model_validator
 
 from ..base.schema import Model, quantity, when
-from .objects import RoadObject
-from .things.furniture import Color
+from .objects import Color, RoadObject
 
 TREES = ("maple", "birch", "poplar", "spruce", "pine")
 SHRUBS = ("hawthorn", "hazel", "blackthorn")

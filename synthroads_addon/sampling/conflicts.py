@@ -26,22 +26,12 @@ from ..road.guidelines import (
     TURNOUT_LANE_WIDTH,
     TURNOUT_TAPER,
 )
-from ..road.parameters import (
-    Environment,
-    Guardrail,
-    MaterialVariation,
-    NoiseBarrier,
-    Overpass,
-    Pole,
-    Pothole,
-    Ramp,
-    Rut,
-    Terrain,
-    Turnout,
-    Vegetation,
-    Vehicle,
-)
+from ..road.parameters import Environment, MaterialVariation, Pothole, Ramp, Rut, Terrain, Turnout, Vegetation, Vehicle
 from ..road.section import Marking
+from ..road.things.guardrail import Guardrail
+from ..road.things.noise_barrier import NoiseBarrier
+from ..road.things.overpass import Overpass
+from ..road.things.pole import Pole
 from ..scenario.road import EnvironmentLimits, Interval, MaterialLimits, RoadScenario
 from .placing.construction import SHORTEST_ALONG, TAPER_OUT, TAPERS_IN
 from .section import cross_section_of

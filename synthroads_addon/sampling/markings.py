@@ -9,9 +9,8 @@ import numpy as np
 
 from ..base.schema import round_value
 from ..road.guidelines import LIMITS
-from ..road.objects import AnyWidth
+from ..road.objects import AnyWidth, Side
 from ..road.section import Arrow, Carriageway, Hatching, LineMarking, Turnout
-from ..road.things.furniture import Side
 from ..road.turnout_geometry import TurnoutShape
 from .placing.site import PlacementSite
 

@@ -11,6 +11,7 @@ import numpy as np
 from ..base.random_streams import stream
 from ..base.schema import round_value
 from ..base.version import generator
+from ..road.objects import Side
 from ..road.parameters import (
     EPSG_URI,
     AlignmentObject,
@@ -23,7 +24,6 @@ from ..road.parameters import (
     Transform,
     Turnout,
 )
-from ..road.things.furniture import Side
 from ..scenario.road import RoadScenario
 from .alignment import HorizontalSampler, sample_profile
 from .conflicts import check_conflicts

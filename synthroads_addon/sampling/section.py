@@ -10,10 +10,9 @@ from ..base.random_streams import stream
 from ..base.schema import round_value
 from ..road.crossfall import crossfall_points
 from ..road.guidelines import STANDARD_CROSS_SECTIONS, StandardCrossSection
-from ..road.objects import WidthPoint, nominal_width, width_at
+from ..road.objects import Side, WidthPoint, nominal_width, width_at
 from ..road.parameters import AlignmentObject
 from ..road.section import Carriageway, Lane, Pavement, Pothole, Rut, Turnout
-from ..road.things.furniture import Side
 from ..scenario.road import FreeCrossSection, RoadScenario
 from .turnouts import (
     BESIDE_LANE_CHANGE,

@@ -13,20 +13,13 @@ from numpy.typing import NDArray
 from ..base.random_streams import stream
 from ..base.schema import round_value
 from ..road.guidelines import OBSTACLE_DISTANCE
-from ..road.objects import AnyWidth, nominal_width, width_at, width_kinks
-from ..road.parameters import (
-    AlignmentObject,
-    ConstructionBeacon,
-    Environment,
-    MaterialVariation,
-    RoadObject,
-    TemporaryBarrier,
-    Terrain,
-)
+from ..road.objects import AnyWidth, Side, nominal_width, width_at, width_kinks
+from ..road.parameters import AlignmentObject, Environment, MaterialVariation, RoadObject, Terrain
 from ..road.section_geometry import CarriagewaySection
 from ..road.surroundings import Vegetation, Vehicle
 from ..road.terrain import fit_to_ground, road_elevation_model
-from ..road.things.furniture import Side
+from ..road.things.beacon import ConstructionBeacon
+from ..road.things.temporary_barrier import TemporaryBarrier
 from ..road.things.vehicles import COLORS, HEAVY_SPEED, VEHICLE_GAP, VEHICLE_LANE_WIDTH, VEHICLE_ROOM, VEHICLE_TYPES
 from ..scenario.road import Interval, MaterialLimits, RoadScenario
 from .placing.site import PlacementSite

@@ -27,8 +27,8 @@ from ..road.guidelines import (
     TURNOUT_TAPER,
     StandardCrossSection,
 )
+from ..road.objects import Side
 from ..road.section import Ramp, Turnout
-from ..road.things.furniture import Side
 from ..road.turnout_geometry import BLEND, NOSE_BEFORE_END, NOSE_WIDTH, STEP
 from ..scenario.road import FreeCrossSection, Interval, RoadScenario
 

@@ -145,4 +145,3 @@ def detect_echoes(result: BlockResult, setting: ScannerSetting) -> BlockResult:
         below_threshold=result.below_threshold + len(result.points) - len(strong),
         saturated=clipped,
     )
-

@@ -45,9 +45,7 @@ class SceneServices(Protocol):
         """Return the means of the scene's materials, in the order of the names."""
         ...
 
-    def layers(
-        self, request: LayerRequest, progress: Callable[[float], None]
-    ) -> AbstractContextManager[LayerSource]:
+    def layers(self, request: LayerRequest, progress: Callable[[float], None]) -> AbstractContextManager[LayerSource]:
         """Open a source of colours and layers; images are rendered first, and progress gets the share of them."""
         ...
 

@@ -286,9 +286,7 @@ class BlockScan:
 
 def _ray_ends(rays: Rays, ray: Index, reach: Float) -> tuple[Float, Float]:
     """Return where rays end after ``reach``, and where they began, (3, N) local, m."""
-    scanner = np.take(
-        rays.origin.reshape(3, -1), ray if rays.origin.shape[1] > 1 else ray % len(rays.time), axis=1
-    )
+    scanner = np.take(rays.origin.reshape(3, -1), ray if rays.origin.shape[1] > 1 else ray % len(rays.time), axis=1)
     return scanner + reach * np.take(rays.direction.reshape(3, -1), ray, axis=1), scanner
 
 

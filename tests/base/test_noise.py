@@ -41,9 +41,7 @@ def by_definition(position: np.ndarray, wavelength: float, seed: int, octaves: i
         above = (point - base) ** 2 * (3 - 2 * (point - base))
         value = 0.0
         for corner in np.ndindex(2, 2, 2):
-            weight = math.prod(
-                (s if up else 1 - s) / math.hypot(s, 1 - s) for s, up in zip(above, corner, strict=True)
-            )
+            weight = math.prod((s if up else 1 - s) / math.hypot(s, 1 - s) for s, up in zip(above, corner, strict=True))
             value += weight * hashed(*(int(i) for i in base + corner), key=int(keys[octave]))
         total += value * 2.0 ** (-octave / 2)
         point = point * 2.0

@@ -28,7 +28,7 @@ from synthroads_addon.dataset.manifest import (
 )
 from synthroads_addon.dataset.recipe import Recipe, load_recipe, recipe_names, scene_jobs
 from synthroads_addon.materials.table import materials
-from synthroads_addon.road.things.furniture import Gantry
+from synthroads_addon.road.things.gantry import Gantry
 from synthroads_addon.sampling.road import sample_road
 from tests.helpers.clouds.random_points import make_points
 

@@ -144,8 +144,8 @@ def test_a_folder_for_temporary_files_that_is_full(
     ("error", "says"),
     [
         ("MemoryError('Unable to allocate 537. TiB')", "error: too little memory (Unable to allocate 537. TiB)"),
-        ("RuntimeError(\"DefaultCPUAllocator: can't allocate memory: 8 bytes\")", "error: too little memory (Default"),
-        ("RuntimeError(\"can't start new thread\")", "error: too little memory (can't start new thread); nothing"),
+        ('RuntimeError("DefaultCPUAllocator: can\'t allocate memory: 8 bytes")', "error: too little memory (Default"),
+        ('RuntimeError("can\'t start new thread")', "error: too little memory (can't start new thread); nothing"),
         ("OSError(28, 'No space left on device', '/tmp/x')", "error: /tmp/x cannot be written (No space left"),
     ],
 )

@@ -264,9 +264,7 @@ BAD_INPUTS = {
 
 
 @pytest.mark.parametrize("name", BAD_INPUTS)
-def test_wrong_input_is_one_line_and_exit_code_2(
-    tmp_path: Path, name: str, capfd: pytest.CaptureFixture[str]
-) -> None:
+def test_wrong_input_is_one_line_and_exit_code_2(tmp_path: Path, name: str, capfd: pytest.CaptureFixture[str]) -> None:
     for file, text in FILES_OF_BAD_INPUTS.items():
         (tmp_path / file).write_text(text)
     line, named = BAD_INPUTS[name]

@@ -23,9 +23,7 @@ def returned(material: Material, degrees: float) -> float:
     """Return the effective reflectance at an incidence angle: what comes back, of a perfect diffuser's at 0 degrees."""
     lobe = 1.0 / math.radians(material.retro_lobe_deg) ** 2
     cosine = math.cos(math.radians(degrees))
-    share = returned_share(
-        cosine, material.reflectivity, *facet_terms(material.slope), material.retroreflection, lobe
-    )
+    share = returned_share(cosine, material.reflectivity, *facet_terms(material.slope), material.retroreflection, lobe)
     return float(share[0])
 
 

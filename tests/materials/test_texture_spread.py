@@ -13,9 +13,7 @@ from synthroads_addon.materials.table import Material, materials
 from synthroads_addon.materials.texture_spread import OCTAVES, factor, spread_factors
 from tests.helpers.scenes.scan_scenes import Standing, middle_pulses, plane, scan_of
 
-UNEVEN = materials()["asphalt"].model_copy(
-    update={"spread_below": 0.4, "spread_above": 0.2, "spread_wavelength": 2.0}
-)
+UNEVEN = materials()["asphalt"].model_copy(update={"spread_below": 0.4, "spread_above": 0.2, "spread_wavelength": 2.0})
 
 
 def uneven_scan(material: Material = UNEVEN, rays: int = 1, path: Standing | None = None, **changes):

@@ -12,7 +12,6 @@ from pydantic.fields import FieldInfo
 from synthroads_addon.base.schema import ClosedModel, Model, unit_of
 from synthroads_addon.road.parameters import (
     Environment,
-    GantrySign,
     Lane,
     MaterialVariation,
     Metadata,
@@ -21,6 +20,7 @@ from synthroads_addon.road.parameters import (
     Ramp,
     Rut,
 )
+from synthroads_addon.road.things.gantry import GantrySign
 from synthroads_addon.scenario.road import Interval, RoadScenario
 from tests.helpers.roads.parameter_sets import LIBRARY_ONLY, OBJECTS
 

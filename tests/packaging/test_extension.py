@@ -96,7 +96,10 @@ def test_elevation_models_come_by_an_extension_of_their_own(archive: Path, manif
     rasterio = {Path(name).name.split("-")[2] for name in names if name.startswith("wheels/rasterio-")}
     assert rasterio == PYTHON_TAGS
     assert {name for name in names if "/" not in name} == {
-        "LICENSE", "THIRD_PARTY.txt", "__init__.py", "blender_manifest.toml",
+        "LICENSE",
+        "THIRD_PARTY.txt",
+        "__init__.py",
+        "blender_manifest.toml",
     }
     assert (own["version"], own["platforms"]) == (manifest["version"], manifest["platforms"])
     assert sorted(own["wheels"]) == sorted(f"./{name}" for name in names if name.endswith(".whl"))

@@ -20,8 +20,6 @@ from synthroads_addon.road.guidelines import (
 )
 from synthroads_addon.road.parameters import (
     AlignmentObject,
-    Delineator,
-    Guardrail,
     HorizontalElement,
     LineMarking,
     RoadParameters,
@@ -30,6 +28,8 @@ from synthroads_addon.road.parameters import (
     read_parameters,
 )
 from synthroads_addon.road.tessellation import sample_stations
+from synthroads_addon.road.things.delineator import Delineator
+from synthroads_addon.road.things.guardrail import Guardrail
 from synthroads_addon.sampling.road import sample_road
 from synthroads_addon.scenario.scenario import RoadScenario, load_scenario
 from tests.helpers.files.mutations import cases

@@ -23,7 +23,7 @@ from synthroads_addon.road.geometry import RoadGeometry
 from synthroads_addon.road.parameters import LineMarking, RoadParameters
 from synthroads_addon.road.stretches import stretches
 from synthroads_addon.road.tessellation import sample_stations
-from synthroads_addon.road.things.signs import SignCatalogue
+from synthroads_addon.road.things.sign_catalogue import SignCatalogue
 from synthroads_addon.sampling.road import sample_road
 from synthroads_addon.scanning.devices.device import DEVICES, Device
 from synthroads_addon.scenario.assets import LIBRARIES, AssetLibrary

@@ -28,7 +28,7 @@ from synthroads_addon.materials.table import read_material_table
 from synthroads_addon.road.centerline import read_axis
 from synthroads_addon.road.geometry import RoadGeometry
 from synthroads_addon.road.parameters import RoadParameters, read_parameters
-from synthroads_addon.road.things.signs import SignCatalogue
+from synthroads_addon.road.things.sign_catalogue import SignCatalogue
 from synthroads_addon.sampling.road import sample_road
 from synthroads_addon.scanning.devices.device import load_device, setting_of
 from synthroads_addon.scanning.platforms.polyline import PolylineGuide

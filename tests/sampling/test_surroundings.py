@@ -18,17 +18,17 @@ from synthroads_addon.road.objects import width_at
 from synthroads_addon.road.parameters import (
     AlignmentObject,
     Carriageway,
-    ConstructionBeacon,
     HorizontalElement,
     Metadata,
     RoadParameters,
-    TemporaryBarrier,
     Terrain,
     Transform,
     VerticalPoint,
     read_parameters,
 )
 from synthroads_addon.road.surroundings import SPECIES, Vegetation, Vehicle
+from synthroads_addon.road.things.beacon import ConstructionBeacon
+from synthroads_addon.road.things.temporary_barrier import TemporaryBarrier
 from synthroads_addon.road.things.vehicles import COLORS, VEHICLE_TYPES
 from synthroads_addon.sampling.placing.site import PlacementSite
 from synthroads_addon.sampling.surroundings import (

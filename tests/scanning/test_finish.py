@@ -80,9 +80,7 @@ def test_dark_patches_are_lost_and_bright_ones_found() -> None:
     assert found.below_threshold == 200 - len(found.points)
     assert (found.points.intensity >= limit).all()
     row = materials()["asphalt"]
-    dark, mean = (
-        float(reflectivity(np.array(row.base_color) * f, row.metallic, row.specular)) for f in (0.3, 1.0)
-    )
+    dark, mean = (float(reflectivity(np.array(row.base_color) * f, row.metallic, row.specular)) for f in (0.3, 1.0))
     limit = 0.5 * (1.0 + dark / mean) * base.points.intensity.min()
     left = finished(flying(threshold=limit), 0.3, 1.8)
     expected = (local_x(base) >= 0.0) | (base.points.intensity * dark / mean >= limit)

@@ -21,7 +21,7 @@ from synthroads_addon.road.parameters import (
     Turnout,
     VerticalPoint,
 )
-from synthroads_addon.road.things.furniture import Asset
+from synthroads_addon.road.things.asset import Asset
 from synthroads_addon.sampling.placing.assets import sample_assets
 from synthroads_addon.sampling.placing.site import PlacementSite
 from synthroads_addon.scenario.assets import AssetLibrary, read_asset_library

@@ -10,16 +10,9 @@ import numpy as np
 
 from ...road.geometry import sections_of
 from ...road.objects import AnyWidth, nominal_width
-from ...road.parameters import (
-    Carriageway,
-    Guardrail,
-    LineMarking,
-    Pavement,
-    RoadObject,
-    RoadParameters,
-    WidthPoint,
-)
+from ...road.parameters import Carriageway, LineMarking, Pavement, RoadObject, RoadParameters, WidthPoint
 from ...road.section_geometry import CarriagewaySection
+from ...road.things.guardrail import Guardrail
 from ..compat import modifier_input
 from ..things.model_builder import named_fields
 from ..things.road.layout import input_name, strip_widths

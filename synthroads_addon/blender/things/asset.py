@@ -12,8 +12,8 @@ from mathutils import Vector
 
 from ...base.errors import InputError
 from ...base.stepper import by_caller
-from ...road.parameters import Asset
 from ...road.surface import surface_elevation
+from ...road.things.asset import Asset
 from ...scanning.scene.mesh_files import check_mesh_file
 from ...scenario.assets import LibraryAsset, library_file, read_asset_library
 from ..files import complaint, stderr_if_it_succeeds

@@ -7,8 +7,7 @@ import math
 import numpy as np
 
 from ...base.classes import class_id
-from ...road.parameters import ConstructionBeacon
-from ...road.things.body_shapes import BEACON_BLADE, BEACON_BLADE_BOTTOM, BEACON_FOOT
+from ...road.things.beacon import BEACON_BLADE, BEACON_BLADE_BOTTOM, BEACON_FOOT, ConstructionBeacon
 from ..nodes import operations as op
 from ..nodes.builder import Tree, Value, makes_group
 from ..nodes.inputs import material_of, socket

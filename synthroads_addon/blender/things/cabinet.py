@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from ...base.classes import class_id
-from ...road.parameters import Cabinet
+from ...road.things.cabinet import Cabinet
 from ..nodes import operations as op
 from ..nodes.builder import Tree, Value, makes_group
 from ..nodes.inputs import material_of, metres

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from ...base.classes import class_id
-from ...road.parameters import ConcreteBarrier
-from ...road.things.body_shapes import CONCRETE_FLANKS, CONCRETE_TIP
+from ...road.things.concrete_barrier import CONCRETE_FLANKS, CONCRETE_TIP, ConcreteBarrier
 from ..nodes import operations as op
 from ..nodes.backbone import first_station, last_station
 from ..nodes.builder import Tree, Value, makes_group

@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ...base.classes import class_id
-from ...road.parameters import Delineator
-from ...road.things.body_shapes import DELINEATOR
+from ...road.things.delineator import DELINEATOR, Delineator
 from ..nodes import operations as op
 from ..nodes.builder import Tree, Value, makes_group
 from ..nodes.inputs import material_of, socket

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from ...base.classes import class_id
-from ...road.parameters import Guardrail
-from ...road.things.body_shapes import (
+from ...road.things.guardrail import (
     GUARDRAIL_BEAM,
     GUARDRAIL_LOWEST_POST,
     GUARDRAIL_POST,
     GUARDRAIL_POST_TOP,
     GUARDRAIL_SPACER,
     GUARDRAIL_TIP,
+    Guardrail,
 )
 from ..nodes import operations as op
 from ..nodes.backbone import first_station, height_on, last_station, look_up, raise_place, station_ribbon

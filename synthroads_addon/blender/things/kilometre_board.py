@@ -5,8 +5,7 @@ from __future__ import annotations
 import math
 
 from ...base.classes import class_id
-from ...road.parameters import KilometreBoard
-from ...road.things.body_shapes import KILOMETRE_POST
+from ...road.things.kilometre_board import KILOMETRE_POST, KilometreBoard
 from ..nodes import operations as op
 from ..nodes.builder import Tree, makes_group
 from ..nodes.inputs import Inputs, material_of, metres

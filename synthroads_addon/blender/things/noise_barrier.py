@@ -6,8 +6,8 @@ import math
 from dataclasses import dataclass
 
 from ...base.classes import class_id
-from ...road.parameters import NoiseBarrier
-from ...road.things.body_shapes import SHORTEST_ELEMENT
+from ...road.things.noise_barrier import NoiseBarrier
+from ...road.things.thing import SHORTEST_ELEMENT
 from ..nodes import operations as op
 from ..nodes.backbone import first_station, last_station
 from ..nodes.builder import Tree, Value, makes_group

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from ...base.classes import class_id
-from ...road.parameters import Pole
+from ...road.things.pole import Pole
 from ..nodes import operations as op
 from ..nodes.builder import Tree, Value, makes_group
 from ..nodes.inputs import boolean, material_of, metres

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from ...base.classes import class_id
-from ...road.parameters import TemporaryBarrier
-from ...road.things.body_shapes import LONGEST_PLASTIC, SHORTEST_ELEMENT, TEMPORARY_FLANKS, TEMPORARY_GAP
+from ...road.things.temporary_barrier import LONGEST_PLASTIC, TEMPORARY_FLANKS, TEMPORARY_GAP, TemporaryBarrier
+from ...road.things.thing import SHORTEST_ELEMENT
 from ..nodes import operations as op
 from ..nodes.backbone import first_station, last_station
 from ..nodes.builder import Tree, Value, makes_group

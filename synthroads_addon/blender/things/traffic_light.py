@@ -5,8 +5,7 @@ from __future__ import annotations
 import math
 
 from ...base.classes import class_id
-from ...road.parameters import TrafficLight
-from ...road.things.body_shapes import TRAFFIC_LIGHT_POST
+from ...road.things.traffic_light import TRAFFIC_LIGHT_POST, TrafficLight
 from ..nodes import operations as op
 from ..nodes.builder import Tree, Value, makes_group
 from ..nodes.inputs import integer, material_of, metres

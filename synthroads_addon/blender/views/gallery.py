@@ -155,7 +155,8 @@ def _driver(parameters: RoadParameters) -> None:
 def _kinds(parameters: RoadParameters) -> Iterator[tuple[str, int]]:
     """Yield (kind, instance) of what can be shown close up: the type, and what of it there are several kinds of."""
     for item in parameters.objects.values():
-        if item.type in _NOT_SHOWN or isinstance(item, AlignmentObject):
+        name = type(item).__name__
+        if name in _NOT_SHOWN or isinstance(item, AlignmentObject):
             continue
         variant = next(
             (
@@ -166,7 +167,7 @@ def _kinds(parameters: RoadParameters) -> Iterator[tuple[str, int]]:
             "",
         )
         species = getattr(item, "species", "")
-        yield "-".join(filter(None, (item.type.lower(), species or variant))), item.instance
+        yield "-".join(filter(None, (name.lower(), species or variant))), item.instance
 
 
 def _close_up(parameters: RoadParameters, mesh: SceneMesh, instance: int) -> bool:

@@ -22,13 +22,10 @@ from ...road.guidelines import (
     TIGHT_CURVE,
 )
 from ...road.surroundings import Vegetation
-from ...road.things.furniture import Gantry, NoiseBarrier, Overpass, Pole, TrafficSign
+from ...road.things.noise_barrier import NoiseBarrier
 from .edges import Edges
 from .obstacles import Spans
 from .rule import Finding, Road, Rule, above, below, gaps
-
-#: What is an obstacle in front of which a barrier must stand, for people.
-OBSTACLES: dict[type[Any], str] = {Gantry: "gantry's post", Overpass: "pier", Pole: "pole", TrafficSign: "sign's post"}
 
 
 def _ramps(edges: Edges) -> Spans:
@@ -86,12 +83,10 @@ def _curve_barrier(road: Road) -> Iterator[Finding]:
 
 def _obstacles(road: Road) -> Iterator[tuple[int, str]]:
     """Yield (index of its body, what it is) of everything that a vehicle must not run into."""
-    signs = road.of(TrafficSign)
-    for kind, what in OBSTACLES.items():
-        for i in road.bodies.of(kind, part="foot"):
-            name = road.bodies.items[i].name
-            if name not in signs or above(signs[name].post_diameter, OBSTACLE_POST):
-                yield i, what
+    for i, (name, block) in enumerate(zip(road.bodies.names, road.bodies.items, strict=True)):
+        thing: Any = road.parameters.objects[name]
+        if block.part == "foot" and thing.obstacle and above(getattr(thing, "post_diameter", np.inf), OBSTACLE_POST):
+            yield i, thing.obstacle
 
 
 def _missing_barrier(road: Road, edges: Edges, index: int, reach: tuple[float, float]) -> tuple[float, float] | None:
@@ -125,7 +120,7 @@ def _obstacle_barrier(road: Road) -> Iterator[Finding]:
                     f"The {what} stands {distance:.2f} m from {side} and {lacking[0]:.1f} m of the barrier in front of "
                     f"it are missing; nearer than {limit} m it is needed (RPS)."
                 )
-                yield Finding(road.bodies.items[i].name, lacking[1], lacking[0], 0.0, text)
+                yield Finding(road.bodies.names[i], lacking[1], lacking[0], 0.0, text)
 
 
 def _noise_barrier(road: Road) -> Iterator[Finding]:
@@ -141,7 +136,7 @@ def _noise_barrier(road: Road) -> Iterator[Finding]:
                     f"The noise barrier stands {distance:.2f} m from {side} and {lacking[0]:.1f} m of the barrier in "
                     "front of it are missing (RPS)."
                 )
-                yield Finding(road.bodies.items[i].name, lacking[1], lacking[0], 0.0, text)
+                yield Finding(road.bodies.names[i], lacking[1], lacking[0], 0.0, text)
 
 
 def _tree_distance(road: Road) -> Iterator[Finding]:

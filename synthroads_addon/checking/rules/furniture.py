@@ -11,8 +11,10 @@ from ...road.guidelines import DELINEATOR_SPACING, EMERGENCY_PHONE_SPACING, KILO
 from ...road.objects import LineObject, PointObject
 from ...road.section import LineMarking
 from ...road.surroundings import Vegetation, Vehicle
-from ...road.things.body_shapes import DELINEATOR_REACH
-from ...road.things.furniture import Cabinet, ConstructionBeacon, Delineator, KilometreBoard
+from ...road.things.beacon import ConstructionBeacon
+from ...road.things.cabinet import Cabinet
+from ...road.things.delineator import DELINEATOR_REACH, Delineator
+from ...road.things.kilometre_board import KilometreBoard
 from .edges import Edges, Float
 from .obstacles import Bodies, Bool
 from .rule import TOLERANCE, Finding, Road, Rule, below
@@ -74,12 +76,12 @@ def _delineator_spacing(road: Road) -> Iterator[Finding]:
 def _delineator_distance(road: Road) -> Iterator[Finding]:
     posts, clearance = road.of(Delineator), road.around.nearest
     for i in np.flatnonzero((clearance >= 0.0) & (clearance < DELINEATOR_DISTANCE)).tolist():
-        body, distance = road.bodies.items[i], float(clearance[i]) + DELINEATOR_REACH
-        if body.name in posts and below(distance, DELINEATOR_DISTANCE):
+        name, distance = road.bodies.names[i], float(clearance[i]) + DELINEATOR_REACH
+        if name in posts and below(distance, DELINEATOR_DISTANCE):
             text = (
                 f"The delineator stands {distance:.2f} m from the paved edge; {DELINEATOR_DISTANCE} m are needed (HLB)."
             )
-            yield Finding(body.name, posts[body.name].station, distance, DELINEATOR_DISTANCE, text)
+            yield Finding(name, posts[name].station, distance, DELINEATOR_DISTANCE, text)
 
 
 def _by_side(road: Road, items: dict[str, KilometreBoard] | dict[str, Cabinet]) -> Iterator[list[tuple[str, float]]]:
@@ -163,9 +165,9 @@ def _object_on_pavement(road: Road) -> Iterator[Finding]:
     clearance, where = road.around.nearest, road.around.where
     worst: dict[str, tuple[float, float]] = {}
     for i in np.flatnonzero(clearance < -TOLERANCE).tolist():
-        body = road.bodies.items[i]
-        if body.part in ("foot", "barrier", "wall") and body.name not in allowed:
-            worst[body.name] = min(worst.get(body.name, (0.0, 0.0)), (float(clearance[i]), float(where[i])))
+        name = road.bodies.names[i]
+        if road.bodies.items[i].part in ("foot", "barrier", "wall") and name not in allowed:
+            worst[name] = min(worst.get(name, (0.0, 0.0)), (float(clearance[i]), float(where[i])))
     places = [(name, station, distance) for name, (distance, station) in worst.items()]
     for name, plants in road.of(Vegetation).items():
         verge = min(edges.verge for edges in road.sides.values())
@@ -183,13 +185,12 @@ def _object_overlap(road: Road) -> Iterator[Finding]:
         depth = np.minimum(depth, np.minimum(high[first], high[second]) - np.maximum(low[first], low[second]))
     reported = set()
     for i in np.flatnonzero(depth > OVERLAP_ROOM).tolist():
-        a, b = bodies.items[first[i]], bodies.items[second[i]]
-        pair = (a.name, b.name)
-        if a.name == b.name or pair in reported:
+        pair = (bodies.names[first[i]], bodies.names[second[i]])
+        if pair[0] == pair[1] or pair in reported:
             continue
         reported.add(pair)
-        text = f"The object and {a.name} reach {depth[i]:.2f} m into each other."
-        yield Finding(b.name, max(a.start, b.start), float(depth[i]), 0.0, text)
+        text = f"The object and {pair[0]} reach {depth[i]:.2f} m into each other."
+        yield Finding(pair[1], float(max(bodies.start[first[i]], bodies.start[second[i]])), float(depth[i]), 0.0, text)
 
 
 def _near_pairs(bodies: Bodies) -> tuple[np.ndarray, np.ndarray]:

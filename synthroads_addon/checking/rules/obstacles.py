@@ -2,81 +2,48 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...road.parameters import RoadParameters
-from ...road.things import body_shapes as shapes
-from ...road.things.furniture import (
-    Asset,
-    Cabinet,
-    ConcreteBarrier,
-    ConstructionBeacon,
-    Delineator,
-    Gantry,
-    Guardrail,
-    KilometreBoard,
-    NoiseBarrier,
-    Overpass,
-    Pole,
-    TrafficLight,
-    TrafficSign,
-)
+from ...road.things.concrete_barrier import ConcreteBarrier
+from ...road.things.guardrail import Guardrail
+from ...road.things.kilometre_board import KilometreBoard
+from ...road.things.sign import TrafficSign
+from ...road.things.thing import Block, Thing
+from ...road.things.traffic_light import TrafficLight
 from .edges import Edges, Float
 
 #: What is longer than this (m) along the road is looked at at its ends as well.
 LONG = 1.5
-#: How far abutments reach, m: their embankments go on to the ground.
-FAR = 1000.0
-
 
 Bool = NDArray[np.bool_]
 Spans = list[tuple[float, float]]
 """Stretches of the road, m."""
 
 
-class Body(NamedTuple):
-    """A box.
-
-    Attributes:
-        name: id of its object.
-        part: ``foot``, ``face``, ``beam``, ``barrier`` or ``wall``.
-        start, end: stations, m.
-        low, high: offsets, m.
-        bottom, top: heights above the surface, m.
-    """
-
-    name: str
-    part: str
-    start: float
-    end: float
-    low: float
-    high: float
-    bottom: float
-    top: float
-
-
 class Bodies:
-    """All boxes of a road.
+    """The boxes around all things of a road.
 
     Attributes:
         items: the boxes.
+        names: ids of their things.
         start, end, low, high, bottom, top: (N,) their borders, m.
     """
 
     def __init__(self, parameters: RoadParameters) -> None:
-        self.items: list[Body] = []
+        self.items: list[Block] = []
+        self.names: list[str] = []
         self._of: dict[type, list[int]] = {}
         for name, item in parameters.objects.items():
-            make = _MAKERS.get(type(item))
-            if make is not None:
+            if isinstance(item, Thing):
                 first = len(self.items)
-                self.items += make(name, item)
+                self.items += item.footprint()
+                self.names += [name] * (len(self.items) - first)
                 self._of.setdefault(type(item), []).extend(range(first, len(self.items)))
-        numbers = np.array([body[2:] for body in self.items], dtype=np.float64).reshape(-1, 6)
+        numbers = np.array([block[1:] for block in self.items], dtype=np.float64).reshape(-1, 6)
         self.start, self.end, self.low, self.high, self.bottom, self.top = numbers.T
 
     def of(self, *kinds: type, part: str) -> list[int]:
@@ -150,7 +117,7 @@ class Barriers:
 
     def __init__(self, parameters: RoadParameters, bodies: Bodies, around: Around) -> None:
         index = bodies.of(Guardrail, ConcreteBarrier, part="barrier")
-        self.names = [bodies.items[i].name for i in index]
+        self.names = [bodies.names[i] for i in index]
         items: list[Any] = [parameters.objects[name] for name in self.names]
         numbers = [(item.start_station, item.end_station, item.offset) for item in items]
         self.start, self.end, self.offset = np.array(numbers, dtype=np.float64).reshape(-1, 3).T
@@ -194,7 +161,7 @@ class Signs:
 
     def __init__(self, parameters: RoadParameters, bodies: Bodies, around: Around) -> None:
         index = bodies.of(TrafficSign, KilometreBoard, part="face") + bodies.of(TrafficLight, part="foot")
-        self.names = [bodies.items[i].name for i in index]
+        self.names = [bodies.names[i] for i in index]
         items: list[Any] = [parameters.objects[name] for name in self.names]
         self.codes = [item.code if isinstance(item, TrafficSign) else "" for item in items]
         numbers = [(item.station, item.rotation_deg) for item in items]
@@ -213,99 +180,3 @@ class Signs:
         """Return the indices of the signs of a code that a carriageway's traffic sees, turned by `room` at most."""
         seen = self.of[edges.name] & (self.away(edges) <= room)
         return np.array([i for i, sign_code in enumerate(self.codes) if sign_code == code and seen[i]], dtype=np.intp)
-
-
-def _upright(name: str, item: Any, half: float, top: float) -> Body:
-    """Return what stands upright on its foot, `half` (m) its half width both ways."""
-    s, d, z = item.station, item.offset, item.elevation
-    return Body(name, "foot", s - half, s + half, d - half, d + half, z, z + top)
-
-
-def _beacon(name: str, item: ConstructionBeacon) -> Iterator[Body]:
-    body = _upright(name, item, item.width / 2.0, item.height)
-    yield body._replace(start=item.station - shapes.BEACON_REACH, end=item.station + shapes.BEACON_REACH)
-
-
-def _face(name: str, item: TrafficSign | KilometreBoard) -> Body:
-    """Return the face of a sign or board, turned as it stands."""
-    turn = np.radians(item.rotation_deg)
-    across = float(abs(np.cos(turn))) * item.width / 2.0 + shapes.FACE_REACH * float(abs(np.sin(turn)))
-    along = float(abs(np.sin(turn))) * item.width / 2.0 + shapes.FACE_REACH * float(abs(np.cos(turn)))
-    s, d, z = item.station, item.offset, item.elevation + item.lower_edge
-    return Body(name, "face", s - along, s + along, d - across, d + across, z, z + item.height)
-
-
-def _sign(name: str, item: TrafficSign) -> Iterator[Body]:
-    face = _face(name, item)
-    half = item.post_diameter / 2.0
-    for i in range(item.posts):
-        share = (i + 0.5) / item.posts
-        s = face.start + (face.end - face.start) * share
-        d = face.low + (face.high - face.low) * share
-        yield Body(name, "foot", s - half, s + half, d - half, d + half, item.elevation, face.top)
-    yield face
-
-
-def _board(name: str, item: KilometreBoard) -> Iterator[Body]:
-    face = _face(name, item)
-    yield _upright(name, item, shapes.BOARD_POST_REACH, item.lower_edge + item.height)
-    yield face
-
-
-def _gantry(name: str, item: Gantry) -> Iterator[Body]:
-    posts = {"left": [item.left_offset], "right": [item.right_offset]}[item.post_side]
-    if item.kind != "cantilever":
-        posts = [item.left_offset, item.right_offset] + ([0.0] if item.kind == "two_sided" else [])
-    half, s, top = item.post_width / 2.0, item.station, item.clearance + item.beam_height
-    for d in posts:
-        yield Body(name, "foot", s - half, s + half, d - half, d + half, 0.0, top)
-    deep = item.beam_depth / 2.0
-    yield Body(name, "beam", s - deep, s + deep, item.right_offset, item.left_offset, item.clearance, top)
-
-
-def _overpass(name: str, item: Overpass) -> Iterator[Body]:
-    half, s, top = item.width / 2.0, item.station, item.clearance + item.deck_thickness
-    for d in item.pier_offsets:
-        yield Body(
-            name, "foot", s - half, s + half, d - item.pier_width / 2.0, d + item.pier_width / 2.0, 0.0, item.clearance
-        )
-    left, right = item.left_abutment, item.right_abutment
-    yield Body(name, "beam", s - half, s + half, right, left, item.clearance, top)
-    yield Body(name, "wall", s - half, s + half, left, FAR, 0.0, top)
-    yield Body(name, "wall", s - half, s + half, -FAR, right, 0.0, top)
-
-
-def _guardrail(name: str, item: Guardrail) -> Iterator[Body]:
-    left = shapes.BEAM_REACH if item.faces in ("left", "both") else shapes.POST_REACH
-    right = shapes.BEAM_REACH if item.faces in ("right", "both") else shapes.POST_REACH
-    yield _along(name, item, right, left)
-
-
-def _along(name: str, item: Any, right: float, left: float) -> Body:
-    start, end = sorted((item.start_station, item.end_station))
-    return Body(name, "barrier", start, end, item.offset - right, item.offset + left, 0.0, item.height)
-
-
-def _on_foot(half_width: Callable[[Any], float]) -> Callable[[str, Any], list[Body]]:
-    return lambda name, item: [_upright(name, item, half_width(item), item.height)]
-
-
-def _symmetric(half_width: Callable[[Any], float]) -> Callable[[str, Any], list[Body]]:
-    return lambda name, item: [_along(name, item, half_width(item), half_width(item))]
-
-
-_MAKERS: dict[type, Callable[[str, Any], Iterable[Body]]] = {
-    Asset: lambda name, item: [_upright(name, item, 0.0, 0.0)],
-    Cabinet: _on_foot(lambda item: max(item.width, item.depth) / 2.0),
-    ConcreteBarrier: _symmetric(lambda item: item.base_width / 2.0),
-    ConstructionBeacon: _beacon,
-    Delineator: _on_foot(lambda _: shapes.DELINEATOR_REACH),
-    Gantry: _gantry,
-    Guardrail: _guardrail,
-    KilometreBoard: _board,
-    NoiseBarrier: _symmetric(lambda item: max(item.thickness, item.post_width) / 2.0),
-    Overpass: _overpass,
-    Pole: _on_foot(lambda item: item.diameter / 2.0),
-    TrafficLight: _on_foot(lambda item: item.light_diameter / 2.0),
-    TrafficSign: _sign,
-}

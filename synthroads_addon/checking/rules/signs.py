@@ -7,7 +7,9 @@ from collections.abc import Iterator
 import numpy as np
 
 from ...road.guidelines import CLEARANCE, EXIT_SEQUENCE, EXIT_SIGN_ROOM, GORE_SIGN, SIGN_DISTANCE, SIGN_LOWER_EDGE
-from ...road.things.furniture import Gantry, Overpass, TrafficSign
+from ...road.things.gantry import Gantry
+from ...road.things.overpass import Overpass
+from ...road.things.sign import TrafficSign
 from .edges import Edges, TurnoutEdges
 from .rule import TOLERANCE, Finding, Road, Rule, above, below
 
@@ -20,10 +22,10 @@ LOW_SIGNS = "450"
 def _sign_distance(road: Road) -> Iterator[Finding]:
     clearance = road.around.nearest
     for i in np.flatnonzero((clearance >= 0.0) & (clearance < SIGN_DISTANCE)).tolist():
-        body, distance = road.bodies.items[i], float(clearance[i])
+        body, name, distance = road.bodies.items[i], road.bodies.names[i], float(clearance[i])
         if body.part == "face" and below(distance, SIGN_DISTANCE) and below(body.bottom, CLEARANCE):
             text = f"The sign stands {distance:.2f} m from the paved edge; {SIGN_DISTANCE} m are needed (VwV-StVO)."
-            yield Finding(body.name, 0.5 * (body.start + body.end), distance, SIGN_DISTANCE, text)
+            yield Finding(name, 0.5 * (body.start + body.end), distance, SIGN_DISTANCE, text)
 
 
 def _sign_lower_edge(road: Road) -> Iterator[Finding]:
@@ -97,7 +99,7 @@ def _clearance(road: Road) -> Iterator[Finding]:
     for i in np.flatnonzero(road.around.nearest < 0.0).tolist():
         body = road.bodies.items[i]
         if body.part == "face":
-            spans.append((body.name, 0.5 * (body.start + body.end), body.bottom))
+            spans.append((road.bodies.names[i], 0.5 * (body.start + body.end), body.bottom))
     for name, station, value in spans:
         if below(value, CLEARANCE):
             text = f"{value:.2f} m are clear below it; {CLEARANCE:.2f} m are needed over the pavement (RAA)."

@@ -10,7 +10,8 @@ import numpy as np
 
 from ...road.guidelines import BEACON_SPACING, BEACON_SPACING_TAPER, CONSTRUCTION_LANE_WIDTH
 from ...road.surroundings import Vehicle
-from ...road.things.furniture import ConstructionBeacon, TemporaryBarrier
+from ...road.things.beacon import ConstructionBeacon
+from ...road.things.temporary_barrier import TemporaryBarrier
 from .edges import Edges, Float
 from .rule import TOLERANCE, Finding, Road, Rule, below
 

@@ -122,9 +122,7 @@ class _Search:
             "pilot_seconds": round(here - self.began_here, 3),
         }
         built = None if self.trial is None else self.trial[0]
-        return Decision(
-            scenario, report, built in (None, ModelKnobs(settings.tolerance, settings.vegetation_detail))
-        )
+        return Decision(scenario, report, built in (None, ModelKnobs(settings.tolerance, settings.vegetation_detail)))
 
     def _choose_by_tolerance(self) -> tuple[_Findings, Choice]:
         found = self._measure()

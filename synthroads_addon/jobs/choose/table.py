@@ -58,9 +58,7 @@ class Table:
         known = sorted((int(number), 1e-6 * value) for number, value in self.pulse.items())
         if rays <= known[0][0]:
             return known[0][1]
-        (a, low), (b, high) = next(
-            (pair for pair in pairwise(known) if rays <= pair[1][0]), (known[-2], known[-1])
-        )
+        (a, low), (b, high) = next((pair for pair in pairwise(known) if rays <= pair[1][0]), (known[-2], known[-1]))
         return low + (high - low) * (rays - a) / (b - a)
 
 

@@ -61,9 +61,7 @@ def _read_knob(
     return Knob(table, {value: (*always, *changes) for value, changes in further}, tuple(errors), whole_paths)
 
 
-KNOBS: dict[str, Knob] = {
-    name: _read_knob(**data) for name, data in read_json(PRESETS / "tradeoff_rows.json").items()
-}
+KNOBS: dict[str, Knob] = {name: _read_knob(**data) for name, data in read_json(PRESETS / "tradeoff_rows.json").items()}
 """Knobs by name. ``fidelity`` are the presets: points that set several knobs at once; ``between`` are presets with one
 knob of another, which a preset must not be worse than. What is usual in them: no colours and relief where the model and
 the beam are measured, which don't touch these."""

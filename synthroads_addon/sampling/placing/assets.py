@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from ...base.errors import InputError
 from ...base.schema import round_value
 from ...road.section_geometry import CarriagewaySection
-from ...road.things.furniture import Asset
+from ...road.things.asset import Asset
 from ...scenario.assets import FARTHEST, AssetPlacement, read_asset_library
 from ...scenario.road import Interval
 from .site import PlacementSite

@@ -11,8 +11,10 @@ import numpy as np
 
 from ...base.schema import round_value
 from ...road.guidelines import BARRIER_DISTANCE, EMBANKMENT_HEIGHT, EMBANKMENT_RUN, OBSTACLE_LEAD, SHORTEST_BARRIER
-from ...road.objects import LineObject
-from ...road.things.furniture import ConcreteBarrier, Guardrail, NoiseBarrier, Side
+from ...road.objects import LineObject, Side
+from ...road.things.concrete_barrier import ConcreteBarrier
+from ...road.things.guardrail import Guardrail
+from ...road.things.noise_barrier import NoiseBarrier
 from ...scenario.road import BarrierLimits
 from .draw import draw, pick
 from .edge import STEP_OF_BARRIERS, Segment

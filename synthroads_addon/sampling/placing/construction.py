@@ -12,9 +12,10 @@ from numpy.typing import NDArray
 
 from ...base.schema import round_value
 from ...road.guidelines import CONSTRUCTION_LANE_WIDTH
-from ...road.objects import RoadObject, WidthPoint, width_kinks
+from ...road.objects import RoadObject, Side, WidthPoint, width_kinks
 from ...road.section import Carriageway, LineMarking
-from ...road.things.furniture import ConstructionBeacon, Side, TemporaryBarrier
+from ...road.things.beacon import ConstructionBeacon
+from ...road.things.temporary_barrier import TemporaryBarrier
 from .draw import draw, pick
 from .layout import Layout, Roadside
 from .ranges import Range, Taken, draw_start, free_ranges

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ...road.guidelines import DELINEATOR_SPACING
 from ...road.parameters import HorizontalElement
-from ...road.things.furniture import Delineator
+from ...road.things.delineator import Delineator
 from .layout import Roadside
 
 DELINEATOR_DISTANCE = 0.50

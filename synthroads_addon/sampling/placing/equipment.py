@@ -5,7 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from ...road.guidelines import EMERGENCY_PHONE_SPACING, KILOMETRE_BOARD_SPACING
-from ...road.things.furniture import Cabinet, KilometreBoard, Pole, TrafficLight
+from ...road.things.cabinet import Cabinet
+from ...road.things.kilometre_board import KilometreBoard
+from ...road.things.pole import Pole
+from ...road.things.traffic_light import TrafficLight
 from .draw import draw, pick
 from .edge import ramp_station
 from .layout import Layout, Roadside, Spot

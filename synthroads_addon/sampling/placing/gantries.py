@@ -9,8 +9,9 @@ from typing import Literal
 import numpy as np
 
 from ...base.schema import round_value
-from ...road.things.furniture import Gantry, GantrySign, Side
-from ...road.things.signs import sign_catalogue
+from ...road.objects import Side
+from ...road.things.gantry import Gantry, GantrySign
+from ...road.things.sign_catalogue import sign_catalogue
 from .draw import draw, pick
 from .layout import SMALL_ZONE, Layout, Roadside
 from .ranges import Taken, draw_start, free_ranges

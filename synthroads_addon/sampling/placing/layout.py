@@ -15,8 +15,8 @@ from typing import Any, NamedTuple
 
 from ...base.schema import round_value
 from ...road.guidelines import OBSTACLE_LEAD, OBSTACLE_TAIL, TIGHT_CURVE
-from ...road.objects import AnyWidth, PointObject
-from ...road.things.furniture import Side, TrafficSign
+from ...road.objects import AnyWidth, PointObject, Side
+from ...road.things.sign import TrafficSign
 from .edge import EdgeProfile
 from .ranges import Range, Taken
 from .site import PlacementSite

@@ -8,7 +8,7 @@ from math import cos, radians, sin, tan
 import numpy as np
 
 from ...base.schema import round_value
-from ...road.things.furniture import Overpass
+from ...road.things.overpass import Overpass
 from .draw import draw, pick
 from .layout import SMALL_ZONE, Layout
 from .ranges import draw_start, free_ranges

@@ -12,8 +12,9 @@ import numpy as np
 
 from ...base.schema import round_value
 from ...road.objects import LineObject
-from ...road.things.furniture import Delineator, TrafficLight
-from ...road.things.signs import sign_catalogue
+from ...road.things.delineator import Delineator
+from ...road.things.sign_catalogue import sign_catalogue
+from ...road.things.traffic_light import TrafficLight
 from .barriers import TERMINAL, BarrierSystem
 from .draw import pick
 from .equipment import LARGEST_KILOMETRE, LIGHT_WIDTH, put_kilometre_board, put_phone

@@ -10,9 +10,10 @@ import numpy as np
 
 from ...base.schema import round_value
 from ...road.guidelines import BARRIER_DISTANCE, EXIT_SEQUENCE, EXIT_SIGN_ROOM, GORE_SIGN, OBSTACLE_POST, SIGN_DISTANCE
+from ...road.objects import Side
 from ...road.section import Turnout
-from ...road.things.furniture import Side, TrafficSign
-from ...road.things.signs import SignType, sign_catalogue
+from ...road.things.sign import TrafficSign
+from ...road.things.sign_catalogue import SignType, sign_catalogue
 from ...road.turnout_geometry import STEP, TurnoutShape
 from .edge import island_begin, ramp_station
 from .layout import MEDIAN_BARRIER_HALF, MEDIAN_OBSTACLE, Layout, Roadside, Spot

@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 
 from ...base.random_streams import stream
 from ...road.guidelines import LIMITS, DesignLimits
+from ...road.objects import Side
 from ...road.parameters import AlignmentObject
 from ...road.section import Carriageway, Turnout
 from ...road.section_geometry import CarriagewaySection
 from ...road.surroundings import Terrain
-from ...road.things.furniture import Side
 from ...road.turnout_geometry import TurnoutShape
 from ...scenario.road import RoadScenario
 

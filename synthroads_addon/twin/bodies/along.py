@@ -6,8 +6,19 @@ import numpy as np
 
 from ...road.geometry import RoadGeometry
 from ...road.objects import LineObject
-from ...road.parameters import ConcreteBarrier, Guardrail, NoiseBarrier, TemporaryBarrier
-from ...road.things import body_shapes as shapes
+from ...road.things.concrete_barrier import CONCRETE_FLANKS, CONCRETE_TIP, ConcreteBarrier
+from ...road.things.guardrail import (
+    GUARDRAIL_BEAM,
+    GUARDRAIL_LOWEST_POST,
+    GUARDRAIL_POST,
+    GUARDRAIL_POST_TOP,
+    GUARDRAIL_SPACER,
+    GUARDRAIL_TIP,
+    Guardrail,
+)
+from ...road.things.noise_barrier import NoiseBarrier
+from ...road.things.temporary_barrier import LONGEST_PLASTIC, TEMPORARY_FLANKS, TEMPORARY_GAP, TemporaryBarrier
+from ...road.things.thing import SHORTEST_ELEMENT
 from ..faces import Faces, Float, loft
 from ..surfaces import height_share, left_of, line_stations, needed_rows, on_ground, ramp_length
 
@@ -53,9 +64,9 @@ def _guardrail(geometry: RoadGeometry, rail: Guardrail, tolerance: float) -> lis
     station, end = _swept_rows(geometry, rail, tolerance)
     feet, left = _feet(geometry, rail, station)
     share = height_share(rail, end, station)
-    top = rail.height * share + shapes.GUARDRAIL_TIP * (1.0 - share)
-    profile = np.array(shapes.GUARDRAIL_BEAM)
-    back = shapes.GUARDRAIL_POST[0] / 2.0 + shapes.GUARDRAIL_SPACER[rail.faces]
+    top = rail.height * share + GUARDRAIL_TIP * (1.0 - share)
+    profile = np.array(GUARDRAIL_BEAM)
+    back = GUARDRAIL_POST[0] / 2.0 + GUARDRAIL_SPACER[rail.faces]
     low, near, far = profile[:, 1].min(), back, back + profile[:, 0].max()
     bodies = []
     for name, side in (("left", 1.0), ("right", -1.0)):
@@ -77,11 +88,11 @@ def _posts(geometry: RoadGeometry, rail: Guardrail, end: float) -> list[Faces]:
     station = rail.start_station + np.arange(count) * rail.post_spacing
     station = station[station <= end + 1e-9]
     share = height_share(rail, end, station)
-    tall = rail.height * share + shapes.GUARDRAIL_TIP * (1.0 - share)
-    station, tall = station[tall >= shapes.GUARDRAIL_LOWEST_POST], tall[tall >= shapes.GUARDRAIL_LOWEST_POST]
+    tall = rail.height * share + GUARDRAIL_TIP * (1.0 - share)
+    station, tall = station[tall >= GUARDRAIL_LOWEST_POST], tall[tall >= GUARDRAIL_LOWEST_POST]
     feet, left = _feet(geometry, rail, station)
-    sizes = np.tile(shapes.GUARDRAIL_POST, (len(feet), 1))
-    return _boxes(feet, left, sizes, tall - shapes.GUARDRAIL_POST_TOP)
+    sizes = np.tile(GUARDRAIL_POST, (len(feet), 1))
+    return _boxes(feet, left, sizes, tall - GUARDRAIL_POST_TOP)
 
 
 def _boxes(feet: Float, left: Float, size: Float, tall: Float) -> list[Faces]:
@@ -97,8 +108,8 @@ def _boxes(feet: Float, left: Float, size: Float, tall: Float) -> list[Faces]:
 def _concrete(geometry: RoadGeometry, barrier: ConcreteBarrier, tolerance: float) -> Faces:
     station, end = _swept_rows(geometry, barrier, tolerance)
     feet, left = _feet(geometry, barrier, station)
-    tall = np.maximum(barrier.height * height_share(barrier, end, station), shapes.CONCRETE_TIP)
-    return loft(_symmetric_sections(feet, left, shapes.CONCRETE_FLANKS[barrier.profile], barrier.base_width, tall))
+    tall = np.maximum(barrier.height * height_share(barrier, end, station), CONCRETE_TIP)
+    return loft(_symmetric_sections(feet, left, CONCRETE_FLANKS[barrier.profile], barrier.base_width, tall))
 
 
 def _symmetric_sections(
@@ -114,7 +125,7 @@ def _symmetric_sections(
 def _noise_barrier(geometry: RoadGeometry, wall: NoiseBarrier) -> list[Faces]:
     """Return posts, and between them panels down to the ground, level at the lower one of their posts."""
     end = min(wall.end_station, geometry.length)
-    count = max(1, int(np.ceil((end - wall.start_station) / wall.post_spacing - shapes.SHORTEST_ELEMENT)))
+    count = max(1, int(np.ceil((end - wall.start_station) / wall.post_spacing - SHORTEST_ELEMENT)))
     station = np.append(wall.start_station + np.arange(count) * wall.post_spacing, end)
     feet, left = _feet(geometry, wall, station)
     posts = _boxes(feet, left, np.full((count + 1, 2), wall.post_width), np.full(count + 1, wall.height))
@@ -133,17 +144,17 @@ def _noise_barrier(geometry: RoadGeometry, wall: NoiseBarrier) -> list[Faces]:
 def _elements(geometry: RoadGeometry, barrier: TemporaryBarrier) -> list[Faces]:
     """Return the elements of a movable barrier, each straight from foot to foot."""
     span, end = barrier.end_station - barrier.start_station, min(barrier.end_station, geometry.length)
-    count = max(1, int(np.ceil(span / barrier.segment_length - shapes.SHORTEST_ELEMENT)))
+    count = max(1, int(np.ceil(span / barrier.segment_length - SHORTEST_ELEMENT)))
     start = barrier.start_station + np.arange(count) * barrier.segment_length
     stop = np.append(start[1:], barrier.end_station)
-    gap = shapes.TEMPORARY_GAP / 2.0
+    gap = TEMPORARY_GAP / 2.0
     ends = np.stack([start + gap, np.minimum(stop - gap, end)], axis=1)
     ends = ends[ends[:, 1] - ends[:, 0] > 0.05]
     feet = _feet(geometry, barrier, ends.ravel())[0].reshape(-1, 2, 3)
     along = feet[:, 1] - feet[:, 0]
     left = np.stack([-along[:, 1], along[:, 0], np.zeros(len(along))], axis=1)
     left /= np.linalg.norm(left, axis=1)[:, None]
-    flank = shapes.TEMPORARY_FLANKS["plastic" if barrier.segment_length <= shapes.LONGEST_PLASTIC else "steel"]
+    flank = TEMPORARY_FLANKS["plastic" if barrier.segment_length <= LONGEST_PLASTIC else "steel"]
     tall = np.full(2, barrier.height)
     return [
         loft(_symmetric_sections(pair, np.stack([side, side]), flank, barrier.base_width, tall))

@@ -9,21 +9,25 @@ from typing import Any
 import numpy as np
 
 from ...road.geometry import RoadGeometry
-from ...road.parameters import (
-    Cabinet,
-    ConstructionBeacon,
-    Delineator,
-    Gantry,
-    GantrySign,
-    KilometreBoard,
-    Overpass,
-    PointObject,
-    Pole,
-    TrafficLight,
-    TrafficSign,
-)
+from ...road.parameters import PointObject
 from ...road.surface import highest_pavement
-from ...road.things import body_shapes as shapes
+from ...road.things.beacon import BEACON_BLADE, BEACON_BLADE_BOTTOM, BEACON_FOOT, ConstructionBeacon
+from ...road.things.cabinet import Cabinet
+from ...road.things.delineator import DELINEATOR, Delineator
+from ...road.things.gantry import GANTRY_HANGER, Gantry, GantrySign
+from ...road.things.kilometre_board import KILOMETRE_POST, KilometreBoard
+from ...road.things.overpass import (
+    BRIDGE_ABUTMENT,
+    BRIDGE_BEARING,
+    BRIDGE_BURIED,
+    BRIDGE_DECK,
+    BRIDGE_PIER_LENGTH,
+    BRIDGE_SEAT,
+    Overpass,
+)
+from ...road.things.pole import Pole
+from ...road.things.sign import SIGN_OUTLINES, SIGN_RAIL, TrafficSign
+from ...road.things.traffic_light import TRAFFIC_LIGHT_POST, TrafficLight
 from ..faces import Faces, Float, loft
 from ..surfaces import on_ground
 
@@ -135,14 +139,14 @@ def _circle(count: int) -> list[tuple[float, float]]:
 
 
 def _delineator(place: Place, item: Delineator) -> list[Faces]:
-    return [place.prism(shapes.DELINEATOR, 0.0, item.height)]
+    return [place.prism(DELINEATOR, 0.0, item.height)]
 
 
 def _sign(place: Place, item: TrafficSign) -> list[Faces]:
-    corners = shapes.SIGN_OUTLINES.get(item.shape) or [(u / 2, v / 2) for u, v in _circle(_ROUND_FACE)]
+    corners = SIGN_OUTLINES.get(item.shape) or [(u / 2, v / 2) for u, v in _circle(_ROUND_FACE)]
     middle = item.lower_edge + item.height / 2.0
     face = [(u * item.width, middle + v * item.height) for u, v in corners]
-    front = -(item.post_diameter / 2.0 + shapes.SIGN_RAIL)
+    front = -(item.post_diameter / 2.0 + SIGN_RAIL)
     top = item.lower_edge + item.height * _POST_TOPS[item.shape]
     beside = [((i + 0.5) / item.posts - 0.5) * item.width for i in range(item.posts)]
     feet = place.ground(beside, 0.0) if item.posts > 1 else [-item.elevation]
@@ -153,7 +157,7 @@ def _sign(place: Place, item: TrafficSign) -> list[Faces]:
 def _kilometre_board(place: Place, item: KilometreBoard) -> list[Faces]:
     middle = item.lower_edge + item.height / 2.0
     board = place.box((item.width, 2.0 * _PLATE, item.height), (0.0, 0.0, middle))
-    return [board, place.post(shapes.KILOMETRE_POST, -item.elevation, item.lower_edge)]
+    return [board, place.post(KILOMETRE_POST, -item.elevation, item.lower_edge)]
 
 
 def _pole(place: Place, item: Pole) -> list[Faces]:
@@ -170,8 +174,8 @@ def _pole(place: Place, item: Pole) -> list[Faces]:
 
 def _traffic_light(place: Place, item: TrafficLight) -> list[Faces]:
     wide, deep, tall = 1.3 * item.light_diameter, 0.7 * item.light_diameter, 1.25 * item.light_diameter * item.lights
-    head = place.box((wide, deep, tall), (0.0, -(shapes.TRAFFIC_LIGHT_POST + deep) / 2.0, item.height - tall / 2.0))
-    return [place.post(shapes.TRAFFIC_LIGHT_POST, -item.elevation, item.height), head]
+    head = place.box((wide, deep, tall), (0.0, -(TRAFFIC_LIGHT_POST + deep) / 2.0, item.height - tall / 2.0))
+    return [place.post(TRAFFIC_LIGHT_POST, -item.elevation, item.height), head]
 
 
 def _cabinet(place: Place, item: Cabinet) -> list[Faces]:
@@ -180,8 +184,8 @@ def _cabinet(place: Place, item: Cabinet) -> list[Faces]:
 
 
 def _beacon(place: Place, item: ConstructionBeacon) -> list[Faces]:
-    foot, bottom = shapes.BEACON_FOOT, shapes.BEACON_BLADE_BOTTOM
-    blade = place.box((item.width, shapes.BEACON_BLADE, item.height), (0.0, 0.0, bottom + item.height / 2.0))
+    foot, bottom = BEACON_FOOT, BEACON_BLADE_BOTTOM
+    blade = place.box((item.width, BEACON_BLADE, item.height), (0.0, 0.0, bottom + item.height / 2.0))
     return [place.box(foot, (0.0, 0.0, foot[2] / 2.0)), blade]
 
 
@@ -216,7 +220,7 @@ def _board(place: Place, item: Gantry, sign: GantrySign, low: float) -> Faces:
     """Return a board's body, in front of the beam as the traffic below it sees it."""
     before_beam = item.beam_bottom(low) + item.beam_height / 2.0
     z = before_beam if item.ends_in_beam(sign, low) else low + sign.height / 2.0
-    y = -sign.facing * (item.beam_depth / 2.0 + shapes.GANTRY_HANGER + sign.depth / 2.0)
+    y = -sign.facing * (item.beam_depth / 2.0 + GANTRY_HANGER + sign.depth / 2.0)
     return place.box((sign.width, sign.depth, sign.height), (item.offset - sign.offset, y, z))
 
 
@@ -247,30 +251,30 @@ def bridge_bodies(place: Place, bridge: Overpass) -> dict[str, Faces]:
     half = bridge.width / 2.0
     low = pavement_below(place, (left, right), (-half, half), shear) + bridge.clearance - float(place.origin[2])
     high = low + bridge.deck_thickness
-    bodies = {"deck": _deck(place, bridge, (left - shapes.BRIDGE_SEAT, right + shapes.BRIDGE_SEAT), low, shear)}
+    bodies = {"deck": _deck(place, bridge, (left - BRIDGE_SEAT, right + BRIDGE_SEAT), low, shear)}
     if bridge.parapet_height > 0.0:
         for name, side in (("parapet-1", -1.0), ("parapet-2", 1.0)):
             y = (half - _PARAPET, half) if side > 0.0 else (-half, _PARAPET - half)
-            ends = (left - shapes.BRIDGE_SEAT, right + shapes.BRIDGE_SEAT)
+            ends = (left - BRIDGE_SEAT, right + BRIDGE_SEAT)
             bodies[name] = _block(place, ends, y, (high, high + bridge.parapet_height), shear)
-    top = low - shapes.BRIDGE_BEARING
+    top = low - BRIDGE_BEARING
     for number, offset in enumerate(bridge.pier_offsets, 1):
         bodies[f"pier-{number}"] = _pier(place, bridge, bridge.offset - offset, top, shear)
     for name, face, side in (("abutment-1", left, -1.0), ("abutment-2", right, 1.0)):
-        foot = float(place.ground(face, np.array([half, -half]) + face * shear).min()) - shapes.BRIDGE_BURIED
-        back = face + side * shapes.BRIDGE_ABUTMENT
+        foot = float(place.ground(face, np.array([half, -half]) + face * shear).min()) - BRIDGE_BURIED
+        back = face + side * BRIDGE_ABUTMENT
         bodies[name] = _block(place, (min(face, back), max(face, back)), (-half, half), (foot, top), shear)
     return bodies
 
 
 def _pier(place: Place, bridge: Overpass, x: float, top: float, shear: float) -> Faces:
-    foot = float(place.ground(x, x * shear)[0]) - shapes.BRIDGE_BURIED
-    long = max(bridge.width * shapes.BRIDGE_PIER_LENGTH, bridge.pier_width * 1.02)
+    foot = float(place.ground(x, x * shear)[0]) - BRIDGE_BURIED
+    long = max(bridge.width * BRIDGE_PIER_LENGTH, bridge.pier_width * 1.02)
     return place.box((bridge.pier_width, long, top - foot), (x, x * shear, (top + foot) / 2.0))
 
 
 def _deck(place: Place, bridge: Overpass, ends: tuple[float, float], low: float, shear: float) -> Faces:
-    half = np.array(shapes.BRIDGE_DECK) * (bridge.width / 2.0, bridge.deck_thickness)
+    half = np.array(BRIDGE_DECK) * (bridge.width / 2.0, bridge.deck_thickness)
     outline = np.concatenate([half, half[::-1] * (-1.0, 1.0)])
     sections = [
         np.column_stack([np.full(len(outline), x), outline[:, 0] + x * shear, outline[:, 1] + low]) for x in ends

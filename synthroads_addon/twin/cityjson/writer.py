@@ -9,7 +9,9 @@ import numpy as np
 
 from ...road.geometry import RoadGeometry
 from ...road.objects import LineObject, PointObject
-from ...road.parameters import Arrow, Asset, Overpass, RoadParameters
+from ...road.parameters import Arrow, RoadParameters
+from ...road.things.asset import Asset
+from ...road.things.overpass import Overpass
 from ..attributes import attributes_of
 from ..bodies.along import bodies_along
 from ..bodies.at import Place, bodies_at, bridge_bodies, places_of

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from ...road.objects import Side
 from ...road.parameters import Lane
-from ...road.things.furniture import Side
 from .marks import RoadMarks
 from .pieces import Float, chords, cubics, distinct, runs
 from .sections import LanePlan, LaneSection, LaneStrip

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from ...road.geometry import RoadGeometry
+from ...road.objects import Side
 from ...road.parameters import LineMarking
-from ...road.things.furniture import Side
 from .pieces import CLOSE
 from .sections import LanePlan, LaneSection
 from .xml import Element, element, notes

@@ -10,27 +10,21 @@ import numpy as np
 
 from ...road.objects import LineObject, PointObject
 from ...road.paint import arrow_outlines, hatching_outlines
-from ...road.parameters import (
-    Arrow,
-    Asset,
-    Cabinet,
-    ConcreteBarrier,
-    ConstructionBeacon,
-    Delineator,
-    Gantry,
-    Guardrail,
-    Hatching,
-    KilometreBoard,
-    LineMarking,
-    NoiseBarrier,
-    Overpass,
-    Pole,
-    RoadObject,
-    TemporaryBarrier,
-    TrafficLight,
-    TrafficSign,
-)
-from ...road.things import body_shapes as shapes
+from ...road.parameters import Arrow, Hatching, LineMarking, RoadObject
+from ...road.things.asset import Asset
+from ...road.things.beacon import ConstructionBeacon
+from ...road.things.cabinet import Cabinet
+from ...road.things.concrete_barrier import ConcreteBarrier
+from ...road.things.delineator import DELINEATOR_REACH, Delineator
+from ...road.things.gantry import Gantry
+from ...road.things.guardrail import Guardrail
+from ...road.things.kilometre_board import KilometreBoard
+from ...road.things.noise_barrier import NoiseBarrier
+from ...road.things.overpass import Overpass
+from ...road.things.pole import Pole
+from ...road.things.sign import TrafficSign
+from ...road.things.temporary_barrier import TemporaryBarrier
+from ...road.things.traffic_light import TrafficLight
 from .numbers import Numbers
 from .pieces import CLOSE, Float
 from .places import Ground, side_of
@@ -39,6 +33,7 @@ from .xml import Element, Value, element, notes
 
 LIGHT_POST, BOARD_POST = 0.12, 0.06
 """Diameters of a traffic light's and a kilometre board's post, m."""
+BEAM_REACH, POST_REACH, BEACON_REACH = 0.2, 0.05, 0.1
 _ABUTMENT = 1.0  # m, thickness of the walls that an overpass ends at
 
 Corners = Iterable[tuple[float, float]]
@@ -298,9 +293,9 @@ def _cross_section(item: LineObject) -> tuple[str, float, float]:
     """Return a barrier's subtype, its width, and how far its middle lies to the left of its axis, m."""
     if isinstance(item, Guardrail):
         if item.faces == "both":
-            return "guardRail", 2.0 * shapes.BEAM_REACH, 0.0
-        beside = (shapes.BEAM_REACH - shapes.POST_REACH) / 2.0
-        return "guardRail", shapes.BEAM_REACH + shapes.POST_REACH, beside if item.faces == "left" else -beside
+            return "guardRail", 2.0 * BEAM_REACH, 0.0
+        beside = (BEAM_REACH - POST_REACH) / 2.0
+        return "guardRail", BEAM_REACH + POST_REACH, beside if item.faces == "left" else -beside
     if isinstance(item, NoiseBarrier):
         return "noiseBarrier", max(item.thickness, item.post_width), 0.0
     subtype = "concreteBarrier" if isinstance(item, ConcreteBarrier) else "temporaryBarrier"
@@ -312,7 +307,7 @@ _SIZES: dict[type[RoadObject], Callable[[Any], _Size]] = {
     Delineator: lambda item: (
         "pole",
         "delineator",
-        {"length": 2.0 * shapes.DELINEATOR_REACH, "width": 2.0 * shapes.DELINEATOR_REACH, "height": item.height},
+        {"length": 2.0 * DELINEATOR_REACH, "width": 2.0 * DELINEATOR_REACH, "height": item.height},
     ),
     Pole: lambda item: ("pole", item.kind, {"radius": item.diameter / 2.0, "height": item.height}),
     Cabinet: lambda item: (
@@ -323,7 +318,7 @@ _SIZES: dict[type[RoadObject], Callable[[Any], _Size]] = {
     ConstructionBeacon: lambda item: (
         "obstacle",
         "constructionBeacon",
-        {"length": 2.0 * shapes.BEACON_REACH, "width": item.width, "height": item.height},
+        {"length": 2.0 * BEACON_REACH, "width": item.width, "height": item.height},
     ),
     Asset: lambda item: ("none", item.name, {}),
 }

@@ -8,10 +8,10 @@ import numpy as np
 
 from ...base.errors import InputError
 from ...road.geometry import RoadGeometry
-from ...road.objects import RoadObject
-from ...road.parameters import Carriageway, GantrySign, Hatching, LineObject, PointObject, Turnout
+from ...road.objects import RoadObject, Side
+from ...road.parameters import Carriageway, Hatching, LineObject, PointObject, Turnout
 from ...road.surface import highest_pavement, known_elevation
-from ...road.things.furniture import Side
+from ...road.things.gantry import GantrySign
 from ..surfaces import height_share, ramp_length
 from .pieces import CLOSE, Float, chords, merged_stations
 from .surface import RoadFrame

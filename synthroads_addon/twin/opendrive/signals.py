@@ -9,15 +9,11 @@ from typing import Any
 
 import numpy as np
 
-from ...road.parameters import (
-    Gantry,
-    GantrySign,
-    KilometreBoard,
-    PointObject,
-    RoadParameters,
-    TrafficLight,
-    TrafficSign,
-)
+from ...road.parameters import PointObject, RoadParameters
+from ...road.things.gantry import Gantry, GantrySign
+from ...road.things.kilometre_board import KilometreBoard
+from ...road.things.sign import TrafficSign
+from ...road.things.traffic_light import TrafficLight
 from .numbers import Numbers
 from .objects import gantry_levels
 from .places import Ground, side_of

@@ -5,8 +5,8 @@ from __future__ import annotations
 import re
 
 from ...road.geometry import RoadGeometry
-from ...road.parameters import TrafficSign
-from ...road.things.furniture import Side
+from ...road.objects import Side
+from ...road.things.sign import TrafficSign
 from .pieces import CLOSE
 
 ADVISORY = 130.0

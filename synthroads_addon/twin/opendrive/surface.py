@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from ...road.alignment import left_vectors
 from ...road.geometry import RoadGeometry
-from ...road.things.furniture import Side
+from ...road.objects import Side
 from .pieces import Cubics, Float, cubics, distinct, merged_stations, piecewise, runs
 from .xml import PLAN_DIGITS, Element, Value, cubic, element
 

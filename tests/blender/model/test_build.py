@@ -20,16 +20,11 @@ from synthroads_addon.blender.compat import modifier_input, set_modifier_input
 from synthroads_addon.blender.model.build import COLLECTION, RoadModel, build_road, remove_road
 from synthroads_addon.blender.scene.evaluated import scene_mesh
 from synthroads_addon.road.geometry import RoadGeometry
-from synthroads_addon.road.parameters import (
-    Carriageway,
-    Delineator,
-    Guardrail,
-    LineMarking,
-    RoadParameters,
-    Vegetation,
-)
+from synthroads_addon.road.parameters import Carriageway, LineMarking, RoadParameters, Vegetation
 from synthroads_addon.road.terrain import ground_elevation
 from synthroads_addon.road.tessellation import sample_stations
+from synthroads_addon.road.things.delineator import Delineator
+from synthroads_addon.road.things.guardrail import Guardrail
 from synthroads_addon.sampling.road import sample_road
 from synthroads_addon.scanning.scene.mesh import SceneMesh
 from synthroads_addon.scenario.scenario import load_scenario
@@ -68,9 +63,7 @@ class Built:
         low, high = across[-1], across[0]
         assert offset.max() < high + 0.01
         assert offset.min() > low - 0.01
-        return self.geometry.elevation(
-            np.clip(station, 0.0, self.geometry.length), np.clip(offset, low, high)
-        )
+        return self.geometry.elevation(np.clip(station, 0.0, self.geometry.length), np.clip(offset, low, high))
 
 
 def demo_parameters(**changes: Any) -> RoadParameters:
@@ -214,10 +207,7 @@ class TestMarkings:
             assert np.isclose(offset.min(), right, atol=ROUNDING)
             dashes = road.geometry.dashes(line)
             corners = mesh.vertices[chosen].astype(np.float64)
-            area = (
-                np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
-                / 2
-            )
+            area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1) / 2
             turn = np.diff(road.geometry.alignment.heading(dashes), axis=1)
             wanted = (np.diff(dashes, axis=1) - turn * (left + right) / 2).sum() * line.width
             assert np.isclose(area.sum(), wanted, rtol=2e-3)
@@ -413,9 +403,7 @@ class TestLiveEditsOfTheRoad:
             assert np.abs(offset[:, None] - truth.geometry.offsets(0.0)).min(axis=1).max() < ROUNDING
             assert np.abs(vertices[:, 2] - truth.surface(station, offset)).max() < ROUNDING
             for line in wider.of_type(LineMarking).values():
-                _, offset = truth.located(
-                    mesh.vertices[np.unique(mesh.triangles[mesh.instance_id == line.instance])]
-                )
+                _, offset = truth.located(mesh.vertices[np.unique(mesh.triangles[mesh.instance_id == line.instance])])
                 assert np.isclose(offset.max(), truth.geometry.marking_edges(line, 0.0)[0][0], atol=ROUNDING)
 
     def test_guardrails_and_terrain_follow_the_road(self) -> None:
@@ -521,9 +509,7 @@ class TestBuilding:
         data["objects"]["carriageway-right"]["rotation_axis"] = "inner_edge"
         road = built(RoadParameters.from_dict(data), parts={"road", "terrain"})
         mesh = road.mesh("Road", "Terrain")
-        assert set(np.unique(mesh.class_id)) == {
-            class_id(name) for name in ("road", "road_marking", "ground")
-        }
+        assert set(np.unique(mesh.class_id)) == {class_id(name) for name in ("road", "road_marking", "ground")}
         vertices = mesh.vertices[np.unique(of_class(mesh, "road"))]
         station, offset = road.located(vertices)
         assert np.abs(vertices[:, 2] - road.surface(station, offset)).max() < ROUNDING

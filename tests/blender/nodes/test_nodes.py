@@ -129,10 +129,7 @@ class TestBuilder:
     def test_joined_geometry_keeps_its_order(self) -> None:
         def build(tree: Tree) -> None:
             """Joined points."""
-            points = [
-                tree.node("GeometryNodeMeshLine", count=1, start_location=(i, 0.0, 0.0)).value
-                for i in range(4)
-            ]
+            points = [tree.node("GeometryNodeMeshLine", count=1, start_location=(i, 0.0, 0.0)).value for i in range(4)]
             tree.output("Mesh", op.join(*points))
 
         mesh = evaluated(node_group("Joined", build))
@@ -216,9 +213,7 @@ class TestGroups:
                 if item.in_out == "INPUT" and item.socket_type in ("NodeSocketFloat", "NodeSocketInt"):
                     assert item.min_value <= item.default_value <= item.max_value, where
                     assert item.min_value > -1e9 or item.name.endswith("Instance"), where
-                if item.in_out == "INPUT" and item.name.endswith(
-                    ("Width", "Height", "Length", "Spacing", "Offset")
-                ):
+                if item.in_out == "INPUT" and item.name.endswith(("Width", "Height", "Length", "Spacing", "Offset")):
                     assert item.subtype in ("DISTANCE", "FACTOR"), where
             assert len(set(names)) == len(names), group.name
 
@@ -244,15 +239,11 @@ class TestGroups:
         snapshot = SNAPSHOTS / f"{group.name}.txt"
         if WRITE in os.environ:
             snapshot.write_text(describe(group), encoding="utf-8")
-        assert describe(group) == snapshot.read_text(encoding="utf-8"), (
-            f"if this is meant, run with {WRITE}=1"
-        )
+        assert describe(group) == snapshot.read_text(encoding="utf-8"), f"if this is meant, run with {WRITE}=1"
 
     def test_the_road_has_an_input_for_each_lane_and_marking(self) -> None:
         names = {item.name for item in road_group(LAYOUT).interface.items_tree}
-        assert {f"Left Lane {n} Width" for n in (1, 2, 3)} | {
-            f"Right Lane {n} Width" for n in (1, 2)
-        } <= names
+        assert {f"Left Lane {n} Width" for n in (1, 2, 3)} | {f"Right Lane {n} Width" for n in (1, 2)} <= names
         assert "Right Lane 3 Width" not in names
         assert {
             "outer Width",

@@ -14,7 +14,8 @@ from synthroads_addon.base.errors import InputError
 from synthroads_addon.blender.model.build import build_road
 from synthroads_addon.blender.scene.evaluated import scene_mesh
 from synthroads_addon.road.geometry import RoadGeometry
-from synthroads_addon.road.parameters import Asset, RoadParameters
+from synthroads_addon.road.parameters import RoadParameters
+from synthroads_addon.road.things.asset import Asset
 from synthroads_addon.sampling.road import sample_road
 from synthroads_addon.scenario.road import RoadScenario
 

@@ -9,8 +9,11 @@ import pytest
 from synthroads_addon.base.classes import class_id
 from synthroads_addon.blender.things.delineator import REFLECTOR
 from synthroads_addon.road.objects import ObjectT
-from synthroads_addon.road.parameters import Cabinet, Delineator, KilometreBoard, Pole, TrafficLight
-from synthroads_addon.road.things.body_shapes import KILOMETRE_POST
+from synthroads_addon.road.things.cabinet import Cabinet
+from synthroads_addon.road.things.delineator import Delineator
+from synthroads_addon.road.things.kilometre_board import KILOMETRE_POST, KilometreBoard
+from synthroads_addon.road.things.pole import Pole
+from synthroads_addon.road.things.traffic_light import TrafficLight
 from tests.helpers.scenes.furnished_road import (
     MEASURE,
     Data,

@@ -22,9 +22,8 @@ from synthroads_addon.blender.things.sign.pictograms import NAMES, PICTOGRAMS
 from synthroads_addon.blender.things.sign.writing import LETTERS, LINES
 from synthroads_addon.materials.table import materials
 from synthroads_addon.road import stretches
-from synthroads_addon.road.parameters import TrafficSign
-from synthroads_addon.road.things.body_shapes import SIGN_RAIL
-from synthroads_addon.road.things.signs import Pictogram, sign_catalogue
+from synthroads_addon.road.things.sign import SIGN_RAIL, TrafficSign
+from synthroads_addon.road.things.sign_catalogue import Pictogram, sign_catalogue
 from synthroads_addon.scanning.scene.mesh import SceneMesh
 from tests.blender.nodes.test_nodes import evaluated
 from tests.helpers.scenes.furnished_road import (

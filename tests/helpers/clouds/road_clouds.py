@@ -11,14 +11,10 @@ from synthroads_addon.base.classes import class_id
 from synthroads_addon.cloud.formats.registry import open_writer
 from synthroads_addon.cloud.points import PointBlock
 from synthroads_addon.road.geometry import RoadGeometry
-from synthroads_addon.road.parameters import (
-    ConcreteBarrier,
-    Delineator,
-    Guardrail,
-    LineMarking,
-    LineObject,
-    RoadParameters,
-)
+from synthroads_addon.road.parameters import LineMarking, LineObject, RoadParameters
+from synthroads_addon.road.things.concrete_barrier import ConcreteBarrier
+from synthroads_addon.road.things.delineator import Delineator
+from synthroads_addon.road.things.guardrail import Guardrail
 from synthroads_addon.sampling.road import sample_road
 from synthroads_addon.scenario.road import RoadScenario
 

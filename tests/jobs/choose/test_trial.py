@@ -38,9 +38,7 @@ class MadeUpScans:
 
 
 @pytest.mark.parametrize("each", [0.0, EACH])
-def test_a_scan_of_a_fixed_time_and_a_rate_is_predicted_exactly(
-    each: float, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_scan_of_a_fixed_time_and_a_rate_is_predicted_exactly(each: float, monkeypatch: pytest.MonkeyPatch) -> None:
     scans = MadeUpScans(each)
     monkeypatch.setattr("synthroads_addon.jobs.choose.trial.record_to_files", scans.record)
     plan = planned(StandIns(), seconds=75.0)

@@ -16,14 +16,10 @@ from synthroads_addon.blender.scene.evaluated import scene_mesh
 from synthroads_addon.jobs.generate import Job, generate
 from synthroads_addon.jobs.scan.plan import Site
 from synthroads_addon.road.geometry import RoadGeometry
-from synthroads_addon.road.parameters import (
-    ConcreteBarrier,
-    Guardrail,
-    LineMarking,
-    NoiseBarrier,
-    RoadParameters,
-    Vegetation,
-)
+from synthroads_addon.road.parameters import LineMarking, RoadParameters, Vegetation
+from synthroads_addon.road.things.concrete_barrier import ConcreteBarrier
+from synthroads_addon.road.things.guardrail import Guardrail
+from synthroads_addon.road.things.noise_barrier import NoiseBarrier
 from synthroads_addon.sampling.road import sample_road
 from synthroads_addon.scanning.beam import RINGS
 from synthroads_addon.scanning.blocks import Blocks
@@ -126,9 +122,7 @@ def test_the_points_don_t_depend_on_the_sections(tmp_path: Path, traffic: float)
         pytest.param("returns", 0.01, 0.1, marks=pytest.mark.skipif(not HAS_RETURN_CAMERA, reason="needs Blender 5")),
     ],
 )
-def test_rendered_colours_don_t_depend_on_the_sections(
-    tmp_path: Path, source: str, median: float, most: float
-) -> None:
+def test_rendered_colours_don_t_depend_on_the_sections(tmp_path: Path, source: str, median: float, most: float) -> None:
     """The same places have the same layers, and colours that differ no more than their source errs (CIEDE2000)."""
     clouds = []
     for section in (100.0, 57.0):

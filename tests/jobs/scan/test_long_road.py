@@ -114,9 +114,7 @@ def build_section(work: SectionScan, section: Any) -> Iterator[ScanPlan]:
         remove_road()
 
 
-def errors_of_a_section(
-    work: SectionScan, road: RoadGeometry, section: Any, monkeypatch: pytest.MonkeyPatch
-) -> Float:
+def errors_of_a_section(work: SectionScan, road: RoadGeometry, section: Any, monkeypatch: pytest.MonkeyPatch) -> Float:
     """Return how far (m) returns from the pavement lie from where exact rays meet the exact triangles."""
     make = Site.plan
     meshes = []

@@ -7,7 +7,10 @@ import pytest
 from synthroads_addon.checking.rules import barriers as checker_barriers
 from synthroads_addon.road.guidelines import StandardCrossSection
 from synthroads_addon.road.objects import WidthPoint
-from synthroads_addon.road.things.furniture import ConcreteBarrier, Guardrail, NoiseBarrier, TrafficSign
+from synthroads_addon.road.things.concrete_barrier import ConcreteBarrier
+from synthroads_addon.road.things.guardrail import Guardrail
+from synthroads_addon.road.things.noise_barrier import NoiseBarrier
+from synthroads_addon.road.things.sign import TrafficSign
 from synthroads_addon.sampling.placing.furniture import place_furniture
 from tests.helpers.roads.sites import bay_at, beside, curve, entry_at, exit_at, faults, make_site, of, place, straight
 

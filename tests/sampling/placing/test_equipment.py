@@ -5,14 +5,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from synthroads_addon.road.things.furniture import (
-    Cabinet,
-    Delineator,
-    Guardrail,
-    KilometreBoard,
-    Pole,
-    TrafficLight,
-)
+from synthroads_addon.road.things.cabinet import Cabinet
+from synthroads_addon.road.things.delineator import Delineator
+from synthroads_addon.road.things.guardrail import Guardrail
+from synthroads_addon.road.things.kilometre_board import KilometreBoard
+from synthroads_addon.road.things.pole import Pole
+from synthroads_addon.road.things.traffic_light import TrafficLight
 from tests.helpers.roads.sites import bay_at, beside, curve, entry_at, exit_at, make_site, of, place, straight
 
 EDGE = 14.0

@@ -9,21 +9,19 @@ import pytest
 from synthroads_addon.road.guidelines import StandardCrossSection
 from synthroads_addon.road.objects import WidthPoint
 from synthroads_addon.road.section import LineMarking
-from synthroads_addon.road.things.furniture import (
-    Cabinet,
-    ConcreteBarrier,
-    ConstructionBeacon,
-    Delineator,
-    Gantry,
-    Guardrail,
-    KilometreBoard,
-    NoiseBarrier,
-    Overpass,
-    Pole,
-    TemporaryBarrier,
-    TrafficLight,
-    TrafficSign,
-)
+from synthroads_addon.road.things.beacon import ConstructionBeacon
+from synthroads_addon.road.things.cabinet import Cabinet
+from synthroads_addon.road.things.concrete_barrier import ConcreteBarrier
+from synthroads_addon.road.things.delineator import Delineator
+from synthroads_addon.road.things.gantry import Gantry
+from synthroads_addon.road.things.guardrail import Guardrail
+from synthroads_addon.road.things.kilometre_board import KilometreBoard
+from synthroads_addon.road.things.noise_barrier import NoiseBarrier
+from synthroads_addon.road.things.overpass import Overpass
+from synthroads_addon.road.things.pole import Pole
+from synthroads_addon.road.things.sign import TrafficSign
+from synthroads_addon.road.things.temporary_barrier import TemporaryBarrier
+from synthroads_addon.road.things.traffic_light import TrafficLight
 from synthroads_addon.sampling.placing.site import PlacementSite
 from tests.helpers.files.mutations import cases
 from tests.helpers.roads.sites import (

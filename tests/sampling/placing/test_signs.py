@@ -6,8 +6,8 @@ import pytest
 
 from synthroads_addon.base.errors import InputError
 from synthroads_addon.road.guidelines import EXIT_SEQUENCE, GORE_SIGN, StandardCrossSection
-from synthroads_addon.road.things.furniture import TrafficSign
-from synthroads_addon.road.things.signs import SignCatalogue, sign_catalogue, sign_type
+from synthroads_addon.road.things.sign import TrafficSign
+from synthroads_addon.road.things.sign_catalogue import SignCatalogue, sign_catalogue, sign_type
 from tests.helpers.roads.sites import bay_at, beside, curve, entry_at, exit_at, make_site, of, place, straight
 
 SIGNS: dict[str, Any] = {"furniture": {"signs": True}}

@@ -8,7 +8,10 @@ import numpy as np
 import pytest
 
 from synthroads_addon.road.guidelines import StandardCrossSection
-from synthroads_addon.road.things.furniture import ConstructionBeacon, Gantry, Overpass, TemporaryBarrier
+from synthroads_addon.road.things.beacon import ConstructionBeacon
+from synthroads_addon.road.things.gantry import Gantry
+from synthroads_addon.road.things.overpass import Overpass
+from synthroads_addon.road.things.temporary_barrier import TemporaryBarrier
 from synthroads_addon.sampling.placing.furniture import closed_lanes
 from tests.helpers.roads.sites import bay_at, beside, exit_at, make_site, of, place, straight
 

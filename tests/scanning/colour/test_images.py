@@ -44,9 +44,10 @@ def _ground_image(view: View, slope: float = 0.0, time: float = 0.0) -> Rendered
     """Return the image of the plane z = slope * y, which is of material 0, with the field's colours."""
     width, height = view.size
     i, j = np.meshgrid(np.arange(width) + 0.5, np.arange(height) + 0.5)
-    rays = np.stack(
-        [(i - view.centre[0]) / view.focal, (view.centre[1] - j) / view.focal, -np.ones_like(i)], axis=-1
-    ) @ view.rotation.T
+    rays = (
+        np.stack([(i - view.centre[0]) / view.focal, (view.centre[1] - j) / view.focal, -np.ones_like(i)], axis=-1)
+        @ view.rotation.T
+    )
     depth = (slope * view.position[1] - view.position[2]) / (rays[..., 2] - slope * rays[..., 1])
     colors = _field(view.position + depth[..., None] * rays)
     return RenderedImage(view, colors.astype(np.float16), depth.astype(np.float32), np.ones_like(i, np.uint16))

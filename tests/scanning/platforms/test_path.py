@@ -709,11 +709,7 @@ def test_a_polylines_corners_are_rounded_in_heading_and_curvature() -> None:
     assert heading_at_end == pytest.approx(np.pi / 2, abs=1e-12)
 
 
-@given(
-    st.lists(
-        st.tuples(st.floats(2.0, 200.0), st.floats(-2.0, 2.0), st.floats(-3.0, 3.0)), min_size=1, max_size=12
-    )
-)
+@given(st.lists(st.tuples(st.floats(2.0, 200.0), st.floats(-2.0, 2.0), st.floats(-3.0, 3.0)), min_size=1, max_size=12))
 @settings(max_examples=30, deadline=None)
 def test_any_polyline_without_sharp_corners_is_followed(steps: list[tuple[float, float, float]]) -> None:
     lengths = np.array([length for length, _, _ in steps])

@@ -60,7 +60,15 @@ def test_parts_in_the_file_s_folder_are_taken(folder: Path, ending: str, address
 @pytest.mark.parametrize("part", ["buffers", "images"])
 @pytest.mark.parametrize(
     "address",
-    ["/dev/zero", "../outside.bin", "..%2Foutside.bin", "a\\..\\..\\outside.bin", "link.bin", "file:///dev/zero", "http://x/y"],
+    [
+        "/dev/zero",
+        "../outside.bin",
+        "..%2Foutside.bin",
+        "a\\..\\..\\outside.bin",
+        "link.bin",
+        "file:///dev/zero",
+        "http://x/y",
+    ],
 )
 def test_addresses_that_leave_the_folder_are_refused(folder: Path, ending: str, part: str, address: str) -> None:
     path = write(folder, ending, **{part: [{"byteLength": 36, "uri": address}]})

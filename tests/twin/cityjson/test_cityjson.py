@@ -13,15 +13,8 @@ import pytest
 
 from synthroads_addon.base.classes import classes
 from synthroads_addon.road.geometry import RoadGeometry
-from synthroads_addon.road.parameters import (
-    Carriageway,
-    LineMarking,
-    Overpass,
-    RoadParameters,
-    Terrain,
-    Vegetation,
-    Vehicle,
-)
+from synthroads_addon.road.parameters import Carriageway, LineMarking, RoadParameters, Terrain, Vegetation, Vehicle
+from synthroads_addon.road.things.overpass import Overpass
 from synthroads_addon.road.turnout_geometry import STEP
 from synthroads_addon.twin.cityjson.writer import write_cityjson
 from tests.helpers.files.cityjson_files import City, OfficialSchema, faults_of, read_city, thinned, width_at

@@ -23,21 +23,21 @@ from synthroads_addon.road.objects import width_at
 from synthroads_addon.road.parameters import (
     AlignmentObject,
     Carriageway,
-    ConcreteBarrier,
-    Gantry,
-    Guardrail,
     HorizontalElement,
     LineMarking,
     LineObject,
-    NoiseBarrier,
-    Overpass,
     PointObject,
     RoadParameters,
-    TrafficSign,
     Turnout,
     Vehicle,
 )
 from synthroads_addon.road.surface import surface_elevation
+from synthroads_addon.road.things.concrete_barrier import ConcreteBarrier
+from synthroads_addon.road.things.gantry import Gantry
+from synthroads_addon.road.things.guardrail import Guardrail
+from synthroads_addon.road.things.noise_barrier import NoiseBarrier
+from synthroads_addon.road.things.overpass import Overpass
+from synthroads_addon.road.things.sign import TrafficSign
 from synthroads_addon.sampling.road import sample_road
 from synthroads_addon.twin.ifc.alignment import plan_segments, write_alignment
 from synthroads_addon.twin.ifc.entities import IfcFile
@@ -633,9 +633,7 @@ def test_damage_is_in_the_surface_and_named(road) -> None:
                 if near.any():
                     heights = geometry.boundary_elevations(station[near])
                     offsets = geometry.offsets(station[near])
-                    plane = [
-                        np.interp(-o, -own, z) for o, own, z in zip(offset[near], offsets, heights, strict=True)
-                    ]
+                    plane = [np.interp(-o, -own, z) for o, own, z in zip(offset[near], offsets, heights, strict=True)]
                     deepest = max(deepest, float((np.array(plane) - vertices[near, 2]).max()))
             ruts = [rut.depth for rut in carriageway.pavement.ruts]
             assert hole.depth - 0.008 < deepest < max(hole.depth, *ruts, 0.0) + 1e-6

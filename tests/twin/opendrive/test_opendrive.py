@@ -17,17 +17,12 @@ from synthroads_addon.base.errors import InputError
 from synthroads_addon.road.geometry import RoadGeometry
 from synthroads_addon.road.objects import LineObject, PointObject
 from synthroads_addon.road.paint import arrow_outlines, hatching_outlines
-from synthroads_addon.road.parameters import (
-    ConstructionBeacon,
-    Gantry,
-    Guardrail,
-    LineMarking,
-    Overpass,
-    RoadParameters,
-    TrafficSign,
-    Turnout,
-    Vehicle,
-)
+from synthroads_addon.road.parameters import LineMarking, RoadParameters, Turnout, Vehicle
+from synthroads_addon.road.things.beacon import ConstructionBeacon
+from synthroads_addon.road.things.gantry import Gantry
+from synthroads_addon.road.things.guardrail import Guardrail
+from synthroads_addon.road.things.overpass import Overpass
+from synthroads_addon.road.things.sign import TrafficSign
 from synthroads_addon.sampling.road import sample_road
 from synthroads_addon.twin.opendrive.pieces import chords, cubics, runs
 from synthroads_addon.twin.opendrive.writer import geo_reference, write_opendrive

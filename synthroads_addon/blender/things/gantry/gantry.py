@@ -9,9 +9,7 @@ import bpy
 import numpy as np
 
 from ....base.classes import class_id
-from ....road.parameters import Gantry
-from ....road.things.body_shapes import GANTRY_BOARD, GANTRY_DISPLAY, GANTRY_HANGER, GANTRY_OVERHANG
-from ....road.things.furniture import GantrySign
+from ....road.things.gantry import GANTRY_BOARD, GANTRY_DISPLAY, GANTRY_HANGER, GANTRY_OVERHANG, Gantry, GantrySign
 from ...materials import material
 from ...nodes import operations as op
 from ...nodes.backbone import height_on

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ....road.things.body_shapes import BRIDGE_DECK
+from ....road.things.overpass import BRIDGE_DECK
 from ...nodes import operations as op
 from ...nodes.builder import Tree, Value, makes_group
 from ...nodes.inputs import Inputs, material_of, metres

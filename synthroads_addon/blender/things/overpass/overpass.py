@@ -6,8 +6,7 @@ import bpy
 import numpy as np
 
 from ....base.classes import class_id
-from ....road.parameters import Overpass
-from ....road.things.body_shapes import BRIDGE_BEARING, BRIDGE_BURIED, BRIDGE_SEAT
+from ....road.things.overpass import BRIDGE_BEARING, BRIDGE_BURIED, BRIDGE_SEAT, Overpass
 from ...nodes import operations as op
 from ...nodes.backbone import height_on
 from ...nodes.builder import Tree, Value, makes_group

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from ....road.things.body_shapes import BRIDGE_ABUTMENT, BRIDGE_BEARING, BRIDGE_PIER_LENGTH, BRIDGE_SEAT
+from ....road.things.overpass import BRIDGE_ABUTMENT, BRIDGE_BEARING, BRIDGE_PIER_LENGTH, BRIDGE_SEAT
 from ...nodes import operations as op
 from ...nodes.builder import Operand, Tree, Value, makes_group
 from ...nodes.inputs import Inputs, material_of, metres

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from ....road.parameters import TrafficSign
-from ....road.things.signs import sign_type
+from ....road.things.sign import TrafficSign
+from ....road.things.sign_catalogue import sign_type
 from ...materials import material
 from .outline import SHAPES
 from .pictograms import NAMES
@@ -25,7 +25,7 @@ class FaceStyle:
 
     Attributes:
         ground, border, writing: colours, as `presets/signs.json` names them.
-        pictogram: what is drawn, as `road.things.signs.Pictogram` names it.
+        pictogram: what is drawn, as `road.things.sign_catalogue.Pictogram` names it.
     """
 
     ground: str

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ....road.things.body_shapes import SIGN_OUTLINES
+from ....road.things.sign import SIGN_OUTLINES
 from ...nodes import operations as op
 from ...nodes.builder import Tree, Value, makes_group
 from ...nodes.inputs import Inputs, integer, metres

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from ....base.classes import class_id
-from ....road.parameters import TrafficSign
-from ....road.things.body_shapes import SIGN_RAIL
+from ....road.things.sign import SIGN_RAIL, TrafficSign
 from ...nodes import operations as op
 from ...nodes.builder import Tree, Value, makes_group
 from ...nodes.inputs import Inputs, boolean, integer, material_of, metres

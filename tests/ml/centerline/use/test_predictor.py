@@ -75,8 +75,11 @@ def test_frames_in_several_sequences_have_the_mean_by_inverse_variances(monkeypa
             number = np.array([frame for frame, values in said.items() if len(values) > turn])
             value, std = np.array([said[frame][turn] for frame in number]).T
             shape = (len(number), len(TARGETS))
-            yield number, np.zeros(len(number)), np.ones(len(number), bool), *(
-                np.broadcast_to(one[:, None], shape).copy() for one in (value, std)
+            yield (
+                number,
+                np.zeros(len(number)),
+                np.ones(len(number), bool),
+                *(np.broadcast_to(one[:, None], shape).copy() for one in (value, std)),
             )
 
     monkeypatch.setattr(ready, "_sequences", told)

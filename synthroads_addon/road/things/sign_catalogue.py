@@ -9,7 +9,8 @@ from pydantic import Field, model_validator
 
 from ...base.files import PRESETS
 from ...base.schema import Model, quantity, read_json
-from .furniture import Color, TrafficSign
+from ..objects import Color
+from .sign import TrafficSign
 
 Pictogram = Literal[
     "none",

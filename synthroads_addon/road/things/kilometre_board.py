@@ -1,0 +1,33 @@
+"""Kilometre boards."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import ClassVar, Literal
+
+from pydantic import Field
+
+from ...base.schema import quantity
+from .thing import Block, StandingThing
+
+KILOMETRE_POST = 0.042
+"""Diameter of a kilometre board's post, m."""
+_POST_REACH = 0.03
+"""Half of what a post is given room for, m."""
+
+
+class KilometreBoard(StandingThing):
+    """A kilometre board: blue, white writing."""
+
+    points_class: ClassVar = "road_sign"
+    order: ClassVar = 100
+    type: Literal["KilometreBoard"] = "KilometreBoard"
+    text: str = Field(max_length=12, description="Its kilometre, as written.")
+    width: float = quantity(0.55, ge=0.1, le=2, unit="m", description="Width of the board.")
+    height: float = quantity(0.26, ge=0.1, le=2, unit="m", description="Height of the board.")
+    lower_edge: float = quantity(1.2, ge=0.2, le=4, unit="m", description="Lower edge above the surface.")
+
+    def footprint(self) -> Iterator[Block]:
+        """Yield the boxes of its post and of the board."""
+        yield self.upright(_POST_REACH, self.lower_edge + self.height)
+        yield self.face(self.width, self.lower_edge, self.height)
