@@ -32,7 +32,7 @@ test-slow: $(RUNNER)/made ## the tests that take long, and the documentation's o
 
 lint docs judges: $(RUNNER)/made
 	@$(NOX) -s $@
-lint: ## check the source: ruff, who imports whom, types
+lint: ## check the source: style, who imports whom, types, known dangers
 judges: ## have programs of others judge the files that SynthRoads writes
 docs: ## build the documentation: build/site/index.html
 

@@ -51,6 +51,11 @@ _PYENV = Path(os.environ.get("PYENV_ROOT") or Path.home() / ".pyenv")
 os.environ["PATH"] = os.pathsep.join([os.environ.get("PATH", ""), *pyenv_folders(_PYENV)])
 
 
+def lock_of(name: str, python: str) -> str:
+    """Return the path of the file with the versions and hashes of all that an environment holds, less PyTorch."""
+    return f"tools/locks/{name.removesuffix(f'-{python}')}-{python}.txt"
+
+
 def made_from(extras: str, root: Path) -> str:
     """Return all that an environment is made from: where the text has changed, it has to be brought up to date."""
     settings = nox.project.load_toml(root / "pyproject.toml")
@@ -63,12 +68,15 @@ def made_from(extras: str, root: Path) -> str:
 
 def install(session: nox.Session, name: str) -> None:
     """Bring a session's environment up to date; where nothing has changed that takes no time."""
-    stamp, wanted = Path(session.bin).parent / "synthroads-stamp", made_from(EXTRAS[name], Path.cwd())
+    stamp, lock = Path(session.bin).parent / "synthroads-stamp", Path(lock_of(name, str(session.python)))
+    wanted = made_from(EXTRAS[name], Path.cwd()) + lock.read_text(encoding="utf-8")
     if stamp.exists() and stamp.read_text(encoding="utf-8") == wanted:
         return
     stamp.unlink(missing_ok=True)
     session.log("The first time this downloads some 400 MB, for the tests more.")
-    session.install("--no-compile", "--editable", f".[{EXTRAS[name]}]")  # most of it is never imported
+    # Most of it is never compiled, as it is never imported. PyTorch isn't in the lock: the second call brings it.
+    session.install("--no-compile", "--require-hashes", "--requirement", str(lock))
+    session.install("--no-compile", "--no-build-isolation", "--editable", f".[{EXTRAS[name]}]")
     if "blender" in EXTRAS[name]:
         session.run_install("python", "tools/check_bpy.py")
     stamp.write_text(wanted, encoding="utf-8")
@@ -155,6 +163,13 @@ def docs(session: nox.Session) -> None:
     strict = ["--jobs", "auto", "--fresh-env", "--fail-on-warning", "--quiet"]
     session.run("python", "-m", "sphinx", *strict, "--doctree-dir", "build/doctrees", "docs", "build/site")
     session.log("built build/site/index.html")
+
+
+@nox.session(python=HERE)
+def lock(session: nox.Session) -> None:
+    """Write the locks of the environments anew; `--check` only compares them."""
+    session.install("uv>=0.13,<0.14", "nox>=2026.10,<2027", "packaging>=24")
+    session.run("python", "tools/lock.py", *session.posargs)
 
 
 @nox.session(python=False)

@@ -42,18 +42,24 @@ class Extension:
         source: folder with its Python code.
         manifest: what it says of itself, still without platform and wheels.
         wheel_list: file with the wheels it brings.
+        lock: file with the hashes of these wheels, for every platform.
     """
 
     name: str
     source: Path
     manifest: Path
     wheel_list: Path
+    lock: Path
 
 
+_LOCKS = ROOT / "tools" / "locks"
 _ELEVATION = ROOT / "tools" / "elevation_models"
 EXTENSIONS = (
-    Extension("synthroads", PACKAGE, MANIFEST, ROOT / "tools" / "extension_wheels.txt"),
-    Extension("synthroads_elevation_models", _ELEVATION, _ELEVATION / MANIFEST.name, _ELEVATION / "wheels.txt"),
+    Extension("synthroads", PACKAGE, MANIFEST, ROOT / "tools" / "extension_wheels.txt", _LOCKS / "extension.txt"),
+    Extension(
+        "synthroads_elevation_models",
+        *(_ELEVATION, _ELEVATION / MANIFEST.name, _ELEVATION / "wheels.txt", _LOCKS / "elevation-models.txt"),
+    ),
 )
 
 # Blender 4.5 and 5.0 have Python 3.11, the official 5.1 and 5.2 have 3.13, Debian's 5.2 has 3.14.
@@ -125,23 +131,27 @@ def read_wheel_list(path: Path) -> list[str]:
 
 def fetch_wheels(extension: Extension, target: str, cache: Path) -> list[Path]:
     """Return an extension's wheels of all Pythons for one platform, sorted by name; download what the cache lacks."""
-    pins = read_wheel_list(extension.wheel_list)
+    lock = extension.lock.read_text(encoding="utf-8")
     wheels: dict[str, Path] = {}
     for version in PYTHON_VERSIONS:
         folder = cache / extension.name / target / f"cp{version.replace('.', '')}"
         stamp = folder / "complete.json"
-        if not stamp.exists() or json.loads(stamp.read_text(encoding="utf-8")) != pins:
+        if not stamp.exists() or json.loads(stamp.read_text(encoding="utf-8")) != lock:
             part = folder.with_name(f"{folder.name}.part-{os.getpid()}")
-            download(pins, version, target, part)
-            (part / stamp.name).write_text(json.dumps(pins), encoding="utf-8")
+            download(extension.lock, version, target, part)
+            (part / stamp.name).write_text(json.dumps(lock), encoding="utf-8")
             shutil.rmtree(folder, ignore_errors=True)
             part.rename(folder)
         wheels.update({path.name: path for path in folder.glob("*.whl")})
     return [wheels[name] for name in sorted(wheels)]
 
 
-def download(pins: list[str], version: str, target: str, folder: Path) -> None:
-    """Download the wheels of one Python and platform, whatever Python and platform this is."""
+def download(lock: Path, version: str, target: str, folder: Path) -> None:
+    """Download the wheels of one Python and platform, whatever Python and platform this is; others' files are refused.
+
+    Raises:
+        BuildError: pip can't get one, or got one whose hash isn't in the lock.
+    """
     folder.mkdir(parents=True, exist_ok=True)
     print(f"downloading wheels for Python {version}, {target}", flush=True)
     command = [
@@ -149,7 +159,7 @@ def download(pins: list[str], version: str, target: str, folder: Path) -> None:
         *("--only-binary=:all:", "--implementation", "cp", "--python-version", version, "--dest", str(folder)),
         *(word for tag in PLATFORM_TAGS[target] for word in ("--platform", tag)),
     ]
-    if subprocess.run([*command, *pins], check=False).returncode != 0:
+    if subprocess.run([*command, "--require-hashes", "--requirement", str(lock)], check=False).returncode != 0:
         shutil.rmtree(folder)
         raise BuildError(f"pip did not get the wheels for Python {version} on {target}, see above")
 
@@ -194,6 +204,35 @@ def third_party_notice(wheels: list[Path]) -> str:
     return head + "\n" + "\n".join(lines) + "\n"
 
 
+def bill_of_materials(extension: Extension, wheels: list[Path]) -> dict[str, object]:
+    """Return what an extension's zip brings, by the standard CycloneDX 1.6: each wheel with its hash and licence."""
+    components = []
+    for wheel in wheels:
+        fields = wheel_metadata(wheel)
+        address = f"pkg:pypi/{normal_name(fields['Name'])}@{fields['Version']}"
+        components.append(
+            {
+                "type": "library",
+                "bom-ref": f"{address}?file_name={wheel.name}",
+                "name": fields["Name"],
+                "version": fields["Version"],
+                "purl": f"{address}?file_name={wheel.name}",
+                "licenses": [{"license": {"name": licence(fields)}}],
+                "hashes": [{"alg": "SHA-256", "content": hashlib.sha256(wheel.read_bytes()).hexdigest()}],
+            }
+        )
+    root = {"type": "application", "bom-ref": extension.name, "name": extension.name, "version": version()}
+    return {
+        "$schema": "http://cyclonedx.org/schema/bom-1.6.schema.json",
+        "bomFormat": "CycloneDX",
+        "specVersion": "1.6",
+        "version": 1,
+        "metadata": {"component": root},
+        "components": components,
+        "dependencies": [{"ref": extension.name, "dependsOn": [str(part["bom-ref"]) for part in components]}],
+    }
+
+
 # --- staging ---------------------------------------------------------------------------------------------------------
 
 
@@ -233,7 +272,7 @@ def toml_list(items: list[str]) -> str:
 
 
 def build(extension: Extension, target: str, output_dir: Path, cache: Path) -> Path:
-    """Build and validate an extension for one platform; return the zip."""
+    """Build and validate an extension for one platform; return the zip, with its bill of materials beside it."""
     wheels = fetch_wheels(extension, target, cache)
     check_complete(extension, wheels)
     output_dir.mkdir(parents=True, exist_ok=True)
@@ -243,6 +282,8 @@ def build(extension: Extension, target: str, output_dir: Path, cache: Path) -> P
         run_tool("build", "--source-dir", folder, "--output-filepath", str(archive))
     make_reproducible(archive)
     run_tool("validate", str(archive))
+    materials = json.dumps(bill_of_materials(extension, wheels), indent=2) + "\n"
+    archive.with_suffix(".cdx.json").write_text(materials, encoding="utf-8", newline="\n")
     return archive
 
 

@@ -1,11 +1,15 @@
-"""Check the source: ruff, who imports whom, and the types. `make lint` runs it; the rules are in pyproject.toml."""
+"""Check the source: style, who imports whom, types, known dangers. `make lint` runs it, by rules in pyproject.toml."""
 
 from __future__ import annotations
 
 import ast
+import os
 import subprocess
 import sys
+from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 from pathlib import Path
+from subprocess import PIPE, STDOUT
 
 ROOT = Path(__file__).resolve().parent.parent
 
@@ -62,22 +66,43 @@ def late_imports(source: str) -> list[int]:
     return found
 
 
-def main() -> int:
-    """Run every check, also after one has failed, and return 0 if all passed."""
+def commands() -> dict[str, list[str]]:
+    """Return the programs that check the source, by what they are called in the output."""
+    scripts = Path(sys.executable).parent
+    audit = [str(scripts / "pip-audit"), "--dry-run", "--disable-pip", "--require-hashes", "--requirement"]
     checks = {
         "ruff": [sys.executable, "-m", "ruff", "check", "."],
-        "import-linter": [str(Path(sys.executable).with_name("lint-imports")), "--no-logo"],
+        "import-linter": [str(scripts / "lint-imports"), "--no-logo"],
+        "bandit": [
+            *(sys.executable, "-m", "bandit", "--quiet", "--configfile", "pyproject.toml", "--recursive"),
+            *("synthroads_addon", "headless", "ml", "tools", "noxfile.py"),
+        ],
+        # Whether a version is known to be unsafe can't be asked without a network: `--dry-run` reads the locks alone.
+        **{f"pip-audit {lock.stem}": [*audit, str(lock)] for lock in sorted((ROOT / "tools" / "locks").glob("*.txt"))},
     }
     if sys.version_info[:2] == (3, 11):
         checks["mypy"] = [sys.executable, "-m", "mypy"]
     else:  # the annotations are those of Blender 4.5's NumPy
         print("-- mypy is left out: types are checked with the libraries that Python 3.11 has")
+    return checks
+
+
+def run_together(checks: dict[str, list[str]]) -> list[str]:
+    """Run programs at the same time, print what each says, and return the names of those that found something."""
+    with ThreadPoolExecutor(max_workers=os.cpu_count()) as pool:
+        answers = pool.map(partial(subprocess.run, cwd=ROOT, text=True, stdout=PIPE, stderr=STDOUT), checks.values())
+        failed = []
+        for name, answer in zip(checks, answers, strict=True):
+            print(f"-- {name}\n{answer.stdout}", end="", flush=True)
+            failed += [name] if answer.returncode != 0 else []
+    return failed
+
+
+def main() -> int:
+    """Run every check, also after one has failed, and return 0 if all passed."""
     own = {"docstrings": print_what_docstrings, "imports within functions": print_late_imports}
     failed = [name for name, print_faults in own.items() if print_faults()]
-    for name, command in checks.items():
-        print(f"-- {name}", flush=True)
-        if subprocess.run(command, cwd=ROOT, check=False).returncode != 0:
-            failed.append(name)
+    failed += run_together(commands())
     print(f"lint: failed: {'; '.join(failed)}" if failed else "lint: all checks passed")
     return 1 if failed else 0
 

@@ -233,7 +233,8 @@ def read_yaml(path: Path) -> Any:
 
     text = read_text(path, "must be YAML in UTF-8")
     try:
-        data = json.loads(json.dumps(yaml.load(text, Loader=Loader), allow_nan=False))
+        plain = yaml.load(text, Loader=Loader)  # nosec B506 # it is a SafeLoader
+        data = json.loads(json.dumps(plain, allow_nan=False))
         if "\\" in text:
             json.dumps(data, ensure_ascii=False).encode()  # refuses half a surrogate pair, which no file could hold
         return data

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import hashlib
 import importlib.util
 import json
 import os
+import re
 import subprocess
 import sys
 import tomllib
@@ -12,6 +14,10 @@ import zipfile
 from pathlib import Path
 
 import pytest
+from cyclonedx.schema import SchemaVersion
+from cyclonedx.validation.json import JsonStrictValidator
+
+from tools.build_extension import EXTENSIONS, BuildError, download
 
 ROOT = Path(__file__).resolve().parents[2]
 PYTHON_TAGS = {"cp311", "cp313", "cp314"}
@@ -112,6 +118,27 @@ def test_lists_the_licences_of_all_wheels(archive: Path, names: list[str]) -> No
         name, version = wheel.split("-")[:2]
         assert f"{name} {version}: ".lower() in notice.replace("-", "_").lower()
     assert "see the wheel" not in notice
+
+
+def test_a_bill_of_materials_lies_beside_each_zip(archive: Path) -> None:
+    for built in sorted(archive.parent.glob("*.zip")):
+        text = built.with_suffix(".cdx.json").read_text(encoding="utf-8")
+        assert JsonStrictValidator(SchemaVersion.V1_6).validate_str(text) is None
+        listed = {part["purl"].partition("file_name=")[2]: part for part in json.loads(text)["components"]}
+        with zipfile.ZipFile(built) as content:
+            wheels = {Path(name).name: content.read(name) for name in content.namelist() if name.endswith(".whl")}
+        assert listed.keys() == wheels.keys()
+        for name, part in listed.items():
+            assert part["hashes"] == [{"alg": "SHA-256", "content": hashlib.sha256(wheels[name]).hexdigest()}]
+
+
+def test_a_wheel_with_another_hash_is_refused(tmp_path: Path) -> None:
+    (elevation,) = (extension for extension in EXTENSIONS if "elevation" in extension.name)
+    text = re.sub(r"sha256:[0-9a-f]{8}", "sha256:00000000", elevation.lock.read_text(encoding="utf-8"))
+    (tmp_path / "lock.txt").write_text(text, encoding="utf-8")
+    with pytest.raises(BuildError, match=r"pip did not get the wheels for Python 3\.11"):
+        download(tmp_path / "lock.txt", "3.11", "linux-x64", tmp_path / "wheels")
+    assert not (tmp_path / "wheels").exists()
 
 
 def test_same_source_gives_the_same_bytes(archive: Path, tmp_path: Path) -> None:

@@ -12,10 +12,13 @@ import yaml
 from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
+import noxfile
+from tools.build_extension import EXTENSIONS
+
 ROOT = Path(__file__).resolve().parents[2]
 MANIFEST = tomllib.loads((ROOT / "blender_manifest.toml").read_text(encoding="utf-8"))
 PYPROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
-WHEEL_LISTS = [ROOT / "tools" / name for name in ("extension_wheels.txt", "elevation_models/wheels.txt")]
+WHEEL_LISTS = [extension.wheel_list for extension in EXTENSIONS]
 PINS = {
     canonicalize_name(requirement.name): str(next(iter(requirement.specifier)).version)
     for requirement in map(
@@ -83,3 +86,39 @@ def test_one_blender_for_each_python() -> None:
 
 def test_no_init_file_in_the_root() -> None:
     assert not (ROOT / "__init__.py").exists(), "it breaks pytest, which would take the root for a package"
+
+
+def _locked(path: Path) -> list[Requirement]:
+    """Return the packages of a lock; each has its version and the hashes of its files."""
+    blocks = re.split(r"(?m)^(?=[a-z0-9])", path.read_text(encoding="utf-8"))[1:]
+    assert all(re.search(r"--hash=sha256:[0-9a-f]{64}", block) for block in blocks)
+    return [Requirement(block.split("\\", 1)[0]) for block in blocks]
+
+
+ENVIRONMENTS = [
+    (name, python) for name in noxfile.EXTRAS for python in noxfile.BLENDER if "-" not in name or name.endswith(python)
+]
+
+
+@pytest.mark.parametrize(("name", "python"), ENVIRONMENTS)
+def test_locks_hold_versions_in_the_ranges(name: str, python: str) -> None:
+    machine = {"python_version": python, "python_full_version": f"{python}.0", "sys_platform": "linux"}
+    machine |= {"platform_machine": "x86_64", "platform_system": "Linux"}
+    lines = _locked(ROOT / noxfile.lock_of(name, python))
+    lock = [line for line in lines if not line.marker or line.marker.evaluate(machine)]
+    versions = {canonicalize_name(line.name): str(next(iter(line.specifier)).version) for line in lock}
+    assert len(versions) == len(lock), "a package stands there twice"
+    offered = PYPROJECT["project"]["optional-dependencies"]
+    for asked in [*BASE, *(Requirement(text) for extra in noxfile.EXTRAS[name].split(",") for text in offered[extra])]:
+        if asked.name != "torch" and (not asked.marker or asked.marker.evaluate(machine)):
+            assert versions[canonicalize_name(asked.name)] in asked.specifier, f"nox -s lock: {asked}"
+
+
+def test_locks_of_bundled_wheels_are_of_the_listed_versions() -> None:
+    lines = [line for extension in EXTENSIONS for line in _locked(extension.lock)]
+    assert {canonicalize_name(line.name): str(next(iter(line.specifier)).version) for line in lines} == PINS
+
+
+def test_no_lock_names_where_packages_come_from() -> None:
+    for path in sorted((ROOT / "tools" / "locks").glob("*.txt")):
+        assert not re.search(r"://|--(extra-)?index|--find-links", path.read_text(encoding="utf-8")), path.name
