@@ -24,19 +24,21 @@ from synthroads_addon.materials.variation import vary_material  # noqa: E402
 from synthroads_addon.road.surroundings import Environment, MaterialVariation  # noqa: E402
 from synthroads_addon.scanning.beam import RINGS, beam_pattern, conical_directions, cylindrical_offsets  # noqa: E402
 from synthroads_addon.scanning.weather.base import Weather  # noqa: E402
-from synthroads_addon.scanning.weather.clear import Clear  # noqa: E402
-from synthroads_addon.scanning.weather.dust import Dust  # noqa: E402
+from synthroads_addon.scanning.weather.conditions import (  # noqa: E402
+    Clear,
+    Dust,
+    Fog,
+    Haze,
+    Precipitation,
+    Rain,
+    Snow,
+)
 from synthroads_addon.scanning.weather.extinction import (  # noqa: E402
     kim_exponent,
     kruse_exponent,
     visibility_extinction,
 )
-from synthroads_addon.scanning.weather.fog import Fog  # noqa: E402
-from synthroads_addon.scanning.weather.haze import Haze  # noqa: E402
-from synthroads_addon.scanning.weather.precipitation import Precipitation  # noqa: E402
-from synthroads_addon.scanning.weather.rain import Rain  # noqa: E402
 from synthroads_addon.scanning.weather.registry import WEATHERS  # noqa: E402
-from synthroads_addon.scanning.weather.snow import Snow  # noqa: E402
 
 mpl.use("Agg")
 from matplotlib import pyplot  # noqa: E402

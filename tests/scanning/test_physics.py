@@ -15,7 +15,7 @@ from synthroads_addon.scanning.plan import ScanPlan
 from synthroads_addon.scanning.scene.mesh import SceneMesh
 from synthroads_addon.scanning.scene.motion import LinearMotion, MovingMesh
 from synthroads_addon.scanning.trace import trace
-from synthroads_addon.scanning.weather.fog import Fog
+from synthroads_addon.scanning.weather.conditions import Fog
 from tests.helpers.scenes.scan_scenes import (
     ORIGIN,
     Standing,

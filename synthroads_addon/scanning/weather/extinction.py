@@ -57,3 +57,14 @@ def _clear_exponent(kilometres: float) -> float:
 def per_metre(decibels_per_kilometre: float) -> float:
     """Return the extinction (1/m) of an attenuation in dB/km."""
     return decibels_per_kilometre * _PER_DECIBEL * _PER_KILOMETRE
+
+
+def snow_extinction(rate_mm_h: float, wavelength_nm: float, *, wet: bool = True) -> float:
+    """Return the extinction of falling snow, 1/m: a S^b dB/km of ITU-R P.1814, S in mm/h of water.
+
+    Wet snow, near 0 degrees C as snow on German motorways mostly is, has a = 1.023e-4 L + 3.786 and b = 0.72, dry
+    snow a = 5.42e-5 L + 5.496 and b = 1.38, with the wavelength L in nm.
+    """
+    if wet:
+        return per_metre((1.023e-4 * wavelength_nm + 3.7855466) * rate_mm_h**0.72)
+    return per_metre((5.42e-5 * wavelength_nm + 5.4958776) * rate_mm_h**1.38)

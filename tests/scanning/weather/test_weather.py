@@ -11,10 +11,14 @@ from synthroads_addon.base.errors import InputError
 from synthroads_addon.road.surroundings import Environment
 from synthroads_addon.sampling.surroundings import WEATHER
 from synthroads_addon.scanning.weather.base import Weather
-from synthroads_addon.scanning.weather.extinction import kim_exponent, kruse_exponent, visibility_extinction
-from synthroads_addon.scanning.weather.rain import Rain
+from synthroads_addon.scanning.weather.conditions import Rain, Snow
+from synthroads_addon.scanning.weather.extinction import (
+    kim_exponent,
+    kruse_exponent,
+    snow_extinction,
+    visibility_extinction,
+)
 from synthroads_addon.scanning.weather.registry import WEATHERS, weather_of
-from synthroads_addon.scanning.weather.snow import Snow, snow_extinction
 from synthroads_addon.scenario.scan import ScanScenario
 from synthroads_addon.scenario.scenario import load_scenario
 
