@@ -1,0 +1,159 @@
+"""Patterns of lines across the forward direction: mirrors that turn or swing, and rows of a grid."""
+
+from __future__ import annotations
+
+import math
+from typing import ClassVar, Literal
+
+import numpy as np
+from pydantic import Field
+
+from ...base.schema import quantity
+from .base import Float, Numbers, Pattern, PulseRays, PulseTiming
+
+
+class LinePattern(Pattern):
+    """A pattern of lines across the forward direction, centred on an angle from the nadir."""
+
+    centre_from_nadir_deg: float = quantity(
+        0.0, ge=-180, le=180, unit="deg", description="Middle of the field of view, to the right of the nadir."
+    )
+
+    def sweep(self, field_of_view: float) -> float:
+        """Return the field of view: a line is swept with every pulse."""
+        return field_of_view
+
+    def fault(self, field_of_view_deg: float, pulse_rate: float) -> str:
+        """Refuse angles beyond the zenith."""
+        largest = abs(self.centre_from_nadir_deg) + field_of_view_deg / 2.0
+        return f"reaches {largest:g} deg from the nadir, beyond 180" if largest > 180.0 + 1e-9 else ""
+
+    def rays(self, timing: PulseTiming, pulse: Numbers, with_frame: bool) -> PulseRays:
+        """Return pulses of lines across the forward direction.
+
+        Line k begins at k / lines per second, and its N pulses follow at the pulse rate. Pulse j is j - (N - 1) / 2
+        steps from the middle of the field of view.
+        """
+        line, within = np.divmod(pulse, timing.pulses_per_line)
+        time = line / timing.lines_per_second + within / timing.pulse_rate
+        angle = self.angles(timing, line, within - (timing.pulses_per_line - 1) / 2.0)
+        angle += math.radians(self.centre_from_nadir_deg)
+        return make_rays(time, angle, self.tilts(line), with_frame)
+
+    def angles(self, timing: PulseTiming, line: Numbers, place: Float) -> Float:
+        """Return the angles (P,) of pulses from the middle of the field of view, rad.
+
+        Args:
+            timing: the head's.
+            line: (P,) number of each pulse's line.
+            place: (P,) how many pulses each is after the middle of its line.
+        """
+        return place * timing.angle_step
+
+    def tilts(self, line: Numbers) -> Float | None:
+        """Return the angles (P,) by which the planes of lines are tilted forward, rad; None if none is."""
+        return None
+
+
+class RotatingMirror(LinePattern):
+    """A mirror that turns at a constant rate; the laser fires only while the beam is within the field of view.
+
+    With one face the beam turns by 360 degrees from one line to the next. A mirror with several faces turns it by less:
+    a share field of view / turn per line of all pulses is fired.
+    """
+
+    order: ClassVar[int] = 1
+    type: Literal["rotating_mirror"] = "rotating_mirror"
+    turn_per_line_deg: float = quantity(
+        360.0, gt=0, le=360, unit="deg", description="Angle by which the beam turns from one line to the next."
+    )
+
+    def sweep(self, field_of_view: float) -> float:
+        """Return the turn per line."""
+        return math.radians(self.turn_per_line_deg)
+
+    def firing_share(self, field_of_view: float) -> float:
+        """Return the share of the turn that lies within the field of view."""
+        return field_of_view / math.radians(self.turn_per_line_deg)
+
+    def fault(self, field_of_view_deg: float, pulse_rate: float) -> str:
+        """Refuse a field of view wider than the turn."""
+        if field_of_view_deg > self.turn_per_line_deg + 1e-9:
+            return f"is wider than the {self.turn_per_line_deg:g} deg that the beam turns per line"
+        return super().fault(field_of_view_deg, pulse_rate)
+
+
+class PolygonMirror(LinePattern):
+    """A polygon of mirrors, each of whose facets sweeps the whole field of view with every pulse."""
+
+    order: ClassVar[int] = 2
+    type: Literal["polygon_mirror"] = "polygon_mirror"
+
+
+class OscillatingMirror(LinePattern):
+    """A mirror that swings to and fro; a line is one swing, so that two lines are a period of the motion."""
+
+    order: ClassVar[int] = 3
+    type: Literal["oscillating_mirror"] = "oscillating_mirror"
+    motion: Literal["triangular", "sinusoidal"] = Field(
+        "triangular", description="At a constant rate, turning back at once; or as a sine of time."
+    )
+
+    @property
+    def cycle_lines(self) -> int:
+        """Return the lines of a period: the swings alternate."""
+        return 2
+
+    def sweep(self, field_of_view: float) -> float:
+        """Return the field of view; a sine is pi / 2 times as fast in the middle as on average."""
+        return field_of_view * (0.5 * math.pi if self.motion == "sinusoidal" else 1.0)
+
+    def angles(self, timing: PulseTiming, line: Numbers, place: Float) -> Float:
+        """Return the angles (P,) of the mirror's motion, every second line in the other direction, rad."""
+        np.negative(place, where=line % 2 == 1, out=place)
+        if self.motion == "triangular":
+            return super().angles(timing, line, place)
+        swing = place * (math.pi * timing.lines_per_second / timing.pulse_rate)
+        return timing.field_of_view / 2.0 * np.sin(swing)
+
+
+class Grid(LinePattern):
+    """Rows of equal angle steps, one after the other: a line is a row, whose plane is tilted forward row by row."""
+
+    order: ClassVar[int] = 4
+    type: Literal["grid"] = "grid"
+    rows: int = quantity(ge=1, le=100_000, unit="1", description="Rows of a frame, from the rearmost to the foremost.")
+    along_field_deg: float = quantity(
+        ge=0, le=170, unit="deg", description="Field of view along the forward direction, centred on the nadir."
+    )
+
+    @property
+    def cycle_lines(self) -> int:
+        """Return the rows of a frame."""
+        return self.rows
+
+    def tilts(self, line: Numbers) -> Float:
+        """Return the angles (P,) by which the planes of rows are tilted forward, rad."""
+        row = line % self.rows - (self.rows - 1) / 2.0
+        return row * (math.radians(self.along_field_deg) / self.rows)
+
+
+def make_rays(time: Float, angle: Float, forward: Float | None, with_frame: bool) -> PulseRays:
+    """Return rays at angles (P,) from the nadir, in planes that are tilted forward by angles (P,), None for 0.
+
+    direction = cos(angle) down + sin(angle) right, where down = (sin(forward), 0, -cos(forward)).
+    """
+    sine, cosine = np.sin(angle), np.cos(angle)
+    nodding = (0.0, 1.0) if forward is None else (np.sin(forward), np.cos(forward))
+    direction = np.empty((3, len(angle)))
+    np.multiply(cosine, nodding[0], out=direction[0])
+    np.negative(sine, out=direction[1])
+    np.multiply(cosine, -nodding[1], out=direction[2])
+    if not with_frame:
+        return PulseRays(time, angle, direction)
+    in_plane, across = np.empty_like(direction), np.zeros_like(direction)
+    np.multiply(sine, -nodding[0], out=in_plane[0])
+    np.negative(cosine, out=in_plane[1])
+    np.multiply(sine, nodding[1], out=in_plane[2])
+    across[0], across[2] = nodding[1], nodding[0]
+    return PulseRays(time, angle, direction, in_plane, across)
