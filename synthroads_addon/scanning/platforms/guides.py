@@ -6,8 +6,6 @@ offsets count to the left.
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
-
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -25,53 +23,20 @@ _SAMPLES = 201  # stations at which a lane's place is looked up
 _FULL_LANE = 1.99  # m; what is narrower is a lane that begins or ends
 
 
-class Guide(ABC):
-    """Line that a path follows.
+class Guide:
+    """Line that a path follows: an alignment with a profile; what lies beneath is level across and as high as the line.
 
-    Attributes:
-        length: the largest station, m; the first is 0.
-        origin: (3,) map coordinates of the local origin, m.
-        breaks: (B,) stations at which the curvature may jump or bend.
-    """
-
-    length: float
-    origin: Float
-    breaks: Float
-
-    @abstractmethod
-    def frame(self, station: Float) -> tuple[Float, Float, Float, Float]:
-        """Return plan position (K, 2), heading (K,), curvature (K,) 1/m, and plan length per station (K,)."""
-
-    @abstractmethod
-    def elevation(self, station: Float) -> Float:
-        """Return the local elevation (K,) of the guide itself."""
-
-    @abstractmethod
-    def ground(self, station: Float, offset: Float, damaged: bool) -> Float:
-        """Return the local elevation (K,) of what lies beneath, with or without ruts and potholes; NaN if unknown."""
-
-    @abstractmethod
-    def project(self, plan: Float) -> tuple[Float, Float]:
-        """Return stations (K,) and offsets (K,) of local points (K, 2)."""
-
-    @abstractmethod
-    def driving_offsets(self) -> tuple[float, ...]:
-        """Return the offset of the outermost lane's middle for each carriageway, m."""
-
-    @abstractmethod
-    def roadside_offsets(self, station: Float) -> Float:
-        """Return the offsets (K,) at which a tripod stands at stations (K,), m."""
-
-
-class AlignmentGuide(Guide):
-    """An alignment with a profile; what lies beneath is level across and as high as the line.
-
-    A vehicle drives along the line, and a tripod stands on it.
+    A vehicle drives along the line, and a tripod stands on it, unless a guide says otherwise.
 
     Args:
         alignment: the line in plan.
         profile: its elevation.
         origin: (3,) map coordinates of the local origin, m.
+
+    Attributes:
+        length: the largest station, m; the first is 0.
+        origin: (3,) map coordinates of the local origin, m.
+        breaks: (B,) stations at which the curvature may jump or bend.
     """
 
     def __init__(self, alignment: Alignment, profile: Profile, origin: ArrayLike) -> None:
@@ -80,32 +45,42 @@ class AlignmentGuide(Guide):
         self.length, self.breaks = alignment.length, alignment.element_starts
 
     def frame(self, station: Float) -> tuple[Float, Float, Float, Float]:
-        """Return plan position (K, 2), heading (K,), curvature (K,) 1/m, and plan length per station (K,): 1."""
+        """Return plan position (K, 2), heading (K,), curvature (K,) 1/m, and plan length per station (K,)."""
         plan, heading, curvature = self.alignment.frame(station)
         return plan, heading, curvature, np.ones(len(station))
 
     def elevation(self, station: Float) -> Float:
-        """Return the profile's local elevation (K,)."""
+        """Return the local elevation (K,) of the line itself."""
         return self.profile.elevation(station)
 
     def ground(self, station: Float, offset: Float, damaged: bool) -> Float:
-        """Return the local elevation (K,) of the line at the stations."""
+        """Return the local elevation (K,) of what lies beneath, with or without ruts and potholes; NaN if unknown."""
         return self.elevation(station)
 
+    def known_ground(self, station: Float, offset: Float, damaged: bool) -> Float:
+        """Return `ground`; raise `InputError`, which names an offset, where it is unknown."""
+        ground = self.ground(station, offset, damaged)
+        unknown = np.flatnonzero(~np.isfinite(ground))
+        if len(unknown):
+            at, beside = float(station[unknown[0]]), float(offset[unknown[0]])
+            allowed = f"there is no ground known at station {at:.1f} m; a smaller one is needed"
+            raise InputError("scan.platform.lateral_offsets", beside, allowed)
+        return ground
+
     def project(self, plan: Float) -> tuple[Float, Float]:
-        """Return stations (K,) and offsets (K,) of local points (K, 2)."""
+        """Return stations (K,) and offsets (K,) of local points (K, 2) beside the alignment."""
         return self.alignment.project(plan)
 
     def driving_offsets(self) -> tuple[float, ...]:
-        """Return 0: a vehicle drives along the line itself."""
+        """Return the offset of the outermost lane's middle for each carriageway, m."""
         return (0.0,)
 
     def roadside_offsets(self, station: Float) -> Float:
-        """Return zeros (K,): a tripod stands on the line itself."""
+        """Return the offsets (K,) at which a tripod stands at stations (K,), m."""
         return np.zeros(len(station))
 
 
-class RoadGuide(AlignmentGuide):
+class RoadGuide(Guide):
     """The centreline of a road."""
 
     def __init__(self, geometry: RoadGeometry) -> None:
@@ -150,9 +125,8 @@ class SmoothedGuide(Guide):
     """
 
     def __init__(self, guide: Guide, degree: int) -> None:
-        self._guide = guide
-        self.length, self.origin = guide.length, guide.origin
-        self.breaks = np.zeros(0)
+        super().__init__(guide.alignment, guide.profile, guide.origin)
+        self._guide, self.breaks = guide, np.zeros(0)
         count = int(np.clip(np.ceil(self.length), 20 * degree, 20_000))
         station = np.arange(count + 1) * (self.length / count)
         plan = guide.frame(station)[0]
@@ -180,19 +154,11 @@ class SmoothedGuide(Guide):
         curvature = (dx * ddy - dy * ddx) / np.maximum(stretch, 1e-12) ** 3
         return np.stack([x, y], axis=1) + self._mean, np.arctan2(dy, dx), curvature, stretch
 
-    def elevation(self, station: Float) -> Float:
-        """Return the local elevation (K,) of the guide at the same stations."""
-        return self._guide.elevation(station)
-
     def ground(self, station: Float, offset: Float, damaged: bool) -> Float:
         """Return the local elevation (K,) of what lies beneath the polynomials' offset points."""
         plan, heading, _, _ = self.frame(station)
         left = np.stack([-np.sin(heading), np.cos(heading)], axis=1)
         return self._guide.ground(*self._guide.project(plan + offset[:, None] * left), damaged)
-
-    def project(self, plan: Float) -> tuple[Float, Float]:
-        """Return stations (K,) and offsets (K,) of local points (K, 2) along the guide."""
-        return self._guide.project(plan)
 
     def driving_offsets(self) -> tuple[float, ...]:
         """Return the driving offsets beside the guide, m."""

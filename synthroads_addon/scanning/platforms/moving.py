@@ -1,10 +1,10 @@
-"""Platforms that move along a guide at a constant speed over ground: what they share, and level flight."""
+"""Platforms that move along a guide at a constant speed over ground: what they share, and those that fly level."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import lru_cache
-from typing import Literal
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 from pydantic import Field
@@ -76,6 +76,26 @@ class AerialPlatform(MovingPlatform):
     def as_single_strip(self) -> AerialPlatform:
         """Return the platform with one strip on its guide, unless offsets are given."""
         return self if self.lateral_offsets is not None else self.model_copy(update={"lateral_offsets": (0.0,)})
+
+
+class Uav(AerialPlatform):
+    """UAV that flies level along the road, usually 60 m up at 8 m/s."""
+
+    order: ClassVar[int] = 0
+    label: ClassVar[str] = "UAV"
+    usual: ClassVar[Mapping[str, Any]] = {"height": 60.0, "speed": 8.0, "lateral_offsets": (10.0, -10.0)}
+
+    kind: Literal["uav"] = Field("uav", title="Platform", description="Platform.")
+
+
+class Aircraft(AerialPlatform):
+    """Aircraft that flies level along the road, usually 800 m up at 60 m/s."""
+
+    order: ClassVar[int] = 3
+    label: ClassVar[str] = "Aircraft"
+    usual: ClassVar[Mapping[str, Any]] = {"height": 800.0, "speed": 60.0, "lateral_offsets": (0.0,)}
+
+    kind: Literal["airborne"] = Field("airborne", title="Platform", description="Platform.")
 
 
 class MovingPath:
@@ -154,13 +174,7 @@ class MovingPath:
         """
         station = track.stations(distance)
         offset = track.offsets(station)[0] + (left if track.forward else -left)
-        ground = self._guide.ground(station, offset, False)
-        unknown = np.flatnonzero(~np.isfinite(ground))
-        if len(unknown):
-            at, beside = float(station[unknown[0]]), float(offset[unknown[0]])
-            field = "scan.platform.lateral_offsets"
-            raise InputError(field, beside, f"there is no ground known at station {at:.1f} m; a smaller one is needed")
-        return ground
+        return self._guide.known_ground(station, offset, False)
 
     def _knots(self, index: int) -> float:
         track = self._strip_track(index)

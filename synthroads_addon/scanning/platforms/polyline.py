@@ -13,7 +13,7 @@ from ...base.rotations import wrap_angle
 from ...road.alignment import CURVATURE_LIMIT, Alignment, Element, finite_array
 from ...road.centerline import read_axis
 from ...road.profile import IntersectionPoint, Profile
-from .guides import AlignmentGuide, Float
+from .guides import Float, Guide
 
 CORNER = 10.0
 """A corner is rounded from this far (m) before it on, or from nearly half way to the nearer neighbouring point."""
@@ -23,7 +23,7 @@ MEASURED = 0.05
 _REPEATED = 1e-3  # m
 
 
-class PolylineGuide(AlignmentGuide):
+class PolylineGuide(Guide):
     """A polyline whose corners are rounded in plan, so that its heading is continuous.
 
     Each corner is replaced by two clothoids that begin `CORNER` before it (or at 49 % of the way to the nearer

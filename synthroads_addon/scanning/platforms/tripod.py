@@ -82,11 +82,7 @@ class Tripod(Platform):
             offset = np.resize(np.array(self.lateral_offsets, dtype=np.float64), len(station))
         plan, heading, _, _ = guide.frame(station)
         left = np.stack([-np.sin(heading), np.cos(heading)], axis=1)
-        ground = guide.ground(station, offset, True)
-        if not np.isfinite(ground).all():
-            place = int(np.argmin(np.isfinite(ground)))
-            allowed = f"there is no ground known at station {station[place]:.1f} m; a smaller one is needed"
-            raise InputError("scan.platform.lateral_offsets", float(offset[place]), allowed)
+        ground = guide.known_ground(station, offset, True)
         positions = np.column_stack([plan + offset[:, None] * left, ground + self.value("height")])
         return TripodPath(self, positions, heading)
 
