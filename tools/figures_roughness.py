@@ -19,9 +19,10 @@ from numpy.typing import NDArray
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
 
+from synthroads_addon.base.noise import field as noise_field  # noqa: E402
 from synthroads_addon.base.random_streams import stream  # noqa: E402
 from synthroads_addon.cloud.points import PointBlock  # noqa: E402
-from synthroads_addon.scanning.relief import OCTAVES, RELIEF, MicroRelief, heights, shift_along_normals  # noqa: E402
+from synthroads_addon.scanning.relief import OCTAVES, RELIEF, MicroRelief, shift_along_normals  # noqa: E402
 from tools.surface_variation import plane_residuals, surface_variation  # noqa: E402
 
 Float = NDArray[np.float64]
@@ -70,7 +71,7 @@ def with_relief(cloud: Cloud, strength: float, noise: float = 0.0, octaves: int 
     """Return the cloud with the relief of its surfaces and a scanner's noise, m, seen from straight above."""
     table = np.array([RELIEF[name] for name, _, _ in STRIP])
     amplitude, wavelength = table[cloud.surface].T
-    height = heights(cloud.xyz, strength * amplitude, wavelength, SEED, octaves)
+    height = strength * amplitude * noise_field(cloud.xyz, wavelength, SEED, octaves)
     height += stream(SEED, "noise").normal(0.0, noise, len(height))
     return Cloud(cloud.xyz + height[:, None] * np.array([0.0, 0.0, 1.0]), cloud.surface)
 
@@ -251,8 +252,7 @@ def footprints() -> None:
         for diameters in ((0.007, 0.007), (0.030, 0.030), (0.096, 0.030), (0.25, 0.25)):
             spread = random.normal(0.0, 0.25, (1500, 400, 3)) * (*diameters, 0.0)
             place = (centres[:, None] + spread).reshape(-1, 3)
-            size = len(place)
-            height = heights(place, np.full(size, relief.amplitude), np.full(size, relief.wavelength), SEED, 6)
+            height = relief.amplitude * noise_field(place, relief.wavelength, SEED, 6)
             seen = height.reshape(1500, 400).mean(axis=1).std()
             text.append(f"{1e3 * diameters[0]:.0f} x {1e3 * diameters[1]:.0f} mm {100 * seen / relief.amplitude:.0f} %")
         print(f"  of the relief of {name}, a footprint sees: " + ", ".join(text))

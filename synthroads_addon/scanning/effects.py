@@ -1,15 +1,18 @@
-"""Effects between tracing and returns, such as drops in the air, that change a pulse's echoes."""
+"""Effects between tracing and returns, such as drops in the air, that change a pulse's echoes; and how they act."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Protocol
+from dataclasses import dataclass, field, replace
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-if TYPE_CHECKING:
-    from .devices.device import ScannerSetting
+from .devices.device import ScannerSetting
+from .pulses import Pulses
+from .radiometry import received_intensity
+from .returns import UNCOUNTED, BothMarks, Marks
+from .trace import Hits, Traced
 
 Float = NDArray[np.float64]
 Index = NDArray[np.intp]
@@ -48,14 +51,6 @@ class PulseHits:
     setting: ScannerSetting
 
 
-def _no_index() -> Index:
-    return np.empty(0, dtype=np.intp)
-
-
-def _no_float() -> Float:
-    return np.empty(0)
-
-
 @dataclass(frozen=True)
 class EchoChanges:
     """Changes that an effect makes to the pulses of a block.
@@ -68,10 +63,10 @@ class EchoChanges:
             at all. None leaves everything as bright as it is. It doesn't apply to the echoes that are added here.
     """
 
-    pulse: Index = field(default_factory=_no_index)
-    ray: Index = field(default_factory=_no_index)
-    distance: Float = field(default_factory=_no_float)
-    brightness: Float = field(default_factory=_no_float)
+    pulse: Index = field(default_factory=lambda: np.empty(0, dtype=np.intp))
+    ray: Index = field(default_factory=lambda: np.empty(0, dtype=np.intp))
+    distance: Float = field(default_factory=lambda: np.empty(0))
+    brightness: Float = field(default_factory=lambda: np.empty(0))
     transmission: Float | None = None
 
 
@@ -94,3 +89,103 @@ class EchoEffect(Protocol):
             random: random numbers of this effect and this block, the same in whatever order blocks are scanned.
         """
         ...
+
+
+def apply_effect(
+    effect: EchoEffect,
+    random: np.random.Generator,
+    setting: ScannerSetting,
+    attenuation: float,
+    pulses: Pulses,
+    traced: Traced,
+    marks: BothMarks,
+) -> tuple[Traced, BothMarks]:
+    """Return what the rays of a block meet, and its marks, after an effect.
+
+    Echoes that are added join what lies behind permeable surfaces, with the face -1.
+
+    Args:
+        effect: sees what those before it have left.
+        random: random numbers of this effect and this block.
+        setting: the scanner's.
+        attenuation: 1/m of range.
+        pulses: the block's.
+        traced: what their rays meet.
+        marks: what that adds to returns.
+
+    Raises:
+        ValueError: the effect's echoes are of no ray, or not finite numbers.
+    """
+    hits = _pulse_hits(setting, attenuation, pulses, traced, marks)
+    changes = effect.change_echoes(hits, random)
+    _check(effect.name, changes, hits.distance.shape)
+    if changes.transmission is not None:
+        traced, marks = _weaken(traced, marks, np.broadcast_to(changes.transmission, hits.distance.shape))
+    return _add_echoes(setting, attenuation, traced, marks, changes)
+
+
+def _pulse_hits(
+    setting: ScannerSetting, attenuation: float, pulses: Pulses, traced: Traced, marks: BothMarks
+) -> PulseHits:
+    first, behind = marks
+    ray, pulse = np.divmod(traced.ray, len(pulses.time))
+    return PulseHits(
+        time=pulses.time,
+        origin=pulses.origin,
+        direction=pulses.direction,
+        share=traced.rays.share[:, 0],
+        distance=first.distance,
+        brightness=_brightness(first, attenuation),
+        behind_pulse=pulse,
+        behind_ray=ray,
+        behind_distance=behind.distance,
+        behind_brightness=_brightness(behind, attenuation),
+        setting=setting,
+    )
+
+
+def _add_echoes(
+    setting: ScannerSetting, attenuation: float, traced: Traced, marks: BothMarks, changes: EchoChanges
+) -> tuple[Traced, BothMarks]:
+    """Return hits and marks with those echoes of an effect that the scanner records."""
+    distance = np.asarray(changes.distance, dtype=np.float64)
+    here = np.flatnonzero((distance >= setting.minimum_range) & (distance <= setting.maximum_range))
+    distance, brightness = distance[here], np.asarray(changes.brightness, dtype=np.float64)[here]
+    none = np.zeros(len(here), dtype=np.intp)
+    # In the air there is no face; it counts as one that lies across the beam.
+    hits = Hits(none - 1, none, distance, none - 1.0, brightness)
+    added = Marks(distance, np.maximum(brightness, UNCOUNTED), received_intensity(brightness, distance, attenuation))
+    first, behind = marks
+    ray = changes.ray[here] * len(traced.rays.time) + changes.pulse[here]
+    traced = replace(traced, behind=Hits.join([traced.behind, hits]), ray=np.concatenate([traced.ray, ray]))
+    return traced, (first, Marks.join([behind, added]))
+
+
+def _brightness(marks: Marks, attenuation: float) -> Float:
+    """Return what a surface sends back, from the intensity that is received of it; 0 where nothing is."""
+    white = received_intensity(1.0, marks.distance, attenuation)
+    return np.divide(marks.intensity, white, out=np.zeros_like(white), where=white > 0.0)
+
+
+def _check(name: str, changes: EchoChanges, shape: tuple[int, ...]) -> None:
+    if not len(changes.pulse) == len(changes.ray) == len(changes.distance) == len(changes.brightness):
+        raise ValueError(f"effect {name}: pulse, ray, distance and brightness must be as many")
+    for index, count in ((changes.ray, shape[0]), (changes.pulse, shape[1])):
+        if len(index) and not 0 <= index.min() <= index.max() < count:
+            raise ValueError(f"effect {name}: echoes must be of one of {shape[0]} rays of {shape[1]} pulses")
+    if not (np.isfinite(changes.distance).all() and np.isfinite(changes.brightness).all()):
+        raise ValueError(f"effect {name}: distances and brightnesses must be finite numbers")
+
+
+def _weaken(traced: Traced, marks: BothMarks, transmission: Float) -> tuple[Traced, BothMarks]:
+    """Return hits and marks with factors (K, P) on the brightness; hits that send no light back are left out."""
+    first, behind = marks
+    left = transmission.ravel()[traced.ray]
+    seen = np.flatnonzero(left > 0.0)
+    first = Marks(
+        distance=np.where(transmission > 0.0, first.distance, np.inf),
+        weight=np.where(transmission > 0.0, first.weight * transmission, first.weight),
+        intensity=first.intensity * transmission,
+    )
+    behind = Marks(behind.distance[seen], behind.weight[seen] * left[seen], behind.intensity[seen] * left[seen])
+    return replace(traced, behind=traced.behind.select(seen), ray=traced.ray[seen]), (first, behind)

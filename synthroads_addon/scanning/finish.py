@@ -16,7 +16,7 @@ from .colour.colour import LayerSource, LayerValues, SeenPoints, sample_points
 from .devices.device import ScannerSetting
 from .plan import ScanPlan
 from .radiometry import saturate
-from .relief import MicroRelief, shift_along_normals
+from .relief import shift_along_normals
 from .returns import number_returns
 from .scan import BlockResult
 
@@ -26,101 +26,79 @@ OPTIONAL = optional_arrays()
 
 
 @dataclass(frozen=True)
-class LayerBrightness:
-    """Brightness of points by their own layers.
-
-    Attributes:
-        means: of the scene's materials, which the layers vary around.
-        surfaces: of these, as the beam meets them.
-        setting: the scanner's.
-    """
-
-    means: Surfaces
-    surfaces: Surfaces
-    setting: ScannerSetting
-
-    def factors(self, points: PointBlock, seen: SeenPoints, values: LayerValues) -> NDArray[np.float64]:
-        """Return how many times as bright points are by their own layers as by their materials' means (N,).
-
-        A return has the layers of what gave most of it. What beads and prisms send back doesn't depend on them, nor
-        does what comes from the air.
-        """
-        own = reflectivity(*(values.arrays[name] for name in ("base_color", "metallic", "specular")))
-        usual = np.take(self.means.reflectivity, seen.material, mode="clip")
-        factor = np.asarray(own / np.maximum(usual, _DARKEST))
-        factor[seen.material == NO_MATERIAL] = 1.0
-        of = self.surfaces
-        if not of.retroreflective:
-            return factor
-        shining = np.flatnonzero(np.append(of.shining, False).take(seen.material, mode="clip"))
-        material = seen.material[shining]
-        cosine = np.cos(np.deg2rad(points.incidence_deg[shining].astype(np.float64)))
-        usual = brightness_of(of, material, cosine)
-        beads = usual - returned_share(cosine, of.reflectivity[material], of.facet_a[material], of.facet_b[material])
-        factor[shining] = (factor[shining] * (usual - beads) + beads) / np.maximum(usual, _DARKEST)
-        return factor
-
-
-@dataclass(frozen=True)
-class Roughness:
-    """Micro-relief that points are shifted by; see `scanning.plan.ScanPlan` for all attributes."""
-
-    relief: MicroRelief
-    strength: float
-    seed: int
-    octaves: int
-    frame: NDArray[np.float64]
-
-    def shift(self, points: PointBlock, seen: SeenPoints) -> PointBlock:
-        """Return the points shifted where they were seen."""
-        place = seen.position + self.frame
-        return shift_along_normals(points, place, self.relief, self.strength, self.seed, self.octaves)
-
-
 class Finish:
     """The stages that blocks go through after the scan: colours, layers, micro-relief and final intensities.
 
-    Args:
-        plan: the scan, of which each stage takes what it needs.
+    Attributes:
+        plan: the scan.
         source: of colours and layers.
     """
 
-    def __init__(self, plan: ScanPlan, source: LayerSource) -> None:
-        self._source, self._coloured, self._kept = source, plan.coloured, plan.kept
-        self._range_corrected = plan.range_corrected
-        self._brightness = self._roughness = None
-        if plan.detects_later:
-            assert plan.means is not None
-            self._brightness = LayerBrightness(plan.means, plan.surfaces, plan.setting)
-        if plan.relief is not None and plan.relief_strength > 0.0:
-            strength, octaves = plan.relief_strength, plan.relief_octaves
-            self._roughness = Roughness(plan.relief, strength, plan.seed, octaves, plan.frame)
+    plan: ScanPlan
+    source: LayerSource
 
     def block(self, result: BlockResult) -> BlockResult:
         """Return a block, or several joined, as the sink gets it."""
-        if result.seen is not None and (self._coloured or self._brightness):
+        plan = self.plan
+        if result.seen is not None and (plan.coloured or plan.detects_later):
             result = self._with_layers(result, result.seen)
         points = result.points
-        if result.seen is not None and self._roughness:
-            points = self._roughness.shift(points, result.seen)
-        changes: dict[str, NDArray[Any] | None] = dict.fromkeys(points.attributes().keys() & OPTIONAL - self._kept)
-        if self._range_corrected:
+        if result.seen is not None and plan.relief is not None:
+            place = result.seen.position + plan.frame
+            points = shift_along_normals(
+                points, place, plan.relief, plan.relief_strength, plan.seed, plan.relief_octaves
+            )
+        changes: dict[str, NDArray[Any] | None] = dict.fromkeys(points.attributes().keys() & OPTIONAL - plan.kept)
+        if plan.range_corrected:
             changes["intensity"] = points.intensity * points.range**2
         return replace(result, points=points.with_arrays(changes), seen=None)
 
     def _with_layers(self, result: BlockResult, seen: SeenPoints) -> BlockResult:
         """Return a block with its points' colours and layers, and with the intensities that follow from these."""
-        values = sample_points(self._source, seen, self._coloured | (_OF_INTENSITY if self._brightness else set()))
-        changes: dict[str, Any] = {name: values.arrays[name] for name in self._coloured}
+        plan = self.plan
+        values = sample_points(self.source, seen, plan.coloured | (_OF_INTENSITY if plan.detects_later else set()))
+        changes: dict[str, Any] = {name: values.arrays[name] for name in plan.coloured}
         changes["color_source"] = values.source
-        if self._brightness:
-            factors = self._brightness.factors(result.points, seen, values)
+        if plan.detects_later:
+            assert plan.means is not None
+            factors = layer_brightness(plan.means, plan.surfaces, result.points, seen, values)
             changes["intensity"] = result.points.intensity * factors
         result = replace(result, points=result.points.with_arrays(changes))
-        if self._brightness:
-            result = detect_echoes(result, self._brightness.setting)
+        if plan.detects_later:
+            result = detect_echoes(result, plan.setting)
         assert result.points.color_source is not None
         return replace(result, sources=np.bincount(result.points.color_source, minlength=256))
+
+
+def layer_brightness(
+    means: Surfaces, surfaces: Surfaces, points: PointBlock, seen: SeenPoints, values: LayerValues
+) -> NDArray[np.float64]:
+    """Return how many times as bright points are by their own layers as by their materials' means (N,).
+
+    A return has the layers of what gave most of it. What beads and prisms send back doesn't depend on them, nor does
+    what comes from the air.
+
+    Args:
+        means: of the scene's materials, which the layers vary around.
+        surfaces: of these, as the beam meets them.
+        points: N points.
+        seen: where.
+        values: their layers.
+    """
+    by_layers = reflectivity(*(values.arrays[name] for name in ("base_color", "metallic", "specular")))
+    usual = np.take(means.reflectivity, seen.material, mode="clip")
+    factor = np.asarray(by_layers / np.maximum(usual, _DARKEST))
+    factor[seen.material == NO_MATERIAL] = 1.0
+    if not surfaces.retroreflective:
+        return factor
+    shining = np.flatnonzero(np.append(surfaces.shining, False).take(seen.material, mode="clip"))
+    material = seen.material[shining]
+    cosine = np.cos(np.deg2rad(points.incidence_deg[shining].astype(np.float64)))
+    facets = (surfaces.facet_a[material], surfaces.facet_b[material])
+    usual = brightness_of(surfaces, material, cosine)
+    beads = usual - returned_share(cosine, surfaces.reflectivity[material], *facets)
+    factor[shining] = (factor[shining] * (usual - beads) + beads) / np.maximum(usual, _DARKEST)
+    return factor
 
 
 def detect_echoes(result: BlockResult, setting: ScannerSetting) -> BlockResult:

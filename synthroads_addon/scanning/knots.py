@@ -70,10 +70,13 @@ class Track:
             return rotation, position, np.ones(len(times), dtype=bool)
         return rotation, position, self.present[index] & self.present[index + 1]
 
-    def point_track(self, point: Float) -> PointTrack:
-        """Return the track of a point (3,) of the own frame, m."""
-        place = np.einsum("ijk,j->ik", self.rotation.reshape(3, 3, -1), point) + self.position
-        return PointTrack(self.begin, self.spacing, place)
+    def way_of(self, point: Float) -> Float:
+        """Return where a point (3,) of the own frame, m, is at the knots (3, K), m."""
+        return np.asarray(np.einsum("ijk,j->ik", self.rotation.reshape(3, 3, -1), point) + self.position)
+
+    def along(self, way: Float, times: Float) -> Float:
+        """Return values (C, N) at times within the track of values (C, K) at its knots."""
+        return _between(way, *_knots(self, times))
 
     def swept_box(self, centre: Float, radius: float) -> Float | None:
         """Return the smallest and largest corner (2, 3) that a sphere reaches on the way; None where it is never there.
@@ -85,33 +88,8 @@ class Track:
         there = np.flatnonzero(self.present)
         if not len(there):
             return None
-        rotation = self.rotation[:, there].reshape(3, 3, -1)
-        middle = np.einsum("ijn,j->in", rotation, centre) + self.position[:, there]
+        middle = self.way_of(centre)[:, there]
         return np.array([middle.min(axis=1) - radius, middle.max(axis=1) + radius])
-
-
-@dataclass(frozen=True)
-class PointTrack:
-    """Where a point of a body is on its track, whether the body is there or not.
-
-    Attributes:
-        begin: time of the first knot, s.
-        spacing: s between two.
-        position: (3, K) m.
-    """
-
-    begin: float
-    spacing: float
-    position: Float
-
-    @property
-    def fastest(self) -> float:
-        """Return the largest speed between two knots, m/s."""
-        return float(np.sqrt(np.square(np.diff(self.position, axis=1)).sum(axis=0).max())) / self.spacing
-
-    def at(self, times: Float) -> Float:
-        """Return places (3, N) at times within the track."""
-        return _between(self.position, *_knots(self, times))
 
 
 class PoseCache:
@@ -151,7 +129,7 @@ def _knot_numbers(begin: float, end: float, spacing: float) -> tuple[int, int]:
     return first, max(int(np.ceil(end / spacing)), first + 1)
 
 
-def _knots(track: Track | PointTrack, times: Float) -> tuple[NDArray[np.intp], Float]:
+def _knots(track: Track, times: Float) -> tuple[NDArray[np.intp], Float]:
     """Return the knots before times (N,), and which share of the way to the next has passed."""
     knot = (times - track.begin) / track.spacing
     index = np.clip(knot.astype(np.intp), 0, track.position.shape[1] - 2)

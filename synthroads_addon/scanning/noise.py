@@ -15,8 +15,6 @@ be asked for in any order, at the same cost.
 
 from __future__ import annotations
 
-from functools import lru_cache
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -32,7 +30,6 @@ BLOCK = 4096
 """Knots of a block."""
 
 _AXES = 6
-_BLOCKS_KEPT = 8
 
 
 class Noise(ClosedModel):
@@ -73,56 +70,43 @@ class Noise(ClosedModel):
     )
 
 
-class TrajectoryNoise:
-    """The errors of one strip.
-
-    Attributes:
-        knot_spacing: s, between knots of the process; between two of them errors are nearly linear in time.
+def trajectory_errors(noise: Noise, seed: int, strip: Strip, time: Float) -> tuple[Float, Float]:
+    """Return the errors of a strip at times (K,) since the first strip's start; before its start they are as there.
 
     Args:
         noise: standard deviations and correlation time.
         seed: of the scan.
         strip: what the errors are for; each has its own.
+        time: (K,) s.
+
+    Returns:
+        position (K, 3), m, along the local axes; roll, pitch and heading (K, 3), rad.
     """
+    time = np.asarray(time, dtype=np.float64)
+    attitude, heading = np.deg2rad([noise.attitude_sigma_deg, noise.heading_sigma_deg])
+    sigma = np.array([noise.position_sigma] * 3 + [attitude, attitude, heading])
+    if not sigma.any():
+        return np.zeros((len(time), 3)), np.zeros((len(time), 3))
+    run = np.maximum(time - strip.start_time, 0.0) / (noise.correlation_time / KNOTS_PER_CORRELATION_TIME)
+    knot = np.floor(run)
+    number, within = np.divmod(knot.astype(np.int64), BLOCK)
+    before, after = _weights(run - knot)
+    values = np.empty((len(time), _AXES))
+    for block in np.unique(number):
+        here = np.flatnonzero(number == block)
+        at, knots = within[here], _process_block(seed, strip, int(block))
+        values[here] = before[here, None] * knots[at] + after[here, None] * knots[at + 1]
+    values *= sigma
+    return values[:, :3], values[:, 3:]
 
-    def __init__(self, noise: Noise, seed: int, strip: Strip) -> None:
-        attitude, heading = np.deg2rad([noise.attitude_sigma_deg, noise.heading_sigma_deg])
-        self._sigma = np.array([noise.position_sigma] * 3 + [attitude, attitude, heading])
-        self.knot_spacing = noise.correlation_time / KNOTS_PER_CORRELATION_TIME
-        self._seed, self._strip = seed, strip
-        self._block = lru_cache(_BLOCKS_KEPT)(self._make_block)
 
-    def errors(self, time: Float) -> tuple[Float, Float]:
-        """Return errors at times (K,) since the first strip's start; before the strip's start they are as there.
-
-        Returns:
-            position (K, 3), m, along the local axes; roll, pitch and heading (K, 3), rad.
-        """
-        time = np.asarray(time, dtype=np.float64)
-        if not self._sigma.any():
-            return np.zeros((len(time), 3)), np.zeros((len(time), 3))
-        run = np.maximum(time - self._strip.start_time, 0.0) / self.knot_spacing
-        knot = np.floor(run)
-        number, within = np.divmod(knot.astype(np.int64), BLOCK)
-        before, after = _weights(run - knot)
-        values = np.empty((len(time), _AXES))
-        for block in np.unique(number):
-            here = np.flatnonzero(number == block)
-            at, knots = within[here], self._block(int(block))
-            values[here] = before[here, None] * knots[at] + after[here, None] * knots[at + 1]
-        values *= self._sigma
-        return values[:, :3], values[:, 3:]
-
-    def _make_block(self, number: int) -> Float:
-        """Return the process of unit variance (`BLOCK` + 1, 6) at a block's knots and the first of the next one."""
-        innovations = [self._innovations(number, BLOCK), self._innovations(number + 1, 1)]
-        if number > 0:
-            innovations.insert(0, self._innovations(number - 1, BLOCK))
-        return _autoregression(np.concatenate(innovations))[-BLOCK - 1 :]
-
-    def _innovations(self, number: int, count: int) -> Float:
-        rng = stream(self._seed, "trajectory noise", self._strip.index, number)
-        return rng.standard_normal((count, _AXES))
+def _process_block(seed: int, strip: Strip, number: int) -> Float:
+    """Return the process of unit variance (`BLOCK` + 1, 6) at a block's knots and the first of the next one."""
+    parts = [(number - 1, BLOCK)] if number > 0 else []
+    parts += [(number, BLOCK), (number + 1, 1)]
+    streams = ((stream(seed, "trajectory noise", strip.index, part), count) for part, count in parts)
+    innovations = np.concatenate([random.standard_normal((count, _AXES)) for random, count in streams])
+    return _autoregression(innovations)[-BLOCK - 1 :]
 
 
 def measured_pose(position: Float, rotation: Float, errors: tuple[Float, Float]) -> tuple[Float, Float]:

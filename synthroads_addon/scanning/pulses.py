@@ -1,4 +1,4 @@
-"""Pulses as they leave the scanner, and the errors that its navigation and its mirror make."""
+"""A block of pulses as they leave the scanner: errors, poses meanwhile, and which of them can hit anything."""
 
 from __future__ import annotations
 
@@ -8,19 +8,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..base.random_streams import stream
 from .devices.device import ScannerSetting
-from .devices.shots import shots
 from .knots import Track
-from .noise import Noise, TrajectoryNoise, measured_pose
-from .platforms.path import Path, Strip
 from .scene.target import Target
 
 Float = NDArray[np.float64]
 Index = NDArray[np.intp]
-
-_MOTION_KNOTS = 0.01
-"""Seconds between two poses of a moving vehicle: it turns by less than a milliradian meanwhile."""
 
 
 @dataclass(frozen=True)
@@ -109,90 +102,7 @@ class Pulses:
         return Pulses(**chosen)
 
 
-@dataclass(frozen=True)
-class Emitter:
-    """The scanner on its way, which errs as it emits pulses.
-
-    Attributes:
-        setting, path, noise, seed, driven: see `scanning.plan.ScanPlan`.
-        several: whether several rays sample a pulse.
-        most_returns: of a pulse that are kept at most.
-    """
-
-    setting: ScannerSetting
-    path: Path
-    noise: Noise
-    seed: int
-    driven: bool
-    several: bool
-    most_returns: int
-
-    def draw_errors(self, strip: Strip, count: int, key: int) -> Errors:
-        """Draw the errors of a block."""
-
-        def source(purpose: str) -> np.random.Generator:
-            return stream(self.seed, purpose, strip.index, key)
-
-        shape = (count, self.most_returns)
-        angle, dropout = self.noise.angle_sigma_mrad * 1e-3, self.noise.dropout
-        return Errors(
-            source("range noise").standard_normal((2, max(shape)), dtype=np.float32)
-            if self.setting.range_sigma
-            else None,
-            source("angle noise").normal(scale=angle, size=(2, count)) if angle else None,
-            source("dropouts").random(shape, dtype=np.float32) < dropout if dropout else None,
-        )
-
-    def poses_between(self, target: Target, strip: Strip, begin: float, end: float) -> Poses:
-        """Return the scanner's poses, and those of what moves in the target, between two times."""
-        spacing = self.path.knot_spacing
-
-        def true(time: Float) -> tuple[Float, Float, Float]:
-            position, rotation = self.path.pose(strip, time)
-            return rotation, position, np.ones(len(time))
-
-        def measured(time: Float) -> tuple[Float, Float, Float]:
-            errors = TrajectoryNoise(self.noise, self.seed, strip).errors(time)
-            position, rotation = measured_pose(*self.path.pose(strip, time), errors)
-            return rotation, position, np.ones(len(time))
-
-        track = Track.between(true, begin, end, spacing)
-        noisy = self.noise.position_sigma or self.noise.attitude_sigma_deg or self.noise.heading_sigma_deg
-        return Poses(
-            track,
-            # Linear between knots, errors would lose some of their spread if they changed much meanwhile.
-            Track.between(measured, begin, end, min(spacing, self.noise.correlation_time / 50.0)) if noisy else track,
-            target.motions(begin, end, min(spacing, _MOTION_KNOTS), track if self.driven else None),
-        )
-
-    def emit(self, strip: Strip, poses: Poses, angle: Float | None, first: int, count: int) -> Pulses:
-        """Return pulses ``first`` to ``first + count`` of a strip.
-
-        Args:
-            angle: (2, P) pointing errors in the scan plane and across it, rad; None without.
-        """
-        shot = shots(self.setting, first, count, self.several or angle is not None)
-        time = shot.time + strip.start_time
-        rotation, origin, _ = poses.true.at(time)
-        direction = _turn_vectors(rotation, shot.direction)
-        frame = (shot.in_plane, shot.across)
-        in_plane, across = (
-            None if not self.several or axis is None else _turn_vectors(rotation, axis) for axis in frame
-        )
-        measured_origin, measured_direction = origin, direction
-        if poses.measured is not poses.true or angle is not None:
-            believed = shot.direction
-            if angle is not None:
-                assert frame[0] is not None
-                assert frame[1] is not None
-                believed = believed + angle[0] * frame[0] + angle[1] * frame[1]
-                believed /= np.sqrt(np.einsum("ij,ij->j", believed, believed))
-            rotation, measured_origin, _ = poses.measured.at(time)
-            measured_direction = _turn_vectors(rotation, believed)
-        return Pulses(time, shot.scan_angle, origin, direction, in_plane, across, measured_origin, measured_direction)
-
-
-def _turn_vectors(rotation: Float, vectors: Float) -> Float:
+def turn_vectors(rotation: Float, vectors: Float) -> Float:
     """Return vectors (3, N) turned by rotations (9, N)."""
     result = np.empty_like(vectors)
     product = np.empty(vectors.shape[1])

@@ -1,8 +1,8 @@
 """Roughness adjustment: points are shifted along the surface's normal by the material's micro-relief.
 
-The scene's surfaces are smooth; real ones have texture. `heights` is that texture as a random field in space: the same
-place has the same height in every strip, and pulses near each other have similar ones. Strength 1 is the relief that
-pavements and soils have been measured to have (`RELIEF`), 0 none, more an exaggeration.
+The scene's surfaces are smooth; real ones have texture. Its heights are a random field in space (`base.noise`), one for
+each wavelength: the same place has the same height in every strip, and pulses near each other have similar ones.
+Strength 1 is the relief that pavements and soils have been measured to have (`RELIEF`), 0 none, more an exaggeration.
 """
 
 from __future__ import annotations
@@ -104,25 +104,6 @@ def relief_of_roughness(row: Material) -> Relief:
     return ASPHALT._replace(amplitude=ASPHALT.amplitude * excess**2)
 
 
-def heights(position: Float, amplitude: Float, wavelength: Float, seed: int, octaves: int = 4) -> Float:
-    """Return the relief's height above the mean surface, along its normal.
-
-    Every value is drawn from one random field per wavelength, see `base.noise`: mean 0, standard deviation
-    `amplitude`, correlation 1/e at 0.28 wavelengths (4 octaves). Materials of one wavelength share the field.
-
-    Args:
-        position: (N, 3) local coordinates on the mean surface, free of noise, m.
-        amplitude: (N,) standard deviation, m.
-        wavelength: (N,) longest wavelength, m.
-        seed: the scene's.
-        octaves: see `OCTAVES`.
-
-    Returns:
-        (N,) m.
-    """
-    return amplitude * field(position, wavelength, seed, octaves)
-
-
 def shift_along_normals(
     points: PointBlock, position: Float, relief: MicroRelief, strength: float, seed: int, octaves: int = 4
 ) -> PointBlock:
@@ -157,7 +138,8 @@ def shift_along_normals(
         return points
     rough = uneven if len(uneven) < len(points) else slice(None)
     material = points.material[rough]
-    height = heights(position[rough], strength * relief.amplitude[material], relief.wavelength[material], seed, octaves)
+    texture = field(position[rough], relief.wavelength[material], seed, octaves)
+    height = strength * relief.amplitude[material] * texture
     xyz, distance = points.xyz.copy(), points.range.copy()
     xyz[rough] += height[:, None] * points.normal[rough]
     before, cosine = distance[rough], np.cos(np.radians(points.incidence_deg[rough].astype(np.float64)))

@@ -51,6 +51,10 @@ class Marks(ArrayRows):
     intensity: Float
 
 
+BothMarks = tuple[Marks, Marks]
+"""Marks of what rays meet first, and of what they meet behind it."""
+
+
 def group_returns(first: Marks, behind: Marks, pulse: Index, resolution: float) -> Echoes:
     """Group the hits of every pulse into returns.
 

@@ -3,31 +3,33 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..base.random_streams import stream
 from ..cloud.points import PointBlock, concatenate, make_block
-from ..materials.surfaces import Surfaces, brightness_of
+from ..materials.surfaces import brightness_of
 from ..materials.texture_spread import spread_factors
-from .apply_effects import BothMarks, EffectChain
-from .beam import BeamPattern, conical_directions, cylindrical_offsets
+from .beam import conical_directions, cylindrical_offsets
 from .colour.colour import SeenPoints
-from .devices.device import ScannerSetting
+from .devices.shots import shots
+from .effects import apply_effect
 from .knots import Track
+from .noise import measured_pose, trajectory_errors
 from .plan import ScanPlan
 from .platforms.path import Strip
 from .point_layers import MeasuredPoints, fill_layers, place_points
-from .pulses import Emitter, Errors, Pulses, reaching_scene
+from .pulses import Errors, Poses, Pulses, reaching_scene, turn_vectors
 from .radiometry import received_intensity, saturate
-from .returns import UNCOUNTED, Echoes, Marks, group_returns, number_returns
-from .scene.target import Target
+from .returns import UNCOUNTED, BothMarks, Echoes, Marks, group_returns, number_returns
 from .trace import Hits, Rays, Traced, trace
 
 Float = NDArray[np.float64]
 Index = NDArray[np.intp]
 
+_MOTION_KNOTS = 0.01
+"""Seconds between two poses of a moving vehicle: it turns by less than a milliradian meanwhile."""
 LENIENT = 0.25
 """Share of the threshold that is enough for an echo whose intensity is yet to change: none is expected to become four
 times as bright as its material's mean makes it."""
@@ -75,110 +77,18 @@ def joined_results(results: list[BlockResult]) -> BlockResult:
 
 
 @dataclass(frozen=True)
-class Beam:
-    """The laser's beam, as the rays that sample a pulse's footprint.
-
-    Attributes:
-        pattern, setting: see `scanning.plan.ScanPlan`.
-        shape: whether the rays diverge from the aperture or run parallel.
-    """
-
-    pattern: BeamPattern
-    setting: ScannerSetting
-    shape: Literal["conical", "cylindrical"]
-
-    def rays(self, target: Target, pulses: Pulses, motions: list[Track]) -> Rays:
-        """Return the rays that sample the pulses' footprints."""
-        origin, share = pulses.origin[:, None, :], self.pattern.weights[:, None]
-        if len(self.pattern) == 1:
-            return Rays(origin, pulses.direction[:, None, :], share, pulses.time)
-        assert pulses.in_plane is not None
-        assert pulses.across is not None
-        divergence = self.setting.divergence
-        if self.shape == "conical":
-            direction = conical_directions(pulses.direction, pulses.in_plane, pulses.across, self.pattern, divergence)
-            return Rays(origin, direction, share, pulses.time)
-        reach = self.setting.maximum_range
-        distance = target.cast(pulses.origin, pulses.direction, reach, pulses.time, motions).distance
-        offsets = cylindrical_offsets(pulses.in_plane, pulses.across, self.pattern, divergence, distance)
-        direction = np.repeat(pulses.direction[:, None, :], len(self.pattern), axis=1)
-        return Rays(origin + offsets, direction, share, pulses.time)
-
-
-@dataclass(frozen=True)
-class LitSurfaces:
-    """Light that surfaces send back to the scanner.
-
-    Attributes:
-        target, surfaces, attenuation, frame, seed: see `scanning.plan.ScanPlan`.
-        in_air: whether some echoes come from no surface.
-    """
-
-    target: Target
-    surfaces: Surfaces
-    attenuation: float
-    frame: Float
-    seed: int
-    in_air: bool
-
-    def marks(self, traced: Traced) -> BothMarks:
-        """Return what the hits of traced rays add to returns: what each ray meets first, and what lies behind."""
-        return self._marks(traced.first), self._marks(traced.behind)
-
-    def _marks(self, hits: Hits) -> Marks:
-        """Return what hits add to returns."""
-        surfaces, material = self.surfaces, hits.material.ravel()
-        brightness = brightness_of(surfaces, material, np.abs(hits.along.ravel())).reshape(hits.face.shape)
-        brightness *= hits.share
-        weight = np.maximum(np.take(surfaces.reflectivity, material), UNCOUNTED).reshape(hits.face.shape)
-        weight *= hits.share
-        return Marks(hits.distance, weight, received_intensity(brightness, hits.distance, self.attenuation))
-
-    def vary_brightness(self, traced: Traced, echoes: Echoes, motions: list[Track]) -> Echoes:
-        """Return the echoes as bright as the places are that gave most of them, see `materials.texture_spread`."""
-        material = traced.pick("material", echoes.hit)
-        own = np.flatnonzero(np.take(self.surfaces.uneven, material, mode="clip"))
-        if self.in_air:
-            own = own[traced.pick("face", echoes.hit[own]) >= 0]
-        if not len(own):
-            return echoes
-        hit = echoes.hit[own]
-        ray, reach, face = traced.ray_of(hit), traced.pick("distance", hit), traced.pick("face", hit)
-        position, _ = _ray_ends(traced.rays, ray, reach)
-        if self.target.moving:
-            (position,) = self.target.at_start(face, position, traced.rays.time[ray % len(traced.rays.time)], motions)
-        intensity = echoes.intensity.copy()
-        intensity[own] *= spread_factors(self.surfaces, material[own], position.T + self.frame, self.seed)
-        return replace(echoes, intensity=intensity)
-
-
 class BlockScan:
     """The stages that blocks of pulses go through, in any order and by any worker.
 
-    Args:
-        plan: the scan, of which each stage takes what it needs.
-
     Attributes:
-        emitter, beam, surfaces: the first stages.
+        plan: the scan.
     """
 
-    def __init__(self, plan: ScanPlan) -> None:
-        setting, effects, later = plan.setting, plan.effects, plan.detects_later
-        several, self._most = plan.rays_per_pulse > 1, plan.most_returns
-        self._cut, self._setting, self._target = plan.cut, setting, plan.target
-        self.emitter = Emitter(setting, plan.path, plan.noise, plan.seed, plan.driven, several, self._most)
-        self.beam = Beam(plan.pattern, setting, plan.beam)
-        # In the air, echoes come from pulses into the sky as well.
-        in_air = bool(effects and plan.target.triangles)
-        self.surfaces = LitSurfaces(plan.target, plan.surfaces, plan.attenuation, plan.frame, plan.seed, in_air)
-        self._effects = EffectChain(effects, plan.seed, plan.attenuation, setting) if in_air else None
-        self._threshold = setting.threshold * (LENIENT if later else 1.0)
-        self._saturation = np.inf if later else setting.saturation
-        self._range_bias, self._wanted, self._targets = plan.noise.range_bias, plan.wanted, plan.targets
+    plan: ScanPlan
 
     def block(self, strip: Strip, block: int) -> BlockResult:
         """Scan one block."""
-        return self.pulses(strip, *self._cut.pulses_of(strip, block), block)
+        return self.pulses(strip, *self.plan.cut.pulses_of(strip, block), block)
 
     def pulses(self, strip: Strip, first: int, count: int, key: int = 0) -> BlockResult:
         """Scan pulses ``first`` to ``first + count`` of a strip at once; ``key`` is that of their random numbers.
@@ -186,26 +96,27 @@ class BlockScan:
         A block isn't cut any smaller, though its arrays leave the processor's cache: blocks are scanned side by side in
         threads that take turns in Python, so that few long calls beat many short ones.
         """
-        setting, target = self._setting, self._target
-        errors = self.emitter.draw_errors(strip, count, key)
-        ends = (self._cut.time(strip, number) for number in (first, first + count - 1))
-        poses = self.emitter.poses_between(target, strip, *ends)
-        pulses = self.emitter.emit(strip, poses, errors.angle, first, count)
+        plan, setting, target = self.plan, self.plan.setting, self.plan.target
+        errors = self.draw_errors(strip, count, key)
+        begin, end = (plan.cut.time(strip, number) for number in (first, first + count - 1))
+        poses = self.poses_between(strip, begin, end)
+        pulses = self.emit(strip, poses, errors.angle, first, count)
         number = np.arange(count)  # of each pulse within the block
-        towards = None if self._effects else reaching_scene(setting, target, pulses, poses.motions)
+        # In the air, echoes come from pulses into the sky as well.
+        towards = None if self._in_air else reaching_scene(setting, target, pulses, poses.motions)
         if towards is not None:
             number = np.flatnonzero(towards)
             pulses = pulses.select(number)
-        rays = self.beam.rays(target, pulses, poses.motions)
-        surfaces, limits = self.surfaces, (setting.minimum_range, setting.maximum_range)
-        traced = trace(target, surfaces.surfaces, rays, poses.motions, *limits)
-        marks = surfaces.marks(traced)
-        if self._effects:
-            traced, marks = self._effects.apply(strip, key, pulses, traced, marks)
+        rays = self.rays(pulses, poses.motions)
+        traced = trace(target, plan.surfaces, rays, poses.motions, setting.minimum_range, setting.maximum_range)
+        marks = self.marks(traced)
+        for effect in plan.effects if self._in_air else ():
+            random = stream(plan.seed, f"effect {effect.name}", strip.index, key)
+            traced, marks = apply_effect(effect, random, setting, plan.attenuation, pulses, traced, marks)
         echoes = group_returns(*marks, traced.pulse, setting.range_resolution)
-        if surfaces.surfaces.varying:
-            echoes = surfaces.vary_brightness(traced, echoes, poses.motions)
-        strong = np.flatnonzero(echoes.intensity >= self._threshold)
+        if plan.surfaces.varying:
+            echoes = self.vary_brightness(traced, echoes, poses.motions)
+        strong = np.flatnonzero(echoes.intensity >= setting.threshold * (LENIENT if plan.detects_later else 1.0))
         weak = len(echoes.pulse) - len(strong)
         if weak:
             echoes = echoes.select(strong)
@@ -213,6 +124,121 @@ class BlockScan:
             echoes = _drop_lost_echoes(echoes, errors.lost[number])
         points, seen, clipped = self._points(strip, pulses, traced, echoes, errors, number, poses.motions)
         return BlockResult(points, seen, count, traced.first.face.size, weak, clipped)
+
+    @property
+    def _in_air(self) -> bool:
+        """Return whether some echoes come from no surface."""
+        return bool(self.plan.effects and self.plan.target.triangles)
+
+    def draw_errors(self, strip: Strip, count: int, key: int) -> Errors:
+        """Draw the errors of a block."""
+        plan = self.plan
+
+        def source(purpose: str) -> np.random.Generator:
+            return stream(plan.seed, purpose, strip.index, key)
+
+        shape = (count, plan.most_returns)
+        angle, dropout, ranges = plan.noise.angle_sigma_mrad * 1e-3, plan.noise.dropout, plan.setting.range_sigma
+        return Errors(
+            source("range noise").standard_normal((2, max(shape)), dtype=np.float32) if ranges else None,
+            source("angle noise").normal(scale=angle, size=(2, count)) if angle else None,
+            source("dropouts").random(shape, dtype=np.float32) < dropout if dropout else None,
+        )
+
+    def poses_between(self, strip: Strip, begin: float, end: float) -> Poses:
+        """Return the scanner's poses, and those of what moves in the target, between two times."""
+        path, noise, spacing = self.plan.path, self.plan.noise, self.plan.path.knot_spacing
+
+        def true(time: Float) -> tuple[Float, Float, Float]:
+            position, rotation = path.pose(strip, time)
+            return rotation, position, np.ones(len(time))
+
+        def measured(time: Float) -> tuple[Float, Float, Float]:
+            errors = trajectory_errors(noise, self.plan.seed, strip, time)
+            position, rotation = measured_pose(*path.pose(strip, time), errors)
+            return rotation, position, np.ones(len(time))
+
+        track = Track.between(true, begin, end, spacing)
+        noisy = noise.position_sigma or noise.attitude_sigma_deg or noise.heading_sigma_deg
+        return Poses(
+            track,
+            # Linear between knots, errors would lose some of their spread if they changed much meanwhile.
+            Track.between(measured, begin, end, min(spacing, noise.correlation_time / 50.0)) if noisy else track,
+            self.plan.target.motions(begin, end, min(spacing, _MOTION_KNOTS), track if self.plan.driven else None),
+        )
+
+    def emit(self, strip: Strip, poses: Poses, angle: Float | None, first: int, count: int) -> Pulses:
+        """Return pulses ``first`` to ``first + count`` of a strip.
+
+        Args:
+            angle: (2, P) pointing errors in the scan plane and across it, rad; None without.
+        """
+        several = self.plan.rays_per_pulse > 1
+        shot = shots(self.plan.setting, first, count, several or angle is not None)
+        time = shot.time + strip.start_time
+        rotation, origin, _ = poses.true.at(time)
+        direction = turn_vectors(rotation, shot.direction)
+        frame = (shot.in_plane, shot.across)
+        in_plane, across = (None if not several or axis is None else turn_vectors(rotation, axis) for axis in frame)
+        measured_origin, measured_direction = origin, direction
+        if poses.measured is not poses.true or angle is not None:
+            believed = shot.direction
+            if angle is not None:
+                assert frame[0] is not None
+                assert frame[1] is not None
+                believed = believed + angle[0] * frame[0] + angle[1] * frame[1]
+                believed /= np.sqrt(np.einsum("ij,ij->j", believed, believed))
+            rotation, measured_origin, _ = poses.measured.at(time)
+            measured_direction = turn_vectors(rotation, believed)
+        return Pulses(time, shot.scan_angle, origin, direction, in_plane, across, measured_origin, measured_direction)
+
+    def rays(self, pulses: Pulses, motions: list[Track]) -> Rays:
+        """Return the rays that sample the pulses' footprints."""
+        pattern, setting = self.plan.pattern, self.plan.setting
+        origin, share = pulses.origin[:, None, :], pattern.weights[:, None]
+        if len(pattern) == 1:
+            return Rays(origin, pulses.direction[:, None, :], share, pulses.time)
+        assert pulses.in_plane is not None
+        assert pulses.across is not None
+        across = (pulses.in_plane, pulses.across, pattern, setting.divergence)
+        if self.plan.beam == "conical":
+            return Rays(origin, conical_directions(pulses.direction, *across), share, pulses.time)
+        met = self.plan.target.cast(pulses.origin, pulses.direction, setting.maximum_range, pulses.time, motions)
+        offsets = cylindrical_offsets(*across, met.distance)
+        direction = np.repeat(pulses.direction[:, None, :], len(pattern), axis=1)
+        return Rays(origin + offsets, direction, share, pulses.time)
+
+    def marks(self, traced: Traced) -> BothMarks:
+        """Return what the hits of traced rays add to returns: what each ray meets first, and what lies behind."""
+        return self._marks(traced.first), self._marks(traced.behind)
+
+    def _marks(self, hits: Hits) -> Marks:
+        """Return what hits add to returns."""
+        surfaces, material = self.plan.surfaces, hits.material.ravel()
+        brightness = brightness_of(surfaces, material, np.abs(hits.along.ravel())).reshape(hits.face.shape)
+        brightness *= hits.share
+        weight = np.maximum(np.take(surfaces.reflectivity, material), UNCOUNTED).reshape(hits.face.shape)
+        weight *= hits.share
+        return Marks(hits.distance, weight, received_intensity(brightness, hits.distance, self.plan.attenuation))
+
+    def vary_brightness(self, traced: Traced, echoes: Echoes, motions: list[Track]) -> Echoes:
+        """Return the echoes as bright as the places are that gave most of them, see `materials.texture_spread`."""
+        surfaces, target = self.plan.surfaces, self.plan.target
+        material = traced.pick("material", echoes.hit)
+        uneven = np.flatnonzero(np.take(surfaces.uneven, material, mode="clip"))
+        if self._in_air:
+            uneven = uneven[traced.pick("face", echoes.hit[uneven]) >= 0]
+        if not len(uneven):
+            return echoes
+        hit = echoes.hit[uneven]
+        ray, reach, face = traced.ray_of(hit), traced.pick("distance", hit), traced.pick("face", hit)
+        position, _ = _ray_ends(traced.rays, ray, reach)
+        if target.moving:
+            (position,) = target.at_start(face, position, traced.rays.time[ray % len(traced.rays.time)], motions)
+        intensity = echoes.intensity.copy()
+        place = position.T + self.plan.frame
+        intensity[uneven] *= spread_factors(surfaces, material[uneven], place, self.plan.seed)
+        return replace(echoes, intensity=intensity)
 
     def _points(
         self,
@@ -225,23 +251,24 @@ class BlockScan:
         motions: list[Track],
     ) -> tuple[PointBlock, SeenPoints | None, int]:
         """Return the points of the echoes, where they were seen, and how many of them saturated the detector."""
-        keep, number, returns = number_returns(echoes.pulse, self._most)
+        plan, setting, target = self.plan, self.plan.setting, self.plan.target
+        keep, number, returns = number_returns(echoes.pulse, plan.most_returns)
         if not keep.all():
             echoes = echoes.select(keep)
-        pulse, hit, target = echoes.pulse, echoes.hit, self._target
+        pulse, hit = echoes.pulse, echoes.hit
         face, along = traced.pick("face", hit), traced.pick("along", hit)
-        distance = echoes.range + self._range_bias
+        distance = echoes.range + plan.noise.range_bias
         if errors.range is not None:
-            own = errors.range_errors(number_in_block[pulse], number, self._most)
-            distance = distance + self._setting.range_sigma * own
-        intensity, clipped = saturate(echoes.intensity, self._saturation)
+            range_errors = errors.range_errors(number_in_block[pulse], number, plan.most_returns)
+            distance = distance + setting.range_sigma * range_errors
+        intensity, clipped = saturate(echoes.intensity, np.inf if plan.detects_later else setting.saturation)
         normal = None
-        if self._targets or "normal" in self._wanted:
+        if plan.targets or "normal" in plan.wanted:
             normal = target.normals(face, along, pulses.time[pulse], motions)
-            if self._effects:
+            if self._in_air:
                 air = np.flatnonzero(face < 0)
                 normal[:, air] = -np.take(traced.rays.direction.reshape(3, -1), traced.ray_of(hit[air]), axis=1)
-        measured = MeasuredPoints(self._setting, target, pulses, pulse, echoes.range, echoes.intensity, face, normal)
+        measured = MeasuredPoints(setting, target, pulses, pulse, echoes.range, echoes.intensity, face, normal)
         points = make_block(
             xyz=place_points(pulses.measured_origin, pulses.measured_direction, pulse, distance, target.origin),
             intensity=intensity,
@@ -255,10 +282,10 @@ class BlockScan:
             strip=np.full(len(pulse), strip.index, dtype=np.uint16),
             range=distance,
             incidence_deg=np.rad2deg(np.arccos(np.minimum(np.abs(along), 1.0))).astype(np.float32),
-            **fill_layers(measured, self._wanted),
+            **fill_layers(measured, plan.wanted),
         )
         seen = None
-        if self._targets and normal is not None:
+        if plan.targets and normal is not None:
             ray, reach = traced.ray_of(hit), traced.pick("distance", hit)
             seen = self._seen_targets(traced.rays, ray, reach, face, normal, motions)
         return points, seen, clipped
@@ -270,7 +297,7 @@ class BlockScan:
 
         That is on the surface that gave most of the return: the mean of all its hits may lie in the air between them.
         """
-        target, time = self._target, rays.time[ray % len(rays.time)]
+        target, time = self.plan.target, rays.time[ray % len(rays.time)]
         position, scanner = _ray_ends(rays, ray, reach)
         if target.moving:
             begin, offset, normal = target.at_start(face, position, time, motions, (scanner - position, normal))

@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 
 from synthroads_addon.base.rotations import rotation_matrix
 from synthroads_addon.scanning import noise as module
-from synthroads_addon.scanning.noise import BLOCK, KNOTS_PER_CORRELATION_TIME, Noise, TrajectoryNoise, measured_pose
+from synthroads_addon.scanning.noise import BLOCK, KNOTS_PER_CORRELATION_TIME, Noise, measured_pose, trajectory_errors
 from synthroads_addon.scanning.platforms.path import Strip
 
 TAU = 30.0
@@ -29,7 +29,7 @@ RECORD = 10_000
 
 def errors(noise: Noise = ALL, strip: Strip = STRIP, seed: int = 1, *, time: np.ndarray) -> np.ndarray:
     """Return the six errors, (K, 6), at times since the strip's start."""
-    return np.concatenate(TrajectoryNoise(noise, seed, strip).errors(strip.start_time + time), axis=1)
+    return np.concatenate(trajectory_errors(noise, seed, strip, strip.start_time + time), axis=1)
 
 
 @pytest.fixture(scope="module")
@@ -104,9 +104,8 @@ def test_order_and_grouping_change_nothing(chosen: list[float], random) -> None:
     order = list(range(len(time)))
     random.shuffle(order)
     cut = random.randint(0, len(order))
-    one = TrajectoryNoise(ALL, 1, STRIP)
     for part in (order[:cut], order[cut:]):
-        position, attitude = one.errors(STRIP.start_time + time[part])
+        position, attitude = trajectory_errors(ALL, 1, STRIP, STRIP.start_time + time[part])
         np.testing.assert_array_equal(np.concatenate([position, attitude], axis=1), whole[part])
 
 
@@ -127,7 +126,7 @@ def test_no_sigma_gives_zeros_without_drawing(monkeypatch: pytest.MonkeyPatch) -
         raise AssertionError("drawn")
 
     monkeypatch.setattr(module, "stream", refuse)
-    position, attitude = TrajectoryNoise(Noise(), 1, STRIP).errors(np.linspace(0.0, 1e5, 1000))
+    position, attitude = trajectory_errors(Noise(), 1, STRIP, np.linspace(0.0, 1e5, 1000))
     assert position.shape == attitude.shape == (1000, 3)
     assert not position.any()
     assert not attitude.any()

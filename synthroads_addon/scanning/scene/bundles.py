@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..knots import PointTrack, Track
+from ..knots import Track
 
 Float = NDArray[np.float64]
 Index = NDArray[np.intp]
@@ -66,21 +66,22 @@ class Bundles:
             centre: (3,) of the ball, own frame, m.
             radius: m.
         """
-        way = track.point_track(centre)
-        bundles = self._bundles_near(way, radius)
+        way = track.way_of(centre)
+        bundles = self._bundles_near(track, way, radius)
         rays = (bundles[:, None] * RAYS + np.arange(RAYS)).ravel()
         rays = rays[rays < len(self.times)]
-        towards = way.at(self.times[rays]) - self.origins[:, rays]
+        towards = track.along(way, self.times[rays]) - self.origins[:, rays]
         direction = self.directions[:, rays]
         ahead = np.einsum("in,in->n", towards, direction)
         towards -= np.clip(ahead, 0.0, self.reach[rays]) * direction
         return rays[np.einsum("in,in->n", towards, towards) <= radius**2]
 
-    def _bundles_near(self, way: PointTrack, radius: float) -> Index:
-        """Return the bundles whose cone touches the ball while they are cast."""
-        towards = way.at(self.time) - self.apex
+    def _bundles_near(self, track: Track, way: Float, radius: float) -> Index:
+        """Return the bundles whose cone touches the ball, whose middle has a way (3, K), while they are cast."""
+        towards = track.along(way, self.time) - self.apex
+        fastest = float(np.sqrt(np.square(np.diff(way, axis=1)).sum(axis=0).max())) / track.spacing
         away = np.sqrt(np.einsum("ib,ib->b", towards, towards))
-        room = radius + self.ball + way.fastest * self.delay
+        room = radius + self.ball + fastest * self.delay
         ahead = np.einsum("ib,ib->b", towards, self.axis)
         off_axis = np.arccos(np.clip(ahead / np.maximum(away, 1e-300), -1.0, 1.0))
         seen_under = np.arcsin(np.minimum(room / np.maximum(away, 1e-300), 1.0))

@@ -96,7 +96,7 @@ def test_rays_from_anywhere_meet_what_each_ray_meets(seed: int, count: int) -> N
 def test_most_bundles_of_a_scanner_s_lines_are_ruled_out() -> None:
     rays, track = lines(200_000, 8.0), turning(np.array([10.0, 12.0, 0.0]), np.array([-20.0, 0.0, 0.0]))
     near = rays.rays_near(track, CENTRE, RADIUS)
-    looked_at = len(rays._bundles_near(track.point_track(CENTRE), RADIUS)) * RAYS
+    looked_at = len(rays._bundles_near(track, track.way_of(CENTRE), RADIUS)) * RAYS
     assert len(near) > 500
     assert looked_at < 10 * len(near) < 10_000
 
@@ -113,5 +113,4 @@ def test_a_way_is_that_of_its_point(way: tuple[float, float, float]) -> None:
     time = np.linspace(0.0, 2.0, 777)
     rotation, place, _ = track.at(time)
     expected = np.einsum("ijn,j->in", rotation.reshape(3, 3, -1), CENTRE) + place
-    np.testing.assert_allclose(track.point_track(CENTRE).at(time), expected, atol=1e-12)
-    assert track.point_track(CENTRE).fastest == pytest.approx(np.hypot(*way[:2]), abs=1.0)
+    np.testing.assert_allclose(track.along(track.way_of(CENTRE), time), expected, atol=1e-12)
