@@ -39,8 +39,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> Outcome:
     """Run `synthroads pack`."""
     _check(arguments)
-    from ml.segmentation.data.pack import packed_tiles, summary, within
-    from ml.segmentation.data.packed_file import write_pack
+    from ml.data.pack import packed_tiles, summary, within
+    from ml.data.packed import write_pack
     from synthroads_addon.base.classes import class_scheme
 
     scheme = class_scheme(arguments.classes)

@@ -100,7 +100,7 @@ def _options(arguments: argparse.Namespace, cloud: RoadCloud, folder: Path) -> O
     course = read_axis(arguments.path)[:, :2] - cloud.origin[:2] if arguments.path else None
     predictor = None
     if arguments.run:
-        from ml.centerline.use.learned_axis import learned_axis
+        from ml.centerline.learned_axis import learned_axis
 
         predictor = learned_axis(arguments.run, arguments.cloud, folder)
     return Options(

@@ -11,7 +11,7 @@ from synthroads_addon.base.errors import InputError
 from synthroads_addon.base.schema import read_yaml
 
 from .configuration import EXPERIMENTS, SHIPPED, Schedule, experiment_names, shipped_names
-from .segmentation.data.classes import MAPPINGS, load_mapping
+from .data.classes import MAPPINGS, load_mapping
 
 _YAML = (".yaml", ".yml", ".json")
 

@@ -13,7 +13,7 @@ from .configuration import Part
 
 P = TypeVar("P", bound=Part)
 
-FOLDERS = {"segmentation": "ml.networks", "centerline": "ml.centerline.networks"}
+FOLDERS = {"segmentation": "ml.networks.segmentation", "centerline": "ml.networks.centerline"}
 """Task -> package whose files are looked through for its networks."""
 _NETWORKS: dict[str, dict[str, type[Part]]] = {task: {} for task in FOLDERS}
 

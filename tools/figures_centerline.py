@@ -27,12 +27,16 @@ ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
 
 from headless.marked_documents import fill  # noqa: E402
-from ml.centerline.data.batches import DataOptions  # noqa: E402
-from ml.centerline.data.corridor import TRUTH_KINDS, TruthKind  # noqa: E402
-from ml.centerline.data.roads import LearningRoad, read_measured, read_scene, scene_folders  # noqa: E402
-from ml.centerline.data.slices import SliceSettings  # noqa: E402
-from ml.centerline.scores import pictures, tables  # noqa: E402
-from ml.centerline.scores.evaluation import (  # noqa: E402
+from ml.configuration import Part  # noqa: E402
+from ml.data.batches import DataOptions  # noqa: E402
+from ml.data.corridor import TRUTH_KINDS, TruthKind  # noqa: E402
+from ml.data.roads import LearningRoad, read_measured, read_scene, scene_folders  # noqa: E402
+from ml.data.slices import SliceSettings  # noqa: E402
+from ml.runs import Run  # noqa: E402
+from ml.scores import pictures, tables  # noqa: E402
+from ml.scores.baselines import SkeletonSettings  # noqa: E402
+from ml.scores.distances import over_seeds  # noqa: E402
+from ml.scores.evaluation import (  # noqa: E402
     HALF_WIDTH,
     Case,
     Cropping,
@@ -45,12 +49,8 @@ from ml.centerline.scores.evaluation import (  # noqa: E402
     trivial_predictors,
     truth_of,
 )
-from ml.centerline.scores.metrics import over_seeds  # noqa: E402
-from ml.centerline.scores.paint import with_painted_line  # noqa: E402
-from ml.centerline.scores.skeleton import SkeletonSettings  # noqa: E402
-from ml.configuration import Part  # noqa: E402
-from ml.results import Spread  # noqa: E402
-from ml.runs import Run  # noqa: E402
+from ml.scores.paint import with_painted_line  # noqa: E402
+from ml.scores.tables import Spread  # noqa: E402
 from ml.tasks import kinds  # noqa: E402
 from synthroads_addon.base.errors import SynthRoadsError  # noqa: E402
 from synthroads_addon.base.files import write_file  # noqa: E402
@@ -275,7 +275,7 @@ def measure_corridor(
     learned: Mapping[str, Sequence[Predictor]], cases: Callable[[int], Sequence[Case]], seeds: Sequence[int]
 ) -> Measured:
     """Return mean errors and coverage of everything that the models say of the corridor, by model and target."""
-    corridor_figures = import_module("ml.centerline.scores.measuring").corridor_figures
+    corridor_figures = import_module("ml.centerline.measuring").corridor_figures
     rows: dict[str, list[dict[str, float]]] = {}
     for index, seed in enumerate(seeds):
         shown = cases(seed)

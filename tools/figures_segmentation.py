@@ -22,15 +22,15 @@ ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
 
 from headless.marked_documents import fill  # noqa: E402
+from ml.data.pack import CROP, summary  # noqa: E402
+from ml.data.packed import PackReader  # noqa: E402
+from ml.data.sources import Source  # noqa: E402
 from ml.runs import HISTORY, METRICS, PRETRAINING, Run  # noqa: E402
-from ml.segmentation.data.pack import CROP, summary  # noqa: E402
-from ml.segmentation.data.packed_file import PackReader  # noqa: E402
-from ml.segmentation.data.sources import Source  # noqa: E402
+from ml.scores.pictures import comparison  # noqa: E402
+from ml.scores.tables import Spread, by_class, by_test, defined  # noqa: E402
 from ml.segmentation.experiment import RESULTS  # noqa: E402
 from ml.segmentation.recipes import SegmentationConfiguration  # noqa: E402
-from ml.segmentation.scores.evaluation import score, trained_model  # noqa: E402
-from ml.segmentation.scores.pictures import comparison  # noqa: E402
-from ml.segmentation.scores.tables import by_class, by_test, cell  # noqa: E402
+from ml.segmentation.scoring import score, trained_model  # noqa: E402
 from ml.training_loop import chosen_device  # noqa: E402
 from synthroads_addon.base.errors import InputError, SynthRoadsError  # noqa: E402
 from synthroads_addon.base.files import write_file  # noqa: E402
@@ -59,7 +59,7 @@ def experiment(folder: Path) -> str:
     seconds = {
         name: [training_seconds(folder / name / f"seed-{seed}") for seed in seeds] for name, seeds in results.items()
     }
-    cells = " | ".join(cell(values) for values in seconds.values() if values)
+    cells = " | ".join(Spread.over(defined(values)).text(0, "-") for values in seconds.values() if values)
     return by_test(results, [f"| *training, s* |  | {cells} |"])
 
 

@@ -31,7 +31,7 @@ FILES = {
     "device": ["synthroads_addon.scanning.devices.device:Device"],
     "materials": ["synthroads_addon.materials.table:MaterialTable"],
     "classes": ["synthroads_addon.base.classes:ClassTable"],
-    "mapping": ["ml.segmentation.data.classes:LabelMapping", "synthroads_addon.base.class_mapping:ClassMapping"],
+    "mapping": ["ml.data.classes:LabelMapping", "synthroads_addon.base.class_mapping:ClassMapping"],
     "assets": ["synthroads_addon.scenario.assets:AssetLibrary"],
     "segmentation": [
         "ml.segmentation.recipes:SegmentationConfiguration",

@@ -17,24 +17,23 @@ from synthroads_addon.base.progress import Progress, silent
 from synthroads_addon.base.schema import canonical_json, read_json
 
 from ..configuration import Configuration
+from ..data.batches import Batches, BatchOptions, DataOptions, Roads, fixed_batches, quiet, read_roads
+from ..data.effects.slices import SequenceEffects
+from ..data.slices import Batch, SliceSettings
+from ..networks.centerline.losses import LossOptions, centerline_loss
+from ..networks.centerline.models import TARGETS, CenterlineModel, ModelOptions
+from ..networks.centerline.transformer import TransformerOptions
 from ..processes import helpers
 from ..registry import network_union
 from ..runs import CALIBRATION, Run, plain, stream_seed
+from ..scores import tables
+from ..scores.calibration import DEVIATIONS, IntervalCalibration
+from ..scores.evaluation import Cropping, case
 from ..tasks import Evaluation, Prediction
 from ..training_loop import chosen_device, fit
-from .data.batches import Batches, BatchOptions, DataOptions, Roads, fixed_batches, quiet, read_roads
-from .data.effects import SequenceEffects
-from .data.slices import Batch, SliceSettings
-from .networks.losses import LossOptions, centerline_loss
-from .networks.models import TARGETS, CenterlineModel, ModelOptions
-from .networks.transformer import TransformerOptions
-from .scores import tables
-from .scores.evaluation import Cropping, case
-from .scores.measuring import measure_run
-from .use.calibration import DEVIATIONS, IntervalCalibration
-from .use.find_road import find_road
-from .use.predictor import CenterlinePredictor, UseOptions
-from .use.writing import corridor_json, geojson
+from .find_road import corridor_json, find_road, geojson
+from .measuring import measure_run
+from .predictor import CenterlinePredictor, UseOptions
 
 if TYPE_CHECKING:
     NetworkModel = ModelOptions

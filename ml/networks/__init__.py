@@ -1,1 +1,1 @@
-"""Networks on point clouds, in plain PyTorch, and what they need to know of a cloud's geometry."""
+"""Networks in plain PyTorch: a folder for each task, one file for each network."""

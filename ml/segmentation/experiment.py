@@ -20,12 +20,12 @@ from synthroads_addon.dataset.manifest import checksum
 from synthroads_addon.scenario.scenario import apply_change, apply_values
 
 from ..configuration import EXPERIMENTS, experiment_names, load_configuration
+from ..data.sources import Source
 from ..runs import CHECKPOINT, CONFIGURATION, HISTORY, METRICS, PRETRAINING, Run, lasting
+from ..scores.tables import by_test
 from ..training_loop import chosen_device
-from .data.sources import Source
 from .recipes import Data, SegmentationConfiguration
-from .scores.evaluation import score_all, trained_model
-from .scores.tables import by_test
+from .scoring import score_all, trained_model
 from .task import train
 
 RESULTS, TABLE = "results.json", "table.md"

@@ -18,15 +18,15 @@ import torch
 from synthroads_addon.base.errors import InputError
 from synthroads_addon.base.progress import peak_memory_mb
 
+from ..data.classes import class_names
+from ..data.crops import Item, Seeds
+from ..data.sources import Source, pointcept_folders, pointcept_root
+from ..data.tiles import CloudTile, scalings
 from ..training_loop import chosen_device, optimizer_of, train_step
-from .data.classes import class_names
-from .data.crops import Item, Seeds
-from .data.sources import Source, pointcept_folders, pointcept_root
-from .data.tiles import CloudTile, scalings
 from .loading import epoch_batches, thin_tiles
 from .network import build
 from .recipes import SegmentationConfiguration
-from .training import objective
+from .task import objective
 
 _TILES = 8
 """Tiles that the measured steps' crops are cut from."""

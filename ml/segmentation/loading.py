@@ -17,11 +17,10 @@ from torch.utils.data import DataLoader
 from synthroads_addon.base.errors import InputError
 from synthroads_addon.base.random_streams import stream
 
-from .adaptation import laid_over
-from .data.crops import CropDataset, Draw, Item, Seeds, collate
-from .data.sources import Source, read_tiles
-from .data.tiles import CloudTile, Scaling, scalings
-from .network import on_device
+from ..data.crops import CropDataset, Draw, Item, Seeds, collate
+from ..data.sources import Source, read_tiles
+from ..data.tiles import CloudTile, Scaling, scalings
+from .network import laid_over, on_device
 from .recipes import SegmentationConfiguration, mapped_intensities, plan
 
 SMALLEST_SHARE = 0.25

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from copy import deepcopy
+from typing import TypeVar
 
 import torch
 from torch import Tensor, nn
+from torch.nn.modules.batchnorm import _BatchNorm
 
-from .adaptation import adapt_norms
-from .data.classes import class_names
-from .data.crops import Item
+from synthroads_addon.base.errors import InputError
+
+from ..data.classes import class_names
+from ..data.crops import Item
 from .recipes import SegmentationConfiguration
 
 
@@ -39,3 +42,111 @@ def adapt_network(model: nn.Module, batches: Iterable[Item], device: torch.devic
     other = deepcopy(model)
     adapt_norms(other, batches, lambda batch: scores_of(other, on_device(batch, device)))
     return other
+
+
+Batch = dict[str, Tensor]
+B = TypeVar("B")
+
+
+def adapt_norms(model: nn.Module, batches: Iterable[B], scores: Callable[[B], Tensor]) -> int:
+    """Replace the running statistics of a model's batch norms, in place, by those of other data: AdaBN.
+
+    Li et al., "Revisiting batch normalization for practical domain adaptation" (2016). Each batch is normalised by its
+    own statistics, as in training, and those of all batches are pooled, by their numbers of points. Weights stay.
+
+    Args:
+        model: comes back with the modes that it had; if an error comes up, also with its old statistics.
+        batches: of the other domain, without effects; crops as large as in training.
+        scores: runs the model on a batch; returns one row per point.
+
+    Returns:
+        The number of points looked at.
+
+    Raises:
+        InputError: there are no points.
+    """
+    norms = [each for each in model.modules() if isinstance(each, _BatchNorm) and each.running_mean is not None]
+    before = [{name: value.clone() for name, value in norm.state_dict().items()} for norm in norms]
+    modes, momenta = [(each, each.training) for each in model.modules()], [norm.momentum for norm in norms]
+    pools = [_Pool(norm) for norm in norms]
+    done = False
+    try:
+        model.eval()  # no dropout
+        for norm in norms:
+            norm.train()
+            norm.momentum = 1.0  # each batch leaves its own statistics
+        points = sum(_look(pools, scores, batch) for batch in batches)
+        if not points:
+            raise InputError("adaptation", 0, "needs points of the domain to adapt to")
+        done = True
+    finally:
+        for norm, state, momentum in zip(norms, before, momenta, strict=True):
+            norm.load_state_dict(state)
+            norm.momentum = momentum
+        for each, training in modes:
+            each.training = training
+    if done:
+        for pool in pools:
+            pool.store()
+    return points
+
+
+def _look(pools: list[_Pool], scores: Callable[[B], Tensor], batch: B) -> int:
+    with torch.no_grad():
+        points = len(scores(batch))
+        for pool in pools:
+            pool.add(points)
+    return points
+
+
+class _Pool:
+    """The statistics of one norm over batches, in double precision."""
+
+    def __init__(self, norm: _BatchNorm) -> None:
+        assert norm.running_mean is not None
+        self.norm = norm
+        self.seen = self._batches()
+        self.weight = 0
+        self.mean = torch.zeros_like(norm.running_mean, dtype=torch.float64)
+        self.square = torch.zeros_like(self.mean)
+
+    def _batches(self) -> int:
+        return 0 if self.norm.num_batches_tracked is None else int(self.norm.num_batches_tracked)
+
+    def add(self, points: int) -> None:
+        """Take in what the last batch left, unless it left nothing: a stage with a single point."""
+        seen, self.seen = self.seen, self._batches()
+        if self.seen == seen or self.norm.running_mean is None or self.norm.running_var is None:
+            return
+        mean, variance = self.norm.running_mean.double(), self.norm.running_var.double()
+        self.weight += points
+        self.mean += points * mean
+        self.square += points * (variance + mean.square())
+
+    def store(self) -> None:
+        """Give the norm its pooled statistics; none if it saw nothing."""
+        if not self.weight or self.norm.running_mean is None or self.norm.running_var is None:
+            return
+        mean = self.mean / self.weight
+        self.norm.running_mean.copy_(mean)
+        self.norm.running_var.copy_((self.square / self.weight - mean.square()).clamp_(min=0.0))
+
+
+def laid_over(batch: Batch) -> Batch:
+    """Return a batch whose clouds are laid over one another in pairs, a last one without a partner as it is: Mix3D.
+
+    Nekrasov et al., "Mix3D: out-of-context data augmentation for 3D scenes" (2021): things then appear where their
+    surroundings don't announce them. Clouds must be centred; their points, labels and features stay as they are.
+
+    Args:
+        batch: packed clouds with ``coord`` (N, 3) and ``offset`` (B,), before neighbours are looked for.
+
+    Raises:
+        InputError: neighbours are already there: they would be those of the single clouds.
+    """
+    if "positions0" in batch:
+        raise InputError("batch", "with neighbours", "must be mixed before neighbours are looked for")
+    offset = batch["offset"]
+    last_of_pair = torch.arange(len(offset), device=offset.device) % 2 == 1
+    last_of_pair[-1:] = True
+    return batch | {"offset": offset[last_of_pair]}

@@ -28,12 +28,12 @@ from synthroads_addon.cloud.formats.las import open_to_copy
 from synthroads_addon.cloud.formats.registry import open_cloud
 from synthroads_addon.cloud.tools.quantile_mapping import LEVELS
 
-from ..cells import thin
-from .data.classes import IGNORED
-from .data.crops import CropSettings
-from .data.sources import FULL
-from .data.tiles import CloudTile, Scaling, eight_bits
-from .scores.scoring import Classifier, label_tile
+from ..data.classes import IGNORED
+from ..data.crops import CropSettings
+from ..data.points import thin
+from ..data.sources import FULL
+from ..data.tiles import CloudTile, Scaling, eight_bits
+from .scoring import Classifier, label_tile
 
 HEADER_TEXTS = range(26, 90)
 """Bytes of a LAS file that hold the system identifier and the generating software, of 32 each."""

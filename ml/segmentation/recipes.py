@@ -17,13 +17,13 @@ from synthroads_addon.base.schema import quantity
 from synthroads_addon.cloud.tools.quantile_mapping import LEVELS, QuantileMap
 
 from ..configuration import Configuration, Part, Schedule
+from ..data.crops import FEATURES, CropSettings, Draw, Feature
+from ..data.effects.crops import Effects
+from ..data.sources import FULL, Source
+from ..data.tiles import CloudTile
 from ..networks.base import SegmentationNetwork
-from ..networks.pointnext import PointNeXtOptions
+from ..networks.segmentation.pointnext import PointNeXtOptions
 from ..registry import network_union
-from .data.crops import FEATURES, CropSettings, Draw, Feature
-from .data.effects import Effects
-from .data.sources import FULL, Source
-from .data.tiles import CloudTile
 
 if TYPE_CHECKING:
     NetworkModel = SegmentationNetwork

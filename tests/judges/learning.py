@@ -17,7 +17,7 @@ OPENPOINTS_FOLDER = bringing.BUILD / "openpoints"
 
 def sklearn_verdict(samples: Samples) -> list[str]:
     """Return the scores of labels drawn at random that scikit-learn counts differently."""
-    from ml.segmentation.scores.metrics import Confusion
+    from ml.scores.confusion import Confusion
 
     rng = np.random.default_rng(5)
     truth, predicted = rng.integers(0, 6, (2, 4000))
@@ -68,7 +68,7 @@ def bring_openpoints() -> None:
 
 def openpoints_verdict(samples: Samples) -> list[str]:
     """Return in what the smallest network differs from the authors': parameters, outputs, gradients, statistics."""
-    from ml.networks.pointnext import architecture
+    from ml.networks.segmentation.pointnext import architecture
     from tests.judges import pointnext_reference as reference
 
     with reference.openpoints_modules(openpoints_folder()) as modules:

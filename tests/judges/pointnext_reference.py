@@ -17,8 +17,8 @@ import pytest
 import torch
 from torch import Tensor, nn
 
-from ml.networks.neighbours import Neighbourhood, build_neighbours
-from ml.networks.pointnext import Architecture, PointNeXt, architecture
+from ml.networks.segmentation.neighbours import Neighbourhood, build_neighbours
+from ml.networks.segmentation.pointnext import Architecture, PointNeXt, architecture
 
 RADIUS, NEIGHBOURS, CLASSES, INPUTS = 0.3, 32, 13, 4
 PUBLISHED = {"S": 792_237, "B": 3_827_853, "L": 7_125_069, "XL": 41_576_461}

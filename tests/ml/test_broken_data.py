@@ -12,12 +12,12 @@ import pytest
 import torch
 from laspy.vlrs.vlrlist import VLRList
 
-from ml.centerline.data.roads import read_scene
-from ml.points import read_ground
+from ml.data.crops import CropSettings, Item
+from ml.data.packed import pack_tile, write_pack
+from ml.data.points import read_ground
+from ml.data.roads import read_scene
+from ml.data.sources import Source, read_tiles
 from ml.runs import CHECKPOINT, Run
-from ml.segmentation.data.crops import CropSettings, Item
-from ml.segmentation.data.packed_file import pack_tile, write_pack
-from ml.segmentation.data.sources import Source, read_tiles
 from ml.segmentation.prediction import Labelling, predict_file
 from ml.segmentation.recipes import SegmentationConfiguration
 from synthroads_addon.base.classes import class_scheme

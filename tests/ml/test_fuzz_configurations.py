@@ -9,8 +9,8 @@ from typing import Any
 import pytest
 
 from ml.configuration import EXPERIMENTS, SHIPPED, load_configuration
+from ml.data.classes import MAPPINGS, load_mapping
 from ml.runs import CHECKPOINT, CONFIGURATION, Run
-from ml.segmentation.data.classes import MAPPINGS, load_mapping
 from ml.segmentation.experiment import configurations, load_experiment
 from ml.tasks import kinds
 from synthroads_addon.base.errors import InputError

@@ -60,7 +60,7 @@ def test_two_networks_of_one_name_are_refused() -> None:
         name: Literal["pointnext"] = Field("pointnext")
 
     with pytest.raises(
-        ValueError, match=r"ml\.networks\.pointnext and .*test_registry both have a network named 'pointn"
+        ValueError, match=r"ml\.networks\.segmentation\.pointnext and .*test_registry both have a network named 'pointn"
     ):
         network("segmentation")(Other)
 
@@ -92,7 +92,7 @@ def code_of_page(file: str) -> str:
 @pytest.mark.slow
 def test_the_network_of_the_page_is_trained_and_used_by_its_configuration(tmp_path: Path) -> None:
     """The file stands in a folder beside the network's own, as only a new process looks for networks anew."""
-    (tmp_path / "pointnet.py").write_text(code_of_page("ml/networks/pointnet.py"), encoding="utf-8")
+    (tmp_path / "pointnet.py").write_text(code_of_page("ml/networks/segmentation/pointnet.py"), encoding="utf-8")
     (tmp_path / "pointnet.yaml").write_text(code_of_page("pointnet.yaml"), encoding="utf-8")
     for split, seed in (("train", 1), ("test", 3)):
         write_pointcept(tmp_path / "real", split, [road_tile(400, seed, split, length=20.0)])
@@ -109,7 +109,8 @@ def test_the_network_of_the_page_is_trained_and_used_by_its_configuration(tmp_pa
         str(tmp_path / "scores"),
         "--json",
     ]
-    code = "import json, sys, ml.networks; ml.networks.__path__.append(sys.argv[1]); from headless import cli\n"
+    code = "import json, sys; from headless import cli; from ml.networks import segmentation\n"
+    code += "segmentation.__path__.append(sys.argv[1])\n"
     code += "sys.exit(any(cli.main(words) for words in json.loads(sys.argv[2])))"
     command = [sys.executable, "-c", code, str(tmp_path), json.dumps([train, evaluate])]
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)

@@ -7,9 +7,9 @@ from typing import Any
 
 import torch
 
-from ml.centerline.data.effects import SequenceEffects
-from ml.centerline.data.slices import Batch, SliceDataset, SliceSettings, collate
-from ml.centerline.networks.models import CenterlineModel
+from ml.data.effects.slices import SequenceEffects
+from ml.data.slices import Batch, SliceDataset, SliceSettings, collate
+from ml.networks.centerline.models import CenterlineModel
 from ml.registry import networks
 from tests.helpers.roads import analytic_roads
 

@@ -7,10 +7,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ml.centerline.data.axis import MeasuredAxis
-from ml.centerline.data.corridor import Truth
-from ml.centerline.data.roads import LearningRoad
-from ml.points import Points
+from ml.data.axis import MeasuredAxis
+from ml.data.corridor import Truth
+from ml.data.points import Points
+from ml.data.roads import LearningRoad
 from synthroads_addon.base.random_streams import stream
 
 Float = NDArray[np.float64]

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ml.points import Points
+from ml.data.points import Points
 from synthroads_addon.base.classes import class_scheme
 from synthroads_addon.base.schema import canonical_json
 from synthroads_addon.cloud.formats.registry import open_writer

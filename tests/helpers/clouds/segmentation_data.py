@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ml.segmentation.data.tiles import CloudTile
+from ml.data.tiles import CloudTile
 from ml.segmentation.recipes import SegmentationConfiguration
 from synthroads_addon.base.classes import class_scheme
 from synthroads_addon.cloud.formats.registry import open_writer

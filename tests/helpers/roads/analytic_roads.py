@@ -7,9 +7,9 @@ from functools import cache
 
 import numpy as np
 
-from ml.centerline.data.corridor import TruthKind, truths
-from ml.centerline.data.roads import LearningRoad
-from ml.points import Points
+from ml.data.corridor import TruthKind, truths
+from ml.data.points import Points
+from ml.data.roads import LearningRoad
 from synthroads_addon.base.classes import class_scheme
 from synthroads_addon.road.geometry import RoadGeometry
 from synthroads_addon.road.parameters import LineMarking, RoadParameters

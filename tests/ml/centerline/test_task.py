@@ -13,10 +13,10 @@ import pytest
 import torch
 
 from ml.centerline import task
-from ml.centerline.data.batches import Batches, BatchOptions, MeasuredRoad, Roads, read_roads
-from ml.centerline.data.effects import SequenceEffects
-from ml.centerline.data.mirroring import mirror_batch
 from ml.configuration import from_data, load_configuration
+from ml.data.batches import Batches, BatchOptions, MeasuredRoad, Roads, read_roads
+from ml.data.effects.slices import SequenceEffects
+from ml.data.slices import mirror_batch
 from ml.runs import CALIBRATION, METRICS, Run
 from ml.tasks import Evaluation, Prediction
 from synthroads_addon.base.errors import Cancelled, InputError, MissingFileError, OutputError

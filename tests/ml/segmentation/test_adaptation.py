@@ -11,10 +11,10 @@ import torch
 import torch.nn.functional as F  # noqa: N812
 from torch import Tensor, nn
 
-from ml.networks.grouping import Norm
-from ml.networks.neighbours import Neighbours, build_neighbours
-from ml.networks.pointnext import PointNeXt, architecture
-from ml.segmentation.adaptation import adapt_norms, laid_over
+from ml.networks.segmentation.grouping import Norm
+from ml.networks.segmentation.neighbours import Neighbours, build_neighbours
+from ml.networks.segmentation.pointnext import PointNeXt, architecture
+from ml.segmentation.network import adapt_norms, laid_over
 from synthroads_addon.base.errors import InputError
 
 PLAN = replace(architecture("S", in_channels=2, num_classes=2, width=8), dropout=0.3)

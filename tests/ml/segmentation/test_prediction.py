@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 import torch
 
+from ml.data.crops import CropSettings, Item
+from ml.data.tiles import Scaling
+from ml.scores.confusion import Confusion
 from ml.segmentation import prediction
-from ml.segmentation.data.crops import CropSettings, Item
-from ml.segmentation.data.tiles import Scaling
 from ml.segmentation.prediction import PREDICTED, Labelling, predict_file
-from ml.segmentation.scores.metrics import Confusion
-from ml.segmentation.scores.scoring import carry, label_tile, pieces
+from ml.segmentation.scoring import carry, label_tile, pieces
 from synthroads_addon.base.classes import class_scheme
 from synthroads_addon.base.errors import InputError, MissingFileError, OutputError
 from tests.helpers.clouds.segmentation_data import road_block, road_tile, write_cloud

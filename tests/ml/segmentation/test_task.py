@@ -19,17 +19,17 @@ from headless import evaluate as evaluate_command
 from headless import predict as predict_command
 from headless import train as train_command
 from ml.configuration import EXPERIMENTS, load_configuration
+from ml.data.classes import IGNORED
+from ml.data.crops import Item, Seeds
+from ml.data.sources import Source, read_tiles
+from ml.data.tiles import scalings
 from ml.runs import CHECKPOINT, PRETRAINING, Run
 from ml.segmentation import experiment, task
-from ml.segmentation.data.classes import IGNORED
-from ml.segmentation.data.crops import Item, Seeds
-from ml.segmentation.data.sources import Source, read_tiles
-from ml.segmentation.data.tiles import scalings
 from ml.segmentation.experiment import configurations, load_experiment, table
 from ml.segmentation.loading import adaptation_batches, epoch_batches, read_domains
 from ml.segmentation.network import build
 from ml.segmentation.recipes import Data, SegmentationConfiguration
-from ml.segmentation.training import smoothed_loss
+from ml.segmentation.task import smoothed_loss
 from ml.tasks import Evaluation, kinds
 from synthroads_addon.base.classes import class_scheme
 from synthroads_addon.base.errors import InputError, MissingFileError

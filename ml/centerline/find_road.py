@@ -1,0 +1,168 @@
+"""A trained model used on a cloud of which nothing is known, strip by strip."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from synthroads_addon.base.progress import Progress, silent
+
+from ..data.corridor import CORRIDOR
+from ..data.frames import Frames, along, read_path
+from ..data.strips import find_ground, path_through, strips
+from ..networks.centerline.models import TARGETS
+from .predictor import CenterlinePredictor
+
+_HEIGHT = TARGETS.index("height")
+
+
+def find_road(
+    predictor: CenterlinePredictor, cloud: Path, path: Path | None = None, progress: Progress = silent
+) -> Found:
+    """Find centreline and corridor along a cloud's road, in bounded memory however long it is.
+
+    Args:
+        predictor: a trained model.
+        cloud: file with the road's points.
+        path: line along the road, or the scanner's trajectory (CSV or GeoJSON, map coordinates); None: it is found in
+            the cloud, as the middle of its ground.
+        progress: told the share that is done.
+
+    Raises:
+        MissingFileError, InputError: a file is missing or damaged, or the cloud holds no ground.
+    """
+    line = None if path is None else read_path(path)
+    ground = find_ground(cloud, progress)
+    line = line or path_through(ground)
+    frames = along(line, predictor.settings.frame_spacing)
+    shape = (len(frames), len(TARGETS))
+    value, std, widths = np.full(shape, np.nan), np.full(shape, np.nan), np.full((*shape, 2), np.nan)
+    for road, local, own in strips(cloud, ground, line, frames, progress):
+        found = predictor.regress(road, local)
+        # Frames keep their stations, which rise strictly, from strip to strip.
+        number = np.searchsorted(frames.station, found.frames.station[own])
+        value[number] = found.value[own]
+        value[number, _HEIGHT] += road.origin[2]
+        std[number], widths[number] = found.std[own], predictor.widths(found)[own]
+        progress("finding the road", float(number[-1] + 1) / len(frames) if len(number) else 0.0)
+    kept = _span(value[:, 0])
+    return Found(frames.select(kept), value[kept], std[kept], widths[kept], ground.header.epsg)
+
+
+def _span(center: NDArray[np.float64]) -> slice:
+    """Return the frames from the first to the last in which something was found; all if nothing was."""
+    there = np.flatnonzero(np.isfinite(center))
+    return slice(int(there[0]), int(there[-1]) + 1) if len(there) else slice(None)
+
+
+Float = NDArray[np.float64]
+
+DIGITS = 4
+"""Decimals: 0.1 mm."""
+UNITS = {
+    "lanes": "1",
+    "heading": "rad",
+}
+"""All other numbers are in metres."""
+
+
+@dataclass(frozen=True)
+class Found:
+    """Predictions in M frames of a whole road, map coordinates; T are the `TARGETS`.
+
+    Attributes:
+        frames: where.
+        value: (M, T), the centre and the edges as y in their frame, the height as elevation; NaN: nothing.
+        std: (M, T) calibrated standard deviations.
+        widths: (M, T, 2) half-widths of the intervals for 68 % and 95 %.
+        epsg: code of the coordinate system, None if it isn't known.
+    """
+
+    frames: Frames
+    value: Float
+    std: Float
+    widths: Float
+    epsg: int | None
+
+    def points(self, name: str) -> Float:
+        """Return the points (M, 3) of one of the lines; z is the centre's elevation."""
+        return np.column_stack([self.frames.at(self._column(name)), self._column("height")])
+
+    def _column(self, name: str) -> Float:
+        return self.value[:, TARGETS.index(name)]
+
+
+def geojson(found: Found, name: str, spacing: float) -> dict[str, Any]:
+    """Return a FeatureCollection with centreline and edges, one feature per stretch without a gap.
+
+    Each has, per vertex, its station along the path, its standard deviation across the road and the half-widths of the
+    intervals that cover 68 % and 95 %, m.
+
+    Args:
+        found: by the model.
+        name: of the collection.
+        spacing: of the frames, m.
+    """
+    features = []
+    for line in ("center", "left_edge", "right_edge"):
+        column = TARGETS.index(line)
+        points = found.points(line)
+        there = np.isfinite(points).all(axis=1)
+        far = np.concatenate([[True], np.diff(found.frames.station) > 1.5 * spacing])
+        ends = np.flatnonzero(far | ~there | ~np.concatenate([[False], there[:-1]]))
+        for stretch in np.split(np.arange(len(there)), ends):
+            part = stretch[there[stretch]]
+            if len(part) < 2:
+                continue
+            properties = {
+                "feature": "centerline" if line == "center" else line,
+                "stations": _as_list(found.frames.station[part]),
+                "std": _as_list(found.std[part, column]),
+                "interval_68": _as_list(found.widths[part, column, 0]),
+                "interval_95": _as_list(found.widths[part, column, 1]),
+            }
+            geometry = {"type": "LineString", "coordinates": np.round(points[part], DIGITS).tolist()}
+            features.append({"type": "Feature", "properties": properties, "geometry": geometry})
+    collection: dict[str, Any] = {"type": "FeatureCollection", "name": name}
+    if found.epsg is not None:
+        collection["crs"] = {"type": "name", "properties": {"name": f"urn:ogc:def:crs:EPSG::{found.epsg}"}}
+    return collection | {"features": features}
+
+
+def corridor_json(found: Found, calibration: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the corridor as JSON data: a list of M numbers per column, null where nothing was found.
+
+    Args:
+        found: by the model.
+        calibration: what is said about how far its deviations can be trusted.
+    """
+    frames = found.frames
+    columns: dict[str, Any] = {
+        "station": _as_list(frames.station),
+        "x": _as_list(frames.position[:, 0]),
+        "y": _as_list(frames.position[:, 1]),
+        "direction": _as_list(frames.direction, 6),
+    }
+    for index, name in enumerate(TARGETS):
+        digits = 6 if name == "heading" else DIGITS
+        columns[name] = _as_list(found.value[:, index], digits)
+        columns[f"{name}_std"] = _as_list(found.std[:, index], digits)
+        columns[f"{name}_68"] = _as_list(found.widths[:, index, 0], digits)
+        columns[f"{name}_95"] = _as_list(found.widths[:, index, 1], digits)
+    return {
+        "type": "Corridor",
+        "version": "1.0",
+        "epsg": found.epsg,
+        "units": {name: UNITS.get(name, "m") for name in ("center", *CORRIDOR)},
+        "calibration": dict(calibration),
+        "slices": columns,
+    }
+
+
+def _as_list(values: Float, digits: int = DIGITS) -> list[float | None]:
+    return [round(value, digits) + 0.0 if np.isfinite(value) else None for value in values.tolist()]

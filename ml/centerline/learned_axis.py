@@ -1,0 +1,78 @@
+"""The axis as a trained centreline model tells it, by way of `synthroads predict`."""
+
+from __future__ import annotations
+
+from pathlib import Path as FilePath
+from tempfile import TemporaryDirectory
+
+import numpy as np
+from numpy.typing import NDArray
+
+from synthroads_addon.base.errors import InputError
+from synthroads_addon.base.schema import read_json
+from synthroads_addon.reconstruction.cloud import RoadCloud
+from synthroads_addon.reconstruction.path import CloudPath
+from synthroads_addon.reconstruction.reconstruct import Predictor
+
+from ..runs import Run
+from ..tasks import Prediction, kinds, task
+
+Float = NDArray[np.float64]
+
+_USUAL_STD = 0.1  # m, where the model tells none
+_GAP = 5.0  # m between points of a line across which nothing is told
+
+
+def learned_axis(folder: FilePath, cloud_file: FilePath, scratch: FilePath) -> Predictor:
+    """Return a predictor of the axis by a trained run.
+
+    Args:
+        folder: of the run.
+        cloud_file: the cloud that the axis is wanted of.
+        scratch: folder for what the model writes, which is removed again.
+
+    Raises:
+        MissingFileError, InputError: it is no run of a centreline model, or its training isn't finished.
+    """
+    trained = Run.open(folder, kinds())
+    name = trained.configuration.task
+    if name != "centerline":
+        raise InputError("--run", str(folder), f"is a model for {name}, a centreline model is needed")
+
+    def predict(cloud: RoadCloud, path: CloudPath) -> tuple[Float, Float]:
+        with TemporaryDirectory(dir=scratch) as place:
+            course, lines = FilePath(place) / "path.csv", FilePath(place) / "axis.geojson"
+            points = path.points[::5] + cloud.origin[:2]
+            np.savetxt(course, points, delimiter=",", header="x,y", comments="", fmt="%.4f")
+            task(name).predict(trained, Prediction(cloud_file, lines, course))
+            return axis_beside(read_json(lines), cloud.origin, path)
+
+    return predict
+
+
+def axis_beside(document: object, origin: Float, path: CloudPath) -> tuple[Float, Float]:
+    """Return offset and standard deviation (M,) of predicted centrelines at each point of a path; NaN beside none.
+
+    Args:
+        document: GeoJSON with features whose ``feature`` is ``centerline``, and ``std`` per vertex.
+        origin: (3,) map coordinates of the path's local origin.
+        path: beside which.
+    """
+    features = document.get("features", []) if isinstance(document, dict) else []
+    offset, std = np.full(len(path.points), np.nan), np.full(len(path.points), np.nan)
+    for feature in features:
+        told = feature.get("properties", {})
+        points = np.array(feature.get("geometry", {}).get("coordinates", []), dtype=np.float64)
+        if told.get("feature") != "centerline" or len(points) < 2:
+            continue
+        station, beside = path.project(points[:, :2] - origin[:2])
+        order = np.argsort(station, kind="stable")
+        given = told.get("std") or [_USUAL_STD] * len(points)
+        deviation = np.array([_USUAL_STD if value is None else value for value in given], dtype=np.float64)
+        wanted = path.stations
+        after = np.clip(np.searchsorted(station[order], wanted), 1, len(points) - 1)
+        low, high = station[order][after - 1], station[order][after]
+        near = (wanted >= low - 1e-9) & (wanted <= high + 1e-9) & (high - low <= _GAP)
+        offset = np.where(near, np.interp(wanted, station[order], beside[order]), offset)
+        std = np.where(near, np.interp(wanted, station[order], deviation[order]), std)
+    return offset, std

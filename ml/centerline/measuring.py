@@ -1,0 +1,167 @@
+"""A trained model measured beside predictors that learn nothing: figures, tables and pictures."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from synthroads_addon.base.errors import InputError, MissingFileError
+from synthroads_addon.base.files import write_file
+from synthroads_addon.base.progress import Progress, silent
+from synthroads_addon.base.schema import canonical_json
+from synthroads_addon.dataset.manifest import MANIFEST
+
+from ..data.corridor import TruthKind
+from ..data.roads import LearningRoad, read_measured, read_scene, scene_folders
+from ..networks.centerline.models import TARGETS
+from ..scores.baselines import SkeletonSettings
+from ..scores.calibration import LEVELS
+from ..scores.distances import coverage
+from ..scores.evaluation import (
+    Case,
+    Cropping,
+    Predictor,
+    case,
+    measure,
+    skeleton_predictor,
+    trivial_predictors,
+    truth_of,
+)
+from ..scores.pictures import PictureView, corridor_picture, lines_picture
+from ..scores.tables import as_data, write_tables
+from ..tasks import Evaluation
+from .predictor import CenterlinePredictor, errors
+
+if TYPE_CHECKING:
+    from .task import CenterlineConfiguration
+
+Float = NDArray[np.float64]
+
+AXIS_ENDINGS = ("_axis.csv", ".geojson")
+"""Ending of the name of a cloud's axis, after the cloud's name."""
+PICTURES = 3
+"""Roads that are drawn."""
+_VIEW = 200.0
+"""m."""
+
+
+def measure_run(
+    configuration: CenterlineConfiguration,
+    predictor: CenterlinePredictor,
+    evaluation: Evaluation,
+    progress: Progress = silent,
+) -> dict[str, Any]:
+    """Measure a trained model on data sets and on real clouds with an axis beside them; write tables and pictures.
+
+    Synthetic roads are looked at along a path that strays from the axis, and whole. Real ones, whose strips were cut
+    around the axis, have both sides of each slice cropped at random, and the path is found in what is left.
+
+    Returns:
+        the model's mean figures; ``tables`` has those of all predictors and roads, ``corridor`` its errors by target,
+        ``files`` the names of what was written.
+    """
+    shown = read_cases(configuration, evaluation, progress)
+    name = f"{configuration.network.name}, seed {configuration.seed}"
+    width = configuration.slices.half_width
+    predictors: dict[str, Sequence[Predictor]] = {name: [predictor]}
+    predictors |= {"skeleton": [skeleton_predictor(SkeletonSettings())], **trivial_predictors(width)}
+    progress("measuring", 0.0)
+    measured = measure(predictors, lambda seed: shown, [configuration.seed])
+    corridor = corridor_figures(predictor, shown)
+    files = [*write_tables(evaluation.output, "centerline", measured), "corridor.json"]
+    write_file(evaluation.output / files[-1], canonical_json(corridor).encode(), overwrite=True)
+    for number, one in enumerate(shown[:PICTURES]):
+        progress("drawing", number / min(len(shown), PICTURES))
+        files += _draw(evaluation.output, one, predictor, name)
+    rows = {figure: spread.mean for figure, spread in measured[name]["all"].items()}
+    plain = {figure: value if np.isfinite(value) else None for figure, value in rows.items()}
+    return {"roads": len(shown), **plain, "corridor": corridor, "tables": as_data(measured), "files": files}
+
+
+def read_cases(
+    configuration: CenterlineConfiguration, evaluation: Evaluation, progress: Progress = silent
+) -> list[Case]:
+    """Read the roads that are named, as the configuration's seed shows them.
+
+    Raises:
+        MissingFileError: there is no such data set or cloud, or no axis beside a cloud.
+        InputError: something is damaged, or no road has a truth of the configuration's kind.
+    """
+    settings, seed = configuration.slices, configuration.seed
+    shown: list[Case] = []
+    for path in evaluation.data:
+        progress(f"reading {path.name}", len(shown) / max(1, len(evaluation.data)))
+        if (path / MANIFEST).is_file():
+            cache = Path(configuration.data.cache) if configuration.data.cache else None
+            for folder in scene_folders(path, evaluation.split):
+                for road in read_scene(folder, settings.truth, cache):
+                    shown.append(case(road, seed, cropping=None, estimated=False, settings=settings))
+        else:
+            road = _measure_case(path, settings.truth)
+            shown.append(case(road, seed, cropping=Cropping(), estimated=True, settings=settings))
+    if not shown:
+        names = ", ".join(str(path) for path in evaluation.data)
+        raise InputError("data", names, f"holds no road with a {settings.truth} of the kind that was learned")
+    return shown
+
+
+def corridor_figures(predictor: CenterlinePredictor, shown: Sequence[Case]) -> dict[str, dict[str, float | None]]:
+    """Return mean error and coverage of each target over all roads; None where the truth isn't known anywhere."""
+    error, std, wide = [], [], []
+    for one in shown:
+        found = predictor.regress(one.road, one.frames)
+        error.append(errors(found, truth_of(one.road)))
+        std.append(found.std)
+        wide.append(predictor.widths(found))
+    return _figures(np.concatenate(error), np.concatenate(std), np.concatenate(wide))
+
+
+def _figures(error: Float, std: Float, wide: Float) -> dict[str, dict[str, float | None]]:
+    rows: dict[str, dict[str, float | None]] = {}
+    for index, name in enumerate(TARGETS):
+        known = np.isfinite(error[:, index]) & np.isfinite(std[:, index])
+        size = np.abs(error[known, index])
+        row: dict[str, float | None] = {"slices": float(known.sum())}
+        row["mae"] = float(size.mean()) if len(size) else None
+        if name == "lanes":
+            row["right"] = float((np.rint(size) == 0).mean()) if len(size) else None
+        for place, level in enumerate(LEVELS):
+            gaussian = coverage(size, std[known, index], level)
+            row[f"coverage_{level:.0%}".rstrip("%")] = gaussian if len(size) else None
+            inside = size <= wide[known, index, place]
+            row[f"interval_{level:.0%}".rstrip("%")] = float(inside.mean()) if len(size) else None
+        rows[name] = row
+    return rows
+
+
+def _measure_case(cloud: Path, truth: TruthKind) -> LearningRoad:
+    found = [cloud.with_name(cloud.stem + ending) for ending in AXIS_ENDINGS]
+    there = [path for path in found if path.is_file()]
+    if not cloud.exists():
+        raise MissingFileError(str(cloud), None, "no such cloud, nor a data set's folder")
+    if not there:
+        names = " or ".join(path.name for path in found)
+        raise MissingFileError(str(cloud), None, f"has no axis beside it, {names}")
+    return read_measured(cloud, there[0], truth)
+
+
+def _draw(folder: Path, one: Case, predictor: CenterlinePredictor, name: str) -> list[str]:
+    """Draw a road; return the names of the pictures."""
+    length = truth_of(one.road).axis.length
+    view = PictureView(max(0.0, 0.5 * (length - _VIEW)), min(length, 0.5 * (length + _VIEW)))
+    prediction = predictor(one.road, one.frames)
+    lines: Mapping[str, Float] = {
+        name: prediction[:, 0],
+        "skeleton": skeleton_predictor(SkeletonSettings())(one.road, one.frames)[:, 0],
+    }
+    pictures = {
+        "lines": lines_picture(one, lines, view, f"{one.road.name}: centrelines"),
+        "corridor": corridor_picture(one, prediction, view, f"{one.road.name}: corridor of {name}"),
+    }
+    for kind, content in pictures.items():
+        write_file(folder / f"{one.road.name}-{kind}.png", content, overwrite=True)
+    return [f"{one.road.name}-{kind}.png" for kind in pictures]

@@ -1,1 +1,0 @@
-"""How good predicted centrelines are: metrics, intervals, baselines, tables and pictures."""

@@ -1,0 +1,202 @@
+"""The roads that a configuration names, and the batches of an epoch."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field, model_validator
+
+from synthroads_addon.base.errors import InputError
+from synthroads_addon.base.progress import Progress, silent
+from synthroads_addon.base.random_streams import stream
+from synthroads_addon.base.schema import quantity
+
+from ..configuration import Part
+from .axis import MeasuredAxis
+from .corridor import Truth, TruthKind
+from .effects.slices import SequenceCrop, SequenceEffects
+from .roads import LearningRoad, read_measured, read_scene, scene_folders
+from .slices import Batch, Sample, SliceDataset, SliceSettings, collate, mirror_batch
+
+
+class MeasuredRoad(Part):
+    """A real cloud and its axis, or the part of it between two stations."""
+
+    cloud: str = Field(description="Cloud.")
+    axis: str = Field(description="CSV or GeoJSON with the axis, in the cloud's map coordinates.")
+    first: float = quantity(0.0, ge=0, unit="m", description="Station along the axis where the part begins.")
+    last: float = quantity(1e9, gt=0, unit="m", description="Station where it ends.")
+
+    @model_validator(mode="after")
+    def _ascending(self) -> MeasuredRoad:
+        if self.last <= self.first:
+            raise ValueError(f"last must be larger than first, {self.first:g}")
+        return self
+
+
+class DataOptions(Part):
+    """Training data. Paths count from the working folder."""
+
+    data_sets: tuple[str, ...] = Field((), description="Folders that `synthroads dataset` made.")
+    train_split: str = Field("train", description="Split of the data sets that weights are learned from.")
+    validation_split: str = Field("validation", description="Split that curves and calibration are made with.")
+    measured: tuple[MeasuredRoad, ...] = Field((), description="Real roads to learn from.")
+    measured_validation: tuple[MeasuredRoad, ...] = Field((), description="Real roads to validate with.")
+    measured_share: float = quantity(
+        0.5, ge=0, le=1, unit="1", description="Of the samples, where there are both kinds."
+    )
+    cache: str = Field("", description="Folder for sorted points, so that the next run starts sooner; none if empty.")
+
+    @model_validator(mode="after")
+    def _something(self) -> DataOptions:
+        if not self.data_sets and not (self.measured and self.measured_validation):
+            raise ValueError("name data_sets, or measured and measured_validation roads")
+        return self
+
+
+class BatchOptions(Part):
+    """How much of it an epoch sees."""
+
+    size: int = quantity(16, ge=1, le=100_000, unit="1", description="Sequences of a batch.")
+    steps: int = quantity(100, ge=1, le=1_000_000, unit="1", description="Batches of an epoch.")
+    passes: int = quantity(
+        2, ge=1, le=100, unit="1", description="How often an epoch uses what it drew; every other time mirrored."
+    )
+    validation: int = quantity(
+        128, ge=1, le=1_000_000, unit="1", description="Sequences that an epoch is validated on."
+    )
+
+    @model_validator(mode="after")
+    def _whole(self) -> BatchOptions:
+        if self.steps % self.passes:
+            raise ValueError(f"steps is {self.steps}: must be a multiple of passes, {self.passes}")
+        return self
+
+
+@dataclass(frozen=True)
+class Roads:
+    """Roads to learn from and roads to validate with; of both the synthetic and the real ones apart."""
+
+    train: list[LearningRoad]
+    measured: list[LearningRoad]
+    validation: list[LearningRoad]
+    measured_validation: list[LearningRoad]
+
+
+def read_roads(data: DataOptions, truth: TruthKind, progress: Progress = silent) -> Roads:
+    """Read all roads of a configuration.
+
+    Raises:
+        MissingFileError, InputError: a file or folder is missing or damaged, or holds nothing of use.
+    """
+    cache = Path(data.cache) if data.cache else None
+    train = _scenes(data.data_sets, data.train_split, truth, cache, progress)
+    validation = _scenes(data.data_sets, data.validation_split, truth, cache, progress)
+    measured = [_read_measured_road(road, truth) for road in data.measured]
+    measured_validation = [_read_measured_road(road, truth) for road in data.measured_validation]
+    if not train and not measured:
+        raise InputError("data", list(data.data_sets), f"holds no road with a {truth} to learn from")
+    if not validation and not measured_validation:
+        raise InputError("data", list(data.data_sets), f"holds no road with a {truth} to validate with")
+    return Roads(train, measured, validation, measured_validation)
+
+
+class Batches:
+    """The batches of an epoch: called with its number, gives them one by one. They hang on seed and epoch alone.
+
+    Args:
+        roads: to learn from.
+        settings: how slices are cut.
+        effects: drawn for each sample.
+        options: how many.
+        seed: of everything random.
+        measured_share: of the samples from real roads, where there are both kinds.
+    """
+
+    def __init__(
+        self,
+        roads: Roads,
+        settings: SliceSettings,
+        effects: SequenceEffects,
+        options: BatchOptions,
+        seed: int,
+        measured_share: float,
+    ) -> None:
+        self.options = options
+        self.seed = seed
+        self.drawn_per_epoch = options.size * options.steps // options.passes
+        kinds = ((roads.train, 1.0 - measured_share), (roads.measured, measured_share))
+        there = [(group, share) for group, share in kinds if group]
+        total = sum(share for _, share in there)
+        self.shares = (
+            np.array([share / total for _, share in there]) if total else np.full(len(there), 1.0 / len(there))
+        )
+        self.datasets = [SliceDataset(group, settings, self.drawn_per_epoch, seed, effects) for group, _ in there]
+
+    def kinds(self, epoch: int) -> NDArray[np.intp]:
+        """Return for each sample that an epoch draws which of `datasets` it comes from."""
+        random = stream(self.seed, "kinds of road", epoch)
+        return random.choice(len(self.shares), self.drawn_per_epoch, p=self.shares)
+
+    def __call__(self, epoch: int, share: slice = slice(None)) -> Iterator[Batch]:
+        """Yield those batches of an epoch, counted from 0, whose numbers a slice names."""
+        kept: dict[int, Sample] = {}
+        kind = self.kinds(epoch)
+        size, each = self.options.size, self.options.steps // self.options.passes
+        for turn, place in (divmod(number, each) for number in range(self.options.steps)[share]):
+            order = stream(self.seed, "order", epoch, turn).permutation(self.drawn_per_epoch)
+            numbers = [int(n) for n in (order if turn else np.arange(len(order)))[place * size : (place + 1) * size]]
+            drawn = {n: kept.get(n) or self.datasets[kind[n]].drawn(epoch, n) for n in numbers}
+            kept |= drawn if self.options.passes > 1 else {}
+            batch = collate([drawn[n] for n in numbers])
+            yield mirror_batch(batch) if turn % 2 else batch
+
+
+def fixed_batches(
+    roads: Sequence[LearningRoad], settings: SliceSettings, effects: SequenceEffects | None, count: int, seed: int
+) -> list[Batch]:
+    """Return batches that are the same every time.
+
+    Args:
+        roads: with a truth.
+        settings: how slices are cut.
+        effects: what is done to the points; None: nothing.
+        count: of sequences.
+        seed: of what is drawn.
+    """
+    dataset = SliceDataset(roads, settings, count, seed, effects, "validation slices")
+    samples = [dataset.drawn(number) for number in range(count)]
+    return [collate(samples[first : first + 32]) for first in range(0, len(samples), 32)]
+
+
+def quiet(crop: SequenceCrop) -> SequenceEffects:
+    """Return effects that do nothing but cut off sides."""
+    strengths = [name for name, field in SequenceEffects.model_fields.items() if field.annotation is float]
+    return SequenceEffects(crop=crop, gamma=(1.0, 1.0), **dict.fromkeys(strengths, 0.0))
+
+
+def _scenes(
+    data_sets: Sequence[str], split: str, truth: TruthKind, cache: Path | None, progress: Progress
+) -> list[LearningRoad]:
+    folders = [folder for data_set in data_sets for folder in scene_folders(Path(data_set), split)]
+    roads: list[LearningRoad] = []
+    for number, folder in enumerate(folders):
+        progress(f"reading {split} roads", number / len(folders))
+        roads += read_scene(folder, truth, cache)
+    return roads
+
+
+def _read_measured_road(road: MeasuredRoad, truth: TruthKind) -> LearningRoad:
+    """Read a real road whose axis is only known between two stations."""
+    whole = read_measured(Path(road.cloud), Path(road.axis), truth)
+    assert whole.truth is not None
+    axis = whole.truth.axis
+    inside = (axis.station >= road.first) & (axis.station <= road.last)
+    if np.count_nonzero(inside) < 2:
+        raise InputError(f"{road.axis}: first", road.first, f"leaves nothing of an axis of {axis.length:.0f} m")
+    part = MeasuredAxis(axis.points[inside], axis.joined[inside[:-1] & inside[1:]])
+    return replace(whole, truth=Truth.measured(part, truth))

@@ -1,0 +1,132 @@
+"""Classes of training data: whatever a source calls its classes, as numbers of the scheme that is learned."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field
+
+from synthroads_addon.base.classes import UNLABELLED, ClassScheme, class_scheme
+from synthroads_addon.base.errors import InputError, nearest_name
+from synthroads_addon.base.schema import Model, read_json
+
+from ..configuration import SHIPPED
+
+MAPPINGS = SHIPPED / "classes"
+"""Folder of the shipped mappings."""
+IGNORED = -1
+"""Label of points that count nowhere."""
+
+
+class LabelMapping(Model):
+    """Which numbers in a file of others stand for which class, as JSON; numbers that aren't named are ignored."""
+
+    vendor_keys_allowed: ClassVar[bool] = False
+
+    title: str = Field("", description="What files it is for.")
+    field: str = Field("classification", min_length=1, description="Attribute of the file that holds the numbers.")
+    classes: dict[str, str] = Field(min_length=1, description="Number in the file -> class, or group of classes.")
+    groups: dict[str, tuple[str, ...]] = Field(
+        {}, description="Group -> classes that count as one where scores are made; for coarser truths."
+    )
+    ignore_zero_intensity: bool = Field(False, description="Ignore points whose intensity is 0: none was measured.")
+
+    def targets(self, names: tuple[str, ...]) -> tuple[str, ...]:
+        """Return what the truth tells apart, in order: the scheme's classes, or the groups.
+
+        Args:
+            names: of the scheme's classes.
+
+        Raises:
+            InputError: a number stands for something that is neither a class nor a group, or a group names no class.
+        """
+        for group, members in self.groups.items():
+            for member in members:
+                if member not in names:
+                    hint = nearest_name(member, names)
+                    raise InputError(f"groups.{group}", member, f"must be one of {', '.join(names)}{hint}")
+        known = tuple(self.groups) if self.groups else names
+        for number, name in self.classes.items():
+            if not number.lstrip("-").isdigit():
+                raise InputError("classes", number, 'must be whole numbers as text, e.g. "40"')
+            if name not in known:
+                raise InputError(
+                    f"classes.{number}", name, f"must be one of {', '.join(known)}{nearest_name(name, known)}"
+                )
+        return known
+
+    def label(self, numbers: NDArray[np.integer], names: tuple[str, ...]) -> NDArray[np.int16]:
+        """Return for numbers of the file (N,) the places in `targets`, or `IGNORED`."""
+        places = {name: place for place, name in enumerate(self.targets(names))}
+        table = {int(number): places[name] for number, name in self.classes.items()}
+        known, inverse = np.unique(numbers, return_inverse=True)
+        found = np.array([table.get(int(number), IGNORED) for number in known], dtype=np.int16)
+        return found[inverse.reshape(-1)] if len(known) else np.zeros(0, dtype=np.int16)
+
+    def group_of(self, names: tuple[str, ...]) -> NDArray[np.int16]:
+        """Return the place in `targets` of each class (C,) that is predicted; `IGNORED` where no group has it."""
+        targets = self.targets(names)
+        if not self.groups:
+            return np.arange(len(names), dtype=np.int16)
+        table = np.full(len(names), IGNORED, dtype=np.int16)
+        for place, group in enumerate(targets):
+            table[[names.index(member) for member in self.groups[group]]] = place
+        return table
+
+
+def load_mapping(name_or_file: str) -> LabelMapping:
+    """Return a shipped mapping (``semantickitti``, ``ign``, ...) or one from a JSON file.
+
+    Raises:
+        MissingFileError: there is no such file.
+        InputError: it is no mapping.
+    """
+    shipped = sorted(path.stem for path in MAPPINGS.glob("*.json"))
+    path = MAPPINGS / f"{name_or_file}.json" if name_or_file in shipped else Path(name_or_file)
+    if path.suffix.lower() != ".json":
+        known = ", ".join(shipped)
+        raise InputError(
+            "mapping", name_or_file, f"must be a .json file or one of {known}{nearest_name(name_or_file, shipped)}"
+        )
+    return LabelMapping.from_dict(read_json(path), str(name_or_file))
+
+
+def class_names(scheme: ClassScheme) -> tuple[str, ...]:
+    """Return the names of a scheme's classes in the order of the network's outputs."""
+    return tuple(row.name for row in scheme.rows)
+
+
+def table_between(source: Mapping[int, str], scheme: ClassScheme, where: str) -> NDArray[np.int16]:
+    """Return a (256,) table from a source's ids to places in a scheme, by names; unlabelled is `IGNORED`.
+
+    A source's class counts as the scheme's class of the same name, else as the one that it is merged into: 17 classes
+    become 5, and the 5 never 17.
+
+    Args:
+        source: names by id.
+        scheme: what is learned.
+        where: the source, for messages.
+
+    Raises:
+        InputError: a class of the source has no place in the scheme.
+    """
+    names = class_names(scheme)
+    full = {row.id: row.name for row in class_scheme("17").rows}
+    members: dict[str, int] = {}
+    for place, row in enumerate(scheme.rows):
+        for member in row.of:
+            members[full.get(member, "") if isinstance(member, int) else member] = place
+    table = np.full(256, IGNORED, dtype=np.int16)
+    for number, name in source.items():
+        if number == UNLABELLED or name == "unlabelled":
+            continue
+        found = names.index(name) if name in names else members.get(name)
+        if found is None:
+            known = ", ".join(names)
+            raise InputError(f"{where}: classes", name, f"has no place in the scheme {scheme.name} ({known})")
+        table[number] = found
+    return table

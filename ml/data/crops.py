@@ -1,0 +1,203 @@
+"""Crops of tiles as PyTorch data: plain dictionaries of tensors under Pointcept's names.
+
+An item holds N points: ``coord`` (N, 3) float32 m, centred; ``grid_coord`` (N, 3) int32, cells of the voxel grid from
+0; ``color`` (N, 3) and ``strength`` (N, 1) float32; ``feat`` (N, F) float32, the network's input; ``segment`` (N,)
+int64, -1 ignored; ``offset`` (1,) int64, N. A batch has the points of its items one after another, and where each
+ends in ``offset``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any, Literal, get_args
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor
+from torch.utils.data import Dataset, IterableDataset, get_worker_info
+
+from synthroads_addon.base.errors import InputError
+from synthroads_addon.base.random_streams import stream
+
+from .effects.crops import MISSING_SIGMA, NO_EFFECTS, Crop, Effects, FloatArray, crop_of
+from .tiles import CloudTile, Scaling
+
+Feature = Literal["x", "y", "z", "red", "green", "blue", "intensity"]
+FEATURES: tuple[Feature, ...] = get_args(Feature)
+Item = dict[str, Tensor]
+COORDINATE_SPAN = 10.0
+"""Centred coordinates as features are in units of this, m, so that they are about as large as the others."""
+
+
+@dataclass(frozen=True)
+class CropSettings:
+    """How items are made.
+
+    Attributes:
+        points: largest number of points of a crop.
+        voxel: edge of the cells of ``grid_coord``, m.
+        features: columns of ``feat``, in this order.
+    """
+
+    points: int = 24_000
+    voxel: float = 0.1
+    features: tuple[Feature, ...] = FEATURES
+
+
+@dataclass(frozen=True)
+class Draw:
+    """One crop of an epoch: which tile, and what makes it differ from the tile's others."""
+
+    tile: int
+    number: int
+
+
+class Seeds:
+    """Where crops are cut out: around any point of a tile, or around each class as often.
+
+    Args:
+        tiles: of all scenes.
+        classes: number of classes.
+        balanced: draw the class first, then the tile by its number of points of that class, then one of these.
+    """
+
+    def __init__(self, tiles: Sequence[CloudTile], classes: int, balanced: bool) -> None:
+        self._tiles = tiles
+        self._balanced = balanced
+        self._counts = np.array([tile.class_counts(classes) for tile in tiles]) if balanced else None
+
+    def draw(self, tile: int, random: np.random.Generator) -> tuple[int, int]:
+        """Return tile and point; a balanced draw chooses its tile itself."""
+        if self._counts is None:
+            return tile, int(random.integers(len(self._tiles[tile])))
+        per_class = self._counts.sum(axis=0)
+        label = random.choice(np.flatnonzero(per_class))
+        chosen = int(random.choice(len(self._tiles), p=self._counts[:, label] / per_class[label]))
+        return chosen, int(random.choice(np.flatnonzero(self._tiles[chosen].segment == label)))
+
+
+class CropDataset(Dataset[Item]):
+    """Map-style: the crops of one epoch, each drawn from its own stream.
+
+    The same seed, epoch and place give the same item, in whichever worker and order.
+
+    Args:
+        tiles: thinned to the training voxel.
+        scalings: of intensities by scene.
+        settings: how items are made.
+        plan: the crops.
+        seeds: where they are cut out.
+        effects: what happens to them.
+        seed, epoch: of all that is random.
+    """
+
+    def __init__(
+        self,
+        tiles: Sequence[CloudTile],
+        scalings: dict[str, Scaling],
+        settings: CropSettings,
+        plan: Sequence[Draw],
+        seeds: Seeds,
+        *,
+        effects: Effects = NO_EFFECTS,
+        seed: int = 0,
+        epoch: int = 0,
+    ) -> None:
+        self.tiles, self.scalings, self.settings = tiles, scalings, settings
+        self.plan, self.seeds, self.effects = plan, seeds, effects
+        self.seed, self.epoch = seed, epoch
+
+    def __len__(self) -> int:
+        return len(self.plan)
+
+    def __getitem__(self, place: int) -> Item:
+        draw = self.plan[place]
+        random = stream(self.seed, "crop", self.epoch, draw.tile, draw.number)
+        return _draw_crop(self, draw.tile, random)
+
+
+class CropStream(IterableDataset[Item]):
+    """Iterable and endless: crops of random tiles with effects on the fly; each worker has a stream of its own.
+
+    Args: see `CropDataset`.
+    """
+
+    def __init__(
+        self,
+        tiles: Sequence[CloudTile],
+        scalings: dict[str, Scaling],
+        settings: CropSettings,
+        seeds: Seeds,
+        effects: Effects,
+        seed: int,
+    ) -> None:
+        self.tiles, self.scalings, self.settings = tiles, scalings, settings
+        self.seeds, self.effects, self.seed = seeds, effects, seed
+
+    def __iter__(self) -> Iterator[Item]:
+        worker = get_worker_info()
+        random = stream(self.seed, "crops", 0 if worker is None else worker.id)
+        while True:
+            yield _draw_crop(self, int(random.integers(len(self.tiles))), random)
+
+
+def cut_crop(tile: CloudTile, middle: NDArray[np.float32], points: int, scaling: Scaling) -> Crop:
+    """Return the points of a tile nearest a place (3,) by horizontal distance, at most as many as given.
+
+    Columns rather than balls: a gantry stays with its posts and a crown with its trunk.
+    """
+    if len(tile) > points:
+        away = ((tile.coord[:, :2] - middle[:2]) ** 2).sum(axis=1)
+        keep = np.sort(np.argpartition(away, points - 1)[:points])
+        tile = tile.select(keep)
+    return crop_of(tile, None if tile.strength is None else scaling.apply(tile.strength))
+
+
+def item(crop: Crop, settings: CropSettings, random: np.random.Generator) -> Item:
+    """Return a crop as an item.
+
+    It is centred on the mean of x and y and the median of z. What is missing is small noise from ``random``.
+
+    Raises:
+        InputError: the crop has no points.
+    """
+    count = len(crop.coord)
+    if count == 0:
+        raise InputError("crop", 0, "has no points")
+    middle = [*crop.coord[:, :2].mean(axis=0, dtype=np.float64), np.median(crop.coord[:, 2])]
+    coord = (crop.coord - np.array(middle)).astype(np.float32)
+    color = _noise(random, (count, 3)) if crop.color is None else crop.color
+    strength = _noise(random, (count, 1)) if crop.strength is None else crop.strength[:, None]
+    columns = np.concatenate([coord / COORDINATE_SPAN, color, strength], axis=1)
+    chosen = [FEATURES.index(name) for name in settings.features]
+    grid = np.floor(coord / settings.voxel).astype(np.int32)
+    arrays: dict[str, NDArray[Any]] = {
+        "coord": coord,
+        "grid_coord": grid - grid.min(axis=0),
+        "color": color,
+        "strength": strength,
+        "feat": columns[:, chosen],
+        "segment": crop.segment.astype(np.int64),
+        "offset": np.array([count], dtype=np.int64),
+    }
+    return {name: torch.from_numpy(np.ascontiguousarray(array)) for name, array in arrays.items()}
+
+
+def _draw_crop(crops: CropDataset | CropStream, place: int, random: np.random.Generator) -> Item:
+    """Return a crop around a seed of a planned tile, or of the tile that the seeds have chosen in its place."""
+    number, point = crops.seeds.draw(place, random)
+    tile = crops.tiles[number]
+    crop = cut_crop(tile, tile.coord[point], crops.settings.points, crops.scalings[tile.scene])
+    return item(crops.effects.apply(crop, random), crops.settings, random)
+
+
+def collate(items: Sequence[Item]) -> Item:
+    """Return a batch: the items' points one after another; ``offset`` (B,) says where each item ends."""
+    batch = {name: torch.cat([entry[name] for entry in items]) for name in items[0]}
+    return batch | {"offset": torch.cumsum(batch["offset"], dim=0)}
+
+
+def _noise(random: np.random.Generator, shape: tuple[int, int]) -> FloatArray:
+    return random.normal(0.0, MISSING_SIGMA, shape).astype(np.float32)

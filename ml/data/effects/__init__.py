@@ -1,0 +1,1 @@
+"""Effects on the samples of a training: cheap, on the fly, each drawn from the sample's own stream."""

@@ -1,0 +1,172 @@
+"""Effects on the intensities and colours of a sequence: other scanners, materials, markings and cameras."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..samples import Stretch
+
+if TYPE_CHECKING:
+    from .slices import SequenceEffects
+
+Float = NDArray[np.float64]
+Generator = np.random.Generator
+
+_DARKEST = 1e-5
+"""Intensities below this share of the brightest count as it."""
+_NARROWEST = 0.02
+"""A footprint narrower than this is a point, m."""
+_LINE_REACH = 0.5
+"""Paint within so far of a line's place is the line's, m."""
+_LINE_WIDTHS = (0.12, 0.6)
+"""Of a solid lane line: one narrow line to a double one with what lies between, m."""
+_VERGE_TONE = 0.3
+"""Logarithm of the largest factor by which a verge of crushed stone is brighter or darker than asphalt."""
+_SCANNER_HEIGHTS = (1.5, 60.0)
+_SCANNER_ASIDE = 15.0
+"""Of the scanners from whose range intensities fall off: lowest and highest, and farthest from the path, m."""
+
+
+def relight(stretch: Stretch, effects: SequenceEffects, rng: Generator) -> None:
+    """Change intensities and colours as another scanner, other materials and another camera would have."""
+    if rng.random() >= effects.plain and stretch.intensity.any():
+        _relight_intensities(stretch, effects, rng)
+    if effects.loses_colors(rng):
+        stretch.has_color = False
+    elif stretch.has_color:
+        factors = np.exp(effects.tint * (rng.uniform(-1.0, 1.0) + rng.uniform(-1.0, 1.0, 3)))
+        stretch.rgb = np.clip(stretch.rgb * factors, 0.0, 1.0)
+
+
+def _relight_intensities(stretch: Stretch, effects: SequenceEffects, rng: Generator) -> None:
+    share = rng.random(7)
+    value, marked = _repaint_lines(np.maximum(stretch.intensity, 0.0), stretch, effects.repaint, rng)
+    value = _wear_markings(value, stretch.paved, marked, effects.paint * share[0])
+    value, like_pavement = _verges(value, stretch, marked, effects.verge, rng)
+    value = np.where(like_pavement, value, value * np.exp(effects.contrast * rng.uniform(-1.0, 1.0)))
+    value = _blur_footprint(value, stretch, effects.footprint * share[5])
+    value *= _falloff(stretch.xyz[:, 1], effects.falloff * share[1], rng)
+    low, high = np.log(effects.gamma)
+    log = np.exp(low + share[4] * (high - low)) * np.log(np.maximum(value / np.max(value), _DARKEST))
+    # Noise by the spread, so that a scanner that compresses its intensities isn't drowned in it.
+    spread = float(np.subtract(*np.percentile(log, (90.0, 10.0))))
+    noise = effects.speckle * share[2] * rng.standard_normal(len(value))
+    pattern = effects.patches * share[3] * _waves(stretch, rng) + effects.stripes * share[6] * _tracks(stretch, rng)
+    stretch.intensity = np.exp(log + spread * (noise + pattern))
+
+
+def _repaint_lines(
+    value: Float, stretch: Stretch, probability: float, rng: Generator
+) -> tuple[Float, NDArray[np.bool_]]:
+    """Return intensities and what is marked (K,) where the lines of a carriageway without shoulders are others.
+
+    Two lanes are parted by dashes on motorways; on rural roads as well by a solid or a double line, or by none; and
+    many of them have no edge lines. On a motorway that would lead astray: beside a ramp it is by its dashes that the
+    line between the lanes is known.
+    """
+    lane, edge, side, width = rng.random(4)
+    marked, bare = stretch.marked, stretch.paved & ~stretch.marked
+    if not stretch.without_shoulders() or not marked.any() or not bare.any():
+        return value, marked
+    paint, pavement = float(np.median(value[marked])), float(np.median(value[bare]))
+    y = stretch.xyz[:, 1] - stretch.center[stretch.number]
+    edges = stretch.lines[stretch.number] * [1.0, -1.0]
+    gone = np.zeros(len(value), dtype=bool)
+    both, one = edge < probability, probability <= edge < 2.0 * probability
+    worn = (both or (one and side < 0.5), both or (one and side >= 0.5), lane >= 1.0 - probability)
+    for happens, offset in zip(worn, (edges[:, 0], edges[:, 1], 0.0), strict=True):
+        if happens:
+            gone |= marked & (np.abs(y - offset) < _LINE_REACH)
+    if lane < probability:
+        low, high = _LINE_WIDTHS
+        painted = stretch.paved & (np.abs(y) < 0.5 * (low + (high - low) * width))
+        value, marked = np.where(painted, paint, value), marked | painted
+    return np.where(gone, pavement, value), marked & ~gone
+
+
+def _verges(
+    value: Float, stretch: Stretch, marked: NDArray[np.bool_], widest: float, rng: Generator
+) -> tuple[Float, NDArray[np.bool_]]:
+    """Return intensities, and which points (K,) look like pavement, where a rural road has verges of crushed stone.
+
+    These are hardly brighter or darker than asphalt: the pavement seems wider than it is.
+    """
+    widths, tone = rng.uniform(0.0, widest, 2), np.exp(_VERGE_TONE * rng.uniform(-1.0, 1.0))
+    bare = stretch.paved & ~marked
+    if not stretch.without_shoulders() or not bare.any():
+        return value, stretch.paved
+    y = stretch.xyz[:, 1] - stretch.center[stretch.number]
+    beyond = np.column_stack([y, -y]) - stretch.paved_sides()[stretch.number]
+    verge = ~stretch.paved & ((beyond > 0.0) & (beyond < widths)).any(axis=1)
+    usual = float(np.median(value[verge])) if verge.any() else 0.0
+    if usual <= 0.0:
+        return value, stretch.paved
+    return np.where(verge, value * (tone * float(np.median(value[bare])) / usual), value), stretch.paved | verge
+
+
+def _wear_markings(value: Float, paved: NDArray[np.bool_], marked: NDArray[np.bool_], share: float) -> Float:
+    """Return intensities whose markings have lost a share of what they are brighter than the pavement."""
+    bare = paved & ~marked
+    if not marked.any() or not bare.any():
+        return value
+    pavement = float(np.median(value[bare]))
+    return np.where(marked, value + share * np.minimum(pavement - value, 0.0), value)
+
+
+def _blur_footprint(value: Float, stretch: Stretch, width: float) -> Float:
+    """Return the means of intensities (K,) over a beam's footprint: over points of the slice within half a width in y.
+
+    A line seen by a wide beam is wider and fainter than it is.
+    """
+    if not len(value) or width < _NARROWEST:
+        return value
+    y = stretch.xyz[:, 1] - stretch.xyz[:, 1].min()
+    # Slices far apart from each other on one axis, so that one search finds all windows.
+    place = stretch.number * (2.0 * (float(y.max()) + width)) + y
+    order = np.argsort(place)
+    place = place[order]
+    total = np.concatenate([[0.0], np.cumsum(value[order])])
+    first = np.searchsorted(place, place - 0.5 * width, side="left")
+    last = np.searchsorted(place, place + 0.5 * width, side="right")
+    result = np.empty_like(value)
+    result[order] = (total[last] - total[first]) / (last - first)
+    return result
+
+
+def _falloff(y: Float, power: float, rng: Generator) -> Float:
+    """Return factors (K,) of intensities that fall off with the range from one or two scanners above the road.
+
+    Heights go from a vehicle's to an aircraft's, equally in logarithms. Of two passes beside each other a point belongs
+    to either, the likelier the nearer: seen from near it is bright, and from far dark, in the same place.
+    """
+    passes = int(rng.integers(1, 3))
+    height = np.exp(rng.uniform(*np.log(_SCANNER_HEIGHTS)))
+    square = height**2 + (y[:, None] - rng.uniform(-_SCANNER_ASIDE, _SCANNER_ASIDE, passes)) ** 2
+    nearness = np.cumsum(1.0 / square, axis=1)
+    chosen = (rng.random(len(y))[:, None] * nearness[:, -1:] > nearness).sum(axis=1)
+    result: Float = (square[np.arange(len(y)), chosen] / height**2) ** (-power / 2.0)
+    return result
+
+
+def _tracks(stretch: Stretch, rng: Generator) -> Float:
+    """Return a random function (K,) of about unit deviation that only changes across the road: waves of 1.5 to 6 m."""
+    count = 5
+    rate = 2.0 * np.pi / np.exp(rng.uniform(np.log(1.5), np.log(6.0), count))
+    y = stretch.xyz[:, 1] - np.nan_to_num(stretch.center)[stretch.number]
+    angle = y[:, None] * rate + rng.uniform(0.0, 2.0 * np.pi, count)
+    result: Float = np.cos(angle).sum(axis=1) * np.sqrt(2.0 / count)
+    return result
+
+
+def _waves(stretch: Stretch, rng: Generator) -> Float:
+    """Return a smooth random function of the place (K,) of about unit deviation: waves of 2 to 20 m any way."""
+    count = 6
+    rate = 2.0 * np.pi / np.exp(rng.uniform(np.log(2.0), np.log(20.0), count))
+    way, phase = rng.uniform(0.0, 2.0 * np.pi, (2, count))
+    x, y = stretch.points_along(), stretch.xyz[:, 1]
+    angle = x[:, None] * (rate * np.cos(way)) + y[:, None] * (rate * np.sin(way)) + phase
+    result: Float = np.cos(angle).sum(axis=1) * np.sqrt(2.0 / count)
+    return result

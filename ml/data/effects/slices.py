@@ -1,0 +1,231 @@
+"""Effects on sequences of slices, drawn while training: cheap, and carried along to the truth.
+
+Every effect takes its random numbers from the sample's own stream, so that a seed and a number give the same sample,
+whatever worker makes it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field, model_validator
+
+from synthroads_addon.base.schema import quantity
+
+from ...configuration import Part
+from ..frames import Frames
+from ..samples import HEADING, HEIGHT, LEFT, RIGHT, Stretch
+from .base import PointEffects, usually
+from .lighting import relight
+
+Float = NDArray[np.float64]
+Generator = np.random.Generator
+
+_RIM = 0.7
+"""Width of the pavement's edge whose height is taken, m."""
+
+
+class SequenceCrop(Part):
+    """Both sides of every slice cut off, so that the middle of what is left isn't the centre.
+
+    A strip reaches to a distance R from the true centre to either side, two numbers drawn for the whole sequence: a
+    road's from ``reach``, a carriageway's from its edge line out to ``beyond`` farther, but at most to the middle of
+    the median. In it every slice, and each of its sides by itself, is cut to a distance between (1 - ``share``) R and
+    R; with the probability ``steady`` the same in all slices, since cuts of their own average out over a sequence. What
+    isn't cut is seen as far as slices reach, as in scans of whole landscapes.
+    """
+
+    probability: float = quantity(0.7, ge=0, le=1, unit="1", description="Of a sequence.")
+    reach: tuple[float, float] = Field((4.0, 30.0), description="Smallest and largest R of a road's strip, m.")
+    beyond: tuple[float, float] = Field((0.0, 4.0), description="R of a carriageway's strip beyond its edge line, m.")
+    share: float = quantity(0.75, ge=0, le=0.95, unit="1", description="Largest part of R that is cut off.")
+    steady: float = quantity(0.25, ge=0, le=1, unit="1", description="Probability of cuts that all slices share.")
+
+    @model_validator(mode="after")
+    def _in_order(self) -> SequenceCrop:
+        for name, least in (("reach", 0.5), ("beyond", 0.0)):
+            low, high = getattr(self, name)
+            if not least <= low <= high <= 1000.0:
+                raise ValueError(f"{name} is {low:g}, {high:g}: must be two ascending numbers from {least:g} to 1000")
+        return self
+
+
+class SequenceEffects(PointEffects):
+    """Effects on a sequence while training. Strengths are the largest; each sample draws its own below them."""
+
+    renamed: ClassVar[Mapping[str, str]] = {"colorless": "color_drop"}
+
+    mirror: float = usually("mirror", 0.5)
+    dropout: float = usually("dropout", 0.3)
+    color_drop: float = usually("color_drop", 0.3)
+    turn_round: float = quantity(0.5, ge=0, le=1, unit="1", description="Probability of running against the path.")
+    crop: SequenceCrop = Field(default=SequenceCrop(), description="Sides cut off.")
+    alone: float = quantity(
+        0.5,
+        ge=0,
+        le=1,
+        unit="1",
+        description="Probability that a carriageway without shoulders has no other beside it: ground on both sides.",
+    )
+    hidden: float = quantity(0.2, ge=0, le=1, unit="1", description="Probability of a hole as behind a vehicle.")
+    empty: float = quantity(0.02, ge=0, le=1, unit="1", description="Probability of a slice without any point.")
+    jitter: float = quantity(0.02, ge=0, le=1, unit="m", description="Standard deviation of the points' noise.")
+    footprint: float = quantity(1.2, ge=0, le=5, unit="m", description="Width across which intensities are means.")
+    tilt: float = quantity(0.01, ge=0, le=0.2, unit="1", description="Cross slope and grade that are added.")
+    plain: float = quantity(0.25, ge=0, le=1, unit="1", description="Probability of intensities as they are.")
+    contrast: float = quantity(1.5, ge=0, le=3, unit="1", description="Log of the factor on what isn't pavement.")
+    verge: float = quantity(
+        2.5, ge=0, le=20, unit="m", description="Width of verges like asphalt beside a carriageway without shoulders."
+    )
+    paint: float = quantity(0.95, ge=0, le=1, unit="1", description="Share of the markings' brightness worn off.")
+    repaint: float = quantity(
+        0.3,
+        ge=0,
+        le=0.5,
+        unit="1",
+        description="Probability that the lane line of a carriageway without shoulders is solid, that it is worn off, "
+        "that both edge lines are, and that one of them is.",
+    )
+    gamma: tuple[float, float] = Field((0.15, 1.5), description="Smallest and largest power of the intensities.")
+    falloff: float = quantity(
+        4.0, ge=0, le=10, unit="1", description="Power of the range fall-off from scanners somewhere above the road."
+    )
+    stripes: float = quantity(0.15, ge=0, le=2, unit="1", description="As speckle, of wheel tracks, joints and lanes.")
+    speckle: float = quantity(0.3, ge=0, le=2, unit="1", description="Noise of intensities by their own p90 - p10.")
+    patches: float = quantity(0.2, ge=0, le=2, unit="1", description="The same of patches some metres long and wide.")
+    tint: float = quantity(0.2, ge=0, le=1, unit="1", description="Log of the factor on each colour channel.")
+
+    @model_validator(mode="after")
+    def _powers(self) -> SequenceEffects:
+        if not 0.01 <= self.gamma[0] <= self.gamma[1] <= 10.0:
+            low, high = self.gamma
+            raise ValueError(f"gamma is {low:g}, {high:g}: must be two ascending numbers from 0.01 to 10")
+        return self
+
+
+def leave_out(stretch: Stretch, effects: SequenceEffects, rng: Generator) -> None:
+    """Draw the effects that leave points out, or put others in their place.
+
+    Args:
+        stretch: is changed in place.
+        effects: their strengths.
+        rng: the sample's own stream.
+    """
+    if rng.random() < effects.alone and stretch.without_shoulders():
+        stand_alone(stretch)
+    crop_sides(stretch, effects.crop, rng)
+    drop(stretch, effects, rng)
+
+
+def transform(stretch: Stretch, effects: SequenceEffects, rng: Generator) -> None:
+    """Draw the effects that change points. They cost the less the fewer points are left."""
+    for happens, turned in ((effects.mirror, mirror), (effects.turn_round, turn_round)):
+        if rng.random() < happens:
+            turned(stretch)
+    move(stretch, effects, rng)
+    relight(stretch, effects, rng)
+
+
+def stand_alone(stretch: Stretch) -> None:
+    """Put what lies beyond the pavement on the outer side of a carriageway on the median's side as well, mirrored.
+
+    So a motorway's carriageway becomes a rural road. Heights go on from the pavement's own edge.
+    """
+    edges = stretch.paved_sides()
+    inwards, outwards = (0, 1) if np.isfinite(stretch.room[:, 0]).any() else (1, 0)
+    sign = 1.0 if outwards == 0 else -1.0
+    # How far beyond the pavement's outer and inner edge each point lies.
+    away = sign * (stretch.xyz[:, 1] - stretch.center[stretch.number])
+    beyond_outer, beyond_inner = away - edges[stretch.number, outwards], -away - edges[stretch.number, inwards]
+    rise = stretch.xyz[:, 2] - stretch.corridor[stretch.number, HEIGHT]
+    rims = [rise[(beyond <= 0.0) & (beyond >= -_RIM)] for beyond in (beyond_inner, beyond_outer)]
+    if not len(rims[0]) or not len(rims[1]):
+        return
+    copied = np.flatnonzero((beyond_outer > 0.0) & np.isfinite(edges[stretch.number, inwards]))
+    kept = np.flatnonzero(~(beyond_inner > 0.0))
+    number = stretch.number[copied]
+    place = stretch.center[number] - sign * (edges[number, inwards] + beyond_outer[copied])
+    mirrored = stretch.xyz[copied].copy()
+    mirrored[:, 1] = place
+    mirrored[:, 2] += float(np.median(rims[0]) - np.median(rims[1]))
+    both = np.concatenate([kept, copied])
+    xyz = np.concatenate([stretch.xyz[kept], mirrored])
+    order = np.argsort(stretch.number[both], kind="stable")
+    stretch.keep(both[order])
+    stretch.xyz = xyz[order]
+    stretch.room = np.full_like(stretch.room, np.inf)
+
+
+def crop_sides(stretch: Stretch, crop: SequenceCrop, rng: Generator) -> None:
+    """Cut off both sides of every slice; slices without a known centre are cut as if it lay at the frame's origin."""
+    count = len(stretch.center)
+    center = np.nan_to_num(stretch.center)
+    if rng.random() >= crop.probability:
+        return
+    if stretch.carriageway:
+        # Points beyond the middle of the median aren't there in the first place.
+        strip = np.nan_to_num(stretch.lines, nan=3.5) + rng.uniform(*crop.beyond, 2)
+        strip = np.minimum(strip, np.nan_to_num(stretch.room, nan=np.inf))
+    else:
+        # Uniform logarithms: narrow strips differ more from each other than wide ones.
+        low, high = np.log(crop.reach)
+        strip = np.tile(np.exp(rng.uniform(low, high, 2)), (count, 1))
+    reach = strip * (1.0 - rng.uniform(0.0, crop.share, (1 if rng.random() < crop.steady else count, 2)))
+    y = stretch.xyz[:, 1] - center[stretch.number]
+    stretch.keep((y <= reach[stretch.number, 0]) & (-y <= reach[stretch.number, 1]))
+
+
+def drop(stretch: Stretch, effects: SequenceEffects, rng: Generator) -> None:
+    """Leave out single points, whole slices, and a hole of some metres."""
+    slices, points = len(stretch.center), len(stretch.number)
+    keep = effects.kept_points(points, rng)
+    keep &= (rng.random(slices) >= effects.empty)[stretch.number]
+    if rng.random() < effects.hidden and points:
+        at, length, width = rng.integers(points), rng.uniform(2.0, 12.0), rng.uniform(1.5, 3.0)
+        x, y = stretch.points_along(), stretch.xyz[:, 1]
+        keep &= ~((np.abs(x - x[at]) <= length / 2.0) & (np.abs(y - y[at]) <= width / 2.0))
+    stretch.keep(keep)
+
+
+def mirror(stretch: Stretch) -> None:
+    """Swap left and right. The frames are mirrored as well, so that a mirrored sample has no way back to the cloud."""
+    frames = stretch.frames
+    stretch.frames = Frames(frames.position * np.array([1.0, -1.0]), -frames.direction, frames.station)
+    stretch.xyz = stretch.xyz * np.array([1.0, -1.0, 1.0])
+    stretch.center = -stretch.center
+    corridor = stretch.corridor.copy()
+    corridor[:, LEFT], corridor[:, RIGHT] = -stretch.corridor[:, RIGHT], -stretch.corridor[:, LEFT]
+    corridor[:, HEADING] *= -1.0
+    stretch.corridor = corridor
+    stretch.lines, stretch.room = stretch.lines[:, ::-1], stretch.room[:, ::-1]
+
+
+def turn_round(stretch: Stretch) -> None:
+    """Run along the road in the other direction, the last slice first."""
+    last = len(stretch.center) - 1
+    order = np.argsort(last - stretch.number, kind="stable")
+    stretch.keep(order)
+    stretch.number = last - stretch.number
+    stretch.xyz = stretch.xyz * np.array([-1.0, -1.0, 1.0])
+    stretch.center = -stretch.center[::-1]
+    corridor = stretch.corridor[::-1].copy()
+    corridor[:, [LEFT, RIGHT]] = -corridor[:, [RIGHT, LEFT]]
+    stretch.corridor = corridor
+    stretch.lines, stretch.room = stretch.lines[::-1, ::-1], stretch.room[::-1, ::-1]
+    stretch.frames = stretch.frames.turned_round()
+
+
+def move(stretch: Stretch, effects: SequenceEffects, rng: Generator) -> None:
+    """Tilt the ground and add noise to the points. Their slices stay what they are."""
+    grade, cross = rng.uniform(-effects.tilt, effects.tilt, 2)
+    along = stretch.along()
+    middle = 0.5 * along[-1]
+    x, y = stretch.points_along() - middle, stretch.xyz[:, 1]
+    noise = rng.uniform(0.0, effects.jitter) * rng.standard_normal(stretch.xyz.shape)
+    stretch.xyz = stretch.xyz + noise
+    stretch.xyz[:, 2] += grade * x + cross * y
+    stretch.corridor = stretch.corridor.copy()
+    stretch.corridor[:, HEIGHT] += grade * (along - middle) + cross * stretch.center

@@ -1,0 +1,163 @@
+"""The corridor of a data set's roads as packed tiles, as many as fit into a file of training data."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from synthroads_addon.base.classes import ClassScheme
+from synthroads_addon.base.errors import InputError
+from synthroads_addon.base.random_streams import stream
+from synthroads_addon.base.schema import read_json
+from synthroads_addon.cloud.formats.registry import open_cloud
+from synthroads_addon.cloud.points import PointBlock, concatenate
+from synthroads_addon.cloud.tools.quantile_mapping import steps_per_unit
+from synthroads_addon.cloud.tools.subsample import GridSubsampler
+from synthroads_addon.dataset.manifest import MANIFEST, SceneEntry, read_manifest
+
+from .packed import Packed, pack_tile
+from .sources import Source, labelled_blocks, read_tiles, tile_of
+from .tiles import CloudTile
+
+CROP = 24_000
+"""Points of a crop, in which the size of a packed set is told."""
+_SMALLEST = 2_000
+"""Tiles of fewer points, at a road's ends, are left out."""
+
+
+def corridor_tiles(
+    folder: Path, scene: str, scheme: ClassScheme, voxel: float, corridor: float, length: float = 60.0
+) -> Iterator[CloudTile]:
+    """Yield the corridor of one scene of a data set, a tile per ``length`` of its road.
+
+    The thinned corridor of one scene is held in memory: about 100 MB per km.
+
+    Args:
+        folder: of the data set.
+        scene: its name there.
+        scheme: classes wanted.
+        voxel: edge of the cells of which one point each is kept, m.
+        corridor: largest horizontal distance from the centreline, m.
+        length: of a tile along the road, m.
+    """
+    home = folder / "scenes" / scene
+    line = densify_polyline(_line(home / "centerline.geojson"), 0.5)
+    tree = cKDTree(line)
+    clouds = sorted(home.glob("cloud.*"))
+    if not clouds:
+        raise InputError(str(home), None, "holds no cloud")
+    with open_cloud(clouds[0]) as cloud, GridSubsampler(voxel, home) as grid:
+        scale = steps_per_unit(cloud)
+        for block in labelled_blocks(cloud, scheme, Source(path=str(clouds[0]))):
+            away, _ = tree.query(block.xyz[:, :2], distance_upper_bound=corridor)
+            grid.add(block.select(np.isfinite(away)))
+        blocks = [_lean(block) for block in grid.blocks()]
+    if not blocks:
+        return
+    points = concatenate(blocks)
+    _, nearest = tree.query(points.xyz[:, :2])
+    station = nearest * 0.5 // length
+    for number in np.unique(station):
+        part = points.select(station == number)
+        if len(part) >= _SMALLEST:
+            yield tile_of(part, scene, np.floor(part.xyz.min(axis=0)), scale)
+
+
+def _lean(block: PointBlock) -> PointBlock:
+    """Return a block without what isn't packed."""
+    block = replace(block, normal=None, material=None, scanner=None, true_range=None, true_xyz=None)
+    return replace(block, roughness=None, metallic=None, specular=None, color_source=None)
+
+
+def _line(path: Path) -> NDArray[np.float64]:
+    """Return the vertices (M, 2) of a centreline in GeoJSON."""
+    data = read_json(path)
+    try:
+        line = np.array(data["features"][0]["geometry"]["coordinates"], dtype=np.float64)[:, :2]
+    except (KeyError, IndexError, TypeError, ValueError):
+        raise InputError(str(path), None, "holds no line") from None
+    return line
+
+
+def densify_polyline(line: NDArray[np.float64], spacing: float) -> NDArray[np.float64]:
+    """Return points (K, 2) every ``spacing`` along a polyline (M, 2), m."""
+    along = np.r_[0.0, np.cumsum(np.hypot(*np.diff(line, axis=0).T))]
+    at = np.arange(int(along[-1] / spacing) + 1) * spacing
+    return np.stack([np.interp(at, along, line[:, axis]) for axis in range(2)], axis=1)
+
+
+def packed_tiles(
+    folder: Path, split: str | None, scheme: ClassScheme, voxel: float, corridor: float
+) -> Iterator[Packed]:
+    """Yield all tiles of a data set (its corridors), or of any other source of labelled points as it is."""
+    if (folder / MANIFEST).is_file():
+        for scene in scenes_of(folder, split):
+            for tile in corridor_tiles(folder, scene.name, scheme, voxel, corridor):
+                yield pack_tile(tile)
+        return
+    for tile in read_tiles(Source(path=str(folder), split=split), scheme, voxel):
+        if len(tile) >= _SMALLEST:
+            yield pack_tile(tile)
+
+
+def scenes_of(folder: Path, split: str | None) -> list[SceneEntry]:
+    """Return the finished scenes of a data set's split.
+
+    Raises:
+        InputError: there are none.
+    """
+    scenes = [scene for scene in read_manifest(folder).scenes if scene.status == "done"]
+    chosen = [scene for scene in scenes if split in (None, scene.split)]
+    if not chosen:
+        known = ", ".join(dict.fromkeys(scene.split for scene in scenes)) or "none"
+        raise InputError("--split", split, f"holds no scene; there are the splits {known}")
+    return chosen
+
+
+def within(tiles: Iterable[Packed], limit: int, seed: int) -> list[Packed]:
+    """Return as many tiles as fit into a number of bytes: of each scene as many, drawn at random, in their order.
+
+    Args:
+        tiles: of all scenes.
+        limit: bytes of the file.
+        seed: of the choice.
+    """
+    given = list(tiles)
+    order = stream(seed, "packed tiles").permutation(len(given))
+    turns: dict[str, int] = {}
+    ranked = []
+    for place in order.tolist():
+        scene = str(given[place].notes["scene"])
+        ranked.append((turns.get(scene, 0), place))
+        turns[scene] = turns.get(scene, 0) + 1
+    size, chosen = 1 << 16, []  # room for the notes' frame
+    for _, place in sorted(ranked):
+        more = len(given[place].content) + 700  # and for the tile's own notes and names
+        if size + more <= limit:
+            size += more
+            chosen.append(place)
+    return [given[place] for place in sorted(chosen)]
+
+
+def summary(notes: Sequence[Mapping[str, Any]], size: int) -> dict[str, Any]:
+    """Return what a packed file holds, as JSON data; ``crops`` is how many of the recipe's its points make up.
+
+    Args:
+        notes: of each tile.
+        size: of the file, bytes.
+    """
+    points = sum(int(tile["points"]) for tile in notes)
+    return {
+        "bytes": size,
+        "tiles": len(notes),
+        "scenes": len({tile["scene"] for tile in notes}),
+        "points": points,
+        "bytes_per_point": round(size / max(points, 1), 3),
+        "crops": points // CROP,
+    }

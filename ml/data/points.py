@@ -1,0 +1,175 @@
+"""A cloud's points in memory, for learning: local coordinates, shares instead of raw steps, classes by name."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from synthroads_addon.base.errors import InputError
+from synthroads_addon.cloud.formats.base import CloudHeader
+from synthroads_addon.cloud.formats.registry import open_cloud
+from synthroads_addon.cloud.points import PointBlock
+
+Float = NDArray[np.float64]
+
+GROUND_CLASSES = ("ground", "road", "road_marking", "roadside", "road_surface")
+"""Names of a road and the ground beside it, in the project's own schemes and in LAS's codes (ASPRS)."""
+UNSORTED_CLASSES = ("never_classified", "unclassified")
+"""Names of points that nobody has sorted."""
+ROAD_CLASSES = ("road", "road_marking", "road_surface")
+SIXTEEN_BITS = 65535.0
+_EIGHT_BITS = 255.0
+
+
+@dataclass(frozen=True)
+class Points:
+    """N points of one cloud.
+
+    Attributes:
+        origin: (3,) float64 map coordinates that were subtracted, whole metres.
+        xyz: (N, 3) float64 local coordinates, m.
+        intensity: (N,) float32, as a share of the file's 16 bits.
+        rgb: (N, 3) float32 sRGB from 0 to 1; 0 without colours.
+        class_id: (N,) uint8, in the file's own scheme.
+        class_names: name of each class by its id.
+        has_color: whether the points have colours; a file whose colours are all 0 has none.
+        epsg: code of the map coordinate system, None if the file doesn't say.
+    """
+
+    origin: Float
+    xyz: Float
+    intensity: NDArray[np.float32]
+    rgb: NDArray[np.float32]
+    class_id: NDArray[np.uint8]
+    class_names: Mapping[int, str] = field(default_factory=dict)
+    has_color: bool = False
+    epsg: int | None = None
+
+    def __len__(self) -> int:
+        return len(self.xyz)
+
+    def select(self, keep: NDArray[np.bool_] | NDArray[np.intp] | slice) -> Points:
+        """Return the points chosen by a mask, indices or a slice."""
+        return replace(
+            self,
+            xyz=self.xyz[keep],
+            intensity=self.intensity[keep],
+            rgb=self.rgb[keep],
+            class_id=self.class_id[keep],
+        )
+
+    def of_class(self, names: Collection[str]) -> NDArray[np.bool_]:
+        """Return a mask (N,) of the points whose class has one of the names."""
+        wanted = np.zeros(256, dtype=bool)
+        for number, name in self.class_names.items():
+            wanted[number] = name in names
+        return wanted[self.class_id]
+
+
+def read_points(path: Path, classes: Collection[str] | None = None) -> Points:
+    """Read a cloud of any format.
+
+    Args:
+        path: the cloud.
+        classes: names of the classes to keep; None: every point.
+
+    Raises:
+        MissingFileError: there is no such file.
+        InputError: it is no cloud, is damaged, or holds no point of these classes.
+    """
+    with open_cloud(path) as cloud:
+        header = cloud.header
+        names = header.scheme.names()
+        wanted = np.array([classes is None or names.get(number) in classes for number in range(256)])
+        kept = [block.select(wanted[block.class_id]) for block in cloud.blocks()]
+    kept = [block for block in kept if len(block)]
+    if not kept:
+        what = "no point at all" if classes is None else f"no point of the classes {', '.join(sorted(classes))}"
+        raise InputError(str(path), None, f"holds {what}")
+    return _points(header, kept, names)
+
+
+def read_ground(path: Path) -> Points:
+    """Read the points of the road and the ground beside it, by their classes; all points of a cloud without classes.
+
+    Raises:
+        MissingFileError: there is no such file.
+        InputError: it is no cloud, is damaged, or is classified but has no ground.
+    """
+    points = read_points(path)
+    ground = points.of_class(GROUND_CLASSES)
+    if ground.any():
+        return points.select(ground)
+    if points.of_class(UNSORTED_CLASSES).all():
+        return points
+    raise InputError(str(path), None, f"holds classes, but none of {', '.join(GROUND_CLASSES)}")
+
+
+def full_color(largest: int) -> float:
+    """Return the value of full brightness in a cloud whose largest is given: some store 8 bits in the fields of 16."""
+    return SIXTEEN_BITS if largest > _EIGHT_BITS else _EIGHT_BITS
+
+
+def _points(header: CloudHeader, blocks: list[PointBlock], names: Mapping[int, str]) -> Points:
+    xyz = _join_arrays([block.xyz for block in blocks])
+    origin = np.floor(xyz.min(axis=0))
+    rgb = _join_arrays([block.rgb for block in blocks])
+    largest = int(rgb.max())
+    scale = (header.intensity_scale or 1.0) / SIXTEEN_BITS
+    return Points(
+        origin=origin,
+        xyz=xyz - origin,
+        intensity=_join_arrays([(block.intensity * scale).astype(np.float32) for block in blocks]),
+        rgb=(rgb / full_color(largest)).astype(np.float32),
+        class_id=_join_arrays([block.class_id for block in blocks]),
+        class_names=dict(names),
+        has_color=header.has_color and largest > 0,
+        epsg=header.epsg,
+    )
+
+
+def _join_arrays(parts: list[NDArray[Any]]) -> NDArray[Any]:
+    return parts[0] if len(parts) == 1 else np.concatenate(parts)
+
+
+def thin(coord: NDArray[np.floating[Any]], cell: float) -> NDArray[np.intp]:
+    """Return the indices of the points that stay, one per occupied cell of a cubic grid, in order.
+
+    The point nearest the cell's centre stays, of equally near ones the first.
+
+    Args:
+        coord: (N, 3) m, counted from a cell's corner.
+        cell: edge of the cells, m.
+
+    Raises:
+        InputError: the points lie too far apart for cells of this size.
+    """
+    if len(coord) == 0:
+        return np.zeros(0, dtype=np.intp)
+    steps = np.asarray(coord, dtype=np.float64) / cell
+    cells = np.floor(steps)
+    key = cell_keys(cells)
+    order = np.lexsort((np.square(steps - cells - 0.5).sum(axis=1), key))
+    first = np.r_[True, np.diff(key[order]) != 0]
+    return np.sort(order[first])
+
+
+def cell_keys(cells: NDArray[np.float64]) -> NDArray[np.int64]:
+    """Return one number per cell (N, 3) of whole numbers, unique within the array.
+
+    Raises:
+        InputError: the cells span more than 64 bits can tell apart.
+    """
+    low = cells.min(axis=0)
+    spans = cells.max(axis=0) - low + 1
+    if not float(np.prod(spans)) < 2**62:  # so that NaN is refused too
+        text = " x ".join(f"{span:.0f}" for span in spans)
+        raise InputError("coord", text, "must span fewer than 2^62 cells in all")
+    relative = (cells - low).astype(np.int64)
+    width, depth = int(spans[0]), int(spans[1])
+    return np.asarray((relative[:, 2] * depth + relative[:, 1]) * width + relative[:, 0])

@@ -1,0 +1,320 @@
+"""`LearningRoad`: one cloud's ground points in the order in which they lie along the road, with the known truth."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import shutil
+from collections.abc import Sequence
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from synthroads_addon.base.errors import InputError, MissingFileError, OutputError
+from synthroads_addon.base.random_streams import stream
+from synthroads_addon.base.scratch.folders import scratch_folder
+from synthroads_addon.cloud.formats.npz import ARCHIVE_FAULTS
+from synthroads_addon.dataset.manifest import checksum, read_manifest
+from synthroads_addon.road.parameters import read_parameters
+
+from .axis import MeasuredAxis
+from .corridor import Truth, TruthKind, truths
+from .frames import Frames
+from .points import GROUND_CLASSES, Points, read_ground, read_points
+
+Float = NDArray[np.float64]
+
+REACH = 45.0
+"""Points farther from the line that they are sorted along aren't kept, m."""
+CLOUD, PARAMETERS = "cloud.laz", "parameters.json"
+_MARGIN = 2.0
+"""Stretch of stations before and behind a slice that may hold points of it, beyond what its corners say, m."""
+_CACHED = {
+    "xyz": ("f4", (3,)),
+    "intensity": ("f4", ()),
+    "rgb": ("u1", (3,)),
+    "class_id": ("u1", ()),
+    "station": ("f4", ()),
+}
+"""Arrays of a `LearningRoad`, with the type and the shape of a point's entry."""
+_CACHE_VERSION = 1
+
+
+@dataclass(frozen=True)
+class LearningRoad:
+    """N points of the road and the ground beside it. Arrays may be mapped from files.
+
+    Attributes:
+        name: of the road.
+        origin: (3,) map coordinates that were subtracted, whole metres.
+        xyz: (N, 3) float32 local coordinates, m: 0.25 mm at 4 km.
+        intensity: (N,) float32 share of 16 bits.
+        rgb: (N, 3) uint8 sRGB.
+        class_id: (N,) uint8 in the file's scheme.
+        class_names: name of each class by its id.
+        has_color: whether the points have colours.
+        station: (N,) float32 along ``reference``, m, ascending.
+        reference: the line that the points are sorted along.
+        truth: the centreline, None if it isn't known.
+    """
+
+    name: str
+    origin: Float
+    xyz: NDArray[np.float32]
+    intensity: NDArray[np.float32]
+    rgb: NDArray[np.uint8]
+    class_id: NDArray[np.uint8]
+    class_names: dict[int, str]
+    has_color: bool
+    station: NDArray[np.float32]
+    reference: MeasuredAxis
+    truth: Truth | None = None
+
+    def __len__(self) -> int:
+        return len(self.station)
+
+    @classmethod
+    def of_points(
+        cls, name: str, points: Points, reference: MeasuredAxis, truth: Truth | None = None, reach: float = REACH
+    ) -> LearningRoad:
+        """Sort points along a line. Points farther than ``reach`` (m) from it are left out."""
+        station, offset = reference.project(points.xyz)
+        near = np.flatnonzero(np.abs(offset) <= reach)
+        order = near[np.argsort(station[near], kind="stable")]
+        return cls(
+            name=name,
+            origin=points.origin,
+            xyz=points.xyz[order].astype(np.float32),
+            intensity=points.intensity[order],
+            rgb=np.rint(255.0 * points.rgb[order]).astype(np.uint8),
+            class_id=points.class_id[order],
+            class_names=dict(points.class_names),
+            has_color=points.has_color,
+            station=station[order].astype(np.float32),
+            reference=reference,
+            truth=truth,
+        )
+
+    def select(self, keep: NDArray[np.bool_]) -> LearningRoad:
+        """Return the road with the points (N,) of a mask only."""
+        return replace(self, **{name: getattr(self, name)[keep] for name in _CACHED})
+
+    @cached_property
+    def belonging(self) -> NDArray[np.bool_]:
+        """Which points (N,) belong to the road: of a carriageway those up to the middle of the median."""
+        if self.truth is None or not np.isfinite(self.truth.room).any():
+            return np.ones(len(self), dtype=bool)
+        station, offset = self.truth.axis.project(self.xyz)
+        nearest = np.clip(np.searchsorted(self.truth.axis.station, station), 0, len(self.truth.room) - 1)
+        room = self.truth.room[nearest]
+        return np.asarray((offset <= room[:, 0]) & (-offset <= room[:, 1]))
+
+    def ids_of(self, names: Sequence[str]) -> list[int]:
+        """Return the ids of the classes that have one of the names."""
+        return [number for number, name in self.class_names.items() if name in names]
+
+    def slices(self, frames: Frames, half_width: float, thickness: float = 1.0) -> Slices:
+        """Return the points in the slice of each of M frames.
+
+        A point is in a slice where it lies within half the thickness before or behind the frame's origin and within
+        half_width (both m) beside it.
+        """
+        half = 0.5 * thickness
+        corners = [
+            replace(frames, position=frames.position + x * _unit(frames.direction)).at(np.full(len(frames), y))
+            for x in (-half, half)
+            for y in (-half_width, half_width)
+        ]
+        stations = self.reference.project(np.concatenate(corners))[0].reshape(4, -1)
+        first = np.searchsorted(self.station, stations.min(axis=0) - _MARGIN)
+        last = np.searchsorted(self.station, stations.max(axis=0) + _MARGIN)
+        index, place, counts = [], [], []
+        for at, direction, low, high in zip(frames.position, frames.direction, first, last, strict=True):
+            delta = self.xyz[low:high, :2] - at
+            cos, sin = np.cos(direction), np.sin(direction)
+            x, y = cos * delta[:, 0] + sin * delta[:, 1], cos * delta[:, 1] - sin * delta[:, 0]
+            inside = np.flatnonzero((np.abs(x) <= half) & (np.abs(y) <= half_width))
+            index.append(low + inside)
+            place.append(np.column_stack([x[inside], y[inside]]))
+            counts.append(len(inside))
+        number = np.repeat(np.arange(len(frames)), counts)
+        return Slices(np.concatenate(index), number, np.concatenate(place))
+
+
+@dataclass(frozen=True)
+class Slices:
+    """K points in slices; one point may be in several.
+
+    Attributes:
+        index: (K,) of the point in its road.
+        number: (K,) of the frame whose slice it is in, ascending.
+        xy: (K, 2) place in that frame, m.
+    """
+
+    index: NDArray[np.intp]
+    number: NDArray[np.intp]
+    xy: Float
+
+
+def scene_folders(data_set: Path, split: str) -> list[Path]:
+    """Return the folders of a data set's scenes of one split that are done.
+
+    Raises:
+        MissingFileError: there is no manifest.
+        InputError: no scene of the split is done.
+    """
+    manifest = read_manifest(data_set)
+    done = [scene for scene in manifest.scenes if scene.status == "done"]
+    found = [data_set / "scenes" / scene.name for scene in done if scene.split == split]
+    if not found:
+        known = ", ".join(sorted({scene.split for scene in done}))
+        raise InputError(f"{data_set}: split", split, f"has no scene that is done; there is {known or 'none at all'}")
+    return found
+
+
+def read_scene(folder: Path, kind: TruthKind, cache: Path | None = None) -> list[LearningRoad]:
+    """Read a scene of a data set: its ground points and their truth from its parameters.
+
+    Args:
+        folder: with ``cloud.laz`` and ``parameters.json``.
+        kind: of the truth. A road with carriageways of two lanes gives a `LearningRoad` for each of them with the kind
+            ``carriageway``, perhaps none; names of several end with their number.
+        cache: folder in which the sorted points are kept, to be mapped into memory the next time; None: nowhere.
+
+    Raises:
+        MissingFileError, InputError: a file is missing or damaged.
+    """
+    for name in (PARAMETERS, CLOUD):
+        if not (folder / name).is_file():
+            raise MissingFileError(str(folder / name), None, "no such file; a scene of a data set has one")
+    parameters = read_parameters(folder / PARAMETERS)
+    whole = _read_cached(folder, cache) if cache else None
+    if whole is None:
+        points = read_points(folder / CLOUD, GROUND_CLASSES)
+        reference = truths(parameters, "road", points.origin)[0].axis
+        whole = LearningRoad.of_points(folder.name, points, reference)
+        if cache:
+            _keep(whole, folder, cache)
+    found = truths(parameters, kind, whole.origin)
+    names = [folder.name] if len(found) == 1 else [f"{folder.name}-{number + 1}" for number in range(len(found))]
+    return [replace(whole, name=name, truth=truth) for name, truth in zip(names, found, strict=True)]
+
+
+def read_measured(cloud: Path, axis: Path, kind: TruthKind, gap: float | None = None) -> LearningRoad:
+    """Read the ground of a real cloud and a measured axis, in the same map coordinates.
+
+    Args:
+        cloud: the cloud.
+        axis: CSV with columns x, y, z (``s`` and others aren't used) or GeoJSON.
+        kind: what the axis is the middle of.
+        gap: see `Axis.read`.
+
+    Raises:
+        MissingFileError, InputError: a file is missing or damaged.
+    """
+    points = read_ground(cloud)
+    line = MeasuredAxis.read(axis, gap).moved(-points.origin)
+    return LearningRoad.of_points(cloud.stem, points, line, Truth.measured(line, kind))
+
+
+def crop_road(road: LearningRoad, share: float, seed: int, length: float = 1.0) -> LearningRoad:
+    """Cut off both sides of every slice of a road with a truth, each at random and by itself.
+
+    Slices are each metre (``length``) of the station along the truth's axis. On either side of the axis a slice reaches
+    to the point farthest from it, at the distance R; points farther than R (1 - ``share`` u) are left out, u uniform
+    from 0 to 1, drawn for the slice and the side from the seed and the road's name. So the axis stays inside what is
+    left, but may lie anywhere from (1 - share) / (2 - share) of its width on, where both sides reached as far.
+
+    Args:
+        road: its truth is where the sides are measured from; it says nothing else.
+        share: largest part of R that is cut off, below 1.
+        seed: the same cuts for the same seed.
+        length: metres of the station that share their cuts; cuts of single slices average out over many.
+
+    Raises:
+        InputError: the road has no truth, or the share is out of its limits.
+    """
+    if road.truth is None or not 0.0 <= share < 1.0:
+        raise InputError("crop", share, "must be a share from 0 to below 1, of a road with a known centreline")
+    station, offset = road.truth.axis.project(road.xyz)
+    number = np.floor((station - station.min()) / length).astype(np.intp)
+    shares = share * stream(seed, "crop", road.name).random((int(number.max()) + 1, 2))
+    keep = np.ones(len(road), dtype=bool)
+    for side, sign in enumerate((1.0, -1.0)):
+        reach = np.zeros(len(shares))
+        np.maximum.at(reach, number, sign * offset)
+        keep &= sign * offset <= (reach * (1.0 - shares[:, side]))[number]
+    return road.select(keep)
+
+
+def cut_beside_median(road: LearningRoad, error: float, rng: np.random.Generator) -> LearningRoad:
+    """Return a road of which the other carriageway is cut off somewhere beside the middle of the median.
+
+    The cut is as far from it everywhere, and nobody knows how far: so it doesn't tell where the carriageway lies.
+
+    Args:
+        road: with a truth; a road that is no carriageway stays as it is.
+        error: how far from the middle of the median it may be at most, m.
+        rng: draws it, uniformly.
+    """
+    aside = rng.uniform(-error, error)
+    return road if road.truth is None else replace(road, truth=replace(road.truth, room=road.truth.room + aside))
+
+
+def _unit(direction: Float) -> Float:
+    return np.column_stack([np.cos(direction), np.sin(direction)])
+
+
+def _cache_folder(folder: Path, cache: Path) -> Path:
+    """Return the folder of a scene's sorted points: a name that says what they were made from."""
+    made_from = f"{_CACHE_VERSION} {REACH} {checksum(folder / CLOUD)} {checksum(folder / PARAMETERS)}"
+    return cache / f"{folder.name}-{hashlib.sha256(made_from.encode()).hexdigest()[:16]}"
+
+
+def _keep(road: LearningRoad, folder: Path, cache: Path) -> None:
+    """Write a road's arrays, in place of damaged ones; they appear when all of them are whole.
+
+    Raises:
+        OutputError: the cache can't be written.
+    """
+    place = _cache_folder(folder, cache)
+    notes = {"origin": road.origin.tolist(), "classes": road.class_names, "has_color": road.has_color}
+    try:
+        cache.mkdir(parents=True, exist_ok=True)
+        with scratch_folder(cache) as scratch:
+            made = scratch / place.name
+            made.mkdir()
+            for array in _CACHED:
+                np.save(made / f"{array}.npy", getattr(road, array))
+            np.save(made / "reference.npy", road.reference.points)
+            (made / "notes.json").write_text(json.dumps(notes), encoding="utf-8")
+            shutil.rmtree(place, ignore_errors=True)
+            with suppress(OSError):  # another training has just kept the same
+                made.rename(place)
+    except OSError as error:
+        raise OutputError("data.cache", str(cache), f"cannot be written ({error.strerror})") from None
+
+
+def _read_cached(folder: Path, cache: Path) -> LearningRoad | None:
+    """Return a road as it was kept; None if it wasn't, or is damaged."""
+    place = _cache_folder(folder, cache)
+    try:
+        notes = json.loads((place / "notes.json").read_text(encoding="utf-8"))
+        arrays = {name: np.load(place / f"{name}.npy", mmap_mode="r") for name in _CACHED}
+        count = len(arrays["xyz"])
+        if any(arrays[name].dtype != of[0] or arrays[name].shape != (count, *of[1]) for name, of in _CACHED.items()):
+            return None
+        return LearningRoad(
+            name=folder.name,
+            origin=np.array(notes["origin"], dtype=np.float64).reshape(3),
+            class_names={int(number): str(name) for number, name in notes["classes"].items()},
+            has_color=bool(notes["has_color"]),
+            reference=MeasuredAxis(np.load(place / "reference.npy")),
+            **arrays,
+        )
+    except (*ARCHIVE_FAULTS, TypeError, AttributeError, InputError):
+        return None

@@ -1,0 +1,347 @@
+"""Slices across roads as PyTorch data: sequences of slices in the frames of a path, with their truth.
+
+A sample is a dictionary of tensors; S is the number of slices of a sequence, N that of its points.
+
+- ``coord`` (N, 3) float32: x along the frame, y to its left, z up from the slice's origin, m;
+- ``feat`` (N, 6) float32: intensity and contrast, red, green, blue, 1 where colours are known and else 0. The first two
+  are `intensity.level` and `intensity.contrast` of the sequence, cut at +-`FEATURE_LIMIT`; colours are 0 to 1. What a
+  cloud hasn't is noise of `MISSING_NOISE`;
+- ``offset`` (S,) int64: ends of the slices' points in ``coord``;
+- ``center`` (S,) float32, ``corridor`` (S, K) float32: the truth, see `corridor.CORRIDOR`; NaN if unknown;
+- ``frame`` (S, 4) float64: x, y, direction and z origin (the median height of the slice's points) in the cloud's local
+  metres; ``station`` (S,) float64 along the path; ``number`` (S,) int64 of the frame; ``road`` int64, its number.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from pydantic import Field
+from torch import Tensor
+from torch.utils.data import Dataset, IterableDataset, get_worker_info
+
+from synthroads_addon.base.errors import InputError
+from synthroads_addon.base.random_streams import stream
+from synthroads_addon.base.schema import quantity
+
+from ..configuration import Part
+from . import intensity
+from .corridor import CORRIDOR, TruthKind
+from .effects.slices import SequenceEffects, leave_out, transform
+from .frames import SPACING, Frames, displace_frames, sequences
+from .points import ROAD_CLASSES
+from .roads import LearningRoad, cut_beside_median
+from .samples import HEIGHT, Stretch
+
+Float = NDArray[np.float64]
+Sample = dict[str, Tensor]
+Batch = dict[str, Tensor]
+
+FEATURES = ("intensity", "contrast", "red", "green", "blue", "has_color")
+"""Columns of ``feat``."""
+FEATURE_LIMIT = 5.0
+MISSING_NOISE = 0.01
+
+
+class SliceSettings(Part):
+    """How slices are cut."""
+
+    truth: TruthKind = Field("road", description="road: the middle of all; carriageway: between its two lanes.")
+    slices: int = quantity(10, ge=1, le=1000, unit="1", description="Slices of a sequence.")
+    spacing: float = quantity(1.0, gt=0, le=100, unit="m", description="Of a sequence's slices along the path.")
+    thickness: float = quantity(1.0, gt=0, le=100, unit="m", description="Of a slice, along the path.")
+    half_width: float = quantity(30.0, gt=0, le=45, unit="m", description="What a slice sees to either side.")
+    points_per_slice: int = quantity(256, ge=1, le=1_000_000, unit="1", description="At most; others are left out.")
+    window: float = quantity(12.0, ge=0, le=100, unit="m", description="The path strays up to half of it to each side.")
+    direction_deg: float = quantity(2.0, ge=0, le=45, unit="deg", description="Error of its direction, deviation.")
+    wander_length: float = quantity(100.0, ge=5, le=10_000, unit="m", description="Length over which it strays.")
+    median_error: float = quantity(
+        1.5, ge=0, le=20, unit="m", description="How far beside the median's middle a carriageway may be cut off."
+    )
+
+    @property
+    def frame_spacing(self) -> float:
+        """Distance of the frames along a path in use, m: sequences of slices farther apart are interleaved."""
+        return min(SPACING, self.spacing)
+
+
+@dataclass(frozen=True)
+class _Start:
+    """A stretch of a road in which sequences can begin: their first station is uniform in low to high."""
+
+    road: int
+    low: float
+    high: float
+
+
+class SliceDataset(Dataset[Sample]):
+    """Sequences drawn at random from roads, each road as often, with a path and effects drawn for each.
+
+    The n-th sample of an epoch depends on the seed, the epoch and n alone.
+
+    Args:
+        roads: with a known truth.
+        settings: how slices are cut.
+        samples: sequences per epoch.
+        seed: of everything random.
+        effects: None: none. The path still strays.
+        purpose: of the samples: those of another purpose are others.
+
+    Raises:
+        InputError: no road is long enough for a sequence.
+    """
+
+    def __init__(
+        self,
+        roads: Sequence[LearningRoad],
+        settings: SliceSettings,
+        samples: int,
+        seed: int,
+        effects: SequenceEffects | None = None,
+        purpose: str = "slices",
+    ) -> None:
+        self.roads = list(roads)
+        self.settings = settings
+        self.samples = samples
+        self.seed = seed
+        self.effects = effects
+        self.purpose = purpose
+        self.epoch = 0
+        self._starts = [starts for number, road in enumerate(self.roads) if (starts := _starts(road, number, settings))]
+        if not self._starts:
+            length = settings.spacing * (settings.slices - 1)
+            raise InputError("roads", len(self.roads), f"none has a known {settings.truth} over {length:g} m")
+
+    def __len__(self) -> int:
+        return self.samples
+
+    def set_epoch(self, epoch: int) -> None:
+        """Choose the epoch whose samples are given from now on."""
+        self.epoch = epoch
+
+    def __getitem__(self, number: int) -> Sample:
+        if not 0 <= number < self.samples:
+            raise IndexError(number)
+        return self.drawn(self.epoch, number)
+
+    def drawn(self, *key: int) -> Sample:
+        """Return the sample of some numbers, any of them."""
+        rng = stream(self.seed, self.purpose, *key)
+        starts = self._starts[rng.integers(len(self._starts))]
+        lengths = np.array([start.high - start.low + 1e-3 for start in starts])
+        start = starts[rng.choice(len(starts), p=lengths / lengths.sum())]
+        settings = self.settings
+        road = cut_beside_median(self.roads[start.road], settings.median_error, rng)
+        assert road.truth is not None
+        station = rng.uniform(start.low, start.high) + settings.spacing * np.arange(settings.slices)
+        axis = road.truth.axis
+        exact = Frames(axis.position(station), axis.direction(station), station)
+        path = displace_frames(exact, rng, settings.window, settings.direction_deg, settings.wander_length)
+        cut = stretch(road, path, settings)
+        if self.effects is not None:
+            leave_out(cut, self.effects, rng)
+            thin(cut, settings.points_per_slice, rng)
+            transform(cut, self.effects, rng)
+        return sample(cut, settings, rng, start.road, np.arange(settings.slices))
+
+
+class IterableSlices(IterableDataset[Sample]):
+    """The samples of a `SliceDataset` without end, the epochs one after another, shared out to the workers."""
+
+    def __init__(self, dataset: SliceDataset) -> None:
+        super().__init__()
+        self.dataset = dataset
+
+    def __iter__(self) -> Iterator[Sample]:
+        worker = get_worker_info()
+        first, step = (0, 1) if worker is None else (worker.id, worker.num_workers)
+        number = first
+        while True:
+            yield self.dataset.drawn(*divmod(number, self.dataset.samples))
+            number += step
+
+
+class FrameSlices(Dataset[Sample]):
+    """All frames of a path along one road, as sequences in order; the last of a stretch overlaps the one before.
+
+    Which points are left out where a slice has too many hangs on the place alone, so that cutting a road into parts
+    changes nothing.
+
+    Args:
+        road: with or without a truth.
+        frames: M frames; ``number`` of a sample says which.
+        settings: how slices are cut.
+        step: slices from one sequence's start to the next one's; so many as a sequence has if not given.
+    """
+
+    def __init__(self, road: LearningRoad, frames: Frames, settings: SliceSettings, step: int | None = None) -> None:
+        self.road = road
+        self.frames = frames
+        self.settings = settings
+        self.runs = sequences(frames, settings.slices, step and min(step, settings.slices), settings.spacing)
+
+    def __len__(self) -> int:
+        return len(self.runs)
+
+    def __getitem__(self, number: int) -> Sample:
+        run = self.runs[number]
+        chosen = self.frames.select(run)
+        place = int(np.floor(1000.0 * chosen.station[0])) & 0xFFFFFFFF
+        cut = stretch(self.road, chosen, self.settings)
+        return sample(cut, self.settings, stream(0, "frames", place), 0, run)
+
+
+def stretch(road: LearningRoad, frames: Frames, settings: SliceSettings) -> Stretch:
+    """Return the points and the truth in the slices of some frames.
+
+    Where the truth is a carriageway's, points beyond the middle of the median are left out, see `Truth.room`.
+    """
+    found = road.slices(frames, settings.half_width, settings.thickness)
+    labels = road.class_id[found.index]
+    paved = np.isin(labels, road.ids_of(ROAD_CLASSES))
+    marked = np.isin(labels, road.ids_of(("road_marking",)))
+    if road.truth is None:
+        unknown = np.full((len(frames), len(CORRIDOR)), np.nan)
+        center, corridor, lines, room = unknown[:, 0], unknown, unknown[:, :2], unknown[:, :2]
+    else:
+        there = road.truth.at(frames.position, frames.direction, np.zeros(len(frames)))
+        center, corridor, lines, room = there.center, there.corridor, there.lines, there.room
+    cut = Stretch(
+        xyz=np.column_stack([found.xy, road.xyz[found.index, 2].astype(np.float64)]),
+        number=found.number,
+        intensity=road.intensity[found.index].astype(np.float64),
+        rgb=road.rgb[found.index] / 255.0,
+        paved=paved,
+        marked=marked,
+        has_color=road.has_color,
+        frames=frames,
+        center=center,
+        corridor=corridor,
+        lines=lines,
+        room=room,
+        carriageway=settings.truth == "carriageway",
+    )
+    if np.isfinite(room).any():
+        y = cut.xyz[:, 1] - center[cut.number]
+        cut.keep(~((y > room[cut.number, 0]) | (-y > room[cut.number, 1])))
+    return cut
+
+
+def sample(
+    cut: Stretch, settings: SliceSettings, rng: np.random.Generator, road: int, number: NDArray[np.intp]
+) -> Sample:
+    """Return a sequence as tensors, with at most ``points_per_slice`` points of each slice drawn at random."""
+    thin(cut, settings.points_per_slice, rng)
+    ends = np.searchsorted(cut.number, np.arange(len(cut.center)), side="right")
+    height = _medians(cut.xyz[:, 2], ends)
+    coord = cut.xyz - np.column_stack([np.zeros((len(cut.number), 2)), height[cut.number]])
+    corridor = cut.corridor.copy()
+    corridor[:, HEIGHT] -= height
+    frame = np.column_stack([cut.frames.position, cut.frames.direction, height])
+    return {
+        "coord": torch.from_numpy(coord.astype(np.float32)),
+        "feat": torch.from_numpy(_features(cut, rng).astype(np.float32)),
+        "offset": torch.from_numpy(ends.astype(np.int64)),
+        "center": torch.from_numpy(cut.center.astype(np.float32)),
+        "corridor": torch.from_numpy(corridor.astype(np.float32)),
+        "frame": torch.from_numpy(frame),
+        "station": torch.from_numpy(cut.frames.station.copy()),
+        "number": torch.from_numpy(np.asarray(number, dtype=np.int64)),
+        "road": torch.tensor(road),
+    }
+
+
+def collate(samples: Sequence[Mapping[str, Tensor]]) -> Batch:
+    """Return B samples as one batch, padded by zeros to P points per slice, the most that any slice has.
+
+    ``coord`` (B, S, P, 3), ``feat`` (B, S, P, F) and ``mask`` (B, S, P), True where there is a point; all else stacked.
+    """
+    slices = len(samples[0]["center"])
+    starts = [torch.cat([item["offset"].new_zeros(1), item["offset"][:-1]]) for item in samples]
+    counts = [item["offset"] - start for item, start in zip(samples, starts, strict=True)]
+    most = max(1, int(torch.stack(counts).max()))
+    batch = {
+        name: torch.stack([item[name] for item in samples])
+        for name in samples[0]
+        if name not in ("coord", "feat", "offset")
+    }
+    mask = torch.arange(most) < torch.stack(counts)[:, :, None]
+    batch["mask"] = mask
+    for name in ("coord", "feat"):
+        padded = torch.zeros(len(samples), slices, most, samples[0][name].shape[1])
+        # Both run through the points slice by slice.
+        padded[mask] = torch.cat([item[name] for item in samples])
+        batch[name] = padded
+    return batch
+
+
+def _starts(road: LearningRoad, number: int, settings: SliceSettings) -> list[_Start]:
+    if road.truth is None:
+        return []
+    length = settings.spacing * (settings.slices - 1)
+    parts = road.truth.axis.parts
+    return [_Start(number, low, high - length) for low, high in parts.tolist() if high - low >= length]
+
+
+def thin(cut: Stretch, most: int, rng: np.random.Generator) -> None:
+    """Leave at most ``most`` points of each slice, each point as likely as any other."""
+    counts = np.bincount(cut.number, minlength=len(cut.center))
+    if counts.max() <= most:
+        return
+    order = np.lexsort((rng.random(len(cut.number)), cut.number))
+    rank = np.arange(len(cut.number)) - np.repeat(np.cumsum(counts) - counts, counts)
+    keep = np.zeros(len(cut.number), dtype=bool)
+    keep[order[rank < most]] = True
+    cut.keep(keep)
+
+
+def _medians(z: Float, ends: NDArray[np.intp]) -> Float:
+    """Return the median height (S,) of each slice's points; of all points where a slice has none, 0 without any."""
+    whole = float(np.median(z)) if len(z) else 0.0
+    starts = np.concatenate([[0], ends[:-1]])
+    return np.array([np.median(z[a:b]) if b > a else whole for a, b in zip(starts, ends, strict=True)])
+
+
+def _features(cut: Stretch, rng: np.random.Generator) -> Float:
+    """Return the features (K, 6), see the module's description."""
+    count = len(cut.number)
+    if cut.intensity.any():
+        logs = intensity.logarithms(cut.intensity)
+        seen = np.column_stack([intensity.level(logs), intensity.contrast(logs, cut.xyz[:, 1])])
+        brightness = np.clip(seen, -FEATURE_LIMIT, FEATURE_LIMIT)
+    else:
+        brightness = MISSING_NOISE * rng.standard_normal((count, 2))
+    colors = cut.rgb if cut.has_color else MISSING_NOISE * rng.standard_normal((count, 3))
+    return np.column_stack([brightness, colors, np.full(count, float(cut.has_color))])
+
+
+_OTHER_SIDE = {"left_edge": "right_edge", "right_edge": "left_edge"}
+_TURNED = ("left_edge", "right_edge", "heading")
+"""Columns of the corridor whose sign changes."""
+
+
+def mirror_batch(batch: Batch) -> Batch:
+    """Return a batch with left and right swapped, truth and frames included."""
+    flip = batch["coord"].new_tensor([1.0, -1.0, 1.0])
+    other = dict(batch, coord=batch["coord"] * flip)
+    other["frame"] = batch["frame"] * batch["frame"].new_tensor([1.0, -1.0, -1.0, 1.0])
+    if "center" in batch:
+        other["center"] = -batch["center"]
+    if "corridor" in batch:
+        other["corridor"] = mirrored_corridor(batch["corridor"])
+    return other
+
+
+def mirrored_corridor(corridor: Tensor) -> Tensor:
+    """Return the corridor (..., K) of the mirrored road."""
+    signs = corridor.new_tensor([-1.0 if name in _TURNED else 1.0 for name in CORRIDOR])
+    return with_sides_swapped(corridor) * signs
+
+
+def with_sides_swapped(corridor: Tensor) -> Tensor:
+    """Return values (..., K) by column of the corridor, those of the left and the right edge exchanged."""
+    return corridor[..., [CORRIDOR.index(_OTHER_SIDE.get(name, name)) for name in CORRIDOR]]

@@ -1,0 +1,279 @@
+"""Where labelled points come from: packed files, data sets in Pointcept's layout, and clouds of any kind."""
+
+from __future__ import annotations
+
+import tempfile
+import zipfile
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import laspy
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field
+
+from synthroads_addon.base.classes import UNLABELLED, ClassScheme
+from synthroads_addon.base.errors import InputError, MissingFileError
+from synthroads_addon.base.files import files_below
+from synthroads_addon.base.schema import quantity, read_json
+from synthroads_addon.cloud.formats.base import BLOCK, CloudReader
+from synthroads_addon.cloud.formats.npz import ARCHIVE_FAULTS
+from synthroads_addon.cloud.formats.registry import ENDINGS, open_cloud
+from synthroads_addon.cloud.points import PointBlock
+from synthroads_addon.cloud.tools.quantile_mapping import levels, steps_per_unit
+from synthroads_addon.dataset.tiles import TileSorter
+
+from ..configuration import Part
+from .classes import IGNORED, LabelMapping, class_names, load_mapping, table_between
+from .packed import PackReader
+from .points import thin
+from .tiles import CloudTile, eight_bits
+
+FULL = 65535.0
+"""Largest 16-bit intensity."""
+
+
+class Source(Part):
+    """Labelled points."""
+
+    path: str = Field(min_length=1, description="A packed file, a data set, a folder of tiles or clouds, or a cloud.")
+    split: str | None = Field(None, description="Split of a data set, or sub-folder; all points if not given.")
+    mapping: str | None = Field(None, description="Classes of clouds of others: a shipped mapping or a JSON file.")
+    tile: float = quantity(60.0, ge=5, le=1000, unit="m", description="Edge of the tiles that clouds are cut into.")
+
+    def label_mapping(self) -> LabelMapping | None:
+        """Return the mapping, or None where the source names its classes itself."""
+        return load_mapping(self.mapping) if self.mapping else None
+
+    def targets(self, scheme: ClassScheme) -> tuple[str, ...]:
+        """Return what the source's truth tells apart, in order; see `LabelMapping.targets`."""
+        mapping, names = self.label_mapping(), class_names(scheme)
+        return mapping.targets(names) if mapping else names
+
+
+def read_tiles(source: Source, scheme: ClassScheme, voxel: float | None) -> Iterator[CloudTile]:
+    """Yield the tiles of a source, ordered by name.
+
+    Args:
+        source: where they are.
+        scheme: classes that are learned.
+        voxel: edge of the cells of which one point each is kept, m; None for all points.
+
+    Raises:
+        MissingFileError: there is nothing.
+        InputError: a file is damaged or has no labels, or its classes don't fit the scheme.
+    """
+    path = Path(source.path)
+    if source.split and path.is_file():
+        raise InputError("split", source.split, f"{path.name} is a file, which has no splits")
+    if path.is_file() and path.suffix.lower() == ".npz" and _is_pack(path):
+        tiles = _packed_tiles(path, scheme, voxel)
+    elif path.is_file():
+        tiles = cloud_tiles(path, scheme, source)
+    elif path.is_dir():
+        tiles = _folder_tiles(path, scheme, source)
+    else:
+        raise MissingFileError(str(path), None, "no such file or folder of labelled points")
+    for tile in tiles:
+        try:
+            kept = None if voxel is None else thin(tile.coord, voxel)
+        except ValueError:
+            raise InputError(str(path), None, f"a tile of {tile.scene} is too large for cells of {voxel:g} m") from None
+        yield tile if kept is None else tile.select(kept)
+
+
+def _is_pack(path: Path) -> bool:
+    try:
+        with zipfile.ZipFile(path) as archive:
+            return "notes.json" in archive.namelist()
+    except ARCHIVE_FAULTS:
+        return False
+
+
+def _packed_tiles(path: Path, scheme: ClassScheme, voxel: float | None) -> Iterator[CloudTile]:
+    pack = PackReader(path)
+    if voxel is not None and pack.voxel > voxel * (1.0 + 1e-9):
+        raise InputError("voxel", voxel, f"must be at least {pack.voxel:g} m, as the points of {path} were thinned")
+    table = table_between(dict(enumerate(class_names(pack.scheme))), scheme, str(path))
+    for place in range(len(pack)):
+        yield _relabel(pack.tile(place), table)
+
+
+def _relabel(tile: CloudTile, table: NDArray[np.int16]) -> CloudTile:
+    known = tile.segment != IGNORED
+    return replace(tile, segment=np.where(known, table[np.where(known, tile.segment, 0)], IGNORED).astype(np.int16))
+
+
+def _folder_tiles(path: Path, scheme: ClassScheme, source: Source) -> Iterator[CloudTile]:
+    root = pointcept_root(path)
+    if root is not None:
+        yield from pointcept_tiles(root, scheme, source.split)
+        return
+    folder = path / source.split if source.split else path
+    clouds = sorted(file for file in files_below(folder) if file.suffix.lower() in ENDINGS and file.is_file())
+    if not clouds:
+        raise MissingFileError(str(folder), None, "holds neither tiles of a data set nor clouds")
+    for cloud in clouds:
+        yield from cloud_tiles(cloud, scheme, source, cloud.relative_to(folder).with_suffix("").as_posix())
+
+
+def pointcept_root(path: Path) -> Path | None:
+    """Return the folder with ``classes.json``: this one, or the only one of a data set."""
+    if (path / "classes.json").is_file():
+        return path
+    roots = sorted(file.parent for file in path.glob("pointcept/*/classes.json"))
+    if len(roots) > 1:
+        names = ", ".join(str(root.relative_to(path)) for root in roots)
+        raise InputError("path", str(path), f"holds several sets of classes: name one of {names}")
+    return roots[0] if roots else None
+
+
+def pointcept_tiles(root: Path, scheme: ClassScheme, split: str | None) -> Iterator[CloudTile]:
+    """Yield the tiles of a folder in Pointcept's layout: ``SPLIT/TILE/coord.npy`` and so on.
+
+    Raises:
+        MissingFileError: there is no such split, or it is empty.
+        InputError: an array is missing or of another length.
+    """
+    told = read_json(root / "classes.json")
+    try:
+        names = dict(zip((int(number) for number in told["ids"]), map(str, told["classes"]), strict=True))
+    except (KeyError, TypeError, ValueError):
+        raise InputError(str(root / "classes.json"), None, "must hold lists of classes and their ids") from None
+    table = table_between(names, scheme, str(root))
+    for folder in pointcept_folders(root, split):
+        yield _pointcept_tile(folder, table)
+
+
+def pointcept_folders(root: Path, split: str | None) -> list[Path]:
+    """Return the folders of the tiles of a split, or of all, by name.
+
+    Raises:
+        MissingFileError: there is no such split, or it is empty.
+    """
+    folders = sorted(file.parent for file in root.glob(f"{split or '*'}/*/coord.npy"))
+    if not folders:
+        splits = ", ".join(sorted(path.name for path in root.iterdir() if path.is_dir())) or "none"
+        raise MissingFileError(f"{root}: split", split, f"holds no tiles; there are the splits {splits}")
+    return folders
+
+
+def _pointcept_tile(folder: Path, table: NDArray[np.int16]) -> CloudTile:
+    coord, segment = _array(folder, "coord", (3,), "f4"), _array(folder, "segment", (), "i8")
+    color = _array(folder, "color", (3,), "u1") if (folder / "color.npy").exists() else None
+    strength = _array(folder, "strength", (), "f4") if (folder / "strength.npy").exists() else None
+    for name, array in (("segment", segment), ("color", color), ("strength", strength)):
+        if array is not None and len(array) != len(coord):
+            raise InputError(
+                str(folder / f"{name}.npy"), len(array), f"must hold {len(coord)} points, as coord.npy does"
+            )
+    notes = read_json(folder / "tile.json") if (folder / "tile.json").is_file() else {}
+    try:
+        origin = np.array(notes.get("origin", [0.0, 0.0, 0.0]), dtype=np.float64).reshape(3)
+    except (AttributeError, TypeError, ValueError):
+        raise InputError(str(folder / "tile.json"), None, "must be an object whose origin is three numbers") from None
+    known = (segment >= 0) & (segment < UNLABELLED)
+    return CloudTile(
+        str(notes.get("scene", folder.name)),
+        origin,
+        coord,
+        color if color is not None and color.any() else None,
+        strength if strength is not None and strength.any() else None,
+        np.where(known, table[np.where(known, segment, 0)], IGNORED).astype(np.int16),
+    )
+
+
+def _array(folder: Path, name: str, entry: tuple[int, ...], kind: str) -> NDArray[Any]:
+    """Return an array (N, *entry) of a folder; what its header claims is held against the file's size."""
+    path = folder / f"{name}.npy"
+    try:
+        with np.errstate(invalid="ignore", over="ignore"):
+            array = np.load(path, mmap_mode="r", allow_pickle=False).reshape(-1, *entry).astype(kind)
+    except (*ARCHIVE_FAULTS, TypeError):
+        raise InputError(str(path), None, "is missing, or no array") from None
+    if not np.isfinite(array).all():
+        raise InputError(str(path), None, "must hold finite numbers")
+    return np.asarray(array)
+
+
+def cloud_tiles(path: Path, scheme: ClassScheme, source: Source, scene: str | None = None) -> Iterator[CloudTile]:
+    """Yield the square tiles of one cloud; memory holds one of them.
+
+    The classes are those of the project's own clouds, or of another's attribute by the source's mapping.
+
+    Args:
+        path: the cloud.
+        scheme: classes that are learned.
+        source: mapping, and edge of the tiles.
+        scene: name that tells the cloud from the source's others; the file's if not given.
+
+    Raises:
+        InputError: the cloud has no points, or no labels of its own and there is no mapping, or it is damaged.
+    """
+    with open_cloud(path) as cloud, tempfile.TemporaryDirectory(prefix="synthroads-") as folder:
+        if not cloud.header.count:
+            raise InputError(str(path), 0, "holds no points to learn from")
+        scale = steps_per_unit(cloud)
+        low = np.min([block.xyz.min(axis=0) for block in cloud.blocks() if len(block)], axis=0)
+        origin = np.floor(low)
+        with TileSorter(source.tile, origin, Path(folder)) as sorter:
+            sorter.add(labelled_blocks(cloud, scheme, source))
+            for part in sorter.tiles():
+                yield tile_of(part.points, scene or path.stem, part.corner, scale)
+
+
+def tile_of(points: PointBlock, scene: str, origin: NDArray[np.float64], scale: float) -> CloudTile:
+    """Return points whose ``class_id`` is the place in the scheme (255: ignored) as a tile.
+
+    Args:
+        points: N of them.
+        scene: name of the scene.
+        origin: (3,) map coordinates that the tile's count from, m.
+        scale: 16-bit steps per unit of intensity.
+    """
+    strength = (levels(points.intensity, scale) / FULL).astype(np.float32)
+    return CloudTile(
+        scene,
+        origin,
+        (points.xyz - origin).astype(np.float32),
+        eight_bits(points.rgb, int(points.rgb.max())) if points.rgb.any() else None,
+        strength if strength.any() else None,
+        np.where(points.class_id == UNLABELLED, IGNORED, points.class_id).astype(np.int16),
+    )
+
+
+def labelled_blocks(cloud: CloudReader, scheme: ClassScheme, source: Source) -> Iterator[PointBlock]:
+    """Yield a cloud's points with the places of their classes in the scheme as ``class_id``; 255 is ignored."""
+    mapping, names = source.label_mapping(), class_names(scheme)
+    if mapping is None:
+        if not cloud.header.labelled:
+            allowed = "has no labels of ours: `mapping` must say which of its numbers is which class"
+            raise InputError(str(cloud.header.path), None, allowed)
+        table = table_between({row.id: row.name for row in cloud.header.scheme.rows}, scheme, str(cloud.header.path))
+        for block in cloud.blocks():
+            yield _with_places(block, table[block.class_id])
+        return
+    for block, numbers in zip(cloud.blocks(), _numbers(cloud, mapping.field), strict=True):
+        places = mapping.label(numbers, names)
+        if mapping.ignore_zero_intensity:
+            places = np.where(block.intensity > 0, places, IGNORED).astype(np.int16)
+        yield _with_places(block, places)
+
+
+def _with_places(block: PointBlock, places: NDArray[np.int16]) -> PointBlock:
+    return replace(block, class_id=np.where(places == IGNORED, UNLABELLED, places).astype(np.uint8))
+
+
+def _numbers(cloud: CloudReader, field: str) -> Iterator[NDArray[Any]]:
+    """Yield an attribute of a LAS file block by block, as `CloudReader.blocks` yields points."""
+    path = cloud.header.path
+    if not cloud.header.kind.startswith("LAS"):
+        raise InputError(str(path), None, "a mapping of classes is for LAS and LAZ files")
+    with laspy.open(path, read_evlrs=False) as file:
+        names = list(file.header.point_format.dimension_names)
+        if field not in names:
+            raise InputError(f"{path}: mapping.field", field, f"must be one of {', '.join(names)}")
+        for record in file.chunk_iterator(BLOCK):
+            yield np.asarray(record[field])

@@ -1,0 +1,105 @@
+"""`CloudTile`: the labelled points of a piece of a scene, as training and scoring hold them in memory."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .classes import IGNORED
+from .points import full_color, thin
+
+
+@dataclass(frozen=True)
+class CloudTile:
+    """N points of one scene.
+
+    Attributes:
+        scene: name of the scene; intensities are scaled scene by scene.
+        origin: (3,) float64 map coordinates that ``coord`` counts from, m.
+        coord: (N, 3) float32, m.
+        color: (N, 3) uint8 sRGB, or None where the scene has none.
+        strength: (N,) float32 intensity as a share of 16 bits, or None where the scene has none.
+        segment: (N,) int16 place of the class in the scheme, or `IGNORED`.
+    """
+
+    scene: str
+    origin: NDArray[np.float64]
+    coord: NDArray[np.float32]
+    color: NDArray[np.uint8] | None
+    strength: NDArray[np.float32] | None
+    segment: NDArray[np.int16]
+
+    def __len__(self) -> int:
+        return len(self.coord)
+
+    def select(self, keep: NDArray[Any]) -> CloudTile:
+        """Return the points chosen by a mask or indices."""
+        return replace(
+            self,
+            coord=self.coord[keep],
+            color=None if self.color is None else self.color[keep],
+            strength=None if self.strength is None else self.strength[keep],
+            segment=self.segment[keep],
+        )
+
+    def class_counts(self, classes: int) -> NDArray[np.int64]:
+        """Return the number of labelled points of each class (C,)."""
+        return np.bincount(self.segment[self.segment != IGNORED], minlength=classes)
+
+
+def eight_bits(rgb: NDArray[Any], largest: int) -> NDArray[np.uint8]:
+    """Return colours (N, 3) of LAS as 8 bits each.
+
+    Args:
+        rgb: as they are stored.
+        largest: of all values of the cloud, see `full_color`.
+    """
+    return np.rint(rgb * (255.0 / full_color(largest))).astype(np.uint8)
+
+
+@dataclass(frozen=True)
+class Scaling:
+    """How a scene's intensities become a feature: ``(share - shift) / span``."""
+
+    shift: float = 0.0
+    span: float = 1.0
+
+    def apply(self, strength: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Return the feature (N,) of intensities (N,); a few retro-reflectors are cut at 5 spans."""
+        return np.clip((strength - self.shift) / self.span, -5.0, 5.0).astype(np.float32)
+
+
+def robust_scaling(strengths: Sequence[NDArray[np.float32]]) -> Scaling:
+    """Return the scaling that gives a scene the median 0 and the span 1 between its 10th and 90th percentile.
+
+    Args:
+        strengths: intensities of the scene's tiles; without any, or where all are alike, the scaling changes nothing
+            but the shift.
+    """
+    values = np.concatenate(strengths) if strengths else np.zeros(0, dtype=np.float32)
+    if len(values) == 0:
+        return Scaling()
+    low, middle, high = np.percentile(values, [10.0, 50.0, 90.0])
+    return Scaling(float(middle), float(high - low) if high > low else 1.0)
+
+
+def scalings(tiles: Sequence[CloudTile], kind: str, voxel: float | None = None) -> dict[str, Scaling]:
+    """Return the scaling of each scene by name.
+
+    Args:
+        tiles: of all scenes.
+        kind: ``robust``, or ``share``: the share of 16 bits as it stands.
+        voxel: edge of the cells of which one point counts, m; None: all points do, as where tiles are thinned out.
+    """
+    if kind == "share":
+        return dict.fromkeys((tile.scene for tile in tiles), Scaling())
+    parts: dict[str, list[NDArray[np.float32]]] = {}
+    for tile in tiles:
+        found = parts.setdefault(tile.scene, [])
+        if tile.strength is not None:
+            found.append(tile.strength if voxel is None else tile.strength[thin(tile.coord, voxel)])
+    return {scene: robust_scaling(found) for scene, found in parts.items()}

@@ -1,0 +1,243 @@
+"""Layers of the centreline models: kernel points across the road, and layers over slices x kernel points.
+
+A slice is a metre of road seen as a set of points. Kernel points lie on its orthogonal (x = 0) at equal spacing; a
+token is what one of them gathers from the points around it. A painted line is a tenth of that spacing wide, so where it
+lies within a token has to be kept. Fixed kernel points are therefore divided into cells, each with weights of its own,
+as the kernel points of a KPConv (Thomas et al. 2019); deformable ones move to where something is and keep the first
+moment of what they gather. A point belongs to the two nearest cells or kernel points with linear weights, which add up
+to 1, and sums are divided by the number of points, so that density matters little.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import torch
+from torch import Tensor, nn
+from torch.nn import functional
+
+from ..base import full_precision
+
+FAR = 3.0
+"""Heights of points beyond this, m, look alike to a model."""
+_FEW = 0.25
+"""Mass of a cell, in points, against which what it gathers fades to zero."""
+
+
+@dataclass
+class Tokens:
+    """Features gathered by the K kernel points of N slices.
+
+    Attributes:
+        features: (N, K, C).
+        places: (N, K) the kernel points' y in the slice's frame, m.
+        heights: (N, K) mean height of the points around them, m; 0 where there are none.
+    """
+
+    features: Tensor
+    places: Tensor
+    heights: Tensor
+
+
+class PointFeatures(nn.Module):
+    """Features of single points: a small network of x, height and attributes. Not of y, which would tie it to a place.
+
+    Args:
+        columns: the columns of a batch's ``feat`` that are used.
+        width: features made from them.
+    """
+
+    def __init__(self, columns: tuple[int, ...], width: int) -> None:
+        super().__init__()
+        self.columns = list(columns)
+        self.network = nn.Sequential(nn.Linear(2 + len(columns), width), nn.ReLU(), nn.Linear(width, width), nn.ReLU())
+
+    def forward(self, coord: Tensor, feat: Tensor) -> Tensor:
+        """Return (N, P, width), all >= 0, of points (N, P, 3), m, with attributes (N, P, F)."""
+        height = coord[..., 2:].clamp(-FAR, FAR)
+        features: Tensor = self.network(torch.cat([2.0 * coord[..., :1], height, feat[..., self.columns]], dim=-1))
+        return features
+
+
+def cell_sums(coord: Tensor, mask: Tensor, features: Tensor, reach: float, number: int) -> Tensor:
+    """Return the sums (N, number, C + 2) over the points in cells across the slices: features, heights, points.
+
+    A point is shared by the two cells whose middles are nearest, in linear proportion.
+
+    Args:
+        coord: (N, P, 3) points, m; only y and z count.
+        mask: (N, P) which of them exist.
+        features: (N, P, C).
+        reach: the cells divide -reach to reach, m.
+        number: of cells.
+    """
+    slices, _, channels = features.shape
+    values = torch.cat([features, coord[..., 2:], torch.ones_like(coord[..., :1])], dim=-1).flatten(0, 1)
+    at = (coord[..., 1] + reach) * (number / (2.0 * reach)) - 0.5
+    low = at.floor()
+    first = number * torch.arange(slices, device=coord.device)[:, None]
+    sums = values.new_zeros(slices * number, channels + 2)
+    for cell, weight in ((low, 1.0 - (at - low)), (low + 1.0, at - low)):
+        inside = mask & (cell >= 0) & (cell < number)
+        index = first + cell.clamp(0, number - 1).long()
+        sums = sums.index_add(0, index.flatten(), values * (weight * inside).flatten()[:, None])
+    return sums.view(slices, number, channels + 2)
+
+
+def cell_features(sums: Tensor) -> Tensor:
+    """Return means of features and heights, and the logarithm of the number of points, from `cell_sums`."""
+    mass = sums[..., -1:]
+    return torch.cat([sums[..., :-1] / (mass + _FEW), torch.log1p(mass)], dim=-1)
+
+
+class FixedKernelPoints(nn.Module):
+    """Kernel points at fixed places, each with a kernel of cells over twice the spacing.
+
+    Args:
+        count: kernel points of a slice.
+        half_width: the outermost ones' distance from the frame's origin, m.
+        cells: per spacing.
+        inputs: features of a point.
+        width: features of a token.
+    """
+
+    places: Tensor
+
+    def __init__(self, count: int, half_width: float, cells: int, inputs: int, width: int) -> None:
+        super().__init__()
+        self.cells = cells
+        self.spacing = 2.0 * half_width / (count - 1)
+        self.number = (count + 1) * cells
+        self.reach = half_width + self.spacing
+        self.register_buffer("places", torch.linspace(-half_width, half_width, count), persistent=False)
+        self.kernel = nn.Conv1d(inputs + 2, width, kernel_size=2 * cells, stride=cells)
+        self.norm = nn.LayerNorm(width)
+
+    def forward(self, coord: Tensor, mask: Tensor, features: Tensor) -> Tokens:
+        """Gather the features (N, P, inputs) of points (N, P, 3), m, of which a mask (N, P) says whether they exist."""
+        sums = cell_sums(coord, mask, features, self.reach, self.number)
+        tokens = self.norm(self.kernel(cell_features(sums).transpose(1, 2)).transpose(1, 2))
+        height, weight = sums[..., -2:].unfold(1, 2 * self.cells, self.cells).sum(-1).unbind(-1)
+        return Tokens(tokens, self.places.expand(len(coord), -1), height / (weight + _FEW))
+
+
+class DeformableKernelPoints(nn.Module):
+    """Kernel points that move along the slice's orthogonal before they gather.
+
+    What fixed kernel points see there says how far each moves, as in a deformable KPConv; here at most one spacing.
+
+    Args:
+        count: kernel points of a slice.
+        half_width: the outermost ones' distance from the frame's origin, m.
+        inputs: features of a point, all >= 0.
+        width: features of a token, those of the fixed kernel points as well.
+    """
+
+    places: Tensor
+
+    def __init__(self, count: int, half_width: float, inputs: int, width: int) -> None:
+        super().__init__()
+        self.spacing = 2.0 * half_width / (count - 1)
+        self.register_buffer("places", torch.linspace(-half_width, half_width, count), persistent=False)
+        self.shift = nn.Linear(width, 1)
+        self.mix = nn.Linear(3 * inputs + 2, width)
+        self.norm = nn.LayerNorm(width)
+
+    @full_precision
+    def forward(self, coord: Tensor, mask: Tensor, features: Tensor, seen: Tensor) -> Tokens:
+        """Gather the features (N, P, inputs) of points (N, P, 3), m.
+
+        Args:
+            coord: the points.
+            mask: (N, P) which of them exist.
+            features: theirs.
+            seen: (N, K, width) tokens of the fixed kernel points at the same places.
+        """
+        places = self.places + self.spacing * torch.tanh(self.shift(seen)[..., 0])
+        away = (coord[:, None, :, 1] - places[..., None]) / self.spacing
+        weight = (1.0 - away.abs()).clamp_min(0.0) * mask[:, None, :]
+        mass = weight.sum(-1, keepdim=True)
+        values = torch.cat([features, coord[..., 2:]], dim=-1)
+        zeroth, first = (torch.cat([weight, weight * away], dim=1) @ values).chunk(2, dim=1)
+        level, tilt = zeroth / (mass + _FEW), first[..., :-1] / (mass + _FEW)
+        # Where in the kernel point's reach a feature has its centre: the line's place if the feature is brightness.
+        centre = first[..., :-1] / (zeroth[..., :-1] + 0.2 * _FEW)
+        tokens = self.norm(self.mix(torch.cat([level, tilt, centre, torch.log1p(mass)], dim=-1)))
+        return Tokens(tokens, places, level[..., -1])
+
+
+class GridConvolution(nn.Module):
+    """A residual convolution over slices x kernel points.
+
+    Args:
+        width: features.
+        along: slices that it spans, odd.
+        across: kernel points that it looks at, odd.
+        apart: how far these lie apart; 1: next to each other.
+    """
+
+    def __init__(self, width: int, along: int, across: int, apart: int = 1) -> None:
+        super().__init__()
+        self.norm = nn.LayerNorm(width)
+        padding = (along // 2, apart * (across // 2))
+        self.convolution = nn.Conv2d(width, width, (along, across), padding=padding, dilation=(1, apart))
+        self.mix = nn.Linear(width, width)
+
+    def forward(self, grid: Tensor) -> Tensor:
+        """Return (B, S, K, C) from the same."""
+        inner = self.convolution(self.norm(grid).permute(0, 3, 1, 2)).permute(0, 2, 3, 1)
+        mixed: Tensor = self.mix(functional.gelu(inner))
+        return grid + mixed
+
+
+class RelativeAttention(nn.Module):
+    """A transformer's layer in which a place is only known by how far it is from others.
+
+    Args:
+        count: longest sequence.
+        width: features.
+        heads: of the attention.
+        dropout: share of what is added that is left out in training.
+    """
+
+    apart: Tensor
+
+    def __init__(self, count: int, width: int, heads: int, dropout: float) -> None:
+        super().__init__()
+        self.heads = heads
+        self.bias = nn.Parameter(torch.zeros(heads, 2 * count - 1))
+        steps = torch.arange(count)
+        self.register_buffer("apart", steps[:, None] - steps[None, :] + count - 1, persistent=False)
+        self.before = nn.LayerNorm(width)
+        self.project = nn.Linear(width, 3 * width)
+        self.out = nn.Linear(width, width)
+        self.network = nn.Sequential(
+            nn.LayerNorm(width), nn.Linear(width, 2 * width), nn.GELU(), nn.Linear(2 * width, width)
+        )
+        self.dropout = nn.Dropout(dropout)
+
+    def forward(self, sequence: Tensor) -> Tensor:
+        """Return (N, L, C) from the same."""
+        number, length, width = sequence.shape
+        each = width // self.heads
+        parts = self.project(self.before(sequence)).view(number, length, 3, self.heads, each)
+        query, key, value = parts.permute(2, 0, 3, 1, 4)
+        score = query @ key.transpose(-1, -2) / each**0.5 + self.bias[:, self.apart[:length, :length]]
+        mixed = (score.softmax(-1) @ value).transpose(1, 2).reshape(number, length, width)
+        sequence = sequence + self.dropout(self.out(mixed))
+        return sequence + self.dropout(self.network(sequence))
+
+
+class AttentionPool(nn.Module):
+    """The weighted means of a slice's tokens, with weights of each of several heads, as one vector."""
+
+    def __init__(self, width: int, heads: int, outputs: int) -> None:
+        super().__init__()
+        self.score = nn.Linear(width, heads)
+        self.out = nn.Linear(width * heads, outputs)
+
+    def forward(self, tokens: Tensor) -> Tensor:
+        """Return (N, outputs) from (N, K, width)."""
+        weights = self.score(tokens).softmax(1)
+        pooled: Tensor = self.out((weights.transpose(1, 2) @ tokens).flatten(1))
+        return pooled

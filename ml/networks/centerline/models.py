@@ -1,0 +1,200 @@
+"""Base of the models that find a road's centreline and corridor in sequences of slices; each is a file beside this one.
+
+All take a batch (see `slices.collate`) of B sequences of S slices with P points, use its ``coord``, ``feat``, ``mask``
+and ``frame``, and return a dictionary:
+
+- ``center``, ``center_std`` (B, S), m; ``corridor``, ``corridor_std`` (B, S, K), columns `CORRIDOR`;
+- ``rough`` (B, S): the centre at first look, m;
+- ``log_std`` (B, S, 1 + K): logarithms of the deviations divided by `SCALE`, of the centre and the corridor;
+- ``logits`` (B, S, 25, 3): what the soft-argmax of centre, left and right edge is taken of; ``places`` (B, S, 25), m;
+- ``fine_logits``, ``fine_places`` (B, S, 64): the same of the second look's centre.
+
+No model knows where it is but by kernel points, all of which have the same weights: a road moved by a kernel point's
+spacing is the same road moved. Frames are only used relative to each other.
+"""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import torch
+from pydantic import Field, model_validator
+from torch import Tensor, nn
+
+from synthroads_addon.base.schema import quantity
+
+from ...configuration import Part
+from ...data.corridor import CORRIDOR
+from ...data.slices import FEATURES, Batch, mirror_batch, mirrored_corridor, with_sides_swapped
+from .layers import AttentionPool, FixedKernelPoints, PointFeatures, Tokens
+from .refinement import Refinement, parabola
+
+Output = dict[str, Tensor]
+
+LINES = ("center", "left_edge", "right_edge")
+"""Targets found by soft-argmax over the kernel points."""
+TARGETS = ("center", *CORRIDOR)
+SCALE = (1.0, 1.0, 1.0, 0.5, 0.2, 0.05, 0.1)
+"""Of `TARGETS`: errors of this size weigh alike; m, and what lanes and headings are measured in."""
+_MIDDLE = {"lanes": 4.0, "lane_width": 3.5, "heading": 0.0}
+"""Values of the scalars without any evidence."""
+_NATURAL = {"lanes": 2.0, "lane_width": 0.3, "heading": 0.05}
+"""Size of their deviations from it."""
+_LARGEST_LOG = 5.0
+
+
+class ModelOptions(Part):
+    """Base of a model's options: its name, its sizes, and how it is built."""
+
+    name: str
+    features: tuple[Literal["intensity", "contrast", "red", "green", "blue", "has_color"], ...] = Field(
+        ("intensity", "contrast"), description="Attributes of a point beside its place."
+    )
+    kernel_points: int = quantity(25, ge=3, le=1000, unit="1", description="Kernel points across a slice.")
+    cells: int = quantity(4, ge=1, le=100, unit="1", description="Cells per spacing of the fixed kernel points.")
+    point_width: int = quantity(16, ge=1, le=1024, unit="1", description="Features of a point.")
+    width: int = quantity(48, ge=2, le=1024, unit="1", description="Features of a token.")
+    context: int = quantity(96, ge=2, le=4096, unit="1", description="Features of a slice.")
+    fine_cells: int = quantity(64, ge=2, le=1000, unit="1", description="Cells of the second look.")
+    fine_reach: float = quantity(6.4, gt=0, le=45, unit="m", description="How far it reaches to either side.")
+    fine_width: int = quantity(24, ge=1, le=1024, unit="1", description="Features of its cells.")
+    layers: int = quantity(3, ge=0, le=50, unit="1", description="Layers over the tokens.")
+    heads: int = quantity(4, ge=1, le=64, unit="1", description="Heads of each attention.")
+    dropout: float = quantity(0.0, ge=0, lt=1, unit="1", description="Share left out in the attention's layers.")
+
+    def build(self, half_width: float, slices: int) -> CenterlineModel:
+        """Return the model with weights from PyTorch's global generator.
+
+        Args:
+            half_width: what a slice sees to either side, m.
+            slices: of a sequence.
+        """
+        raise NotImplementedError
+
+    @model_validator(mode="after")
+    def _divisible(self) -> ModelOptions:
+        for name in ("width", "context"):
+            if getattr(self, name) % self.heads or getattr(self, name) % 2:
+                raise ValueError(f"{name} must be even and a multiple of heads, {self.heads}")
+        return self
+
+
+class Heads(nn.Module):
+    """Lines by soft-argmax over a slice's tokens, other numbers and all deviations from the slice's context."""
+
+    def __init__(self, width: int, context: int, spacing: float) -> None:
+        super().__init__()
+        self.spacing = spacing
+        self.local = nn.Linear(width, context)
+        self.context = nn.Linear(context, context)
+        self.maps = nn.Sequential(nn.GELU(), nn.Linear(context, 2 * len(LINES) + 1))
+        self.scalars = nn.Sequential(nn.Linear(context, context), nn.GELU(), nn.Linear(context, len(_MIDDLE)))
+        self.spread = nn.Sequential(nn.Linear(context, context), nn.GELU(), nn.Linear(context, len(CORRIDOR)))
+
+    def forward(self, tokens: Tokens, context: Tensor) -> Output:
+        """Return the output for N slices with context (N, D): center (N,), corridor (N, K) and so on."""
+        maps = self.maps(self.local(tokens.features) + self.context(context)[:, None])
+        logits, residual, lift = maps.split([len(LINES), len(LINES), 1], dim=-1)
+        share = logits.softmax(1)
+        lines = (share * (tokens.places[..., None] + self.spacing * residual)).sum(1)
+        height = (share[..., 0] * (tokens.heights + lift[..., 0])).sum(1)
+        middle, natural = context.new_tensor(list(_MIDDLE.values())), context.new_tensor(list(_NATURAL.values()))
+        scalars = middle + natural * self.scalars(context)
+        return {
+            "center": lines[:, 0],
+            "corridor": torch.cat([lines[:, 1:], scalars, height[:, None]], dim=1),
+            "log_std": self.spread(context) - 1.0,
+            "logits": logits,
+        }
+
+
+class CenterlineModel(nn.Module):
+    """Base of the models: the points' features, the fixed kernel points' tokens and the heads."""
+
+    def __init__(self, options: ModelOptions, half_width: float, slices: int) -> None:
+        super().__init__()
+        self.options = options
+        width, count = options.width, options.kernel_points
+        columns = tuple(FEATURES.index(name) for name in options.features)
+        self.points = PointFeatures(columns, options.point_width)
+        self.kernel_points = FixedKernelPoints(count, half_width, options.cells, options.point_width, width)
+        self.pool = AttentionPool(width, options.heads, options.context)
+        self.heads = Heads(width, options.context, self.kernel_points.spacing)
+        fine = (options.fine_reach, options.fine_cells)
+        self.again = Refinement(options.point_width, options.fine_width, options.context, slices, *fine, options.heads)
+
+    def forward(self, batch: Batch) -> Output:
+        """Return the output for a batch."""
+        shape = batch["mask"].shape[:2]
+        coord, feat, mask = (batch[name].flatten(0, 1) for name in ("coord", "feat", "mask"))
+        features = self.points(coord, feat)
+        tokens, context = self.look(self.kernel_points(coord, mask, features), coord, mask, features, shape[1])
+        found = {name: values.unflatten(0, shape) for name, values in self.heads(tokens, context).items()}
+        context = context.unflatten(0, shape)
+        # Where to look again is no way for the second look's errors to reach the first.
+        guess, heading = self.line(found["center"].detach(), found, context, batch["frame"])
+        guess, heading = guess.detach(), heading.detach()
+        step, log_std, found["fine_logits"] = self.again(
+            batch["coord"], batch["mask"], features.unflatten(0, shape), guess, heading, context
+        )
+        found["rough"], found["center"] = found["center"], guess + step
+        found["fine_places"] = guess[..., None] + self.again.places
+        found["log_std"] = _bound_values(torch.cat([log_std[..., None], found["log_std"]], dim=-1))
+        _, heading = self.line(found["center"].detach(), found, context, batch["frame"])
+        place = CORRIDOR.index("heading")
+        found["corridor"] = torch.cat(
+            [found["corridor"][..., :place], heading[..., None], found["corridor"][..., place + 1 :]], dim=-1
+        )
+        std = torch.exp(found["log_std"]) * found["log_std"].new_tensor(SCALE)
+        return found | {"center_std": std[..., 0], "corridor_std": std[..., 1:]}
+
+    def look(self, tokens: Tokens, coord: Tensor, mask: Tensor, features: Tensor, slices: int) -> tuple[Tokens, Tensor]:
+        """Return tokens that have seen their surroundings, and the context (N, D) of each of the N slices."""
+        raise NotImplementedError
+
+    def line(self, center: Tensor, found: Output, context: Tensor, frame: Tensor) -> tuple[Tensor, Tensor]:
+        """Return a line through centres (B, S): its y in the frames, m, and its direction in them, rad.
+
+        Args:
+            center: y of the centres, m; a constant.
+            found: what else the heads said.
+            context: (B, S, D).
+            frame: (B, S, 4).
+        """
+        raise NotImplementedError
+
+
+class SequenceModel(CenterlineModel):
+    """A model whose slices know of each other: the line is a parabola through the centres of all."""
+
+    def __init__(self, options: ModelOptions, half_width: float, slices: int) -> None:
+        super().__init__(options, half_width, slices)
+        self.trust = nn.Linear(options.context, 1)
+        self.stiffness = nn.Parameter(torch.tensor([-6.0, -4.0, -2.0]))
+
+    def line(self, center: Tensor, found: Output, context: Tensor, frame: Tensor) -> tuple[Tensor, Tensor]:
+        """See `CenterlineModel.line`; each centre weighs what its context says."""
+        weight = torch.exp(2.0 * torch.tanh(0.5 * self.trust(context)[..., 0]))
+        guess, heading = parabola(frame, center, weight, torch.exp(self.stiffness))
+        return guess, heading + found["corridor"][..., CORRIDOR.index("heading")]
+
+
+def both_ways(model: nn.Module, batch: Batch) -> Output:
+    """Return the mean of a model's output and of that for the mirrored batch, mirrored back.
+
+    Mirroring the batch mirrors the result exactly. Variances are averaged; what the two disagree on is left out, as the
+    calibration sees it.
+    """
+    one, other = model(batch), model(mirror_batch(batch))
+    back = mirrored_corridor(other["corridor"])
+    variance = with_sides_swapped(other["corridor_std"]) ** 2
+    return {
+        "center": 0.5 * (one["center"] - other["center"]),
+        "center_std": (0.5 * (one["center_std"] ** 2 + other["center_std"] ** 2)).sqrt(),
+        "corridor": 0.5 * (one["corridor"] + back),
+        "corridor_std": (0.5 * (one["corridor_std"] ** 2 + variance)).sqrt(),
+    }
+
+
+def _bound_values(logarithm: Tensor) -> Tensor:
+    return _LARGEST_LOG * torch.tanh(logarithm / _LARGEST_LOG)

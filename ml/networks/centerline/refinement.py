@@ -1,0 +1,127 @@
+"""The second look: all slices of a sequence moved so that the road found at first runs straight through their middle.
+
+What was found at first is known to a tenth of a kernel point's spacing. Seen from there, every road looks alike: lines
+run straight along the slices, dashes of one slice complete those of another, and what is left to find is small.
+"""
+
+from __future__ import annotations
+
+import torch
+from torch import Tensor, nn
+
+from ..base import full_precision
+from .layers import GridConvolution, RelativeAttention, cell_features, cell_sums
+
+_APART = (1, 3, 6)
+"""How far the cells lie apart that each convolution looks at; five of them."""
+_PARABOLA_UNIT = 5.0
+"""m: in this unit the places along a sequence are numbers of about one, of which parabolas are fitted well."""
+_FIRST_LOG_STD = -1.5
+
+
+class Refinement(nn.Module):
+    """How far a road's centre lies from where it was first found, by soft-argmax over fine cells around that.
+
+    All cells have the same weights and see twice the sum of `_APART` cells to either side: a line between two lanes is
+    found in the same way wherever the first look left it, or, where none is painted, by the lines on either side.
+
+    Args:
+        inputs: features of a point.
+        width: features of a cell.
+        context: features of a slice.
+        slices: of a sequence, which see each other; 1: each by itself.
+        reach: the cells divide -reach to reach beside the first guess, m.
+        cells: their number.
+        heads: of the attention.
+    """
+
+    places: Tensor
+
+    def __init__(
+        self, inputs: int, width: int, context: int, slices: int, reach: float, cells: int, heads: int
+    ) -> None:
+        super().__init__()
+        self.reach, self.cells, self.spacing = reach, cells, 2.0 * reach / cells
+        self.register_buffer("places", self.spacing * (torch.arange(cells) + 0.5) - reach, persistent=False)
+        self.first = nn.Linear(inputs + 2, width)
+        along = 5 if slices > 1 else 1
+        self.grid = nn.ModuleList(GridConvolution(width, along, 5, apart) for apart in _APART)
+        self.local = nn.Linear(width, width)
+        self.context = nn.Linear(context, width)
+        self.where = nn.Sequential(nn.GELU(), nn.Linear(width, 2))
+        self.seen = nn.Linear(width, context)
+        self.along = RelativeAttention(slices, context, heads, 0.0) if slices > 1 else None
+        self.spread = nn.Sequential(nn.LayerNorm(context), nn.Linear(context, 1))
+
+    def forward(
+        self, coord: Tensor, mask: Tensor, features: Tensor, guess: Tensor, heading: Tensor, context: Tensor
+    ) -> tuple[Tensor, Tensor, Tensor]:
+        """Look again.
+
+        Args:
+            coord: (B, S, P, 3) points, m.
+            mask: (B, S, P) which of them exist.
+            features: (B, S, P, C).
+            guess: (B, S) y at which the road was found first, m.
+            heading: (B, S) its direction in the slices' frames, rad.
+            context: (B, S, D) of the slices.
+
+        Returns:
+            (B, S) how much farther to the left the centre lies, m, the logarithm of that's deviation, and (B, S, cells)
+            what the soft-argmax is taken of.
+        """
+        aside = guess[..., None] + coord[..., 0] * torch.tan(heading)[..., None]
+        straight = coord - torch.stack([torch.zeros_like(aside), aside, torch.zeros_like(aside)], dim=-1)
+        sums = cell_sums(straight.flatten(0, 1), mask.flatten(0, 1), features.flatten(0, 1), self.reach, self.cells)
+        grid = self.first(cell_features(sums)).unflatten(0, guess.shape)
+        for layer in self.grid:
+            grid = layer(grid)
+        logits, residual = self.where(self.local(grid) + self.context(context)[..., None, :]).unbind(-1)
+        share = logits.softmax(-1)
+        step = (share * (self.places + self.spacing * residual)).sum(-1)
+        seen = self.seen((share[..., None] * grid).sum(-2)) + context
+        if self.along is not None:
+            seen = self.along(nn.functional.gelu(seen))
+        return step, self.spread(nn.functional.gelu(seen))[..., 0] + _FIRST_LOG_STD, logits
+
+
+@full_precision
+def parabola(frame: Tensor, center: Tensor, weight: Tensor, stiffness: Tensor) -> tuple[Tensor, Tensor]:
+    """Fit a parabola through the centres of each sequence, by weighted least squares in its middle slice's frame.
+
+    Args:
+        frame: (B, S, 4) float64: x, y and direction of the slices' frames.
+        center: (B, S) y of the centres in them, m.
+        weight: (B, S) of the centres, > 0.
+        stiffness: (3,) > 0, what offset, slope and curvature cost: this keeps the fit defined if places coincide.
+
+    Returns:
+        y (B, S) at which the parabola crosses the slices' orthogonals, m, and its direction (B, S) in them, rad.
+    """
+    place, turn = _in_the_middle(frame, center.dtype)
+    left = torch.stack([-torch.sin(turn), torch.cos(turn)], dim=-1)
+    points = place + center[..., None] * left
+    # The middle's own offset costs nothing: a road far from the path is as good as one near it.
+    middle = points.mean(1, keepdim=True)[..., 1]
+    along = points[..., 0] / _PARABOLA_UNIT
+    powers = torch.stack([torch.ones_like(along), along, along * along], dim=-1)
+    weighted = powers * weight[..., None]
+    normal = weighted.transpose(1, 2) @ powers + torch.diag(stiffness)
+    factors = torch.linalg.solve(normal, (weighted * (points[..., 1] - middle)[..., None]).sum(1))
+    value = (powers @ factors[..., None])[..., 0] + middle
+    slope = (factors[:, 1:2] + 2.0 * factors[:, 2:] * along) / _PARABOLA_UNIT
+    # One step of Newton's method along the orthogonal: the parabola is nearly straight from here to there.
+    away = (points[..., 1] - value) / (left[..., 1] - slope * left[..., 0])
+    return center - away, torch.atan(slope) - turn
+
+
+def _in_the_middle(frame: Tensor, dtype: torch.dtype) -> tuple[Tensor, Tensor]:
+    """Return origins (B, S, 2) and directions (B, S), -pi to pi, of frames in that of the sequence's middle slice."""
+    middle = frame[:, frame.shape[1] // 2, :]
+    delta = frame[..., :2] - middle[:, None, :2]
+    cos, sin = torch.cos(middle[:, 2:3]), torch.sin(middle[:, 2:3])
+    x, y = delta.unbind(-1)
+    place = torch.stack([cos * x + sin * y, cos * y - sin * x], dim=-1)
+    # Directions of a path towards the west jump by a whole turn.
+    turn = torch.remainder(frame[..., 2] - middle[:, 2:3] + torch.pi, 2.0 * torch.pi) - torch.pi
+    return place.to(dtype), turn.to(dtype)

@@ -1,0 +1,1 @@
+"""Networks that give every point a class, and what they need to know of a cloud's geometry."""

@@ -1,0 +1,308 @@
+"""Convolutions over neighbours without their cost: computed once per support point, then gathered.
+
+A convolution over the neighbours ``j`` of a point ``i`` sees their features and relative positions,
+``x_ij = A f_j + B (p_j - p_i) / r``. It is linear, so ``x_ij = g_j - h_i`` with ``g = A f + B p / r`` once per support
+point and ``h = B p / r`` once per query. What follows it, a batch norm and a ReLU, rises or falls as a whole with each
+channel, so that the maximum over the neighbours can be taken first: of ``g_j``, or of ``-g_j`` where the norm's scale
+is negative. Nothing of the size points x neighbours x channels is kept, not even for the gradient; the norm's mean and
+variance over all pairs follow from how often each support point is a neighbour and from which directions it is seen.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import torch
+import torch.nn.functional as F  # noqa: N812 (its name everywhere)
+from torch import Tensor, nn
+
+from ..base import full_precision
+
+_CHUNK = {"cpu": 1 << 18}
+"""Gathered numbers at once: what a CPU's cache holds, or what a GPU needs to be busy."""
+_CHUNK_ELSEWHERE = 1 << 26
+
+
+class Norm(nn.BatchNorm1d):
+    """Batch norm over packed points (N, C); nothing special happens to batches of one point, or of none, in training.
+
+    A single value has no variance: it becomes the norm's bias, and the running statistics stay as they are.
+    """
+
+    def forward(self, values: Tensor) -> Tensor:
+        """Return the normalised values (N, C)."""
+        if self.training and len(values) < 2:
+            return values * 0 + self.bias
+        return super().forward(values)
+
+    def observe(self, mean: Tensor, variance: Tensor, count: int) -> None:
+        """Move the running statistics towards mean and (population) variance of `count` values, both (C,)."""
+        if count < 2 or self.running_mean is None or self.running_var is None or self.num_batches_tracked is None:
+            return
+        with torch.no_grad():
+            self.num_batches_tracked += 1
+            share = 1.0 / float(self.num_batches_tracked) if self.momentum is None else self.momentum
+            self.running_mean.lerp_(mean.detach(), share)
+            self.running_var.lerp_(variance.detach() * (count / (count - 1)), share)
+
+    def scale_sign(self) -> Tensor:
+        """Return +1 or -1 for each channel (C,): whether what the norm gives rises with what it gets."""
+        return torch.where(self.weight.detach() < 0, -1.0, 1.0).to(self.weight.dtype)
+
+
+class Grouping:
+    """Which M queries look at which of N support points, K neighbours each, and how the pairs lie.
+
+    Args:
+        index: (M, K) integers below N.
+        support: (N, 3) positions divided by the radius.
+        queries: (M, 3) positions divided by the radius.
+    """
+
+    def __init__(self, index: Tensor, support: Tensor, queries: Tensor) -> None:
+        self.index, self.support, self.queries = index, support, queries
+        self._seen: tuple[Tensor, Tensor, Tensor, Tensor] | None = None
+
+    @property
+    def pairs(self) -> int:
+        """Number of pairs, M x K."""
+        return self.index.numel()
+
+    def relative(self) -> Tensor:
+        """Return the position of each neighbour relative to its query, divided by the radius (M, K, 3)."""
+        gathered = self.support.index_select(0, self.index.reshape(-1)).view(*self.index.shape, 3)
+        return gathered - self.queries[:, None]
+
+    def seen(self) -> tuple[Tensor, Tensor, Tensor, Tensor]:
+        """Return how support points are seen; computed once, as it depends on the geometry alone.
+
+        The share of all pairs that each is in (N,); the sum of its relative positions less their overall mean, over the
+        number of pairs (N, 3); that mean (3,); the relative positions' covariance (3, 3).
+        """
+        if self._seen is None:
+            flat = self.index.reshape(-1).long()  # adding at 32-bit indices is slow
+            relative = self.relative().reshape(-1, 3)
+            mean = relative.mean(dim=0)
+            centred = relative - mean
+            share = torch.bincount(flat, minlength=len(self.support)).to(relative.dtype) / self.pairs
+            sums = torch.zeros_like(self.support).index_add_(0, flat, centred) / self.pairs
+            self._seen = share, sums, mean, centred.T @ centred / self.pairs
+        return self._seen
+
+    def moments(self, features: Tensor, directions: Tensor) -> tuple[Tensor, Tensor]:
+        """Return mean and population variance (C,) over all pairs of ``features_j + directions (p_j - p_i) / r``.
+
+        Args:
+            features: of the support points (N, C).
+            directions: (C, 3).
+        """
+        share, sums, mean, covariance = self.seen()
+        feature_mean = share @ features
+        # About a constant: as `share` and `sums` are centred, its value changes nothing, neither here nor in gradients.
+        centred = features - feature_mean.detach()
+        variance = (
+            share @ centred.square()
+            + 2.0 * ((sums.T @ centred) * directions.T).sum(dim=0)
+            + ((directions @ covariance) * directions).sum(dim=1)
+        )
+        return feature_mean + directions @ mean, variance.clamp(min=0.0)
+
+
+class _GatherMax(torch.autograd.Function):
+    @staticmethod
+    def forward(ctx: Any, values: Tensor, index: Tensor) -> Tensor:
+        largest, place = _largest(values, index, with_place=ctx.needs_input_grad[0])
+        ctx.save_for_backward(place)
+        ctx.shape = values.shape
+        return largest
+
+    @staticmethod
+    def backward(ctx: Any, *gradients: Tensor) -> tuple[Tensor, None]:
+        (place,) = ctx.saved_tensors
+        return gradients[0].new_zeros(ctx.shape).scatter_add_(0, place.long(), gradients[0]), None
+
+
+def gather_max(values: Tensor, index: Tensor) -> Tensor:
+    """Return the maximum (M, C) over the rows of `values` (N, C) that each row of `index` (M, K) names, K up to 255.
+
+    The gradient goes to the first of equal ones. Of the size M x K x C only a chunk is held at a time.
+    """
+    result: Tensor = _GatherMax.apply(values, index)
+    return result
+
+
+def _largest(values: Tensor, index: Tensor, *, with_place: bool) -> tuple[Tensor, Tensor]:
+    """Return maxima (M, C), and which row of `values` each comes from (M, C) or, if nobody asks, nothing (0,)."""
+    (queries, limit), channels = index.shape, values.shape[1]
+    largest = values.new_empty(queries, channels)
+    place = index.new_empty((queries, channels) if with_place else 0)
+    for rows in _chunks(queries, limit * channels, values.device):
+        gathered = values.index_select(0, index[rows].reshape(-1)).view(-1, limit, channels)
+        largest[rows] = gathered.amax(dim=1)
+        if with_place:
+            place[rows] = index[rows].gather(1, _first_column(gathered, largest[rows]))
+    return largest, place
+
+
+def _chunks(queries: int, size: int, device: torch.device) -> Iterator[slice]:
+    """Yield slices of queries of whose results, `size` numbers each, a cache holds all."""
+    rows = max(_CHUNK.get(device.type, _CHUNK_ELSEWHERE) // max(size, 1), 1)
+    for begin in range(0, queries, rows):
+        yield slice(begin, begin + rows)
+
+
+def _first_column(values: Tensor, largest: Tensor) -> Tensor:
+    """Return which of K values (M, K, C) is the largest, the first of equal ones (M, C); `values` are lost."""
+    limit = values.shape[1]
+    # The first of equal ones gets the largest number. Not integers: comparing into floats is far quicker.
+    countdown = torch.arange(limit, 0, -1, dtype=values.dtype, device=values.device)[:, None]
+    first = values.eq_(largest[:, None]).mul_(countdown).amax(dim=1)
+    return (limit - first.long()).clamp_(max=limit - 1)  # NaN equals nothing: any will do then
+
+
+@full_precision
+def normalised_max(features: Tensor, weight: Tensor, norm: Norm, grouping: Grouping) -> Tensor:
+    """Return the maximum over neighbours of a norm of a convolution, without activation (M, C).
+
+    Args:
+        features: of the support points (N, C0).
+        weight: of the convolution (C, 3 + C0), relative positions first.
+        norm: over the C channels; in training its statistics are those of all pairs.
+        grouping: who looks at whom.
+    """
+    sign = norm.scale_sign()
+    turned = weight * sign[:, None]
+    directions, own = turned[:, :3], turned[:, 3:]
+    values = features @ own.T
+    mean, variance = _statistics(norm, sign, grouping, values, directions)
+    scale = norm.weight * sign * torch.rsqrt(variance + norm.eps)
+    top = gather_max(torch.addmm(values, grouping.support, directions.T), grouping.index)
+    offset = torch.addmm(norm.bias - mean * scale, grouping.queries, -(directions * scale[:, None]).T)
+    return torch.addcmul(offset, top, scale)
+
+
+@full_precision
+def normalised_max_of_two(
+    features: Tensor, weights: tuple[Tensor, Tensor], norms: tuple[Norm, Norm], grouping: Grouping
+) -> Tensor:
+    """Return the maximum over neighbours of two layers, the second without activation (M, C2).
+
+    Args:
+        features: of the support points (N, C0).
+        weights: of the convolution (C1, 3 + C0), and of the layer that follows it on each pair (C2, C1).
+        norms: of both; between them is a ReLU.
+        grouping: who looks at whom.
+    """
+    first, second = norms
+    directions, own = weights[0][:, :3], weights[0][:, 3:]
+    values = features @ own.T
+    mean, variance = _statistics(first, torch.ones_like(first.weight), grouping, values, directions)
+    scale = first.weight * torch.rsqrt(variance + first.eps)
+    support = torch.addmm(values, grouping.support, directions.T) * scale
+    offset = torch.addmm(first.bias - mean * scale, grouping.queries, -(directions * scale[:, None]).T)
+    sign = second.scale_sign()
+    turned = weights[1] * sign[:, None]
+    top, total, product = pairs_max(support, offset, grouping.index, turned, moments=second.training)
+    mean, variance = _running(second, sign)
+    if second.training and grouping.pairs:
+        between = total / grouping.pairs
+        mean = turned @ between
+        covariance = product / grouping.pairs - torch.outer(between, between)
+        variance = ((turned @ covariance) * turned).sum(dim=1).clamp(min=0.0)
+        second.observe(mean * sign, variance, grouping.pairs)
+    scale = second.weight * sign * torch.rsqrt(variance + second.eps)
+    return torch.addcmul(second.bias - mean * scale, top, scale)
+
+
+def _statistics(
+    norm: Norm, sign: Tensor, grouping: Grouping, values: Tensor, directions: Tensor
+) -> tuple[Tensor, Tensor]:
+    """Return mean and variance (C,) that a norm uses for values of channels turned by `sign`."""
+    if not norm.training or not grouping.pairs:
+        return _running(norm, sign)
+    mean, variance = grouping.moments(values, directions)
+    norm.observe(mean * sign, variance, grouping.pairs)
+    return mean, variance
+
+
+def _running(norm: Norm, sign: Tensor) -> tuple[Tensor, Tensor]:
+    assert norm.running_mean is not None
+    assert norm.running_var is not None
+    return norm.running_mean * sign, norm.running_var
+
+
+class _PairsMax(torch.autograd.Function):
+    @staticmethod
+    def forward(
+        ctx: Any, support: Tensor, offset: Tensor, index: Tensor, weight: Tensor, moments: bool
+    ) -> tuple[Tensor, Tensor, Tensor]:
+        (queries, limit), (many, few) = index.shape, weight.shape
+        top, column = (
+            offset.new_empty(queries, many),
+            torch.empty(queries, many, dtype=torch.uint8, device=offset.device),
+        )
+        total, product = offset.new_zeros(few), offset.new_zeros(few, few)
+        for rows in _chunks(queries, limit * many, offset.device):
+            pairs = _pairs(support, offset[rows], index[rows])
+            after = (pairs @ weight.T).view(-1, limit, many)
+            top[rows] = after.amax(dim=1)
+            column[rows] = _first_column(after, top[rows]).to(torch.uint8)
+            if moments:
+                total += pairs.sum(dim=0)
+                product.addmm_(pairs.T, pairs)
+        ctx.save_for_backward(support, offset, index, weight, column)
+        ctx.moments = moments
+        return top, total, product
+
+    @staticmethod
+    def backward(ctx: Any, *gradients: Tensor) -> tuple[Tensor, Tensor, None, Tensor, None]:
+        support, offset, index, weight, column = ctx.saved_tensors
+        of_top, of_total, of_product = gradients
+        limit, many = index.shape[1], weight.shape[0]
+        of_support, of_offset, of_weight = (torch.zeros_like(each) for each in (support, offset, weight))
+        both = of_product + of_product.T
+        for rows in _chunks(len(index), limit * many, offset.device):
+            pairs = _pairs(support, offset[rows], index[rows])
+            of_after = pairs.new_zeros(len(of_top[rows]), limit, many)
+            of_after.scatter_(1, column[rows, None].long(), of_top[rows, None])
+            of_weight.addmm_(of_after.view(-1, many).T, pairs)
+            of_pairs = of_after.view(-1, many) @ weight
+            if ctx.moments:
+                of_pairs.addmm_(pairs, both).add_(of_total)
+            of_pairs.mul_(pairs.sign())  # through the ReLU
+            of_support.index_add_(0, index[rows].reshape(-1).long(), of_pairs)
+            of_offset[rows] = of_pairs.view(-1, limit, pairs.shape[1]).sum(dim=1)
+        return of_support, of_offset, None, of_weight, None
+
+
+def pairs_max(
+    support: Tensor, offset: Tensor, index: Tensor, weight: Tensor, *, moments: bool
+) -> tuple[Tensor, Tensor, Tensor]:
+    """Return the maximum over neighbours of a layer on ``y_ij = relu(support_j + offset_i)``, and moments of ``y``.
+
+    The pairs are made chunk by chunk, and again for the gradient, so that a cache holds them.
+
+    Args:
+        support: (N, C1).
+        offset: (M, C1).
+        index: (M, K) rows of `support`, K up to 255.
+        weight: of the layer (C2, C1).
+        moments: whether those are wanted; they are 0 otherwise.
+
+    Returns:
+        Maxima (M, C2), the sum of ``y`` over all pairs (C1,), and the sum of its products ``y y^T`` (C1, C1).
+    """
+    result: tuple[Tensor, Tensor, Tensor] = _PairsMax.apply(support, offset, index, weight, moments)
+    return result
+
+
+def _pairs(support: Tensor, offset: Tensor, index: Tensor) -> Tensor:
+    gathered = support.index_select(0, index.reshape(-1)).view(*index.shape, support.shape[1])
+    return F.relu_(gathered.add_(offset[:, None])).view(-1, support.shape[1])
+
+
+@full_precision
+def interpolate(values: Tensor, nearest: Tensor, weight: Tensor) -> Tensor:
+    """Return weighted sums (N, C) of the rows of `values` (M, C) that `nearest` (N, 3) names."""
+    return F.embedding_bag(nearest, values, mode="sum", per_sample_weights=weight.to(values.dtype))

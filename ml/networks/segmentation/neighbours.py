@@ -1,0 +1,267 @@
+"""Which points a network thins a cloud out to, and which of them look at which: computed before it, on the CPU.
+
+A network that halves the resolution stage by stage needs only indices and positions of each stage, and those depend on
+the geometry alone. So workers that prepare batches build them, with k-d trees, and the network itself only gathers.
+
+Clouds of a batch are packed: their points lie one after the other in arrays (sum N, C), and ``offset`` says where each
+cloud ends. No index ever leads from one cloud to another, so a batch gives what its clouds give one by one.
+
+Neighbourhoods hold a limited number of points. Out of a ball with more, the first in the cloud's order are taken, as
+PointNet++'s ball query does. With ``order="geometry"`` that order is a hash of the coordinates: a random subset of the
+ball, spread over all of it, that does not depend on the order in which the points came. (The nearest ones would shrink
+the ball.) Only points with the very same coordinates keep their given order among themselves.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from synthroads_addon.base.errors import InputError
+
+from ...data.points import thin
+
+Floats = NDArray[np.float64]
+Indices = NDArray[np.int64]
+Neighbours = dict[str, torch.Tensor]
+"""Tensors by name; ``s`` is a stage's number, 0 being the cloud itself, with M_s points:
+
+- ``positions{s}`` (M_s, 3): m, from the middle of the cloud's extent; in the dtype of the coordinates
+- ``offset{s}`` (B,) int64: where each cloud ends
+- ``sample{s}`` (M_s,) int64, s > 0: the stage's points among those of the stage before
+- ``group{s}`` (M_s, K) int32, s > 0: for each of the stage's points, its neighbours in the stage before
+- ``inner{s}`` (M_s, K) int32, s > 0: its neighbours in its own stage; only where the neighbourhood says so
+- ``nearest{s}`` (M_{s-1}, 3) int32, s > 0: for each point of the stage before, the nearest three of this stage
+- ``weight{s}`` (M_{s-1}, 3): their weights by inverse distance, of the sum 1
+"""
+
+_CHUNK = 1 << 15
+"""Queries whose pairs are held at once."""
+_TINY = 1e-8
+"""Added to distances, m, before they are inverted: as in PointNet++."""
+
+
+@dataclass(frozen=True)
+class Neighbourhood:
+    """How a cloud is thinned out and which points are neighbours.
+
+    Attributes:
+        radius: of the balls around the first stage's points, m; it doubles with each stage.
+        neighbours: points of a ball; fewer are filled up with the first one again.
+        strides: of the stages: one in so many points stays.
+        inner: of the stages: whether its points also look at each other, within twice the stage's radius.
+        sampling: ``grid`` keeps of each cell the point nearest to its middle; cells of the first stage are two thirds
+            of the radius wide, and double with each stage (a fourth of a surface's points then stays), and
+            ``farthest`` keeps exactly one in ``stride``, each the farthest from those already kept.
+        order: ``geometry``, a hash of the coordinates, or ``given``, the order of the points.
+
+    Raises:
+        InputError: a value is outside of what is possible.
+    """
+
+    radius: float = 0.3
+    neighbours: int = 32
+    strides: tuple[int, ...] = (4, 4, 4, 4)
+    inner: tuple[bool, ...] = (True, True, True, True)
+    sampling: str = "grid"
+    order: str = "geometry"
+
+    def __post_init__(self) -> None:
+        """Check the values."""
+        if not 0 < self.radius < float("inf"):
+            raise InputError("neighbourhood.radius", self.radius, "must be above 0 m and finite")
+        if not 1 <= self.neighbours <= 255:
+            raise InputError("neighbourhood.neighbours", self.neighbours, "must be from 1 to 255")
+        if not self.strides or min(self.strides) < 2 or len(self.inner) != len(self.strides):
+            raise InputError("neighbourhood.strides", self.strides, "must be 2 or more, one for each of `inner`")
+        for field, allowed in (("sampling", ("grid", "farthest")), ("order", ("geometry", "given"))):
+            if getattr(self, field) not in allowed:
+                raise InputError(f"neighbourhood.{field}", getattr(self, field), f"must be {' or '.join(allowed)}")
+
+    def stage_radius(self, stage: int) -> float:
+        """Return the radius of ``group{stage}``, m; that of ``inner{stage}`` is twice as large."""
+        return self.radius * 2.0 ** (stage - 1)
+
+
+def build_neighbours(coord: torch.Tensor, offset: torch.Tensor, neighbourhood: Neighbourhood) -> Neighbours:
+    """Return the stages of packed clouds.
+
+    Args:
+        coord: (N, 3) float32 or float64, m; on the CPU.
+        offset: (B,) integers: where each cloud ends. Clouds may be empty or of one point.
+        neighbourhood: what to look for.
+
+    Raises:
+        InputError: the offsets don't fit the points, a coordinate is not finite, or a cloud spans more cells of
+            its thinnings than 2^62.
+    """
+    ends = _checked_ends(coord, offset)
+    stages = len(neighbourhood.strides)
+    clouds = [
+        _stages_of(coord[begin:end].numpy(), neighbourhood) for begin, end in itertools.pairwise([0, *ends.tolist()])
+    ]
+    sizes = np.array([[len(cloud[f"positions{s}"]) for s in range(stages + 1)] for cloud in clouds], dtype=np.int64)
+    sizes = sizes.reshape(len(clouds), stages + 1)
+    begins = np.cumsum(sizes, axis=0) - sizes
+    packed: Neighbours = {}
+    for name, into, dtype in _names(neighbourhood):
+        shift = [0] * len(clouds) if into is None else begins[:, into].tolist()
+        parts = [cloud[name] + step if step else cloud[name] for cloud, step in zip(clouds, shift, strict=True)]
+        joined = np.concatenate(parts) if parts else _empty_part(name, neighbourhood)
+        packed[name] = torch.from_numpy(np.ascontiguousarray(joined)).to(dtype or coord.dtype)
+    for stage in range(stages + 1):
+        packed[f"offset{stage}"] = torch.from_numpy(np.cumsum(sizes[:, stage]))
+    return packed
+
+
+def _checked_ends(coord: torch.Tensor, offset: torch.Tensor) -> Indices:
+    if coord.ndim != 2 or coord.shape[1] != 3 or not coord.is_floating_point():
+        raise InputError("coord", tuple(coord.shape), "must be floating-point numbers of the shape (N, 3)")
+    ends = np.asarray(offset.cpu().numpy(), dtype=np.int64)
+    if ends.ndim != 1 or np.any(np.diff(ends, prepend=0) < 0) or (ends[-1] if len(ends) else 0) != len(coord):
+        raise InputError("offset", ends.tolist(), f"must rise from 0 or more to the number of points, {len(coord)}")
+    if not bool(torch.isfinite(coord).all()):
+        raise InputError("coord", "NaN or infinity", "must be finite numbers, m")
+    return ends
+
+
+def _names(neighbourhood: Neighbourhood) -> Iterator[tuple[str, int | None, torch.dtype | None]]:
+    """Yield the names of a cloud's arrays, the stage that they point into, and their dtype (None: the coordinates')."""
+    yield "positions0", None, None
+    for stage, inner in enumerate(neighbourhood.inner, start=1):
+        yield f"positions{stage}", None, None
+        yield f"sample{stage}", stage - 1, torch.int64
+        yield f"group{stage}", stage - 1, torch.int32
+        if inner:
+            yield f"inner{stage}", stage, torch.int32
+        yield f"nearest{stage}", stage, torch.int32
+        yield f"weight{stage}", None, None
+
+
+def _empty_part(name: str, neighbourhood: Neighbourhood) -> NDArray[np.float64]:
+    return np.zeros((0,) if name.startswith("sample") else (0, _columns(name, neighbourhood)))
+
+
+def _columns(name: str, neighbourhood: Neighbourhood) -> int:
+    return neighbourhood.neighbours if name.startswith(("group", "inner")) else 3
+
+
+def _stages_of(coord: NDArray[np.floating], neighbourhood: Neighbourhood) -> dict[str, NDArray[np.generic]]:
+    """Return the arrays of one cloud, with indices that count from its own first point."""
+    local = _about_middle(coord)
+    order = geometric_order(local) if neighbourhood.order == "geometry" else np.arange(len(local))
+    # What the network sees is rounded to the coordinates' dtype, so neighbours are those of the rounded positions.
+    points = local[order].astype(np.float64)
+    found: dict[str, NDArray[np.generic]] = {"positions0": local}
+    tree = cKDTree(points) if len(points) else None
+    for stage, stride in enumerate(neighbourhood.strides, start=1):
+        radius = neighbourhood.stage_radius(stage)
+        sample = _sample(points, stride, radius, neighbourhood.sampling)
+        kept = points[sample]
+        kept_tree = cKDTree(kept) if len(kept) else None
+        found[f"positions{stage}"] = kept.astype(local.dtype)
+        found[f"sample{stage}"] = sample
+        found[f"group{stage}"] = _first_in_ball(kept_tree, tree, radius, neighbourhood.neighbours)
+        if neighbourhood.inner[stage - 1]:
+            found[f"inner{stage}"] = _first_in_ball(kept_tree, kept_tree, 2 * radius, neighbourhood.neighbours)
+        found[f"nearest{stage}"], found[f"weight{stage}"] = nearest_three(points, kept_tree)
+        points, tree = kept, kept_tree
+    return _in_given_order(found, order)
+
+
+def _about_middle(coord: NDArray[np.floating]) -> NDArray[np.floating]:
+    """Return coordinates about the middle of their extent, which, unlike a sum, doesn't depend on the points' order."""
+    if not len(coord):
+        return coord
+    exact = coord.astype(np.float64)
+    return (exact - 0.5 * (exact.min(axis=0) + exact.max(axis=0))).astype(coord.dtype)
+
+
+def _in_given_order(found: dict[str, NDArray[np.generic]], order: Indices) -> dict[str, NDArray[np.generic]]:
+    """Return arrays that were found in another order of the cloud's points such that they fit the given one."""
+    place = np.empty_like(order)
+    place[order] = np.arange(len(order))
+    turned = {name: order[found[name]] if len(order) else found[name] for name in ("sample1", "group1")}
+    return found | turned | {name: found[name][place] for name in ("nearest1", "weight1")}
+
+
+def geometric_order(points: NDArray[np.floating]) -> Indices:
+    """Return an order of points (N, 3) that looks random but follows from their coordinates alone."""
+    bits = np.ascontiguousarray(points.astype(np.float64) + 0.0).view(np.uint64)  # + 0.0: one zero, not two
+    key = np.zeros(len(points), dtype=np.uint64)
+    for axis in range(3):
+        key = _mix_bits(key ^ bits[:, axis])
+    return np.argsort(key, kind="stable")
+
+
+def _mix_bits(key: NDArray[np.uint64]) -> NDArray[np.uint64]:
+    """Return 64-bit numbers stirred (the finaliser of SplitMix64; Steele, Lea and Flood, 2014)."""
+    key = key + np.uint64(0x9E3779B97F4A7C15)
+    key = (key ^ (key >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
+    key = (key ^ (key >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
+    return key ^ (key >> np.uint64(31))
+
+
+def _sample(points: Floats, stride: int, radius: float, sampling: str) -> Indices:
+    if not len(points):
+        return np.zeros(0, dtype=np.int64)
+    if sampling == "grid":
+        return thin(points - points.min(axis=0), radius * 2.0 / 3.0)
+    return farthest_sample(points, max(len(points) // stride, 1))
+
+
+def farthest_sample(points: Floats, count: int) -> Indices:
+    """Return points each of which is the farthest from those before it, the first one first; the first of equal ones.
+
+    Eldar et al., "The farthest point strategy for progressive image sampling" (1997). Takes N x count distances.
+    """
+    columns = np.ascontiguousarray(points.T)
+    distance = np.full(len(points), np.inf)
+    chosen = np.zeros(count, dtype=np.int64)
+    for step in range(1, count):
+        apart = columns - columns[:, chosen[step - 1], None]
+        np.minimum(distance, np.square(apart, out=apart).sum(axis=0), out=distance)
+        chosen[step] = distance.argmax()
+    return chosen
+
+
+def _first_in_ball(queries: cKDTree | None, support: cKDTree | None, radius: float, limit: int) -> Indices:
+    """Return for each query the first `limit` support points nearer than the radius (M, limit), padded with the first.
+
+    Every query is a support point itself, so that no ball is empty.
+    """
+    if queries is None or support is None:
+        return np.zeros((0, limit), dtype=np.int64)
+    found = np.full((queries.n, limit), -1, dtype=np.int64)
+    for begin in range(0, queries.n, _CHUNK):
+        part = queries if queries.n <= _CHUNK else cKDTree(queries.data[begin : begin + _CHUNK])
+        pairs = part.sparse_distance_matrix(support, radius, output_type="ndarray")
+        pairs = pairs[pairs["v"] < radius]
+        key = np.sort(pairs["i"].astype(np.int64) * support.n + pairs["j"])
+        query, neighbour = key // support.n, key % support.n
+        first = np.searchsorted(query, np.arange(part.n))
+        rank = np.arange(len(key)) - first[query]
+        inside = rank < limit
+        found[begin + query[inside], rank[inside]] = neighbour[inside]
+    return np.where(found < 0, found[:, :1], found)
+
+
+def nearest_three(points: Floats, tree: cKDTree | None) -> tuple[Indices, Floats]:
+    """Return for each point the nearest three of a tree and their weights, 1 / (distance + 1e-8), of the sum 1.
+
+    Where the tree has fewer, index and weight of the others are 0.
+    """
+    nearest = np.zeros((len(points), 3), dtype=np.int64)
+    weight = np.zeros((len(points), 3))
+    if tree is not None:
+        count = min(tree.n, 3)
+        distance, index = tree.query(points, k=[*range(1, count + 1)])
+        nearest[:, :count], weight[:, :count] = index, 1.0 / (distance + _TINY)
+        weight /= weight.sum(axis=1, keepdims=True)
+    return nearest, weight

@@ -1,0 +1,281 @@
+"""Predictors that learn nothing: a model counts only where it beats them.
+
+Each looks at the points of one slice, or of `SEQUENCE` metres about it: as many as the models see that take ten slices
+at once. As these lie apart, `SPANNED` ones are also taken from every slice of `SPAN` metres, by a parabola through what
+each says. Where a slice has fewer than `FEWEST` points there is no prediction.
+
+- `centroid`: the mean of the points;
+- `middle of the extent`: between the outermost points;
+- `middle of the bright`: between the outermost of the bright points, those above the middle of the intensity's range.
+  The range is from the 5 % to the 95 % quantile; "outermost" are the 5 % and 95 % quantiles too, against stray points;
+- `between the brightest`: between the brightest strip left of the extent's middle and the brightest right of it, as
+  edge lines or verges of a rural road; strips of `STRIP`, with at least `FEWEST_OF_STRIP` points.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import ndimage
+from scipy.spatial import cKDTree
+from skimage.morphology import skeletonize
+
+from synthroads_addon.base.thresholds import otsu
+
+from ..data.axis import MeasuredAxis
+
+Float = NDArray[np.float64]
+Index = NDArray[np.intp]
+Rule = Callable[[Float, Float], float]
+"""From the points' y (N,), m, and intensities (N,) of one slice to the centre's y, m."""
+
+SEQUENCE = 10.0
+"""m."""
+SPAN = 37.0
+"""Length that ten slices of 1 m span which are 4 m apart, m."""
+FEWEST = 5
+STRIP = 0.25
+"""m."""
+FEWEST_OF_STRIP = 2
+_TAIL = 0.05
+
+
+def centroid(y: Float, intensity: Float) -> float:
+    """Return the mean."""
+    return float(y.mean())
+
+
+def extent_middle(y: Float, intensity: Float) -> float:
+    """Return the middle between the outermost points."""
+    return float(y.min() + y.max()) / 2.0
+
+
+def bright_middle(y: Float, intensity: Float) -> float:
+    """Return the middle between the outermost bright points."""
+    low, high = np.quantile(intensity, [_TAIL, 1.0 - _TAIL])
+    bright = y[intensity >= (low + high) / 2.0]
+    return float(np.quantile(bright, [_TAIL, 1.0 - _TAIL]).mean())
+
+
+def between_brightest(y: Float, intensity: Float) -> float:
+    """Return the middle between the brightest strip left and right of the extent's middle."""
+    middle = extent_middle(y, intensity)
+    number = np.floor((y - middle) / STRIP).astype(np.intp)
+    first = int(number.min())
+    count = np.bincount(number - first)
+    mean = np.bincount(number - first, intensity) / np.maximum(count, 1)
+    mean[count < FEWEST_OF_STRIP] = -np.inf
+    right, left = mean[: max(0, -first)], mean[max(0, -first) :]
+    if not np.isfinite(right).any() or not np.isfinite(left).any():
+        return float("nan")
+    numbers = (int(right.argmax()) + first, int(left.argmax()) + max(0, first))
+    return middle + STRIP * (sum(numbers) + 1.0) / 2.0
+
+
+RULES: dict[str, tuple[Rule, float]] = {
+    "centroid": (centroid, 1.0),
+    "middle of the extent": (extent_middle, 1.0),
+    "middle of the bright": (bright_middle, 1.0),
+    "between the brightest": (between_brightest, 1.0),
+    "middle of the extent, 10 m": (extent_middle, SEQUENCE),
+    "middle of the bright, 10 m": (bright_middle, SEQUENCE),
+    "between the brightest, 10 m": (between_brightest, SEQUENCE),
+}
+"""Predictors by name: rule and length of the slice along the frame, m."""
+SPANNED = ("middle of the extent", "middle of the bright")
+"""Those that are also taken over `SPAN`."""
+
+
+def slice_centers(rule: Rule, number: Index, y: Float, intensity: Float, count: int) -> Float:
+    """Return the centres' y (M,), m; NaN where a slice has too few points.
+
+    Args:
+        rule: one of `RULES`.
+        number: (N,) the slice that each point lies in.
+        y: (N,) across, in its slice's frame, m.
+        intensity: (N,) of any scale.
+        count: M, of slices.
+    """
+    result = np.full(count, np.nan)
+    order = np.argsort(number, kind="stable")
+    ends = np.cumsum(np.bincount(number, minlength=count))
+    for index, own in enumerate(np.split(order, ends[:-1])):
+        if len(own) >= FEWEST:
+            result[index] = rule(y[own], intensity[own])
+    return result
+
+
+Mask = NDArray[np.bool_]
+
+MASKS = ("classes", "ground", "dark")
+WINDOW = 100
+"""Slices of a window."""
+MARGIN = 40
+"""Slices before and behind a window that are thinned with it, so that a window's end is no end of the road."""
+REACH = 5.0
+"""Bins farther apart than this, m, and than three bins are not joined by a line."""
+_AROUND = np.ones((3, 3), dtype=bool)
+
+
+@dataclass(frozen=True)
+class SkeletonSettings:
+    """Settings that a grid search chooses.
+
+    Attributes:
+        raster: width of a pixel, m.
+        branch: branches shorter than this are cut off, m.
+        mask: out of `MASKS`.
+        bin: width of the bins along the principal axis, m.
+    """
+
+    raster: float = 1.0
+    branch: float = 15.0
+    mask: str = "classes"
+    bin: float = 5.0
+
+
+def skeleton_centers(
+    xy: Float, intensity: Float | None, origin: Float, direction: Float, settings: SkeletonSettings = SkeletonSettings()
+) -> Float:
+    """Return where the baseline's line crosses each slice's orthogonal: y in its frame (M,), m; NaN where it doesn't.
+
+    Args:
+        xy: (N, 2) the road's points, m.
+        intensity: (N,) of any scale; needed for the mask ``dark`` only.
+        origin: (M, 2) of the slices' frames, about a metre apart, in their order along the path.
+        direction: (M,) of the frames, rad.
+        settings: raster, branches, mask, bins.
+    """
+    return centers_on(skeletons(xy, intensity, origin, settings), origin, direction, settings.bin)
+
+
+def skeletons(xy: Float, intensity: Float | None, origin: Float, settings: SkeletonSettings) -> list[Float]:
+    """Return the pruned skeleton's points (K, 2) of each window; arguments as of `skeleton_centers`."""
+    place = cKDTree(origin)
+    slice_of = place.query(xy)[1]
+    order = np.argsort(slice_of, kind="stable")
+    sorted_slices = slice_of[order]
+    result = []
+    for first in range(0, len(origin), WINDOW):
+        last = min(first + WINDOW, len(origin))
+        begin, end = np.searchsorted(sorted_slices, [first - MARGIN, last + MARGIN])
+        own = order[begin:end]
+        line = np.empty((0, 2))
+        if len(own):
+            line = skeleton_points(xy[own], None if intensity is None else intensity[own], settings)
+        belongs = place.query(line)[1] if len(line) else np.empty(0, dtype=np.intp)
+        result.append(line[(belongs >= first) & (belongs < last)])
+    return result
+
+
+def centers_on(lines: Sequence[Float], origin: Float, direction: Float, width: float) -> Float:
+    """Return `skeleton_centers` of the windows' skeletons (K, 2), averaged in bins of a width, m."""
+    result = np.full(len(origin), np.nan)
+    parts = [slice(first, first + WINDOW) for first in range(0, len(origin), WINDOW)]
+    chains = [average_along(line, width, direction[part]) for line, part in zip(lines, parts, strict=True)]
+    for number, part in enumerate(parts):
+        # With its neighbours, as the line goes on from window to window.
+        chain = np.concatenate(chains[max(0, number - 1) : number + 2])
+        result[part] = crossings(chain, origin[part], direction[part], max(REACH, 3.0 * width))
+    return result
+
+
+def skeleton_points(xy: Float, intensity: Float | None, settings: SkeletonSettings) -> Float:
+    """Return the middles (K, 2) of the pixels of the pruned skeleton of points (N, 2), m."""
+    corner = np.floor(xy.min(axis=0) / settings.raster) - 1.0
+    cell = (np.floor(xy / settings.raster) - corner).astype(np.intp)
+    shape = tuple(cell.max(axis=0) + 2)
+    mask = np.zeros(shape, dtype=bool)
+    if settings.mask == "dark" and intensity is not None:
+        cell = cell[_in_dark_pixels(cell, shape, intensity)]
+    mask[cell[:, 0], cell[:, 1]] = True
+    pixels = np.argwhere(prune_skeleton(skeletonize(mask), settings.branch / settings.raster))
+    return (pixels + corner + 0.5) * settings.raster
+
+
+def _in_dark_pixels(cell: Index, shape: tuple[int, ...], intensity: Float) -> Mask:
+    """Return which points (N,) lie in pixels whose median intensity is below Otsu's threshold of the pixels."""
+    number = np.ravel_multi_index((cell[:, 0], cell[:, 1]), shape)
+    used, owner = np.unique(number, return_inverse=True)
+    median = ndimage.median(intensity, owner, np.arange(len(used)))
+    return (median <= otsu(median))[owner]
+
+
+def prune_skeleton(skeleton: Mask, shortest: float) -> Mask:
+    """Return a skeleton without branches shorter than ``shortest`` pixels, thinned again after each round of cuts.
+
+    Args:
+        skeleton: (rows, columns), one pixel wide.
+        shortest: length in pixels along the branch, a diagonal step being the root of two.
+    """
+    while True:
+        number, free = _branches(skeleton)
+        short = [label for label, length in _lengths(number, free) if length < shortest]
+        if not short:
+            return skeleton
+        skeleton = skeletonize(skeleton & ~np.isin(number, short))
+
+
+def _branches(skeleton: Mask) -> tuple[NDArray[np.int32], list[int]]:
+    """Return the skeleton's pixels numbered by the line that they belong to, and the numbers of those that end freely.
+
+    Lines meet at junctions: connected pixels with three or more neighbours that three or more lines touch. Pixels of a
+    step in a line have three neighbours as well, but only two lines: they join them.
+    """
+    neighbours = ndimage.convolve(skeleton.astype(np.int8), _AROUND.astype(np.int8), mode="constant") - 1
+    crowded = skeleton & (neighbours > 2)
+    number, _ = ndimage.label(skeleton & ~crowded, structure=_AROUND)
+    knots, _ = ndimage.label(crowded, structure=_AROUND)
+    junction = np.zeros_like(skeleton)
+    for knot, part in enumerate(ndimage.find_objects(knots), 1):
+        box = tuple(slice(max(0, side.start - 1), side.stop + 1) for side in part)
+        own = knots[box] == knot
+        touching = np.unique(number[box][ndimage.binary_dilation(own, _AROUND)])
+        junction[box] |= own & (np.count_nonzero(touching) > 2)
+    number, _ = ndimage.label(skeleton & ~junction, structure=_AROUND)
+    ends = skeleton & ~junction & (neighbours <= 1)
+    return number, [int(label) for label in np.unique(number[ends])]
+
+
+def _lengths(number: NDArray[np.int32], chosen: list[int]) -> Iterator[tuple[int, float]]:
+    """Yield number and length in pixels of each of the chosen lines: its pixels, diagonal steps counting more."""
+    boxes = ndimage.find_objects(number)
+    for label in chosen:
+        own = number[boxes[label - 1]] == label
+        diagonal = np.count_nonzero(own[1:, 1:] & own[:-1, :-1]) + np.count_nonzero(own[1:, :-1] & own[:-1, 1:])
+        yield label, np.count_nonzero(own) + (2.0**0.5 - 1.0) * diagonal
+
+
+def average_along(points: Float, width: float, direction: Float) -> Float:
+    """Return points (K, 2) averaged per bin of their principal axis, (J, 2) in the order along the path, m.
+
+    Args:
+        points: of a window's skeleton.
+        width: of a bin, m.
+        direction: (M,) of the window's frames, rad: which way the path runs.
+    """
+    if len(points) < 2:
+        return np.empty((0, 2))
+    middle = points.mean(axis=0)
+    axes = np.linalg.svd(points - middle, full_matrices=False)[2]
+    if axes[0] @ (np.cos(direction).sum(), np.sin(direction).sum()) < 0.0:
+        axes = -axes
+    local = (points - middle) @ axes.T
+    _, owner = np.unique(np.floor(local[:, 0] / width).astype(np.intp), return_inverse=True)
+    count = np.bincount(owner)
+    mean = np.column_stack([np.bincount(owner, local[:, side]) / count for side in (0, 1)])
+    return mean @ axes + middle
+
+
+def crossings(chain: Float, origin: Float, direction: Float, reach: float = REACH) -> Float:
+    """Return where a chain of points (J, 2) crosses each frame's orthogonal, y (M,), m; NaN where it doesn't.
+
+    Points farther than ``reach`` (m) apart are not joined; of several crossings the one nearest to the frame counts.
+    """
+    apart = np.hypot(*np.diff(chain, axis=0).T)
+    if not (apart > 0.0).any():
+        return np.full(len(origin), np.nan)
+    return MeasuredAxis(chain, apart <= reach).crossing(origin, direction)[0]

@@ -1,0 +1,277 @@
+"""Any predictor of centrelines, measured on roads with a known axis.
+
+A predictor is a function from a road and M frames of slices to (M, 2 or more) numbers: y of the centre in each frame, m
+(NaN: none), and its standard deviation, m (NaN: none). Columns of a corridor may follow, see `CORRIDOR_COLUMNS`.
+
+Every predictor sees the same points in the same frames. Both depend on a seed:
+
+- where a strip of points was cut around the axis beforehand, both sides of every slice are cropped at random and
+  independently (`Cropping`), as the middle of what is left must not be the answer;
+- the frames come from a path that strays to either side within a window and errs in its direction. What strays is the
+  axis of a synthetic road, which is scanned far to both sides; for a real one it is the path that is estimated from its
+  *cropped* points.
+
+Of a synthetic road's carriageways the other one is cut off somewhere beside the middle of the median.
+
+Slices in which the truth's axis has a gap are left out.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+from itertools import product
+
+import numpy as np
+from numpy.typing import NDArray
+
+from synthroads_addon.base.errors import InputError
+from synthroads_addon.base.random_streams import stream
+
+from ..data.corridor import CORRIDOR, Truth
+from ..data.frames import Frames, along, displace_frames, estimated_path, stretches
+from ..data.points import ROAD_CLASSES
+from ..data.roads import LearningRoad, Slices, crop_road, cut_beside_median
+from ..data.slices import SliceSettings
+from . import baselines
+from .distances import figures, over_roads, over_seeds
+from .tables import Spread
+
+Float = NDArray[np.float64]
+Predictor = Callable[[LearningRoad, Frames], Float]
+
+CORRIDOR_COLUMNS = ("center", "center_std", *CORRIDOR, *(f"{name}_std" for name in CORRIDOR), "center_68", "center_95")
+"""Columns of a prediction; only the first is needed. Those of the corridor are for pictures. The last two are the
+half-widths of the centre's intervals of 68 % and 95 %, m: by the standard deviation where they aren't given."""
+HALF_WIDTH = SliceSettings().half_width
+"""Trivial predictors see points up to this far beside a frame where nothing else is said, m."""
+
+
+@dataclass(frozen=True)
+class Cropping:
+    """How the sides of slices are cut off, see `roads.cropped`.
+
+    Attributes:
+        share: the largest part of the distance from the axis to the outermost point that is cut off; uniform from 0.
+        length: metres along the axis over which the cuts stay the same. 1: every slice has cuts of its own, which
+            average out over a sequence of slices. Longer ones don't.
+    """
+
+    share: float = 0.5
+    length: float = 1.0
+
+
+@dataclass(frozen=True)
+class Case:
+    """A road as one seed shows it: its points, cropped perhaps, and the frames in which it is looked at."""
+
+    road: LearningRoad
+    frames: Frames
+
+
+def case(
+    road: LearningRoad, seed: int, *, cropping: Cropping | None, estimated: bool, settings: SliceSettings | None = None
+) -> Case:
+    """Return a road as a seed shows it.
+
+    Args:
+        road: with a known truth.
+        seed: of cuts and of how the path strays.
+        cropping: None: all points stay.
+        estimated: whether the path is found in the points; else it is the axis. Both stray.
+        settings: how far the path strays; those of `SliceSettings` if not given.
+
+    Raises:
+        InputError: the road has no truth.
+    """
+    settings = settings or SliceSettings()
+    seen = road if cropping is None else crop_road(road, cropping.share, seed, cropping.length)
+    seen = cut_beside_median(seen, settings.median_error, stream(seed, "median", road.name))
+    path = estimated_path(seen.xyz.astype(np.float64)) if estimated else truth_of(road).axis
+    rng = stream(seed, "frames", road.name)
+    strayed = displace_frames(along(path), rng, settings.window, settings.direction_deg, settings.wander_length)
+    return Case(seen, strayed)
+
+
+def truth_of(road: LearningRoad) -> Truth:
+    """Return a road's truth.
+
+    Raises:
+        InputError: it isn't known.
+    """
+    if road.truth is None:
+        raise InputError("road", road.name, "must have a known centreline to be measured on")
+    return road.truth
+
+
+def evaluate(predictor: Predictor, shown: Case) -> dict[str, float]:
+    """Return the figures of one predictor on one road, see `metrics.figures`."""
+    frames = shown.frames
+    predicted = predictor(shown.road, frames)
+    true, _ = truth_of(shown.road).axis.crossing(frames.position, frames.direction)
+    std = predicted[:, 1] if predicted.shape[1] > 1 else None
+    intervals = predicted[:, -2:] if predicted.shape[1] == len(CORRIDOR_COLUMNS) else None
+    return figures(frames.at(predicted[:, 0]), frames.at(true), frames.station, std, intervals)
+
+
+def measure(
+    predictors: Mapping[str, Sequence[Predictor]], cases: Callable[[int], Sequence[Case]], seeds: Sequence[int]
+) -> dict[str, dict[str, dict[str, Spread]]]:
+    """Return figures by predictor and road (`all` being all together), over seeds.
+
+    Args:
+        predictors: by name; one per seed, as models that were trained with it, or one for all seeds.
+        cases: the roads as a seed shows them.
+        seeds: of cuts and frames. The n-th predictor is measured with the n-th seed.
+
+    Raises:
+        InputError: two roads have the same name, by which figures are told apart.
+    """
+    rows: dict[str, dict[str, list[dict[str, float]]]] = {name: {} for name in predictors}
+    for name, versions in predictors.items():
+        if len(versions) not in (1, len(seeds)):
+            raise ValueError(f"{name}: {len(versions)} predictors for {len(seeds)} seeds")
+    for index, seed in enumerate(seeds):
+        shown = cases(seed)
+        names = [one.road.name for one in shown]
+        if twice := {name for name in names if names.count(name) > 1}:
+            raise InputError("road", sorted(twice)[0], "is the name of several roads; give data sets of other names")
+        found: dict[str, dict[str, dict[str, float]]] = {name: {} for name in predictors}
+        for one in shown:  # road by road: predictors share what they cut out of it
+            for name, versions in predictors.items():
+                found[name][one.road.name] = evaluate(versions[0 if len(versions) == 1 else index], one)
+        for name, by_name in found.items():
+            for road, row in (*by_name.items(), ("all", over_roads(by_name.values()))):
+                rows[name].setdefault(road, []).append(row)
+    return {name: {road: over_seeds(values) for road, values in by_road.items()} for name, by_road in rows.items()}
+
+
+def trivial_predictor(name: str, cut: Cut | None = None) -> Predictor:
+    """Return one of `baselines.RULES`, which sees what is cut out: its own, or what several predictors share."""
+    rule, length = baselines.RULES[name]
+    cut = cut or Cut()
+
+    def predict(road: LearningRoad, frames: Frames) -> Float:
+        found = cut(road, frames, length)
+        own = road.belonging[found.index]
+        y, intensity = found.xy[own, 1], road.intensity[found.index[own]].astype(np.float64)
+        return baselines.slice_centers(rule, found.number[own], y, intensity, len(frames))[:, None]
+
+    return predict
+
+
+class Cut:
+    """Slices of one road at a time, of each thickness cut out once.
+
+    Args:
+        half_width: points up to this are seen beside a frame, m.
+    """
+
+    def __init__(self, half_width: float = HALF_WIDTH) -> None:
+        self.half_width = half_width
+        self._last: tuple[LearningRoad, Frames] | None = None
+        self._slices: dict[float, Slices] = {}
+
+    def __call__(self, road: LearningRoad, frames: Frames, thickness: float) -> Slices:
+        """Return the points in each slice of so many metres."""
+        if self._last is None or self._last[0] is not road or self._last[1] is not frames:
+            self._last, self._slices = (road, frames), {}
+        if thickness not in self._slices:
+            self._slices[thickness] = road.slices(frames, self.half_width, thickness)
+        return self._slices[thickness]
+
+
+def skeleton_predictor(settings: baselines.SkeletonSettings) -> Predictor:
+    """Return the skeleton baseline; the mask ``classes`` takes the points of the road's classes where there are any."""
+
+    def predict(road: LearningRoad, frames: Frames) -> Float:
+        xy, intensity = _mask_points(road, settings.mask)
+        return baselines.skeleton_centers(xy, intensity, frames.position, frames.direction, settings)[:, None]
+
+    return predict
+
+
+def _mask_points(road: LearningRoad, mask: str) -> tuple[Float, Float]:
+    """Return places (N, 2) and intensities (N,) of the points that the skeleton's mask is made of."""
+    paved = np.isin(road.class_id, road.ids_of(ROAD_CLASSES))
+    own = road.belonging & paved if mask == "classes" and paved.any() else road.belonging
+    return road.xyz[own, :2].astype(np.float64), road.intensity[own].astype(np.float64)
+
+
+def path_itself(road: LearningRoad, frames: Frames) -> Float:
+    """Predict the frames' own origins: what the displaced path alone would be worth."""
+    return np.zeros((len(frames), 1))
+
+
+def trivial_predictors(half_width: float = HALF_WIDTH) -> dict[str, list[Predictor]]:
+    """Return all predictors that learn nothing, by name, for `measure`; see `trivial_predictor`."""
+    found: dict[str, list[Predictor]] = {"the displaced path": [path_itself]}
+    cut = Cut(half_width)
+    found |= {name: [trivial_predictor(name, cut)] for name in baselines.RULES}
+    for name in baselines.SPANNED:
+        rule = trivial_predictor(name, cut)
+        found[f"{name}, parabola of {baselines.SPAN:.0f} m"] = [along_parabolas(rule, baselines.SPAN)]
+    return found
+
+
+def along_parabolas(predictor: Predictor, length: float) -> Predictor:
+    """Return what predicts, of each frame, the parabola through a predictor's centres that far along the path, m."""
+
+    def predict(road: LearningRoad, frames: Frames) -> Float:
+        y = predictor(road, frames)[:, 0]
+        place, result = frames.at(y), np.full(len(y), np.nan)
+        for part in stretches(frames):
+            known = part[np.isfinite(y[part])]
+            for own in part:
+                near = known[np.abs(frames.station[known] - frames.station[own]) <= 0.5 * length]
+                if len(near) >= baselines.FEWEST:
+                    cos, sin = np.cos(frames.direction[own]), np.sin(frames.direction[own])
+                    x, aside = ((place[near] - frames.position[own]) @ np.array([[cos, -sin], [sin, cos]])).T
+                    result[own] = np.polyfit(x, aside, 2)[2]
+        return result[:, None]
+
+    return predict
+
+
+@dataclass(frozen=True)
+class GridSearch:
+    """Variants tried for the baseline, and the best.
+
+    Attributes:
+        best: of the settings that find at least `FOUND` of the slices, the one with the smallest mean distance.
+        rows: settings with their figures.
+    """
+
+    best: baselines.SkeletonSettings
+    rows: list[tuple[baselines.SkeletonSettings, dict[str, float]]]
+
+
+FOUND = 0.8
+RASTERS = (0.25, 0.5, 1.0, 2.0)
+BRANCHES = (5.0, 10.0, 15.0, 30.0)
+BINS = (1.0, 5.0, 10.0)
+"""m."""
+
+
+def grid_search(shown: Sequence[Case], masks: Sequence[str]) -> GridSearch:
+    """Return the baseline's best settings on the cases of one road, to be frozen for all others."""
+    rows: list[tuple[baselines.SkeletonSettings, dict[str, float]]] = []
+    for mask, raster, branch in product(masks, RASTERS, BRANCHES):
+        tried = [baselines.SkeletonSettings(raster, branch, mask, width) for width in BINS]
+        found: list[list[dict[str, float]]] = [[] for _ in tried]
+        for one in shown:
+            frames = one.frames
+            # Thinning takes the time, and doesn't depend on the bins.
+            lines = baselines.skeletons(*_mask_points(one.road, mask), frames.position, tried[0])
+            for settings, some in zip(tried, found, strict=True):
+                y = baselines.centers_on(lines, frames.position, frames.direction, settings.bin)
+                some.append(evaluate(partial(_as_column, y), one))
+        rows.extend((settings, over_roads(some)) for settings, some in zip(tried, found, strict=True))
+    enough = [row for row in rows if row[1]["found"] >= FOUND] or rows
+    best = min(enough, key=lambda row: row[1]["mae"] if np.isfinite(row[1]["mae"]) else np.inf)
+    return GridSearch(best[0], rows)
+
+
+def _as_column(y: Float, road: LearningRoad, frames: Frames) -> Float:
+    return y[:, None]

@@ -1,0 +1,304 @@
+"""Pictures of what was found, over the cloud that it was found in: centrelines and corridors, classes from above."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image
+from scipy.stats import rankdata
+
+from synthroads_addon.base.classes import class_scheme
+
+from ..data.classes import IGNORED
+from ..data.corridor import CORRIDOR
+from ..data.frames import Frames
+from ..data.tiles import CloudTile
+from .calibration import DEVIATIONS, LEVELS
+from .evaluation import CORRIDOR_COLUMNS, Case, truth_of
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+Float = NDArray[np.float64]
+
+COLORS = ("#d81b60", "#1e88e5", "#ffc107", "#004d40", "#8e24aa", "#6d4c41")
+TRUE = "#00e5a0"
+EDGE = "#ff8f00"
+CENTER = "#1e88e5"
+_PALETTE = 256
+_MOST_POINTS = 60_000
+_LINEAR = 0.1
+"""Offsets from the true axis are drawn to a linear scale up to this and to a logarithmic one beyond, m."""
+_APART = 4.0
+"""Predictions farther apart than this, m, are not joined."""
+
+
+def small_png(figure: Any, dpi: float | None = None) -> bytes:
+    """Return a Matplotlib figure as a PNG of at most 256 colours; with all of them points make it four times as large.
+
+    Args:
+        figure: is drawn.
+        dpi: pixels per inch; the figure's own if not given.
+    """
+    drawn, content = io.BytesIO(), io.BytesIO()
+    figure.savefig(drawn, format="png", dpi=dpi or figure.dpi)
+    image = Image.open(drawn).convert("RGB").quantize(_PALETTE, dither=Image.Dither.NONE)
+    image.save(content, format="png", optimize=True)
+    return content.getvalue()
+
+
+@dataclass(frozen=True)
+class PictureView:
+    """The part of a road that is drawn: stations along its true axis, m."""
+
+    first: float
+    last: float
+
+
+def lines_picture(
+    shown: Case, lines: Mapping[str, Float], view: PictureView, title: str, height: float = 12.0
+) -> bytes:
+    """Return a PNG: centrelines over the cloud, and how far each is from the true axis.
+
+    Args:
+        shown: road and frames.
+        lines: y of the centres in the frames (M,), m, by the predictor's name.
+        view: what of the road.
+        title: of the picture.
+        height: of the upper panel to either side of the axis, m.
+    """
+    figure, panels = _panels(title, (2.2, 1.0), view, height)
+    _cloud(panels[0], shown, view, height)
+    _true(panels[0], shown, view)
+    panels[1].axhline(0.0, color="black", lw=1.0, label="true axis")
+    largest = 0.0
+    for (name, y), color in zip(lines.items(), COLORS, strict=False):
+        station, offset = _beside(shown, shown.frames.at(y), view)
+        panels[0].plot(station, offset, color=color, lw=1.2, label=name)
+        panels[1].plot(station, offset, color=color, lw=1.2)
+        largest = max(largest, float(np.nanquantile(np.abs(offset), 0.98)) if np.isfinite(offset).any() else 0.0)
+    limit = 1.3 * max(largest, _LINEAR)
+    panels[1].set_yscale("symlog", linthresh=_LINEAR, linscale=1.5)
+    ticks = [sign * size for size in (0.05, 0.1, 1.0, 10.0) for sign in (-1.0, 1.0) if size <= limit]
+    panels[1].set_yticks([0.0, *ticks], [f"{tick:g}" for tick in (0.0, *ticks)])
+    panels[1].set(ylabel="offset from it, m", ylim=(-limit, limit))
+    panels[0].legend(loc="upper right", ncols=3, fontsize=8, framealpha=0.9)
+    return small_png(figure, dpi=110)
+
+
+def corridor_picture(shown: Case, prediction: Float, view: PictureView, title: str, height: float = 16.0) -> bytes:
+    """Return a PNG: centre and edges with their 95 % bands over the cloud, the centre's error, the lanes.
+
+    Args:
+        shown: road and frames.
+        prediction: (M, 2 to 4 + 2 K) columns `CORRIDOR_COLUMNS`; panels of what isn't there stay away.
+        view: what of the road.
+        title: of the picture.
+        height: of the upper panel to either side of the axis, m.
+    """
+    column = {name: prediction[:, i] for i, name in enumerate(CORRIDOR_COLUMNS[: prediction.shape[1]])}
+    with_lanes = "lanes" in column and bool(np.isfinite(column["lanes"]).any())
+    figure, panels = _panels(title, (2.4, 1.0, 0.8) if with_lanes else (2.4, 1.0), view, height)
+    _cloud(panels[0], shown, view, height)
+    _true(panels[0], shown, view, edges=True)
+    for name, color, label in (("center", CENTER, "centre"), ("left_edge", EDGE, "edges"), ("right_edge", EDGE, None)):
+        if name in column:
+            _band(panels[0], shown, view, column[name], _half_width(column, name, 95), color, label)
+    panels[0].legend(loc="upper right", ncols=4, fontsize=8, framealpha=0.9)
+    _center_error(panels[1], shown, view, column)
+    if with_lanes:
+        _lanes(panels[2], shown, view, column)
+    return small_png(figure, dpi=110)
+
+
+def _panels(title: str, heights: Sequence[float], view: PictureView, height: float) -> tuple[Any, Sequence[Any]]:
+    from matplotlib.figure import Figure  # takes half a second, which only pictures need
+
+    figure = Figure(figsize=(13.0, 1.6 + 2.0 * sum(heights)), layout="constrained")
+    panels = figure.subplots(len(heights), 1, sharex=True, height_ratios=heights)
+    figure.suptitle(title, fontsize=11)
+    panels[0].set(xlim=(view.first, view.last), ylim=(-height, height), ylabel="offset from the true axis, m")
+    panels[-1].set(xlabel="station along the true axis, m")
+    for panel in panels[1:]:
+        panel.grid(alpha=0.3)
+    return figure, panels
+
+
+def _cloud(axes: Axes, shown: Case, view: PictureView, height: float) -> None:
+    """Draw the points by intensity, straightened along the true axis.
+
+    Where only an axis is known, as of real scans that may not be passed on, means of cells are drawn and no points.
+    """
+    own = np.flatnonzero(shown.road.belonging)
+    station, offset = truth_of(shown.road).axis.project(shown.road.xyz[own])
+    near = np.flatnonzero((station >= view.first) & (station <= view.last) & (np.abs(offset) <= height))
+    intensity = shown.road.intensity[own[near]]
+    # By their ranks: a scanner beside the road sees its near side a hundred times as bright as the far one.
+    intensity = rankdata(intensity) / max(1, len(near))
+    look: dict[str, Any] = {"cmap": "gray", "vmin": -0.5, "vmax": 1.0, "rasterized": True}
+    axes.set_facecolor("#101418")
+    if truth_of(shown.road).left is None:
+        along, aside = np.arange(view.first, view.last + 0.5), np.arange(-height, height + 0.125, 0.25)
+        places = np.column_stack([station[near], offset[near]])
+        count, _ = np.histogramdd(places, bins=[along, aside])
+        total, _ = np.histogramdd(places, bins=[along, aside], weights=intensity)
+        axes.pcolormesh(along, aside, np.where(count > 0, total / np.maximum(count, 1), np.nan).T, **look)
+        return
+    some = slice(None, None, max(1, len(near) // _MOST_POINTS))
+    size = float(np.clip(60_000 / max(len(near), 1), 0.4, 6.0))
+    axes.scatter(station[near][some], offset[near][some], c=intensity[some], s=size, lw=0, **look)
+
+
+def _true(axes: Axes, shown: Case, view: PictureView, edges: bool = False) -> None:
+    truth = truth_of(shown.road)
+    station = np.arange(view.first, view.last, 0.5)
+    axes.plot(station, np.where(truth.axis.inside(station), 0.0, np.nan), color=TRUE, lw=2.5, label="true axis")
+    if edges:
+        lines = [line for line in (truth.left, truth.right) if line is not None]
+        for line, label in zip(lines, ("true edges", None), strict=False):
+            along, aside = truth.axis.project(line.points)
+            order = np.argsort(along)
+            axes.plot(along[order], aside[order], color=TRUE, lw=2.0, ls="--", label=label)
+
+
+def _beside(shown: Case, points: Float, view: PictureView) -> tuple[Float, Float]:
+    """Return station and offset of those points (M, 2) that lie in the view, by station; NaN between stretches."""
+    truth = truth_of(shown.road)
+    there = np.isfinite(points).all(axis=1)
+    station, offset = truth.axis.project(points[there])
+    inside = (station >= view.first) & (station <= view.last) & truth.axis.inside(station)
+    station, offset = station[inside], offset[inside]
+    order = np.argsort(station)
+    station, offset = station[order], offset[order]
+    breaks = np.flatnonzero(np.diff(station) > _APART) + 1
+    return np.insert(station, breaks, np.nan), np.insert(offset, breaks, np.nan)
+
+
+def _half_width(column: Mapping[str, Float], name: str, level: int) -> Float:
+    """Return half-widths (M,) of an interval, m: as the prediction says, else by its standard deviation, else 0."""
+    if f"{name}_{level}" in column:
+        width = column[f"{name}_{level}"]
+    else:
+        width = DEVIATIONS[LEVELS.index(level / 100.0)] * column.get(f"{name}_std", np.zeros(len(column[name])))
+    return np.nan_to_num(width)
+
+
+def _band(axes: Axes, shown: Case, view: PictureView, y: Float, width: Float, color: str, label: str | None) -> None:
+    """Draw a line with an interval of 95 %."""
+    station, offset = _beside(shown, shown.frames.at(y), view)
+    _, low = _across(shown, shown.frames, y - width, view)
+    at, high = _across(shown, shown.frames, y + width, view)
+    axes.fill_between(at, low, high, color=color, alpha=0.35, lw=0, label=None if label is None else f"{label}, 95 %")
+    axes.plot(station, offset, color=color, lw=1.3, label=label)
+
+
+def _across(shown: Case, frames: Frames, y: Float, view: PictureView) -> tuple[Float, Float]:
+    """Return the frames' stations on the true axis (K,) and the offsets of their points, in the frames' order."""
+    truth = truth_of(shown.road)
+    _, station = truth.axis.crossing(frames.position, frames.direction)
+    inside = (station >= view.first) & (station <= view.last) & np.isfinite(y)
+    _, offset = truth.axis.project(frames.at(y)[inside])
+    order = np.argsort(station[inside])
+    station, offset = station[inside][order], offset[order]
+    breaks = np.flatnonzero(np.diff(station) > _APART) + 1
+    return np.insert(station, breaks, np.nan), np.insert(offset, breaks, np.nan)
+
+
+def _center_error(axes: Axes, shown: Case, view: PictureView, column: Mapping[str, Float]) -> None:
+    y = column["center"]
+    station, offset = _across(shown, shown.frames, y, view)
+    for level, alpha in ((95, 0.2), (68, 0.35)):
+        width = _half_width(column, "center", level)
+        if width.any():
+            at, low = _across(shown, shown.frames, y - width, view)
+            _, high = _across(shown, shown.frames, y + width, view)
+            axes.fill_between(at, low, high, color=CENTER, alpha=alpha, lw=0, label=f"{level} %")
+    axes.plot(station, offset, color=CENTER, lw=1.2, label="predicted centre")
+    axes.axhline(0.0, color="black", lw=1.0)
+    axes.set(ylabel="centre, m")
+    axes.legend(loc="upper right", ncols=3, fontsize=8)
+
+
+def _lanes(axes: Axes, shown: Case, view: PictureView, column: Mapping[str, Float]) -> None:
+    there = truth_of(shown.road).at(shown.frames.position, shown.frames.direction, np.zeros(len(shown.frames)))
+    inside = np.flatnonzero((there.station >= view.first) & (there.station <= view.last))
+    inside = inside[np.argsort(there.station[inside])]
+    station = there.station[inside]
+    for name, color in (("lanes", CENTER), ("lane_width", EDGE)):
+        value, label = column[name][inside], name.replace("_", " ") + (", m" if name == "lane_width" else "")
+        spread = _half_width(column, name, 95)[inside]
+        axes.fill_between(station, value - spread, value + spread, color=color, alpha=0.25, lw=0)
+        axes.plot(station, value, color=color, lw=1.2, label=label)
+        true = there.corridor[inside, CORRIDOR.index(name)]
+        axes.plot(station, true, color="black", lw=1.0, ls="--", label="true" if name == "lanes" else None)
+    axes.set(ylabel="lanes")
+    axes.legend(loc="upper right", ncols=3, fontsize=8)
+
+
+_PIXELS = 490
+"""Of a view's longer side: as many as it has in the picture, so that none is lost."""
+_OUTSIDE = (0.5, 99.5)
+"""Percentiles of x and of y that a view goes from and to: a sweep's few far points would make all others tiny."""
+_UNKNOWN = (0.07, 0.07, 0.09)
+"""Dark, as road markings are drawn white."""
+_WRONG = np.array([[0.75, 0.75, 0.75], [0.9, 0.1, 0.1]])
+
+
+def comparison(tile: CloudTile, predicted: NDArray[np.int16], names: Sequence[str]) -> bytes:
+    """Return a PNG: a tile from above by its truth, by the classes predicted, and where the two differ.
+
+    Args:
+        tile: with its truth.
+        predicted: (N,) classes.
+        names: of the classes.
+    """
+    from matplotlib.figure import Figure  # takes half a second, which only pictures need
+    from matplotlib.patches import Patch
+
+    colors = class_colors(names)
+    wrong = np.where(tile.segment == IGNORED, IGNORED, (predicted != tile.segment).astype(np.int16))
+    shown = ((tile.segment, colors, "truth"), (predicted, colors, "predicted"), (wrong, _WRONG, "wrong"))
+    known = tile.coord[tile.segment != IGNORED, :2] if (tile.segment != IGNORED).any() else tile.coord[:, :2]
+    extent = np.percentile(known, _OUTSIDE, axis=0)
+    views = [top_view(tile.coord, labels, table, extent) for labels, table, _ in shown]
+    figure = Figure(figsize=(15, 0.8 + 4.9 * views[0].shape[0] / _PIXELS), dpi=100, layout="constrained")
+    for axes, view, (_, _, title) in zip(figure.subplots(1, 3), views, shown, strict=True):
+        axes.imshow(view, origin="lower", interpolation="nearest")
+        axes.set(title=title, xticks=[], yticks=[])
+    patches = [Patch(facecolor=color, edgecolor="0.5", label=name) for name, color in zip(names, colors, strict=True)]
+    figure.legend(handles=patches, loc="outside lower center", ncols=min(len(patches), 9), frameon=False)
+    return small_png(figure)
+
+
+def class_colors(names: Sequence[str]) -> NDArray[np.float64]:
+    """Return the previews' colours of classes (C, 3), from 0 to 1; a group's that isn't a class is grey."""
+    known = {row.name: row.color for scheme in ("17", "5") for row in class_scheme(scheme).rows}
+    return np.array([known.get(name, (150, 150, 150)) for name in names]) / 255.0
+
+
+def top_view(
+    coord: NDArray[np.float32], labels: NDArray[np.int16], colors: NDArray[np.float64], extent: NDArray[np.floating]
+) -> NDArray[np.float64]:
+    """Return an image (H, W, 3), north up in row order: of each pixel the highest point's colour.
+
+    Args:
+        coord: (N, 3) m.
+        labels: (N,) rows of ``colors``; those of `IGNORED` aren't drawn.
+        colors: (C, 3).
+        extent: (2, 2) smallest and largest x and y shown, m.
+    """
+    low, high = extent
+    cell = max(float((high - low).max()) / _PIXELS, 0.05)
+    size = np.floor((high - low) / cell).astype(int) + 1
+    image = np.full((size[1], size[0], 3), _UNKNOWN, dtype=np.float64)
+    order = np.argsort(coord[:, 2], kind="stable")
+    inside = ((coord[:, :2] >= low) & (coord[:, :2] <= high)).all(axis=1)
+    order = order[inside[order] & (labels[order] != IGNORED)]
+    column, row = np.floor((coord[order, :2] - low) / cell).astype(int).T
+    image[row, column] = colors[labels[order]]
+    return image

@@ -1,1 +1,0 @@
-"""Labelled points: where they come from, as tiles, crops and packed files."""

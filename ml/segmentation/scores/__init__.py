@@ -1,1 +1,0 @@
-"""How good a segmentation is: scores, tables and pictures."""

@@ -1,0 +1,261 @@
+"""From the network's points back to all points: pieces with overlap, and voxels' classes carried to the full cloud."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from typing import Any, Protocol
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+from torch import Tensor, nn
+
+from synthroads_addon.base.classes import ClassScheme
+from synthroads_addon.base.errors import InputError
+from synthroads_addon.base.progress import Progress, silent
+from synthroads_addon.base.random_streams import stream
+
+from ..data.classes import IGNORED, class_names
+from ..data.crops import CropSettings, Item, item
+from ..data.effects.crops import crop_of
+from ..data.points import thin
+from ..data.sources import Source, read_tiles
+from ..data.tiles import CloudTile, Scaling, scalings
+from ..runs import Run
+from ..scores.confusion import Confusion
+from .loading import adaptation_batches, thin_tiles, watched_workers
+from .network import adapt_network, build, on_device, scores_of
+from .recipes import SegmentationConfiguration
+
+EDGE = 24.0
+"""Edge of the pieces that are predicted at a time, m: about as wide as a crop of training."""
+MARGIN = 4.0
+"""Width that is seen around a piece, m."""
+LARGEST = 100_000
+"""Points of a piece, margin included; what has more is cut in four, down to `_SMALLEST_EDGE`."""
+_SMALLEST_EDGE = 1.5
+
+
+class Classifier(Protocol):
+    """Function that turns a batch of one item into the scores of its points."""
+
+    def __call__(self, batch: Item) -> torch.Tensor: ...
+
+
+def pieces(
+    plan: NDArray[np.floating[Any]],
+    own: NDArray[np.bool_] | None = None,
+    edge: float = EDGE,
+    margin: float = MARGIN,
+    largest: int = LARGEST,
+) -> Iterator[tuple[NDArray[np.intp], NDArray[np.intp]]]:
+    """Yield pieces: the indices of their own points, and of all points that they see, own ones included.
+
+    Every point that is to be in a piece is in exactly one.
+
+    Args:
+        plan: (N, 2) m.
+        own: (N,) which points are to be in a piece, the others being seen only; all if not given.
+        edge: of the squares, m.
+        margin: seen around them, m.
+        largest: points seen; squares with more are cut in four.
+    """
+    wanted = np.arange(len(plan)) if own is None else np.flatnonzero(own)
+    if len(wanted) == 0:
+        return
+    position = np.asarray(plan, dtype=np.float64)
+    yield from _cut_squares(position, wanted, np.arange(len(plan)), position[wanted].min(axis=0), edge, margin, largest)
+
+
+def _cut_squares(
+    position: NDArray[np.float64],
+    own: NDArray[np.intp],
+    seen: NDArray[np.intp],
+    low: NDArray[np.float64],
+    edge: float,
+    margin: float,
+    largest: int,
+) -> Iterator[tuple[NDArray[np.intp], NDArray[np.intp]]]:
+    """Cut points into squares counted from ``low``; ``seen`` holds all that the squares may see."""
+    cells = np.floor((position[own] - low) / edge).astype(np.int64)
+    for cell in np.unique(cells, axis=0):
+        inside = own[np.all(cells == cell, axis=1)]
+        corner = low + cell * edge
+        near = position[seen]
+        around = seen[np.all((near >= corner - margin) & (near < corner + edge + margin), axis=1)]
+        if len(around) > largest and edge / 2 >= _SMALLEST_EDGE:
+            yield from _cut_squares(position, inside, around, corner, edge / 2, min(margin, edge / 2), largest)
+        else:
+            yield inside, around
+
+
+def label_tile(
+    tile: CloudTile,
+    scaling: Scaling,
+    classifier: Classifier,
+    settings: CropSettings,
+    core: NDArray[np.bool_] | None = None,
+    seed: int = 0,
+) -> NDArray[np.int16]:
+    """Return the class of each point of a tile: thinned out, predicted piece by piece, carried back.
+
+    Args:
+        tile: N points of any density; its labels aren't looked at.
+        scaling: of its intensities.
+        classifier: scores (n, C) of a batch.
+        settings: voxel and features.
+        core: (N,) the points whose class is wanted, in their order; all if not given.
+        seed: of the noise that stands for missing features.
+    """
+    keep = thin(tile.coord, settings.voxel)
+    small = tile.select(keep)
+    own = _needed_points(small.coord, tile.coord, core, settings.voxel)
+    strength = None if small.strength is None else scaling.apply(small.strength)
+    whole = replace(crop_of(small, strength), segment=np.full(len(small), IGNORED, dtype=np.int16))
+    labels = np.zeros(len(small), dtype=np.int16)
+    for number, (inside, seen) in enumerate(pieces(small.coord[:, :2], own)):
+        batch = item(whole.select(seen), settings, stream(seed, "missing features", number))
+        best = classifier(batch).argmax(dim=1).cpu().numpy()
+        labels[inside] = best[np.searchsorted(seen, inside)]
+    return carry(small.coord[own], labels[own], tile.coord if core is None else tile.coord[core])
+
+
+def _needed_points(
+    small: NDArray[np.float32], full: NDArray[np.float32], core: NDArray[np.bool_] | None, voxel: float
+) -> NDArray[np.bool_]:
+    """Return which of the thinned points are needed for the classes of the core: those within two cells of it."""
+    if core is None:
+        return np.ones(len(small), dtype=bool)
+    low, high = full[core][:, :2].min(axis=0) - 2 * voxel, full[core][:, :2].max(axis=0) + 2 * voxel
+    return np.asarray(np.all((small[:, :2] >= low) & (small[:, :2] <= high), axis=1))
+
+
+def carry(known: NDArray[np.float32], labels: NDArray[np.int16], points: NDArray[np.float32]) -> NDArray[np.int16]:
+    """Return for each point (M,) the label of the nearest known point.
+
+    Args:
+        known: (N, 3) m, at least one.
+        labels: (N,).
+        points: (M, 3) m.
+    """
+    if len(points) == 0:
+        return np.zeros(0, dtype=np.int16)
+    _, nearest = cKDTree(known).query(points)
+    return labels[nearest]
+
+
+def trained_model(run: Run[SegmentationConfiguration], device: torch.device) -> nn.Module:
+    """Return the network of a trained run.
+
+    Raises:
+        InputError: the checkpoint is damaged or of another network.
+    """
+    state = run.saved(device)
+    if state is None:
+        raise InputError(str(run.folder), None, "holds no checkpoint")
+    model = build(run.configuration).to(device)
+    try:
+        model.load_state_dict(state["model"])
+    except (KeyError, RuntimeError):
+        raise InputError(str(run.folder), None, "its checkpoint is of another network than its configuration") from None
+    return model.eval()
+
+
+def classifier(model: nn.Module, configuration: SegmentationConfiguration, device: torch.device) -> Classifier:
+    """Return what scores the points of an item."""
+
+    def scores(batch: Item) -> Tensor:
+        model.eval()
+        with torch.inference_mode():
+            return scores_of(model, on_device(configuration.network.prepare(batch), device))
+
+    return scores
+
+
+def check_tests(configuration: SegmentationConfiguration) -> None:
+    """Look at the data of all tests, as far as can be told without a network: trainings take hours.
+
+    Raises:
+        MissingFileError: there are none.
+        InputError: see `score`, or a source's first tile can't be read.
+    """
+    scheme = configuration.scheme()
+    for sources in configuration.data.tests.values():
+        _targets(sources, scheme)
+        for source in sources:
+            _groups(source, scheme)
+            if next(read_tiles(source, scheme, None), None) is None:
+                raise InputError("data.tests", source.path, "holds no points")
+
+
+def score_all(
+    model: nn.Module, configuration: SegmentationConfiguration, device: torch.device, progress: Progress = silent
+) -> dict[str, Any]:
+    """Return the scores of a configuration's tests by name, see `Confusion.to_dict`."""
+    return {
+        name: score(model, configuration, sources, device, progress)[0].to_dict()
+        for name, sources in configuration.data.tests.items()
+    }
+
+
+def score(
+    model: nn.Module,
+    configuration: SegmentationConfiguration,
+    sources: Sequence[Source],
+    device: torch.device,
+    progress: Progress = silent,
+) -> tuple[Confusion, tuple[CloudTile, Any] | None]:
+    """Return the confusion over all points of some sources, and the largest tile with its classes, to be drawn.
+
+    Raises:
+        InputError: the sources tell different classes apart, or a mapping's groups leave out a class.
+    """
+    scheme = configuration.scheme()
+    confusion = Confusion(_targets(sources, scheme))
+    if configuration.adaptation.adabn:
+        tiles = list(thin_tiles(sources, configuration, "test"))
+        with watched_workers(configuration):
+            model = adapt_network(model, adaptation_batches(tiles, configuration), device)
+    scores = classifier(model, configuration, device)
+    shown = None
+    for source in sources:
+        groups = _groups(source, scheme)
+        for scene in _scenes(read_tiles(source, scheme, None)):
+            scaling = scalings(scene, configuration.intensity, configuration.voxel)
+            for tile in scene:
+                labels = label_tile(tile, scaling[tile.scene], scores, configuration.crop_settings())
+                confusion.add(tile.segment, groups[labels])
+                if shown is None or len(tile) > len(shown[0]):
+                    shown = (tile, groups[labels])
+            progress("scoring", 0.5)
+    return confusion, shown
+
+
+def _targets(sources: Sequence[Source], scheme: ClassScheme) -> tuple[str, ...]:
+    names = {source.targets(scheme) for source in sources}
+    if len(names) != 1:
+        raise InputError("data.tests", len(names), "sources of one test must tell the same classes apart")
+    return names.pop()
+
+
+def _groups(source: Source, scheme: ClassScheme) -> NDArray[np.int16]:
+    """Return for each class of the scheme (C,) the place of the target that it counts as."""
+    mapping, names = source.label_mapping(), class_names(scheme)
+    groups = mapping.group_of(names) if mapping else np.arange(len(names), dtype=np.int16)
+    if (groups == IGNORED).any():
+        raise InputError("groups", mapping and mapping.title, "must have a place for every class of the scheme")
+    return groups
+
+
+def _scenes(tiles: Iterator[CloudTile]) -> Iterator[list[CloudTile]]:
+    """Yield the tiles of one scene after another, which stand together."""
+    scene: list[CloudTile] = []
+    for tile in tiles:
+        if scene and scene[0].scene != tile.scene:
+            yield scene
+            scene = []
+        scene.append(tile)
+    if scene:
+        yield scene
