@@ -10,17 +10,7 @@ from .rules.rule import Road, Rule, Violation
 
 __all__ = ["RULES", "Rule", "Violation", "check"]
 
-MODULES = (
-    alignment,
-    crossfall,
-    section,
-    turnouts,
-    markings,
-    barriers,
-    signs,
-    furniture,
-    traffic,
-)
+MODULES = (alignment, crossfall, section, turnouts, markings, barriers, signs, furniture, traffic)
 """Where the rules are, in the order of their findings."""
 RULES: dict[str, Rule] = {rule.id: rule for module in MODULES for rule in module.RULES}
 """All rules by id, in the order of their findings."""

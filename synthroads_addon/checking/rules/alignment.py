@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import partial
 from itertools import pairwise
+from typing import Literal
 
 import numpy as np
 
 from ...road.guidelines import LONGEST_STRAIGHT
-from .rule import STRAIGHT, CurvatureRun, Finding, Road, Rule, above, below, out_of_order, same_curvature
+from .rule import STRAIGHT, CurvatureRun, Finding, Road, Rule, at_least, at_most, out_of_order, same_curvature
 
 #: Shortest straight between two curves of the same direction, m (RAA, after a textbook).
 SHORTEST_STRAIGHT_SAME_DIRECTION = 400.0
@@ -22,24 +24,21 @@ SAME_GRADE = 1e-6
 
 
 def _element_length(road: Road) -> Iterator[Finding]:
-    for i in np.flatnonzero(~(road.lengths > 0.0)).tolist():
-        length = float(road.lengths[i])
-        yield Finding(
-            road.axis, float(road.starts[i]), length, 0.0, f"Element {i + 1} is {length:g} m long; above 0 is needed."
-        )
+    for i in np.flatnonzero(~(road.lengths > 0.0)):
+        text = f"Element {i + 1} is {road.lengths[i]:g} m long; above 0 is needed."
+        yield Finding(road.axis, road.starts[i], road.lengths[i], 0.0, text)
 
 
 def _radius(road: Road) -> Iterator[Finding]:
     least = road.limits.radius
     sharp = [(run.start, run.radius) for run in road.runs if not run.straight]
-    sharp += [(station, 1.0 / curvature) for station, curvature in _clothoids_own_ends(road)]
+    sharp += [(station, 1.0 / curvature) for station, curvature in _sharp_clothoid_ends(road)]
     for station, radius in sorted(sharp):
-        if below(radius, least):
-            text = f"The radius of {radius:.1f} m is below {least:.0f} m ({road.guideline})."
-            yield Finding(road.axis, station, radius, least, text)
+        text = f"The radius of {radius:.1f} m is below {least:.0f} m ({road.guideline})."
+        yield from at_least(road.axis, station, radius, least, text)
 
 
-def _clothoids_own_ends(road: Road) -> Iterator[tuple[float, float]]:
+def _sharp_clothoid_ends(road: Road) -> Iterator[tuple[float, float]]:
     """Yield (station, |curvature|) of clothoids' sharper ends where no neighbour is as sharp or stands for it."""
     k0, k1 = np.abs(road.k0), np.abs(road.k1)
     last = len(k0) - 1
@@ -77,23 +76,20 @@ def _clothoids(road: Road) -> Iterator[tuple[int, float, float, float]]:
 def _clothoid_minimum(road: Road) -> Iterator[Finding]:
     least = road.limits.clothoid
     for i, parameter, _, _ in _clothoids(road):
-        if below(parameter, least):
-            text = f"The clothoid's A = {parameter:.1f} m is below {least:.0f} m ({road.guideline})."
-            yield Finding(road.axis, float(road.starts[i]), parameter, least, text)
+        text = f"The clothoid's A = {parameter:.1f} m is below {least:.0f} m ({road.guideline})."
+        yield from at_least(road.axis, road.starts[i], parameter, least, text)
 
 
 def _clothoid_short(road: Road) -> Iterator[Finding]:
     for i, parameter, _, radius in _clothoids(road):
-        if below(parameter, radius / 3.0):
-            text = f"The clothoid's A = {parameter:.1f} m is below R/3 = {radius / 3.0:.1f} m (RAA: R/3 <= A <= R)."
-            yield Finding(road.axis, float(road.starts[i]), parameter, radius / 3.0, text)
+        text = f"The clothoid's A = {parameter:.1f} m is below R/3 = {radius / 3.0:.1f} m (RAA: R/3 <= A <= R)."
+        yield from at_least(road.axis, road.starts[i], parameter, radius / 3.0, text)
 
 
 def _clothoid_long(road: Road) -> Iterator[Finding]:
     for i, parameter, radius, _ in _clothoids(road):
-        if above(parameter, radius):
-            text = f"The clothoid's A = {parameter:.1f} m is above R = {radius:.1f} m (RAA: R/3 <= A <= R)."
-            yield Finding(road.axis, float(road.starts[i]), parameter, radius, text)
+        text = f"The clothoid's A = {parameter:.1f} m is above R = {radius:.1f} m (RAA: R/3 <= A <= R)."
+        yield from at_most(road.axis, road.starts[i], parameter, radius, text)
 
 
 def _clothoid_ratio(road: Road) -> Iterator[Finding]:
@@ -102,46 +98,47 @@ def _clothoid_ratio(road: Road) -> Iterator[Finding]:
         after = parameters.get(i + 1)
         if after is None or max(abs(road.k1[i]), abs(road.k0[i + 1])) > STRAIGHT or road.k0[i] * road.k1[i + 1] >= 0.0:
             continue
-        small, large = sorted((np.float64(before), np.float64(after)))
-        ratio = float(large / small)
-        if above(ratio, CLOTHOID_RATIO):
-            text = (
-                f"The S-curve's clothoids, A = {before:.1f} m and {after:.1f} m, are as 1 : {ratio:.2f}; "
-                f"1 : {CLOTHOID_RATIO} is allowed (RAA)."
-            )
-            yield Finding(road.axis, float(road.starts[i + 1]), ratio, CLOTHOID_RATIO, text)
+        ratio = _ratio(before, after)
+        text = (
+            f"The S-curve's clothoids, A = {before:.1f} m and {after:.1f} m, are as 1 : {ratio:.2f}; "
+            f"1 : {CLOTHOID_RATIO} is allowed (RAA)."
+        )
+        yield from at_most(road.axis, road.starts[i + 1], ratio, CLOTHOID_RATIO, text)
+
+
+def _ratio(one: float, other: float) -> float:
+    """Return the larger over the smaller of two lengths; infinite or NaN where the smaller is 0."""
+    small, large = sorted((np.float64(one), np.float64(other)))
+    return float(large / small)
 
 
 def _curvature_jump(road: Road) -> Iterator[Finding]:
-    same = same_curvature(road.k1[:-1], road.k0[1:])
-    for i in np.flatnonzero(~same).tolist():
-        jump = float(abs(road.k0[i + 1] - road.k1[i]))
+    for i in np.flatnonzero(~same_curvature(road.k1[:-1], road.k0[1:])):
+        jump = abs(road.k0[i + 1] - road.k1[i])
         text = f"The curvature jumps by {jump:.2e} 1/m: a transition curve is missing (RAA)."
-        yield Finding(road.axis, float(road.starts[i + 1]), jump, 0.0, text)
+        yield Finding(road.axis, road.starts[i + 1], jump, 0.0, text)
 
 
 def _straight_longest(road: Road) -> Iterator[Finding]:
     for run in road.runs:
-        length = run.end - run.start
-        if run.straight and above(length, LONGEST_STRAIGHT):
-            text = f"The straight is {length:.0f} m long; {LONGEST_STRAIGHT:.0f} m are allowed (RAA)."
-            yield Finding(road.axis, run.start, length, LONGEST_STRAIGHT, text)
+        if run.straight:
+            text = f"The straight is {run.length:.0f} m long; {LONGEST_STRAIGHT:.0f} m are allowed (RAA)."
+            yield from at_most(road.axis, run.start, run.length, LONGEST_STRAIGHT, text)
 
 
 def _straight_between(road: Road) -> Iterator[Finding]:
     least = SHORTEST_STRAIGHT_SAME_DIRECTION
     for run in road.runs:
-        length = run.end - run.start
-        if not run.straight or road.cut(run) or not below(length, least):
+        if not run.straight or road.is_cut(run):
             continue
         before = _direction(road.k1[run.first - 1], road.k0[run.first - 1])
         after = _direction(road.k0[run.last + 1], road.k1[run.last + 1])
         if before * after > 0.0:
             text = (
-                f"The straight between two curves of the same direction is {length:.1f} m long; it must be absent or "
-                f"{least:.0f} m and more (RAA)."
+                f"The straight between two curves of the same direction is {run.length:.1f} m long; it must be absent "
+                f"or {least:.0f} m and more (RAA)."
             )
-            yield Finding(road.axis, run.start, length, least, text)
+            yield from at_least(road.axis, run.start, run.length, least, text)
 
 
 def _direction(near: float, far: float) -> float:
@@ -168,31 +165,26 @@ def _radius_ratio(road: Road) -> Iterator[Finding]:
     lengths = np.concatenate(([0.0], np.cumsum([run.end - run.start for run in straights])))
     for before, after in pairwise(_arcs(road)):
         span = np.searchsorted(starts, [before.end, after.start])
-        straight = float(lengths[span[1]] - lengths[span[0]])
-        small, large = sorted((before.radius, after.radius))
-        ratio = float(large / small)
-        if straight < road.two_seconds and small < RADIUS_RATIO_BELOW and above(ratio, RADIUS_RATIO):
+        straight = lengths[span[1]] - lengths[span[0]]
+        ratio = _ratio(before.radius, after.radius)
+        if straight < road.two_seconds and min(before.radius, after.radius) < RADIUS_RATIO_BELOW:
             text = (
                 f"The neighbouring radii {before.radius:.0f} m and {after.radius:.0f} m are as 1 : {ratio:.2f}; "
                 f"1 : {RADIUS_RATIO} is allowed below {RADIUS_RATIO_BELOW:.0f} m (RAA)."
             )
-            yield Finding(road.axis, after.start, ratio, RADIUS_RATIO, text)
+            yield from at_most(road.axis, after.start, ratio, RADIUS_RATIO, text)
 
 
 def _arc_length(road: Road) -> Iterator[Finding]:
     for arc in _arcs(road):
-        length = arc.end - arc.start
-        if below(length, road.two_seconds) and (arc.start == arc.end or not road.cut(arc)):
-            text = f"The arc is {length:.1f} m long; two seconds of travel are {road.two_seconds:.1f} m (RAA)."
-            yield Finding(road.axis, arc.start, length, road.two_seconds, text)
+        if arc.length == 0.0 or not road.is_cut(arc):
+            text = f"The arc is {arc.length:.1f} m long; two seconds of travel are {road.two_seconds:.1f} m (RAA)."
+            yield from at_least(road.axis, arc.start, arc.length, road.two_seconds, text)
 
 
 def _vertical_order(road: Road) -> Iterator[Finding]:
-    stations = np.array([p.station for p in road.parameters.alignment.vertical])
-    for i in out_of_order(stations):
-        past = float(stations[:i].max())
-        at = float(stations[i])
-        text = f"Point of vertical intersection {i + 1} at {at:.3f} m does not follow the one at {past:.3f} m."
+    for number, at, past in out_of_order(point.station for point in road.parameters.alignment.vertical):
+        text = f"Point of vertical intersection {number} at {at:.3f} m does not follow the one at {past:.3f} m."
         yield Finding(road.axis, at, at, past, text)
 
 
@@ -210,45 +202,30 @@ def _grade(road: Road) -> Iterator[Finding]:
         for i in np.flatnonzero(np.abs(profile.station - at) < profile.tangents).tolist():
             share = (at - end[i]) / (2.0 * profile.tangents[i])
             grades.append((at, float(profile.grades[i] + share * (profile.grades[i + 1] - profile.grades[i]))))
-    reported = set()
-    for station, grade in grades:
-        if above(100.0 * abs(grade), steepest) and (station, grade) not in reported:
-            reported.add((station, grade))
-            text = f"The grade of {100.0 * grade:.2f} % is steeper than {steepest} % ({road.guideline})."
-            yield Finding(road.axis, station, 100.0 * abs(grade), steepest, text)
+    for station, grade in dict.fromkeys(grades):
+        text = f"The grade of {100.0 * grade:.2f} % is steeper than {steepest} % ({road.guideline})."
+        yield from at_most(road.axis, station, 100.0 * abs(grade), steepest, text)
 
 
-def _rounding(road: Road, crest: bool) -> Iterator[Finding]:
+def _rounding(road: Road, kind: Literal["crest", "sag"]) -> Iterator[Finding]:
     profile = road.vertical
-    least = road.limits.crest if crest else road.limits.sag
-    change = np.diff(profile.grades)
-    concerned = (change < -SAME_GRADE) if crest else (change > SAME_GRADE)
+    least = road.limits.crest if kind == "crest" else road.limits.sag
+    change = np.diff(profile.grades) * (-1.0 if kind == "crest" else 1.0)
     on_road = (profile.station + profile.tangents > 0.0) & (profile.station - profile.tangents < road.length)
-    for i in np.flatnonzero(concerned & on_road).tolist():
-        radius = float(profile.radius[i])
-        if below(radius, least):
-            kind = "crest" if crest else "sag"
-            has = f"radius of {radius:.0f} m" if radius else "missing rounding"
-            text = f"The {kind}'s {has} is below {least:.0f} m ({road.guideline})."
-            yield Finding(road.axis, float(profile.station[i]), radius, least, text)
-
-
-def _crest(road: Road) -> Iterator[Finding]:
-    yield from _rounding(road, crest=True)
-
-
-def _sag(road: Road) -> Iterator[Finding]:
-    yield from _rounding(road, crest=False)
+    for i in np.flatnonzero((change > SAME_GRADE) & on_road):
+        radius = profile.radius[i]
+        has = f"radius of {radius:.0f} m" if radius else "missing rounding"
+        text = f"The {kind}'s {has} is below {least:.0f} m ({road.guideline})."
+        yield from at_least(road.axis, profile.station[i], radius, least, text)
 
 
 def _rounding_overlap(road: Road) -> Iterator[Finding]:
     profile = road.vertical
     room = np.diff(profile.station)
     need = profile.tangents[:-1] + profile.tangents[1:]
-    for i in np.flatnonzero(need > room * (1.0 + 1e-6)).tolist():
+    for i in np.flatnonzero(need > room * (1.0 + 1e-6)):
         text = f"The tangents of two roundings need {need[i]:.2f} m and have {room[i]:.2f} m between their points."
-        station = float(profile.station[i + 1] - profile.tangents[i + 1])
-        yield Finding(road.axis, station, float(need[i]), float(room[i]), text)
+        yield Finding(road.axis, profile.station[i + 1] - profile.tangents[i + 1], need[i], room[i], text)
 
 
 RULES = (
@@ -265,7 +242,7 @@ RULES = (
     Rule("arc-length", "Arcs last two seconds of travel", "m", "RAA", "derived", _arc_length),
     Rule("vertical-order", "Points of the profile are in order", "m", "", "definition", _vertical_order),
     Rule("grade-maximum", "Steepest grade", "%", "RAA", "confirmed", _grade),
-    Rule("crest-radius", "Smallest crest radius", "m", "RAA", "confirmed", _crest),
-    Rule("sag-radius", "Smallest sag radius", "m", "RAA", "confirmed", _sag),
+    Rule("crest-radius", "Smallest crest radius", "m", "RAA", "confirmed", partial(_rounding, kind="crest")),
+    Rule("sag-radius", "Smallest sag radius", "m", "RAA", "confirmed", partial(_rounding, kind="sag")),
     Rule("rounding-overlap", "Roundings don't overlap", "m", "", "definition", _rounding_overlap),
 )

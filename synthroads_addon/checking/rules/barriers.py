@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from itertools import islice, product
 from typing import Any
 
 import numpy as np
@@ -24,13 +25,17 @@ from ...road.guidelines import (
 from ...road.surroundings import Vegetation
 from ...road.things.noise_barrier import NoiseBarrier
 from .edges import Edges
-from .obstacles import Spans
-from .rule import Finding, Road, Rule, above, below, gaps
+from .obstacles import Bool
+from .rule import Finding, Road, Rule, above, at_least, below, gaps
 
 
-def _ramps(edges: Edges) -> Spans:
-    """Return where no barrier is asked for: beside a ramp, which a barrier of one offset cannot follow."""
-    return [turnout.ramp_span for turnout in edges.turnouts if turnout.turnout.ramp]
+def _unprotected(road: Road, edges: Edges, protecting: Bool, start: float, end: float) -> Iterator[tuple[float, float]]:
+    """Yield the stretches (m) between two stations along which none of some barriers (B,) stands.
+
+    None is asked for beside a ramp, which a barrier of one offset cannot follow.
+    """
+    ramps = [turnout.ramp_span for turnout in edges.turnouts if turnout.turnout.ramp]
+    return gaps(road.barriers.spans(protecting) + ramps, start, end, BARRIER_GAP)
 
 
 def _median_barrier(road: Road) -> Iterator[Finding]:
@@ -55,8 +60,7 @@ def _embankment_barrier(road: Road) -> Iterator[Finding]:
     if not below(terrain.batter_slope, EMBANKMENT_RUN):
         return
     for name, edges in road.sides.items():
-        spans = road.barriers.spans(road.beside[edges.name].outer) + _ramps(edges)
-        for start, end in gaps(spans, 0.0, road.length, BARRIER_GAP):
+        for start, end in _unprotected(road, edges, road.beside[name].outer, 0.0, road.length):
             text = (
                 f"The embankment is {terrain.embankment_height:.1f} m high and 1 : {terrain.batter_slope:g} steep, and "
                 f"{end - start:.1f} m beside it are without barrier (RPS)."
@@ -66,19 +70,16 @@ def _embankment_barrier(road: Road) -> Iterator[Finding]:
 
 def _curve_barrier(road: Road) -> Iterator[Finding]:
     below_radius = TIGHT_CURVE * LIMITS[road.design_class].radius
-    for run in road.runs:
-        if run.straight or not below(run.radius, below_radius):
+    curves = [run for run in road.runs if not run.straight and below(run.radius, below_radius)]
+    for run, (name, edges) in product(curves, road.sides.items()):
+        if edges.sign * run.curvature > 0.0:
             continue
-        for name, edges in road.sides.items():
-            if edges.sign * run.curvature > 0.0:
-                continue
-            spans = road.barriers.spans(road.beside[edges.name].outer) + _ramps(edges)
-            for start, end in gaps(spans, run.start, run.end, BARRIER_GAP):
-                text = (
-                    f"The curve's radius of {run.radius:.0f} m is below {below_radius:.0f} m, and {end - start:.1f} m "
-                    "of its outer side are without barrier (RPS)."
-                )
-                yield Finding(name, start, end - start, 0.0, text)
+        for start, end in _unprotected(road, edges, road.beside[name].outer, run.start, run.end):
+            text = (
+                f"The curve's radius of {run.radius:.0f} m is below {below_radius:.0f} m, and {end - start:.1f} m "
+                "of its outer side are without barrier (RPS)."
+            )
+            yield Finding(name, start, end - start, 0.0, text)
 
 
 def _obstacles(road: Road) -> Iterator[tuple[int, str]]:
@@ -99,12 +100,12 @@ def _missing_barrier(road: Road, edges: Edges, index: int, reach: tuple[float, f
         reach: m that the barriers begin before it and end behind it, in the direction of traffic.
     """
     body, beside = road.bodies.items[index], road.beside[edges.name]
-    low, high = (body.low, body.high) if edges.sign > 0 else (-body.high, -body.low)
+    low, high = edges.distances(body.low, body.high)
     outside = road.around.outer[edges.name][index]
     between = beside.outer & (beside.distance < low) if outside else beside.inner & (beside.distance > high)
     before, behind = reach if edges.traffic > 0 else reach[::-1]
-    spans = road.barriers.spans(between) + _ramps(edges)
-    missing = list(gaps(spans, max(body.start - before, 0.0), min(body.end + behind, road.length), BARRIER_GAP))
+    start, end = max(body.start - before, 0.0), min(body.end + behind, road.length)
+    missing = list(_unprotected(road, edges, between, start, end))
     return (math.fsum(end - start for start, end in missing), missing[0][0]) if missing else None
 
 
@@ -112,7 +113,7 @@ def _obstacle_barrier(road: Road) -> Iterator[Finding]:
     limit = OBSTACLE_DISTANCE[road.design_class]
     for i, what in _obstacles(road):
         for side, edges in road.sides.items():
-            distance = float(road.around.clearance[side][i])
+            distance = road.around.clearance[side][i]
             if distance < 0.0 or not below(distance, limit):
                 continue
             if lacking := _missing_barrier(road, edges, i, (OBSTACLE_LEAD, OBSTACLE_TAIL)):
@@ -127,7 +128,7 @@ def _noise_barrier(road: Road) -> Iterator[Finding]:
     limit = OBSTACLE_DISTANCE[road.design_class]
     for i in road.bodies.of(NoiseBarrier, part="barrier"):
         for side, edges in road.sides.items():
-            distance = float(road.around.clearance[side][i])
+            distance = road.around.clearance[side][i]
             if distance < 0.0 or not road.around.outer[side][i]:
                 continue
             reach = (OBSTACLE_LEAD, OBSTACLE_TAIL) if below(distance, limit) else (0.0, 0.0)
@@ -148,9 +149,8 @@ def _tree_distance(road: Road) -> Iterator[Finding]:
             distance = edges.verge + plants.band_start
             if distance < 0.0 or not below(distance, least):
                 continue
-            beside = road.beside[edges.name]
-            near = beside.outer & (road.barriers.clearance < distance)
-            for start, _ in list(gaps(road.barriers.spans(near) + _ramps(edges), 0.0, road.length, BARRIER_GAP))[:1]:
+            near = road.beside[edges.name].outer & (road.barriers.clearance < distance)
+            for start, _ in islice(_unprotected(road, edges, near, 0.0, road.length), 1):
                 text = (
                     f"Trees stand {distance:.2f} m from the {edges.carriageway.side} paved edge with no barrier in "
                     f"front; {least} m are needed (RPS)."
@@ -161,20 +161,19 @@ def _tree_distance(road: Road) -> Iterator[Finding]:
 def _barrier_distance(road: Road) -> Iterator[Finding]:
     barriers = road.barriers
     for i, name in enumerate(barriers.names):
-        distance = float(barriers.clearance[i])
-        if distance >= 0.0 and below(distance, BARRIER_DISTANCE):
+        distance = barriers.clearance[i]
+        if distance >= 0.0:
             text = f"The barrier stands {distance:.2f} m from the paved edge; {BARRIER_DISTANCE} m are needed (RPS)."
-            yield Finding(name, float(barriers.where[i]), distance, BARRIER_DISTANCE, text)
+            yield from at_least(name, barriers.where[i], distance, BARRIER_DISTANCE, text)
 
 
 def _barrier_length(road: Road) -> Iterator[Finding]:
     barriers = road.barriers
     for i, name in enumerate(barriers.names):
-        start, end = float(barriers.start[i]), float(barriers.end[i])
-        cut = start <= 0.0 or not below(end, road.length)
-        if below(end - start, SHORTEST_BARRIER) and not cut:
+        start, end = barriers.start[i], barriers.end[i]
+        if start > 0.0 and below(end, road.length):
             text = f"The barrier is {end - start:.1f} m long; {SHORTEST_BARRIER:.0f} m are needed (RPS)."
-            yield Finding(name, start, end - start, SHORTEST_BARRIER, text)
+            yield from at_least(name, start, end - start, SHORTEST_BARRIER, text)
 
 
 RULES = (

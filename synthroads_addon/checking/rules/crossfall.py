@@ -9,7 +9,7 @@ import numpy as np
 from ...road.guidelines import LARGEST_CROSSFALL_PERCENT, LEAST_CROSSFALL_PERCENT, curve_crossfall_percent
 from .edges import Edges
 from .obstacles import Bool
-from .rule import TOLERANCE, Crossfall, Finding, Road, Rule, above, below, stretches
+from .rule import TOLERANCE, Crossfall, Finding, Road, Rule, at_least, at_most, below, out_of_order, stretches
 
 #: A run-off may reach this far (m) beyond the elements whose curvature changes: crossfall points are often rounded.
 RUN_OFF_BEYOND = 1.0
@@ -22,13 +22,10 @@ NARROW_RUN_OFF = 4.0
 def _crossfall_order(road: Road) -> Iterator[Finding]:
     for name, edges in road.sides.items():
         points = edges.carriageway.crossfall
-        before = -np.inf
-        for i, point in enumerate(points):
-            step = point.station == before and point.crossfall_percent != points[i - 1].crossfall_percent
-            if point.station < before or step:
-                text = f"Crossfall point {i + 1} at {point.station:.3f} m does not follow the one at {before:.3f} m."
-                yield Finding(name, point.station, point.station, before, text)
-            before = max(before, point.station)
+        for number, at, past in out_of_order(point.station for point in points):
+            if at < past or points[number - 1].crossfall_percent != points[number - 2].crossfall_percent:
+                text = f"Crossfall point {number} at {at:.3f} m does not follow the one at {past:.3f} m."
+                yield Finding(name, at, at, past, text)
 
 
 def _crossfall_least(road: Road) -> Iterator[Finding]:
@@ -36,9 +33,9 @@ def _crossfall_least(road: Road) -> Iterator[Finding]:
     for name, fall in road.crossfalls.items():
         value = np.abs(fall.percent[:-1])
         for first, last in stretches(~fall.runs_off & (value < least * (1.0 - TOLERANCE))):
-            worst = float(value[first : last + 1].min())
+            worst = value[first : last + 1].min()
             text = f"The crossfall is {worst:.2f} % outside of a run-off; {least} % are needed (RAA)."
-            yield Finding(name, float(fall.station[first]), worst, least, text)
+            yield Finding(name, fall.station[first], worst, least, text)
 
 
 def _crossfall_largest(road: Road) -> Iterator[Finding]:
@@ -48,7 +45,7 @@ def _crossfall_largest(road: Road) -> Iterator[Finding]:
         for first, last in stretches(value > largest * (1.0 + TOLERANCE)):
             worst = first + int(np.argmax(value[first : last + 1]))
             text = f"The crossfall is {value[worst]:.2f} %; {largest} % are allowed (RAA)."
-            yield Finding(name, float(fall.station[worst]), float(value[worst]), largest, text)
+            yield Finding(name, fall.station[worst], value[worst], largest, text)
 
 
 def _crossfall_inside(road: Road) -> Iterator[Finding]:
@@ -65,13 +62,12 @@ def _crossfall_inside(road: Road) -> Iterator[Finding]:
             inwards = -np.sign(run.curvature) * np.interp(at, fall.station, fall.percent)
             worst = int(np.argmin(inwards))
             needed = curve_crossfall_percent(road.design_class, run.curvature)
-            if below(float(inwards[worst]), needed):
-                text = (
-                    f"The crossfall towards the inside of the {run.radius:.0f} m curve is {inwards[worst]:.2f} %; "
-                    f"{needed} % are needed ({road.guideline})."
-                )
-                station = run.start if worst == 0 else float(at[worst])
-                yield Finding(name, station, float(inwards[worst]), needed, text)
+            text = (
+                f"The crossfall towards the inside of the {run.radius:.0f} m curve is {inwards[worst]:.2f} %; "
+                f"{needed} % are needed ({road.guideline})."
+            )
+            station = run.start if worst == 0 else at[worst]
+            yield from at_least(name, station, inwards[worst], needed, text)
 
 
 def _lever(edges: Edges) -> float:
@@ -100,7 +96,7 @@ def _run_off_steepest(road: Road) -> Iterator[Finding]:
         for first, last in stretches(fall.runs_off & (slope > limit * (1.0 + TOLERANCE))):
             worst = first + int(np.argmax(slope[first : last + 1] / limit[first : last + 1]))
             text = f"The edge runs off at {slope[worst]:.3f} %; {limit[worst]:.3f} % are allowed (RAA)."
-            yield Finding(name, float(fall.station[worst]), float(slope[worst]), float(limit[worst]), text)
+            yield Finding(name, fall.station[worst], slope[worst], limit[worst], text)
 
 
 def _run_off_least(road: Road) -> Iterator[Finding]:
@@ -115,7 +111,7 @@ def _run_off_least(road: Road) -> Iterator[Finding]:
                 f"The edge runs off at {slope[worst]:.3f} % where the crossfall is below {LEAST_CROSSFALL_PERCENT} %; "
                 f"{least:.3f} % are needed to drain it (RAA)."
             )
-            yield Finding(name, float(fall.station[worst]), float(slope[worst]), least, text)
+            yield Finding(name, fall.station[worst], slope[worst], least, text)
 
 
 def _run_off_place(road: Road) -> Iterator[Finding]:
@@ -125,10 +121,9 @@ def _run_off_place(road: Road) -> Iterator[Finding]:
         piece = np.clip(np.searchsorted(fall.station, middle) - 1, 0, len(fall.runs_off) - 1)
         element = np.clip(np.searchsorted(road.starts, middle) - 1, 0, len(road.lengths) - 1)
         for first, last in stretches(fall.runs_off[piece] & road.constant[element]):
-            length = float(cuts[last + 1] - cuts[first])
-            if above(length, RUN_OFF_BEYOND):
-                text = f"The crossfall changes over {length:.1f} m where the curvature doesn't (RAA)."
-                yield Finding(name, float(cuts[first]), length, RUN_OFF_BEYOND, text)
+            length = cuts[last + 1] - cuts[first]
+            text = f"The crossfall changes over {length:.1f} m where the curvature doesn't (RAA)."
+            yield from at_most(name, cuts[first], length, RUN_OFF_BEYOND, text)
 
 
 RULES = (

@@ -6,7 +6,7 @@ All distances are horizontal, from the centreline outwards, m: the carriageway's
 from __future__ import annotations
 
 from itertools import accumulate
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +15,7 @@ from ...road.objects import AnyWidth
 from ...road.section import Carriageway, Turnout
 
 Float = NDArray[np.float64]
+Offset = TypeVar("Offset", Float, float)
 
 #: At the nose the unpaved ground between hard shoulder and ramp is this wide (m), and the ramp goes on this far (m).
 NOSE_WIDTH, NOSE_BEFORE_END = 1.0, 10.0
@@ -42,7 +43,7 @@ class WidthByStation:
         return np.interp(station, self.station, self.width)
 
 
-class Across(NamedTuple):
+class EdgeDistances(NamedTuple):
     """Distances at N stations, m.
 
     Attributes:
@@ -129,7 +130,7 @@ class TurnoutEdges:
             w += [a + (b - a) * i / (BETWEEN + 1) for a, b in parts for i in range(1, BETWEEN + 1)]
         return np.array([self.station(at) for at in w])
 
-    def widen(self, station: Float, edges: _Sums) -> None:
+    def widen(self, station: Float, edges: _WidthSums) -> None:
         """Add what it does to the sums of the carriageway's widths at N stations, in place."""
         start, end = self.turnout.start_station, self.turnout.end_station
         w = station - start if self._forward else end - station
@@ -148,7 +149,7 @@ class TurnoutEdges:
         edges.bare[inside] += np.where(w >= self.nose, np.maximum(wedge - full, 0.0), 0.0)
 
 
-class _Sums(NamedTuple):
+class _WidthSums(NamedTuple):
     """Widths (N,) at N stations, m.
 
     Attributes:
@@ -194,24 +195,24 @@ class Edges:
         inside = np.concatenate(bends) if bends else np.zeros(0)
         inside = inside[(inside > 0.0) & (inside < length)]
         self.marks = np.unique(np.concatenate(([0.0], inside, [length])))
-        self._constant = self._own(np.zeros(1)) if all(width.constant for width in widths) else None
+        self._constant = self._main(np.zeros(1)) if all(width.constant for width in widths) else None
         self.at_marks = self.at(self.marks)
 
-    def at(self, station: Float) -> Across:
+    def at(self, station: Float) -> EdgeDistances:
         """Return the edges at N stations."""
         count = len(station)
-        parts = self._own(station) if self._constant is None else [np.repeat(x, count, axis=0) for x in self._constant]
+        parts = self._main(station) if self._constant is None else [np.repeat(x, count, axis=0) for x in self._constant]
         inner, lanes, base, full = parts
         if not self.turnouts:
             main = base + full
-            return Across(inner, lanes, main, main, main, main)
-        sums = _Sums(full, full.copy(), np.zeros(count), np.zeros(count), np.zeros(count))
+            return EdgeDistances(inner, lanes, main, main, main, main)
+        sums = _WidthSums(full, full.copy(), np.zeros(count), np.zeros(count), np.zeros(count))
         for turnout in self.turnouts:
             turnout.widen(station, sums)
         high = base + sums.left + sums.wedge
         outer, gap = high + sums.added, sums.bare > 0.0
         gap_low, gap_high = np.where(gap, high - sums.bare, outer), np.where(gap, high, outer)
-        return Across(inner, lanes, base + full, outer, gap_low, gap_high)
+        return EdgeDistances(inner, lanes, base + full, outer, gap_low, gap_high)
 
     def inner(self, station: Float) -> Float:
         """Return the inner paved edge (N,) at N stations."""
@@ -222,11 +223,11 @@ class Edges:
         inside = self.marks[(self.marks > start) & (self.marks < end)]
         return np.concatenate(([start], inside, [end]))
 
-    def distances(self, low: Float, high: Float) -> tuple[Float, Float]:
+    def distances(self, low: Offset, high: Offset) -> tuple[Offset, Offset]:
         """Return the smaller and the larger distance of what lies between two offsets."""
         return (low, high) if self.sign > 0 else (-high, -low)
 
-    def _own(self, station: Float) -> list[Float]:
+    def _main(self, station: Float) -> list[Float]:
         """Return inner edge, lane boundaries, outer edge of the outer edge strip, width of the hard shoulder."""
         inner = self._inner(station)
         widths = [inner + self._inner_strip(station), *(width(station) for width in reversed(self.lane_widths))]

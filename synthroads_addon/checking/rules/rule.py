@@ -114,6 +114,11 @@ class CurvatureRun:
         return abs(self.curvature) < STRAIGHT
 
     @property
+    def length(self) -> float:
+        """Return the length, m."""
+        return self.end - self.start
+
+    @property
     def radius(self) -> float:
         """Return the radius, m; infinite on a straight."""
         return 1.0 / abs(self.curvature) if self.curvature else np.inf
@@ -148,10 +153,8 @@ class Road:
             self._by_type.setdefault(type(item), {})[name] = item
         self.axis, alignment = next(iter(self.of(AlignmentObject).items()))
         self.terrain = next(iter(self.of(Terrain).values()), None)
-        elements = alignment.horizontal
-        self.lengths = np.array([e.length for e in elements], dtype=np.float64)
-        self.k0 = np.array([e.curvature_start for e in elements], dtype=np.float64)
-        self.k1 = np.array([e.curvature_end for e in elements], dtype=np.float64)
+        rows = [(e.length, e.curvature_start, e.curvature_end) for e in alignment.horizontal]
+        self.lengths, self.k0, self.k1 = np.array(rows, dtype=np.float64).T
         self.starts = np.concatenate(([0.0], np.cumsum(np.maximum(self.lengths, 0.0))))
         self.length = float(self.starts[-1])
         self.constant: Bool = same_curvature(self.k0, self.k1)
@@ -220,7 +223,7 @@ class Road:
             runs.append(CurvatureRun(float(self.starts[first]), float(self.starts[i + 1]), curvature, first, i))
         return runs
 
-    def cut(self, run: CurvatureRun) -> bool:
+    def is_cut(self, run: CurvatureRun) -> bool:
         """Return whether the road's begin or end cuts a run, so that its true length is unknown."""
         return run.first == 0 or run.last == len(self.lengths) - 1
 
@@ -229,20 +232,15 @@ class Vertical:
     """The profile as arrays; points whose station isn't past all before them are left out (and found by a rule).
 
     Attributes:
-        points: (P,) indices in the set of the points that are kept.
         station, radius: (P,) m.
         grades: (P + 1,) m/m before, between and after the points; the outer ones repeat their neighbour.
         tangents: (P,) tangent lengths of the roundings, m.
     """
 
     def __init__(self, alignment: AlignmentObject) -> None:
-        points = alignment.vertical
-        station = np.array([p.station for p in points], dtype=np.float64)
-        elevation = np.array([p.elevation for p in points], dtype=np.float64)
-        self.points = increasing(station)
-        self.station = station[self.points]
-        self.radius = np.array([p.radius for p in points], dtype=np.float64)[self.points]
-        between = np.diff(elevation[self.points]) / np.diff(self.station)
+        points = np.array([(p.station, p.elevation, p.radius) for p in alignment.vertical], dtype=np.float64)
+        self.station, elevation, self.radius = points[increasing(points[:, 0])].T
+        between = np.diff(elevation) / np.diff(self.station)
         self.grades = np.concatenate((between[:1], between, between[-1:])) if len(between) else np.zeros(2)
         self.tangents = 0.5 * self.radius * np.abs(np.diff(self.grades))
 
@@ -280,9 +278,13 @@ def increasing(station: Float) -> NDArray[np.intp]:
     return np.flatnonzero(station > before)
 
 
-def out_of_order(station: Float) -> list[int]:
-    """Return the indices of the stations that don't lie past all stations before them."""
-    return sorted(set(range(len(station))) - set(increasing(station).tolist()))
+def out_of_order(stations: Iterable[float]) -> Iterator[tuple[int, float, float]]:
+    """Yield number (from 1), station and the largest one before of those that don't lie past all before them."""
+    past = -np.inf
+    for number, station in enumerate(stations, start=1):
+        if station <= past:
+            yield number, station, past
+        past = max(past, station)
 
 
 def below(value: float, limit: float) -> bool:
@@ -293,6 +295,18 @@ def below(value: float, limit: float) -> bool:
 def above(value: float, limit: float) -> bool:
     """Return whether a value exceeds a limit by more than the tolerance."""
     return below(-value, -limit)
+
+
+def at_least(item: str, station: float, value: float, limit: float, text: str) -> Iterator[Finding]:
+    """Yield a finding if a value falls short of its limit."""
+    if below(value, limit):
+        yield Finding(item, station, value, limit, text)
+
+
+def at_most(item: str, station: float, value: float, limit: float, text: str) -> Iterator[Finding]:
+    """Yield a finding if a value exceeds its limit."""
+    if above(value, limit):
+        yield Finding(item, station, value, limit, text)
 
 
 def stretches(mask: Bool) -> Iterator[tuple[int, int]]:

@@ -11,7 +11,7 @@ from ...road.things.gantry import Gantry
 from ...road.things.overpass import Overpass
 from ...road.things.sign import TrafficSign
 from .edges import Edges, TurnoutEdges
-from .rule import TOLERANCE, Finding, Road, Rule, above, below
+from .rule import TOLERANCE, Finding, Road, Rule, at_least, at_most, below
 
 #: Signs may be turned away from their traffic by this angle, degrees.
 TURNED = 45.0
@@ -21,18 +21,18 @@ LOW_SIGNS = "450"
 
 def _sign_distance(road: Road) -> Iterator[Finding]:
     clearance = road.around.nearest
-    for i in np.flatnonzero((clearance >= 0.0) & (clearance < SIGN_DISTANCE)).tolist():
-        body, name, distance = road.bodies.items[i], road.bodies.names[i], float(clearance[i])
-        if body.part == "face" and below(distance, SIGN_DISTANCE) and below(body.bottom, CLEARANCE):
+    for i in np.flatnonzero((clearance >= 0.0) & (clearance < SIGN_DISTANCE)):
+        body, name, distance = road.bodies.items[i], road.bodies.names[i], clearance[i]
+        if body.part == "face" and below(body.bottom, CLEARANCE):
             text = f"The sign stands {distance:.2f} m from the paved edge; {SIGN_DISTANCE} m are needed (VwV-StVO)."
-            yield Finding(name, 0.5 * (body.start + body.end), distance, SIGN_DISTANCE, text)
+            yield from at_least(name, 0.5 * (body.start + body.end), distance, SIGN_DISTANCE, text)
 
 
 def _sign_lower_edge(road: Road) -> Iterator[Finding]:
     for name, sign in road.of(TrafficSign).items():
-        if not sign.code.startswith(LOW_SIGNS) and below(sign.lower_edge, SIGN_LOWER_EDGE):
+        if not sign.code.startswith(LOW_SIGNS):
             text = f"The sign's lower edge is {sign.lower_edge:.2f} m high; {SIGN_LOWER_EDGE} m are needed (VwV-StVO)."
-            yield Finding(name, sign.station, sign.lower_edge, SIGN_LOWER_EDGE, text)
+            yield from at_least(name, sign.station, sign.lower_edge, SIGN_LOWER_EDGE, text)
 
 
 def _sign_facing(road: Road) -> Iterator[Finding]:
@@ -40,9 +40,9 @@ def _sign_facing(road: Road) -> Iterator[Finding]:
     turned = np.full(len(signs.names), np.inf)
     for name, edges in road.sides.items():
         turned = np.where(signs.of[name], np.minimum(turned, signs.away(edges)), turned)
-    for i in np.flatnonzero(turned > TURNED).tolist():
+    for i in np.flatnonzero(turned > TURNED):
         text = f"It is turned {turned[i]:.0f} degrees away from its traffic; {TURNED:.0f} are allowed."
-        yield Finding(signs.names[i], float(signs.station[i]), float(turned[i]), TURNED, text)
+        yield Finding(signs.names[i], signs.station[i], turned[i], TURNED, text)
 
 
 def _exits(road: Road) -> list[tuple[Edges, TurnoutEdges]]:
@@ -54,16 +54,14 @@ def _exit_sign_missing(road: Road) -> Iterator[Finding]:
         signs, begin = road.signs, turnout.station(0.0)
         for before, code in EXIT_SEQUENCE.items():
             place = begin - edges.traffic * before
-            if not 0.0 <= place <= road.length:
-                continue
-            stations = signs.station[signs.seen(edges, code, TURNED)]
-            away = float(np.abs(stations - place).min(initial=road.length))
-            if above(away, EXIT_SIGN_ROOM):
+            if 0.0 <= place <= road.length:
+                stations = signs.station[signs.seen(edges, code, TURNED)]
+                away = np.abs(stations - place).min(initial=road.length)
                 text = (
                     f"The nearest sign {code} is {away:.0f} m from its place {before:.0f} m before the exit; "
                     f"{EXIT_SIGN_ROOM:.0f} m are allowed (StVO)."
                 )
-                yield Finding(turnout.name, place, away, EXIT_SIGN_ROOM, text)
+                yield from at_most(turnout.name, place, away, EXIT_SIGN_ROOM, text)
 
 
 def _exit_sign_place(road: Road) -> Iterator[Finding]:
@@ -71,16 +69,15 @@ def _exit_sign_place(road: Road) -> Iterator[Finding]:
     for side in {edges.name: edges for edges, _ in exits}.values():
         begins = np.array([turnout.station(0.0) for edges, turnout in exits if edges is side])
         for before, code in EXIT_SEQUENCE.items():
-            for i in signs.seen(side, code, TURNED).tolist():
+            for i in signs.seen(side, code, TURNED):
                 ahead = side.traffic * (begins - signs.station[i])
-                away = float(np.abs(ahead - before).min())
-                announces = np.any((ahead >= 0.0) & (ahead <= max(EXIT_SEQUENCE) + EXIT_SIGN_ROOM))
-                if announces and above(away, EXIT_SIGN_ROOM):
+                away = np.abs(ahead - before).min()
+                if np.any((ahead >= 0.0) & (ahead <= max(EXIT_SEQUENCE) + EXIT_SIGN_ROOM)):
                     text = (
                         f"The sign {code} stands {away:.0f} m from where it belongs, {before:.0f} m before an exit; "
                         f"{EXIT_SIGN_ROOM:.0f} m are allowed (StVO)."
                     )
-                    yield Finding(signs.names[i], float(signs.station[i]), away, EXIT_SIGN_ROOM, text)
+                    yield from at_most(signs.names[i], signs.station[i], away, EXIT_SIGN_ROOM, text)
 
 
 def _gore_sign(road: Road) -> Iterator[Finding]:
@@ -88,22 +85,20 @@ def _gore_sign(road: Road) -> Iterator[Finding]:
         signs = road.signs
         low, high = turnout.span(turnout.nose, turnout.end)
         there = signs.bare[edges.name] & (signs.station >= low) & (signs.station <= high)
-        if not any(signs.codes[i].split("-")[0] == GORE_SIGN for i in np.flatnonzero(there).tolist()):
+        if not any(signs.codes[i].split("-")[0] == GORE_SIGN for i in np.flatnonzero(there)):
             text = f"No sign {GORE_SIGN} stands in the exit's gore, behind its nose (StVO)."
             yield Finding(turnout.name, turnout.station(turnout.nose), 0.0, 1.0, text)
 
 
 def _clearance(road: Road) -> Iterator[Finding]:
-    spans = [(name, item.station, item.clearance) for name, item in road.of(Gantry).items()]
-    spans += [(name, item.station, item.clearance) for name, item in road.of(Overpass).items()]
-    for i in np.flatnonzero(road.around.nearest < 0.0).tolist():
+    spans = [(name, item.station, item.clearance) for name, item in road.each(Gantry, Overpass)]
+    for i in np.flatnonzero(road.around.nearest < 0.0):
         body = road.bodies.items[i]
         if body.part == "face":
             spans.append((road.bodies.names[i], 0.5 * (body.start + body.end), body.bottom))
     for name, station, value in spans:
-        if below(value, CLEARANCE):
-            text = f"{value:.2f} m are clear below it; {CLEARANCE:.2f} m are needed over the pavement (RAA)."
-            yield Finding(name, station, value, CLEARANCE, text)
+        text = f"{value:.2f} m are clear below it; {CLEARANCE:.2f} m are needed over the pavement (RAA)."
+        yield from at_least(name, station, value, CLEARANCE, text)
 
 
 def _gantry_sign(road: Road) -> Iterator[Finding]:

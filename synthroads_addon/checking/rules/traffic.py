@@ -13,7 +13,7 @@ from ...road.surroundings import Vehicle
 from ...road.things.beacon import ConstructionBeacon
 from ...road.things.temporary_barrier import TemporaryBarrier
 from .edges import Edges, Float
-from .rule import TOLERANCE, Finding, Road, Rule, below
+from .rule import TOLERANCE, Finding, Road, Rule, at_least
 
 #: Beacons farther apart than this (m) are of two construction zones.
 ZONES_APART = 100.0
@@ -40,16 +40,16 @@ class _Beacon(NamedTuple):
     beacon: ConstructionBeacon
 
 
-def _side_of(road: Road, offset: float) -> Edges | None:
+def _carriageway_at(road: Road, offset: float) -> Edges | None:
     """Return the carriageway on an offset's side of the centreline."""
     return next((edges for edges in road.sides.values() if edges.sign * offset > 0.0), None)
 
 
-def _rows(road: Road) -> Iterator[tuple[Edges, list[_Beacon]]]:
+def _beacon_rows(road: Road) -> Iterator[tuple[Edges, list[_Beacon]]]:
     """Yield the rows of beacons in order: those of one carriageway that traffic passes on the same side."""
     rows: dict[tuple[str, str], list[_Beacon]] = {}
     for name, beacon in road.of(ConstructionBeacon).items():
-        edges = _side_of(road, beacon.offset)
+        edges = _carriageway_at(road, beacon.offset)
         if edges is not None:
             place = _Beacon(beacon.station, edges.sign * beacon.offset, name, beacon)
             rows.setdefault((edges.name, beacon.pass_side), []).append(place)
@@ -57,9 +57,9 @@ def _rows(road: Road) -> Iterator[tuple[Edges, list[_Beacon]]]:
         yield road.sides[side], sorted(beacons)
 
 
-def _zones(road: Road) -> Iterator[tuple[Edges, list[_Beacon]]]:
+def _construction_zones(road: Road) -> Iterator[tuple[Edges, list[_Beacon]]]:
     """Yield the rows of beacons of each construction zone."""
-    for edges, beacons in _rows(road):
+    for edges, beacons in _beacon_rows(road):
         first = 0
         for i, (here, there) in enumerate(pairwise(beacons), start=1):
             if there.station - here.station > ZONES_APART:
@@ -68,13 +68,13 @@ def _zones(road: Road) -> Iterator[tuple[Edges, list[_Beacon]]]:
         yield edges, beacons[first:]
 
 
-def _outwards(edges: Edges, place: _Beacon) -> bool:
+def _is_passed_outside(edges: Edges, place: _Beacon) -> bool:
     """Return whether traffic passes a beacon outwards of it, seen from the centreline."""
     return (place.beacon.pass_side == "left") == (edges.sign > 0)
 
 
 def _beacon_spacing(road: Road) -> Iterator[Finding]:
-    for _, beacons in _zones(road):
+    for _, beacons in _construction_zones(road):
         for here, there in pairwise(beacons):
             gap = there.station - here.station
             sideways = abs(there.distance - here.distance) > TAPER_SLOPE * gap
@@ -86,25 +86,25 @@ def _beacon_spacing(road: Road) -> Iterator[Finding]:
 
 
 def _open_lane(road: Road) -> Iterator[Finding]:
-    for edges, beacons in _rows(road):
+    for edges, beacons in _beacon_rows(road):
         station = np.array([place.station for place in beacons])
         distance = np.array([place.distance for place in beacons])
-        inwards, outwards = _open(edges, station, distance, np.array([b.beacon.width for b in beacons]) / 2.0)
-        beyond = np.array([_outwards(edges, place) for place in beacons])
-        for place, width in zip(beacons, np.where(beyond, outwards, inwards).tolist(), strict=True):
-            yield from _too_narrow(place.name, place.station, width)
+        inwards, outwards = _open_widths(edges, station, distance, np.array([b.beacon.width for b in beacons]) / 2.0)
+        beyond = np.array([_is_passed_outside(edges, place) for place in beacons])
+        for place, width in zip(beacons, np.where(beyond, outwards, inwards), strict=True):
+            yield from _find_narrow(place.name, place.station, width)
     for name, barrier in road.of(TemporaryBarrier).items():
-        side = _side_of(road, barrier.offset)
+        side = _carriageway_at(road, barrier.offset)
         if side is None:
             continue
         station = np.array([barrier.start_station, barrier.end_station])
         distance = side.sign * np.array([barrier.offset, barrier.end_offset], dtype=np.float64)
-        widest = np.maximum(*_open(side, station, distance, barrier.base_width / 2.0))
-        worst = int(np.argmin(widest))
-        yield from _too_narrow(name, float(station[worst]), float(widest[worst]))
+        widest = np.maximum(*_open_widths(side, station, distance, barrier.base_width / 2.0))
+        worst = np.argmin(widest)
+        yield from _find_narrow(name, station[worst], widest[worst])
 
 
-def _open(edges: Edges, station: Float, distance: Float, half: Float | float) -> tuple[Float, Float]:
+def _open_widths(edges: Edges, station: Float, distance: Float, half: Float | float) -> tuple[Float, Float]:
     """Return how much (N,) of the lanes is left inwards and outwards of what stands at N distances, m."""
     lanes = edges.at(station).lanes
     outermost, innermost = lanes[:, 0], lanes[:, -1]
@@ -112,10 +112,9 @@ def _open(edges: Edges, station: Float, distance: Float, half: Float | float) ->
     return inwards, outermost - np.maximum(distance + half, innermost)
 
 
-def _too_narrow(name: str, station: float, open_width: float) -> Iterator[Finding]:
-    if below(open_width, CONSTRUCTION_LANE_WIDTH):
-        text = f"{open_width:.2f} m of the lanes are left open beside it; {CONSTRUCTION_LANE_WIDTH} m are needed (RSA)."
-        yield Finding(name, station, open_width, CONSTRUCTION_LANE_WIDTH, text)
+def _find_narrow(name: str, station: float, open_width: float) -> Iterator[Finding]:
+    text = f"{open_width:.2f} m of the lanes are left open beside it; {CONSTRUCTION_LANE_WIDTH} m are needed (RSA)."
+    return at_least(name, station, open_width, CONSTRUCTION_LANE_WIDTH, text)
 
 
 def _vehicle_lane(road: Road) -> Iterator[Finding]:
@@ -124,10 +123,9 @@ def _vehicle_lane(road: Road) -> Iterator[Finding]:
         length, needed = VEHICLE_SIZES[vehicle.model]
         lane = edges.lane_widths[vehicle.lane]
         low, high = vehicle.station - length / 2.0, vehicle.station + length / 2.0
-        width = float(lane.width[0] if lane.constant else lane(edges.between(low, high)).min())
-        if below(width, needed):
-            text = f"Lane {vehicle.lane + 1} is {width:.2f} m wide there; the {vehicle.model} takes {needed} m."
-            yield Finding(name, vehicle.station, width, needed, text)
+        width = lane.width[0] if lane.constant else lane(edges.between(low, high)).min()
+        text = f"Lane {vehicle.lane + 1} is {width:.2f} m wide there; the {vehicle.model} takes {needed} m."
+        yield from at_least(name, vehicle.station, width, needed, text)
 
 
 def _vehicle_overlap(road: Road) -> Iterator[Finding]:
@@ -146,7 +144,7 @@ def _vehicle_overlap(road: Road) -> Iterator[Finding]:
                 reached, before = station + half, name
 
 
-def _between(road: Road, edges: Edges, row: Float) -> Iterator[tuple[str, float, float, float]]:
+def _vehicles_beside(road: Road, edges: Edges, row: Float) -> Iterator[tuple[str, float, float, float]]:
     """Yield (id, station, distance of its middle, distance of the row) of vehicles beside a row of places (R, 2)."""
     for name, vehicle in road.of(Vehicle).items():
         if vehicle.carriageway == edges.name and row[0, 0] <= vehicle.station <= row[-1, 0]:
@@ -158,18 +156,18 @@ def _between(road: Road, edges: Edges, row: Float) -> Iterator[tuple[str, float,
 def _vehicle_closed(road: Road) -> Iterator[Finding]:
     vehicles = road.of(Vehicle)
     overlaps: list[tuple[str, float, float]] = []
-    for edges, beacons in _zones(road):
+    for edges, beacons in _construction_zones(road):
         row = np.array([(place.station, place.distance) for place in beacons])
-        for name, station, middle, line in _between(road, edges, row):
-            free = middle - line if _outwards(edges, beacons[0]) else line - middle
+        for name, station, middle, line in _vehicles_beside(road, edges, row):
+            free = middle - line if _is_passed_outside(edges, beacons[0]) else line - middle
             overlaps.append((name, station, VEHICLE_SIZES[vehicles[name].model][1] / 2.0 - free))
     for barrier in road.of(TemporaryBarrier).values():
-        side = _side_of(road, barrier.offset)
+        side = _carriageway_at(road, barrier.offset)
         places = [(barrier.start_station, barrier.offset), (barrier.end_station, barrier.end_offset)]
         if side is None:
             continue
         row = np.array([(station, side.sign * offset) for station, offset in places])
-        for name, station, middle, line in _between(road, side, row):
+        for name, station, middle, line in _vehicles_beside(road, side, row):
             reach = VEHICLE_SIZES[vehicles[name].model][1] / 2.0 + barrier.base_width / 2.0
             overlaps.append((name, station, reach - abs(middle - line)))
     for name, station, over in overlaps:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from itertools import pairwise
+from collections.abc import Iterable, Iterator
+from itertools import pairwise, product
 
 from ...road.guidelines import (
     EMERGENCY_BAY_LENGTH,
@@ -17,90 +17,84 @@ from ...road.guidelines import (
 )
 from ...road.section import Turnout
 from .edges import NOSE_BEFORE_END, TurnoutEdges
-from .rule import SAME_STATION, Finding, Road, Rule, above, below
+from .rule import SAME_STATION, Finding, Road, Rule, above, at_least
 from .section import lane_tapers
 
 _NAMES = {"emergency_bay": "emergency bay", "exit": "exit", "entry": "entry"}
 
 
-def _place(road: Road, turnout: Turnout) -> float:
-    return float(min(max(turnout.start_station, 0.0), road.length))
+def _clip_to_road(road: Road, station: float) -> float:
+    """Return a station (m), or the nearer end of the road beyond it."""
+    return min(max(station, 0.0), road.length)
 
 
-def _too_small(road: Road, with_ramp: bool, field: str, least: float, text: str) -> Iterator[Finding]:
-    """Yield the exits and entries, or the emergency bays, of which a length or width falls short of the least (m)."""
+def _find_small(road: Road, bays: bool, field: str, least: float, text: str) -> Iterator[Finding]:
+    """Yield the emergency bays, or the exits and entries, of which a length or width falls short of the least (m)."""
     for name, turnout in road.of(Turnout).items():
-        value = getattr(turnout, field)
-        if (turnout.ramp is not None) == with_ramp and below(value, least):
+        if (turnout.ramp is None) == bays:
+            value = getattr(turnout, field)
             sentence = text.format(kind=_NAMES[turnout.kind], value=value, least=least)
-            yield Finding(name, _place(road, turnout), value, least, sentence)
+            yield from at_least(name, _clip_to_road(road, turnout.start_station), value, least, sentence)
 
 
 def _lane_length(road: Road) -> Iterator[Finding]:
     text = "The {kind}'s lane is {value:.1f} m long; {least:.0f} m are needed (RAA)."
-    yield from _too_small(road, True, "lane_length", TURNOUT_LANE_LENGTH[road.design_class], text)
+    return _find_small(road, False, "lane_length", TURNOUT_LANE_LENGTH[road.design_class], text)
 
 
 def _lane_width(road: Road) -> Iterator[Finding]:
     text = "The {kind}'s lane is {value:.2f} m wide; {least} m are needed (RAA)."
-    yield from _too_small(road, True, "lane_width", TURNOUT_LANE_WIDTH, text)
+    return _find_small(road, False, "lane_width", TURNOUT_LANE_WIDTH, text)
 
 
 def _bay_width(road: Road) -> Iterator[Finding]:
     text = "The {kind} is {value:.2f} m wide; {least} m are needed (RAA)."
-    yield from _too_small(road, False, "lane_width", EMERGENCY_BAY_WIDTH, text)
+    return _find_small(road, True, "lane_width", EMERGENCY_BAY_WIDTH, text)
 
 
 def _bay_length(road: Road) -> Iterator[Finding]:
     text = "The {kind} is {value:.1f} m long; {least:.0f} m are needed (RAA)."
-    yield from _too_small(road, False, "lane_length", EMERGENCY_BAY_LENGTH, text)
+    return _find_small(road, True, "lane_length", EMERGENCY_BAY_LENGTH, text)
 
 
 def _taper(road: Road) -> Iterator[Finding]:
     for name, turnout in road.of(Turnout).items():
         least = TURNOUT_TAPER if turnout.ramp else EMERGENCY_BAY_TAPER
         shortest = min(taper for taper in (turnout.taper_in_length, turnout.taper_out_length) if taper > 0.0)
-        if below(shortest, least):
-            text = f"The {_NAMES[turnout.kind]}'s taper is {shortest:.1f} m long; {least:.0f} m are needed (RAA)."
-            yield Finding(name, _place(road, turnout), shortest, least, text)
+        text = f"The {_NAMES[turnout.kind]}'s taper is {shortest:.1f} m long; {least:.0f} m are needed (RAA)."
+        yield from at_least(name, _clip_to_road(road, turnout.start_station), shortest, least, text)
 
 
 def _nose(road: Road) -> Iterator[Finding]:
     for _, edges in road.turnouts:
-        ramp = edges.turnout.ramp
-        needed = edges.natural_nose + NOSE_BEFORE_END
-        if ramp is not None and below(ramp.length, needed):
+        if ramp := edges.turnout.ramp:
+            needed = edges.natural_nose + NOSE_BEFORE_END
             text = f"The ramp is {ramp.length:.1f} m long; {needed:.1f} m are needed to reach its nose."
-            yield Finding(edges.name, _tip(road, edges), ramp.length, needed, text)
+            yield from at_least(edges.name, _clip_to_road(road, edges.station(edges.tip)), ramp.length, needed, text)
 
 
-def _tip(road: Road, edges: TurnoutEdges) -> float:
-    return float(min(max(edges.station(edges.tip), 0.0), road.length))
-
-
-def _start(edges: TurnoutEdges) -> float:
-    return edges.turnout.start_station
+def _consecutive(turnouts: Iterable[TurnoutEdges]) -> Iterator[tuple[TurnoutEdges, TurnoutEdges]]:
+    """Return each two turnouts that follow one another."""
+    return pairwise(sorted(turnouts, key=lambda item: item.turnout.start_station))
 
 
 def _gap(road: Road) -> Iterator[Finding]:
     for side in road.sides.values():
-        for before, after in pairwise(sorted(side.turnouts, key=_start)):
-            gap = after.turnout.start_station - before.turnout.end_station
-            if below(gap, TURNOUT_GAP):
-                text = f"The turnout begins {gap:.1f} m behind {before.name}; {TURNOUT_GAP:.0f} m are needed (RAA)."
-                yield Finding(after.name, _place(road, after.turnout), gap, TURNOUT_GAP, text)
+        for before, after in _consecutive(side.turnouts):
+            begin = after.turnout.start_station
+            gap = begin - before.turnout.end_station
+            text = f"The turnout begins {gap:.1f} m behind {before.name}; {TURNOUT_GAP:.0f} m are needed (RAA)."
+            yield from at_least(after.name, _clip_to_road(road, begin), gap, TURNOUT_GAP, text)
 
 
 def _interchange(road: Road) -> Iterator[Finding]:
     least = INTERCHANGE_SPACING[road.design_class]
-    for side in road.sides.values():
-        for kind in ("exit", "entry"):
-            alike = [item for item in side.turnouts if item.turnout.kind == kind]
-            for before, after in pairwise(sorted(alike, key=_start)):
-                spacing = after.turnout.start_station - before.turnout.start_station
-                if below(spacing, least):
-                    text = f"The {kind} lies {spacing:.0f} m behind {before.name}; {least:.0f} m are needed (RAA)."
-                    yield Finding(after.name, _place(road, after.turnout), spacing, least, text)
+    for side, kind in product(road.sides.values(), ("exit", "entry")):
+        for before, after in _consecutive(item for item in side.turnouts if item.turnout.kind == kind):
+            begin = after.turnout.start_station
+            spacing = begin - before.turnout.start_station
+            text = f"The {kind} lies {spacing:.0f} m behind {before.name}; {least:.0f} m are needed (RAA)."
+            yield from at_least(after.name, _clip_to_road(road, begin), spacing, least, text)
 
 
 def _range(road: Road) -> Iterator[Finding]:
@@ -115,16 +109,13 @@ def _range(road: Road) -> Iterator[Finding]:
 
 
 def _lane_change(road: Road) -> Iterator[Finding]:
-    for side in road.sides.values():
-        if not side.turnouts:
-            continue
+    for side, item in road.turnouts:
         for lane, begin, end in lane_tapers(road, side):
-            for item in side.turnouts:
-                low, high = max(begin, item.turnout.start_station), min(end, item.turnout.end_station)
-                if high > low + SAME_STATION:
-                    kind = _NAMES[item.turnout.kind]
-                    text = f"Lane {lane + 1} begins or ends beside the {kind} for {high - low:.1f} m."
-                    yield Finding(item.name, low, high - low, 0.0, text)
+            low, high = max(begin, item.turnout.start_station), min(end, item.turnout.end_station)
+            if high > low + SAME_STATION:
+                kind = _NAMES[item.turnout.kind]
+                text = f"Lane {lane + 1} begins or ends beside the {kind} for {high - low:.1f} m."
+                yield Finding(item.name, low, high - low, 0.0, text)
 
 
 RULES = (
