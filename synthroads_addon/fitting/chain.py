@@ -17,7 +17,8 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from ..road.alignment import Alignment, Element, FloatArray, IntArray
+from ..base.arrays import Float, Int
+from ..road.alignment import Alignment, Element
 
 FREE, EQUAL, ZERO = 0, 1, 2
 
@@ -37,10 +38,10 @@ class Chain:
         pinned: the start's pose and value are given by what comes before.
     """
 
-    pose: FloatArray
-    knots: FloatArray
-    values: FloatArray
-    kinds: IntArray
+    pose: Float
+    knots: Float
+    values: Float
+    kinds: Int
     pinned: bool = False
 
     @property
@@ -59,12 +60,12 @@ class Chain:
         return slice(self.turns, self.turns + self.size + 1)
 
     @property
-    def slopes(self) -> FloatArray:
+    def slopes(self) -> Float:
         """(M,) change of value per metre."""
         return np.diff(self.values) / np.diff(self.knots)
 
     @cached_property
-    def groups(self) -> tuple[FloatArray, FloatArray]:
+    def groups(self) -> tuple[Float, Float]:
         """Return (M + 1, G) and (M + 1,): values = first @ free values + second."""
         label = np.arange(self.size + 1)
         zero = np.zeros(self.size + 1, bool)
@@ -91,7 +92,7 @@ class Chain:
         start = 0 if self.pinned else self.turns
         return start + self.groups[0].shape[1] + self.size - 1
 
-    def basis(self, free_knots: bool) -> FloatArray:
+    def basis(self, free_knots: bool) -> Float:
         """Return (F, P): the change of all F parameters for each of the P free ones.
 
         All are: pose (across, heading; or elevation), M + 1 values, M - 1 inner knots.
@@ -126,18 +127,18 @@ class AxisData(Protocol):
     def snaps(self) -> tuple[int, ...]:
         """Kinds that an element may be snapped to."""
 
-    def measure(self, chain: Chain, stations: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def measure(self, chain: Chain, stations: Float) -> tuple[Float, Float]:
         """Return stations (N,) of the points on the chain, from the former ones, and residuals (N,), m."""
 
-    def jacobian(self, chain: Chain, stations: FloatArray) -> FloatArray:
+    def jacobian(self, chain: Chain, stations: Float) -> Float:
         """Return (N, F) derivatives of the residuals by all parameters (see `Chain.basis`)."""
 
-    def move_pose(self, pose: FloatArray, step: FloatArray) -> FloatArray:
+    def move_pose(self, pose: Float, step: Float) -> Float:
         """Return the pose after a step of its parameters."""
 
 
 def ramp_integrals(
-    chain: Chain, stations: FloatArray, grid: FloatArray, weight: NDArray[Any]
+    chain: Chain, stations: Float, grid: Float, weight: NDArray[Any]
 ) -> tuple[NDArray[Any], NDArray[Any]]:
     """Return two (N, M): from the start to each station, weight times each element's rising and falling ramp.
 
@@ -159,14 +160,14 @@ def ramp_integrals(
     return result[0], result[1]
 
 
-def quadrature_grid(chain: Chain, stations: FloatArray) -> FloatArray:
+def quadrature_grid(chain: Chain, stations: Float) -> Float:
     """Return sorted stations that hold all knots and points and lie at most `_QUADRATURE` apart."""
     inside = stations[(stations > 0.0) & (stations < chain.knots[-1])]
     even = np.linspace(0.0, chain.knots[-1], int(chain.knots[-1] / _QUADRATURE) + 2)
     return np.unique(np.concatenate((inside, chain.knots, even[1:-1])))
 
 
-def assemble(pose: FloatArray, rise: FloatArray, fall: FloatArray, slopes: FloatArray) -> FloatArray:
+def assemble(pose: Float, rise: Float, fall: Float, slopes: Float) -> Float:
     """Return (N, F) derivatives from those by the pose and by every element's ramps.
 
     A knot's value raises the ramp before it and the one after it; a knot that moves with its value held changes its
@@ -184,18 +185,18 @@ def assemble(pose: FloatArray, rise: FloatArray, fall: FloatArray, slopes: Float
 class Plan:
     """Map points (N, 2) of an axis, in order, with weights (N,); the residual is the weighted offset."""
 
-    points: FloatArray
-    weights: FloatArray
+    points: Float
+    weights: Float
     least: float
     reach: float  # m that a foot may move between two steps
     limit: float = 0.2
     snaps: tuple[int, ...] = (EQUAL, ZERO)
 
-    def measure(self, chain: Chain, stations: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def measure(self, chain: Chain, stations: Float) -> tuple[Float, Float]:
         feet, offset = chain.alignment.project_near(self.points, stations, self.reach)
         return feet, self.weights * offset
 
-    def jacobian(self, chain: Chain, stations: FloatArray) -> FloatArray:
+    def jacobian(self, chain: Chain, stations: Float) -> Float:
         """A change of curvature at s' turns the rest of the road about the point there.
 
         The offset at s thus falls by t(s) . (z(s) - z(s')) for each radian; the foot's own shift has no effect.
@@ -214,7 +215,7 @@ class Plan:
         across = -(tangent * np.exp(1j * alignment.start_heading)).real
         return self.weights[:, None] * assemble(np.column_stack((across, -lever)), rise, fall, chain.slopes)
 
-    def move_pose(self, pose: FloatArray, step: FloatArray) -> FloatArray:
+    def move_pose(self, pose: Float, step: Float) -> Float:
         return pose + np.array([-np.sin(pose[2]) * step[0], np.cos(pose[2]) * step[0], step[1]])
 
 
@@ -222,25 +223,25 @@ class Plan:
 class Heights:
     """Elevations (N,) at stations, with weights (N,); the residual is the weighted height above the chain."""
 
-    heights: FloatArray
-    weights: FloatArray
+    heights: Float
+    weights: Float
     least: float
     limit: float = 10.0
     snaps: tuple[int, ...] = (EQUAL,)
 
-    def measure(self, chain: Chain, stations: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def measure(self, chain: Chain, stations: Float) -> tuple[Float, Float]:
         return stations, self.weights * (self.heights - elevations(chain, stations))
 
-    def jacobian(self, chain: Chain, stations: FloatArray) -> FloatArray:
+    def jacobian(self, chain: Chain, stations: Float) -> Float:
         grid = quadrature_grid(chain, stations)
         rise, fall = ramp_integrals(chain, stations, grid, np.ones(len(grid) - 1))
         return -self.weights[:, None] * assemble(np.ones((len(stations), 1)), rise, fall, chain.slopes)
 
-    def move_pose(self, pose: FloatArray, step: FloatArray) -> FloatArray:
+    def move_pose(self, pose: Float, step: Float) -> Float:
         return pose + step
 
 
-def elevations(chain: Chain, stations: FloatArray) -> FloatArray:
+def elevations(chain: Chain, stations: Float) -> Float:
     """Return the elevation (N,), the integral of a chain of grades; the end grades go on beyond the ends."""
     gap = np.diff(chain.knots)
     base = chain.pose[0] + np.concatenate(([0.0], np.cumsum(0.5 * gap * (chain.values[:-1] + chain.values[1:]))))
@@ -256,9 +257,9 @@ class ChainFit:
     """A chain with the points' stations and residuals on it."""
 
     chain: Chain
-    stations: FloatArray
-    residuals: FloatArray
-    _linear: tuple[FloatArray, FloatArray] | None = field(default=None, repr=False)
+    stations: Float
+    residuals: Float
+    _linear: tuple[Float, Float] | None = field(default=None, repr=False)
 
     @property
     def square(self) -> float:
@@ -273,7 +274,7 @@ class ChainFit:
     def p95(self) -> float:
         return float(np.percentile(np.abs(self.residuals), 95))
 
-    def linear(self, data: AxisData) -> tuple[FloatArray, FloatArray]:
+    def linear(self, data: AxisData) -> tuple[Float, Float]:
         """Return R (F, F) and (F,): the sum of squares is that of R d + the vector, but for a constant."""
         if self._linear is None:
             q, r = np.linalg.qr(data.jacobian(self.chain, self.stations))
@@ -281,14 +282,14 @@ class ChainFit:
         return self._linear
 
 
-def room(chain: Chain, least: float) -> FloatArray:
+def room(chain: Chain, least: float) -> Float:
     """Return (M - 1,) how far each inner knot may move, m: its elements don't get shorter than `least`."""
     gap = np.diff(chain.knots)
     spare = np.maximum(gap - least, 0.02 * gap)  # those that are already shorter may still move a little
     return 0.5 * np.minimum(spare[:-1], spare[1:])
 
 
-def apply_step(data: AxisData, chain: Chain, step: FloatArray) -> Chain:
+def apply_step(data: AxisData, chain: Chain, step: Float) -> Chain:
     """Return the chain after a step (F,) of all parameters, its knots kept apart."""
     values = np.clip(chain.values + step[chain.value_columns], -data.limit, data.limit)
     spare = _SHARE * np.maximum(np.diff(chain.knots) - data.least, 0.0)
@@ -297,13 +298,13 @@ def apply_step(data: AxisData, chain: Chain, step: FloatArray) -> Chain:
     return replace(chain, pose=data.move_pose(chain.pose, step[: chain.turns]), values=values, knots=knots).tie_values()
 
 
-def least_squares(matrix: FloatArray, wanted: FloatArray) -> FloatArray:
+def least_squares(matrix: Float, wanted: Float) -> Float:
     """Return the x of full rank with the least ``|matrix x - wanted|``; by QR, since chains are ill-conditioned."""
     q, r = np.linalg.qr(matrix)
     return np.linalg.solve(r, q.T @ wanted)
 
 
-def knot_penalty(data: AxisData, chain: Chain, width: int) -> FloatArray:
+def knot_penalty(data: AxisData, chain: Chain, width: int) -> Float:
     """Return (M - 1, width) rows that measure steps of the knots, the last of `width` parameters, by their room.
 
     Far from its place a knot's linear effect is worth nothing: without this, every knot would seem dispensable.
@@ -314,7 +315,7 @@ def knot_penalty(data: AxisData, chain: Chain, width: int) -> FloatArray:
     return rows
 
 
-def refine(data: AxisData, chain: Chain, stations: FloatArray, free_knots: bool, steps: int) -> ChainFit:
+def refine(data: AxisData, chain: Chain, stations: Float, free_knots: bool, steps: int) -> ChainFit:
     """Levenberg-Marquardt: improve all free parameters at once, at most `steps` times.
 
     The damping holds knots by their room, scaled by the present sum of squares: exact data end quadratically.
@@ -342,7 +343,7 @@ def refine(data: AxisData, chain: Chain, stations: FloatArray, free_knots: bool,
     return fit
 
 
-def _system(data: AxisData, fit: ChainFit, basis: FloatArray, free_knots: bool) -> tuple[FloatArray, ...]:
+def _system(data: AxisData, fit: ChainFit, basis: Float, free_knots: bool) -> tuple[Float, ...]:
     """Return R (P, P), the right side (P,), the knots' penalty (M - 1, P) and the scale (P,) of the linear problem."""
     matrix = data.jacobian(fit.chain, fit.stations) @ basis
     scale = column_scale(matrix)
@@ -351,7 +352,7 @@ def _system(data: AxisData, fit: ChainFit, basis: FloatArray, free_knots: bool) 
     return r, -(q.T @ fit.residuals), held, scale
 
 
-def column_scale(matrix: FloatArray) -> FloatArray:
+def column_scale(matrix: Float) -> Float:
     """Return the columns' lengths, none so small that dividing by it would blow up noise."""
     scale = np.sqrt((matrix**2).sum(axis=0))
     return np.maximum(scale, max(1e-9 * scale.max(initial=0.0), 1e-300))

@@ -14,8 +14,9 @@ from typing import ClassVar, Protocol
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..base.arrays import Float, Int
 from ..base.errors import InputError
-from ..road.alignment import Alignment, Element, FloatArray, IntArray, finite_array
+from ..road.alignment import Alignment, Element, finite_array
 from ..road.centerline import read_axis
 from ..road.profile import IntersectionPoint, Profile
 from .chain import FREE, AxisData, Chain, ChainFit, Heights, Plan, elevations, refine
@@ -56,7 +57,7 @@ class Deviations:
     worst_station: float
 
     @classmethod
-    def of(cls, station: FloatArray, distance: FloatArray) -> Deviations:
+    def of(cls, station: Float, distance: Float) -> Deviations:
         """Return root mean square, 95th percentile and maximum of distances (N,) at stations (N,), m."""
         size = np.abs(distance)
         worst, rms = int(size.argmax()), float(np.sqrt((size**2).mean()))
@@ -117,7 +118,7 @@ def fit_axis(points: ArrayLike, tolerance: float = 0.05) -> AxisFit:
     return AxisFit(placed, profile, Deviations.of(station, across[real]), Deviations.of(station, above), len(given))
 
 
-def _check_points(points: ArrayLike) -> FloatArray:
+def _check_points(points: ArrayLike) -> Float:
     """Return (N, 3) finite points without consecutive duplicates in plan, N >= 2."""
     array = finite_array("points", points)
     if array.ndim != 2 or array.shape[1] not in (2, 3):
@@ -132,7 +133,7 @@ def _check_points(points: ArrayLike) -> FloatArray:
     return array
 
 
-def _bridge_gaps(points: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _bridge_gaps(points: Float) -> tuple[Float, Float]:
     """Return points (M, 3) with some added on the chord of every long gap, and weights (M,).
 
     A polyline with dense points on its curves only would leave the fit without a hold on the straights between. The
@@ -162,7 +163,7 @@ class _Part(Protocol):
 
     spacing: ClassVar[_Spacing]
 
-    def begin(self, chosen: IntArray, spacing: float, start: Start | None, origin: float) -> tuple[AxisData, ChainFit]:
+    def begin(self, chosen: Int, spacing: float, start: Start | None, origin: float) -> tuple[AxisData, ChainFit]:
         """Return the points' data and their fit by fixed knots `spacing` apart."""
 
     def leave(self, chain: Chain, cut: float) -> Start:
@@ -171,11 +172,11 @@ class _Part(Protocol):
 
 @dataclass(frozen=True)
 class _PlanPart:
-    points: FloatArray
-    weights: FloatArray
+    points: Float
+    weights: Float
     spacing: ClassVar[_Spacing] = _Spacing(7.0, _SPACING, 5.0)
 
-    def begin(self, chosen: IntArray, spacing: float, start: Start | None, origin: float) -> tuple[AxisData, ChainFit]:
+    def begin(self, chosen: Int, spacing: float, start: Start | None, origin: float) -> tuple[AxisData, ChainFit]:
         data = Plan(self.points[chosen], self.weights[chosen], 0.4 * spacing, max(_NEAR, 2.0 * spacing))
         chain, station = start_plan(data.points, spacing, start)
         return data, refine(data, chain, station, False, 8)
@@ -187,12 +188,12 @@ class _PlanPart:
 
 @dataclass(frozen=True)
 class _HeightPart:
-    station: FloatArray
-    heights: FloatArray
-    weights: FloatArray
+    station: Float
+    heights: Float
+    weights: Float
     spacing: ClassVar[_Spacing] = _Spacing(20.0, 40.0, 40.0)
 
-    def begin(self, chosen: IntArray, spacing: float, start: Start | None, origin: float) -> tuple[AxisData, ChainFit]:
+    def begin(self, chosen: Int, spacing: float, start: Start | None, origin: float) -> tuple[AxisData, ChainFit]:
         data = Heights(self.heights[chosen], self.weights[chosen], 0.8 * spacing)
         station = self.station[chosen] - origin
         return data, refine(data, start_heights(station, data.heights, spacing, start), station, False, 8)
@@ -201,7 +202,7 @@ class _HeightPart:
         return elevations(chain, np.array([cut])), float(np.interp(cut, chain.knots, chain.values))
 
 
-def _fit_plan(points: FloatArray, weights: FloatArray, tolerance: float) -> tuple[Alignment, FloatArray]:
+def _fit_plan(points: Float, weights: Float, tolerance: float) -> tuple[Alignment, Float]:
     """Return the alignment from the first point's foot to the last one's, and all points' stations, roughly."""
     run = np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))))
     chain, station = _walk(_PlanPart(points, weights), run, tolerance)
@@ -209,14 +210,14 @@ def _fit_plan(points: FloatArray, weights: FloatArray, tolerance: float) -> tupl
 
 
 def _fit_heights(
-    station: FloatArray, heights: FloatArray, weights: FloatArray, length: float, tolerance: float
+    station: Float, heights: Float, weights: Float, length: float, tolerance: float
 ) -> Profile:
     order = np.argsort(station, kind="stable")
     station = np.clip(station[order], 0.0, length)
     return _profile(_walk(_HeightPart(station, heights[order], weights[order]), station, tolerance)[0])
 
 
-def _walk(part: _Part, run: FloatArray, tolerance: float) -> tuple[Chain, FloatArray]:
+def _walk(part: _Part, run: Float, tolerance: float) -> tuple[Chain, Float]:
     """Fit window after window; return the whole chain and the stations (N,) of all points on it, roughly.
 
     `run` (N) tells how far along the points are, roughly as well.
@@ -244,7 +245,7 @@ def _walk(part: _Part, run: FloatArray, tolerance: float) -> tuple[Chain, FloatA
 
 
 def _solve(
-    part: _Part, chosen: IntArray, start: Start | None, origin: float, length: float, tolerance: float
+    part: _Part, chosen: Int, start: Start | None, origin: float, length: float, tolerance: float
 ) -> ChainFit:
     """Fit one window: as exact data if they are, else with knots as dense as the tolerance needs."""
     scale = 2.5 * length / len(chosen)  # knots need data between them

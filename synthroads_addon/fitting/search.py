@@ -19,7 +19,7 @@ from typing import Literal
 
 import numpy as np
 
-from ..road.alignment import FloatArray, IntArray
+from ..base.arrays import Float, Int
 from .chain import (
     EQUAL,
     FREE,
@@ -55,7 +55,7 @@ class Edit:
 
 
 #: An edit, the linear conditions (C, P) that it imposes on the free parameters, and how far they are from true (C,).
-Condition = tuple[Edit, FloatArray, FloatArray]
+Condition = tuple[Edit, Float, Float]
 
 
 @dataclass(frozen=True)
@@ -120,7 +120,7 @@ def apply_edits(chain: Chain, edits: Sequence[Edit]) -> tuple[Chain, list[int]]:
     return replace(chain, knots=chain.knots[keep], values=chain.values[keep], kinds=np.array(kinds)), keep
 
 
-def _interpolation(chain: Chain, keep: list[int]) -> tuple[FloatArray, FloatArray]:
+def _interpolation(chain: Chain, keep: list[int]) -> tuple[Float, Float]:
     """Return old values (M + 1) as a linear function of the kept ones (M + 1, K) and of the knots (M + 1, M + 1)."""
     weights = np.zeros((chain.size + 1, len(keep)))
     weights[keep, np.arange(len(keep))] = 1.0
@@ -135,7 +135,7 @@ def _interpolation(chain: Chain, keep: list[int]) -> tuple[FloatArray, FloatArra
     return weights, shifts
 
 
-def _lift(chain: Chain, new: Chain, keep: list[int]) -> FloatArray:
+def _lift(chain: Chain, new: Chain, keep: list[int]) -> Float:
     """Return all parameters of the chain as a linear function of those of the edited one."""
     weights, shifts = _interpolation(chain, keep)
     inner = [i for i in keep if 0 < i < chain.size]
@@ -173,7 +173,7 @@ def _allowance(fit: ChainFit, goal: Goal) -> float:
     return float(np.sqrt(fit.square + len(fit.residuals) * goal.floor**2))
 
 
-def _covariance_root(data: AxisData, fit: ChainFit, free_knots: bool, goal: Goal) -> FloatArray:
+def _covariance_root(data: AxisData, fit: ChainFit, free_knots: bool, goal: Goal) -> Float:
     """Return W with W.T @ W the free parameters' covariance for unit noise."""
     basis = fit.chain.basis(free_knots)
     rows = fit.linear(data)[0] @ basis
@@ -207,7 +207,7 @@ def options(data: AxisData, fit: ChainFit, free_knots: bool, goal: Goal) -> list
     return sorted(result, key=lambda pair: pair[0])
 
 
-def _merges(chain: Chain, basis: FloatArray, free_knots: bool) -> Iterator[Condition]:
+def _merges(chain: Chain, basis: Float, free_knots: bool) -> Iterator[Condition]:
     """Yield for each inner knot that its value is that of the straight between its neighbours."""
     rows, knots, values = basis[chain.value_columns], chain.knots, chain.values
     first = basis.shape[1] - chain.size  # + i: the column of inner knot i
@@ -223,7 +223,7 @@ def _merges(chain: Chain, basis: FloatArray, free_knots: bool) -> Iterator[Condi
             yield Edit("merge", i), condition[None], np.array([values[i] - values[i - 1] - share * change])
 
 
-def _snaps(data: AxisData, chain: Chain, basis: FloatArray) -> Iterator[Condition]:
+def _snaps(data: AxisData, chain: Chain, basis: Float) -> Iterator[Condition]:
     """Yield for each element that its ends' values are equal, and that they are zero."""
     rows = basis[chain.value_columns]
     for e, kind in enumerate(chain.kinds):
@@ -329,13 +329,13 @@ def splits(data: AxisData, fit: ChainFit) -> list[Chain]:
     return [new for _, new in sorted(ways, key=lambda way: -way[0])]
 
 
-def _split_element(chain: Chain, freed: IntArray, e: int, knot: float) -> Chain:
+def _split_element(chain: Chain, freed: Int, e: int, knot: float) -> Chain:
     """Return the chain with a knot in element e, both parts of which are free."""
     values = np.insert(chain.values, e + 1, np.interp(knot, chain.knots, chain.values))
     return replace(chain, knots=np.insert(chain.knots, e + 1, knot), values=values, kinds=np.insert(freed, e, FREE))
 
 
-def _gain(columns: list[FloatArray], q: FloatArray, rest: FloatArray) -> float:
+def _gain(columns: list[Float], q: Float, rest: Float) -> float:
     """Return by how much new columns, beside the old ones q, would lower the sum of squares."""
     new = np.stack(columns, axis=1)
     new = new - q @ (q.T @ new)

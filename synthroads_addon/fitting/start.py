@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..road.alignment import FloatArray, IntArray
+from ..base.arrays import Float, Int
 from .chain import FREE, Chain
 
 _STIFFNESS = 0.05  # of the spline, relative to the density of the data; it spans gaps and leaves the rest alone
 
-Start = tuple[FloatArray, float]  # pose and value where the part before was left
+Start = tuple[Float, float]  # pose and value where the part before was left
 
 
-def start_plan(points: FloatArray, spacing: float, start: Start | None) -> tuple[Chain, FloatArray]:
+def start_plan(points: Float, spacing: float, start: Start | None) -> tuple[Chain, Float]:
     """Return a chain of curvatures along the points (N, 2) and their stations (N,), m.
 
     The curvatures are fitted to the spline's heading, not taken from it, so that the chain doesn't drift away.
@@ -38,7 +38,7 @@ def start_plan(points: FloatArray, spacing: float, start: Start | None) -> tuple
     return chain, np.interp(run, at, station)[len(through) - len(points) :]
 
 
-def start_heights(station: FloatArray, heights: FloatArray, spacing: float, start: Start | None) -> Chain:
+def start_heights(station: Float, heights: Float, spacing: float, start: Start | None) -> Chain:
     """Return a chain of grades along heights (N,) at stations (N,) counted from the part's begin, m."""
     if start is not None:
         station, heights = np.append(0.0, station), np.append(start[0][0], heights)
@@ -52,16 +52,16 @@ def start_heights(station: FloatArray, heights: FloatArray, spacing: float, star
     return Chain(start[0], knots, values, _free(knots), True)
 
 
-def even_knots(length: float, spacing: float) -> FloatArray:
+def even_knots(length: float, spacing: float) -> Float:
     """Return knots from 0 to the length, about `spacing` apart, at least two."""
     return np.linspace(0.0, length, max(1, round(length / spacing)) + 1)
 
 
-def _free(knots: FloatArray) -> IntArray:
+def _free(knots: Float) -> Int:
     return np.full(len(knots) - 1, FREE)
 
 
-def smooth_values(run: FloatArray, values: FloatArray, spacing: float, at: FloatArray) -> FloatArray:
+def smooth_values(run: Float, values: Float, spacing: float, at: Float) -> Float:
     """Return (M, D): at `at` (M), a cubic spline of even knots through values (N, D) at `run` (N).
 
     Its third differences are penalised, so that it goes on smoothly through gaps in the data.
@@ -76,7 +76,7 @@ def smooth_values(run: FloatArray, values: FloatArray, spacing: float, at: Float
     return _cubic(at / width, count) @ np.linalg.solve(normal, matrix.T @ (values - centre)) + centre
 
 
-def _cubic(place: FloatArray, count: int) -> FloatArray:
+def _cubic(place: Float, count: int) -> Float:
     """Return (N, count + 3) values of the cubic B-splines over `count` unit intervals."""
     interval = np.clip(place.astype(np.int64), 0, count - 1)
     f = place - interval
@@ -86,7 +86,7 @@ def _cubic(place: FloatArray, count: int) -> FloatArray:
     return matrix
 
 
-def _hat_integrals(station: FloatArray, knots: FloatArray) -> FloatArray:
+def _hat_integrals(station: Float, knots: Float) -> Float:
     """Return (N, K): the integral from the first knot to each station of each knot's hat, for even knots."""
     width = knots[1] - knots[0]
     v = np.clip((station[:, None] - knots) / width, -1.0, 1.0)

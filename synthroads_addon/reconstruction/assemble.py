@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..base.arrays import Float
 from ..base.schema import round_value
 from ..base.version import generator
 from ..fitting.axis_object import alignment_object
@@ -35,7 +35,6 @@ from .lines import Line
 from .objects import FoundBarrier, FoundPost
 from .section import MeasuredSection, Side, SideSection, line_width
 
-Float = NDArray[np.float64]
 RotationAxis = Literal["carriageway_axis", "inner_edge"]
 
 UNKNOWN_EPSG = 25832

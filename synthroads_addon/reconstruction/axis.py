@@ -5,16 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..base.arrays import Float
 from ..base.errors import InputError
 from .layout import RoadLayout
 from .lines import USUAL, Line
 from .path import SPACING
 from .profiles import STRETCH
 from .smoothing import mean_with_std, smooth, unseen
-
-Float = NDArray[np.float64]
 
 WAVELENGTH = 60.0
 """Shorter swings of the axis, m, are noise."""

@@ -11,13 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
+from ..base.arrays import Bool, Float, Index
 from ..base.classes import ClassScheme
 from ..base.errors import InputError
 from ..cloud.formats.registry import open_cloud
 from ..cloud.strays import Strays
 from .path import CloudPath
 
-Float = NDArray[np.float64]
 _Points = tuple[Float, NDArray[np.float32], NDArray[np.uint8]]
 
 FEWEST_POINTS = 2000
@@ -103,7 +103,7 @@ class RoadCloud:
     strays: int = 0
 
     @cached_property
-    def surface(self) -> NDArray[np.intp]:
+    def surface(self) -> Index:
         """Return the indices of the points that lie flat."""
         return np.flatnonzero(self.of(*SURFACE))
 
@@ -112,7 +112,7 @@ class RoadCloud:
         kept = path.within(self.xyz[:, :2], distance)
         return replace(self, xyz=self.xyz[kept], intensity=self.intensity[kept], kind=self.kind[kept])
 
-    def of(self, *kinds: PointKind) -> NDArray[np.bool_]:
+    def of(self, *kinds: PointKind) -> Bool:
         """Return the mask (N,) of some kinds."""
         return np.isin(self.kind, kinds)
 

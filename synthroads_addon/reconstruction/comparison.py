@@ -5,10 +5,10 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 from scipy.spatial.distance import cdist
 
+from ..base.arrays import Bool, Float
 from ..road.geometry import RoadGeometry
 from ..road.objects import Side, width_at
 from ..road.parameters import LineObject, RoadParameters
@@ -16,8 +16,6 @@ from ..road.things.concrete_barrier import ConcreteBarrier
 from ..road.things.delineator import Delineator
 from ..road.things.guardrail import Guardrail
 from ..road.things.noise_barrier import NoiseBarrier
-
-Float = NDArray[np.float64]
 
 BARRIER_DISTANCE, POST_DISTANCE = 0.5, 1.0
 """Barriers and delineators within so far of each other are the same, m."""
@@ -137,7 +135,7 @@ def _barriers(there: RoadGeometry, here: RoadGeometry, apart: Float) -> dict[str
 
 def _match_barriers(
     one: RoadGeometry, items: list[Any], other: RoadGeometry, others: list[Any], apart: Float
-) -> tuple[NDArray[np.bool_], Float]:
+) -> tuple[Bool, Float]:
     """Return of each metre of some barriers whether one of the others stands there, and how far beside (m)."""
     hit: list[Float] = []
     for item in items:
@@ -189,5 +187,5 @@ def _place(road: RoadGeometry, station: Float, offset: Float) -> Float:
     return position + offset[:, None] * np.column_stack([-np.sin(heading), np.cos(heading)])
 
 
-def _share(hits: NDArray[np.bool_]) -> float | None:
+def _share(hits: Bool) -> float | None:
     return round(float(hits.mean()), 4) if len(hits) else None

@@ -6,12 +6,10 @@ import warnings
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..base.arrays import Float
 from .path import SPACING
 from .profiles import ACROSS, STRETCH, Grid, Profiles, SurfacePoints
-
-Float = NDArray[np.float64]
 
 _FARTHEST = 8.0  # m beyond a carriageway's lines that its edge is looked for
 _MIXED = 0.8  # m to either side of an edge in which pavement and verge are weighed

@@ -5,15 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import ndimage
 from scipy.signal import find_peaks
 
+from ..base.arrays import Bool, Float
 from .path import SPACING
 from .profiles import ACROSS, STRETCH, Grid, Profiles, SurfacePoints
 from .smoothing import mean_with_std, smooth, unseen
-
-Float = NDArray[np.float64]
 
 WAVELENGTH = 40.0
 """Shorter swings of a line's offset, m, are noise."""
@@ -255,7 +253,7 @@ def _stretches(profiles: Profiles, middle: Float, share: Float) -> tuple[Float, 
 
 
 def _between_points(
-    profiles: Profiles, points: SurfacePoints, measured: Float, on: NDArray[np.bool_]
+    profiles: Profiles, points: SurfacePoints, measured: Float, on: Bool
 ) -> tuple[Float, Float, Float]:
     """Return a line's middle and width (K,) in each stretch, m, from the points on it and beside it; and how far apart
     the points are that its middle lies between.
@@ -289,7 +287,7 @@ def _between_points(
     return middle, width, apart
 
 
-def _best_span(marked: NDArray[np.bool_]) -> tuple[int, int]:
+def _best_span(marked: Bool) -> tuple[int, int]:
     """Return the span (first, behind the last) of points in which most are marked, and outside of which most aren't."""
     total = np.append(0, np.cumsum(np.where(marked, 1, -1)))
     lowest = np.minimum.accumulate(total)

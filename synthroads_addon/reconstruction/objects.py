@@ -13,11 +13,11 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
+from ..base.arrays import Bool, Float, Index
 from ..road.things.guardrail import GUARDRAIL_BEAM, GUARDRAIL_POST, GUARDRAIL_SPACER
 from .cloud import PointKind
 from .smoothing import mean_with_std
 
-Float = NDArray[np.float64]
 BarrierKind = Literal["guardrail", "concrete", "noise"]
 
 CELL_ALONG, CELL_ACROSS = 1.0, 0.1
@@ -56,7 +56,7 @@ class StandingObject:
     height: Float
     kind: NDArray[np.uint8]
 
-    def chosen(self, mask: NDArray[np.bool_] | NDArray[np.intp]) -> StandingObject:
+    def chosen(self, mask: Bool | Index) -> StandingObject:
         """Return some of the points."""
         return StandingObject(self.station[mask], self.offset[mask], self.height[mask], self.kind[mask])
 
@@ -86,7 +86,7 @@ class FoundPost:
     points: int
 
 
-def find_barriers(standing: StandingObject) -> tuple[list[FoundBarrier], NDArray[np.bool_]]:
+def find_barriers(standing: StandingObject) -> tuple[list[FoundBarrier], Bool]:
     """Return the barriers along the road, and which points (N,) belong to one."""
     barriers: list[FoundBarrier] = []
     used = np.zeros(len(standing.station), dtype=bool)
@@ -102,7 +102,7 @@ def find_barriers(standing: StandingObject) -> tuple[list[FoundBarrier], NDArray
     return sorted(barriers, key=lambda item: (item.start, item.offset)), used
 
 
-def _linear(station: Float, offset: Float) -> list[NDArray[np.intp]]:
+def _linear(station: Float, offset: Float) -> list[Index]:
     """Return the points of each cluster that is long enough: connected cells, small holes along the road filled."""
     if len(station) < _FEWEST_OF_BARRIER:
         return []
@@ -119,7 +119,7 @@ def _linear(station: Float, offset: Float) -> list[NDArray[np.intp]]:
     return [g for g in groups if len(g) >= _FEWEST_OF_BARRIER and np.ptp(station[g]) >= SHORTEST_BARRIER]
 
 
-def _pieces(part: StandingObject) -> list[NDArray[np.bool_]]:
+def _pieces(part: StandingObject) -> list[Bool]:
     """Return masks of the pieces of a linear cluster along which its offset stays the same."""
     index = np.floor((part.station - part.station.min()) / _STRETCH).astype(np.int64)
     order = np.argsort(index, kind="stable")
@@ -164,7 +164,7 @@ def facing(barrier: FoundBarrier, side: Literal["left", "right", "both"]) -> Fou
     return replace(barrier, offset=barrier.offset + behind * (_BEAM + GUARDRAIL_SPACER[side]), faces=side)
 
 
-def find_posts(standing: StandingObject, barrier_points: NDArray[np.bool_]) -> list[FoundPost]:
+def find_posts(standing: StandingObject, barrier_points: Bool) -> list[FoundPost]:
     """Return the delineators: small clusters of their class, or lone ones of their height where the class is unknown.
 
     Args:
@@ -182,7 +182,7 @@ def find_posts(standing: StandingObject, barrier_points: NDArray[np.bool_]) -> l
     return sorted(posts, key=lambda item: (item.station, item.offset))
 
 
-def _clusters(part: StandingObject) -> list[NDArray[np.intp]]:
+def _clusters(part: StandingObject) -> list[Index]:
     """Return the points of each cluster that hangs together, in their order."""
     if not len(part.station):
         return []

@@ -5,14 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.spatial import cKDTree
 
+from ..base.arrays import Bool, Float, Index
 from ..base.errors import InputError
 from ..road.alignment import Alignment
 from .smoothing import smooth
-
-Float = NDArray[np.float64]
 
 SPACING = 1.0
 """Distance of a path's points, m."""
@@ -79,7 +78,7 @@ class CloudPath:
             station[block], offset[block] = _project(frames, points[block], self._near(points[block]))
         return self.start + station, offset
 
-    def within(self, points: Float, distance: float) -> NDArray[np.bool_]:
+    def within(self, points: Float, distance: float) -> Bool:
         """Return which points (N, 2) lie within a distance (m) of the path, to the nearest cell of 4 m."""
         middles, owner = _cells(points)
         away, _ = cKDTree(self.points).query(middles)
@@ -101,7 +100,7 @@ class CloudPath:
         return CloudPath(self.points[kept], self.heading[kept])
 
 
-def _cells(points: Float) -> tuple[Float, NDArray[np.intp]]:
+def _cells(points: Float) -> tuple[Float, Index]:
     """Return the middles (C, 2) of the cells of 4 m that points (N, 2) lie in, and each point's cell."""
     cell = np.floor(points / _CELL).astype(np.int64)
     low = cell.min(axis=0)

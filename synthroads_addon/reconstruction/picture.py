@@ -6,9 +6,9 @@ from pathlib import Path as FilePath
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import ndimage
 
+from ..base.arrays import Float
 from ..road.geometry import RoadGeometry
 from ..road.objects import LineObject
 from ..road.parameters import LineMarking
@@ -16,8 +16,6 @@ from ..road.things.delineator import Delineator
 from .cloud import RoadCloud
 from .profiles import Profiles
 from .reconstruct import Reconstruction
-
-Float = NDArray[np.float64]
 
 AXIS, EDGE, MARK, BARRIER, POST = "#d1006b", "#ff8c00", "#00a2ff", "#7a3cff", "#00b050"
 _SIZE = (13.0, 9.0)  # inches

@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
+from ..base.arrays import Bool, Float, Index, Int
 from .cloud import PointKind, RoadCloud
 from .path import SPACING, CloudPath
 
-Float = NDArray[np.float64]
 Grid = NDArray[np.float32]
 
 ACROSS = 0.1
@@ -34,11 +34,11 @@ class SurfacePoints:
         paved, marked: (N,) by class.
     """
 
-    begins: NDArray[np.intp]
+    begins: Index
     station: Grid
     offset: Grid
-    paved: NDArray[np.bool_]
-    marked: NDArray[np.bool_]
+    paved: Bool
+    marked: Bool
 
     def near(self, stretch: int, low: float, high: float) -> slice:
         """Return where the points of a stretch between two offsets (m) are."""
@@ -115,7 +115,7 @@ def make_profiles(cloud: RoadCloud, path: CloudPath, half_width: float, exact: b
 
 
 def _by_stretch(
-    row: NDArray[np.int64], station: Float, offset: Float, kind: NDArray[np.uint8], rows: int
+    row: Int, station: Float, offset: Float, kind: NDArray[np.uint8], rows: int
 ) -> SurfacePoints:
     stretch = row // STRETCH
     order = np.argsort(stretch * 1000.0 + offset)  # offsets are less than 100 m
@@ -147,7 +147,7 @@ def paint_share(brightness: Grid, paved: Grid | None) -> Grid:
     return np.where(known, np.clip(above / full, -0.5, 1.5), np.nan).astype(np.float32)
 
 
-def _fill_bins(values: Grid, known: NDArray[np.bool_]) -> Grid:
+def _fill_bins(values: Grid, known: Bool) -> Grid:
     """Return values (S, U) whose unknown bins hold the mean of what is known around, farther away the less is."""
     result = np.where(known, values, 0.0).astype(np.float32)
     done = known.copy()

@@ -6,8 +6,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..base.arrays import Float
 from ..base.errors import InputError
 from ..base.progress import Progress, silent
 from ..fitting.fit import AxisFit, fit_axis
@@ -26,7 +26,6 @@ from .section import MeasuredSection, Side, SideSection, measure_section, snap_t
 from .smoothing import smooth
 from .surroundings import face_guardrails, measure_ground, standing_points
 
-Float = NDArray[np.float64]
 Predictor = Callable[[RoadCloud, CloudPath], tuple[Float, Float]]
 """Returns offset and standard deviation (M,) of the axis at each point of a path; NaN where it knows none."""
 

@@ -5,14 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import ndimage
 
+from ..base.arrays import Float
 from .path import SPACING, CloudPath
 from .profiles import ACROSS, Grid, Profiles
 from .smoothing import smooth
-
-Float = NDArray[np.float64]
 
 STEP, WINDOW = 10, 20
 """Metres from one stretch to the next, and in a stretch."""

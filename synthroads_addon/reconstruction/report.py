@@ -6,16 +6,14 @@ from dataclasses import asdict
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..base.arrays import Float
 from ..checking.checker import check
 from ..road.geometry import RoadGeometry
 from ..road.parameters import LineMarking
 from .cloud import PointKind, RoadCloud
 from .reconstruct import Reconstruction
 from .section import MeasuredSection, Side, SideSection, standard_section
-
-Float = NDArray[np.float64]
 
 _MOST_POINTS = 400_000
 _FROM_EDGES = 0.1  # m: nearer to an edge of the pavement than this a point may lie beside it

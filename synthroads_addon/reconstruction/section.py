@@ -6,9 +6,9 @@ from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import ndimage
 
+from ..base.arrays import Bool, Float
 from ..road.guidelines import STANDARD_CROSS_SECTIONS, StandardCrossSection
 from .edges import Edge, paved_edge, stretch_count
 from .layout import Band, RoadKind, RoadLayout
@@ -16,7 +16,6 @@ from .lines import Line
 from .profiles import Profiles
 from .smoothing import mean_with_std
 
-Float = NDArray[np.float64]
 Side = Literal["left", "right"]
 
 EDGE_LINE, NARROW_LINE = 0.30, 0.15
@@ -79,7 +78,7 @@ class SideSection:
     apart: Float
     inner_edge: Edge
     outer_edge: Edge
-    usual: NDArray[np.bool_]
+    usual: Bool
     inner_offset: Estimate
     inner_strip: Estimate
     lanes: list[Estimate]
@@ -312,7 +311,7 @@ def _inside(first: Float, apart: Float, inner: Edge) -> tuple[Estimate, Estimate
     return (Estimate(max(0.0, offset.value), offset.std), Estimate(float(np.clip(strip.value, 0.0, 2.0)), strip.std))
 
 
-def _usual(outside: Float, line: Line | None) -> NDArray[np.bool_]:
+def _usual(outside: Float, line: Line | None) -> Bool:
     """Return where (K,) the pavement outside of the lanes (K,), m, is that of the road itself.
 
     Beside exits and entries the edge line is a dashed one; beside an emergency bay the pavement is wider.

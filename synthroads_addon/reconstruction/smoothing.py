@@ -5,10 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import cho_solve_banded, cholesky_banded
 
-Float = NDArray[np.float64]
+from ..base.arrays import Float
 
 ORDER = 3
 """Order of the differences that are held small: a curvature that changes linearly costs nothing."""

@@ -5,17 +5,15 @@ from __future__ import annotations
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import ndimage
 
+from ..base.arrays import Bool, Float
 from .assemble import GroundShape
 from .cloud import STANDING, PointKind, RoadCloud
 from .objects import FoundBarrier, StandingObject, facing
 from .path import SPACING, CloudPath
 from .profiles import ACROSS, STRETCH, Profiles
 from .section import MeasuredSection
-
-Float = NDArray[np.float64]
 
 USUAL_VERGE = 1.5
 """Width of the verge where classes don't tell, m."""
@@ -99,7 +97,7 @@ def measure_ground(cloud: RoadCloud, path: CloudPath, section: MeasuredSection, 
     return GroundShape(max(reach, outermost + 5.0), float(np.median(below)), spread, width, seen)
 
 
-def _usual(section: MeasuredSection, station: Float, offset: Float) -> NDArray[np.bool_]:
+def _usual(section: MeasuredSection, station: Float, offset: Float) -> Bool:
     """Return which places (N,) lie where the pavement's edge on their side is the road's own."""
     result = np.zeros(len(station), dtype=bool)
     for side in section.sides.values():

@@ -23,10 +23,9 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..base.arrays import Float, Int
 from ..base.errors import InputError
 
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 Kind = Literal["line", "arc", "clothoid"]
 
 #: A change of curvature times length below this (rad) is an arc or a line: a clothoid so flat breaks other programs'
@@ -122,7 +121,7 @@ class Alignment:
         self._build_pieces(np.asarray(lengths), headings)
         self._nodes = self._build_nodes()
 
-    def _build_pieces(self, lengths: FloatArray, headings: FloatArray) -> None:
+    def _build_pieces(self, lengths: Float, headings: Float) -> None:
         """Tabulate the pieces' series; the first and last piece are the tangents beyond the ends."""
         k_start = np.array([element.curvature_start for element in self.elements])
         k_change = np.array([element.curvature_end for element in self.elements]) - k_start
@@ -144,7 +143,7 @@ class Alignment:
         tangents[0] = 0.0, start[-1]
         tangents[1] = np.exp(1j * headings[[0, -1]])
 
-        def framed(before: float, inner: FloatArray, after: float) -> FloatArray:
+        def framed(before: float, inner: Float, after: float) -> Float:
             return np.concatenate(([before], inner, [after]))
 
         series = np.concatenate((tangents[:, :1], series, tangents[:, 1:]), axis=1)
@@ -157,7 +156,7 @@ class Alignment:
         # The end itself belongs to the last element.
         self._borders = np.concatenate((borders, [np.nextafter(self.length, np.inf)]))
 
-    def _build_nodes(self) -> FloatArray:
+    def _build_nodes(self) -> Float:
         """Return (M, 3) station, x, y of coarse nodes, both ends included, at most `_NODE_SPACING` apart."""
         borders = np.concatenate((self._borders[:-1], [self.length]))
         count = np.maximum(1, np.ceil(np.diff(borders) / _NODE_SPACING)).astype(np.int64)
@@ -167,7 +166,7 @@ class Alignment:
         x, y, _, _ = self._evaluate(station)
         return np.column_stack((station, x, y))
 
-    def _evaluate(self, station: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    def _evaluate(self, station: Float) -> tuple[Float, Float, Float, Float]:
         """Return x, y from the start, heading and curvature at flat stations."""
         piece = np.searchsorted(self._borders, station, side="right")
         u = station - self._middles[piece]
@@ -181,7 +180,7 @@ class Alignment:
         bend, slope = self._bends[piece], self._slopes[piece] * u
         return x, y, self._headings[piece] + u * (bend + 0.5 * slope), bend + slope
 
-    def frame(self, station: ArrayLike) -> tuple[FloatArray, FloatArray, FloatArray]:
+    def frame(self, station: ArrayLike) -> tuple[Float, Float, Float]:
         """Return position (..., 2) m, heading (...) rad and curvature (...) 1/m at stations of any shape.
 
         The heading is not wrapped: it goes on counting through full turns. InputError for stations that aren't finite.
@@ -195,24 +194,24 @@ class Alignment:
         position = np.stack((out[0] + self.x, out[1] + self.y), axis=-1).reshape(*stations.shape, 2)
         return position, out[2].reshape(stations.shape)[()], out[3].reshape(stations.shape)[()]
 
-    def position(self, station: ArrayLike) -> FloatArray:
+    def position(self, station: ArrayLike) -> Float:
         """Return the map position (..., 2), m."""
         return self.frame(station)[0]
 
-    def place(self, station: FloatArray, offset: FloatArray) -> FloatArray:
+    def place(self, station: Float, offset: Float) -> Float:
         """Return the map positions (N, 2) of stations and offsets (N,), m."""
         position, heading, _ = self.frame(station)
         return position + offset[:, None] * left_vectors(heading)
 
-    def heading(self, station: ArrayLike) -> FloatArray:
+    def heading(self, station: ArrayLike) -> Float:
         """Return the heading (...), rad, counter-clockwise from +x."""
         return self.frame(station)[1]
 
-    def curvature(self, station: ArrayLike) -> FloatArray:
+    def curvature(self, station: ArrayLike) -> Float:
         """Return the curvature (...), 1/m, positive in a left curve."""
         return self.frame(station)[2]
 
-    def project(self, points: ArrayLike) -> tuple[FloatArray, FloatArray]:
+    def project(self, points: ArrayLike) -> tuple[Float, Float]:
         """Return station (N,) and offset (N,) of map points (N, 2); the offset is positive to the left.
 
         The foot is the road's nearest point. The tangents beyond the ends serve the points whose nearest point of the
@@ -228,7 +227,7 @@ class Alignment:
             station[chosen], offset[chosen] = self._project_leaf(x, y, nodes)
         return station, offset
 
-    def project_near(self, points: ArrayLike, station: ArrayLike, reach: float) -> tuple[FloatArray, FloatArray]:
+    def project_near(self, points: ArrayLike, station: ArrayLike, reach: float) -> tuple[Float, Float]:
         """Return station (N,) and offset (N,) of points (N, 2) whose stations are known to within `reach` metres.
 
         Faster than `project`, it cannot stray to another branch of a road that crosses itself, and it takes the
@@ -241,7 +240,7 @@ class Alignment:
         foot, _, offset = self._find_feet(x, y, guess, guess - reach, guess + reach)
         return foot, offset
 
-    def _leaves(self, x: FloatArray, y: FloatArray) -> Iterator[tuple[IntArray, FloatArray, FloatArray, IntArray]]:
+    def _leaves(self, x: Float, y: Float) -> Iterator[tuple[Int, Float, Float, Int]]:
         """Halve the points along their longer extent until few are left, near few nodes; yield both.
 
         Points in any order thus fall into compact boxes, and each box meets only the nodes around it.
@@ -259,7 +258,7 @@ class Alignment:
             order = np.argpartition(x if high[0] - low[0] > high[1] - low[1] else y, half)
             stack += [(chosen[part], x[part], y[part]) for part in (order[:half], order[half:])]
 
-    def _nodes_near(self, low: FloatArray, high: FloatArray) -> IntArray:
+    def _nodes_near(self, low: Float, high: Float) -> Int:
         """Return indices of every node that may be next to the nearest point of something in the box.
 
         The nearest node of a point is at most half a spacing farther than its foot, hence the margin.
@@ -269,7 +268,7 @@ class Alignment:
         farthest = np.hypot(*np.maximum(nodes - low, high - nodes).T)
         return np.flatnonzero(nearest <= farthest.min() + _NODE_SPACING)
 
-    def _project_leaf(self, x: FloatArray, y: FloatArray, nodes: IntArray) -> tuple[FloatArray, FloatArray]:
+    def _project_leaf(self, x: Float, y: Float, nodes: Int) -> tuple[Float, Float]:
         """Start from every node that is a local minimum of the distance and near the least; keep the best foot."""
         owner, column = _rivals(x, y, self._nodes[nodes, 1], self._nodes[nodes, 2])
         start = nodes[column]
@@ -286,7 +285,7 @@ class Alignment:
             station[beyond], offset[beyond] = self._on_tangents(x[beyond], y[beyond])
         return station, offset
 
-    def _on_tangents(self, x: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def _on_tangents(self, x: Float, y: Float) -> tuple[Float, Float]:
         """Return station and offset on the nearer of both tangents, of points that lie beyond an end."""
         feet = []
         for end, side in ((0.0, -1.0), (self.length, 1.0)):
@@ -299,8 +298,8 @@ class Alignment:
         return np.where(later, station_1, station_0), np.where(later, offset_1, offset_0)
 
     def _find_feet(
-        self, x: FloatArray, y: FloatArray, station: FloatArray, low: FloatArray, high: FloatArray
-    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        self, x: Float, y: Float, station: Float, low: Float, high: Float
+    ) -> tuple[Float, Float, Float]:
         """Improve stations between low and high until the tangent there is square to the point.
 
         The step is exact on a circle: with g along and d across, the angle at its centre is atan2(k g, 1 - k d). A
@@ -329,7 +328,7 @@ class Alignment:
         return station, along, offset
 
 
-def _series(bend: FloatArray, slope: FloatArray) -> NDArray[np.complex128]:
+def _series(bend: Float, slope: Float) -> NDArray[np.complex128]:
     """Return (terms + 1, P) coefficients of the position for unit half length; the constant is left 0."""
     w = np.zeros((_TERMS + 1, len(bend)), complex)
     z = np.zeros_like(w)
@@ -340,7 +339,7 @@ def _series(bend: FloatArray, slope: FloatArray) -> NDArray[np.complex128]:
     return z
 
 
-def _step(along: FloatArray, offset: FloatArray, bend: FloatArray) -> FloatArray:
+def _step(along: Float, offset: Float, bend: Float) -> Float:
     """Return the arc length to the foot on the circle of curvature, for a straight the distance along."""
     turn, lever = bend * along, 1.0 - bend * offset
     curved = np.abs(turn) > 1e-9
@@ -348,7 +347,7 @@ def _step(along: FloatArray, offset: FloatArray, bend: FloatArray) -> FloatArray
         return np.where(curved, np.arctan2(turn, lever) / np.where(curved, bend, 1.0), along / lever)
 
 
-def _rivals(x: FloatArray, y: FloatArray, node_x: FloatArray, node_y: FloatArray) -> tuple[IntArray, IntArray]:
+def _rivals(x: Float, y: Float, node_x: Float, node_y: Float) -> tuple[Int, Int]:
     """Return (point, node) index pairs, sorted by point: nodes whose distance is a local minimum near the least."""
     centre_x, centre_y = node_x.mean(), node_y.mean()  # cancellation then stays far below a node spacing
     p = np.column_stack((x - centre_x, y - centre_y))
@@ -365,12 +364,12 @@ def _rivals(x: FloatArray, y: FloatArray, node_x: FloatArray, node_y: FloatArray
     return owner, column
 
 
-def left_vectors(heading: FloatArray) -> FloatArray:
+def left_vectors(heading: Float) -> Float:
     """Return the unit vectors (..., 2) to the left of headings (...), rad."""
     return np.stack([-np.sin(heading), np.cos(heading)], axis=-1)
 
 
-def clip_offset(offset: ArrayLike, curvature: ArrayLike, share: float = 0.98) -> FloatArray:
+def clip_offset(offset: ArrayLike, curvature: ArrayLike, share: float = 0.98) -> Float:
     """Return the offset cut where its curve would fold, so that 1 - curvature x offset >= 1 - share.
 
     Args:
@@ -388,7 +387,7 @@ def clip_offset(offset: ArrayLike, curvature: ArrayLike, share: float = 0.98) ->
     return np.where(folds, share / np.where(folds, bend, 1.0), offsets)[()]
 
 
-def running_sum(values: Sequence[float]) -> FloatArray:
+def running_sum(values: Sequence[float]) -> Float:
     """Return (N + 1,) sums of the first 0, 1, ... N values, compensated (Neumaier), so that they don't drift."""
     total, lost, sums = 0.0, 0.0, [0.0]
     for value in values:
@@ -399,7 +398,7 @@ def running_sum(values: Sequence[float]) -> FloatArray:
     return np.array(sums)
 
 
-def finite_array(name: str, values: ArrayLike) -> FloatArray:
+def finite_array(name: str, values: ArrayLike) -> Float:
     """Return the values as float64, or raise InputError naming the first that is not a finite number."""
     try:
         array = np.asarray(values, dtype=np.float64)

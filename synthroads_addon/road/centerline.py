@@ -13,11 +13,10 @@ from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..base.arrays import Float
 from ..base.errors import InputError
 from ..base.files import read_text
-from .alignment import FloatArray
 from .geometry import RoadGeometry
 
 FARTHEST = 1e8
@@ -28,7 +27,7 @@ _LONG_STEP, _SHARPEST = 500.0, -0.5
 _TWO = "at least two distinct points are needed"
 
 
-def read_axis(path: str | os.PathLike[str]) -> FloatArray:
+def read_axis(path: str | os.PathLike[str]) -> Float:
     """Return the points (N, 3) of an axis, m, in the file's order.
 
     CSV (comma, semicolon, tab or spaces): with a header that names at least x and y (z optional, other columns
@@ -51,7 +50,7 @@ def read_axis(path: str | os.PathLike[str]) -> FloatArray:
     return points
 
 
-def _refuse_slips(name: str, points: FloatArray) -> None:
+def _refuse_slips(name: str, points: Float) -> None:
     """Refuse a point (of N, 3) far from its neighbours: it lacks a digit, and the fit would look for a road there."""
     steps = np.diff(points[:, :2], axis=0)
     length = np.hypot(*steps.T)
@@ -198,7 +197,7 @@ def _refuse_degrees(name: str, document: dict[str, Any], rows: list[tuple[float,
         raise InputError(f"{name} coordinates", first, "metres of a projected system are needed, not degrees")
 
 
-def centerline_geojson(geometry: RoadGeometry, stations: NDArray[np.float64]) -> dict[str, Any]:
+def centerline_geojson(geometry: RoadGeometry, stations: Float) -> dict[str, Any]:
     """Return a FeatureCollection with the centreline through the given stations (N,), elevations included.
 
     Coordinates are those of the parameter set's reference system, named by the member ``crs`` (GeoJSON 2008); 0.1 mm.

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..base.arrays import Float
 from .section import Pothole, Rut
 from .section_geometry import CarriagewaySection
-
-Float = NDArray[np.float64]
 
 _SLIVER = 2e-4
 """Columns of a mesh are at least this share of a strip's width apart: below a millimetre."""

@@ -15,8 +15,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from ..base.arrays import Bool, Float, Int
 from ..base.errors import InputError, MissingFileError
 from .alignment import Alignment
 
@@ -24,8 +25,7 @@ if TYPE_CHECKING:
     from rasterio.crs import CRS
     from rasterio.io import DatasetReader
 
-Float = NDArray[np.float64]
-Cells = NDArray[np.int64]
+Cells = Int
 """Cells (2, ...): their rows and columns."""
 
 LOWEST, HIGHEST = -500.0, 9000.0
@@ -86,7 +86,7 @@ class HeightGrid:
         """Return rows and columns with fractions (2, ...) of map coordinates (...), m."""
         return np.stack([(north - self.north) / self.step_north, (east - self.east) / self.step_east])
 
-    def between_centres(self, located: Float) -> NDArray[np.bool_]:
+    def between_centres(self, located: Float) -> Bool:
         """Return whether rows and columns (2, ...) lie between the centres of the outermost cells."""
         row, column = located
         room = 1e-6  # of a cell, for rounding

@@ -9,8 +9,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from ..base.arrays import Float, Index, Int
 from .alignment import Alignment, Element
 from .damage import damage_depth
 from .objects import Side, width_at
@@ -18,8 +19,6 @@ from .parameters import AlignmentObject, Carriageway, LineMarking, Median, RoadP
 from .profile import IntersectionPoint, Profile
 from .section_geometry import CarriagewaySection
 from .turnout_geometry import TURNOUT_STRIPS
-
-Float = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -118,7 +117,7 @@ class RoadGeometry:
                 result -= damage_depth(section, station, offset)
         return result
 
-    def strip_index(self, station: ArrayLike, offset: ArrayLike) -> NDArray[np.intp]:
+    def strip_index(self, station: ArrayLike, offset: ArrayLike) -> Index:
         """Return the index into `strips` of stations and offsets (N,); -1 outside."""
         station, offset = _pairs(station, offset)
         boundaries = self.offsets(station)
@@ -130,7 +129,7 @@ class RoadGeometry:
         index = np.where(at_end, widest_last, index)
         return np.where((index < 0) | (index > last), -1, index)
 
-    def instances(self, strip: SurfaceStrip, station: ArrayLike) -> NDArray[np.int64]:
+    def instances(self, strip: SurfaceStrip, station: ArrayLike) -> Int:
         """Return the instance numbers (N,) that a strip's surface has at stations (N,)."""
         station = np.atleast_1d(np.asarray(station, dtype=np.float64))
         result = np.full(station.shape, strip.instance, dtype=np.int64)

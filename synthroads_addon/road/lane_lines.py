@@ -5,8 +5,8 @@ from __future__ import annotations
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..base.arrays import Float, Index
 from ..base.errors import InputError
 from .alignment import clip_offset, running_sum
 from .damage import damage_depth
@@ -16,8 +16,6 @@ from .section import Carriageway
 from .section_geometry import CarriagewaySection
 from .surroundings import Vehicle
 from .things.vehicles import VEHICLE_LANE_WIDTH
-
-Float = NDArray[np.float64]
 
 _PANEL = 5.0
 """Longest piece (m) over which the distance driven is integrated at once."""
@@ -168,5 +166,5 @@ def lane_of(geometry: RoadGeometry, vehicle: Vehicle) -> LaneLine:
     return LaneLine(geometry, carriageway, vehicle.lane)
 
 
-def _panel(borders: Float, value: Float) -> NDArray[np.intp]:
+def _panel(borders: Float, value: Float) -> Index:
     return np.clip(np.searchsorted(borders, value, side="right") - 1, 0, len(borders) - 2)

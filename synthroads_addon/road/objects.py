@@ -7,9 +7,10 @@ from itertools import pairwise
 from typing import Annotated, Any, ClassVar, Literal, TypeVar
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from pydantic import AfterValidator, Discriminator, Field, Tag
 
+from ..base.arrays import Float
 from ..base.schema import Model, quantity
 
 StrictFinite = Annotated[float, Field(strict=True, ge=-1e8, le=1e8)]
@@ -63,7 +64,7 @@ class LineObject(RoadObject):
     end_station: float = quantity(ge=0, unit="m", description="End, terminal included.")
     offset: float = quantity(ge=-100, le=100, unit="m", description="Offset of its axis.")
 
-    def offset_at(self, station: NDArray[np.float64]) -> NDArray[np.float64]:
+    def offset_at(self, station: Float) -> Float:
         """Return the offsets (N,) of its axis at stations (N,), m."""
         return np.full(station.shape, self.offset)
 
@@ -105,7 +106,7 @@ ShoulderWidth = Annotated[Annotated[float, Field(strict=True, ge=0, le=6), Tag("
 StripWidth = Annotated[Annotated[float, Field(strict=True, ge=0, le=2), Tag("number")] | WidthPoints, _FORM, _METRES]
 
 
-def width_at(width: AnyWidth, station: ArrayLike) -> NDArray[np.float64]:
+def width_at(width: AnyWidth, station: ArrayLike) -> Float:
     """Return a width (m) at stations of any shape, same shape."""
     station = np.asarray(station, dtype=np.float64)
     if isinstance(width, tuple):

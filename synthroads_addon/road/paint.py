@@ -6,14 +6,12 @@ from collections.abc import Iterator
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..base.arrays import Float
 from .geometry import RoadGeometry
 from .parameters import Arrow, Hatching, Turnout
 from .section_geometry import CarriagewaySection
 from .turnout_geometry import TurnoutShape
-
-Float = NDArray[np.float64]
 
 _EDGE_LINE = 0.3
 """The hatching keeps clear of the lines along both sides of the gore, m."""

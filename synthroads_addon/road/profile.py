@@ -13,8 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..base.arrays import Float
 from ..base.errors import InputError
-from .alignment import FloatArray, finite_array
+from .alignment import finite_array
 
 #: Roundings may overlap by this much (m) and are then taken as touching: stations in files are rounded.
 TOUCH = 1e-6
@@ -84,7 +85,7 @@ class Profile:
         ends = np.concatenate((station - self.tangent_lengths, station + self.tangent_lengths))
         self.breakpoints = np.unique(np.concatenate((ends[np.tile(rounded, 2)], station[kinked])))
 
-    def _refuse_overlap(self, gap: FloatArray) -> None:
+    def _refuse_overlap(self, gap: Float) -> None:
         reach = self.tangent_lengths[:-1] + self.tangent_lengths[1:]
         over = reach > gap + TOUCH
         if over.any():
@@ -95,14 +96,14 @@ class Profile:
             )
             raise InputError(f"profile.points[{place + 1}].radius", self.points[place + 1].radius, allowed)
 
-    def _build_pieces(self, station: FloatArray, elevation: FloatArray, curvature: FloatArray) -> None:
+    def _build_pieces(self, station: Float, elevation: Float, curvature: Float) -> None:
         """Tabulate quadratics z + u (g + c u / 2): the first grade, then a rounding and a grade for each point.
 
         A grade is measured from its point, a rounding from its start: nothing is carried along the road.
         """
         tangent, before, after = self.tangent_lengths, self.grades[:-1], self.grades[1:]
 
-        def interleaved(first: float, rounding: FloatArray, grade: FloatArray) -> FloatArray:
+        def interleaved(first: float, rounding: Float, grade: Float) -> Float:
             return np.concatenate(([first], np.column_stack((rounding, grade)).ravel()))
 
         borders = interleaved(-np.inf, station - tangent, station + tangent)
@@ -112,27 +113,27 @@ class Profile:
         self._grades = interleaved(before[0], before, after)
         self._curvatures = interleaved(0.0, curvature, np.zeros_like(curvature))
 
-    def _evaluate(self, station: ArrayLike) -> tuple[FloatArray, FloatArray, FloatArray]:
+    def _evaluate(self, station: ArrayLike) -> tuple[Float, Float, Float]:
         stations = finite_array("station", station)
         piece = np.searchsorted(self._borders, stations, side="right")
         u, grade, curvature = stations - self._bases[piece], self._grades[piece], self._curvatures[piece]
         elevation = self._elevations[piece] + u * (grade + 0.5 * curvature * u)
         return elevation[()], (grade + curvature * u)[()], curvature[()]
 
-    def elevation(self, station: ArrayLike) -> FloatArray:
+    def elevation(self, station: ArrayLike) -> Float:
         """Return the elevation, m, at stations of any shape; InputError for stations that aren't finite."""
         return self._evaluate(station)[0]
 
-    def grade(self, station: ArrayLike) -> FloatArray:
+    def grade(self, station: ArrayLike) -> Float:
         """Return the grade dz/ds, m/m, rising positive; at a kink that of the side after it."""
         return self._evaluate(station)[1]
 
-    def curvature(self, station: ArrayLike) -> FloatArray:
+    def curvature(self, station: ArrayLike) -> Float:
         """Return d2z/ds2, 1/m, positive in a sag; at a border that of the side after it."""
         return self._evaluate(station)[2]
 
 
-def _grades(gap: FloatArray, rise: FloatArray) -> FloatArray:
+def _grades(gap: Float, rise: Float) -> Float:
     """Return the grades with the first and last repeated outwards; one point is level."""
     if not len(gap):
         return np.zeros(2)

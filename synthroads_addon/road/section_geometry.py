@@ -5,13 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from ..base.arrays import Float
 from .objects import nominal_width, width_at, width_kinks
 from .section import Carriageway, Turnout
 from .turnout_geometry import TURNOUT_STRIPS, TurnoutShape
-
-Float = NDArray[np.float64]
 
 
 class CarriagewaySection:

@@ -11,8 +11,8 @@ import math
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..base.arrays import Float
 from .geometry import RoadGeometry
 from .objects import RoadObject
 from .parameters import LineMarking, LineObject, PointObject, RoadParameters, Vehicle
@@ -40,7 +40,7 @@ def stretches(length: float, longest: float = LONGEST) -> list[tuple[float, floa
     return list(pairwise(borders))
 
 
-def frame_of(geometry: RoadGeometry, start: float, end: float) -> tuple[NDArray[np.float64], int]:
+def frame_of(geometry: RoadGeometry, start: float, end: float) -> tuple[Float, int]:
     """Return the frame in which a stretch is built.
 
     Args:

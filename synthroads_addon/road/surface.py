@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..base.arrays import Float
 from .geometry import RoadGeometry
 from .terrain import ground_elevation
-
-Float = NDArray[np.float64]
 
 _BLOCK = 20_000
 """Places looked up at a time: each needs a row of all strips."""

@@ -5,16 +5,14 @@ from __future__ import annotations
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..base.arrays import Float
 from ..base.files import stamp
 from ..base.random_streams import stream
 from ..base.schema import round_value
 from .elevation_model import Corridor, ElevationModel, read_elevation_model
 from .geometry import RoadGeometry, alignment_of, profile_of
 from .parameters import AlignmentObject, Terrain
-
-Float = NDArray[np.float64]
 
 GROUND_MARGIN = 12.0
 """Heights of the ground are wanted this far (m) beyond the terrain's half width and the road's ends."""

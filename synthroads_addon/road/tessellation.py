@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..base.arrays import Float
 from .damage import damage_rows
 from .geometry import RoadGeometry
 from .parameters import LineMarking
@@ -20,7 +20,7 @@ root sum of squares stays below the whole."""
 
 def sample_stations(
     geometry: RoadGeometry, tolerance: float, start: float = 0.0, end: float = np.inf
-) -> NDArray[np.float64]:
+) -> Float:
     """Return the (N,) increasing stations at which the road is sampled.
 
     Every kink (element, rounding, crossfall point, end of a dash) is a station of its own. Between two kinks the
@@ -48,7 +48,7 @@ def sample_stations(
     return stations[low : max(high, low + 1) + 1]
 
 
-def _kinks(geometry: RoadGeometry, tolerance: float) -> NDArray[np.float64]:
+def _kinks(geometry: RoadGeometry, tolerance: float) -> Float:
     parameters, end = geometry.parameters, geometry.length
     stations = [geometry.alignment.element_starts, np.asarray(geometry.profile.breakpoints), [0.0, end]]
     for section in geometry.sections.values():
@@ -63,14 +63,14 @@ def _kinks(geometry: RoadGeometry, tolerance: float) -> NDArray[np.float64]:
     return kinks[keep] if len(kinks) > 2 else kinks
 
 
-def _around(kinks: NDArray[np.float64], start: float, end: float) -> NDArray[np.float64]:
+def _around(kinks: Float, start: float, end: float) -> Float:
     """Return those of the sorted kinks that the spacing between two stations depends on: at least two."""
     low = int(np.clip(np.searchsorted(kinks, start, side="right") - 1, 0, len(kinks) - 2))
     high = int(np.searchsorted(kinks, end, side="left"))
     return kinks[low : max(high, low + 1) + 1]
 
 
-def _chord_spacing(geometry: RoadGeometry, kinks: NDArray[np.float64], tolerance: float) -> NDArray[np.float64]:
+def _chord_spacing(geometry: RoadGeometry, kinks: Float, tolerance: float) -> Float:
     """Return the largest spacing (K,) whose horizontal and vertical sagitta keep their share of the tolerance."""
     samples = np.linspace(kinks[:-1] + 1e-6, kinks[1:] - 1e-6, 5)
     widest = np.abs(geometry.offsets(kinks)).max(axis=1)
@@ -83,7 +83,7 @@ def _chord_spacing(geometry: RoadGeometry, kinks: NDArray[np.float64], tolerance
     return np.sqrt(8.0 * _SHARE * tolerance / np.maximum(np.maximum(horizontal, vertical), 1e-12))
 
 
-def _twist_spacing(geometry: RoadGeometry, kinks: NDArray[np.float64], tolerance: float) -> NDArray[np.float64]:
+def _twist_spacing(geometry: RoadGeometry, kinks: Float, tolerance: float) -> Float:
     """Return the largest spacing (K,) at which two triangles stay close to a strip whose crossfall changes.
 
     The middle of a twisted quad of width w and length ds lies w ds (dq/ds) / 4 off its diagonal.

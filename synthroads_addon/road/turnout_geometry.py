@@ -5,12 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..base.arrays import Float
 from .objects import width_at
 from .section import Carriageway, Ramp, Turnout
-
-Float = NDArray[np.float64]
 
 STEP = 0.05
 """Length over which sudden changes happen (pavement at the nose and at a ramp's end), m.

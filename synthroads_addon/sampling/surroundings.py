@@ -8,8 +8,8 @@ from itertools import groupby, pairwise
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..base.arrays import Bool, Float, Index
 from ..base.random_streams import stream
 from ..base.schema import round_value
 from ..road.guidelines import OBSTACLE_DISTANCE
@@ -24,7 +24,6 @@ from ..road.things.vehicles import COLORS, HEAVY_SPEED, VEHICLE_GAP, VEHICLE_LAN
 from ..scenario.road import Interval, MaterialLimits, RoadScenario
 from .placing.site import PlacementSite
 
-Float = NDArray[np.float64]
 Kind = Literal["grass", "shrub", "tree"]
 
 SHRUB_DISTANCE = 2.0
@@ -264,7 +263,7 @@ def _wide_stretch(width: AnyWidth, length: float) -> tuple[float, float]:
 
 
 def _traffic(
-    rng: np.random.Generator, stretches: Float, heavy: NDArray[np.bool_], limits: Interval
+    rng: np.random.Generator, stretches: Float, heavy: Bool, limits: Interval
 ) -> list[tuple[int, float, str]]:
     """Return lane, speed (m/s) and model of vehicles, in this order sorted; none where every lane is closed.
 
@@ -286,7 +285,7 @@ def _traffic(
     return sorted((lane, min(round_value(speed), most), _MODELS[model]) for lane, speed, model, most in rows)
 
 
-def _pick(rng: np.random.Generator, sums: Float, number: int) -> NDArray[np.intp]:
+def _pick(rng: np.random.Generator, sums: Float, number: int) -> Index:
     """Draw so many numbers from 0 to N - 1, whose weights have the running sums (N,)."""
     return sums.searchsorted(rng.random(number) * sums[-1], side="right")
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...base.arrays import Float
 from ...base.errors import InputError
 from ...base.schema import round_value
 from ...road.section_geometry import CarriagewaySection
@@ -14,8 +14,6 @@ from ...road.things.asset import Asset
 from ...scenario.assets import FARTHEST, AssetPlacement, read_asset_library
 from ...scenario.road import Interval
 from .site import PlacementSite
-
-Float = NDArray[np.float64]
 
 
 def sample_assets(site: PlacementSite) -> Iterator[tuple[str, Asset]]:

@@ -8,8 +8,8 @@ from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...base.arrays import Float
 from ...base.schema import round_value
 from ...road.guidelines import CONSTRUCTION_LANE_WIDTH
 from ...road.objects import RoadObject, Side, WidthPoint, width_kinks
@@ -52,7 +52,7 @@ class Zone(NamedTuple):
     boundary: float
     edge: float
 
-    def distance(self, station: NDArray[np.float64], depth: float) -> NDArray[np.float64]:
+    def distance(self, station: Float, depth: float) -> Float:
         """Return the distance (N,) of a line so deep (m) in the closed lane, which the tapers lead from the edge."""
         outer, inner = self.edge - EDGE_DISTANCE - (BEACON_DISTANCE - depth), self.boundary + depth
         return np.interp(station, self.stations, (outer, inner, inner, outer))
@@ -149,7 +149,7 @@ def _equipment(
     yield f"marking-construction-{side}", _line(side, zone, draw(rng, layout.site.scenario.markings.film_thickness))
 
 
-def _beacon_stations(marks: tuple[float, float, float, float]) -> NDArray[np.float64]:
+def _beacon_stations(marks: tuple[float, float, float, float]) -> Float:
     """Return the stations of beacons, one at each end of the tapers."""
     spans = zip(pairwise(marks), (SPACING_TAPER, SPACING, SPACING_TAPER), strict=True)
     parts = [np.linspace(*span, math.ceil((span[1] - span[0]) / step), endpoint=False) for span, step in spans]

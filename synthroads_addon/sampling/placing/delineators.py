@@ -7,8 +7,8 @@ from bisect import bisect_right
 from collections.abc import Iterator
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...base.arrays import Float
 from ...road.guidelines import DELINEATOR_SPACING
 from ...road.parameters import HorizontalElement
 from ...road.things.delineator import Delineator
@@ -21,7 +21,7 @@ DELINEATOR_BEHIND_BARRIER = 1.15
 _REACH = 0.5  # m along the road: a post keeps clear of barriers and pavement over so much to either side
 
 
-def delineators(roadside: Roadside, stations: NDArray[np.float64]) -> Iterator[tuple[str, Delineator]]:
+def delineators(roadside: Roadside, stations: Float) -> Iterator[tuple[str, Delineator]]:
     """Yield (id, post) at stations (P,) along one side, behind the barrier where one stands."""
     distances = roadside.edge.line_beside(stations, _REACH) + DELINEATOR_DISTANCE
     for piece in roadside.pieces:
@@ -34,7 +34,7 @@ def delineators(roadside: Roadside, stations: NDArray[np.float64]) -> Iterator[t
         yield f"delineator-{roadside.side}-{number:04d}", post
 
 
-def delineator_stations(elements: tuple[HorizontalElement, ...]) -> NDArray[np.float64]:
+def delineator_stations(elements: tuple[HorizontalElement, ...]) -> Float:
     """Return stations of delineators, from half a spacing after the beginning to the end.
 
     Between two posts lies the spacing of the table at the tightest curvature within the next 50 m, so that the posts

@@ -6,15 +6,13 @@ from bisect import bisect_left, bisect_right
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...base.arrays import Float
 from ...road.guidelines import SHORTEST_BARRIER
 from ...road.objects import width_at
 from ...road.section import Ramp
 from ...road.section_geometry import CarriagewaySection
 from ...road.turnout_geometry import STEP, TurnoutShape
-
-Float = NDArray[np.float64]
 
 ISLAND_ROOM = 3.2
 """Where the island between main road and ramp is wider than this, barriers and delineators leave the ramp's outer
