@@ -1,18 +1,19 @@
-"""Model fitted to a measured axis: a chain of linear functions of the station, and its least-squares refinement.
+"""Model fitted to a measured axis: a chain of linear functions of the station, its first guess and its refinement.
 
 In plan the chain is the curvature (integrated twice it is the position), in height the grade (integrated once it is
 the elevation). An element is FREE (a clothoid; a parabola), EQUAL (its value is constant: an arc; a constant grade) or
 ZERO (a line). The chain is continuous. Its parameters are the start's pose, the values at the knots and the inner
 knots' stations; the kinds of the elements tie values together (`Chain.groups`).
 
-`Plan` and `Heights` are the two sets of data: they measure a chain's residuals and how these change.
+`Plan` and `Heights` are the two sets of data: they measure a chain's residuals and how these change. A first guess
+follows a smoothing spline through the points; it has many elements, and is improved by least squares.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, Protocol
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,9 +22,12 @@ from ..base.arrays import Float, Int
 from ..road.alignment import Alignment, Element
 
 FREE, EQUAL, ZERO = 0, 1, 2
+NEAR = 40.0
+"""Distance around where they should be that feet are looked for within, m."""
 
 _QUADRATURE = 2.0  # m, step of the integrals in the Jacobian; the residuals themselves are exact
 _SHARE = 0.45  # of its room that a knot may use up in one step, so that neighbours never meet
+_STIFFNESS = 0.05  # of the first spline, relative to the density of the data; it spans gaps and leaves the rest alone
 
 
 @dataclass(frozen=True)
@@ -112,31 +116,6 @@ class Chain:
         return Alignment([Element(float(n), float(a), float(b)) for n, a, b in rows], x, y, heading)
 
 
-class AxisData(Protocol):
-    """Points to be fitted: what `refine` and the search need of them."""
-
-    @property
-    def least(self) -> float:
-        """Length of the shortest element, m."""
-
-    @property
-    def limit(self) -> float:
-        """Largest absolute value."""
-
-    @property
-    def snaps(self) -> tuple[int, ...]:
-        """Kinds that an element may be snapped to."""
-
-    def measure(self, chain: Chain, stations: Float) -> tuple[Float, Float]:
-        """Return stations (N,) of the points on the chain, from the former ones, and residuals (N,), m."""
-
-    def jacobian(self, chain: Chain, stations: Float) -> Float:
-        """Return (N, F) derivatives of the residuals by all parameters (see `Chain.basis`)."""
-
-    def move_pose(self, pose: Float, step: Float) -> Float:
-        """Return the pose after a step of its parameters."""
-
-
 def ramp_integrals(
     chain: Chain, stations: Float, grid: Float, weight: NDArray[Any]
 ) -> tuple[NDArray[Any], NDArray[Any]]:
@@ -167,7 +146,7 @@ def quadrature_grid(chain: Chain, stations: Float) -> Float:
     return np.unique(np.concatenate((inside, chain.knots, even[1:-1])))
 
 
-def assemble(pose: Float, rise: Float, fall: Float, slopes: Float) -> Float:
+def assemble_jacobian(pose: Float, rise: Float, fall: Float, slopes: Float) -> Float:
     """Return (N, F) derivatives from those by the pose and by every element's ramps.
 
     A knot's value raises the ramp before it and the one after it; a knot that moves with its value held changes its
@@ -181,25 +160,51 @@ def assemble(pose: Float, rise: Float, fall: Float, slopes: Float) -> Float:
     return np.hstack((pose, values, knots))
 
 
+class Spacings(NamedTuple):
+    """Distances of the knots that a search begins with, m.
+
+    Attributes:
+        exact: for data without noise: close enough to tell short elements apart.
+        first: for all others.
+        finest: where the first ones cannot keep the tolerance.
+    """
+
+    exact: float
+    first: float
+    finest: float
+
+
 @dataclass(frozen=True)
 class Plan:
-    """Map points (N, 2) of an axis, in order, with weights (N,); the residual is the weighted offset."""
+    """Map points of an axis, in order; the residual is the weighted offset.
+
+    Attributes:
+        points, weights: (N, 2) m, and (N,).
+        least: length of the shortest element, m.
+        reach: how far a foot may move between two steps, m.
+        limit: largest absolute curvature, 1/m.
+        snaps: kinds that an element may be snapped to.
+        spacings: of the first knots.
+    """
 
     points: Float
     weights: Float
-    least: float
-    reach: float  # m that a foot may move between two steps
-    limit: float = 0.2
-    snaps: tuple[int, ...] = (EQUAL, ZERO)
+    least: float = 0.0
+    reach: float = 0.0
+    limit: ClassVar[float] = 0.2
+    snaps: ClassVar[tuple[int, ...]] = (EQUAL, ZERO)
+    spacings: ClassVar[Spacings] = Spacings(7.0, 20.0, 5.0)
 
     def measure(self, chain: Chain, stations: Float) -> tuple[Float, Float]:
+        """Return stations (N,) of the points on the chain, from the former ones, and residuals (N,), m."""
         feet, offset = chain.alignment.project_near(self.points, stations, self.reach)
         return feet, self.weights * offset
 
     def jacobian(self, chain: Chain, stations: Float) -> Float:
-        """A change of curvature at s' turns the rest of the road about the point there.
+        """Return (N, F) derivatives of the residuals by all parameters (see `Chain.basis`).
 
-        The offset at s thus falls by t(s) . (z(s) - z(s')) for each radian; the foot's own shift has no effect.
+        A change of curvature at s' turns the rest of the road about the point there. The offset at s thus falls by
+        t(s) . (z(s) - z(s')) for each radian; the foot's own shift has no effect.
         """
         alignment = chain.alignment
         grid = quadrature_grid(chain, stations)
@@ -213,21 +218,46 @@ class Plan:
         lever = (tangent * z).real
         rise, fall = ((tangent[:, None] * b).real - lever[:, None] * a for a, b in zip(plain, turned, strict=True))
         across = -(tangent * np.exp(1j * alignment.start_heading)).real
-        return self.weights[:, None] * assemble(np.column_stack((across, -lever)), rise, fall, chain.slopes)
+        return self.weights[:, None] * assemble_jacobian(np.column_stack((across, -lever)), rise, fall, chain.slopes)
 
     def move_pose(self, pose: Float, step: Float) -> Float:
+        """Return the pose after a step of its parameters."""
         return pose + np.array([-np.sin(pose[2]) * step[0], np.cos(pose[2]) * step[0], step[1]])
+
+    def fit_window(self, chosen: Int, spacing: float, start: Start | None, origin: float) -> ChainFit:
+        """Return the fit by fixed knots of a spacing (m) to some of the points, those of a window.
+
+        Args:
+            chosen: indices of the points.
+            spacing: m.
+            start: pose and value where the window before was left.
+            origin: station of the window's begin, m.
+        """
+        part = Plan(self.points[chosen], self.weights[chosen], 0.4 * spacing, max(NEAR, 2.0 * spacing))
+        return refine(part, *_first_plan(part.points, spacing, start), False, 8)
+
+    def state_at(self, chain: Chain, cut: float) -> Start:
+        """Return pose and value at a station of the chain."""
+        position, heading, value = chain.alignment.frame(cut)
+        return np.append(position, heading), float(value)
 
 
 @dataclass(frozen=True)
 class Heights:
-    """Elevations (N,) at stations, with weights (N,); the residual is the weighted height above the chain."""
+    """Elevations at stations; the residual is the weighted height above the chain. Attributes and methods as `Plan`.
+
+    Attributes:
+        heights, weights, stations: (N,) m, 1, and m along the whole axis.
+        least, limit, snaps, spacings: as in `Plan`.
+    """
 
     heights: Float
     weights: Float
-    least: float
-    limit: float = 10.0
-    snaps: tuple[int, ...] = (EQUAL,)
+    stations: Float
+    least: float = 0.0
+    limit: ClassVar[float] = 10.0
+    snaps: ClassVar[tuple[int, ...]] = (EQUAL,)
+    spacings: ClassVar[Spacings] = Spacings(20.0, 40.0, 40.0)
 
     def measure(self, chain: Chain, stations: Float) -> tuple[Float, Float]:
         return stations, self.weights * (self.heights - elevations(chain, stations))
@@ -235,10 +265,22 @@ class Heights:
     def jacobian(self, chain: Chain, stations: Float) -> Float:
         grid = quadrature_grid(chain, stations)
         rise, fall = ramp_integrals(chain, stations, grid, np.ones(len(grid) - 1))
-        return -self.weights[:, None] * assemble(np.ones((len(stations), 1)), rise, fall, chain.slopes)
+        return -self.weights[:, None] * assemble_jacobian(np.ones((len(stations), 1)), rise, fall, chain.slopes)
 
     def move_pose(self, pose: Float, step: Float) -> Float:
         return pose + step
+
+    def fit_window(self, chosen: Int, spacing: float, start: Start | None, origin: float) -> ChainFit:
+        part = Heights(self.heights[chosen], self.weights[chosen], self.stations[chosen] - origin, 0.8 * spacing)
+        return refine(part, _first_heights(part.stations, part.heights, spacing, start), part.stations, False, 8)
+
+    def state_at(self, chain: Chain, cut: float) -> Start:
+        return elevations(chain, np.array([cut])), float(np.interp(cut, chain.knots, chain.values))
+
+
+AxisData = Plan | Heights
+Start = tuple[Float, float]
+"""Pose and value where the part before was left."""
 
 
 def elevations(chain: Chain, stations: Float) -> Float:
@@ -254,12 +296,12 @@ def elevations(chain: Chain, stations: Float) -> Float:
 
 @dataclass
 class ChainFit:
-    """A chain with the points' stations and residuals on it."""
+    """A chain fitted to data, with the points' stations and residuals on it."""
 
+    data: AxisData
     chain: Chain
     stations: Float
     residuals: Float
-    _linear: tuple[Float, Float] | None = field(default=None, repr=False)
 
     @property
     def square(self) -> float:
@@ -274,15 +316,14 @@ class ChainFit:
     def p95(self) -> float:
         return float(np.percentile(np.abs(self.residuals), 95))
 
-    def linear(self, data: AxisData) -> tuple[Float, Float]:
+    @cached_property
+    def linear(self) -> tuple[Float, Float]:
         """Return R (F, F) and (F,): the sum of squares is that of R d + the vector, but for a constant."""
-        if self._linear is None:
-            q, r = np.linalg.qr(data.jacobian(self.chain, self.stations))
-            self._linear = r, q.T @ self.residuals
-        return self._linear
+        q, r = np.linalg.qr(self.data.jacobian(self.chain, self.stations))
+        return r, q.T @ self.residuals
 
 
-def room(chain: Chain, least: float) -> Float:
+def knot_room(chain: Chain, least: float) -> Float:
     """Return (M - 1,) how far each inner knot may move, m: its elements don't get shorter than `least`."""
     gap = np.diff(chain.knots)
     spare = np.maximum(gap - least, 0.02 * gap)  # those that are already shorter may still move a little
@@ -311,7 +352,7 @@ def knot_penalty(data: AxisData, chain: Chain, width: int) -> Float:
     """
     rows = np.zeros((chain.size - 1, width))
     if chain.size > 1:
-        rows[:, -(chain.size - 1) :] = np.diag(1.0 / room(chain, data.least))
+        rows[:, -(chain.size - 1) :] = np.diag(1.0 / knot_room(chain, data.least))
     return rows
 
 
@@ -320,22 +361,22 @@ def refine(data: AxisData, chain: Chain, stations: Float, free_knots: bool, step
 
     The damping holds knots by their room, scaled by the present sum of squares: exact data end quadratically.
     """
-    fit = ChainFit(chain, *data.measure(chain, stations))
+    fit = ChainFit(data, chain, *data.measure(chain, stations))
     basis = chain.basis(free_knots)
-    damping, system = 1.0, _system(data, fit, basis, free_knots)
+    damping, system = 1.0, _system(fit, basis, free_knots)
     for _ in range(steps if basis.shape[1] else 0):
         r, target, held, scale = system
         weight = np.sqrt(damping * (fit.square + 1e-12 * len(fit.residuals)))
         rows = np.vstack((r, weight * held, np.sqrt(1e-7 * damping) * np.eye(r.shape[1])))
         step = least_squares(rows, np.concatenate((target, np.zeros(len(rows) - len(target))))) / scale
         trial_chain = apply_step(data, fit.chain, basis @ step)
-        trial = ChainFit(trial_chain, *data.measure(trial_chain, fit.stations))
+        trial = ChainFit(data, trial_chain, *data.measure(trial_chain, fit.stations))
         if trial.square < fit.square:
             gain = 1.0 - trial.square / fit.square
             fit, damping = trial, max(0.2 * damping, 1e-6)
             if gain < 1e-4 or fit.square < 1e-16 * len(fit.residuals):
                 break
-            system = _system(data, fit, basis, free_knots)
+            system = _system(fit, basis, free_knots)
         else:
             damping *= 6.0
             if damping > 1e5:
@@ -343,12 +384,12 @@ def refine(data: AxisData, chain: Chain, stations: Float, free_knots: bool, step
     return fit
 
 
-def _system(data: AxisData, fit: ChainFit, basis: Float, free_knots: bool) -> tuple[Float, ...]:
+def _system(fit: ChainFit, basis: Float, free_knots: bool) -> tuple[Float, ...]:
     """Return R (P, P), the right side (P,), the knots' penalty (M - 1, P) and the scale (P,) of the linear problem."""
-    matrix = data.jacobian(fit.chain, fit.stations) @ basis
+    matrix = fit.data.jacobian(fit.chain, fit.stations) @ basis
     scale = column_scale(matrix)
     q, r = np.linalg.qr(matrix / scale)
-    held = knot_penalty(data, fit.chain, len(scale)) / scale if free_knots else np.zeros((0, len(scale)))
+    held = knot_penalty(fit.data, fit.chain, len(scale)) / scale if free_knots else np.zeros((0, len(scale)))
     return r, -(q.T @ fit.residuals), held, scale
 
 
@@ -356,3 +397,86 @@ def column_scale(matrix: Float) -> Float:
     """Return the columns' lengths, none so small that dividing by it would blow up noise."""
     scale = np.sqrt((matrix**2).sum(axis=0))
     return np.maximum(scale, max(1e-9 * scale.max(initial=0.0), 1e-300))
+
+
+def _first_plan(points: Float, spacing: float, start: Start | None) -> tuple[Chain, Float]:
+    """Return a chain of curvatures along the points (N, 2) and their stations (N,), m.
+
+    The curvatures are fitted to the spline's heading, not taken from it, so that the chain doesn't drift away.
+    """
+    through = points if start is None else np.vstack((start[0][:2], points))
+    run = np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(through, axis=0).T))))
+    at = np.linspace(0.0, run[-1], int(run[-1] / min(1.0, 0.1 * spacing)) + 20)
+    curve = _smooth_values(run, through, 0.5 * spacing, at)
+    move = np.diff(curve, axis=0)
+    station = np.concatenate(([0.0], np.cumsum(np.hypot(*move.T))))
+    heading = np.unwrap(np.arctan2(move[:, 1], move[:, 0]))
+    knots = _even_knots(station[-1], spacing)
+    turn = np.column_stack((np.ones(len(heading)), _hat_integrals(0.5 * (station[1:] + station[:-1]), knots)))
+    if start is None:
+        solution = np.linalg.lstsq(turn, heading, rcond=1e-10)[0]
+        pose = np.append(curve[0], solution[0])
+    else:
+        pose, value = start
+        heading += 2.0 * np.pi * np.round((pose[2] - heading[0]) / (2.0 * np.pi))
+        rest = np.linalg.lstsq(turn[:, 2:], heading - pose[2] - value * turn[:, 1], rcond=1e-10)[0]
+        solution = np.concatenate(([pose[2], value], rest))
+    chain = Chain(pose, knots, np.clip(solution[1:], -0.2, 0.2), _free(knots), start is not None)
+    return chain, np.interp(run, at, station)[len(through) - len(points) :]
+
+
+def _first_heights(station: Float, heights: Float, spacing: float, start: Start | None) -> Chain:
+    """Return a chain of grades along heights (N,) at stations (N,) counted from the part's begin, m."""
+    if start is not None:
+        station, heights = np.append(0.0, station), np.append(start[0][0], heights)
+    knots = _even_knots(station[-1], spacing)
+    curve = _smooth_values(station, heights[:, None], 0.5 * spacing, knots)[:, 0]
+    grade = np.diff(curve) / np.diff(knots)
+    values = np.concatenate((grade[:1], 0.5 * (grade[1:] + grade[:-1]), grade[-1:]))
+    if start is None:
+        return Chain(curve[:1], knots, values, _free(knots))
+    values[0] = start[1]
+    return Chain(start[0], knots, values, _free(knots), True)
+
+
+def _even_knots(length: float, spacing: float) -> Float:
+    """Return knots from 0 to the length, about `spacing` apart, at least two."""
+    return np.linspace(0.0, length, max(1, round(length / spacing)) + 1)
+
+
+def _free(knots: Float) -> Int:
+    return np.full(len(knots) - 1, FREE)
+
+
+def _smooth_values(run: Float, values: Float, spacing: float, at: Float) -> Float:
+    """Return (M, D): at `at` (M), a cubic spline of even knots through values (N, D) at `run` (N).
+
+    Its third differences are penalised, so that it goes on smoothly through gaps in the data.
+    """
+    count = max(1, int(np.ceil(run[-1] / spacing)))
+    width = run[-1] / count
+    matrix = _cubic(run / width, count)
+    bend = np.diff(np.eye(count + 3), 3, axis=0)
+    normal = matrix.T @ matrix + _STIFFNESS * max(len(run) / count, 1e-3) * bend.T @ bend
+    normal[np.diag_indices(len(normal))] += 1e-10 * len(run) / count  # two points alone determine no spline
+    centre = values.mean(axis=0)
+    return _cubic(at / width, count) @ np.linalg.solve(normal, matrix.T @ (values - centre)) + centre
+
+
+def _cubic(place: Float, count: int) -> Float:
+    """Return (N, count + 3) values of the cubic B-splines over `count` unit intervals."""
+    interval = np.clip(place.astype(np.int64), 0, count - 1)
+    f = place - interval
+    weights = np.stack(((1 - f) ** 3, 3 * f**3 - 6 * f**2 + 4, -3 * f**3 + 3 * f**2 + 3 * f + 1, f**3), axis=1) / 6
+    matrix = np.zeros((len(place), count + 3))
+    matrix[np.arange(len(place))[:, None], interval[:, None] + np.arange(4)] = weights
+    return matrix
+
+
+def _hat_integrals(station: Float, knots: Float) -> Float:
+    """Return (N, K): the integral from the first knot to each station of each knot's hat, for even knots."""
+    width = knots[1] - knots[0]
+    v = np.clip((station[:, None] - knots) / width, -1.0, 1.0)
+    whole = np.where(v < 0.0, 0.5 * (v + 1.0) ** 2, 0.5 + v - 0.5 * v**2)
+    whole[:, 0] -= 0.5
+    return width * whole

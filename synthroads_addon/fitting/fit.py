@@ -9,21 +9,23 @@ curvature at which the one before was left, so time and memory stay proportional
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import ClassVar, Protocol
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
+from pydantic import ValidationError
 
 from ..base.arrays import Float, Int
 from ..base.errors import InputError
-from ..road.alignment import Alignment, Element, finite_array
+from ..base.schema import round_value
+from ..road.alignment import Alignment, finite_array
 from ..road.centerline import read_axis
+from ..road.parameters import AlignmentObject, HorizontalElement, VerticalPoint
 from ..road.profile import IntersectionPoint, Profile
-from .chain import FREE, AxisData, Chain, ChainFit, Heights, Plan, elevations, refine
-from .search import Goal, descent, improve_fit, independent
-from .start import Start, start_heights, start_plan
-
-__all__ = ["AxisFit", "Deviations", "fit_axis", "read_axis"]
+from ..scenario.road import RoadScenario
+from .chain import FREE, NEAR, AxisData, Chain, ChainFit, Heights, Plan, Start, elevations
+from .search import Goal, descent, improve_fit, independent_count
 
 _WINDOW = 1200.0  # m
 _TAIL = 300.0  # m at a window's end that only steady what lies before
@@ -34,12 +36,12 @@ _ROUNDED = 3.5e-4  # m: or on one whose coordinates were rounded to 1 mm, where 
 _RANDOM = 0.5  # correlation of neighbouring residuals that still passes for random
 _GAP = 100.0  # m between points from which the chord between them is given some weight
 _CHORD_WEIGHT = 1e-3
-_NEAR = 40.0  # m that feet are looked for around where they should be
-_SPACING = 20.0  # m between knots at first
 _MARGIN = 0.98  # of the tolerance that the search aims at: it may see thinned points only
 _NEGLIGIBLE = 0.3  # of the tolerance: residuals below it are worth no element
 _FINER_HELPS = 0.8  # of the rms at most must be left by knots half as far apart: else the rest is noise
 _RELAXED = 1.5  # times what dense knots reach is aimed at where the tolerance cannot be had: less would fit noise
+_FLATTEST = 1e7  # m: a rounding of a larger radius bends by less than 1 mm over 100 m, and is written as a kink
+_PLAY = 1e-5  # of a radius: roundings that touch must not overlap once stations and elevations are rounded
 
 
 @dataclass(frozen=True)
@@ -89,6 +91,63 @@ class AxisFit:
     points: int
 
 
+def fitted_axis(path: Path, scenario: RoadScenario) -> tuple[AlignmentObject, RoadScenario, dict[str, Any]]:
+    """Fit an alignment to the points of a CSV or GeoJSON file.
+
+    Returns:
+        the alignment in local coordinates, the scenario with the length and map origin that follow from it, and how
+        well it fits (m): root mean square, 95th percentile and worst distance, horizontally and in height.
+
+    Raises:
+        InputError: the file is missing or not an axis.
+    """
+    points = read_axis(path)
+    origin = np.round(points.mean(axis=0))
+    fit = fit_axis(points - origin)
+    alignment = alignment_object(fit)
+    road = scenario.model_copy(update={"length": alignment.length, "map_origin": tuple(origin.tolist())})
+    report = {
+        "file": path.name,
+        "points": fit.points,
+        "elements": len(alignment.horizontal),
+        "horizontal": fit.horizontal.to_dict(),
+        "height": fit.height.to_dict(),
+    }
+    return alignment, road, report
+
+
+def alignment_object(fit: AxisFit) -> AlignmentObject:
+    """Return a fitted axis as the alignment of a parameter set, with the instance number 1.
+
+    Raises:
+        InputError: what was fitted is no road: its bends, lengths or elevations are beyond all limits.
+    """
+    start, heading, _ = fit.alignment.frame(0.0)
+    elements = [(round_value(e.length), e.curvature_start, e.curvature_end) for e in fit.alignment.elements]
+    points = [(round_value(p.station), round_value(p.elevation), p.radius) for p in fit.profile.points]
+    try:
+        return AlignmentObject(
+            instance=1,
+            start_x=round_value(float(start[0])),
+            start_y=round_value(float(start[1])),
+            start_heading_deg=round_value(float(np.rad2deg(np.angle(np.exp(1j * heading)))), 12),
+            horizontal=tuple(HorizontalElement.between(*element) for element in elements),
+            vertical=tuple(
+                VerticalPoint(station=station, elevation=elevation, radius=_written_radius(radius))
+                for station, elevation, radius in points
+            ),
+        )
+    except ValidationError as error:
+        fault = error.errors(include_url=False)[0]
+        field, wrong = fault["loc"][0] if fault["loc"] else "axis", str(fault["msg"]).lower()
+        raise InputError(f"axis: {field}", fault.get("input"), f"no road runs through its points ({wrong})") from None
+
+
+def _written_radius(radius: float) -> float:
+    """Return the radius of a rounding as it is written."""
+    return radius * (1.0 - _PLAY) if radius < _FLATTEST else 0.0
+
+
 def fit_axis(points: ArrayLike, tolerance: float = 0.05) -> AxisFit:
     """Fit an alignment and a profile to the points of an axis.
 
@@ -107,7 +166,7 @@ def fit_axis(points: ArrayLike, tolerance: float = 0.05) -> AxisFit:
     origin = np.append(np.round(given[:, :2].mean(axis=0)), 0.0)
     local, weights = _bridge_gaps(given - origin)
     alignment, near = _fit_plan(local[:, :2], weights, _MARGIN * tolerance)
-    reach = max(_NEAR, 5.0 * float(np.median(np.diff(near))))
+    reach = max(NEAR, 5.0 * float(np.median(np.diff(near))))
     station, _ = alignment.project_near(local[:, :2], near, reach)
     across = np.hypot(*(local[:, :2] - alignment.position(station)).T)
     profile = _fit_heights(station, local[:, 2], weights, alignment.length, _HEIGHT_SHARE * tolerance)
@@ -141,7 +200,7 @@ def _bridge_gaps(points: Float) -> tuple[Float, Float]:
     """
     step = np.hypot(*np.diff(points[:, :2], axis=0).T)
     usual = float(np.median(step))
-    added = np.where(step > max(_GAP, 5.0 * usual), np.ceil(step / max(_SPACING, 2.0 * usual)) - 1.0, 0.0)
+    added = np.where(step > max(_GAP, 5.0 * usual), np.ceil(step / max(Plan.spacings.first, 2.0 * usual)) - 1.0, 0.0)
     owner = np.repeat(np.arange(len(step)), added.astype(np.int64) + 1)
     nth = np.arange(len(owner)) - np.searchsorted(owner, owner)
     share = (nth / (added[owner] + 1.0))[:, None]
@@ -149,63 +208,10 @@ def _bridge_gaps(points: Float) -> tuple[Float, Float]:
     return np.vstack((dense, points[-1:])), np.append(np.where(nth == 0, 1.0, _CHORD_WEIGHT), 1.0)
 
 
-@dataclass(frozen=True)
-class _Spacing:
-    """Distances of the knots that a search begins with, m."""
-
-    exact: float  # for data without noise: close enough to tell short elements apart
-    first: float
-    finest: float  # where the first ones cannot keep the tolerance
-
-
-class _Part(Protocol):
-    """One of both problems, as the windows see it."""
-
-    spacing: ClassVar[_Spacing]
-
-    def begin(self, chosen: Int, spacing: float, start: Start | None, origin: float) -> tuple[AxisData, ChainFit]:
-        """Return the points' data and their fit by fixed knots `spacing` apart."""
-
-    def leave(self, chain: Chain, cut: float) -> Start:
-        """Return pose and value at a station of the chain."""
-
-
-@dataclass(frozen=True)
-class _PlanPart:
-    points: Float
-    weights: Float
-    spacing: ClassVar[_Spacing] = _Spacing(7.0, _SPACING, 5.0)
-
-    def begin(self, chosen: Int, spacing: float, start: Start | None, origin: float) -> tuple[AxisData, ChainFit]:
-        data = Plan(self.points[chosen], self.weights[chosen], 0.4 * spacing, max(_NEAR, 2.0 * spacing))
-        chain, station = start_plan(data.points, spacing, start)
-        return data, refine(data, chain, station, False, 8)
-
-    def leave(self, chain: Chain, cut: float) -> Start:
-        position, heading, value = chain.alignment.frame(cut)
-        return np.append(position, heading), float(value)
-
-
-@dataclass(frozen=True)
-class _HeightPart:
-    station: Float
-    heights: Float
-    weights: Float
-    spacing: ClassVar[_Spacing] = _Spacing(20.0, 40.0, 40.0)
-
-    def begin(self, chosen: Int, spacing: float, start: Start | None, origin: float) -> tuple[AxisData, ChainFit]:
-        data = Heights(self.heights[chosen], self.weights[chosen], 0.8 * spacing)
-        station = self.station[chosen] - origin
-        return data, refine(data, start_heights(station, data.heights, spacing, start), station, False, 8)
-
-    def leave(self, chain: Chain, cut: float) -> Start:
-        return elevations(chain, np.array([cut])), float(np.interp(cut, chain.knots, chain.values))
-
-
 def _fit_plan(points: Float, weights: Float, tolerance: float) -> tuple[Alignment, Float]:
     """Return the alignment from the first point's foot to the last one's, and all points' stations, roughly."""
     run = np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))))
-    chain, station = _walk(_PlanPart(points, weights), run, tolerance)
+    chain, station = _fit_windows(Plan(points, weights), run, tolerance)
     return _trim_ends(chain, float(station[0]), float(station[-1])), station - station[0]
 
 
@@ -214,10 +220,10 @@ def _fit_heights(
 ) -> Profile:
     order = np.argsort(station, kind="stable")
     station = np.clip(station[order], 0.0, length)
-    return _profile(_walk(_HeightPart(station, heights[order], weights[order]), station, tolerance)[0])
+    return _profile(_fit_windows(Heights(heights[order], weights[order], station), station, tolerance)[0])
 
 
-def _walk(part: _Part, run: Float, tolerance: float) -> tuple[Chain, Float]:
+def _fit_windows(data: AxisData, run: Float, tolerance: float) -> tuple[Chain, Float]:
     """Fit window after window; return the whole chain and the stations (N,) of all points on it, roughly.
 
     `run` (N) tells how far along the points are, roughly as well.
@@ -234,44 +240,44 @@ def _walk(part: _Part, run: Float, tolerance: float) -> tuple[Chain, Float]:
         end = max(end, min(first + 8, len(run)))
         every = -(-(end - first) // _MOST_POINTS)
         chosen = np.unique(np.append(np.arange(first, end, every), end - 1))
-        fit = _solve(part, chosen, start, origin, float(run[end - 1] - run[first]), tolerance)
+        fit = _solve(data, chosen, start, origin, float(run[end - 1] - run[first]), tolerance)
         station[first:end] = origin + np.interp(np.arange(first, end), chosen, fit.stations)
         if end == len(run):
             return _join_pieces([*pieces, fit.chain]), station
         cut = _window_end(fit.chain, tail)
-        start = part.leave(fit.chain, cut)
-        pieces.append(_head(fit.chain, cut))
+        start = data.state_at(fit.chain, cut)
+        pieces.append(_cut_chain(fit.chain, cut))
         first, origin = int(chosen[np.argmax(fit.stations >= cut)]), origin + cut
 
 
 def _solve(
-    part: _Part, chosen: Int, start: Start | None, origin: float, length: float, tolerance: float
+    data: AxisData, chosen: Int, start: Start | None, origin: float, length: float, tolerance: float
 ) -> ChainFit:
     """Fit one window: as exact data if they are, else with knots as dense as the tolerance needs."""
     scale = 2.5 * length / len(chosen)  # knots need data between them
-    count = independent(length, len(chosen))
+    count = independent_count(length, len(chosen))
     exact = Goal(tolerance, 2.0 * tolerance, _EXACT, count, int(length / 15.0) + 5)
-    data, rich = part.begin(chosen, max(part.spacing.exact, scale), start, origin)
+    rich = data.fit_window(chosen, max(data.spacings.exact, scale), start, origin)
     if rich.rms < 3.0 * _ROUNDED:
-        best = min(descent(data, rich, exact), key=exact.rank)
-        if _exactly(best) and exact.rank(best)[:2] == (False, False):
+        best = min(descent(rich, exact), key=exact.rank)
+        if _is_exact(best) and exact.rank(best)[:2] == (False, False):
             return best
     goal = Goal(tolerance, 2.0 * tolerance, _NEGLIGIBLE * tolerance, count, int(max(5.0, length / 30.0 - 0.01)))
-    spacing = max(part.spacing.first, scale)
-    data, rich = part.begin(chosen, spacing, start, origin)
-    while not goal.met(rich) and 0.5 * spacing >= max(part.spacing.finest, scale):
+    spacing = max(data.spacings.first, scale)
+    rich = data.fit_window(chosen, spacing, start, origin)
+    while not goal.is_met(rich) and 0.5 * spacing >= max(data.spacings.finest, scale):
         spacing *= 0.5
-        finer_data, finer = part.begin(chosen, spacing, start, origin)
+        finer = data.fit_window(chosen, spacing, start, origin)
         if finer.rms > _FINER_HELPS * rich.rms:
             break
-        data, rich = finer_data, finer
-    if not goal.met(rich):
+        rich = finer
+    if not goal.is_met(rich):
         goal = replace(goal, rms=max(goal.rms, _RELAXED * rich.rms), p95=max(goal.p95, _RELAXED * rich.p95))
-    return improve_fit(data, min(descent(data, rich, goal), key=goal.rank), goal)
+    return improve_fit(min(descent(rich, goal), key=goal.rank), goal)
 
 
-def _exactly(fit: ChainFit) -> bool:
-    """Tell whether nothing but rounding is left of the residuals."""
+def _is_exact(fit: ChainFit) -> bool:
+    """Return whether nothing but rounding is left of the residuals."""
     r = fit.residuals
     return fit.rms < _EXACT or (fit.rms < _ROUNDED and float(r[1:] @ r[:-1]) < _RANDOM * fit.square)
 
@@ -283,7 +289,7 @@ def _window_end(chain: Chain, tail: float) -> float:
     return float(good[-1]) if len(good) else float(latest)
 
 
-def _head(chain: Chain, cut: float) -> Chain:
+def _cut_chain(chain: Chain, cut: float) -> Chain:
     """Return the chain up to a station."""
     count = int(np.searchsorted(chain.knots, cut - 1e-9))  # elements that begin before the cut
     knots = np.append(chain.knots[:count], cut)
@@ -323,8 +329,7 @@ def _trim_ends(chain: Chain, first: float, last: float) -> Alignment:
     if last > knots[-2]:
         values[-1] += slope[-1] * (last - knots[-1])
         knots[-1] = last
-    rows = zip(np.diff(knots), values[:-1], values[1:], strict=True)
-    return Alignment([Element(float(n), float(a), float(b)) for n, a, b in rows], x, y, heading)
+    return replace(chain, pose=np.array([x, y, heading]), knots=knots, values=values).alignment
 
 
 def _profile(chain: Chain) -> Profile:

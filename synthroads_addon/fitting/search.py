@@ -35,7 +35,7 @@ from .chain import (
 )
 
 _CORRELATED = 20.0  # m
-_TRIALS = 3  # refinements per decision
+_TRIALS, _STEPS = 3, 12  # refinements per decision, and the steps of each
 _PARTS = 4  # an element is split at one of the inner borders of so many parts
 _WORTH = 0.05  # least gain of score
 _HOPELESS = 10.0  # times the bound at which a descent ends
@@ -75,7 +75,7 @@ class Goal:
     count: float
     most: int
 
-    def met(self, fit: ChainFit) -> bool:
+    def is_met(self, fit: ChainFit) -> bool:
         return fit.rms <= self.rms and fit.p95 <= self.p95
 
     def score(self, fit: ChainFit) -> float:
@@ -88,10 +88,10 @@ class Goal:
 
     def rank(self, fit: ChainFit) -> tuple[bool, bool, float]:
         """Key that is least for the best fit: bounds first, then the number of elements, then the score."""
-        return (not self.met(fit), fit.chain.size > self.most, self.score(fit))
+        return (not self.is_met(fit), fit.chain.size > self.most, self.score(fit))
 
 
-def independent(length: float, points: int) -> float:
+def independent_count(length: float, points: int) -> float:
     """Return the number of observations that count, at least 4."""
     return max(4.0, min(float(points), max(10.0, length / _CORRELATED)))
 
@@ -148,7 +148,7 @@ def _lift(chain: Chain, new: Chain, keep: list[int]) -> Float:
     return lift
 
 
-def foresee(data: AxisData, fit: ChainFit, edits: Sequence[Edit], free_knots: bool, goal: Goal) -> tuple[Chain, float]:
+def foresee(fit: ChainFit, edits: Sequence[Edit], free_knots: bool, goal: Goal) -> tuple[Chain, float]:
     """Return the edited chain at the optimum of the linearised problem, and the sum of squares expected there."""
     new, keep = apply_edits(fit.chain, edits)
     new = new.tie_values()
@@ -156,16 +156,16 @@ def foresee(data: AxisData, fit: ChainFit, edits: Sequence[Edit], free_knots: bo
     start = np.zeros(len(lift))  # the jump to the new chain's values
     values = fit.chain.value_columns
     start[values] = lift[values, new.value_columns] @ new.values - fit.chain.values
-    r, projected = fit.linear(data)
+    r, projected = fit.linear
     matrix, target = r @ (lift @ basis), -(projected + r @ start)
-    held = _allowance(fit, goal) * knot_penalty(data, new, basis.shape[1]) if free_knots else matrix[:0]
+    held = _allowance(fit, goal) * knot_penalty(fit.data, new, basis.shape[1]) if free_knots else matrix[:0]
     scale = column_scale(matrix)
     rows = np.vstack((matrix / scale, held / scale, 1e-6 * np.eye(len(scale))))
     scaled = least_squares(rows, np.concatenate((target, np.zeros(len(rows) - len(target)))))
     rest = rows @ scaled
     rest[: len(target)] -= target
     square = float(rest @ rest) - float(projected @ projected) + fit.square
-    return apply_step(data, new, basis @ (scaled / scale)), square
+    return apply_step(fit.data, new, basis @ (scaled / scale)), square
 
 
 def _allowance(fit: ChainFit, goal: Goal) -> float:
@@ -173,25 +173,25 @@ def _allowance(fit: ChainFit, goal: Goal) -> float:
     return float(np.sqrt(fit.square + len(fit.residuals) * goal.floor**2))
 
 
-def _covariance_root(data: AxisData, fit: ChainFit, free_knots: bool, goal: Goal) -> Float:
+def _covariance_root(fit: ChainFit, free_knots: bool, goal: Goal) -> Float:
     """Return W with W.T @ W the free parameters' covariance for unit noise."""
     basis = fit.chain.basis(free_knots)
-    rows = fit.linear(data)[0] @ basis
+    rows = fit.linear[0] @ basis
     if free_knots:
-        rows = np.vstack((rows, _allowance(fit, goal) * knot_penalty(data, fit.chain, basis.shape[1])))
+        rows = np.vstack((rows, _allowance(fit, goal) * knot_penalty(fit.data, fit.chain, basis.shape[1])))
     scale = column_scale(rows)
     root = np.linalg.qr(np.vstack((rows / scale, 1e-6 * np.eye(len(scale)))), mode="r")
     return np.linalg.solve(root, np.eye(len(scale))).T / scale
 
 
-def options(data: AxisData, fit: ChainFit, free_knots: bool, goal: Goal) -> list[tuple[float, Edit]]:
+def rank_edits(fit: ChainFit, free_knots: bool, goal: Goal) -> list[tuple[float, Edit]]:
     """Return (expected change of score, edit), cheapest first, by each edit's own Wald statistic."""
     chain, present = fit.chain, goal.score(fit)
-    root = _covariance_root(data, fit, free_knots, goal)
+    root = _covariance_root(fit, free_knots, goal)
     basis = chain.basis(free_knots)
     conditions = list(_merges(chain, basis, free_knots))
     if free_knots:
-        conditions += _snaps(data, chain, basis)
+        conditions += _snaps(fit.data, chain, basis)
     result = []
     for edit, rows, violation in conditions:
         spread = root @ rows.T
@@ -240,11 +240,11 @@ def _snaps(data: AxisData, chain: Chain, basis: Float) -> Iterator[Condition]:
                 yield Edit(ZERO, e), pair[free], ends[free]
 
 
-def _several(options_: list[tuple[float, Edit]], most: int, gain: float) -> list[tuple[float, Edit]]:
+def _disjoint_edits(ways: list[tuple[float, Edit]], most: int, gain: float) -> list[tuple[float, Edit]]:
     """Return edits that pay and don't touch each other, cheapest first."""
     taken: set[int] = set()
     chosen: list[tuple[float, Edit]] = []
-    for change, edit in options_:
+    for change, edit in ways:
         low, high = edit.span
         if len(chosen) >= most or change > -gain:
             break
@@ -254,48 +254,44 @@ def _several(options_: list[tuple[float, Edit]], most: int, gain: float) -> list
     return chosen
 
 
-def _refine_again(data: AxisData, fit: ChainFit, chain: Chain, free_knots: bool) -> ChainFit:
-    return refine(data, chain, fit.stations, free_knots, 12)
-
-
-def simplify_fit(data: AxisData, fit: ChainFit, free_knots: bool, goal: Goal) -> ChainFit | None:
+def simplify_fit(fit: ChainFit, free_knots: bool, goal: Goal) -> ChainFit | None:
     """Return the fit after the edit, or the edits at once, that cost least; None if there is nothing to take away."""
-    ways = options(data, fit, free_knots, goal)
-    batch = _several(ways, max(1, fit.chain.size // 3), 0.5 * np.log(goal.count))
+    ways = rank_edits(fit, free_knots, goal)
+    batch = _disjoint_edits(ways, max(1, fit.chain.size // 3), 0.5 * np.log(goal.count))
     present = goal.score(fit)
     while len(batch) > 1:
-        chain, _ = foresee(data, fit, [edit for _, edit in batch], free_knots, goal)
-        trial = _refine_again(data, fit, chain, free_knots)
+        chain, _ = foresee(fit, [edit for _, edit in batch], free_knots, goal)
+        trial = refine(fit.data, chain, fit.stations, free_knots, _STEPS)
         if goal.score(trial) - present <= 0.5 * math.fsum(change for change, _ in batch):
             return trial
         batch = batch[: len(batch) // 2]
     trials = []
-    for trial in _trials(data, fit, [edit for _, edit in ways[: 3 * _TRIALS]], free_knots, goal):
+    for trial in _trials(fit, [edit for _, edit in ways[: 3 * _TRIALS]], free_knots, goal):
         if goal.score(trial) < present:
             return trial
         trials.append(trial)
     return min(trials, key=goal.score, default=None)
 
 
-def _trials(data: AxisData, fit: ChainFit, edits: list[Edit], free_knots: bool, goal: Goal) -> Iterator[ChainFit]:
+def _trials(fit: ChainFit, edits: list[Edit], free_knots: bool, goal: Goal) -> Iterator[ChainFit]:
     """Foresee every edit and refine the most promising ones, best first."""
-    foreseen = [foresee(data, fit, [edit], free_knots, goal) for edit in edits]
+    foreseen = [foresee(fit, [edit], free_knots, goal) for edit in edits]
     scores = [goal.expected_score(square, chain, len(fit.residuals)) for chain, square in foreseen]
     for i in np.argsort(scores, kind="stable")[:_TRIALS]:
-        yield _refine_again(data, fit, foreseen[i][0], free_knots)
+        yield refine(fit.data, foreseen[i][0], fit.stations, free_knots, _STEPS)
 
 
-def descent(data: AxisData, fit: ChainFit, goal: Goal) -> list[ChainFit]:
+def descent(fit: ChainFit, goal: Goal) -> list[ChainFit]:
     """Return all fits from a rich chain down to few elements: first with fixed knots, then with free ones.
 
     It goes on past the bounds, since a poor removal may be made good by the next, but not hopelessly far.
     """
     path, free_knots = [fit], False
     while fit.rms < _HOPELESS * max(goal.rms, path[0].rms):
-        trial = simplify_fit(data, fit, free_knots, goal)
+        trial = simplify_fit(fit, free_knots, goal)
         if not free_knots and (trial is None or goal.score(trial) > goal.score(fit)):
             free_knots = True
-            trial = refine(data, fit.chain, fit.stations, True, 20)
+            trial = refine(fit.data, fit.chain, fit.stations, True, 20)
         elif trial is None:
             return path
         fit = trial
@@ -303,9 +299,9 @@ def descent(data: AxisData, fit: ChainFit, goal: Goal) -> list[ChainFit]:
     return path
 
 
-def splits(data: AxisData, fit: ChainFit) -> list[Chain]:
+def split_chains(fit: ChainFit) -> list[Chain]:
     """Return chains with one element more, or one freer, the one that would help most first."""
-    chain = fit.chain
+    chain, data = fit.chain, fit.data
     cuts = np.linspace(0.0, 1.0, _PARTS + 1)[:-1]
     fine = np.append((chain.knots[:-1, None] + np.diff(chain.knots)[:, None] * cuts).ravel(), chain.knots[-1])
     dense = replace(chain, knots=fine, values=np.interp(fine, chain.knots, chain.values))
@@ -344,23 +340,23 @@ def _gain(columns: list[Float], q: Float, rest: Float) -> float:
     return float(rest @ (new @ solution))
 
 
-def improve_fit(data: AxisData, fit: ChainFit, goal: Goal, steps: int = 60) -> ChainFit:
+def improve_fit(fit: ChainFit, goal: Goal, steps: int = 60) -> ChainFit:
     """Return a fit that no single edit improves: grown until the bounds are met, then changed while the rank falls."""
     for _ in range(steps):
-        while goal.met(fit):
-            ways = [edit for _, edit in options(data, fit, True, goal)[: 3 * _TRIALS]]
-            best = min(_trials(data, fit, ways, True, goal), key=goal.rank, default=None)
+        while goal.is_met(fit):
+            ways = [edit for _, edit in rank_edits(fit, True, goal)[: 3 * _TRIALS]]
+            best = min(_trials(fit, ways, True, goal), key=goal.rank, default=None)
             if best is None or not _better(best, fit, goal):
                 break
             fit = best
-        grown = [_refine_again(data, fit, chain, True) for chain in splits(data, fit)[:_TRIALS]]
+        grown = [refine(fit.data, chain, fit.stations, True, _STEPS) for chain in split_chains(fit)[:_TRIALS]]
         best = min(grown, key=goal.score, default=None)
         if best is None:
             return fit
-        if goal.met(fit) and not _better(best, fit, goal):
+        if goal.is_met(fit) and not _better(best, fit, goal):
             # A split may pay only together with the removal that it makes possible.
-            ways = [edit for _, edit in options(data, best, True, goal)[: 3 * _TRIALS]]
-            best = min(_trials(data, best, ways, True, goal), key=goal.rank, default=None)
+            ways = [edit for _, edit in rank_edits(best, True, goal)[: 3 * _TRIALS]]
+            best = min(_trials(best, ways, True, goal), key=goal.rank, default=None)
             if best is None or not _better(best, fit, goal):
                 return fit
         fit = best
@@ -368,6 +364,6 @@ def improve_fit(data: AxisData, fit: ChainFit, goal: Goal, steps: int = 60) -> C
 
 
 def _better(new: ChainFit, old: ChainFit, goal: Goal) -> bool:
-    """Tell whether a fit beats another: by its bounds or number of elements, or by a score worth it."""
+    """Return whether a fit beats another: by its bounds or number of elements, or by a score worth it."""
     coarse_new, coarse_old = goal.rank(new)[:2], goal.rank(old)[:2]
     return coarse_new < coarse_old or (coarse_new == coarse_old and goal.score(new) < goal.score(old) - _WORTH)

@@ -11,7 +11,7 @@ from ..base.crs import wkt
 from ..base.errors import InputError
 from ..base.files import output_folder
 from ..base.progress import Progress, StageTimer, silent
-from ..fitting.axis_object import fitted_axis
+from ..fitting.fit import fitted_axis
 from ..road.geometry import RoadGeometry
 from ..road.parameters import RoadParameters, read_parameters
 from ..sampling.road import sample_road

@@ -11,8 +11,7 @@ import numpy as np
 from ..base.arrays import Float
 from ..base.schema import round_value
 from ..base.version import generator
-from ..fitting.axis_object import alignment_object
-from ..fitting.fit import AxisFit
+from ..fitting.fit import AxisFit, alignment_object
 from ..road.guidelines import LIMITS, STANDARD_CROSS_SECTIONS, design_class_of
 from ..road.parameters import (
     EPSG_URI,

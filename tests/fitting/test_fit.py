@@ -13,8 +13,9 @@ import pytest
 
 from synthroads_addon.base.errors import InputError, MissingFileError
 from synthroads_addon.fitting.chain import FREE, ZERO, Chain, ChainFit, Heights, Plan
-from synthroads_addon.fitting.fit import AxisFit, _exactly, _trim_ends, fit_axis, read_axis
+from synthroads_addon.fitting.fit import AxisFit, _is_exact, _trim_ends, fit_axis
 from synthroads_addon.road.alignment import Alignment, Element
+from synthroads_addon.road.centerline import read_axis
 from synthroads_addon.road.profile import IntersectionPoint, Profile
 
 REAL = sorted((Path(__file__).resolve().parents[2].parent / "shared" / "real").glob("*_axis.csv"))
@@ -234,7 +235,7 @@ def test_what_counts_as_exact() -> None:
     chain = Chain(np.zeros(3), np.array([0.0, 1.0]), np.zeros(2), np.array([ZERO]))
     smooth, random = np.sin(np.linspace(0.0, 20.0, 900)), np.random.default_rng(1).uniform(-0.5e-3, 0.5e-3, 900)
     for residuals, exact in ((1e-7 * smooth, True), (random, True), (2e-4 * smooth, False), (10 * random, False)):
-        assert _exactly(ChainFit(chain, np.zeros(900), residuals)) is exact
+        assert _is_exact(ChainFit(Heights(residuals, residuals, residuals), chain, np.zeros(900), residuals)) is exact
 
 
 def test_a_corner_is_rounded_and_its_straights_stay_straight() -> None:
@@ -402,7 +403,7 @@ def test_derivatives_by_differences() -> None:
     points = position + 0.3 * np.sin(s)[:, None] * np.column_stack((-np.sin(heading), np.cos(heading)))
     check_jacobian(Plan(points, np.full(75, 0.5), 5.0, 40.0), plan, s, 5e-3)
     profile = Chain(np.array([80.0]), knots, 5 * values, np.full(4, FREE))
-    check_jacobian(Heights(80 + np.sin(s), np.full(75, 0.5), 5.0), profile, s, 1e-3)
+    check_jacobian(Heights(80 + np.sin(s), np.full(75, 0.5), s, 5.0), profile, s, 1e-3)
 
 
 @functools.cache

@@ -23,7 +23,7 @@ from synthroads_addon.checking.checker import check
 from synthroads_addon.cloud.tools.convert import read_centerline
 from synthroads_addon.dataset.manifest import faults, read_manifest
 from synthroads_addon.dataset.recipe import RECIPES, load_recipe, scene_jobs
-from synthroads_addon.fitting.axis_object import fitted_axis
+from synthroads_addon.fitting.fit import fitted_axis
 from synthroads_addon.materials.table import read_material_table
 from synthroads_addon.road.centerline import read_axis
 from synthroads_addon.road.geometry import RoadGeometry
