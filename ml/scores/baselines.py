@@ -23,7 +23,7 @@ from scipy import ndimage
 from scipy.spatial import cKDTree
 from skimage.morphology import skeletonize
 
-from synthroads_addon.base.thresholds import otsu
+from synthroads_addon.base.arrays import otsu
 
 from ..data.axis import MeasuredAxis
 

@@ -20,8 +20,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from ..base.arrays import otsu
 from ..base.errors import InputError
-from ..base.thresholds import otsu
 from ..road.centerline import read_axis
 from .classes import RealClass, RealCloud, select_class
 

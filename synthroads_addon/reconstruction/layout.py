@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
+from ..base.arrays import otsu
 from ..base.errors import InputError
-from ..base.thresholds import otsu
 from .edges import paved_edge, stretch_middles
 from .lines import USUAL, WAVELENGTH, Line
 from .path import SPACING

@@ -10,9 +10,9 @@ from hypothesis import strategies as st
 from PIL import Image
 
 from headless.cli import main
+from synthroads_addon.base.arrays import otsu
 from synthroads_addon.base.errors import InputError, OutputError
 from synthroads_addon.base.noise import field
-from synthroads_addon.base.thresholds import otsu
 from synthroads_addon.calibration.classes import RealClass, class_by_label, read_real, seen_from
 from synthroads_addon.calibration.expected import Expectation, Receiver, Views, chosen_views
 from synthroads_addon.calibration.fit import (
