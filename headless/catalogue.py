@@ -9,7 +9,7 @@ from collections import Counter
 from pathlib import Path
 
 from synthroads_addon.base.catalogue import Entry, Kind, figures, plain, preset, span
-from synthroads_addon.base.classes import class_scheme, scheme_names
+from synthroads_addon.base.classes import ClassSelector, Member, class_scheme, scheme_names
 from synthroads_addon.base.files import PRESETS, preset_names
 from synthroads_addon.dataset.recipe import RECIPES, load_recipe, recipe_names
 from synthroads_addon.materials.table import material_table_path, read_material_table
@@ -67,8 +67,16 @@ def _recipe(name: str) -> Entry:
 def _classes(name: str) -> Entry:
     rows = class_scheme(name).rows
     shipped = {"17": PRESETS / "classes.json", "5": PRESETS / "classes_5.json"}
-    table = [{"id": row.id, "name": row.name, "las": row.las, "of": list(row.of)} for row in rows]
+    table = [{"id": row.id, "name": row.name, "las": row.las, "of": [_member(one) for one in row.of]} for row in rows]
     return Entry(name, f"{len(rows)} classes", shipped.get(name, Path(name)), {"classes": table})
+
+
+def _member(member: Member) -> str | int:
+    """Return what a class stands for as text; a selector as its fields."""
+    if not isinstance(member, ClassSelector):
+        return member
+    shown = {key: value for key, value in member.to_dict().items() if key != "where" and value} | member.where
+    return " ".join(f"{key}={value}" for key, value in shown.items())
 
 
 def _assets(name: str) -> Entry:

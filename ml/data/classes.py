@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from synthroads_addon.base.classes import UNLABELLED, ClassScheme, class_scheme
+from synthroads_addon.base.classes import UNLABELLED, ClassScheme, ClassSelector, class_scheme
 from synthroads_addon.base.errors import InputError, nearest_name
 from synthroads_addon.base.schema import Model, read_json
 
@@ -119,7 +119,8 @@ def table_between(source: Mapping[int, str], scheme: ClassScheme, where: str) ->
     members: dict[str, int] = {}
     for place, row in enumerate(scheme.rows):
         for member in row.of:
-            members[full.get(member, "") if isinstance(member, int) else member] = place
+            if not isinstance(member, ClassSelector):
+                members[full.get(member, "") if isinstance(member, int) else member] = place
     table = np.full(256, IGNORED, dtype=np.int16)
     for number, name in source.items():
         if number == UNLABELLED or name == "unlabelled":

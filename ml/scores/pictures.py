@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from PIL import Image
 from scipy.stats import rankdata
 
-from synthroads_addon.base.classes import class_scheme
+from synthroads_addon.base.classes import ClassScheme, class_scheme
 
 from ..data.classes import IGNORED
 from ..data.corridor import CORRIDOR
@@ -249,18 +249,21 @@ _UNKNOWN = (0.07, 0.07, 0.09)
 _WRONG = np.array([[0.75, 0.75, 0.75], [0.9, 0.1, 0.1]])
 
 
-def comparison(tile: CloudTile, predicted: NDArray[np.int16], names: Sequence[str]) -> bytes:
+def comparison(
+    tile: CloudTile, predicted: NDArray[np.int16], names: Sequence[str], scheme: ClassScheme | None = None
+) -> bytes:
     """Return a PNG: a tile from above by its truth, by the classes predicted, and where the two differ.
 
     Args:
         tile: with its truth.
         predicted: (N,) classes.
         names: of the classes.
+        scheme: that they are of, for their colours; a built-in one if None.
     """
     from matplotlib.figure import Figure  # takes half a second, which only pictures need
     from matplotlib.patches import Patch
 
-    colors = class_colors(names)
+    colors = class_colors(names, scheme)
     wrong = np.where(tile.segment == IGNORED, IGNORED, (predicted != tile.segment).astype(np.int16))
     shown = ((tile.segment, colors, "truth"), (predicted, colors, "predicted"), (wrong, _WRONG, "wrong"))
     known = tile.coord[tile.segment != IGNORED, :2] if (tile.segment != IGNORED).any() else tile.coord[:, :2]
@@ -275,9 +278,10 @@ def comparison(tile: CloudTile, predicted: NDArray[np.int16], names: Sequence[st
     return small_png(figure)
 
 
-def class_colors(names: Sequence[str]) -> NDArray[np.float64]:
+def class_colors(names: Sequence[str], scheme: ClassScheme | None = None) -> NDArray[np.float64]:
     """Return the previews' colours of classes (C, 3), from 0 to 1; a group's that isn't a class is grey."""
-    known = {row.name: row.color for scheme in ("17", "5") for row in class_scheme(scheme).rows}
+    schemes = (class_scheme("17"), class_scheme("5"), *([scheme] if scheme else []))
+    known = {row.name: row.color for one in schemes for row in one.rows}
     return np.array([known.get(name, (150, 150, 150)) for name in names]) / 255.0
 
 

@@ -92,9 +92,10 @@ def evaluate(run: SegmentationRun, evaluation: Evaluation, progress: Progress = 
         write_file(evaluation.output / files[-1], (score_table(results[name]) + "\n").encode(), overwrite=True)
         if shown is not None:
             tile, labels = shown
-            classes = source.targets(configuration.scheme())
+            scheme = configuration.scheme()
             files.append(f"{name}.png")
-            write_file(evaluation.output / files[-1], comparison(tile, labels, classes), overwrite=True)
+            picture = comparison(tile, labels, source.targets(scheme), scheme)
+            write_file(evaluation.output / files[-1], picture, overwrite=True)
     means = {f"{name}_mean_iou": result["mean_iou"] for name, result in results.items()}
     return {**means, "tests": results, "files": files}
 

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from fnmatch import fnmatchcase
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from .classes import classes
-from .errors import nearest_name
+from .errors import InputError, nearest_name
 from .schema import Model
 
 KINDS = ("objects", "materials", "collections")
@@ -18,7 +18,8 @@ KINDS = ("objects", "materials", "collections")
 class ClassMapping(Model):
     """Names -> classes, for scenes of others. Names are shell patterns: ``Tree*``, ``pole.???``, ``[Ss]ign*``.
 
-    Case matters, and of several patterns that fit a name the first counts. What stands nearer to the face wins; in
+    ``Lamp.*`` fits ``Lamp`` too: of the same things Blender calls the first that, and the others ``Lamp.001`` and so
+    on. Case matters, and of several patterns that fit a name the first counts. What stands nearer to the face wins; in
     full, a face's class is
 
     1. its attribute ``class_id``,
@@ -34,22 +35,39 @@ class ClassMapping(Model):
     materials: dict[str, str] = Field({}, description="Pattern of materials' names -> class.")
     collections: dict[str, str] = Field({}, description="Pattern of collections' names -> class.")
 
-    @model_validator(mode="after")
-    def _classes_exist(self) -> ClassMapping:
-        known = [row.name for row in classes()]
+    def check(self, known: Iterable[str], source: str) -> None:
+        """Refuse classes that a scheme doesn't have.
+
+        Args:
+            known: names of the scheme's classes.
+            source: file of the mapping.
+
+        Raises:
+            InputError: there is no such class; names the pattern.
+        """
+        known = tuple(known)
         for kind in KINDS:
             for pattern, name in getattr(self, kind).items():
                 if name not in known:
                     hint = nearest_name(name, known)
-                    raise ValueError(f"{kind}: {pattern!r}: there is no class {name!r}{hint}")
-        return self
+                    raise InputError(f"{source}: {kind}.{pattern}", name, f"must be one of {', '.join(known)}{hint}")
+
+
+def fits_pattern(name: str, pattern: str) -> bool:
+    """Return whether a name fits a shell pattern; ``Lamp.*`` fits ``Lamp`` too. Case matters."""
+    return fnmatchcase(name, pattern) or (pattern.endswith(".*") and fnmatchcase(name, pattern[:-2]))
 
 
 class NameClasses:
-    """A mapping at work on the names of one scene; it remembers which patterns fitted."""
+    """A mapping at work on the names of one scene; it remembers which patterns fitted.
 
-    def __init__(self, mapping: ClassMapping | None) -> None:
-        ids = {row.name: row.id for row in classes()}
+    Args:
+        mapping: names -> classes; none if None.
+        ids: ``class_id`` by the names of classes; that of the full table if None.
+    """
+
+    def __init__(self, mapping: ClassMapping | None, ids: Mapping[str, int] | None = None) -> None:
+        ids = {row.name: row.id for row in classes()} if ids is None else ids
         rows: Mapping[str, dict[str, str]] = {kind: getattr(mapping, kind) if mapping else {} for kind in KINDS}
         self._rows = {kind: [(pattern, ids[name]) for pattern, name in rows[kind].items()] for kind in KINDS}
         self._found: dict[tuple[str, str], int | None] = {}
@@ -69,7 +87,7 @@ class NameClasses:
         if not self._rows[kind]:
             return None
         if (kind, name) not in self._found:
-            fits = [(pattern, number) for pattern, number in self._rows[kind] if fnmatchcase(name, pattern)]
+            fits = [(pattern, number) for pattern, number in self._rows[kind] if fits_pattern(name, pattern)]
             self._used |= {(kind, pattern) for pattern, _ in fits}
             self._found[kind, name] = fits[0][1] if fits else None
         return self._found[kind, name]

@@ -1,17 +1,22 @@
-"""The classes of points: 17 in full, 5 in short, or a user's own; and their codes in LAS. The tables are data."""
+"""The classes of points: 17 in full, 5 in short, or a user's own; and their codes in LAS. The tables are data.
+
+A scheme merges the classes of the full table, splits them (by material, by type of thing, by asset) and adds others.
+Until it is written a point's ``class_id`` is that of the full table, or of a *fine* class: one of the scheme's that
+the full table doesn't have, with a number from 254 downwards that nothing else stands for.
+"""
 
 from __future__ import annotations
 
 import colorsys
-from collections.abc import Iterable
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cache
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field, model_validator
+from pydantic import Discriminator, Field, Tag, model_validator
 
 from .errors import InputError, nearest_name
 from .files import PRESETS
@@ -23,6 +28,46 @@ UNCLASSIFIED = 1
 """LAS code of what carries no label (ASPRS LAS 1.4 R15, table 17)."""
 
 
+class ClassSelector(Model):
+    """Faces that the full table doesn't tell apart. All that is given must fit; names are shell patterns."""
+
+    vendor_keys_allowed: ClassVar[bool] = False
+
+    class_name: str | None = Field(None, alias="class", description="Class of the full table.")
+    material: str | None = Field(None, description="Material, e.g. concrete.")
+    thing: str | None = Field(None, description="Type of object in the parameter set, e.g. Vehicle.")
+    where: dict[str, str] = Field({}, description="Fields of that object and what they must be, e.g. model: truck.")
+    asset: str | None = Field(None, description="Name of a free asset in its library.")
+
+    @model_validator(mode="after")
+    def _selects(self) -> ClassSelector:
+        if not any((self.class_name, self.material, self.thing, self.asset)):
+            raise ValueError("must have at least one of class, material, thing, asset")
+        if self.where and not self.thing:
+            raise ValueError("where needs a thing whose fields it names")
+        return self
+
+
+Member = str | int | ClassSelector
+"""What a class stands for: a class of the full table, a number of a scene's own, or what a selector finds."""
+
+
+def _form(member: object) -> str | None:
+    """Return the form of what a class stands for: only that form's faults are told."""
+    if isinstance(member, str | bool):
+        return "name" if isinstance(member, str) else None
+    return {int: "number", dict: "selector", ClassSelector: "selector"}.get(type(member))
+
+
+_FORM = Discriminator(_form, "member_type", "must be a class's name, a number, or a JSON object that selects faces")
+_Members = tuple[
+    Annotated[
+        Annotated[str, Tag("name")] | Annotated[int, Tag("number")] | Annotated[ClassSelector, Tag("selector")], _FORM
+    ],
+    ...,
+]
+
+
 @dataclass(frozen=True)
 class PointClass:
     """One semantic class.
@@ -32,15 +77,18 @@ class PointClass:
         name: as in scenario files and legends.
         las: code in the LAS field ``classification`` (ASPRS LAS 1.4 R15 table 17; 64 and above are user-defined).
         color: sRGB for previews, 0 to 255.
-        of: names (or ids) of the full table's classes that a class of a shorter scheme stands for; empty in the full
-            table.
+        of: what a class of another scheme stands for; empty in the full table.
     """
 
     id: int
     name: str
     las: int
     color: tuple[int, int, int]
-    of: tuple[str | int, ...] = ()
+    of: tuple[Member, ...] = ()
+
+    def selectors(self) -> Iterator[ClassSelector]:
+        """Yield the selectors among what it stands for."""
+        return (member for member in self.of if isinstance(member, ClassSelector))
 
 
 _Byte = Annotated[int, Field(ge=0, le=255)]
@@ -53,14 +101,17 @@ class ClassRow(Model):
     name: str = Field(min_length=1, max_length=64, description="Name.")
     las: int = quantity(ge=0, le=255, unit="1", description="Code in the LAS field classification.")
     color: tuple[_Byte, _Byte, _Byte] = Field(description="sRGB for previews.")
-    of: tuple[Annotated[str | int, Field(union_mode="left_to_right")], ...] = Field(
-        (), description="Classes of the full table (names, or ids of one's own scene) that it stands for."
+    of: _Members = Field(
+        (),
+        description="What it stands for: classes of the full table by name, numbers of one's own scene, or selectors; "
+        "that of its own name if not given.",
     )
 
 
 class ClassTable(Model):
-    """A table of classes, or a scheme that merges them, in JSON."""
+    """A table of classes, or a scheme that merges, splits or adds to them, in JSON."""
 
+    extends: Literal["17", "5"] | None = Field(None, description="Built-in scheme whose classes these are added to.")
     classes: tuple[ClassRow, ...] = Field(min_length=1, max_length=256, description="The classes.")
 
     @model_validator(mode="after")
@@ -79,11 +130,27 @@ class ClassScheme:
         name: ``17``, ``5``, a file's stem, or ``asprs``.
         rows: the classes, ordered by id.
         ids: (256,) uint8, from the ``class_id`` of the points handed in to the scheme's.
+        fine: classes that the full table doesn't have, by the ``class_id`` of the points handed in; as in the file.
     """
 
     name: str
     rows: tuple[PointClass, ...]
     ids: NDArray[np.uint8]
+    fine: Mapping[int, PointClass] = field(default_factory=dict)
+
+    def source_ids(self) -> dict[str, int]:
+        """Return the ``class_id`` that points are handed in with by the names that objects may have as their class."""
+        return {row.name: number for number, row in self.fine.items()} | {row.name: row.id for row in classes()}
+
+    def sources(self) -> ClassScheme:
+        """Return the full table and the fine classes as the scheme of points that are yet to be handed in."""
+        full = classes()
+        fine = (replace(row, id=number, of=()) for number, row in sorted(self.fine.items()))
+        return ClassScheme("17", (*full, *fine), np.arange(256, dtype=np.uint8))
+
+    def selectors(self) -> Iterator[tuple[int, ClassSelector]]:
+        """Yield the selectors with the ``class_id`` of what they find; of several that fit the first counts."""
+        return ((number, selector) for number, row in self.fine.items() for selector in row.selectors())
 
     def names(self) -> dict[int, str]:
         """Return the classes' names by id, 255 included."""
@@ -133,7 +200,8 @@ def scheme_names() -> list[str]:
 def class_scheme(name_or_file: str) -> ClassScheme:
     """Return a built-in scheme, or one from a JSON file of the form of ``presets/classes_5.json``.
 
-    Classes of the full table that no row names become unlabelled.
+    Classes of the full table that no row names become unlabelled. A row with selectors, or of a name that the full
+    table doesn't have and without `of`, is a fine class.
 
     Raises:
         InputError: there is no such scheme, or its file names unknown classes, one class twice or a code beyond LAS.
@@ -144,9 +212,10 @@ def class_scheme(name_or_file: str) -> ClassScheme:
     if path.suffix.lower() != ".json":
         known = ", ".join(scheme_names())
         raise InputError("classes", name_or_file, f"must be one of {known}, or a .json file of classes")
-    rows = _read_rows(path)
+    table = _read_table(path)
     name = "5" if name_or_file == "5" else path.stem
-    return ClassScheme(name, rows, _merging_table(rows, str(path)))
+    fine = _fine_classes(table.classes)
+    return ClassScheme(name, _rows(table.classes), _merging_table(table.classes, fine, str(path)), fine)
 
 
 def stored_scheme(data: object, source: str) -> ClassScheme:
@@ -188,6 +257,11 @@ def class_colors() -> NDArray[np.uint8]:
 
 
 def _read_rows(path: Path) -> tuple[PointClass, ...]:
+    return _rows(_read_table(path).classes)
+
+
+def _read_table(path: Path) -> ClassTable:
+    """Return a table with the classes that it extends before its own."""
     table = ClassTable.from_dict(read_json(path), str(path))
     for row in table.classes:
         if row.id == UNLABELLED:
@@ -195,7 +269,11 @@ def _read_rows(path: Path) -> tuple[PointClass, ...]:
         if 23 <= row.las <= 63:
             allowed = "must be 0 to 22 or 64 to 255: ASPRS reserves 23 to 63"
             raise InputError(f"{path}: {row.name}.las", row.las, allowed)
-    return _rows(table.classes)
+    if table.extends is None:
+        return table
+    shipped = PRESETS / ("classes.json" if table.extends == "17" else "classes_5.json")
+    extended = [row.to_dict() for row in _read_table(shipped).classes]
+    return ClassTable.from_dict({"classes": extended + [row.to_dict() for row in table.classes]}, str(path))
 
 
 def _rows(rows: Iterable[ClassRow]) -> tuple[PointClass, ...]:
@@ -203,19 +281,37 @@ def _rows(rows: Iterable[ClassRow]) -> tuple[PointClass, ...]:
     return tuple(sorted(made, key=lambda row: row.id))
 
 
-def _merging_table(rows: tuple[PointClass, ...], source: str) -> NDArray[np.uint8]:
-    """Return the (256,) table from full ids to a scheme's, checked."""
+def _fine_classes(rows: Sequence[ClassRow]) -> dict[int, PointClass]:
+    """Return the classes that the full table doesn't have, by numbers that no row names, in the rows' order."""
+    known = {row.name for row in classes()}
+    named = {member for row in rows for member in row.of if isinstance(member, int)}
+    free = (number for number in range(UNLABELLED - 1, -1, -1) if number not in named)
+    made = [PointClass(r.id, r.name, r.las, r.color, r.of) for r in rows]
+    fine = [row for row in made if any(row.selectors()) or (not row.of and row.name not in known)]
+    return dict(zip(free, fine, strict=False))
+
+
+def _merging_table(rows: Sequence[ClassRow], fine: Mapping[int, PointClass], source: str) -> NDArray[np.uint8]:
+    """Return the (256,) table from the ids of points handed in to a scheme's, checked."""
     ids = {row.name: row.id for row in classes()}
     table = np.full(256, UNLABELLED, dtype=np.uint8)
     for row in rows:
-        for member in row.of or (row.name,):
-            if isinstance(member, str) and member not in ids:
-                hint = nearest_name(member, ids)
-                raise InputError(f"{source}: {row.name}", member, f"must be a class of {', '.join(ids)}{hint}")
+        for member in row.of or ((row.name,) if row.name in ids else ()):
+            if isinstance(member, ClassSelector):
+                _known_class(member.class_name, ids, f"{source}: {row.name}.of.class")
+                continue
+            _known_class(member, ids, f"{source}: {row.name}")
             number = ids[member] if isinstance(member, str) else member
             if not 0 <= number < UNLABELLED:
                 raise InputError(f"{source}: {row.name}", member, "must be a class's name or an id from 0 to 254")
             if table[number] != UNLABELLED:
                 raise InputError(f"{source}: {row.name}", member, "belongs to another class already")
             table[number] = row.id
+    for number, made in fine.items():
+        table[number] = made.id
     return table
+
+
+def _known_class(name: Member | None, ids: Mapping[str, int], where: str) -> None:
+    if isinstance(name, str) and name not in ids:
+        raise InputError(where, name, f"must be a class of {', '.join(ids)}{nearest_name(name, ids)}")

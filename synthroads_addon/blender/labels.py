@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 import bpy
@@ -39,13 +39,25 @@ class Label:
 class Labels:
     """The labels of a scene's objects.
 
+    Args:
+        scene: the scene.
+        mapping: classes by name; none if None.
+        ids: ``class_id`` by the names of classes that objects may have; that of the full table if None.
+
+    Attributes:
+        reserved: values of ``class_id`` that no face may have by a number of its own: they are classes' by name.
+
     Raises:
         InputError: a custom property isn't what it must be; names the object.
     """
 
-    def __init__(self, scene: bpy.types.Scene, mapping: ClassMapping | None) -> None:
-        self.by_name = NameClasses(mapping)
-        self._ids = {row.name: row.id for row in classes()}
+    def __init__(
+        self, scene: bpy.types.Scene, mapping: ClassMapping | None, ids: Mapping[str, int] | None = None
+    ) -> None:
+        full = {row.name: row.id for row in classes()}
+        self._ids = dict(full if ids is None else ids)
+        self.reserved = frozenset(self._ids.values()) - frozenset(full.values())
+        self.by_name = NameClasses(mapping, self._ids)
         self._by_collection = self._collections(scene)
 
     def label_of(self, item: bpy.types.Object, owner: bpy.types.Object) -> Label:

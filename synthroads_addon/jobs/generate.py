@@ -15,6 +15,7 @@ from ..fitting.fit import fitted_axis
 from ..road.geometry import RoadGeometry
 from ..road.parameters import RoadParameters, read_parameters
 from ..sampling.road import sample_road
+from ..scanning.scene.classify import check_asset_classes
 from ..scenario.scan import scanner_setting
 from ..scenario.scenario import Scenario
 from ..twin.formats import check_formats
@@ -79,6 +80,7 @@ def generate(job: Job, progress: Progress = silent) -> dict[str, Any]:
     with output_folder(job.output, files.names, job.overwrite) as folder:
         road, report = make_road(source, timer)
         refuse_sections(job.scenario, road.length)
+        check_asset_classes(job.scenario.cloud.scheme(), road.parameters)
         if set(job.scenario.outputs) & {"scene", *OF_POINTS}:
             from ..blender.files import empty_file  # Blender takes a second to start: other outputs need none
             from .road_scene import RoadScene

@@ -60,7 +60,8 @@ class RoadScene:
 
     def read(self) -> ScannedScene:
         """Return the open scene, which shows the road, as it is scanned."""
-        return scanned_scene(geometry=self.road, speed_factor=self.scenario.scan.traffic_speed_factor)
+        factor, class_ids = self.scenario.scan.traffic_speed_factor, self.scenario.cloud.scheme().source_ids()
+        return scanned_scene(geometry=self.road, speed_factor=factor, class_ids=class_ids)
 
     def rebuild(self, changes: Mapping[str, Any]) -> ScannedScene:
         """Return the scene of the model with fields of the scenario changed, which is built in place of that before."""

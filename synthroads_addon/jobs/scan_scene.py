@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..base.class_mapping import ClassMapping
+from ..base.classes import ClassScheme
 from ..base.crs import wkt
 from ..base.errors import InputError
 from ..base.files import output_folder
@@ -128,9 +129,12 @@ def check_scene_scan(job: SceneScan) -> ClassMapping | None:
     job.scenario.own_materials()
     if job.epsg is not None:
         wkt(job.epsg)
+    known = job.scenario.cloud.scheme().source_ids()
     if job.classes is None:
         return None
-    return ClassMapping.from_dict(read_json(job.classes), source=str(job.classes))
+    mapping = ClassMapping.from_dict(read_json(job.classes), source=str(job.classes))
+    mapping.check(known, str(job.classes))
+    return mapping
 
 
 def _read_scene(job: SceneScan, mapping: ClassMapping | None) -> tuple[ScannedScene, RoadGeometry | None, list[str]]:
@@ -144,7 +148,10 @@ def _read_scene(job: SceneScan, mapping: ClassMapping | None) -> tuple[ScannedSc
         raise InputError("--origin", list(job.origin), "can't be given: the road in the scene has one of its own")
     factor = job.scenario.scan.traffic_speed_factor
     road = RoadGeometry(parameters) if parameters else None
-    scene = scanned_scene(classes=mapping, geometry=road, speed_factor=factor, number_objects=True)
+    class_ids = job.scenario.cloud.scheme().source_ids()
+    scene = scanned_scene(
+        classes=mapping, geometry=road, speed_factor=factor, number_objects=True, class_ids=class_ids
+    )
     if not len(scene.static) and not scene.moving:
         name = str(job.scene) if job.scene else "open scene"
         raise InputError(name, None, "holds nothing visible with faces that could be scanned")
@@ -161,7 +168,8 @@ def scene_site(job: SceneScan, mesh: SceneMesh, road: RoadGeometry | None) -> Si
         conditions = replace(conditions, epsg=job.epsg)
     view = None
     if "previews" in job.scenario.outputs:
-        view = road_view(road) if road else scene_view(mesh)
+        scheme = job.scenario.cloud.scheme().sources()
+        view = road_view(road, scheme) if road else scene_view(mesh, scheme)
     return Site(job.scenario, scene_path(job, mesh, road), conditions, view)
 
 
@@ -203,15 +211,20 @@ def _scanner_place(job: SceneScan, place: tuple[float, ...], mesh: SceneMesh) ->
     return [*local, ground + _tripod_of(job).value("height")]
 
 
-def scene_view(mesh: SceneMesh) -> TopView:
-    """Return a raster that holds the scene, its longer side from left to right."""
+def scene_view(mesh: SceneMesh, scheme: ClassScheme | None = None) -> TopView:
+    """Return a raster that holds the scene, its longer side from left to right.
+
+    Args:
+        mesh: the scene.
+        scheme: of the points' classes; the 17 if None.
+    """
     low, high = body_bounds(mesh)
     start, end = (low + mesh.origin)[:2], (high + mesh.origin)[:2]
     axis = int(np.argmax(end - start))
     reach = float((end - start)[1 - axis]) / 2.0 + _BORDER
     middle = (start + end)[1 - axis] / 2.0
     start[1 - axis] = end[1 - axis] = middle
-    return TopView(start, end, -reach, reach)
+    return TopView(start, end, -reach, reach, scheme)
 
 
 def _warnings_of_counts(counts: dict[str, Any]) -> list[str]:

@@ -58,16 +58,18 @@ class ScanConditions:
         environment: light and weather.
         variation: of the road's materials.
         epsg: map coordinate system; None if unknown.
+        road: what stands on and beside it, for classes by things; None if there is no road.
     """
 
     environment: Environment = field(default_factory=Environment)
     variation: MaterialVariation = field(default_factory=MaterialVariation)
     epsg: int | None = None
+    road: RoadParameters | None = None
 
     @classmethod
     def of(cls, road: RoadParameters | None) -> ScanConditions:
         """Return the conditions of a road."""
-        return cls() if road is None else cls(road.environment, road.materials, road.metadata.epsg)
+        return cls() if road is None else cls(road.environment, road.materials, road.metadata.epsg, road)
 
 
 @dataclass(frozen=True)

@@ -9,6 +9,7 @@ from pydantic import Field, model_validator
 from ..base.classes import ClassScheme, class_scheme
 from ..base.schema import ClosedModel, first_repeated, optional, quantity
 from ..cloud.layers import DEFAULT_ATTRIBUTES, LAYERS, Attribute
+from ..scanning.scene.classify import check_selectors
 
 CloudFormat = Literal["laz", "las", "ply", "e57", "npz"]
 Intensity = Literal["received", "range_corrected"]
@@ -56,5 +57,7 @@ class CloudScenario(ClosedModel):
         return frozenset[str]().union(*(LAYERS[name].types for name in self.attributes))
 
     def scheme(self) -> ClassScheme:
-        """Return the scheme of the classes; raise `InputError` if there is no such scheme."""
-        return class_scheme(self.classes)
+        """Return the scheme of the classes; raise `InputError` if there is none, or no thing that it names."""
+        scheme = class_scheme(self.classes)
+        check_selectors(scheme, self.classes)
+        return scheme

@@ -115,8 +115,6 @@ def test_a_library_is_read_and_written_back(tmp_path: Path) -> None:
 OUTSIDE = "must lie in the library's folder: a relative path with / and without .."
 BOTH_OR_NONE = ".placement: either spacing or per_km is needed, and not both"
 FAULTS: dict[str, tuple[dict[str, Any], str]] = {
-    "class": (entry(class_name="vegetaton"), ".class_name: 'vegetaton' must be one of ground, road, "),
-    "nearest class": (entry(class_name="vegetaton"), " (did you mean 'vegetation'?)"),
     "suffix": (entry(file="models/bench.fbx"), ".file: 'models/bench.fbx' must be one of .blend, .glb, .obj"),
     "no suffix": (entry(file="models/bench"), ".file: 'models/bench' must be one of .blend, .glb, .obj"),
     "outside": (entry(file="../bench.glb"), f".file: '../bench.glb' {OUTSIDE}"),

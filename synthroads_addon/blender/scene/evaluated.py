@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Generator, Hashable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from itertools import chain, count
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import bpy
 import numpy as np
@@ -44,6 +44,7 @@ def scene_mesh(
     objects: Collection[bpy.types.Object] | None = None,
     classes: ClassMapping | None = None,
     number_objects: bool = False,
+    class_ids: Mapping[str, int] | None = None,
 ) -> SceneMesh:
     """Return the triangles of the evaluated scene: everything that is visible in it and has faces.
 
@@ -58,12 +59,13 @@ def scene_mesh(
         classes: classes by name.
         number_objects: each object (one that shows a collection is one) without a number gets one, in the order of
             their names, from 1 on past those that are taken.
+        class_ids: ``class_id`` by the names of classes; that of the full table if None, see `ClassScheme.source_ids`.
 
     Raises:
         InputError: an object's vertices aren't finite, or a custom property isn't what it must be; names the object.
     """
     depsgraph = _depsgraph(source)
-    reading = _Reading(depsgraph, objects, classes)
+    reading = _Reading(depsgraph, objects, classes, class_ids)
     reading.copy_all()
     tables = reading.tables(_origin(depsgraph.scene), number_objects)
     return join_parts(reading.pairs(None), tables)
@@ -77,6 +79,7 @@ def scanned_scene(
     speed_factor: float = 1.0,
     *,
     number_objects: bool = False,
+    class_ids: Mapping[str, int] | None = None,
 ) -> ScannedScene:
     """Return the evaluated scene as `scene_mesh` does, but what moves apart from what stands.
 
@@ -86,7 +89,7 @@ def scanned_scene(
     (vx, vy, vz), m/s; what such an object shows or carries moves with it as one body.
 
     Args:
-        source, objects, classes, number_objects: see `scene_mesh`.
+        source, objects, classes, number_objects, class_ids: see `scene_mesh`.
         geometry: the road that the scene was built from; if None its vehicles stand.
         speed_factor: share of all speeds that they have in the scan, >= 0; with 0 everything stands.
 
@@ -94,7 +97,8 @@ def scanned_scene(
         InputError: as `scene_mesh`; a velocity isn't three numbers, the factor is negative, or the geometry is that of
             another road.
     """
-    steps = scanned_scene_steps(source, objects, classes, geometry, speed_factor, number_objects=number_objects)
+    further: dict[str, Any] = {"number_objects": number_objects, "class_ids": class_ids}
+    steps = scanned_scene_steps(source, objects, classes, geometry, speed_factor, **further)
     while True:
         try:
             next(steps)
@@ -111,6 +115,7 @@ def scanned_scene_steps(
     speed_factor: float = 1.0,
     *,
     number_objects: bool = False,
+    class_ids: Mapping[str, int] | None = None,
 ) -> Generator[float, None, CopiedScene]:
     """Read the evaluated scene as `scanned_scene` does, in steps in the main thread between which the window may live.
 
@@ -135,7 +140,7 @@ def scanned_scene_steps(
             lanes: dict[str, LaneMotion] = {}
             if geometry is not None:
                 lanes = lane_motions(geometry, speed_factor, origin - np.array(geometry.parameters.transform.translate))
-            reading = _Reading(depsgraph, objects, classes, lanes, speed_factor)
+            reading = _Reading(depsgraph, objects, classes, class_ids, lanes, speed_factor)
             if attempt == _ATTEMPTS:
                 reading.copy_all()
             for share in reading.copies():
@@ -228,10 +233,11 @@ class _Reading:
         depsgraph: bpy.types.Depsgraph,
         objects: Collection[bpy.types.Object] | None,
         classes: ClassMapping | None,
+        class_ids: Mapping[str, int] | None = None,
         lanes: Mapping[str, LaneMotion] | None = None,
         speed_factor: float = 0.0,
     ) -> None:
-        self.labels = Labels(depsgraph.scene, classes)
+        self.labels = Labels(depsgraph.scene, classes, class_ids)
         self.motions: dict[Hashable, Motion] = {}
         self._chosen = None if objects is None else {item.original for item in objects}
         self._lanes = lanes or {}
@@ -295,7 +301,7 @@ class _Reading:
     def tables(self, origin: Float, number_objects: bool) -> SceneTables:
         """Return what all meshes have in common."""
         labels = self._numbered() if number_objects else self._labels
-        return SceneTables(labels, self.materials, origin)
+        return SceneTables(labels, self.materials, origin, self.labels.reserved)
 
     def _walk(self, depsgraph: bpy.types.Depsgraph) -> None:
         known: dict[tuple[int, int, int], _MeshUse | None] = {}

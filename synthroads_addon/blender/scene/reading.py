@@ -65,11 +65,13 @@ class SceneTables:
         labels: of all objects.
         materials: names.
         origin: (3,) map coordinates of the local origin, m.
+        reserved: values of ``class_id`` that faces' own numbers can't have, see `Labels`.
     """
 
     labels: Sequence[Label]
     materials: tuple[str, ...]
     origin: Float
+    reserved: frozenset[int] = frozenset()
 
 
 def slot_names(item: bpy.types.Object) -> list[str]:
@@ -238,7 +240,7 @@ def join_parts(pairs: list[tuple[MeshPart, Places]], tables: SceneTables, frame:
         for matrices, labels in _blocks(part, places):
             last = vertex + len(matrices) * len(part.vertices), triangle + len(matrices) * len(part.triangles)
             mine = {name: arrays[name][triangle : last[1]] for name in ("triangles", *_PER_FACE)}
-            _label(part, [tables.labels[i] for i in labels], mine)
+            _label(part, [tables.labels[i] for i in labels], tables.reserved, mine)
             if not as_it_is:
                 into = matrices if frame is None else frame @ matrices
                 _place(part, into, arrays["vertices"][vertex : last[0]], mine["triangles"], vertex)
@@ -275,7 +277,7 @@ def _place(
     numbers += (first + size * np.arange(count, dtype=np.int64)).astype(np.int32)[:, None, None]
 
 
-def _label(part: MeshPart, labels: list[Label], into: dict[str, NDArray[Any]]) -> None:
+def _label(part: MeshPart, labels: list[Label], reserved: frozenset[int], into: dict[str, NDArray[Any]]) -> None:
     """Fill in class, instance and material (N * T,) of a part at N places."""
     count = len(labels)
     into["material"].reshape(count, -1)[...] = part.material
@@ -287,6 +289,8 @@ def _label(part: MeshPart, labels: list[Label], into: dict[str, NDArray[Any]]) -
     class_id = into["class_id"].reshape(count, -1)
     if part.class_id is not None:
         class_id[...] = part.class_id
+        if reserved:
+            class_id[np.isin(class_id, list(reserved))] = UNLABELLED
         return
     strong, weak = np.array([(label.strong, label.weak) for label in labels], np.int16).T[:, :, None]
     of_material = np.int16(-1) if part.material_class is None else part.material_class[part.material]

@@ -271,6 +271,9 @@ def _scheme_of(cloud: CloudReader, classes: str | None) -> ClassScheme:
     if classes is None or (header.labelled and classes == header.scheme.name):
         return header.scheme.as_stored()
     scheme = class_scheme(classes)
+    if any(scheme.selectors()):
+        finer = ", ".join(row.name for row in scheme.fine.values() if any(row.selectors()))
+        raise InputError("--classes", classes, f"has {finer}, which a cloud's classes don't tell apart: scan with it")
     if not header.labelled or header.scheme.name != "17":
         held = f"the classes {header.scheme.name}" if header.labelled else "LAS codes only"
         raise InputError(str(header.path), None, f"holds {held}: only the 17 classes can be merged into {classes}")

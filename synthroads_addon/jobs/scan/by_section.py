@@ -113,7 +113,8 @@ class SectionScan:
         tolerance, detail = settings.tolerance, settings.vegetation_detail
         model = build_road(self._standing, tolerance, detail, stretch=stretch, geometry=self._road)
         frame = model.origin - np.array(whole.transform.translate)
-        static = scene_mesh(objects=list(model.objects.values()))
+        class_ids = self._scenario.cloud.scheme().source_ids()
+        static = scene_mesh(objects=list(model.objects.values()), class_ids=class_ids)
         passing = self._passing(section)
         vehicles = {name: motion.vehicle for name, motion in passing.items()}
         motions = {name: ShiftedMotion(motion, frame) for name, motion in passing.items()}

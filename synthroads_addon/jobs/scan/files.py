@@ -12,7 +12,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...base.classes import classes
 from ...base.progress import StageTimer
 from ...cloud.formats.base import CloudWriter
 from ...cloud.formats.registry import open_writer
@@ -127,7 +126,7 @@ class CloudFiles:
 
     def summary(self) -> dict[str, Any]:
         """Return the counts as JSON data."""
-        names = {row.id: row.name for row in classes()} | {255: "unlabelled"}
+        names = self.scenario.cloud.scheme().sources().names()
         by_class = {names.get(i, str(i)): int(n) for i, n in enumerate(self.counts.by_class) if n}
         return {
             **{name: value for name, value in asdict(self.counts).items() if not name.startswith("by_")},

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ...base.classes import ClassScheme
 from ...base.errors import InputError
 from ...base.progress import StageTimer
 from ...cloud.layers import optional_arrays
@@ -27,6 +28,7 @@ from ...scanning.plan import ScanConditions, ScanPlan, SceneServices
 from ...scanning.platforms.guides import RoadGuide
 from ...scanning.platforms.path import Path as ScanPath
 from ...scanning.relief import micro_relief
+from ...scanning.scene.classify import classify_scene
 from ...scanning.scene.motion import ScannedScene
 from ...scanning.scene.target import Target
 from ...scanning.weather.registry import weather_of
@@ -55,6 +57,7 @@ def plan_scan(
         InputError: the device can't do what the scenario asks for, or its table of materials can't be read.
     """
     conditions = conditions or ScanConditions()
+    scene = classify_scene(scene, scenario.cloud.scheme(), conditions.road)
     scan, settings, setting = scenario.scan, scenario.settings(), scanner_setting(scenario.scan)
     materials, kept = scene.static.materials, kept_layers(scenario)
     means, by_layers = services.materials(materials), scenario.colour.intensity_from_layers
@@ -149,7 +152,7 @@ class Site:
     @classmethod
     def of_road(cls, scenario: Scenario, road: RoadGeometry) -> Site:
         """Return the site of a road's scan."""
-        view = road_view(road) if "previews" in scenario.outputs else None
+        view = road_view(road, scenario.cloud.scheme().sources()) if "previews" in scenario.outputs else None
         path = scenario.scan.platform.make_path(RoadGuide(road))
         return cls(scenario, path, ScanConditions.of(road.parameters), view)
 
@@ -183,8 +186,13 @@ class Site:
         return record_to_files([plan], self.files(folder, plan.target.origin), timer)
 
 
-def road_view(geometry: RoadGeometry) -> TopView:
-    """Return a raster for the previews that holds the whole swath of a road."""
+def road_view(geometry: RoadGeometry, scheme: ClassScheme | None = None) -> TopView:
+    """Return a raster for the previews that holds the whole swath of a road.
+
+    Args:
+        geometry: the road.
+        scheme: of the points' classes; the 17 if None.
+    """
     origin = np.array(geometry.parameters.transform.translate)[:2]
     stations = np.linspace(0.0, geometry.length, 50)
     terrain = geometry.parameters.terrain
@@ -195,4 +203,4 @@ def road_view(geometry: RoadGeometry) -> TopView:
     normal = np.array([-chord[1], chord[0]]) / max(np.hypot(*chord), 1e-9)
     edges = np.concatenate([plan + reach * left, plan - reach * left])
     across = (edges - plan[0]) @ normal
-    return TopView(plan[0] + origin, plan[-1] + origin, float(across.min()) - 2, float(across.max()) + 2)
+    return TopView(plan[0] + origin, plan[-1] + origin, float(across.min()) - 2, float(across.max()) + 2, scheme)

@@ -122,9 +122,9 @@ def _scan_saved_copy(saved: SavedScene, output: _Output) -> dict[str, Any]:
 
 def _read_open_scene(scan: RoadScan, timer: StageTimer) -> Generator[Step, None, _Measure]:
     """Read the open scene; return what scans it."""
-    speed_factor = scan.scenario.scan.traffic_speed_factor
+    speed_factor, class_ids = scan.scenario.scan.traffic_speed_factor, scan.scenario.cloud.scheme().source_ids()
     with timer.stage("scene mesh"):
-        steps = scanned_scene_steps(geometry=scan.road, speed_factor=speed_factor)
+        steps = scanned_scene_steps(geometry=scan.road, speed_factor=speed_factor, class_ids=class_ids)
         copied = yield from _shares(steps)
     services = SnapshotServices(copied.materials)
     return lambda output: _scan_snapshot(scan, copied, services, output)

@@ -1,0 +1,119 @@
+"""Classes that a scheme tells apart beyond the full table, given to the faces of a scene: see `ClassSelector`."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from typing import get_args
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...base.class_mapping import fits_pattern
+from ...base.classes import ClassScheme, ClassSelector, class_id
+from ...base.errors import InputError, nearest_name
+from ...road.objects import RoadObject
+from ...road.parameters import AnyObject, Asset, RoadParameters
+from .mesh import SceneMesh
+from .motion import ScannedScene
+
+_TYPES: dict[str, type[RoadObject]] = {
+    kind.model_fields["type"].default: kind for kind in get_args(get_args(AnyObject)[0])
+}
+"""Every type of object of a parameter set."""
+
+
+def check_selectors(scheme: ClassScheme, source: str) -> None:
+    """Refuse selectors of things that there aren't; raise `InputError` naming what there is.
+
+    Args:
+        scheme: of classes.
+        source: its file.
+    """
+    for number, selector in scheme.selectors():
+        where = f"{source}: {scheme.fine[number].name}.of"
+        if selector.thing and selector.thing not in _TYPES:
+            hint = nearest_name(selector.thing, _TYPES)
+            raise InputError(f"{where}.thing", selector.thing, f"must be one of {', '.join(_TYPES)}{hint}")
+        for name in selector.where:
+            fields = _TYPES[selector.thing or ""].model_fields
+            if name not in fields:
+                hint = nearest_name(name, fields)
+                raise InputError(f"{where}.where", name, f"must be a field of {selector.thing}{hint}")
+
+
+def check_asset_classes(scheme: ClassScheme, road: RoadParameters) -> None:
+    """Refuse free assets of classes that a scheme doesn't have; raise `InputError` naming the asset."""
+    known = scheme.source_ids()
+    for name, item in road.of_type(Asset).items():
+        if item.class_name not in known:
+            hint = nearest_name(item.class_name, known)
+            of = f"{item.name} of {item.library}"
+            allowed = f"{of}: must be a class of the scheme {scheme.name} (cloud.classes): {', '.join(known)}{hint}"
+            raise InputError(f"objects.{name}.class_name", item.class_name, allowed)
+
+
+def classify_scene(scene: ScannedScene, scheme: ClassScheme, road: RoadParameters | None) -> ScannedScene:
+    """Return a scene whose faces have the classes that a scheme's selectors find; of several that fit the first counts.
+
+    Args:
+        scene: its faces have classes of the full table.
+        scheme: one without selectors returns the scene itself.
+        road: that the scene shows; without one nothing is a thing or an asset.
+    """
+    selectors = list(scheme.selectors())
+    if not selectors:
+        return scene
+    rules = [_Rule(number, selector, _numbers_of(selector, road)) for number, selector in selectors]
+    moving = tuple(replace(body, mesh=_classify(body.mesh, rules)) for body in scene.moving)
+    return replace(scene, static=_classify(scene.static, rules), moving=moving)
+
+
+@dataclass(frozen=True)
+class _Rule:
+    """A selector at work.
+
+    Attributes:
+        number: ``class_id`` of what it finds.
+        selector: what it looks for.
+        instances: numbers of the objects that it means; None if it means no objects in particular.
+    """
+
+    number: int
+    selector: ClassSelector
+    instances: NDArray[np.uint32] | None
+
+    def fits(self, mesh: SceneMesh) -> NDArray[np.bool_]:
+        """Return which faces (T,) it finds."""
+        found = np.ones(len(mesh), dtype=bool)
+        if self.selector.class_name is not None:
+            found &= mesh.class_id == class_id(self.selector.class_name)
+        if self.selector.material is not None:
+            materials = [fits_pattern(name, self.selector.material) for name in mesh.materials]
+            found &= np.array(materials, dtype=bool)[mesh.material]
+        if self.instances is not None:
+            found &= np.isin(mesh.instance_id, self.instances)
+        return found
+
+
+def _classify(mesh: SceneMesh, rules: Iterable[_Rule]) -> SceneMesh:
+    class_ids = mesh.class_id.copy()
+    for rule in reversed(list(rules)):
+        class_ids[rule.fits(mesh)] = rule.number
+    return replace(mesh, class_id=class_ids)
+
+
+def _numbers_of(selector: ClassSelector, road: RoadParameters | None) -> NDArray[np.uint32] | None:
+    """Return the instance numbers of the objects that a selector means; None if it says nothing of objects."""
+    if selector.thing is None and selector.asset is None:
+        return None
+    items = road.objects.values() if road else ()
+    return np.array([item.instance for item in items if _means(selector, item)], dtype=np.uint32)
+
+
+def _means(selector: ClassSelector, item: RoadObject) -> bool:
+    if selector.asset is not None and not (isinstance(item, Asset) and fits_pattern(item.name, selector.asset)):
+        return False
+    if selector.thing is not None and not isinstance(item, _TYPES[selector.thing]):
+        return False
+    return all(fits_pattern(str(getattr(item, name)), pattern) for name, pattern in selector.where.items())
