@@ -13,7 +13,8 @@ from ...base.class_mapping import fits_pattern
 from ...base.classes import ClassScheme, ClassSelector, class_id
 from ...base.errors import InputError, nearest_name
 from ...road.objects import RoadObject
-from ...road.parameters import AnyObject, Asset, RoadParameters
+from ...road.parameters import AnyObject, RoadParameters
+from ...road.things.asset import Asset
 from .mesh import SceneMesh
 from .motion import ScannedScene
 
