@@ -416,7 +416,7 @@ BROKEN |= {"flat.obj": b"v 0 0 0\nv 1 0 0\nv 2 0 0\nf 1 2 3\n", "cut.stl": b"sol
         ("yard.obj", ["--tripod", "1,1", "--speed", "3"], "--speed is 3.0: can't be given with --tripod"),
         ("yard.obj", ["--tripod", "1,1,3", "--height", "3"], "--height is 3.0: can't be given with a tripod"),
         ("yard.obj", ["--classes", "nowhere.json"], "nowhere.json: no such file"),
-        ("yard.obj", ["--classes", "{wrong}"], "there is no class 'rode' (did you mean 'road'?)"),
+        ("yard.obj", ["--classes", "{wrong}"], "objects.Floor is 'rode': must be one of ground, road,"),
         ("yard.obj", ["--classes", "{unknown}"], "unknown key 'object' (did you mean 'objects'?)"),
     ],
 )
