@@ -13,19 +13,10 @@ from ..base.schema import round_value
 from ..base.version import generator
 from ..fitting.fit import AxisFit, alignment_object
 from ..road.guidelines import LIMITS, STANDARD_CROSS_SECTIONS, design_class_of
-from ..road.parameters import (
-    EPSG_URI,
-    Carriageway,
-    CrossfallPoint,
-    Lane,
-    LineMarking,
-    Median,
-    Metadata,
-    RoadObject,
-    RoadParameters,
-    Terrain,
-    Transform,
-)
+from ..road.objects import RoadObject
+from ..road.parameters import EPSG_URI, Metadata, RoadParameters, Transform
+from ..road.section import Carriageway, CrossfallPoint, Lane, LineMarking, Median
+from ..road.surroundings import Terrain
 from ..road.things.concrete_barrier import ConcreteBarrier
 from ..road.things.delineator import Delineator
 from ..road.things.guardrail import Guardrail

@@ -10,8 +10,8 @@ from scipy.spatial.distance import cdist
 
 from ..base.arrays import Bool, Float
 from ..road.geometry import RoadGeometry
-from ..road.objects import Side, width_at
-from ..road.parameters import LineObject, RoadParameters
+from ..road.objects import LineObject, Side, width_at
+from ..road.parameters import RoadParameters
 from ..road.things.concrete_barrier import ConcreteBarrier
 from ..road.things.delineator import Delineator
 from ..road.things.guardrail import Guardrail

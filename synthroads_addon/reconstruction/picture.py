@@ -11,7 +11,7 @@ from scipy import ndimage
 from ..base.arrays import Float
 from ..road.geometry import RoadGeometry
 from ..road.objects import LineObject
-from ..road.parameters import LineMarking
+from ..road.section import LineMarking
 from ..road.things.delineator import Delineator
 from .cloud import RoadCloud
 from .profiles import Profiles

@@ -10,7 +10,7 @@ import numpy as np
 from ..base.arrays import Float
 from ..checking.checker import check
 from ..road.geometry import RoadGeometry
-from ..road.parameters import LineMarking
+from ..road.section import LineMarking
 from .cloud import PointKind, RoadCloud
 from .reconstruct import Reconstruction
 from .section import MeasuredSection, Side, SideSection, standard_section

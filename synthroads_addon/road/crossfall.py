@@ -6,7 +6,8 @@ import math
 
 from ..base.schema import round_value
 from .guidelines import LEAST_CROSSFALL_PERCENT, LIMITS, curve_crossfall_percent
-from .parameters import CrossfallPoint, HorizontalElement
+from .parameters import HorizontalElement
+from .section import CrossfallPoint
 
 LEAST_RUN_OFF = 0.1
 """Least slope (%) of the pavement's edge per metre of its distance from the rotation axis, while water could stand."""

@@ -15,8 +15,9 @@ from ..base.arrays import Float, Index, Int
 from .alignment import Alignment, Element
 from .damage import damage_depth
 from .objects import Side, width_at
-from .parameters import AlignmentObject, Carriageway, LineMarking, Median, RoadParameters, Turnout
+from .parameters import AlignmentObject, RoadParameters
 from .profile import IntersectionPoint, Profile
+from .section import Carriageway, LineMarking, Median, Turnout
 from .section_geometry import CarriagewaySection
 from .turnout_geometry import TURNOUT_STRIPS
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..base.arrays import Float
 from .geometry import RoadGeometry
-from .parameters import Arrow, Hatching, Turnout
+from .section import Arrow, Hatching, Turnout
 from .section_geometry import CarriagewaySection
 from .turnout_geometry import TurnoutShape
 

@@ -16,61 +16,11 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, Union
 from pydantic import Field, model_validator
 
 from ..base.errors import InputError
-from ..base.schema import Model, canonical_json, quantity, read_json, when
-from .objects import LineObject, ObjectT, PointObject, RoadObject, StrictFinite, WidthPoint
-from .section import (
-    Arrow,
-    Carriageway,
-    CrossfallPoint,
-    Hatching,
-    Lane,
-    LineMarking,
-    Median,
-    Pavement,
-    Pothole,
-    Ramp,
-    Rut,
-    Turnout,
-)
+from ..base.schema import Model, quantity, read_json, when
+from .objects import ObjectT, RoadObject, StrictFinite
+from .section import Arrow, Carriageway, Hatching, LineMarking, Median, Turnout
 from .surroundings import Environment, MaterialVariation, Terrain, Vegetation, Vehicle
 from .things.registry import THINGS
-
-__all__ = [
-    "DESIGN_CLASSES",
-    "EPSG_URI",
-    "SCHEMA_VERSION",
-    "AlignmentObject",
-    "AnyObject",
-    "Arrow",
-    "Carriageway",
-    "CrossfallPoint",
-    "Environment",
-    "Hatching",
-    "HorizontalElement",
-    "Lane",
-    "LineMarking",
-    "LineObject",
-    "MaterialVariation",
-    "Median",
-    "Metadata",
-    "Pavement",
-    "PointObject",
-    "Pothole",
-    "Ramp",
-    "RoadObject",
-    "RoadParameters",
-    "Rut",
-    "Terrain",
-    "Transform",
-    "Turnout",
-    "Vegetation",
-    "Vehicle",
-    "VerticalPoint",
-    "WidthPoint",
-    "parameters_schema",
-    "read_parameters",
-    "write_schema",
-]
 
 SCHEMA_VERSION: Literal["1.0"] = "1.0"
 EPSG_URI = "https://www.opengis.net/def/crs/EPSG/0/{}"
@@ -272,8 +222,3 @@ def parameters_schema() -> dict[str, Any]:
     """Return the JSON Schema (draft 2020-12) of a parameter set."""
     schema = RoadParameters.model_json_schema()
     return {"$schema": "https://json-schema.org/draft/2020-12/schema", **schema}
-
-
-def write_schema(path: Path) -> None:
-    """Write the JSON Schema in the canonical layout."""
-    path.write_text(canonical_json(parameters_schema()), encoding="utf-8")

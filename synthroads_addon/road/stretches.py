@@ -14,8 +14,10 @@ import numpy as np
 
 from ..base.arrays import Float
 from .geometry import RoadGeometry
-from .objects import RoadObject
-from .parameters import LineMarking, LineObject, PointObject, RoadParameters, Vehicle
+from .objects import LineObject, PointObject, RoadObject
+from .parameters import RoadParameters
+from .section import LineMarking
+from .surroundings import Vehicle
 from .things.temporary_barrier import TemporaryBarrier
 
 LONGEST = 500.0

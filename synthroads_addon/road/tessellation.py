@@ -7,7 +7,7 @@ import numpy as np
 from ..base.arrays import Float
 from .damage import damage_rows
 from .geometry import RoadGeometry
-from .parameters import LineMarking
+from .section import LineMarking
 from .turnout_geometry import STEP
 
 MAXIMUM_SPACING = 8.0

@@ -26,8 +26,8 @@ from ..road.guidelines import (
     TURNOUT_LANE_WIDTH,
     TURNOUT_TAPER,
 )
-from ..road.parameters import Environment, MaterialVariation, Pothole, Ramp, Rut, Terrain, Turnout, Vegetation, Vehicle
-from ..road.section import Marking
+from ..road.section import Marking, Pothole, Ramp, Rut, Turnout
+from ..road.surroundings import Environment, MaterialVariation, Terrain, Vegetation, Vehicle
 from ..road.things.guardrail import Guardrail
 from ..road.things.noise_barrier import NoiseBarrier
 from ..road.things.overpass import Overpass

@@ -11,19 +11,9 @@ import numpy as np
 from ..base.random_streams import stream
 from ..base.schema import round_value
 from ..base.version import generator
-from ..road.objects import Side
-from ..road.parameters import (
-    EPSG_URI,
-    AlignmentObject,
-    Carriageway,
-    HorizontalElement,
-    Median,
-    Metadata,
-    RoadObject,
-    RoadParameters,
-    Transform,
-    Turnout,
-)
+from ..road.objects import RoadObject, Side
+from ..road.parameters import EPSG_URI, AlignmentObject, HorizontalElement, Metadata, RoadParameters, Transform
+from ..road.section import Carriageway, Median, Turnout
 from ..scenario.road import RoadScenario
 from .alignment import HorizontalSampler, sample_profile
 from .conflicts import check_conflicts

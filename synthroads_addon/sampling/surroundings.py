@@ -13,10 +13,10 @@ from ..base.arrays import Bool, Float, Index
 from ..base.random_streams import stream
 from ..base.schema import round_value
 from ..road.guidelines import OBSTACLE_DISTANCE
-from ..road.objects import AnyWidth, Side, nominal_width, width_at, width_kinks
-from ..road.parameters import AlignmentObject, Environment, MaterialVariation, RoadObject, Terrain
+from ..road.objects import AnyWidth, RoadObject, Side, nominal_width, width_at, width_kinks
+from ..road.parameters import AlignmentObject
 from ..road.section_geometry import CarriagewaySection
-from ..road.surroundings import Vegetation, Vehicle
+from ..road.surroundings import Environment, MaterialVariation, Terrain, Vegetation, Vehicle
 from ..road.terrain import fit_to_ground, road_elevation_model
 from ..road.things.beacon import ConstructionBeacon
 from ..road.things.temporary_barrier import TemporaryBarrier

@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..road.geometry import RoadGeometry
-from ..road.parameters import Vegetation
 from ..road.surface import surface_elevation
+from ..road.surroundings import Vegetation
 from ..road.things.overpass import Overpass
 from .blocks import Block, Blocks
 from .devices.shots import shots

@@ -13,7 +13,8 @@ from ..base.schema import compact_json
 from ..road.centerline import centerline_geojson
 from ..road.geometry import RoadGeometry
 from ..road.objects import LineObject, PointObject, RoadObject
-from ..road.parameters import Arrow, Carriageway, Hatching, LineMarking, Median, RoadParameters, Turnout
+from ..road.parameters import RoadParameters
+from ..road.section import Arrow, Carriageway, Hatching, LineMarking, Median, Turnout
 from .attributes import attributes_of
 from .surfaces import dash_stations, line_points, on_ground, painted_surface, road_stations
 

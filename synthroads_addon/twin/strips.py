@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ..road.alignment import left_vectors
 from ..road.damage import damage_columns, damage_depth, damaged_strips, space_shares
 from ..road.geometry import RoadGeometry, SurfaceStrip
-from ..road.parameters import Pavement, Pothole, Rut
+from ..road.section import Pavement, Pothole, Rut
 from ..road.section_geometry import CarriagewaySection
 from .faces import Faces, Float, compact, grid_corners, join_polygons, polygons, quads
 

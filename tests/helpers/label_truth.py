@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from synthroads_addon.base.classes import class_id
 from synthroads_addon.cloud.points import PointBlock
 from synthroads_addon.road.geometry import RoadGeometry
-from synthroads_addon.road.parameters import LineMarking
+from synthroads_addon.road.section import LineMarking
 
 Float = NDArray[np.float64]
 

@@ -12,7 +12,7 @@ from synthroads_addon.blender.materials import constants, material, vary
 from synthroads_addon.jobs.generate import Job, generate
 from synthroads_addon.jobs.scan_scene import SceneScan, scan_scene
 from synthroads_addon.materials.table import materials, write_material_table
-from synthroads_addon.road.parameters import Environment, MaterialVariation
+from synthroads_addon.road.surroundings import Environment, MaterialVariation
 from synthroads_addon.scenario.scenario import Scenario
 from tools.check_calibration import checked
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from synthroads_addon.road.damage import damage_columns, damaged_strips, space_shares
-from synthroads_addon.road.parameters import Carriageway, CrossfallPoint, Lane, Pavement, Pothole
+from synthroads_addon.road.section import Carriageway, CrossfallPoint, Lane, Pavement, Pothole
 from synthroads_addon.road.section_geometry import CarriagewaySection
 
 

@@ -19,14 +19,14 @@ from synthroads_addon.road.elevation_model import Corridor, _cells_needed, read_
 from synthroads_addon.road.geometry import RoadGeometry
 from synthroads_addon.road.parameters import (
     AlignmentObject,
-    Carriageway,
     HorizontalElement,
     Metadata,
     RoadParameters,
-    Terrain,
     Transform,
     VerticalPoint,
 )
+from synthroads_addon.road.section import Carriageway
+from synthroads_addon.road.surroundings import Terrain
 from synthroads_addon.road.terrain import fit_to_ground, ground_elevation
 from synthroads_addon.sampling.surroundings import origin_on_ground
 from synthroads_addon.scenario.road import RoadScenario

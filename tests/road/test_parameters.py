@@ -21,12 +21,12 @@ from synthroads_addon.road.guidelines import (
 from synthroads_addon.road.parameters import (
     AlignmentObject,
     HorizontalElement,
-    LineMarking,
     RoadParameters,
     VerticalPoint,
     parameters_schema,
     read_parameters,
 )
+from synthroads_addon.road.section import LineMarking
 from synthroads_addon.road.tessellation import sample_stations
 from synthroads_addon.road.things.delineator import Delineator
 from synthroads_addon.road.things.guardrail import Guardrail

@@ -20,7 +20,8 @@ from synthroads_addon.dataset.recipe import RECIPES, load_recipe, scene_jobs
 from synthroads_addon.materials.table import MaterialTable
 from synthroads_addon.road.alignment import Alignment, Element, clip_offset
 from synthroads_addon.road.geometry import RoadGeometry
-from synthroads_addon.road.parameters import LineMarking, RoadParameters
+from synthroads_addon.road.parameters import RoadParameters
+from synthroads_addon.road.section import LineMarking
 from synthroads_addon.road.stretches import stretches
 from synthroads_addon.road.tessellation import sample_stations
 from synthroads_addon.road.things.sign_catalogue import SignCatalogue

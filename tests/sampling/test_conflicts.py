@@ -7,13 +7,8 @@ from hypothesis import strategies as st
 from synthroads_addon.base.errors import InputError
 from synthroads_addon.checking import checker
 from synthroads_addon.checking.rules import rule as checker_base
-from synthroads_addon.road.parameters import (
-    AlignmentObject,
-    Carriageway,
-    HorizontalElement,
-    Turnout,
-    VerticalPoint,
-)
+from synthroads_addon.road.parameters import AlignmentObject, HorizontalElement, VerticalPoint
+from synthroads_addon.road.section import Carriageway, Turnout
 from synthroads_addon.sampling.conflicts import conflicts
 from synthroads_addon.sampling.road import sample_road
 from tests.helpers.roads.sampled_parts import PAIRS, broken, changed_lane, scenario, sides

@@ -7,7 +7,8 @@ import pytest
 
 from synthroads_addon.road.geometry import RoadGeometry
 from synthroads_addon.road.objects import width_at
-from synthroads_addon.road.parameters import Arrow, Hatching, LineMarking, RoadParameters
+from synthroads_addon.road.parameters import RoadParameters
+from synthroads_addon.road.section import Arrow, Hatching, LineMarking
 from synthroads_addon.sampling.road import sample_road
 from tests.helpers.roads.sampled_parts import at, changed_lane, full_roads, sampled_roads, scenario, sides, tip
 

@@ -17,7 +17,8 @@ from synthroads_addon.road.guidelines import (
     TURNOUT_GAP,
     TURNOUT_LANE_LENGTH,
 )
-from synthroads_addon.road.parameters import Carriageway, LineMarking, Median, RoadParameters, Turnout
+from synthroads_addon.road.parameters import RoadParameters
+from synthroads_addon.road.section import Carriageway, LineMarking, Median, Turnout
 from synthroads_addon.sampling.conflicts import conflicts
 from synthroads_addon.sampling.road import sample_road
 from synthroads_addon.sampling.section import cross_section_of

@@ -17,16 +17,15 @@ from synthroads_addon.road.guidelines import OBSTACLE_DISTANCE
 from synthroads_addon.road.objects import width_at
 from synthroads_addon.road.parameters import (
     AlignmentObject,
-    Carriageway,
     HorizontalElement,
     Metadata,
     RoadParameters,
-    Terrain,
     Transform,
     VerticalPoint,
     read_parameters,
 )
-from synthroads_addon.road.surroundings import SPECIES, Vegetation, Vehicle
+from synthroads_addon.road.section import Carriageway
+from synthroads_addon.road.surroundings import SPECIES, Terrain, Vegetation, Vehicle
 from synthroads_addon.road.things.beacon import ConstructionBeacon
 from synthroads_addon.road.things.temporary_barrier import TemporaryBarrier
 from synthroads_addon.road.things.vehicles import COLORS, VEHICLE_TYPES

@@ -12,15 +12,9 @@ import numpy as np
 import pytest
 
 from synthroads_addon.base.errors import InputError, MissingFileError
-from synthroads_addon.road.parameters import (
-    AlignmentObject,
-    Carriageway,
-    HorizontalElement,
-    Ramp,
-    Terrain,
-    Turnout,
-    VerticalPoint,
-)
+from synthroads_addon.road.parameters import AlignmentObject, HorizontalElement, VerticalPoint
+from synthroads_addon.road.section import Carriageway, Ramp, Turnout
+from synthroads_addon.road.surroundings import Terrain
 from synthroads_addon.road.things.asset import Asset
 from synthroads_addon.sampling.placing.assets import sample_assets
 from synthroads_addon.sampling.placing.site import PlacementSite

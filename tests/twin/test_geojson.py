@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 from synthroads_addon.road.geometry import RoadGeometry
-from synthroads_addon.road.parameters import Carriageway, LineMarking, RoadParameters, Turnout
+from synthroads_addon.road.parameters import RoadParameters
+from synthroads_addon.road.section import Carriageway, LineMarking, Turnout
 from synthroads_addon.road.things.gantry import Gantry
 from synthroads_addon.twin.geojson import write_geojson
 from tests.helpers.roads.twin_roads import full_road, many_roads

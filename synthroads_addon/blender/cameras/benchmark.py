@@ -10,7 +10,8 @@ from typing import Any
 
 import bpy
 
-from ...road.parameters import RoadParameters, Vegetation
+from ...road.parameters import RoadParameters
+from ...road.surroundings import Vegetation
 from ...scanning.colour.request import LayerRequest
 from ...scanning.colour.views import View
 from ..compat import modifier_input, set_modifier_input

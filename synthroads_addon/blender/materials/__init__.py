@@ -11,7 +11,7 @@ import bpy
 from ...base.errors import nearest_name
 from ...materials.table import UNKNOWN, Material, materials
 from ...materials.variation import vary_material
-from ...road.parameters import Environment, MaterialVariation
+from ...road.surroundings import Environment, MaterialVariation
 from .looks import vary_color
 from .shading import shade
 

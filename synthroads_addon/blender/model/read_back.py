@@ -9,8 +9,9 @@ import bpy
 import numpy as np
 
 from ...road.geometry import sections_of
-from ...road.objects import AnyWidth, nominal_width
-from ...road.parameters import Carriageway, LineMarking, Pavement, RoadObject, RoadParameters, WidthPoint
+from ...road.objects import AnyWidth, RoadObject, WidthPoint, nominal_width
+from ...road.parameters import RoadParameters
+from ...road.section import Carriageway, LineMarking, Pavement
 from ...road.section_geometry import CarriagewaySection
 from ...road.things.guardrail import Guardrail
 from ..compat import modifier_input

@@ -9,7 +9,7 @@ import bpy
 import numpy as np
 
 from ...base.classes import class_id
-from ...road.parameters import Vehicle
+from ...road.surroundings import Vehicle
 from ...scanning.scene.mesh import SceneMesh
 from ...scanning.scene.motion import Motion, MovingMesh, ScannedScene
 from ..compat import set_modifier_input

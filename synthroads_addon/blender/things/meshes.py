@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...road.geometry import RoadGeometry
-from ...road.parameters import PointObject
+from ...road.objects import PointObject
 
 Float = NDArray[np.float64]
 

@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 
 from ...base.stepper import aside, pause, rest
 from ...road.geometry import RoadGeometry
-from ...road.parameters import PointObject, RoadObject, RoadParameters
+from ...road.objects import PointObject, RoadObject
+from ...road.parameters import RoadParameters
 from ...road.stretches import cut_stretch, frame_of
 from ...road.tessellation import sample_stations
 from ..compat import set_modifier_input

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from ...base.classes import class_id
 from ...base.stepper import aside
 from ...road.paint import arrow_outlines, hatching_outlines, pieces
-from ...road.parameters import Arrow, Hatching
+from ...road.section import Arrow, Hatching
 from ..nodes import operations as op
 from ..nodes.backbone import height_on, look_up, station_ribbon
 from ..nodes.builder import Tree, makes_group

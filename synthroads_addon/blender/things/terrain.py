@@ -10,7 +10,7 @@ from ...base.classes import class_id
 from ...base.stepper import aside
 from ...road.alignment import clip_offset
 from ...road.geometry import RoadGeometry
-from ...road.parameters import Terrain
+from ...road.surroundings import Terrain
 from ...road.terrain import GROUND_MARGIN, ground_elevation
 from ..nodes import operations as op
 from ..nodes.backbone import limit_offset, row

@@ -17,7 +17,9 @@ from ...base.files import PRESETS
 from ...base.schema import read_json
 from ...materials.table import materials
 from ...road.geometry import RoadGeometry
-from ...road.parameters import AlignmentObject, Carriageway, Environment, RoadParameters
+from ...road.parameters import AlignmentObject, RoadParameters
+from ...road.section import Carriageway
+from ...road.surroundings import Environment
 from ...sampling.road import sample_road
 from ...scanning.scene.mesh import SceneMesh
 from ...scenario.road import RoadScenario

@@ -9,7 +9,7 @@ import numpy as np
 from mathutils import Vector
 from numpy.typing import ArrayLike
 
-from ...road.parameters import Environment
+from ...road.surroundings import Environment
 from ..sky import fill_sky, new_sun
 
 SUN = "SR Sun"

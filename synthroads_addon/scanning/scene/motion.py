@@ -12,7 +12,7 @@ from ...base.errors import InputError
 from ...road.alignment import finite_array
 from ...road.geometry import RoadGeometry
 from ...road.lane_lines import LaneLine, lane_of
-from ...road.parameters import Vehicle
+from ...road.surroundings import Vehicle
 from ...road.things.vehicles import CHASSIS, VEHICLE_TYPES
 from .mesh import SceneMesh
 from .passes import VehiclePasses, lane_passes

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ...road.geometry import RoadGeometry
-from ...road.parameters import PointObject
+from ...road.objects import PointObject
 from ...road.surface import highest_pavement
 from ...road.things.beacon import BEACON_BLADE, BEACON_BLADE_BOTTOM, BEACON_FOOT, ConstructionBeacon
 from ...road.things.cabinet import Cabinet

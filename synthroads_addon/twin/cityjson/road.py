@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...road.geometry import RoadGeometry
-from ...road.parameters import Arrow, Carriageway, Hatching, LineMarking, Median, RoadObject, Turnout
+from ...road.objects import RoadObject
+from ...road.section import Arrow, Carriageway, Hatching, LineMarking, Median, Turnout
 from ..attributes import attributes_of
 from ..faces import Faces, Int, join_polygons
 from ..strips import StripSurface, strip_surfaces

@@ -9,7 +9,8 @@ import numpy as np
 
 from ...road.geometry import RoadGeometry
 from ...road.objects import LineObject, PointObject
-from ...road.parameters import Arrow, RoadParameters
+from ...road.parameters import RoadParameters
+from ...road.section import Arrow
 from ...road.things.asset import Asset
 from ...road.things.overpass import Overpass
 from ..attributes import attributes_of

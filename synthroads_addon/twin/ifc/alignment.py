@@ -15,8 +15,8 @@ import numpy as np
 
 from ...road.alignment import Alignment
 from ...road.geometry import RoadGeometry
-from ...road.parameters import Carriageway
 from ...road.profile import Profile
+from ...road.section import Carriageway
 from .entities import Entity, Float, IfcFile, short
 
 _HORIZONTAL = {"line": "LINE", "arc": "CIRCULARARC", "clothoid": "CLOTHOID"}

@@ -10,7 +10,7 @@ import math
 from collections.abc import Callable
 from typing import Any
 
-from ...road.parameters import PointObject
+from ...road.objects import PointObject
 from ...road.things.asset import Asset
 from ...road.things.beacon import BEACON_BLADE, BEACON_BLADE_BOTTOM, BEACON_FOOT, ConstructionBeacon
 from ...road.things.cabinet import Cabinet

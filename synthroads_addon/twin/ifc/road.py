@@ -19,7 +19,8 @@ from ...road.damage import damage_columns, damage_depth, damaged_strips
 from ...road.geometry import SurfaceStrip
 from ...road.guidelines import LIMITS
 from ...road.objects import AnyWidth
-from ...road.parameters import Arrow, Carriageway, Hatching, LineMarking, Median, Pothole, RoadParameters, Rut, Turnout
+from ...road.parameters import RoadParameters
+from ...road.section import Arrow, Carriageway, Hatching, LineMarking, Median, Pothole, Rut, Turnout
 from ...road.section_geometry import CarriagewaySection
 from ...road.turnout_geometry import TURNOUT_STRIPS, TurnoutShape
 from ..faces import Faces

@@ -8,7 +8,7 @@ import numpy as np
 
 from ...road.alignment import clip_offset
 from ...road.lane_lines import lane_of
-from ...road.parameters import Terrain, Vegetation, Vehicle
+from ...road.surroundings import Terrain, Vegetation, Vehicle
 from ...road.things.vehicles import CHASSIS, VEHICLE_TYPES
 from .entities import Entity
 from .scene import Scene, grid_triangles

@@ -13,7 +13,8 @@ from typing import Literal
 from ...base.crs import wkt
 from ...base.errors import InputError
 from ...road.geometry import RoadGeometry
-from ...road.parameters import PointObject, RoadParameters
+from ...road.objects import PointObject
+from ...road.parameters import RoadParameters
 from ..surfaces import road_stations
 from .alignment import write_alignment
 from .barriers import write_barriers

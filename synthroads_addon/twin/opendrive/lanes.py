@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ...road.objects import Side
-from ...road.parameters import Lane
+from ...road.section import Lane
 from .marks import RoadMarks
 from .pieces import Float, chords, cubics, distinct, runs
 from .sections import LanePlan, LaneSection, LaneStrip

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from ...road.geometry import RoadGeometry
 from ...road.objects import Side
-from ...road.parameters import LineMarking
+from ...road.section import LineMarking
 from .pieces import CLOSE
 from .sections import LanePlan, LaneSection
 from .xml import Element, element, notes

@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from ...road.objects import LineObject, PointObject
+from ...road.objects import LineObject, PointObject, RoadObject
 from ...road.paint import arrow_outlines, hatching_outlines
-from ...road.parameters import Arrow, Hatching, LineMarking, RoadObject
+from ...road.section import Arrow, Hatching, LineMarking
 from ...road.things.asset import Asset
 from ...road.things.beacon import ConstructionBeacon
 from ...road.things.cabinet import Cabinet

@@ -8,8 +8,8 @@ import numpy as np
 
 from ...base.errors import InputError
 from ...road.geometry import RoadGeometry
-from ...road.objects import RoadObject, Side
-from ...road.parameters import Carriageway, Hatching, LineObject, PointObject, Turnout
+from ...road.objects import LineObject, PointObject, RoadObject, Side
+from ...road.section import Carriageway, Hatching, Turnout
 from ...road.surface import highest_pavement, known_elevation
 from ...road.things.gantry import GantrySign
 from ..surfaces import height_share, ramp_length

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ...road.objects import Side
-from ...road.parameters import Median
+from ...road.section import Median
 from ...road.turnout_geometry import TURNOUT_STRIPS, TurnoutShape
 from .pieces import CLOSE, Cubics, Float, cubics
 from .surface import RoadFrame

@@ -9,7 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from ...road.parameters import PointObject, RoadParameters
+from ...road.objects import PointObject
+from ...road.parameters import RoadParameters
 from ...road.things.gantry import Gantry, GantrySign
 from ...road.things.kilometre_board import KilometreBoard
 from ...road.things.sign import TrafficSign

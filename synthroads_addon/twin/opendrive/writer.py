@@ -12,9 +12,9 @@ from pathlib import Path
 
 from ...base.crs import wkt
 from ...road.geometry import RoadGeometry
-from ...road.parameters import AlignmentObject, LineMarking, RoadParameters, Turnout, Vehicle
-from ...road.section import Carriageway, Median
-from ...road.surroundings import Terrain, Vegetation
+from ...road.parameters import AlignmentObject, RoadParameters
+from ...road.section import Carriageway, LineMarking, Median, Turnout
+from ...road.surroundings import Terrain, Vegetation, Vehicle
 from .lanes import lanes
 from .marks import RoadMarks
 from .numbers import Numbers

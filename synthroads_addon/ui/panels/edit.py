@@ -15,7 +15,8 @@ from ...blender.compat import shown_input
 from ...blender.model.read_back import carried_inputs
 from ...blender.model.store import PARAMETERS, find_road, objects_of, recall_parameters
 from ...blender.things.model_builder import ROLE, SUPPORT
-from ...road.parameters import RoadParameters, Vegetation
+from ...road.parameters import RoadParameters
+from ...road.surroundings import Vegetation
 from ..fields.drawing import value_row
 from ..fields.wording import title_case
 from ..work.common import Sidebar, column

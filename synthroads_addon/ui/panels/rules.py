@@ -15,7 +15,8 @@ from ...blender.model.store import find_road, objects_of, recall_parameters
 from ...blender.things.model_builder import ROLE
 from ...checking.checker import RULES, Violation, check
 from ...road.geometry import RoadGeometry
-from ...road.parameters import Carriageway, LineMarking, RoadParameters
+from ...road.parameters import RoadParameters
+from ...road.section import Carriageway, LineMarking
 from ..work.common import Sidebar, has_road, redraw_sidebars, refusing, right_label
 from ..work.view import Marker, look_at_place, redraw_views, view_of
 

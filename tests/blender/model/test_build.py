@@ -20,7 +20,9 @@ from synthroads_addon.blender.compat import modifier_input, set_modifier_input
 from synthroads_addon.blender.model.build import COLLECTION, RoadModel, build_road, remove_road
 from synthroads_addon.blender.scene.evaluated import scene_mesh
 from synthroads_addon.road.geometry import RoadGeometry
-from synthroads_addon.road.parameters import Carriageway, LineMarking, RoadParameters, Vegetation
+from synthroads_addon.road.parameters import RoadParameters
+from synthroads_addon.road.section import Carriageway, LineMarking
+from synthroads_addon.road.surroundings import Vegetation
 from synthroads_addon.road.terrain import ground_elevation
 from synthroads_addon.road.tessellation import sample_stations
 from synthroads_addon.road.things.delineator import Delineator

@@ -19,7 +19,8 @@ from synthroads_addon.blender.model.read_back import edited_parameters
 from synthroads_addon.blender.scene.evaluated import scene_mesh
 from synthroads_addon.road.geometry import RoadGeometry
 from synthroads_addon.road.guidelines import SECTIONS_OF_CLASS
-from synthroads_addon.road.parameters import Carriageway, LineMarking, RoadParameters, Turnout
+from synthroads_addon.road.parameters import RoadParameters
+from synthroads_addon.road.section import Carriageway, LineMarking, Turnout
 from synthroads_addon.road.stretches import FRAME, stretches
 from synthroads_addon.road.things.guardrail import Guardrail
 from synthroads_addon.road.turnout_geometry import STEP

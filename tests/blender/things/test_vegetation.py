@@ -16,8 +16,7 @@ from synthroads_addon.blender.things.vegetation import shrub, tree
 from synthroads_addon.blender.things.vegetation.build import species_shapes
 from synthroads_addon.blender.things.vegetation.grass import tuft_group
 from synthroads_addon.materials.table import materials
-from synthroads_addon.road.parameters import Vegetation
-from synthroads_addon.road.surroundings import SPECIES
+from synthroads_addon.road.surroundings import SPECIES, Vegetation
 from synthroads_addon.scanning.scene.mesh import SceneMesh
 from tests.helpers.scenes.furnished_road import Data, Float, FurnishedRoad, normals, of_material, pieces
 

@@ -14,7 +14,8 @@ from synthroads_addon.blender.scene.evaluated import scene_mesh
 from synthroads_addon.blender.things.vehicle.models import model_group
 from synthroads_addon.blender.things.vehicle.vehicle import MATERIALS
 from synthroads_addon.materials.table import materials
-from synthroads_addon.road.parameters import Carriageway, Vehicle
+from synthroads_addon.road.section import Carriageway
+from synthroads_addon.road.surroundings import Vehicle
 from synthroads_addon.road.tessellation import sample_stations
 from synthroads_addon.road.things.vehicles import CHASSIS, COLORS, VEHICLE_TYPES
 from synthroads_addon.scanning.scene.mesh import SceneMesh

@@ -11,7 +11,9 @@ from synthroads_addon.base.classes import class_id
 from synthroads_addon.cloud.formats.registry import open_writer
 from synthroads_addon.cloud.points import PointBlock
 from synthroads_addon.road.geometry import RoadGeometry
-from synthroads_addon.road.parameters import LineMarking, LineObject, RoadParameters
+from synthroads_addon.road.objects import LineObject
+from synthroads_addon.road.parameters import RoadParameters
+from synthroads_addon.road.section import LineMarking
 from synthroads_addon.road.things.concrete_barrier import ConcreteBarrier
 from synthroads_addon.road.things.delineator import Delineator
 from synthroads_addon.road.things.guardrail import Guardrail

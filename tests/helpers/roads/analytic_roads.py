@@ -12,7 +12,8 @@ from ml.data.points import Points
 from ml.data.roads import LearningRoad
 from synthroads_addon.base.classes import class_scheme
 from synthroads_addon.road.geometry import RoadGeometry
-from synthroads_addon.road.parameters import LineMarking, RoadParameters
+from synthroads_addon.road.parameters import RoadParameters
+from synthroads_addon.road.section import LineMarking
 from synthroads_addon.sampling.road import sample_road
 from synthroads_addon.scenario.road import RoadScenario
 

@@ -14,8 +14,8 @@ from pydantic.fields import FieldInfo
 
 from synthroads_addon.base.schema import Model
 from synthroads_addon.road.objects import WidthPoint
-from synthroads_addon.road.parameters import AnyObject, Environment, MaterialVariation, Metadata, Transform
-from synthroads_addon.road.surroundings import SPECIES
+from synthroads_addon.road.parameters import AnyObject, Metadata, Transform
+from synthroads_addon.road.surroundings import SPECIES, Environment, MaterialVariation
 
 OBJECTS = {kind.model_fields["type"].default: kind for kind in get_args(get_args(AnyObject)[0])}
 """Type of object -> its class."""

@@ -11,7 +11,8 @@ from synthroads_addon.checking.rules import markings as checker_markings
 from synthroads_addon.checking.rules import section as checker_section
 from synthroads_addon.checking.rules import turnouts as checker_turnout
 from synthroads_addon.road.guidelines import SECTIONS_OF_CLASS
-from synthroads_addon.road.parameters import Carriageway, RoadParameters, Turnout
+from synthroads_addon.road.parameters import RoadParameters
+from synthroads_addon.road.section import Carriageway, Turnout
 from synthroads_addon.sampling.road import sample_road
 from synthroads_addon.scenario.road import RoadScenario
 

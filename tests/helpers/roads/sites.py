@@ -12,19 +12,16 @@ from synthroads_addon.checking.rules import signs as checker_signs
 from synthroads_addon.checking.rules import traffic as checker_traffic
 from synthroads_addon.checking.rules.rule import Violation
 from synthroads_addon.road.guidelines import STANDARD_CROSS_SECTIONS, StandardCrossSection
-from synthroads_addon.road.objects import LineObject
+from synthroads_addon.road.objects import LineObject, RoadObject
 from synthroads_addon.road.parameters import (
     AlignmentObject,
-    Carriageway,
     HorizontalElement,
-    Median,
     Metadata,
-    RoadObject,
     RoadParameters,
     Transform,
     VerticalPoint,
 )
-from synthroads_addon.road.section import CrossfallPoint, Lane, Ramp, Turnout
+from synthroads_addon.road.section import Carriageway, CrossfallPoint, Lane, Median, Ramp, Turnout
 from synthroads_addon.road.surroundings import Terrain
 from synthroads_addon.sampling.placing.furniture import place_furniture
 from synthroads_addon.sampling.placing.site import PlacementSite

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from synthroads_addon.road.parameters import PointObject
+from synthroads_addon.road.objects import PointObject
 from tests.helpers.scenes.furnished_road import Float, FurnishedRoad
 
 

@@ -16,7 +16,9 @@ from synthroads_addon.blender.scene.evaluated import scene_mesh
 from synthroads_addon.jobs.generate import Job, generate
 from synthroads_addon.jobs.scan.plan import Site
 from synthroads_addon.road.geometry import RoadGeometry
-from synthroads_addon.road.parameters import LineMarking, RoadParameters, Vegetation
+from synthroads_addon.road.parameters import RoadParameters
+from synthroads_addon.road.section import LineMarking
+from synthroads_addon.road.surroundings import Vegetation
 from synthroads_addon.road.things.concrete_barrier import ConcreteBarrier
 from synthroads_addon.road.things.guardrail import Guardrail
 from synthroads_addon.road.things.noise_barrier import NoiseBarrier

@@ -21,7 +21,8 @@ from synthroads_addon.cloud.points import PointBlock, concatenate
 from synthroads_addon.jobs.scan.plan import plan_scan
 from synthroads_addon.road import stretches as stretch
 from synthroads_addon.road.geometry import RoadGeometry
-from synthroads_addon.road.parameters import RoadParameters, Vehicle
+from synthroads_addon.road.parameters import RoadParameters
+from synthroads_addon.road.surroundings import Vehicle
 from synthroads_addon.road.things.vehicles import CHASSIS, VEHICLE_TYPES
 from synthroads_addon.scanning.platforms.path import Strip
 from synthroads_addon.scanning.record import scan_blocks

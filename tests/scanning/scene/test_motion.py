@@ -14,7 +14,9 @@ from numpy.typing import NDArray
 from synthroads_addon.base.errors import InputError
 from synthroads_addon.road.geometry import RoadGeometry
 from synthroads_addon.road.lane_lines import LaneLine
-from synthroads_addon.road.parameters import Carriageway, RoadParameters, Vehicle
+from synthroads_addon.road.parameters import RoadParameters
+from synthroads_addon.road.section import Carriageway
+from synthroads_addon.road.surroundings import Vehicle
 from synthroads_addon.road.things.vehicles import CHASSIS, VEHICLE_GAP, VEHICLE_LANE_WIDTH, VEHICLE_TYPES
 from synthroads_addon.sampling.road import sample_road
 from synthroads_addon.scanning.scene.motion import LaneMotion, LinearMotion, lane_motions

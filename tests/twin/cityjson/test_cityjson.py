@@ -13,7 +13,9 @@ import pytest
 
 from synthroads_addon.base.classes import classes
 from synthroads_addon.road.geometry import RoadGeometry
-from synthroads_addon.road.parameters import Carriageway, LineMarking, RoadParameters, Terrain, Vegetation, Vehicle
+from synthroads_addon.road.parameters import RoadParameters
+from synthroads_addon.road.section import Carriageway, LineMarking
+from synthroads_addon.road.surroundings import Terrain, Vegetation, Vehicle
 from synthroads_addon.road.things.overpass import Overpass
 from synthroads_addon.road.turnout_geometry import STEP
 from synthroads_addon.twin.cityjson.writer import write_cityjson

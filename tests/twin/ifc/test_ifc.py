@@ -19,19 +19,11 @@ from synthroads_addon.base.schema import unit_of
 from synthroads_addon.road.alignment import Alignment, Element
 from synthroads_addon.road.geometry import RoadGeometry
 from synthroads_addon.road.lane_lines import lane_of
-from synthroads_addon.road.objects import width_at
-from synthroads_addon.road.parameters import (
-    AlignmentObject,
-    Carriageway,
-    HorizontalElement,
-    LineMarking,
-    LineObject,
-    PointObject,
-    RoadParameters,
-    Turnout,
-    Vehicle,
-)
+from synthroads_addon.road.objects import LineObject, PointObject, width_at
+from synthroads_addon.road.parameters import AlignmentObject, HorizontalElement, RoadParameters
+from synthroads_addon.road.section import Carriageway, LineMarking, Turnout
 from synthroads_addon.road.surface import surface_elevation
+from synthroads_addon.road.surroundings import Vehicle
 from synthroads_addon.road.things.concrete_barrier import ConcreteBarrier
 from synthroads_addon.road.things.gantry import Gantry
 from synthroads_addon.road.things.guardrail import Guardrail

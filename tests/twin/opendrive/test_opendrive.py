@@ -17,7 +17,9 @@ from synthroads_addon.base.errors import InputError
 from synthroads_addon.road.geometry import RoadGeometry
 from synthroads_addon.road.objects import LineObject, PointObject
 from synthroads_addon.road.paint import arrow_outlines, hatching_outlines
-from synthroads_addon.road.parameters import LineMarking, RoadParameters, Turnout, Vehicle
+from synthroads_addon.road.parameters import RoadParameters
+from synthroads_addon.road.section import LineMarking, Turnout
+from synthroads_addon.road.surroundings import Vehicle
 from synthroads_addon.road.things.beacon import ConstructionBeacon
 from synthroads_addon.road.things.gantry import Gantry
 from synthroads_addon.road.things.guardrail import Guardrail

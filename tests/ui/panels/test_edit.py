@@ -15,7 +15,7 @@ from synthroads_addon.blender.model.read_back import edited_parameters
 from synthroads_addon.blender.model.store import find_road, objects_of, recall_parameters
 from synthroads_addon.blender.scene.evaluated import scene_mesh
 from synthroads_addon.road.geometry import RoadGeometry
-from synthroads_addon.road.parameters import LineMarking
+from synthroads_addon.road.section import LineMarking
 from synthroads_addon.scanning.scene.mesh import SceneMesh
 from synthroads_addon.ui.panels import edit
 from tests.helpers.scenes.fake_layout import drawn

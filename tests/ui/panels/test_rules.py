@@ -16,7 +16,7 @@ from synthroads_addon.blender.model.store import find_road, objects_of, recall_p
 from synthroads_addon.blender.things.model_builder import ROLE
 from synthroads_addon.checking.checker import RULES, check
 from synthroads_addon.road.geometry import RoadGeometry
-from synthroads_addon.road.parameters import Carriageway
+from synthroads_addon.road.section import Carriageway
 from synthroads_addon.ui.panels import rules
 from tests.helpers.scenes.fake_layout import drawn
 

@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from ....road.damage import damage_columns, damage_depth, damaged_strips
 from ....road.geometry import RoadGeometry, sections_of
 from ....road.objects import AnyWidth, nominal_width, width_at
-from ....road.parameters import Carriageway, LineMarking, Median, RoadParameters, Turnout
+from ....road.parameters import RoadParameters
+from ....road.section import Carriageway, LineMarking, Median, Turnout
 from ....road.section_geometry import CarriagewaySection
 from ....road.stretches import BEYOND
 from ....road.turnout_geometry import TURNOUT_STRIPS

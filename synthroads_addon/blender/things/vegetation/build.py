@@ -8,7 +8,7 @@ from typing import Any
 
 from ....base.files import PRESETS
 from ....base.schema import read_json
-from ....road.parameters import Vegetation
+from ....road.surroundings import Vegetation
 from ..model_builder import ModelBuilder
 from .grass import grass_group
 from .shrub import shrub_group

@@ -7,7 +7,8 @@ import numpy as np
 
 from ....base.classes import class_id
 from ....road.lane_lines import LaneLine, lane_of
-from ....road.parameters import PointObject, Vehicle
+from ....road.objects import PointObject
+from ....road.surroundings import Vehicle
 from ....road.things.vehicles import CHASSIS
 from ...materials.looks import COLOR
 from ...nodes import operations as op
