@@ -15,7 +15,7 @@ NOX = $(RUNNER)/bin/python -m nox
 
 .DEFAULT_GOAL := help
 .NOTPARALLEL:
-.PHONY: help demo test test-slow lint judges docs extension clean distclean
+.PHONY: help demo test test-slow fuzz lint judges docs extension clean distclean
 
 help: ## say what there is
 	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/  make \1|\2/p' $(MAKEFILE_LIST) | awk -F'|' '{ printf "%-18s %s\n", $$1, $$2 }'
@@ -29,6 +29,9 @@ test: $(RUNNER)/made ## check the source and run the tests on both Blender LTS r
 
 test-slow: $(RUNNER)/made ## the tests that take long, and the documentation's own
 	@TEST_MARKERS=slow $(NOX) -s tests docs summary
+
+fuzz: $(RUNNER)/made ## tens of thousands of files made wrong by chance (SEED=N: others than usual)
+	@TEST_MARKERS=fuzz FUZZ_SEED=$(SEED) $(NOX) -s tests summary
 
 lint docs judges: $(RUNNER)/made
 	@$(NOX) -s $@

@@ -33,6 +33,9 @@ PARTS = {"blender": [*BLENDER_TESTS], "others": ["tests", *(f"--ignore={folder}"
 ONLY = {("3.13", "blender"): "smoke or not any_blender", ("3.13", "others"): "smoke"}
 """Marker expressions by Python and part, where not all of a part's tests are run on that Python."""
 
+QUICK = "not slow and not fuzz"
+"""Marker expression of the tests of `make test`."""
+
 nox.needs_version = ">=2026.10"
 nox.options.sessions = ["lint", "tests", "summary"]
 nox.options.reuse_venv = "yes"
@@ -137,7 +140,7 @@ def tests(session: nox.Session) -> None:
     version = str(session.python)
     outcomes[version] = "FAILED, the environment could not be made"
     install(session, session.name)
-    markers = os.environ.get("TEST_MARKERS") or "not slow"
+    markers = os.environ.get("TEST_MARKERS") or QUICK
     # Without a limit on restarts a worker that crashes can leave the others waiting for ever.
     workers = ["-n", os.environ.get("TEST_WORKERS") or "2", "--dist", "loadfile", "--max-worker-restart", "0"]
     # The processes share the cores already; spinning threads of linear algebra would only slow each other down.
@@ -149,7 +152,7 @@ def tests(session: nox.Session) -> None:
             codes.append(0)
         except CommandFailed as failure:
             codes.append(failure.return_code or 1)
-    good = passed(codes, everything=markers == "not slow" and not session.posargs)
+    good = passed(codes, everything=markers == QUICK and not session.posargs)
     outcomes[version] = f"{'passed' if good else 'FAILED'}, {time.perf_counter() - start:.0f} s"
     if not good:
         raise CommandFailed(f"pytest ended with {codes}")

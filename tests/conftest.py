@@ -31,7 +31,8 @@ BLENDER_FOLDER = Path(tempfile.mkdtemp(prefix="synthroads-blender-"))
 os.environ["BLENDER_USER_RESOURCES"] = str(BLENDER_FOLDER)
 
 HAS_TORCH = importlib.util.find_spec("torch") is not None
-collect_ignore = [*(() if HAS_BPY else BLENDER_TESTS), *(() if HAS_TORCH else ("ml",))]
+LEARNING = ("ml", "fuzz/test_configurations.py", "fuzz/test_learning_data.py")
+collect_ignore = [*(() if HAS_BPY else BLENDER_TESTS), *(() if HAS_TORCH else LEARNING)]
 
 # The same examples in every run, and no time limit for one: the machine may be busy with something else.
 hypothesis.settings.register_profile("synthroads", deadline=None, derandomize=True)

@@ -12,7 +12,7 @@ import pytest
 
 from synthroads_addon.base.errors import InputError
 from synthroads_addon.blender.scene.foreign import open_scene
-from tests.robustness.test_broken_files import mesh_file
+from tests.fuzz.test_bytes import mesh_file
 
 PEAK_MB = 1500
 SECONDS = 20
@@ -24,8 +24,9 @@ def export(path: Path) -> bytes:
     bpy.context.object.data.materials.append(bpy.data.materials.new("M"))
     if path.suffix == ".blend":
         bpy.ops.wm.save_as_mainfile(filepath=str(path), copy=True, compress=False)
-    elif path.suffix == ".glb":
-        bpy.ops.export_scene.gltf(filepath=str(path))
+    elif path.suffix in (".glb", ".gltf"):
+        kind = "GLB" if path.suffix == ".glb" else "GLTF_SEPARATE"
+        bpy.ops.export_scene.gltf(filepath=str(path), export_format=kind)
     else:
         names = {".obj": "obj_export", ".ply": "ply_export", ".stl": "stl_export", ".usdc": "usd_export"}
         getattr(bpy.ops.wm, names[path.suffix])(filepath=str(path))
@@ -77,12 +78,13 @@ def broken(data: bytes, rng: np.random.Generator) -> bytes:
         (".glb", 3),
         (".ply", 3),
         (".stl", 3),
-        pytest.param(".glb", 300, marks=pytest.mark.slow),
-        pytest.param(".ply", 300, marks=pytest.mark.slow),
-        pytest.param(".stl", 300, marks=pytest.mark.slow),
-        pytest.param(".obj", 200, marks=pytest.mark.slow),
-        pytest.param(".blend", 200, marks=pytest.mark.slow),
-        pytest.param(".usdc", 40, marks=pytest.mark.slow),
+        pytest.param(".glb", 300, marks=pytest.mark.fuzz),
+        pytest.param(".ply", 300, marks=pytest.mark.fuzz),
+        pytest.param(".stl", 300, marks=pytest.mark.fuzz),
+        pytest.param(".gltf", 300, marks=pytest.mark.fuzz),
+        pytest.param(".obj", 200, marks=pytest.mark.fuzz),
+        pytest.param(".blend", 200, marks=pytest.mark.fuzz),
+        pytest.param(".usdc", 40, marks=pytest.mark.fuzz),
     ],
 )
 def test_scenes(tmp_path: Path, ending: str, count: int) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import resource
 import signal
 import time
@@ -11,14 +12,15 @@ from contextlib import contextmanager
 from typing import Any
 
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import HealthCheck, given, seed, settings
 from hypothesis import strategies as st
 
 from synthroads_addon.base.errors import SynthRoadsError
 
 LONGEST = 10.0
 """Seconds of the processor that a reader may take for one file of a few kilobytes."""
-_ROOM = 6 << 30  # bytes of address space that a reader may take beyond what is taken already
+FUZZ_SEED = os.environ.get("FUZZ_SEED") or None
+_ROOM = 4 << 30  # bytes of address space that a reader may take beyond what is taken already
 
 Part = dict[str, Any] | list[Any]
 
@@ -102,22 +104,27 @@ def accepted(action: Callable[[], object]) -> bool:
     return True
 
 
-def cases(fast: int, slow: int) -> pytest.MarkDecorator:
-    """Return the mark that runs a test with an argument ``count`` on few cases, and as a slow test on many."""
-    many = pytest.param(slow, id="many", marks=pytest.mark.slow)
-    return pytest.mark.parametrize("count", [pytest.param(fast, id="few"), many])
+def cases(few: int, many: int, mark: pytest.MarkDecorator = pytest.mark.slow) -> pytest.MarkDecorator:
+    """Return the mark that runs a test with an argument ``count`` on few cases, and under another mark on many."""
+    many = pytest.param(many, id="many", marks=mark)
+    return pytest.mark.parametrize("count", [pytest.param(few, id="few"), many])
+
+
+def fuzz(few: int, many: int) -> pytest.MarkDecorator:
+    """Return the mark that runs a test with an argument ``count`` on few cases, and by `make fuzz` on many."""
+    return cases(few, many, pytest.mark.fuzz)
 
 
 def for_all(strategy: st.SearchStrategy[Any], count: int, body: Callable[[Any], object]) -> None:
-    """Run a body on a number of cases."""
+    """Run a body on a number of cases, the same in every run unless the environment has another FUZZ_SEED."""
     health = [HealthCheck.too_slow, HealthCheck.data_too_large, HealthCheck.large_base_example]
 
-    @settings(max_examples=count, suppress_health_check=health, database=None)
+    @settings(max_examples=count, suppress_health_check=health, database=None, derandomize=FUZZ_SEED is None)
     @given(strategy)
     def run(case: Any) -> None:
         body(case)
 
-    run()
+    (run if FUZZ_SEED is None else seed(int(FUZZ_SEED))(run))()
 
 
 # --- values ---------------------------------------------------------------------------------------------------------

@@ -1,6 +1,6 @@
 """Files made wrong by chance: each reader takes or refuses them in one line; nothing hangs, nothing else comes out.
 
-Few cases run with the fast tests, thousands with the slow ones. What was found once stands at the end as a test of its
+Few cases run with the fast tests, thousands by `make fuzz`. What was found once stands at the end as a test of its
 own.
 """
 
@@ -36,7 +36,7 @@ from synthroads_addon.scanning.platforms.registry import make_platform
 from synthroads_addon.scenario.assets import LIBRARIES, read_asset_library
 from synthroads_addon.scenario.road import RoadScenario
 from synthroads_addon.scenario.scenario import Scenario, apply_change, load_scenario, parsed_change
-from tests.helpers.files.mutations import accepted, cases, damaged, for_all, json_files, wrong_values, yaml_files
+from tests.helpers.files.mutations import accepted, damaged, for_all, fuzz, json_files, wrong_values, yaml_files
 from tests.helpers.roads.checker_full_road import full
 
 ROOT = Path(__file__).parents[2]
@@ -96,7 +96,7 @@ def use_road(path: Path) -> None:
     assert again == parameters
 
 
-@cases(40, 5000)
+@fuzz(40, 5000)
 def test_roads(put: Put, count: int) -> None:
     for_all(json_files([full(), read_json(PRESETS / "classes.json")]), count, put("road.json", use_road))
 
@@ -110,13 +110,13 @@ def use_scenario(path: Path) -> None:
     assert Scenario.from_dict(json.loads(scenario.to_json())) == scenario
 
 
-@cases(40, 4000)
+@fuzz(40, 4000)
 def test_scenarios(put: Put, count: int) -> None:
     documents = [*every("scenarios/*.json"), Scenario().to_dict()]
     for_all(json_files(documents), count, put("scenario.json", use_scenario))
 
 
-@cases(10, 1000)
+@fuzz(10, 1000)
 def test_roads_sampled_from_scenarios(count: int) -> None:
     """Limits that pass the checks are sampled, or refused because they contradict each other."""
     documents = [
@@ -141,12 +141,12 @@ def use_device(path: Path) -> None:
     assert setting.angle_step > 0.0
 
 
-@cases(40, 3000)
+@fuzz(40, 3000)
 def test_devices(put: Put, count: int) -> None:
     for_all(json_files(every("devices/*.json")), count, put("device.json", use_device))
 
 
-@cases(20, 3000)
+@fuzz(20, 3000)
 def test_recipes(put: Put, count: int) -> None:
     small = {"title": "t", "set": {"fidelity": "draft", "road.length": 40}, "layouts": ["pointcept"], "tile": 30.0}
     small["groups"] = [
@@ -156,14 +156,14 @@ def test_recipes(put: Put, count: int) -> None:
     for_all(yaml_files(documents), count, put("recipe.yaml", lambda path: scene_jobs(load_recipe(str(path)))))
 
 
-@cases(20, 1500)
+@fuzz(20, 1500)
 def test_axes_in_csv(put: Put, count: int) -> None:
     road = RoadScenario()
     files = [text.encode() for text in AXES]
     for_all(damaged(files), count, put("axis.csv", lambda path: fitted_axis(path, road)))
 
 
-@cases(20, 1500)
+@fuzz(20, 1500)
 def test_axes_in_geojson(put: Put, count: int) -> None:
     road = RoadScenario()
     for_all(json_files(LINES), count, put("axis.geojson", lambda path: fitted_axis(path, road)))
@@ -177,12 +177,12 @@ def use_trajectory(path: Path) -> None:
         assert np.isfinite(place).all()
 
 
-@cases(20, 1500)
+@fuzz(20, 1500)
 def test_trajectories(put: Put, count: int) -> None:
     for_all(damaged([TRAJECTORY.encode()]), count, put("trajectory.csv", use_trajectory))
 
 
-@cases(10, 1000)
+@fuzz(10, 1000)
 def test_asset_libraries(put: Put, tmp_path: Path, count: int) -> None:
     documents = every("assets/*/library.json")
     body = put("library.json", lambda path: read_asset_library(str(path)))
@@ -191,13 +191,13 @@ def test_asset_libraries(put: Put, tmp_path: Path, count: int) -> None:
     for_all(json_files(documents), count, body)
 
 
-@cases(10, 1000)
+@fuzz(10, 1000)
 def test_material_tables(put: Put, count: int) -> None:
     documents = [read_json(PRESETS / "materials.json"), *every("material_tables/*.json")]
     for_all(json_files(documents), count, put("materials.json", read_material_table))
 
 
-@cases(10, 1000)
+@fuzz(10, 1000)
 def test_tables_of_classes(put: Put, count: int) -> None:
     documents = [read_json(PRESETS / "classes_5.json"), {"objects": {"Pillar*": "pole"}, "materials": {"Tar": "road"}}]
 
@@ -209,7 +209,7 @@ def test_tables_of_classes(put: Put, count: int) -> None:
     for_all(json_files(documents), count, put("classes.json", use))
 
 
-@cases(10, 500)
+@fuzz(10, 500)
 def test_catalogues_of_signs(put: Put, count: int) -> None:
     documents = [read_json(PRESETS / "signs.json")]
     for_all(
@@ -217,7 +217,7 @@ def test_catalogues_of_signs(put: Put, count: int) -> None:
     )
 
 
-@cases(10, 1000)
+@fuzz(10, 1000)
 def test_manifests(put: Put, count: int) -> None:
     def use(path: Path) -> None:
         faults(path.parent, read_manifest(path.parent).scenes)
@@ -225,12 +225,12 @@ def test_manifests(put: Put, count: int) -> None:
     for_all(json_files([MANIFEST]), count, put("manifest.json", use))
 
 
-@cases(10, 1000)
+@fuzz(10, 1000)
 def test_centrelines(put: Put, count: int) -> None:
     for_all(json_files(LINES), count, put("line.geojson", read_centerline))
 
 
-@cases(20, 1000)
+@fuzz(20, 1000)
 def test_changes_on_the_command_line(count: int) -> None:
     texts = [b"road.length=800", b'scan.platform={"kind": "vehicle"}', b"outputs=[]", b"seed=3"]
 

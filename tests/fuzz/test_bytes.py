@@ -21,7 +21,7 @@ from synthroads_addon.materials.table import materials
 from synthroads_addon.road.elevation_model import read_elevation_model
 from synthroads_addon.scanning.scene.mesh_files import check_mesh_file
 from tests.helpers.clouds.random_points import make_points
-from tests.helpers.files.mutations import TOKENS, accepted, cases, damaged, for_all, limited
+from tests.helpers.files.mutations import TOKENS, accepted, damaged, for_all, fuzz, limited
 from tests.judges import require
 from tests.road.test_elevation_model import EPSG, ascii_grid, centres, corridor, geotiff, plane
 
@@ -63,7 +63,7 @@ def every_cloud(folder: Path, ending: str) -> list[bytes]:
     return files
 
 
-@cases(12, 800)
+@fuzz(12, 800)
 @pytest.mark.parametrize("ending", [".las", ".laz", ".ply", ".e57", ".npz"])
 def test_clouds(tmp_path: Path, ending: str, count: int) -> None:
     path = tmp_path / f"cloud{ending}"
@@ -91,7 +91,7 @@ def rasters(folder: Path) -> dict[str, list[bytes]]:
     }
 
 
-@cases(15, 800)
+@fuzz(15, 800)
 @pytest.mark.parametrize("ending", [".tif", ".asc"])
 def test_elevation_models(tmp_path: Path, ending: str, count: int) -> None:
     path = tmp_path / f"dem{ending}"
@@ -107,7 +107,7 @@ def test_elevation_models(tmp_path: Path, ending: str, count: int) -> None:
     assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e3 < before + PEAK_MB
 
 
-@cases(10, 400)
+@fuzz(10, 400)
 @pytest.mark.parametrize("ending", [".png", ".jpg", ".tif"])
 def test_pictures_of_materials(tmp_path: Path, ending: str, count: int) -> None:
     from PIL import Image
@@ -305,7 +305,7 @@ def glb(changes: dict, binary: bytes) -> bytes:
     return head + text + struct.pack("<2I", len(binary), 0x004E4942) + binary
 
 
-@cases(30, 1500)
+@fuzz(30, 1500)
 @pytest.mark.parametrize("ending", [".ply", ".stl", ".glb"])
 def test_meshes(tmp_path: Path, ending: str, count: int) -> None:
     sound = mesh_file(tmp_path / f"sound{ending}")

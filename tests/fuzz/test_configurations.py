@@ -15,7 +15,7 @@ from ml.segmentation.experiment import configurations, load_experiment
 from ml.tasks import kinds
 from synthroads_addon.base.errors import InputError
 from synthroads_addon.base.schema import read_json, read_yaml
-from tests.helpers.files.mutations import accepted, cases, for_all, json_files, yaml_files
+from tests.helpers.files.mutations import accepted, for_all, fuzz, json_files, yaml_files
 
 Body = Callable[[bytes], None]
 
@@ -40,7 +40,7 @@ def documents(folder: Path, pattern: str, read: Callable[[Path], Any]) -> list[A
     return [read(path) for path in sorted(folder.glob(pattern))]
 
 
-@cases(30, 3000)
+@fuzz(30, 3000)
 def test_configurations(body: Any, count: int) -> None:
     known = kinds()
     use = body("training.yaml", lambda path: load_configuration(str(path), known, ["seed=2"]))
@@ -55,19 +55,19 @@ class _AnyFolder(dict[str, str]):
         return iter(("real", "synthetic", "other", "gantries"))
 
 
-@cases(10, 1000)
+@fuzz(10, 1000)
 def test_experiments(body: Any, count: int) -> None:
     use = body("experiment.yaml", lambda path: configurations(load_experiment(str(path)), _AnyFolder()))
     for_all(yaml_files(documents(EXPERIMENTS, "*.yaml", read_yaml)), count, use)
 
 
-@cases(10, 1000)
+@fuzz(10, 1000)
 def test_mappings_of_classes(body: Any, count: int) -> None:
     use = body("classes.json", lambda path: load_mapping(str(path)))
     for_all(json_files(documents(MAPPINGS, "*.json", read_json)), count, use)
 
 
-@cases(10, 500)
+@fuzz(10, 500)
 def test_folders_of_runs(tmp_path: Path, count: int) -> None:
     """Damaged files of a run: opened and resumed, or refused."""
     known = kinds()

@@ -21,10 +21,10 @@ from ml.runs import CHECKPOINT, Run
 from ml.segmentation.prediction import Labelling, predict_file
 from ml.segmentation.recipes import SegmentationConfiguration
 from synthroads_addon.base.classes import class_scheme
+from tests.fuzz.test_bytes import every_cloud
 from tests.helpers.clouds.road_data_sets import write_data_set
 from tests.helpers.clouds.segmentation_data import road_block, road_tile, write_cloud, write_pointcept
-from tests.helpers.files.mutations import TOKENS, accepted, cases, damaged, for_all
-from tests.robustness.test_broken_files import every_cloud
+from tests.helpers.files.mutations import TOKENS, accepted, damaged, for_all, fuzz
 
 SHORT = [token for token in TOKENS if len(token) < 100]
 SCHEME = class_scheme("5")
@@ -44,7 +44,7 @@ def clouds(folder: Path, ending: str) -> list[bytes]:
     return [*files, (folder / f"behind{ending}").read_bytes()]
 
 
-@cases(15, 800)
+@fuzz(15, 800)
 @pytest.mark.parametrize("ending", [".las", ".laz"])
 def test_clouds_to_be_labelled(tmp_path: Path, ending: str, count: int) -> None:
     path, target = tmp_path / f"cloud{ending}", tmp_path / "out" / f"labelled{ending}"
@@ -60,7 +60,7 @@ def test_clouds_to_be_labelled(tmp_path: Path, ending: str, count: int) -> None:
     for_all(damaged(clouds(tmp_path, ending), SHORT, head=900), count, body)
 
 
-@cases(10, 500)
+@fuzz(10, 500)
 @pytest.mark.parametrize("mapping", [None, "ign"])
 def test_clouds_to_learn_from(tmp_path: Path, mapping: str | None, count: int) -> None:
     path = tmp_path / "cloud.las"
@@ -78,7 +78,7 @@ def test_clouds_to_learn_from(tmp_path: Path, mapping: str | None, count: int) -
     for_all(damaged(clouds(tmp_path, ".las"), SHORT, head=900), count, body)
 
 
-@cases(20, 800)
+@fuzz(20, 800)
 def test_packed_tiles(tmp_path: Path, count: int) -> None:
     path = tmp_path / "pack.npz"
     write_pack(path, [pack_tile(road_tile(500, seed)) for seed in (1, 2)], SCHEME, 0.1)
@@ -95,7 +95,7 @@ def test_packed_tiles(tmp_path: Path, count: int) -> None:
     for_all(damaged([sound], SHORT, head=900), count, body)
 
 
-@cases(20, 800)
+@fuzz(20, 800)
 @pytest.mark.parametrize("name", ["coord.npy", "segment.npy", "color.npy", "strength.npy", "tile.json"])
 def test_tiles_of_a_data_set(tmp_path: Path, name: str, count: int) -> None:
     root = write_pointcept(tmp_path, "train", [road_tile(200)])
@@ -118,7 +118,7 @@ def checked(path: Path, body: Callable[[], object], count: int) -> None:
     for_all(damaged([path.read_bytes()], SHORT), count, run)
 
 
-@cases(10, 500)
+@fuzz(10, 500)
 def test_checkpoints(tmp_path: Path, count: int) -> None:
     run = Run.start(tmp_path, SegmentationConfiguration.from_dict({"task": "segmentation", "data": {"real": []}}))
     run.save({"model": torch.nn.Linear(4, 3).state_dict(), "epoch": 1})
@@ -131,7 +131,7 @@ def scene(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return write_data_set(tmp_path_factory.mktemp("set")) / "scenes" / "a-01"
 
 
-@cases(3, 150)
+@fuzz(3, 150)
 @pytest.mark.parametrize("name", ["notes.json", "xyz.npy", "station.npy", "reference.npy", "class_id.npy"])
 def test_roads_that_were_kept(scene: Path, tmp_path: Path, name: str, count: int) -> None:
     """A kept copy that is damaged is made anew from the cloud."""

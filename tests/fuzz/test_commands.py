@@ -11,10 +11,10 @@ from hypothesis import strategies as st
 
 from synthroads_addon.sampling.road import sample_road
 from synthroads_addon.scenario.road import RoadScenario
-from tests.helpers.files.mutations import TOKENS, cases, damaged, for_all, json_files, yaml_files
+from tests.fuzz.test_bytes import cloud
+from tests.fuzz.test_files import LINES, MANIFEST
+from tests.helpers.files.mutations import TOKENS, damaged, for_all, fuzz, json_files, yaml_files
 from tests.helpers.roads.checker_full_road import full
-from tests.robustness.test_broken_files import cloud
-from tests.robustness.test_fuzz_files import LINES, MANIFEST
 
 ROOT = Path(__file__).parents[2]
 LONGEST = 60.0
@@ -84,7 +84,7 @@ def commands(folder: Path) -> st.SearchStrategy[tuple[str, bytes, tuple[str, ...
     )
 
 
-@cases(3, 200)
+@fuzz(3, 200)
 def test_commands(tmp_path: Path, count: int) -> None:
     def body(case: tuple[str, bytes, tuple[str, ...]]) -> None:
         name, content, (module, *arguments) = case

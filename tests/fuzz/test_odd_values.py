@@ -1,0 +1,99 @@
+"""Valid clouds whose values are odd by chance: each tool of clouds, and reconstruction, takes or refuses them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import laspy
+import numpy as np
+import pytest
+from hypothesis import strategies as st
+
+from headless.commands import command
+from tests.helpers.files.mutations import for_all, fuzz, limited
+
+SECONDS = 60.0
+EDGES = (0.0, 1e-9, -1.0, 0.5, 60.0, 1e3, -1e5, 1e6, 4e8, -4e8, 2e9)
+FIELDS = {
+    "intensity": (0, 1, 65535),
+    "classification": (0, 2, 5, 7, 18, 44, 255),
+    "return_number": (0, 1, 15),
+    "number_of_returns": (0, 1, 15),
+    "scan_angle": (0, -30_000, 30_001),
+    "point_source_id": (0, 65535),
+    "gps_time": (0.0, -1.0, 1e300, float("nan"), float("inf")),
+    "red": (0, 65535),
+}
+TOOLS = ("info", "subsample", "convert", "map-intensity", "preview", "reconstruct")
+
+
+def values() -> st.SearchStrategy[dict[str, Any]]:
+    """Return descriptions of clouds: how many points, where, on which grid, with which values of which fields."""
+    triple = st.tuples(*[st.sampled_from(EDGES)] * 3)
+    place = st.tuples(*[st.sampled_from((0.0, 0.0, 294_000.0, 5_628_000.0, *EDGES))] * 3)
+    strip = st.tuples(*(st.sampled_from((length, length, *EDGES)) for length in (60.0, 12.0, 0.05)))
+    odd = st.dictionaries(st.sampled_from(sorted(FIELDS)), st.integers(0, 99), max_size=4)
+    return st.fixed_dictionaries(
+        {
+            "count": st.sampled_from([0, 1, 2, 10, 300, 2000, 4000]),
+            "low": place,
+            "span": strip,
+            "strays": st.lists(triple, max_size=3),
+            "scale": st.sampled_from([1e-9, 1e-4, 1e-3, 1e-3, 0.01, 1.0, 1e3]),
+            "version": st.sampled_from([("1.2", 0), ("1.2", 3), ("1.4", 6), ("1.4", 7)]),
+            "fields": odd,
+            "share": st.sampled_from([0.0, 0.01, 1.0]),
+            "tool": st.sampled_from(TOOLS),
+        }
+    )
+
+
+def write(path: Path, case: dict[str, Any]) -> bool:
+    """Write a cloud as described; return whether LAS can hold it."""
+    rng = np.random.default_rng(case["count"])
+    low, span = np.array(case["low"]), np.array(case["span"])
+    xyz = np.concatenate([low + span * rng.random((case["count"], 3)), np.reshape(case["strays"], (-1, 3))])
+    version, kind = case["version"]
+    header = laspy.LasHeader(point_format=kind, version=version)
+    reach = np.abs(xyz - np.floor(low)).max(initial=0.0) / 2**30
+    header.scales, header.offsets = np.full(3, max(case["scale"], reach)), np.floor(low)
+    las = laspy.LasData(header)
+    las.x, las.y, las.z = xyz.T
+    las.intensity = rng.integers(0, 60_000, len(xyz))
+    for name, number in case["fields"].items():
+        if name in las.point_format.dimension_names:
+            value, old = FIELDS[name][number % len(FIELDS[name])], np.array(las[name])
+            most = np.iinfo(old.dtype).max if old.dtype.kind in "iu" else np.inf
+            old[rng.random(len(old)) < case["share"]] = min(value, most)  # not a number stays so: it comes first
+            try:
+                las[name] = old
+            except OverflowError:  # older formats have fewer bits
+                return False
+    las.write(path)
+    return True
+
+
+@fuzz(6, 1500)
+def test_each_tool_takes_or_refuses_them(tmp_path: Path, capsys: pytest.CaptureFixture[str], count: int) -> None:
+    pytest.importorskip("scipy", reason="reconstruction needs SciPy")
+    plain = tmp_path / "plain.las"
+    sound = {"count": 300, "low": (0, 0, 0), "span": (60, 8, 0.5), "strays": [], "scale": 0.001}
+    write(plain, {**sound, "version": ("1.4", 6), "fields": {}, "share": 0.0})
+    outputs = {"subsample": "thin.laz", "convert": "other.ply", "map-intensity": "mapped.laz", "preview": "pictures"}
+    options = {"subsample": ["--grid=0.1"], "map-intensity": [f"--target={plain}"], "reconstruct": ["--no-picture"]}
+
+    def words(tool: str) -> list[str]:
+        first = [] if tool == "info" else [f"--output={tmp_path / outputs.get(tool, 'road')}", "--overwrite"]
+        return ([] if tool == "reconstruct" else [tool]) + first + options.get(tool, [])
+
+    def body(case: dict[str, Any]) -> None:
+        cloud, tool = tmp_path / "cloud.las", case["tool"]
+        if not write(cloud, case):
+            return
+        with limited(SECONDS):
+            code = command("reconstruct" if tool == "reconstruct" else "cloud", [*words(tool), str(cloud), "--quiet"])
+        said = [line for line in capsys.readouterr().err.splitlines() if line.startswith("error:")]
+        assert (code, len(said)) in ((0, 0), (2, 1), (3, 0)), (code, said)
+
+    for_all(values(), count, body)
