@@ -1,14 +1,36 @@
-"""Types of arrays by what they hold, and a threshold that parts their values in two."""
+"""Types of arrays by what they hold, records of arrays, and a threshold that parts an array's values in two."""
 
 from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
+AnyArray = NDArray[Any]
 Bool = NDArray[np.bool_]
 Float = NDArray[np.float64]
+Float32 = NDArray[np.float32]
 Index = NDArray[np.intp]
 Int = NDArray[np.int64]
+UInt8 = NDArray[np.uint8]
+UInt16 = NDArray[np.uint16]
+
+
+@dataclass(frozen=True)
+class ArrayRows:
+    """Record of arrays that have a row each for the same things."""
+
+    def select(self, rows: Bool | Index | slice) -> Self:
+        """Return the rows chosen by a mask, indices or a slice."""
+        return type(self)(*(getattr(self, field.name)[rows] for field in fields(self)))
+
+    @classmethod
+    def join(cls, parts: Sequence[Any]) -> Self:
+        """Return the rows of several records of this class, in order; at least one record is needed."""
+        return cls(*(np.concatenate([getattr(part, field.name) for part in parts]) for field in fields(cls)))
 
 
 def otsu(values: Float) -> float:

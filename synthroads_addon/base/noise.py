@@ -15,10 +15,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from .arrays import Float, Float32
 from .random_streams import stream
 
-Float = NDArray[np.float64]
-_Weights = tuple[NDArray[np.float32], NDArray[np.float32]]
+_Weights = tuple[Float32, Float32]
 _Hash = NDArray[np.uint32]
 
 MAX_OCTAVES = 12
@@ -79,7 +79,7 @@ def _turn_coordinates(point: list[Float]) -> list[Float]:
     return [(a * x + b * y + c * z) / 19.0 for a, b, c in _TURN]
 
 
-def _octave(point: list[Float], key: np.uint32) -> NDArray[np.float32]:
+def _octave(point: list[Float], key: np.uint32) -> Float32:
     """Return unit-variance value noise on the lattice of whole numbers."""
     weights: list[_Weights] = []
     nodes: list[_Hash] = []
@@ -88,11 +88,11 @@ def _octave(point: list[Float], key: np.uint32) -> NDArray[np.float32]:
         nodes.append(floor.astype(np.int64).astype(np.uint32) * prime)
         weights.append(_weights((coordinate - floor).astype(np.float32)))
 
-    def along_z(node: _Hash) -> NDArray[np.float32]:
+    def along_z(node: _Hash) -> Float32:
         low = node + nodes[2]
         return _value(low) * weights[2][0] + _value(low + _AXES[2]) * weights[2][1]
 
-    def along_y(node: _Hash) -> NDArray[np.float32]:
+    def along_y(node: _Hash) -> Float32:
         low = node + nodes[1]
         return along_z(_mix_bits(low)) * weights[1][0] + along_z(_mix_bits(low + _AXES[1])) * weights[1][1]
 
@@ -100,7 +100,7 @@ def _octave(point: list[Float], key: np.uint32) -> NDArray[np.float32]:
     return along_y(_mix_bits(low)) * weights[0][0] + along_y(_mix_bits(low + _AXES[0])) * weights[0][1]
 
 
-def _weights(t: NDArray[np.float32]) -> _Weights:
+def _weights(t: Float32) -> _Weights:
     """Return the weights of the nodes below and above, their squares summing to 1."""
     above = t * t * (np.float32(3.0) - np.float32(2.0) * t)
     below = np.float32(1.0) - above
@@ -115,7 +115,7 @@ def _mix_bits(node: _Hash) -> _Hash:
     return node
 
 
-def _value(node: _Hash) -> NDArray[np.float32]:
+def _value(node: _Hash) -> Float32:
     """Return numbers uniform in -sqrt(3) to sqrt(3) from hashes; their upper bits, which count, are the best mixed."""
     node = _mix_bits(node)
     node *= _FACTORS[1]

@@ -7,9 +7,9 @@ local x, pitch > 0 is nose up and roll > 0 is right side down. Matrices map body
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-Float = NDArray[np.float64]
+from .arrays import Float
 
 
 def rotation_matrix(heading: ArrayLike, pitch: ArrayLike = 0.0, roll: ArrayLike = 0.0) -> Float:

@@ -4,19 +4,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import laspy
 import numpy as np
-from numpy.typing import NDArray
 
+from ..base.arrays import AnyArray, Bool, Float, Index, Int
 from ..base.classes import ClassScheme
 from ..base.errors import InputError, nearest_name
 from ..cloud.formats.registry import open_cloud
 from ..cloud.points import concatenate
-
-Float = NDArray[np.float64]
-Index = NDArray[np.intp]
 
 FEWEST = 200
 """Points that a class must have for its quantiles to mean anything."""
@@ -36,7 +32,7 @@ class RealCloud:
 
     xyz: Float
     intensity: Float
-    label: NDArray[np.int64]
+    label: Int
     scheme: ClassScheme | None
     distance: Float
     incidence: Float
@@ -89,7 +85,7 @@ def read_real(path: Path, attribute: str | None = None) -> RealCloud:
     )
 
 
-def _attribute(path: Path, name: str) -> NDArray[np.int64]:
+def _attribute(path: Path, name: str) -> Int:
     """Return an extra attribute (N,) of a LAS file."""
     if path.suffix.lower() not in (".las", ".laz"):
         raise InputError("--class-field", name, f"needs a LAS or LAZ file, not {path.name}")
@@ -167,13 +163,13 @@ def _normals(place: Float) -> Float:
     _, owner, count = np.unique(cell, axis=0, return_inverse=True, return_counts=True)
     owner = owner.ravel()
 
-    def mean(values: NDArray[Any]) -> Float:
+    def mean(values: AnyArray) -> Float:
         return np.asarray(np.bincount(owner, values) / count)
 
     x, y, z = (place[:, i] - mean(place[:, i])[owner] for i in range(3))
     xx, xy, yy, xz, yz = mean(x * x), mean(x * y), mean(y * y), mean(x * z), mean(y * z)
     fit = xx * yy - xy * xy
-    flat: NDArray[np.bool_] = (count < 12) | (fit < 1e-2 * np.maximum(xx, yy) ** 2)
+    flat: Bool = (count < 12) | (fit < 1e-2 * np.maximum(xx, yy) ** 2)
     fit[flat] = np.inf  # upright
     slope_x, slope_y = (xz * yy - yz * xy) / fit, (yz * xx - xz * xy) / fit
     normal = np.stack([-slope_x, -slope_y, np.ones(len(count))], axis=1)

@@ -12,8 +12,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..base.arrays import Float
 from ..base.random_streams import stream
 from ..materials.surfaces import Reflection, brightness_of, surfaces_of
 from ..materials.table import Material
@@ -21,8 +21,6 @@ from ..materials.texture_spread import spread_factors
 from ..scanning.beam import RINGS, beam_pattern, beam_radii
 from ..scanning.radiometry import received_intensity
 from .texture import Texture
-
-Float = NDArray[np.float64]
 
 SAMPLES = 20_000
 """Places that are looked at: they leave quantiles of a class uncertain by about 1 % of its interquartile range."""

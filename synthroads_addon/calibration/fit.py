@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..base.arrays import Float, Index
 from ..base.errors import InputError
 from ..base.noise import field
 from ..materials.reflectance import LUMINANCE, facet_terms
@@ -17,7 +17,6 @@ from ..materials.table import Material
 from ..materials.texture_spread import OCTAVES
 from .expected import Expectation, Receiver
 
-Float = NDArray[np.float64]
 Function = Callable[[Float], Float]
 
 FITTED = (0.25, 0.5, 0.75, 0.9)
@@ -216,13 +215,13 @@ def fitted_wavelength(place: Float, intensity: Float) -> float:
     return WAVELENGTHS[int(np.argmin(misfits))]
 
 
-def _members(place: Float, size: float) -> NDArray[np.intp]:
+def _members(place: Float, size: float) -> Index:
     cell = np.floor(place[:, :2] / size).astype(np.int64)
     _, owner = np.unique(cell[:, 0] * 2_000_003 + cell[:, 1], return_inverse=True)
     return np.asarray(owner.ravel(), dtype=np.intp)
 
 
-def _within(values: Float, squares: list[NDArray[np.intp]]) -> Float:
+def _within(values: Float, squares: list[Index]) -> Float:
     """Return the variance within squares of each size as a share of the whole; NaN where too few have two points."""
     result = []
     for owner in squares:

@@ -11,8 +11,8 @@ from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..base.arrays import Float
 from ..base.errors import InputError, nearest_name
 from ..materials.surfaces import Reflection
 from ..materials.table import Material, materials, read_material_table, write_material_table
@@ -34,7 +34,6 @@ from .fit import (
 from .pavement import RoadClasses, road_classes
 from .texture import Texture, read_texture
 
-Float = NDArray[np.float64]
 Part = Literal["spread", "wavelength", "slope"]
 PARTS: tuple[Part, ...] = ("spread", "wavelength", "slope")
 _ROAD = ("paved", "line")

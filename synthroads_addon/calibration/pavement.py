@@ -18,15 +18,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..base.arrays import otsu
+from ..base.arrays import Float, Index, otsu
 from ..base.errors import InputError
 from ..road.centerline import read_axis
 from .classes import RealClass, RealCloud, select_class
-
-Float = NDArray[np.float64]
-Index = NDArray[np.intp]
 
 STRETCH = 20.0
 REACH = 0.6

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
+from ..base.arrays import Float
 from ..base.errors import InputError
 from ..base.files import write_file
 from ..cloud.tools.picture import nice_step
@@ -18,7 +18,6 @@ from ..materials.surfaces import brightness_of, surfaces_of
 from .fit import FITTED
 from .job import Calibration, Compared
 
-Float = NDArray[np.float64]
 Color = tuple[int, int, int]
 Box = tuple[float, float, float, float]
 
@@ -194,12 +193,7 @@ def _draw_grid(frame: _Frame, text: str) -> None:
 
 
 def _text(
-    draw: ImageDraw.ImageDraw,
-    place: tuple[float, float],
-    text: str,
-    size: int,
-    color: Color = _INK,
-    anchor: str = "la",
+    draw: ImageDraw.ImageDraw, place: tuple[float, float], text: str, size: int, color: Color = _INK, anchor: str = "la"
 ) -> None:
     font = ImageFont.load_default(size=size * _SCALE)
     draw.text((place[0] * _SCALE, place[1] * _SCALE), text, fill=color, font=font, anchor=anchor)

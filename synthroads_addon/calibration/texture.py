@@ -6,15 +6,13 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 from PIL import Image
 
+from ..base.arrays import Float
 from ..base.errors import InputError, MissingFileError
 from ..materials.reflectance import reflectivity
 from ..materials.table import Material
 from ..scanning.colour.colour import decode_srgb
-
-Float = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -7,11 +7,11 @@ columns of all formats, and the labels in the panel.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..base.arrays import AnyArray
 from .points import FIELDS, POINT_TYPES, PointBlock, make_block
 
 
@@ -44,7 +44,7 @@ class Column:
         """Return whether the values are whole numbers."""
         return self.scale is None
 
-    def values(self, block: PointBlock) -> NDArray[Any]:
+    def values(self, block: PointBlock) -> AnyArray:
         """Return the column (N,) of a block; KeyError if the block doesn't have it."""
         array = block.array(self.array)
         if array is None:
@@ -178,7 +178,7 @@ def attributes_of(names: set[str]) -> tuple[Attribute, ...]:
     return tuple(name for name in ATTRIBUTES if {column.name for column in LAYERS[name].columns} <= names)
 
 
-def make_points(stored: dict[str, NDArray[Any]], attributes: tuple[Attribute, ...], count: int) -> PointBlock:
+def make_points(stored: dict[str, AnyArray], attributes: tuple[Attribute, ...], count: int) -> PointBlock:
     """Return the block of N points that a file's arrays make up.
 
     Arrays that a block always has and the file hasn't are 0; range and incidence are NaN.
@@ -189,12 +189,12 @@ def make_points(stored: dict[str, NDArray[Any]], attributes: tuple[Attribute, ..
         attributes: that the file holds.
         count: N.
     """
-    arrays: dict[str, NDArray[Any]] = {
+    arrays: dict[str, AnyArray] = {
         name: np.full(count, np.nan if np.dtype(kind).kind == "f" else 0, dtype=kind)
         for name, kind in _TYPES.items()
         if name not in optional_arrays()
     }
-    parts: dict[str, list[NDArray[Any]]] = {}
+    parts: dict[str, list[AnyArray]] = {}
     for column in columns(attributes):
         if column.name in stored:
             parts.setdefault(column.array, []).append(stored[column.name])

@@ -9,6 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..base.arrays import AnyArray, Bool, Float, Float32, Index, UInt8, UInt16
+
 NO_MATERIAL = 65535
 """`PointBlock.material` of points in the air, which lie on no surface."""
 
@@ -42,37 +44,37 @@ class PointBlock:
         more: (N, ...) arrays of other layers of `cloud.layers`, by name.
     """
 
-    xyz: NDArray[np.float64]
-    intensity: NDArray[np.float64]
-    rgb: NDArray[np.uint16]
-    class_id: NDArray[np.uint8]
+    xyz: Float
+    intensity: Float
+    rgb: UInt16
+    class_id: UInt8
     instance_id: NDArray[np.uint32]
-    return_number: NDArray[np.uint8]
-    number_of_returns: NDArray[np.uint8]
-    gps_time: NDArray[np.float64]
-    scan_angle_deg: NDArray[np.float32]
-    strip: NDArray[np.uint16]
-    range: NDArray[np.float64]
-    incidence_deg: NDArray[np.float32]
-    normal: NDArray[np.float32] | None = None
-    material: NDArray[np.uint16] | None = None
-    scanner: NDArray[np.float64] | None = None
-    true_range: NDArray[np.float64] | None = None
-    true_xyz: NDArray[np.float64] | None = None
-    roughness: NDArray[np.float32] | None = None
-    metallic: NDArray[np.float32] | None = None
-    specular: NDArray[np.float32] | None = None
-    color_source: NDArray[np.uint8] | None = None
-    more: Mapping[str, NDArray[Any]] = field(default_factory=dict)
+    return_number: UInt8
+    number_of_returns: UInt8
+    gps_time: Float
+    scan_angle_deg: Float32
+    strip: UInt16
+    range: Float
+    incidence_deg: Float32
+    normal: Float32 | None = None
+    material: UInt16 | None = None
+    scanner: Float | None = None
+    true_range: Float | None = None
+    true_xyz: Float | None = None
+    roughness: Float32 | None = None
+    metallic: Float32 | None = None
+    specular: Float32 | None = None
+    color_source: UInt8 | None = None
+    more: Mapping[str, AnyArray] = field(default_factory=dict)
 
     def __len__(self) -> int:
         return len(self.xyz)
 
-    def select(self, keep: NDArray[np.bool_] | NDArray[np.intp] | slice) -> PointBlock:
+    def select(self, keep: Bool | Index | slice) -> PointBlock:
         """Return the points chosen by a mask, indices or a slice."""
         return make_block(**{name: array[keep] for name, array in self.attributes().items()})
 
-    def attributes(self) -> dict[str, NDArray[Any]]:
+    def attributes(self) -> dict[str, AnyArray]:
         """Return the arrays that are there, by name."""
         named = {name: array for name in FIELDS if (array := getattr(self, name)) is not None}
         return named | dict(self.more)
@@ -81,7 +83,7 @@ class PointBlock:
         """Return an array by its name; None if it isn't there."""
         return getattr(self, name) if name in FIELDS else self.more.get(name)
 
-    def with_arrays(self, arrays: Mapping[str, NDArray[Any] | None]) -> PointBlock:
+    def with_arrays(self, arrays: Mapping[str, AnyArray | None]) -> PointBlock:
         """Return the block with arrays put in place of those of the same names; None takes one away."""
         kept = {name: array for name, array in {**self.attributes(), **arrays}.items() if array is not None}
         return make_block(**kept)
@@ -103,7 +105,7 @@ POINT_TYPES: dict[str, tuple[str, int]] = {
 FIELDS = tuple(f.name for f in fields(PointBlock) if f.name != "more")
 
 
-def make_block(**arrays: NDArray[Any]) -> PointBlock:
+def make_block(**arrays: AnyArray) -> PointBlock:
     """Return the block that arrays make up, those of `cloud.layers` that have no field of their own included."""
     more = {name: array for name, array in arrays.items() if name not in FIELDS}
     return PointBlock(**{name: array for name, array in arrays.items() if name in FIELDS}, more=more)

@@ -11,8 +11,9 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
-Float = NDArray[np.float64]
-Keys = NDArray[np.int64]
+from ..base.arrays import Bool, Index, Int
+
+Keys = Int
 
 EDGE = 256.0
 """Edge of a cube, m."""
@@ -49,7 +50,7 @@ class Strays:
         """Return how many of the places stray."""
         return int(self._counts.sum() - self._counts[np.isin(self._keys, self._of_body())].sum())
 
-    def stay(self, xyz: NDArray[np.floating]) -> NDArray[np.bool_]:
+    def stay(self, xyz: NDArray[np.floating]) -> Bool:
         """Return which of some of the places (N, 3) don't stray."""
         return np.isin(self._keys_of(xyz), self._of_body())
 
@@ -69,7 +70,7 @@ class Strays:
             self._body = self._keys[kept[parts]] if kept.any() else self._keys
         return self._body
 
-    def _parts(self) -> NDArray[np.intp]:
+    def _parts(self) -> Index:
         """Return the number of the part that each cube belongs to."""
         place = {int(key): number for number, key in enumerate(self._keys)}
         steps = _joined(np.array(_STEPS)) - _joined(np.zeros((1, 3), dtype=np.int64))
@@ -87,7 +88,7 @@ class Strays:
         return part
 
 
-def _joined(numbers: NDArray[np.int64]) -> Keys:
+def _joined(numbers: Int) -> Keys:
     """Return one number (N,) for each cube's three (N, 3)."""
     shifted = numbers + 2 ** (_BITS - 1)
     return np.asarray(shifted[:, 0] | shifted[:, 1] << _BITS | shifted[:, 2] << 2 * _BITS)

@@ -10,11 +10,10 @@ from abc import ABC, abstractmethod
 from collections.abc import Iterator, Sequence
 from itertools import product
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..base.arrays import AnyArray, Float, Float32
 from ..base.classes import UNLABELLED, ClassScheme
 from ..base.errors import InputError
 from ..base.schema import canonical_json
@@ -58,7 +57,7 @@ class LayoutWriter(ABC):
     def close(self) -> None:
         """Write what comes last."""
 
-    def strength(self, points: PointBlock) -> NDArray[np.float32]:
+    def strength(self, points: PointBlock) -> Float32:
         """Return intensities (N,) from 0 to 1: the 16 bits of the cloud's file as a share."""
         return np.clip(np.rint(points.intensity * self._scale) / _FULL, 0.0, 1.0).astype(np.float32)
 
@@ -78,7 +77,7 @@ class PointceptWriter(LayoutWriter):
         instance = points.instance_id.astype(np.int64)
         if instance.max(initial=0) > _LARGEST_INSTANCE:
             raise InputError("instance", int(instance.max()), f"Pointcept holds numbers up to {_LARGEST_INSTANCE}")
-        arrays: dict[str, NDArray[Any]] = {
+        arrays: dict[str, AnyArray] = {
             "coord": (points.xyz - tile.corner).astype(np.float32),
             "color": np.round(points.rgb / 257.0).astype(np.uint8),
             "strength": self.strength(points)[:, None],
@@ -106,7 +105,7 @@ class SemanticKittiWriter(LayoutWriter):
     def __init__(self, folder: Path, job: SceneJob, scheme: ClassScheme, intensity_scale: float) -> None:
         super().__init__(folder, job, scheme, intensity_scale)
         self._sequence = layout_root(folder, "semantickitti", scheme) / "sequences" / f"{job.number:02d}"
-        self._corners: list[NDArray[np.float64]] = []
+        self._corners: list[Float] = []
         self._numbers: dict[int, int] = {}
         for name in ("velodyne", "labels"):
             (self._sequence / name).mkdir(parents=True)
@@ -154,7 +153,7 @@ class SemanticKittiWriter(LayoutWriter):
 WRITERS: dict[Layout, type[LayoutWriter]] = {"pointcept": PointceptWriter, "semantickitti": SemanticKittiWriter}
 
 
-def write_layouts(cloud: Path, folder: Path, recipe: Recipe, job: SceneJob, origin: NDArray[np.float64]) -> None:
+def write_layouts(cloud: Path, folder: Path, recipe: Recipe, job: SceneJob, origin: Float) -> None:
     """Write all layouts that a recipe asks for from one scene's cloud, in memory that doesn't grow with it.
 
     Args:

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..base.arrays import Float
 from ..cloud.points import PointBlock
 from ..cloud.tools.tile_files import TileFiles
 
@@ -25,7 +25,7 @@ class Tile:
 
     row: int
     column: int
-    corner: NDArray[np.float64]
+    corner: Float
     points: PointBlock
 
     @property
@@ -44,7 +44,7 @@ class TileSorter(TileFiles):
         folder: see `TileFiles`.
     """
 
-    def __init__(self, edge: float, origin: NDArray[np.float64], folder: Path) -> None:
+    def __init__(self, edge: float, origin: Float, folder: Path) -> None:
         super().__init__(folder)
         self.edge = edge
         self.origin = np.asarray(origin, dtype=np.float64)

@@ -7,9 +7,10 @@ out on purpose.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-Float = NDArray[np.float64]
+from ..base.arrays import Float
+
 Number = Float | float
 
 LUMINANCE = np.array([0.3, 0.59, 0.11])

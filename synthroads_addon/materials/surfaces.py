@@ -9,12 +9,11 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from ..base.arrays import Float
 from .reflectance import facet_terms, reflectivity, returned_share
 from .table import Material
 from .texture_spread import mean_over_median
 
-Float = NDArray[np.float64]
-Index = NDArray[np.integer]
 Reflection = Literal["lambert", "oren_nayar"]
 
 
@@ -83,7 +82,7 @@ def surfaces_of(rows: Iterable[Material], reflection: Reflection = "lambert", sp
     )
 
 
-def brightness_of(surfaces: Surfaces, material: Index, cosine: Float) -> Float:
+def brightness_of(surfaces: Surfaces, material: NDArray[np.integer], cosine: Float) -> Float:
     """Return the brightness (N,) of surfaces before distance and attenuation, see `reflectance.returned_share`.
 
     Args:

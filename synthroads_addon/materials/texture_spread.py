@@ -19,12 +19,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from ..base.arrays import Float
 from ..base.noise import field
 
 if TYPE_CHECKING:
     from .surfaces import Surfaces
 
-Float = NDArray[np.float64]
 
 OCTAVES = 3
 """The fewest with which the field is nearly normal."""

@@ -13,19 +13,11 @@ from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..base.arrays import Float
 from ..base.errors import InputError
 
-Float = NDArray[np.float64]
-
-RINGS: dict[int, tuple[int, ...]] = {
-    1: (),
-    7: (6,),
-    19: (6, 12),
-    37: (6, 12, 18),
-    61: (6, 12, 18, 24),
-}
+RINGS: dict[int, tuple[int, ...]] = {1: (), 7: (6,), 19: (6, 12), 37: (6, 12, 18), 61: (6, 12, 18, 24)}
 """Rays per pulse -> rays on each ring around the central one, from the inside."""
 
 

@@ -6,16 +6,13 @@ from dataclasses import dataclass, field, replace
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..base.arrays import Float, Index
 from .devices.device import ScannerSetting
 from .pulses import Pulses
 from .radiometry import received_intensity
 from .returns import UNCOUNTED, BothMarks, Marks
 from .trace import Hits, Traced
-
-Float = NDArray[np.float64]
-Index = NDArray[np.intp]
 
 
 @dataclass(frozen=True)

@@ -6,8 +6,8 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..base.arrays import AnyArray, Float
 from ..cloud.layers import optional_arrays
 from ..cloud.points import NO_MATERIAL, PointBlock
 from ..materials.reflectance import reflectivity, returned_share
@@ -48,7 +48,7 @@ class Finish:
             points = shift_along_normals(
                 points, place, plan.relief, plan.relief_strength, plan.seed, plan.relief_octaves
             )
-        changes: dict[str, NDArray[Any] | None] = dict.fromkeys(points.attributes().keys() & OPTIONAL - plan.kept)
+        changes: dict[str, AnyArray | None] = dict.fromkeys(points.attributes().keys() & OPTIONAL - plan.kept)
         if plan.range_corrected:
             changes["intensity"] = points.intensity * points.range**2
         return replace(result, points=points.with_arrays(changes), seen=None)
@@ -72,7 +72,7 @@ class Finish:
 
 def layer_brightness(
     means: Surfaces, surfaces: Surfaces, points: PointBlock, seen: SeenPoints, values: LayerValues
-) -> NDArray[np.float64]:
+) -> Float:
     """Return how many times as bright points are by their own layers as by their materials' means (N,).
 
     A return has the layers of what gave most of it. What beads and prisms send back doesn't depend on them, nor does

@@ -8,9 +8,8 @@ from functools import lru_cache
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-Float = NDArray[np.float64]
+from ..base.arrays import Bool, Float, Index
 
 _AT_ONCE = 256
 """Knots whose poses are worked out at once: for so many it takes hardly longer than for a few."""
@@ -37,7 +36,7 @@ class Track:
     spacing: float
     rotation: Float
     position: Float
-    present: NDArray[np.bool_]
+    present: Bool
 
     @classmethod
     def between(cls, pose: Callable[[Float], Any], begin: float, end: float, spacing: float) -> Track:
@@ -61,7 +60,7 @@ class Track:
             np.asarray(present, dtype=bool),
         )
 
-    def at(self, times: Float) -> tuple[Float, Float, NDArray[np.bool_]]:
+    def at(self, times: Float) -> tuple[Float, Float, Bool]:
         """Return rotation (9, N), position (3, N) and presence (N,) at times within the track."""
         index, share = _knots(self, times)
         rotation = _between(self.rotation, index, share)
@@ -129,7 +128,7 @@ def _knot_numbers(begin: float, end: float, spacing: float) -> tuple[int, int]:
     return first, max(int(np.ceil(end / spacing)), first + 1)
 
 
-def _knots(track: Track, times: Float) -> tuple[NDArray[np.intp], Float]:
+def _knots(track: Track, times: Float) -> tuple[Index, Float]:
     """Return the knots before times (N,), and which share of the way to the next has passed."""
     knot = (times - track.begin) / track.spacing
     index = np.clip(knot.astype(np.intp), 0, track.position.shape[1] - 2)
@@ -137,7 +136,7 @@ def _knots(track: Track, times: Float) -> tuple[NDArray[np.intp], Float]:
     return index, knot
 
 
-def _between(values: Float, index: NDArray[np.intp], share: Float) -> Float:
+def _between(values: Float, index: Index, share: Float) -> Float:
     """Return (C, N) values between knots ``index`` and ``index + 1``."""
     step = np.diff(values, axis=1)
     result = np.take(step, index, axis=1)

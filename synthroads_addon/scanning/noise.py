@@ -16,14 +16,12 @@ be asked for in any order, at the same cost.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..base.arrays import Float
 from ..base.random_streams import stream
 from ..base.rotations import rotation_matrix
 from ..base.schema import ClosedModel, quantity
 from .platforms.path import Strip
-
-Float = NDArray[np.float64]
 
 KNOTS_PER_CORRELATION_TIME = 128
 BLOCK = 4096

@@ -8,8 +8,8 @@ from dataclasses import dataclass, field
 from typing import Any, Literal, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..base.arrays import Float
 from ..materials.surfaces import Surfaces
 from ..materials.table import Material
 from ..road.parameters import RoadParameters
@@ -27,8 +27,6 @@ from .relief import MicroRelief
 from .scene.caster import Caster
 from .scene.mesh import SceneMesh
 from .scene.target import Target
-
-Float = NDArray[np.float64]
 
 _SPARE = 2
 """Factor on the returns of a pulse that are kept meanwhile: some are lost to the threshold later."""

@@ -4,16 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..base.arrays import AnyArray, Float, Index
 from .devices.device import ScannerSetting
 from .pulses import Pulses
 from .scene.target import Target
-
-Float = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -34,14 +31,14 @@ class MeasuredPoints:
     setting: ScannerSetting
     target: Target
     pulses: Pulses
-    pulse: NDArray[np.intp]
+    pulse: Index
     distance: Float
     intensity: Float
-    face: NDArray[np.intp]
+    face: Index
     normal: Float | None
 
 
-Filler = Callable[[MeasuredPoints], NDArray[Any]]
+Filler = Callable[[MeasuredPoints], AnyArray]
 FILLERS: dict[str, Filler] = {}
 """Function that fills an array, by the array's name."""
 
@@ -56,12 +53,12 @@ def fills(array: str) -> Callable[[Filler], Filler]:
     return register
 
 
-def fill_layers(points: MeasuredPoints, wanted: frozenset[str]) -> dict[str, NDArray[Any]]:
+def fill_layers(points: MeasuredPoints, wanted: frozenset[str]) -> dict[str, AnyArray]:
     """Return the arrays that are wanted of points, by name."""
     return {array: filler(points) for array, filler in FILLERS.items() if array in wanted}
 
 
-def place_points(origin: Float, direction: Float, pulse: NDArray[np.intp], distance: Float, map_origin: Float) -> Float:
+def place_points(origin: Float, direction: Float, pulse: Index, distance: Float, map_origin: Float) -> Float:
     """Return the map coordinates (N, 3) of points at a distance (N,) along the beams (3, P) of their pulses, m."""
     result = np.empty((len(pulse), 3))
     for axis in range(3):
@@ -74,27 +71,27 @@ def place_points(origin: Float, direction: Float, pulse: NDArray[np.intp], dista
 
 
 @fills("normal")
-def _normal(points: MeasuredPoints) -> NDArray[Any]:
+def _normal(points: MeasuredPoints) -> AnyArray:
     assert points.normal is not None
     return np.ascontiguousarray(points.normal.T, dtype=np.float32)
 
 
 @fills("scanner")
-def _scanner(points: MeasuredPoints) -> NDArray[Any]:
+def _scanner(points: MeasuredPoints) -> AnyArray:
     return points.pulses.origin.T[points.pulse] + points.target.origin
 
 
 @fills("true_range")
-def _true_range(points: MeasuredPoints) -> NDArray[Any]:
+def _true_range(points: MeasuredPoints) -> AnyArray:
     return points.distance
 
 
 @fills("true_xyz")
-def _true_xyz(points: MeasuredPoints) -> NDArray[Any]:
+def _true_xyz(points: MeasuredPoints) -> AnyArray:
     pulses, origin = points.pulses, points.target.origin
     return place_points(pulses.origin, pulses.direction, points.pulse, points.distance, origin)
 
 
 @fills("material")
-def _material(points: MeasuredPoints) -> NDArray[Any]:
+def _material(points: MeasuredPoints) -> AnyArray:
     return points.target.face_values("material", points.face)

@@ -6,14 +6,11 @@ from dataclasses import dataclass, fields
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..base.arrays import Bool, Float, Float32, Index, UInt8
 from .devices.device import ScannerSetting
 from .knots import Track
 from .scene.target import Target
-
-Float = NDArray[np.float64]
-Index = NDArray[np.intp]
 
 
 @dataclass(frozen=True)
@@ -28,11 +25,11 @@ class Errors:
         lost: (P, returns) bool; None without.
     """
 
-    range: NDArray[np.float32] | None
+    range: Float32 | None
     angle: Float | None
-    lost: NDArray[np.bool_] | None
+    lost: Bool | None
 
-    def range_errors(self, pulse: Index, number: NDArray[np.uint8], most: int) -> NDArray[np.float32]:
+    def range_errors(self, pulse: Index, number: UInt8, most: int) -> Float32:
         """Return (N,) range errors of returns, in units of one sigma.
 
         First returns have a number each. Later ones, which are few, take theirs from a second row, the third and
@@ -113,9 +110,7 @@ def turn_vectors(rotation: Float, vectors: Float) -> Float:
     return result
 
 
-def reaching_scene(
-    setting: ScannerSetting, target: Target, pulses: Pulses, motions: list[Track]
-) -> NDArray[np.bool_] | None:
+def reaching_scene(setting: ScannerSetting, target: Target, pulses: Pulses, motions: list[Track]) -> Bool | None:
     """Return which pulses (P,) may hit anything at all, as those into the sky don't; None if all may."""
     boxes = [] if target.bounds is None else [target.bounds]
     boxes += target.moving_bounds(motions)
@@ -124,7 +119,7 @@ def reaching_scene(
     low, high = np.min([box[0] for box in boxes], axis=0), np.max([box[1] for box in boxes], axis=0)
     cone = max(setting.divergence) * 2.0
     width = cone * setting.maximum_range
-    towards: NDArray[np.bool_] | None = None
+    towards: Bool | None = None
     for axis in range(3):
         place, direction = pulses.origin[axis], pulses.direction[axis]
         if place.min() > high[axis] + width:

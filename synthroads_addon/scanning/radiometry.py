@@ -8,9 +8,9 @@ at 1 m, gives 1.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-Float = NDArray[np.float64]
+from ..base.arrays import Float
 
 NEAREST = 1e-3
 """Nearer than this, m, 1/d^2 doesn't grow on: the law holds far from the aperture only, and stays finite."""

@@ -12,14 +12,12 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..base.arrays import Float
 from ..base.errors import InputError
 from ..base.noise import field
 from ..cloud.points import PointBlock
 from ..materials.table import UNKNOWN, Material, materials
-
-Float = NDArray[np.float64]
 
 MAX_STRENGTH = 100.0
 OCTAVES = {"draft": 2, "standard": 4, "high": 6}

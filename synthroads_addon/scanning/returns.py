@@ -5,12 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from .array_rows import ArrayRows
-
-Float = NDArray[np.float64]
-Index = NDArray[np.intp]
+from ..base.arrays import ArrayRows, Bool, Float, Index, UInt8
 
 UNCOUNTED = 1e-6
 """Least reflectance that a hit has in a return's mean range, so that black surfaces have a range as well."""
@@ -154,7 +150,7 @@ def _merge_echoes(one: Echoes, several: Echoes) -> Echoes:
     return echoes.select(np.argsort(echoes.pulse, kind="stable"))
 
 
-def number_returns(pulse: Index, maximum: int) -> tuple[NDArray[np.bool_], NDArray[np.uint8], NDArray[np.uint8]]:
+def number_returns(pulse: Index, maximum: int) -> tuple[Bool, UInt8, UInt8]:
     """Return which echoes are recorded, and for these the return number and the number of returns.
 
     Args:

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..base.arrays import Bool, Float, Index, Int
 from ..base.random_streams import stream
 from ..cloud.points import PointBlock, concatenate, make_block
 from ..materials.surfaces import brightness_of
@@ -24,9 +24,6 @@ from .pulses import Errors, Poses, Pulses, reaching_scene, turn_vectors
 from .radiometry import received_intensity, saturate
 from .returns import UNCOUNTED, BothMarks, Echoes, Marks, group_returns, number_returns
 from .trace import Hits, Rays, Traced, trace
-
-Float = NDArray[np.float64]
-Index = NDArray[np.intp]
 
 _MOTION_KNOTS = 0.01
 """Seconds between two poses of a moving vehicle: it turns by less than a milliradian meanwhile."""
@@ -54,7 +51,7 @@ class BlockResult:
     rays: int
     below_threshold: int
     saturated: int
-    sources: NDArray[np.int64] | None = None
+    sources: Int | None = None
     blocks: int = 1
 
 
@@ -317,7 +314,7 @@ def _ray_ends(rays: Rays, ray: Index, reach: Float) -> tuple[Float, Float]:
     return scanner + reach * np.take(rays.direction.reshape(3, -1), ray, axis=1), scanner
 
 
-def _drop_lost_echoes(echoes: Echoes, lost: NDArray[np.bool_]) -> Echoes:
+def _drop_lost_echoes(echoes: Echoes, lost: Bool) -> Echoes:
     """Return the echoes that are not lost at random, by their number within the pulse."""
     keep, number, _ = number_returns(echoes.pulse, lost.shape[1])
     chosen = np.flatnonzero(keep)

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..base.arrays import Float
 from ..road.geometry import RoadGeometry
 from ..road.surface import surface_elevation
 from ..road.surroundings import Vegetation
@@ -21,8 +21,6 @@ from ..road.things.overpass import Overpass
 from .blocks import Block, Blocks
 from .devices.shots import shots
 from .platforms.path import Strip
-
-Float = NDArray[np.float64]
 
 BORDER = 25.0
 """Length built beyond the reach of a section's rays (m), so that where the model is cut lies beyond it as well."""

@@ -3,17 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..base.arrays import AnyArray, ArrayRows, Float, Index
 from ..materials.surfaces import Surfaces
-from .array_rows import ArrayRows
 from .knots import Track
 from .scene.target import Target
-
-Float = NDArray[np.float64]
 
 LAYERS = 8
 """Surfaces that a ray passes at most."""
@@ -55,8 +51,8 @@ class Hits(ArrayRows):
             shape of the others.
     """
 
-    face: NDArray[np.intp]
-    material: NDArray[np.intp]
+    face: Index
+    material: Index
     distance: Float
     along: Float
     share: Float
@@ -76,21 +72,21 @@ class Traced:
     rays: Rays
     first: Hits
     behind: Hits
-    ray: NDArray[np.intp]
+    ray: Index
 
     @property
-    def pulse(self) -> NDArray[np.intp]:
+    def pulse(self) -> Index:
         """Return the pulses (B,) of what lies behind."""
         return np.asarray(self.ray % self.first.face.shape[1])
 
-    def ray_of(self, hits: NDArray[np.intp]) -> NDArray[np.intp]:
+    def ray_of(self, hits: Index) -> Index:
         """Return the rays of hits, numbered as in `returns.Echoes`."""
         late = np.flatnonzero(hits >= self.first.face.size)
         result = hits.copy()
         result[late] = self.ray[hits[late] - self.first.face.size]
         return result
 
-    def pick(self, name: str, hits: NDArray[np.intp]) -> NDArray[Any]:
+    def pick(self, name: str, hits: Index) -> AnyArray:
         """Return an attribute of chosen hits, numbered as in `returns.Echoes`."""
         first, behind = getattr(self.first, name).ravel(), getattr(self.behind, name)
         if not len(behind):
@@ -144,7 +140,7 @@ def trace(
     return _gather_hits(rays, first, layers, rays_on)
 
 
-def _gather_hits(rays: Rays, first: Hits, layers: list[Hits], on: list[NDArray[np.intp]]) -> Traced:
+def _gather_hits(rays: Rays, first: Hits, layers: list[Hits], on: list[Index]) -> Traced:
     """Return all hits; behind permeable surfaces only those within reach."""
     if not layers:
         none, nothing = np.empty(0, dtype=np.intp), np.empty(0)

@@ -13,8 +13,8 @@ from pathlib import Path
 from typing import Any, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...base.arrays import AnyArray, Float, UInt8
 from ...base.classes import ClassScheme, asprs_scheme, class_scheme, stored_scheme
 from ...base.crs import wkt
 from ...base.errors import InputError, OutputError
@@ -59,7 +59,7 @@ class CloudWriter(ABC):
         self,
         path: Path,
         epsg: int | None,
-        offset: NDArray[np.float64],
+        offset: Float,
         intensity_scale: float,
         attributes: tuple[Attribute, ...] = DEFAULT_ATTRIBUTES,
         scheme: ClassScheme | None = None,
@@ -132,7 +132,7 @@ class CloudWriter(ABC):
         """Return `notes` with offset and coordinate system, for formats that have no fields for these."""
         return {**self.notes(), "offset": self.offset.tolist(), "crs": self.crs_text}
 
-    def integers(self, values: NDArray[Any], kind: str, name: str, scale: float | None = None) -> NDArray[Any]:
+    def integers(self, values: AnyArray, kind: str, name: str, scale: float | None = None) -> AnyArray:
         """Return values (N,) as whole steps, rounded, in the integer type ``kind``.
 
         Raises:
@@ -152,18 +152,18 @@ class CloudWriter(ABC):
             raise OutputError(str(self.path), float(worst * step), allowed)
         return steps.astype(kind)
 
-    def finite(self, values: NDArray[Any], name: str) -> NDArray[Any]:
+    def finite(self, values: AnyArray, name: str) -> AnyArray:
         """Return values as they are; raise `OutputError` if one is NaN or infinite."""
         if not np.isfinite(values).all():
             worst = values[~np.isfinite(values).reshape(len(values), -1).all(axis=1)][0]
             raise self.refused(worst.tolist(), f"{name} must be finite")
         return values
 
-    def file_class_ids(self, block: PointBlock) -> NDArray[np.uint8]:
+    def file_class_ids(self, block: PointBlock) -> UInt8:
         """Return the block's classes (N,) in the file's scheme."""
         return np.take(self.scheme.ids, self.integers(block.class_id, "uint8", "class_id"))
 
-    def stored(self, column: Column, block: PointBlock) -> NDArray[Any]:
+    def stored(self, column: Column, block: PointBlock) -> AnyArray:
         """Return a column (N,) of a block as the integers that LAS and E57 store."""
         if column.array == "class_id":
             return self.file_class_ids(block)
@@ -236,7 +236,7 @@ class CloudHeader:
     path: Path
     kind: str
     count: int
-    offset: NDArray[np.float64]
+    offset: Float
     crs_text: str | None = None
     epsg: int | None = None
     intensity_scale: float | None = None
@@ -355,7 +355,7 @@ def intensity_scale(path: Path, notes: dict[str, Any]) -> float:
     return float(scale)
 
 
-def finite_coordinates(path: Path, done: int, xyz: NDArray[np.float64]) -> NDArray[np.float64]:
+def finite_coordinates(path: Path, done: int, xyz: Float) -> Float:
     """Return the coordinates (N, 3) of a block as they are.
 
     Args:

@@ -13,8 +13,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...base.arrays import AnyArray
 from ...base.errors import InputError
 from ...base.rotations import matrices
 from ..layers import Column, columns, make_points
@@ -133,7 +133,7 @@ class E57Writer(CloudWriter):
             self._points.close()
         self._file.close()
 
-    def _packed(self, part: PointBlock) -> dict[str, NDArray[Any]]:
+    def _packed(self, part: PointBlock) -> dict[str, AnyArray]:
         """Return what is stored of at most `_CAPACITY` points, by name."""
         local = part.xyz - self.offset
         packed = {f"cartesian{'XYZ'[i]}": self.integers(local[:, i], "int32", "xyz", SCALE) for i in range(3)}
@@ -294,9 +294,7 @@ class E57Reader(CloudReader):
     def _layer_names(self) -> set[str]:
         return {e57_name(column) for column in columns(self.header.attributes)}
 
-    def _block(
-        self, arrays: dict[str, NDArray[Any]], count: int, pose: tuple[NDArray[Any], NDArray[Any]]
-    ) -> PointBlock:
+    def _block(self, arrays: dict[str, AnyArray], count: int, pose: tuple[AnyArray, AnyArray]) -> PointBlock:
         rotation, translation = pose
         present = [column for column in columns(self.header.attributes) if e57_name(column) in arrays]
         stored = {column.name: arrays[e57_name(column)].copy() for column in present}
@@ -314,7 +312,7 @@ def _field_names(prototype: Any) -> set[str]:
     return {prototype.get(i).elementName() for i in range(prototype.childCount())}
 
 
-def _pose(scan: Any) -> tuple[NDArray[Any], NDArray[Any]]:
+def _pose(scan: Any) -> tuple[AnyArray, AnyArray]:
     """Return rotation matrix (3, 3) and translation (3,) of a scan."""
     if not scan.isDefined("pose"):
         return np.eye(3), np.zeros(3)

@@ -20,6 +20,7 @@ import numpy as np
 from laspy.vlrs.known import WktCoordinateSystemVlr
 from numpy.typing import NDArray
 
+from ...base.arrays import AnyArray, Float
 from ...base.classes import asprs_scheme, class_scheme, stored_scheme
 from ...base.errors import InputError, OutputError
 from ...base.schema import canonical_json
@@ -88,7 +89,7 @@ class LasWriter(CloudWriter):
             self._writer.point_writer.write_points(record)
             self._held = 0
 
-    def _pack(self, block: PointBlock, record: NDArray[Any]) -> None:
+    def _pack(self, block: PointBlock, record: AnyArray) -> None:
         """Turn points into LAS records, in place."""
         self._pack_coordinates(block.xyz, record)
         brightness = block.intensity * self.intensity_scale
@@ -109,7 +110,7 @@ class LasWriter(CloudWriter):
             record[column.name] = self.stored(column, block)
         record["classification"] = np.take(self._codes, self.integers(block.class_id, "uint8", "class_id"))
 
-    def _pack_coordinates(self, xyz: NDArray[np.float64], record: NDArray[Any]) -> None:
+    def _pack_coordinates(self, xyz: Float, record: AnyArray) -> None:
         steps = np.empty((3, len(xyz)))  # a row per axis: its extremes are found ten times as fast
         np.subtract(xyz.T, self._header.offsets[:, None], out=steps)
         np.rint(np.multiply(steps, 1.0 / SCALE, out=steps), out=steps)
@@ -121,7 +122,7 @@ class LasWriter(CloudWriter):
         self._low = np.minimum(self._low, low.astype(np.int64))
         self._high = np.maximum(self._high, high.astype(np.int64))
 
-    def _pack_returns(self, block: PointBlock, record: NDArray[Any]) -> None:
+    def _pack_returns(self, block: PointBlock, record: AnyArray) -> None:
         """Pack return number and number of returns, four bits each."""
         number = self.integers(block.return_number, "uint8", "return_number")
         of = self.integers(block.number_of_returns, "uint8", "number_of_returns")
@@ -304,7 +305,7 @@ def _check_start(path: Path, file: BinaryIO) -> None:
         raise InputError(str(path), None, "is not a LAS file that can be read (its header is damaged or truncated)")
 
 
-def _scan_angle(record: Any, names: set[str]) -> NDArray[Any]:
+def _scan_angle(record: Any, names: set[str]) -> AnyArray:
     """Return scan angles (N,) in degrees."""
     if "scan_angle" in names:
         return np.asarray(record["scan_angle"]).astype(np.float64) * SCAN_ANGLE_STEP

@@ -20,8 +20,8 @@ from typing import IO, Any
 
 import numpy as np
 from numpy.lib import format as npy
-from numpy.typing import NDArray
 
+from ...base.arrays import AnyArray
 from ...base.errors import InputError
 from ..layers import columns, layer_arrays, make_points
 from ..points import POINT_TYPES, PointBlock
@@ -132,13 +132,13 @@ class NpzReader(CloudReader):
             for member in members.values():
                 member.close()
 
-    def _rows(self, member: IO[bytes], name: str, count: int) -> NDArray[Any]:
+    def _rows(self, member: IO[bytes], name: str, count: int) -> AnyArray:
         shape, kind = self._kinds[name]
         rows = (count, *shape[1:])
         data = np.frombuffer(member.read(int(np.prod(rows)) * kind.itemsize), dtype=kind)
         return data.reshape(rows).copy()
 
-    def _block(self, arrays: dict[str, NDArray[Any]], count: int) -> PointBlock:
+    def _block(self, arrays: dict[str, AnyArray], count: int) -> PointBlock:
         stored = {
             c.name: arrays[c.array] if c.component is None else arrays[c.array][:, c.component]
             for c in columns(self.header.attributes)

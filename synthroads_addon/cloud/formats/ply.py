@@ -13,8 +13,8 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...base.arrays import AnyArray, UInt16
 from ...base.errors import InputError
 from ..layers import Column, columns, make_points
 from ..points import PointBlock
@@ -150,7 +150,7 @@ class PlyReader(CloudReader):
                 raise damage_error(self.header.path, done, self.header.count)
             yield self._block(np.frombuffer(data, dtype=self._type), done)
 
-    def _block(self, record: NDArray[Any], done: int) -> PointBlock:
+    def _block(self, record: AnyArray, done: int) -> PointBlock:
         stored = {c.name: record[ply_name(c)] for c in columns(self.header.attributes) if ply_name(c) in self._names}
         stored |= {name: record[field].copy() for name, field in _FIELDS.items() if field in self._names}
         if not self.header.labelled:
@@ -164,7 +164,7 @@ class PlyReader(CloudReader):
         return make_points(stored, self.header.attributes, len(record))
 
 
-def _sixteen_bits(channel: NDArray[Any]) -> NDArray[np.uint16]:
+def _sixteen_bits(channel: AnyArray) -> UInt16:
     """Return a colour channel of 8 bits, 16 bits, or 0 to 1, in 16 bits."""
     if channel.dtype.kind == "f":
         return np.rint(np.clip(channel, 0, 1) * 65535).astype(np.uint16)

@@ -7,9 +7,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any, Literal
 
-import numpy as np
-from numpy.typing import NDArray
-
+from ...base.arrays import Float
 from ...base.classes import ClassScheme
 from ...base.errors import InputError, MissingFileError, nearest_name
 from ..layers import DEFAULT_ATTRIBUTES, Attribute
@@ -40,7 +38,7 @@ def check_ending(path: Path, field: str = "file") -> str:
 def open_writer(
     path: Path,
     epsg: int | None,
-    offset: NDArray[np.float64],
+    offset: Float,
     intensity_scale: float,
     attributes: tuple[Attribute, ...] = DEFAULT_ATTRIBUTES,
     scheme: ClassScheme | None = None,

@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...base.arrays import Float
 from ...base.classes import ClassScheme, class_scheme
 from ...base.errors import InputError, OutputError
 from ...base.files import output_folder
@@ -108,7 +108,7 @@ def draw_previews(
     folder: Path,
     line: tuple[float, float, float, float] | None = None,
     station: float | None = None,
-    centerline: NDArray[np.float64] | None = None,
+    centerline: Float | None = None,
     depth: float = 1.0,
     overwrite: bool = False,
 ) -> dict[str, Any]:
@@ -169,7 +169,7 @@ def _staying_blocks(cloud: CloudReader, strays: Strays | None) -> Iterator[Point
         yield block if strays is None else block.select(np.flatnonzero(strays.stay(block.xyz)))
 
 
-def read_centerline(path: Path) -> NDArray[np.float64]:
+def read_centerline(path: Path) -> Float:
     """Return the points (N, 2) of the first line of a GeoJSON file, as `synthroads generate` writes one."""
     data = read_json(path)
     try:
@@ -214,11 +214,11 @@ class _Extent:
         self.middle = origin + total / count
         spread = products / count - np.outer(total / count, total / count)
         axis = np.linalg.eigh(spread)[1][:, 1]
-        self.along: NDArray[np.float64] = axis if axis[0] >= 0 else -axis
+        self.along: Float = axis if axis[0] >= 0 else -axis
         low, high = self._reach(self.middle, self.along)
         self.start, self.end = self.middle + low * self.along, self.middle + high * self.along
 
-    def across(self, start: NDArray[np.float64], end: NDArray[np.float64]) -> tuple[float, float]:
+    def across(self, start: Float, end: Float) -> tuple[float, float]:
         """Return the reach to the right (negative) and to the left of a line."""
         along = np.asarray(end) - np.asarray(start)
         length = float(np.hypot(*along))
@@ -226,23 +226,19 @@ class _Extent:
         low, high = self._reach(np.asarray(start), np.array([-along[1], along[0]]))
         return low - 1.0, high + 1.0
 
-    def axis(self) -> NDArray[np.float64]:
+    def axis(self) -> Float:
         """Return the long axis as a line (2, 2)."""
         return np.stack([self.start, self.end])
 
-    def _reach(self, origin: NDArray[np.float64], direction: NDArray[np.float64]) -> tuple[float, float]:
+    def _reach(self, origin: Float, direction: Float) -> tuple[float, float]:
         along = (self._outermost - origin) @ direction
         slack = self._SLACK * float(np.ptp(self._outermost, axis=0).max())
         return float(along.min()) - slack, float(along.max()) + slack
 
 
 def _cross_cut(
-    line: tuple[float, float, float, float] | None,
-    station: float | None,
-    path: NDArray[np.float64],
-    reach: float,
-    extent: _Extent,
-) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
+    line: tuple[float, float, float, float] | None, station: float | None, path: Float, reach: float, extent: _Extent
+) -> tuple[Float, Float, float]:
     """Return middle, direction (to the right) and reach to either side of a cut."""
     if line is not None:
         left, right = np.array(line[:2]), np.array(line[2:])

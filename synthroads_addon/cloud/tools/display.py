@@ -14,8 +14,8 @@ from pathlib import Path
 from typing import Literal, get_args
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...base.arrays import Float, Float32, Int, UInt8
 from ...base.classes import ClassScheme, PointClass
 from ...base.errors import InputError
 from ...base.random_streams import stream
@@ -50,14 +50,14 @@ class DisplayCloud:
     """
 
     header: CloudHeader
-    origin: NDArray[np.float64]
-    xyz: NDArray[np.float32]
-    class_id: NDArray[np.uint8]
-    rgb: NDArray[np.uint8]
-    brightness: NDArray[np.float32]
+    origin: Float
+    xyz: Float32
+    class_id: UInt8
+    rgb: UInt8
+    brightness: Float32
     brightness_text: str
-    counts: NDArray[np.int64]
-    _colors: dict[str, NDArray[np.uint8]] = field(default_factory=dict, repr=False)
+    counts: Int
+    _colors: dict[str, UInt8] = field(default_factory=dict, repr=False)
     _limits: dict[str, tuple[float, float]] = field(default_factory=dict, repr=False)
 
     def __len__(self) -> int:
@@ -90,13 +90,13 @@ class DisplayCloud:
             self._limits[by] = (float(low + shift), float(high + shift))
         return self._limits[by]
 
-    def colors(self, by: ColourBy) -> NDArray[np.uint8]:
+    def colors(self, by: ColourBy) -> UInt8:
         """Return the points' colours (N, 4), sRGB and opaque; worked out once for each ``by``."""
         if by not in self._colors:
             self._colors[by] = np.column_stack([self._rgb_by(by), np.full(len(self), 255, np.uint8)])
         return self._colors[by]
 
-    def _rgb_by(self, by: ColourBy) -> NDArray[np.uint8]:
+    def _rgb_by(self, by: ColourBy) -> UInt8:
         if by == "class":
             return self.header.scheme.colors()[self.class_id]
         if by == "rgb":
@@ -109,14 +109,14 @@ class DisplayCloud:
         return height_colors()[np.nan_to_num(share * 255.0).astype(np.uint8)]
 
 
-def height_colors() -> NDArray[np.uint8]:
+def height_colors() -> UInt8:
     """Return a (256, 3) table of sRGB colours from low to high."""
     stops = np.array([[int(stop[i : i + 2], 16) for i in (1, 3, 5)] for stop in _HEIGHT_STOPS], dtype=np.float64)
     at = np.linspace(0.0, len(stops) - 1.0, 256)
     return np.column_stack([np.interp(at, np.arange(len(stops)), stops[:, i]) for i in range(3)]).astype(np.uint8)
 
 
-def chosen_points(count: int, budget: int) -> NDArray[np.int64]:
+def chosen_points(count: int, budget: int) -> Int:
     """Return the increasing indices (min(count, budget),) of the points that stay of ``count``."""
     if count <= budget:
         return np.arange(count, dtype=np.int64)
@@ -125,7 +125,7 @@ def chosen_points(count: int, budget: int) -> NDArray[np.int64]:
     return edges[:-1] + (picks * np.diff(edges)).astype(np.int64)
 
 
-def drawing_places(count: int) -> NDArray[np.int64]:
+def drawing_places(count: int) -> Int:
     """Return for each of the chosen points (count,), in the file's order, where it stands in the drawing's."""
     return stream(0, "drawing order", count).permutation(count)
 
@@ -133,7 +133,7 @@ def drawing_places(count: int) -> NDArray[np.int64]:
 def read_display(
     path: Path,
     budget: int,
-    origin: NDArray[np.float64] | None = None,
+    origin: Float | None = None,
     progress: Callable[[float], None] = lambda share: None,
     block: int = BLOCK,
 ) -> DisplayCloud:
@@ -180,7 +180,7 @@ def read_display(
         return result
 
 
-def _empty(header: CloudHeader, size: int, origin: NDArray[np.float64] | None) -> DisplayCloud:
+def _empty(header: CloudHeader, size: int, origin: Float | None) -> DisplayCloud:
     return DisplayCloud(
         header=header,
         origin=np.zeros(3) if origin is None else np.asarray(origin, dtype=np.float64),

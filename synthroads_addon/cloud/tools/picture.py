@@ -6,9 +6,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
+from ...base.arrays import Bool, Float, UInt8
 from ...base.classes import PointClass
 from .raster import Axes
 
@@ -37,13 +37,13 @@ Legend = Sequence[tuple[str, Color]] | GrayBar | None
 """Names and colours, or values of grays, that stand below a picture."""
 
 
-def class_legend(rows: Sequence[PointClass], labels: NDArray[np.uint8]) -> list[tuple[str, Color]]:
+def class_legend(rows: Sequence[PointClass], labels: UInt8) -> list[tuple[str, Color]]:
     """Return names and colours of the classes that occur among labels, unlabelled points included."""
     seen = set(np.unique(labels).tolist())
     return [(row.name.replace("_", " "), row.color) for row in rows if row.id in seen]
 
 
-def gray(values: NDArray[np.float64], filled: NDArray[np.bool_], text: str) -> tuple[NDArray[np.float64], GrayBar]:
+def gray(values: Float, filled: Bool, text: str) -> tuple[Float, GrayBar]:
     """Return values (N,) as grays (N, 3), the darkest and brightest half percent cut, with their legend."""
     low, high = np.quantile(values[filled], [0.005, 0.995]) if filled.any() else (0.0, 1.0)
     shade = np.clip((values - low) / max(high - low, 1e-300), 0, 1) * 255
@@ -51,12 +51,7 @@ def gray(values: NDArray[np.float64], filled: NDArray[np.bool_], text: str) -> t
 
 
 def add_frame(
-    pixels: NDArray[np.uint8],
-    title: str,
-    legend: Legend,
-    axes: Axes,
-    north: tuple[float, float] | None = None,
-    ticks: bool = False,
+    pixels: UInt8, title: str, legend: Legend, axes: Axes, north: tuple[float, float] | None = None, ticks: bool = False
 ) -> Image.Image:
     """Return a picture (height, width, 3) with its frame.
 

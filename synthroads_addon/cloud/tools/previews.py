@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...base.arrays import AnyArray, Float
 from ...base.classes import ClassScheme, class_scheme
 from ..points import PointBlock
 from .picture import PAPER, Legend, add_frame, class_legend, gray, nice_step
@@ -31,14 +30,7 @@ class TopView:
         scheme: what the points' classes are; the 17 if not given.
     """
 
-    def __init__(
-        self,
-        start: NDArray[np.float64],
-        end: NDArray[np.float64],
-        low: float,
-        high: float,
-        scheme: ClassScheme | None = None,
-    ) -> None:
+    def __init__(self, start: Float, end: Float, low: float, high: float, scheme: ClassScheme | None = None) -> None:
         chord = np.asarray(end) - np.asarray(start)
         length = max(float(np.hypot(*chord)), 1.0)
         self.along = chord / length if length > 1.0 else np.array([1.0, 0.0])
@@ -62,7 +54,7 @@ class TopView:
     def save(self, folder: Path, epsg: int | None, has_color: bool = True) -> list[Path]:
         """Write ``preview_class.png``, ``preview_intensity.png`` and ``preview_rgb.png``; return their paths."""
         raster = self.raster
-        pictures: dict[str, tuple[NDArray[Any], Legend]] = {
+        pictures: dict[str, tuple[AnyArray, Legend]] = {
             "class": _class_colors(raster, self.scheme),
             "intensity": _grays(raster),
         }
@@ -93,8 +85,8 @@ class CrossSection:
 
     def __init__(
         self,
-        middle: NDArray[np.float64],
-        right: NDArray[np.float64],
+        middle: Float,
+        right: Float,
         reach: float,
         depth: float,
         heights: tuple[float, float],
@@ -135,12 +127,12 @@ class CrossSection:
         return path
 
 
-def _class_colors(raster: Raster, scheme: ClassScheme) -> tuple[NDArray[Any], Legend]:
+def _class_colors(raster: Raster, scheme: ClassScheme) -> tuple[AnyArray, Legend]:
     """Return the colours (cells, 3) of the classes, and their legend."""
     shown = raster.label[raster.count > 0]
     return scheme.colors()[raster.label], class_legend(scheme.rows, shown)
 
 
-def _grays(raster: Raster) -> tuple[NDArray[Any], Legend]:
+def _grays(raster: Raster) -> tuple[AnyArray, Legend]:
     """Return the grays (cells, 3) of the intensities, and their legend."""
     return gray(raster.intensity(), raster.count > 0, raster.brightness.text)

@@ -10,8 +10,8 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...base.arrays import Float, Index, Int
 from ...base.errors import InputError
 from ..formats.base import CloudReader
 from ..points import PointBlock
@@ -31,14 +31,14 @@ def steps_per_unit(cloud: CloudReader) -> float:
     return (LEVELS - 1) / brightest if brightest > 0 else 1.0
 
 
-def levels(intensity: NDArray[np.float64], scale: float) -> NDArray[np.intp]:
+def levels(intensity: Float, scale: float) -> Index:
     """Return intensities (N,) as 16-bit steps; what is brighter is the brightest."""
     return np.clip(np.rint(intensity * scale), 0, LEVELS - 1).astype(np.intp)
 
 
-def histograms(cloud: CloudReader, scale: float) -> dict[int, NDArray[np.int64]]:
+def histograms(cloud: CloudReader, scale: float) -> dict[int, Int]:
     """Return the number of points on each level (65536,) by class."""
-    result: dict[int, NDArray[np.int64]] = {}
+    result: dict[int, Int] = {}
     for block in cloud.blocks():
         level = levels(block.intensity, scale)
         for label in np.unique(block.class_id):
@@ -47,7 +47,7 @@ def histograms(cloud: CloudReader, scale: float) -> dict[int, NDArray[np.int64]]
     return result
 
 
-def largest_gap(a: NDArray[np.int64], b: NDArray[np.int64]) -> float:
+def largest_gap(a: Int, b: Int) -> float:
     """Return the Kolmogorov-Smirnov distance of two histograms: the largest gap between their distributions."""
     return float(np.abs(np.cumsum(a) / max(a.sum(), 1) - np.cumsum(b) / max(b.sum(), 1)).max())
 
@@ -66,7 +66,7 @@ class QuantileMap:
         mapped: (65536,) histogram of what has been mapped so far.
     """
 
-    def __init__(self, source: NDArray[np.int64], target: NDArray[np.int64]) -> None:
+    def __init__(self, source: Int, target: Int) -> None:
         if source.sum() == 0 or target.sum() == 0:
             raise ValueError("both histograms must hold points")
         ends = np.cumsum(source)
@@ -77,7 +77,7 @@ class QuantileMap:
         self._seen = np.zeros(LEVELS, dtype=np.int64)
         self.mapped = np.zeros(LEVELS, dtype=np.int64)
 
-    def map(self, level: NDArray[np.intp]) -> NDArray[np.intp]:
+    def map(self, level: Index) -> Index:
         """Return the levels (N,) that points of given levels, in the cloud's order, are mapped to."""
         turn = self._seen[level] + _occurrence(level)
         self._seen += np.bincount(level, minlength=LEVELS)
@@ -111,7 +111,7 @@ class IntensityMapping:
                 raise InputError(str(cloud.header.path), None, "has no points")
         self._have, self._want = _total(have), _total(want)
         self.alone: list[str] = []
-        self._class_targets: dict[int, NDArray[np.int64]] = {}
+        self._class_targets: dict[int, Int] = {}
         if per_class:
             self._maps = self._class_maps(source, target, have, want)
         else:
@@ -143,11 +143,7 @@ class IntensityMapping:
         return {label: largest_gap(self._maps[label].mapped, want) for label, want in self._class_targets.items()}
 
     def _class_maps(
-        self,
-        source: CloudReader,
-        target: CloudReader,
-        have: dict[int, NDArray[np.int64]],
-        want: dict[int, NDArray[np.int64]],
+        self, source: CloudReader, target: CloudReader, have: dict[int, Int], want: dict[int, Int]
     ) -> dict[int, QuantileMap]:
         theirs = {name: label for label, name in target.header.scheme.names().items() if label in want}
         names = source.header.scheme.names()
@@ -162,11 +158,11 @@ class IntensityMapping:
         return maps
 
 
-def _total(parts: dict[int, NDArray[np.int64]]) -> NDArray[np.int64]:
+def _total(parts: dict[int, Int]) -> Int:
     return np.sum(list(parts.values()), axis=0)
 
 
-def _occurrence(values: NDArray[np.intp]) -> NDArray[np.intp]:
+def _occurrence(values: Index) -> Index:
     """Return for each value (N,) how many equal ones stand before it."""
     order = np.argsort(values, kind="stable")
     ordered = values[order]

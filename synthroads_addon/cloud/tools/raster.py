@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...base.arrays import AnyArray, Bool, Float, Index, UInt8
 from ..points import PointBlock
-
-Float = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -99,7 +96,7 @@ class Raster:
         """Return the mean colour (cells, 3), 0 to 255."""
         return (self._rgb / np.maximum(self.count, 1) / 257.0).T
 
-    def picture(self, colors: NDArray[Any], paper: tuple[int, int, int]) -> NDArray[np.uint8]:
+    def picture(self, colors: AnyArray, paper: tuple[int, int, int]) -> UInt8:
         """Return colours (cells, 3) as a picture (height, width, 3), with larger dots the fewer cells are filled."""
         shape = (self.height, self.width)
         filled = (self.count > 0).reshape(shape)
@@ -108,7 +105,7 @@ class Raster:
             result, filled = _grow_cells(result, filled)
         return result
 
-    def _dot_growth(self, filled: NDArray[np.bool_]) -> int:
+    def _dot_growth(self, filled: Bool) -> int:
         """Return by how many cells dots are to grow: by none where most cells between points are filled."""
         rows, columns = filled.any(axis=1), filled.any(axis=0)
         used = filled[rows][:, columns]
@@ -116,13 +113,13 @@ class Raster:
         neighbours = float((used[:, 1:] & used[:, :-1]).sum() / max(1, used.sum())) if used.size else 1.0
         return 0 if share > 0.35 or neighbours > 0.8 else 1 if neighbours > 0.4 else 2
 
-    def _keep_foremost(self, cell: NDArray[np.intp], depth: Float, label: NDArray[np.uint8]) -> None:
+    def _keep_foremost(self, cell: Index, depth: Float, label: UInt8) -> None:
         np.maximum.at(self._front, cell, depth)
         foremost = depth == self._front[cell]
         self.label[cell[foremost]] = label[foremost]
 
 
-def _grow_cells(picture: NDArray[np.uint8], filled: NDArray[np.bool_]) -> tuple[NDArray[np.uint8], NDArray[np.bool_]]:
+def _grow_cells(picture: UInt8, filled: Bool) -> tuple[UInt8, Bool]:
     """Fill empty cells beside filled ones with their colours."""
     result, done = picture.copy(), filled.copy()
     for axis, step in ((1, 1), (1, -1), (0, 1), (0, -1)):

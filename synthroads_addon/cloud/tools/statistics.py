@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ...base.arrays import Float, Index, Int, UInt8, UInt16
 from ...materials.reflectance import LUMINANCE
 from ..formats.base import CloudReader
 from ..points import PointBlock
@@ -23,7 +24,7 @@ _MOST_PAIRS = 3e8
 _PAIRS_AT_ONCE = 4_000_000
 
 
-def luminance(rgb: NDArray[np.uint16]) -> NDArray[np.float64]:
+def luminance(rgb: UInt16) -> Float:
     """Return 0.3 r + 0.59 g + 0.11 b (N,), 0 to 1, of colours (N, 3) as they are stored."""
     return rgb @ LUMINANCE / 65535.0
 
@@ -76,7 +77,7 @@ class Moments:
         self.mean = np.zeros((width, 256))
         self.squares = np.zeros((width, 256))
 
-    def add(self, label: NDArray[np.uint8], values: Iterable[NDArray[np.float64]]) -> None:
+    def add(self, label: UInt8, values: Iterable[Float]) -> None:
         """Add points by label (N,) and their quantities, each (N,) (Chan, Golub and LeVeque 1979)."""
         count = np.bincount(label, minlength=256)
         some = np.maximum(count, 1)
@@ -122,7 +123,7 @@ class _FirstPass:
             chosen = block.class_id == label
             self._samples[int(label)].add(block.xyz[chosen], ranks[chosen])
 
-    def samples(self, radius: float) -> dict[int, NDArray[np.float64]]:
+    def samples(self, radius: float) -> dict[int, Float]:
         """Return the places (S, 3) to measure roughness at, by class: so few that it takes bounded time."""
         places = {label: sample.xyz for label, sample in self._samples.items() if len(sample.xyz)}
         density = self.moments.count.sum() / max(1.0, self._cells.area(None))
@@ -158,10 +159,10 @@ class _Cells:
 
     def __init__(self) -> None:
         self._keys = np.zeros(0, dtype=np.int64)
-        self._new: list[NDArray[np.int64]] = []
+        self._new: list[Int] = []
         self._pending = 0
 
-    def add(self, xyz: NDArray[np.float64], label: NDArray[np.uint8]) -> None:
+    def add(self, xyz: Float, label: UInt8) -> None:
         column = np.clip(np.floor(xyz[:, :2] / AREA_CELL), -(2**25), 2**25 - 1).astype(np.int64) + 2**25
         self._new.append(np.unique(((column[:, 0] << 26 | column[:, 1]) << 8) | label))
         self._pending += len(self._new[-1])
@@ -187,7 +188,7 @@ class _Sample:
         self.xyz = np.zeros((0, 3))
         self._ranks = np.zeros(0, dtype=np.uint64)
 
-    def add(self, xyz: NDArray[np.float64], ranks: NDArray[np.uint64]) -> None:
+    def add(self, xyz: Float, ranks: NDArray[np.uint64]) -> None:
         if len(self._ranks) >= self._size:
             low = ranks < self._ranks[-1] if self._size else np.zeros(len(ranks), dtype=bool)
             xyz, ranks = xyz[low], ranks[low]
@@ -196,7 +197,7 @@ class _Sample:
         self.xyz, self._ranks = np.concatenate([self.xyz, xyz])[order], ranks[order]
 
 
-def hash_positions(xyz: NDArray[np.float64]) -> NDArray[np.uint64]:
+def hash_positions(xyz: Float) -> NDArray[np.uint64]:
     """Return a well-mixed number (N,) of each position (N, 3), rounded to 0.1 mm (SplitMix64, Steele et al. 2014)."""
     mixed = np.zeros(len(xyz), dtype=np.uint64)
     for axis in range(3):
@@ -215,7 +216,7 @@ class _Roughness:
         radius: of the neighbourhood, m.
     """
 
-    def __init__(self, places: dict[int, NDArray[np.float64]], radius: float) -> None:
+    def __init__(self, places: dict[int, Float], radius: float) -> None:
         self._radius = radius
         self._places = np.concatenate(list(places.values())) if places else np.zeros((0, 3))
         self._label = np.repeat(list(places), [len(xyz) for xyz in places.values()]).astype(np.intp)
@@ -230,7 +231,7 @@ class _Roughness:
         self._keys, self._starts = np.unique(keys[order], return_index=True)
         self._counts = np.diff(np.r_[self._starts, len(order)])
 
-    def add(self, xyz: NDArray[np.float64]) -> None:
+    def add(self, xyz: Float) -> None:
         """Add a block's points (N, 3)."""
         if not len(self._keys):
             return
@@ -266,10 +267,10 @@ class _Roughness:
             result[int(label)] = float(variation[chosen].mean()), int(chosen.sum())
         return result
 
-    def _column(self, xyz: NDArray[np.float64]) -> NDArray[np.int64]:
+    def _column(self, xyz: Float) -> Int:
         return np.floor((xyz[:, :2] - self._corner) / max(self._radius, 1e-9)).astype(np.int64)
 
-    def _gather(self, step: NDArray[np.float64], place: NDArray[np.intp]) -> None:
+    def _gather(self, step: Float, place: Index) -> None:
         near = (step**2).sum(axis=1) <= self._radius**2
         step, place = step[near], place[near]
         size = len(self._places)
@@ -283,7 +284,7 @@ class _Roughness:
 _PAIRS = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))
 
 
-def _parts(counts: NDArray[np.intp]) -> Iterator[slice]:
+def _parts(counts: Index) -> Iterator[slice]:
     """Yield slices over points of which each stands for so many pairs that they fit into memory."""
     ends = np.cumsum(counts)
     first = 0

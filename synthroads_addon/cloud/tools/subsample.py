@@ -9,11 +9,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...base.arrays import AnyArray, Float, Index
 from ...base.errors import InputError
 from ..points import PointBlock
 from .tile_files import TileFiles
@@ -58,7 +57,7 @@ class GridSubsampler(TileFiles):
             yield points.select(np.lexsort((points.return_number, points.gps_time)))
 
 
-def keep_one_per_cell(block: PointBlock, cell: float) -> NDArray[np.intp]:
+def keep_one_per_cell(block: PointBlock, cell: float) -> Index:
     """Return the indices of the points that stay of a block, ordered by their cells (z, then y, then x)."""
     cells = np.floor(block.xyz / cell)
     away = ((block.xyz - (cells + 0.5) * cell) ** 2).sum(axis=1)
@@ -70,7 +69,7 @@ def keep_one_per_cell(block: PointBlock, cell: float) -> NDArray[np.intp]:
     return order[first]
 
 
-def _order(block: PointBlock, cells: NDArray[np.float64], nearness: NDArray[np.float64]) -> NDArray[np.intp]:
+def _order(block: PointBlock, cells: Float, nearness: Float) -> Index:
     """Return the order by cell, then nearness; where points tie, by position and attributes."""
     low = cells.min(axis=0) if len(cells) else np.zeros(3)
     spans = (cells.max(axis=0) - low + 1 if len(cells) else np.ones(3)).astype(np.int64)
@@ -79,7 +78,7 @@ def _order(block: PointBlock, cells: NDArray[np.float64], nearness: NDArray[np.f
         key = (relative[:, 2] * spans[1] + relative[:, 1]) * spans[0] + relative[:, 0]
         order = np.lexsort((nearness, key))
         tied = (np.diff(key[order]) == 0) & (np.diff(nearness[order]) == 0)
-        keys: tuple[NDArray[Any], ...] = (nearness, key)
+        keys: tuple[AnyArray, ...] = (nearness, key)
     else:
         order = np.lexsort((nearness, *cells.T))
         tied = np.all(np.diff(cells[order], axis=0) == 0, axis=1) & (np.diff(nearness[order]) == 0)

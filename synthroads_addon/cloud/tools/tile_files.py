@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Any, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...base.arrays import Int
 from ...base.scratch.folders import scratch_folder
 from ..points import PointBlock, make_block
 
@@ -33,7 +33,7 @@ class TileFiles:
     def __exit__(self, *_: object) -> None:
         self._scratch.close()
 
-    def append(self, block: PointBlock, tile: NDArray[np.int64]) -> None:
+    def append(self, block: PointBlock, tile: Int) -> None:
         """Append a block's points to their tiles (N, 2); all blocks must have the same attributes."""
         if len(block) == 0:
             return

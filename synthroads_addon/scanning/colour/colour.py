@@ -9,13 +9,11 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from ...base.arrays import AnyArray, ArrayRows, Bool, Float, Float32, UInt8, UInt16
 from ...cloud.points import NO_MATERIAL
 from ...materials.table import Material
-from ..array_rows import ArrayRows
 from .light import CloudShadows, SunAndSky
 from .settings import ColourMode
-
-Float = NDArray[np.float64]
 
 MATERIAL_LAYERS: dict[str, int] = {"base_color": 3, "roughness": 1, "metallic": 1, "specular": 1}
 """Layers of the surface itself, and their components."""
@@ -35,7 +33,7 @@ class LayerValues:
     """
 
     arrays: dict[str, NDArray[np.generic]]
-    source: NDArray[np.uint8]
+    source: UInt8
 
 
 def source_name(number: int) -> str:
@@ -73,7 +71,7 @@ class SeenPoints(ArrayRows):
     position: Float
     scanner: Float
     normal: NDArray[np.floating]
-    material: NDArray[np.uint16]
+    material: UInt16
     time: Float
 
     def __len__(self) -> int:
@@ -112,15 +110,15 @@ class SurfaceConstants:
         varies: by layer: (M,) bool; where False the mean is the exact value everywhere and nothing need be rendered.
     """
 
-    values: dict[str, NDArray[np.float32]]
-    varies: dict[str, NDArray[np.bool_]]
+    values: dict[str, Float32]
+    varies: dict[str, Bool]
 
     def varying(self, wanted: frozenset[str]) -> tuple[str, ...]:
         """Return those of the wanted layers that some material varies, in the order of `MATERIAL_LAYERS`."""
         return tuple(name for name in MATERIAL_LAYERS if name in wanted and bool(self.varies[name].any()))
 
 
-def surface_constants(rows: Sequence[Material], varies: dict[str, NDArray[np.bool_]] | None = None) -> SurfaceConstants:
+def surface_constants(rows: Sequence[Material], varies: dict[str, Bool] | None = None) -> SurfaceConstants:
     """Return the constants of materials in the order of the scene mesh's; nothing varies if not said so."""
     values = {
         name: np.array([getattr(row, name) for row in rows], np.float32).reshape((-1, 3) if parts == 3 else (-1,))
@@ -143,7 +141,7 @@ def decode_srgb(stored: Float) -> Float:
     return np.where(stored <= 0.04045, stored / 12.92, ((stored + 0.055) / 1.055) ** 2.4)
 
 
-def encode_srgb(linear: NDArray[np.floating]) -> NDArray[np.uint16]:
+def encode_srgb(linear: NDArray[np.floating]) -> UInt16:
     """Return linear colours as 16-bit sRGB (IEC 61966-2-1), clipped to what that can show."""
     linear = np.clip(np.asarray(linear, np.float32), 0.0, 1.0)
     curve = np.float32(1.055) * np.power(linear, np.float32(1 / 2.4)) - np.float32(0.055)
@@ -174,7 +172,7 @@ def sample_points(source: LayerSource, points: SeenPoints, wanted: frozenset[str
     if on is points:
         return values
 
-    def spread(array: NDArray[np.generic], rest: int) -> NDArray[Any]:
+    def spread(array: NDArray[np.generic], rest: int) -> AnyArray:
         result = np.full((len(points), *array.shape[1:]), rest, array.dtype)
         result[solid] = array
         return result
@@ -202,11 +200,7 @@ class MaterialLayers:
         return self.layer_values(points, {}, np.full(len(points), FROM_MATERIAL, np.uint8), wanted)
 
     def layer_values(
-        self,
-        points: SeenPoints,
-        channels: dict[str, NDArray[np.float32]],
-        source: NDArray[np.uint8],
-        wanted: frozenset[str],
+        self, points: SeenPoints, channels: dict[str, Float32], source: UInt8, wanted: frozenset[str]
     ) -> LayerValues:
         """Return the wanted layers: rendered ones where there are any and the material varies, else the means.
 
@@ -218,7 +212,7 @@ class MaterialLayers:
             wanted: layers.
         """
         found = source != FROM_MATERIAL
-        layers: dict[str, NDArray[np.float32]] = {}
+        layers: dict[str, Float32] = {}
         for name in sorted(needed_layers(wanted, self.shading.mode)):
             layers[name] = self.constants.values[name][points.material]
             if name in channels:
@@ -229,13 +223,7 @@ class MaterialLayers:
             arrays["rgb"] = self._rgb(points, layers, channels, found)
         return LayerValues(arrays, source)
 
-    def _rgb(
-        self,
-        points: SeenPoints,
-        layers: dict[str, NDArray[np.float32]],
-        channels: dict[str, NDArray[np.float32]],
-        found: NDArray[np.bool_],
-    ) -> NDArray[np.uint16]:
+    def _rgb(self, points: SeenPoints, layers: dict[str, Float32], channels: dict[str, Float32], found: Bool) -> UInt16:
         if self.shading.mode == "false_colour":
             return encode_srgb(np.stack([layers[name] for name in _FALSE_COLOUR], axis=1))
         color = layers["base_color"]

@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...base.arrays import Float, UInt16
 from .colour import decode_srgb
-
-Float = NDArray[np.float64]
 
 _WHITE = np.array([0.95047, 1.0, 1.08883])
 _TO_XYZ = np.array(
@@ -15,7 +13,7 @@ _TO_XYZ = np.array(
 )
 
 
-def cie_lab(rgb: NDArray[np.uint16]) -> Float:
+def cie_lab(rgb: UInt16) -> Float:
     """Return CIE L*a*b* (N, 3) under D65 of 16-bit sRGB (N, 3)."""
     ratio = decode_srgb(rgb.astype(np.float64) / 65535.0) @ _TO_XYZ.T / _WHITE
     f = np.where(ratio > (6 / 29) ** 3, np.cbrt(ratio), ratio * (29 / 6) ** 2 / 3 + 4 / 29)

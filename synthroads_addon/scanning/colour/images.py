@@ -7,14 +7,11 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...base.arrays import Bool, Float, Float32, Index, UInt8
 from .colour import FROM_MATERIAL, NEARBY, LayerValues, MaterialLayers, SeenPoints
 from .nearby import REACH, light_nearby, sample_nearby
 from .views import RenderedImage, View
-
-Float = NDArray[np.float64]
-Index = NDArray[np.intp]
 
 CANDIDATES = 8
 """Images nearest to the scanner that a point can take its values from; all of three places where that is more."""
@@ -82,7 +79,7 @@ class ImageLayers:
             points, {name: taken[:, part] for name, part in self.channels.items()}, source, wanted
         )
 
-    def _take_all(self, points: SeenPoints, taken: NDArray[np.float32], source: NDArray[np.uint8]) -> None:
+    def _take_all(self, points: SeenPoints, taken: Float32, source: UInt8) -> None:
         """Fill in values, sources, and times of the points that an image shows."""
         cube = np.floor(points.scanner / self._cell).astype(np.int64)
         if (cube == cube[0]).all():
@@ -93,7 +90,7 @@ class ImageLayers:
         for rows in np.split(order, np.flatnonzero(np.diff(group[order])) + 1):
             self._take(points, rows, taken, source)
 
-    def _take(self, points: SeenPoints, rows: Index, taken: NDArray[np.float32], source: NDArray[np.uint8]) -> None:
+    def _take(self, points: SeenPoints, rows: Index, taken: Float32, source: UInt8) -> None:
         """Fill in rows of points that the scanner saw from about one place."""
         seen = points.select(rows)
         chosen, misfit = self._misfits(seen, self._candidates)
@@ -114,9 +111,7 @@ class ImageLayers:
         if hidden.any():
             self._take_hidden(points, rows[hidden], taken, source)
 
-    def _take_hidden(
-        self, points: SeenPoints, rows: Index, taken: NDArray[np.float32], source: NDArray[np.uint8]
-    ) -> None:
+    def _take_hidden(self, points: SeenPoints, rows: Index, taken: Float32, source: UInt8) -> None:
         """Fill in what any image around shows of points that the best ones don't, and then what it shows close by.
 
         These are few: it is quicker to look at all of them in image by image than to go by their own order.
@@ -147,7 +142,7 @@ class ImageLayers:
         near = rows[source[rows] == NEARBY]
         taken[near] = light_nearby(self.material, points.select(near), taken[near], self.channels)
 
-    def _misfits(self, points: SeenPoints, candidates: int) -> tuple[NDArray[np.intp], NDArray[np.float32]]:
+    def _misfits(self, points: SeenPoints, candidates: int) -> tuple[Index, Float32]:
         """Return the images (C,) nearest to the scanner and how badly they suit each point (C, N)."""
         away = np.linalg.norm(self._places - points.scanner.mean(axis=0), axis=1)
         chosen = np.argsort(away, kind="stable")[:candidates]
@@ -162,14 +157,7 @@ class ImageLayers:
         return chosen, misfit
 
 
-def _misfit(
-    view: View,
-    at: NDArray[np.float32],
-    middle: Float,
-    scanned: NDArray[np.float32],
-    reach: NDArray[np.float32],
-    normal: NDArray[np.float32],
-) -> NDArray[np.float32]:
+def _misfit(view: View, at: Float32, middle: Float, scanned: Float32, reach: Float32, normal: Float32) -> Float32:
     """Return how badly (N,) an image suits points; `_NOWHERE` where it doesn't show them."""
     towards = (view.position - middle).astype(np.float32) - at
     away = np.maximum(_length(towards), np.float32(1e-6))
@@ -183,7 +171,7 @@ def _misfit(
     return np.where(inside, misfit, _NOWHERE)
 
 
-def sample_image(image: RenderedImage, points: SeenPoints) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
+def sample_image(image: RenderedImage, points: SeenPoints) -> tuple[Float32, Bool]:
     """Return an image's layers (n, C) of those n of N points that it shows, and which those are (N,).
 
     Bilinear over the pixels around a point that show its surface: the same material, at the depth of the plane
@@ -227,5 +215,5 @@ def _plane(view: View, points: SeenPoints) -> Callable[[Index, Index], Float]:
     return depths
 
 
-def _length(vectors: NDArray[np.float32]) -> NDArray[np.float32]:
+def _length(vectors: Float32) -> Float32:
     return np.sqrt(np.einsum("nk,nk->n", vectors, vectors))

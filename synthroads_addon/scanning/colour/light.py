@@ -7,10 +7,9 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ...base.arrays import Float, Float32
 from ...base.random_streams import stream
 from ...road.surroundings import Environment
-
-Float = NDArray[np.float64]
 
 SUN = np.array([0.35, -0.45, 0.82]) / np.linalg.norm([0.35, -0.45, 0.82])
 """Direction of a usual sun, where no environment says another."""
@@ -51,12 +50,12 @@ class SunAndSky:
     above: Float = field(default_factory=lambda: np.full(3, 0.45))
     below: Float = field(default_factory=lambda: np.full(3, 0.45))
 
-    def sunlight(self, normal: NDArray[np.floating]) -> NDArray[np.float32]:
+    def sunlight(self, normal: NDArray[np.floating]) -> Float32:
         """Return (N, 3) light of the sun on white matt surfaces with these unit normals (N, 3), unshadowed."""
         cosine = np.clip(np.asarray(normal, np.float32) @ self.direction.astype(np.float32), 0.0, None)
         return np.asarray(cosine[:, None] * self.sun.astype(np.float32))
 
-    def sky(self, normal: NDArray[np.floating]) -> NDArray[np.float32]:
+    def sky(self, normal: NDArray[np.floating]) -> Float32:
         """Return (N, 3) light of an unobstructed sky, and of the ground below it, on white matt surfaces.
 
         A surface sees a share (1 + n_z) / 2 of an even sky.
@@ -98,7 +97,7 @@ class CloudShadows:
         self._slope = sun[:2] / max(float(sun[2]), 0.05)
         self._field = _cloud_field(environment.cloud_cover, seed)
 
-    def transmission(self, position: Float, time: ArrayLike) -> NDArray[np.float32]:
+    def transmission(self, position: Float, time: ArrayLike) -> Float32:
         """Return the share (N,) of the direct sun at local positions (N, 3), m, and times (N,) or one time, s."""
         position = position + self._frame
         plan = position[:, :2] - position[:, 2:3] * self._slope
@@ -112,7 +111,7 @@ class CloudShadows:
         return np.asarray((1 - v) * ((1 - u) * f[i, j] + u * f[k, j]) + v * ((1 - u) * f[i, m] + u * f[k, m]))
 
 
-def _cloud_field(cover: float, seed: int) -> NDArray[np.float32]:
+def _cloud_field(cover: float, seed: int) -> Float32:
     """Return the transmission of the direct sun on a periodic lattice (C, C)."""
     random = stream(seed, "cloud shadows")
     total = np.zeros((_CELLS, _CELLS))

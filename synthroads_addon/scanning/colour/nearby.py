@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...base.arrays import Bool, Float, Float32, UInt16
 from .colour import MaterialLayers, SeenPoints
 from .views import RenderedImage
-
-Float = NDArray[np.float64]
 
 REACH = 0.3
 """How far away a place may lie that stands for a point, m."""
@@ -19,9 +17,7 @@ _LIT = 0.05
 """Share of the sun's full light from which on a place counts as lit."""
 
 
-def sample_nearby(
-    image: RenderedImage, position: Float, material: NDArray[np.uint16], limit: Float
-) -> tuple[NDArray[np.float32], NDArray[np.bool_], Float]:
+def sample_nearby(image: RenderedImage, position: Float, material: UInt16, limit: Float) -> tuple[Float32, Bool, Float]:
     """Return what an image shows close to points: its layers (n, C), of which points (N,), and how far away (n,), m.
 
     Of the pixels around a point's projection those count that show its material, and of these the one that shows the
@@ -49,9 +45,7 @@ def sample_nearby(
     return image.layers[j[best], i[best]][near].astype(np.float32), near, away[best][near]
 
 
-def light_nearby(
-    fallback: MaterialLayers, points: SeenPoints, taken: NDArray[np.float32], channels: dict[str, slice]
-) -> NDArray[np.float32]:
+def light_nearby(fallback: MaterialLayers, points: SeenPoints, taken: Float32, channels: dict[str, slice]) -> Float32:
     """Return channels (N, C) taken at places close by, with the sun's light as the points' own slope has it.
 
     Leaves, blades and sheets that touch lean every way. Whether the sun reaches a place is therefore all that is kept

@@ -8,11 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ...base.arrays import Float, Float32, UInt16
 from ..platforms.path import Path, Strip
 from ..scene.mesh import SceneMesh
 from .settings import ColourSettings
-
-Float = NDArray[np.float64]
 
 OVERLAP = 1.3
 """Length that an image covers as a multiple of the image spacing: what stands up is seen from aside."""
@@ -98,8 +97,8 @@ class RenderedImage:
 
     view: View
     layers: NDArray[np.float16]
-    depth: NDArray[np.float32]
-    material: NDArray[np.uint16]
+    depth: Float32
+    material: UInt16
 
 
 def views_along(path: Path, points: Float, settings: ColourSettings, field_of_view: float, largest: int) -> list[View]:
@@ -208,13 +207,7 @@ _AROUND: Sequence[Float] = tuple(_around())
 
 
 def _cut_view(
-    place: Float,
-    rotation: Float,
-    focal: float,
-    time: float,
-    points: Float,
-    limits: tuple[float, float],
-    largest: int,
+    place: Float, rotation: Float, focal: float, time: float, points: Float, limits: tuple[float, float], largest: int
 ) -> View | None:
     """Return a camera whose image holds the scene within its limits (tangents aside and along), or None if empty."""
     right, up, back = ((points - place) @ rotation).T

@@ -8,8 +8,9 @@ from functools import lru_cache
 
 import numpy as np
 
+from ...base.arrays import Float
 from ...base.rotations import rotation_matrix
-from ..patterns.base import Float, Numbers, PulseRays
+from ..patterns.base import Numbers, PulseRays
 from .device import ScannerSetting
 
 _LARGEST_TABLE = 2**18

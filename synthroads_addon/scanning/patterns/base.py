@@ -15,10 +15,10 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from ...base.arrays import Float, Int
 from ...base.schema import Model
 
-Float = NDArray[np.float64]
-Numbers = NDArray[np.int64]
+Numbers = Int
 
 FULL_TURN = 2.0 * math.pi
 

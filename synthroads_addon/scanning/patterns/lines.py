@@ -8,8 +8,9 @@ from typing import ClassVar, Literal
 import numpy as np
 from pydantic import Field
 
+from ...base.arrays import Float
 from ...base.schema import quantity
-from .base import Float, Numbers, Pattern, PulseRays, PulseTiming
+from .base import Numbers, Pattern, PulseRays, PulseTiming
 
 
 class LinePattern(Pattern):

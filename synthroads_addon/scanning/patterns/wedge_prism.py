@@ -8,8 +8,9 @@ from typing import ClassVar, Literal
 import numpy as np
 from pydantic import Field, model_validator
 
+from ...base.arrays import Float
 from ...base.schema import Model, quantity
-from .base import FULL_TURN, Float, Numbers, Pattern, PulseRays, PulseTiming
+from .base import FULL_TURN, Numbers, Pattern, PulseRays, PulseTiming
 
 
 class Wedge(Model):

@@ -7,8 +7,9 @@ offsets count to the left.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from ...base.arrays import Float
 from ...base.errors import InputError
 from ...road.alignment import Alignment
 from ...road.damage import damage_depth
@@ -16,8 +17,6 @@ from ...road.geometry import RoadGeometry
 from ...road.profile import Profile
 from ...road.section_geometry import CarriagewaySection
 from ...road.surface import surface_elevation
-
-Float = NDArray[np.float64]
 
 _SAMPLES = 201  # stations at which a lane's place is looked up
 _FULL_LANE = 1.99  # m; what is narrower is a lane that begins or ends

@@ -9,10 +9,11 @@ from typing import Any, ClassVar, Literal
 import numpy as np
 from pydantic import Field
 
+from ...base.arrays import Float
 from ...base.errors import InputError
 from ...base.rotations import rotation_matrix
 from ...base.schema import Finite, notes, quantity
-from .guides import Float, Guide, SmoothedGuide
+from .guides import Guide, SmoothedGuide
 from .path import KNOT_RANGE, Strip, knots_for, strips_of
 from .platform import Platform
 from .strip_line import EasedFunction, StripTrack, Sway

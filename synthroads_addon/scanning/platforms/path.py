@@ -6,11 +6,9 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...base.arrays import Float
 from ...base.errors import InputError
-
-Float = NDArray[np.float64]
 
 TURNAROUND = 10.0
 """Seconds between two strips."""

@@ -7,10 +7,11 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from ...base.arrays import Float
 from ...base.rotations import rotation_matrix
 from ...base.schema import ClosedModel, quantity
 from .guides import Guide
-from .path import Float, Path
+from .path import Path
 
 
 class Platform(ClosedModel):

@@ -6,14 +6,15 @@ import os
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from ...base.arrays import Float, Index
 from ...base.errors import InputError
 from ...base.rotations import wrap_angle
 from ...road.alignment import CURVATURE_LIMIT, Alignment, Element, finite_array
 from ...road.centerline import read_axis
 from ...road.profile import IntersectionPoint, Profile
-from .guides import Float, Guide
+from .guides import Guide
 
 CORNER = 10.0
 """A corner is rounded from this far (m) before it on, or from nearly half way to the nearer neighbouring point."""
@@ -89,7 +90,7 @@ class PolylineGuide(Guide):
         return cls(points - base, base.tolist(), tolerance)
 
 
-def _thin_points(points: Float, tolerance: float) -> NDArray[np.intp]:
+def _thin_points(points: Float, tolerance: float) -> Index:
     """Return the indices of the points that make the line: without repetitions, and thinned in three dimensions."""
     distinct = np.concatenate(([True], np.hypot(*np.diff(points[:, :2], axis=0).T) > _REPEATED))[: len(points)]
     kept = np.flatnonzero(distinct)
@@ -128,7 +129,7 @@ def _clothoid_lengths(turn: Float, reach: Float) -> Float:
     return np.asarray(reach / (x + y * np.tan(half)))
 
 
-def _refuse_sharp(points: Float, kept: NDArray[np.intp], turn: Float, lengths: Float) -> None:
+def _refuse_sharp(points: Float, kept: Index, turn: Float, lengths: Float) -> None:
     sharp = (np.abs(turn) > CURVATURE_LIMIT * lengths) | (np.abs(turn) > np.deg2rad(170.0))
     if not sharp.any():
         return

@@ -5,11 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...base.arrays import Float
 from .path import Path, Strip
-
-Float = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

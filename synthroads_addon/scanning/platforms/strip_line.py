@@ -8,11 +8,11 @@ from functools import cached_property
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...base.arrays import Float
 from ...base.errors import InputError
 from ...base.rotations import wrap_angle
-from .guides import Float, Guide
+from .guides import Guide
 
 FOLD = 0.98
 """An offset may use up to this share of the radius: beyond it the offset line would turn back on itself."""
@@ -240,16 +240,13 @@ class EasedFunction:
     def _near(self, centre: Float, values: Float) -> Float:
         return centre + wrap_angle(values - centre) if self._angles else values
 
-    def _at_nodes(self, numbers: NDArray[np.float64]) -> Float:
+    def _at_nodes(self, numbers: Float) -> Float:
         """Return the function at nodes; beyond the ends it goes on with the slope of the parabola that ends there."""
         distance = numbers * self.step
         within = np.clip(distance, 0.0, self._length)
         values = self._function(within)
         reach = min(0.5, self._length / 4.0)
-        for outside, end, inwards in (
-            (distance < 0.0, 0.0, reach),
-            (distance > self._length, self._length, -reach),
-        ):
+        for outside, end, inwards in ((distance < 0.0, 0.0, reach), (distance > self._length, self._length, -reach)):
             if outside.any():
                 last, middle, first = self._function(end + inwards * np.arange(3.0))
                 middle, first = self._near(last, middle), self._near(last, first)

@@ -9,14 +9,14 @@ from dataclasses import dataclass
 from typing import ClassVar, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field
 
+from ...base.arrays import Float, Int
 from ...base.errors import InputError, nearest_name
 from ...base.files import read_text
 from ...base.rotations import angle_between, matrices, quaternions, rotation_matrix, slerp
 from ...road.centerline import FARTHEST, fields_of
-from .guides import Float, Guide
+from .guides import Guide
 from .path import KNOT_RANGE, Strip, knots_for
 from .platform import Platform
 
@@ -136,7 +136,7 @@ class Trajectory:
     roll: Float
     pitch: Float
     heading: Float
-    lines: NDArray[np.int64]
+    lines: Int
 
 
 def read_trajectory(path: str | os.PathLike[str]) -> Trajectory:

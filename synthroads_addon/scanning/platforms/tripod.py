@@ -10,10 +10,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 from pydantic import Field
 
+from ...base.arrays import Float
 from ...base.errors import InputError
 from ...base.rotations import rotation_matrix
 from ...base.schema import Finite, notes, quantity
-from .guides import Float, Guide
+from .guides import Guide
 from .path import KNOT_RANGE, Strip, knots_for, strips_of
 from .platform import Platform
 

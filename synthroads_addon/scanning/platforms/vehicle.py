@@ -8,7 +8,8 @@ from typing import Any, ClassVar, Literal
 import numpy as np
 from pydantic import Field
 
-from .guides import Float, Guide
+from ...base.arrays import Float
+from .guides import Guide
 from .moving import MovingPath, MovingPlatform
 from .strip_line import StripTrack
 

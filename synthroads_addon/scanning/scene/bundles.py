@@ -5,12 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...base.arrays import Float, Index
 from ..knots import Track
-
-Float = NDArray[np.float64]
-Index = NDArray[np.intp]
 
 RAYS = 64
 """Rays of a bundle. Fewer make more bundles, more make wider ones; no result depends on it."""

@@ -7,9 +7,8 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from ...base.arrays import Float, Float32, Index
 from .mesh import SceneMesh
-
-Float = NDArray[np.float64]
 
 
 class Caster(Protocol):
@@ -23,9 +22,7 @@ class Caster(Protocol):
     name: str
     main_thread_only: bool
 
-    def cast(
-        self, origins: NDArray[np.float32], directions: NDArray[np.float32], maximum_range: float
-    ) -> NDArray[np.int32]:
+    def cast(self, origins: Float32, directions: Float32, maximum_range: float) -> NDArray[np.int32]:
         """Return the (N,) indices of the faces hit; -1 where nothing is hit within ``maximum_range`` (m).
 
         Args:
@@ -59,7 +56,7 @@ class FacePlanes:
         normal /= np.where(length > 0.0, length, 1.0)
         self.planes[3, block] = np.einsum("ij,ij->j", normal, a)
 
-    def intersect(self, faces: NDArray[np.intp], origins: Float, directions: Float) -> tuple[Float, Float]:
+    def intersect(self, faces: Index, origins: Float, directions: Float) -> tuple[Float, Float]:
         """Return where rays meet the planes of ``faces``: range (m) and n . d, whose size is the cosine of incidence.
 
         Args:
@@ -84,7 +81,7 @@ class FacePlanes:
             height /= along
         return height, along
 
-    def normals(self, faces: NDArray[np.intp], along: Float) -> Float:
+    def normals(self, faces: Index, along: Float) -> Float:
         """Return (3, H) unit normals of faces, turned towards rays with n . d = ``along`` (H,)."""
         result = np.take(self.planes[:3], faces, axis=1)
         result *= np.where(along > 0.0, -1.0, 1.0)

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...base.arrays import Float
 from ...cloud.strays import Strays
 from .mesh import SceneMesh
-
-Float = NDArray[np.float64]
 
 _BLOCK = 1 << 17
 _SHORTEST = 1.0  # m

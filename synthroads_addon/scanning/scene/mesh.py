@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ...base.arrays import AnyArray, Float, Float32, UInt8, UInt16
 from ...base.errors import InputError
 from ...cloud.strays import FARTHEST
 
@@ -39,13 +39,13 @@ class SceneMesh:
         InputError: wrong shape or type, indices out of range, or numbers that aren't finite; names the field.
     """
 
-    vertices: NDArray[np.float32]
+    vertices: Float32
     triangles: NDArray[np.int32]
-    class_id: NDArray[np.uint8]
+    class_id: UInt8
     instance_id: NDArray[np.uint32]
-    material: NDArray[np.uint16]
+    material: UInt16
     materials: tuple[str, ...]
-    origin: NDArray[np.float64]
+    origin: Float
 
     def __post_init__(self) -> None:
         for name, (dtype, shape) in _SHAPES.items():
@@ -87,13 +87,13 @@ class SceneMesh:
         """Return the size of all arrays, bytes."""
         return sum(value.nbytes for f in fields(self) if hasattr(value := getattr(self, f.name), "nbytes"))
 
-    def vertex_bounds(self) -> NDArray[np.float64] | None:
+    def vertex_bounds(self) -> Float | None:
         """Return the smallest and the largest local coordinates (2, 3) of the vertices, m; None without any."""
         if not len(self.vertices):
             return None
         return np.array([self.vertices.min(axis=0), self.vertices.max(axis=0)], dtype=np.float64)
 
-    def normals(self) -> NDArray[np.float64]:
+    def normals(self) -> Float:
         """Return (T, 3) unit normals; triangles without area have the zero vector."""
         result = np.empty((len(self.triangles), 3))
         for start in range(0, len(result), _BLOCK):
@@ -102,20 +102,20 @@ class SceneMesh:
             result[start : start + _BLOCK] = cross / np.where(length > 0.0, length, 1.0)[:, None]
         return result
 
-    def areas(self) -> NDArray[np.float64]:
+    def areas(self) -> Float:
         """Return (T,) areas, m2."""
         result = np.empty(len(self.triangles))
         for start in range(0, len(result), _BLOCK):
             result[start : start + _BLOCK] = np.linalg.norm(self._cross(start), axis=1) / 2.0
         return result
 
-    def _cross(self, start: int) -> NDArray[Any]:
+    def _cross(self, start: int) -> AnyArray:
         """Return (B, 3) cross products of two sides of the triangles of one block, in float64."""
         corners = self.vertices[self.triangles[start : start + _BLOCK]].astype(np.float64)
         return np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
 
 
-def empty_scene_mesh(origin: NDArray[np.float64], materials: tuple[str, ...] = ()) -> SceneMesh:
+def empty_scene_mesh(origin: Float, materials: tuple[str, ...] = ()) -> SceneMesh:
     """Return a mesh without triangles."""
     return SceneMesh(
         vertices=np.empty((0, 3), np.float32),

@@ -17,8 +17,8 @@ from typing import Any, BinaryIO
 from urllib.parse import unquote
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...base.arrays import AnyArray, UInt8
 from ...base.errors import InputError
 from ...cloud.formats.ply import PLY_TYPES
 
@@ -111,7 +111,7 @@ def _ply_type(word: str) -> str:
     return PLY_TYPES[word].lstrip("<")
 
 
-def _ply_text(file: BinaryIO, elements: list[tuple[str, int, list[_Property]]]) -> Iterator[NDArray[Any]]:
+def _ply_text(file: BinaryIO, elements: list[tuple[str, int, list[_Property]]]) -> Iterator[AnyArray]:
     """Yield the vertices of each face of a PLY as text."""
     for name, count, properties in elements:
         for _ in range(count):
@@ -125,7 +125,7 @@ def _ply_text(file: BinaryIO, elements: list[tuple[str, int, list[_Property]]]) 
 
 def _ply_bytes(
     path: Path, file: BinaryIO, kind: str, elements: list[tuple[str, int, list[_Property]]]
-) -> Iterator[NDArray[Any]]:
+) -> Iterator[AnyArray]:
     """Yield the vertices of faces of a binary PLY: of all at once where all have as many, else of one by one."""
     order = {"binary_little_endian": "<", "binary_big_endian": ">"}[kind]
     data, at = np.memmap(path, np.uint8, "r"), file.tell()
@@ -145,9 +145,7 @@ def _ply_bytes(
             raise ValueError("it ends before its elements do")
 
 
-def _ply_lists(
-    data: NDArray[np.uint8], at: int, count: int, properties: list[_Property]
-) -> Iterator[tuple[NDArray[Any], int]]:
+def _ply_lists(data: UInt8, at: int, count: int, properties: list[_Property]) -> Iterator[tuple[AnyArray, int]]:
     """Yield the lists of an element's entries, and where the entries end that they belong to."""
     place = next(place for place, (length, _, _) in enumerate(properties) if length)
     before = sum(np.dtype(kind).itemsize for _, kind, _ in properties[:place])

@@ -6,8 +6,9 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from ...base.arrays import Bool, Float
 from ...base.errors import InputError
 from ...road.alignment import finite_array
 from ...road.geometry import RoadGeometry
@@ -17,8 +18,7 @@ from ...road.things.vehicles import CHASSIS, VEHICLE_TYPES
 from .mesh import SceneMesh
 from .passes import VehiclePasses, lane_passes
 
-Float = NDArray[np.float64]
-Pose = tuple[Float, Float, NDArray[np.bool_]]
+Pose = tuple[Float, Float, Bool]
 
 
 class Motion(Protocol):
@@ -163,7 +163,7 @@ class LaneMotion:
             moved._way = self._way.from_elsewhere(moved._way.start)
         return moved
 
-    def _place(self, time: Float) -> tuple[Float, NDArray[np.bool_]]:
+    def _place(self, time: Float) -> tuple[Float, Bool]:
         """Return stations and presence (K,)."""
         if self._way is None or self.speed_factor == 0.0:
             return np.full(time.shape, self.vehicle.station), np.ones(time.shape, dtype=bool)

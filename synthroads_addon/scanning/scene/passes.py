@@ -6,11 +6,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...base.arrays import Bool, Float
 from ...road.things.vehicles import VEHICLE_GAP
-
-Float = NDArray[np.float64]
 
 OVERHANG = 0.25
 """A vehicle is there while no more of it than this (m) sticks out of its lane: in a curve its lane is shorter than the
@@ -42,7 +40,7 @@ class VehiclePasses:
         """Return when its middle reaches the lane's end, s."""
         return max(0.0, (self.whole - self.start) / self.speed)
 
-    def at(self, time: Float) -> tuple[Float, NDArray[np.bool_]]:
+    def at(self, time: Float) -> tuple[Float, Bool]:
         """Return the distances (K,) of its middle, m, and whether (K,) it is there, at times (K,).
 
         Where it waits to come in again it is at the lane's end.

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...base.arrays import AnyArray, Float, Float32, Index
 from ...base.classes import UNLABELLED
 from ...cloud.points import NO_MATERIAL
 from ..knots import PoseCache, Track, track_knots
@@ -16,9 +15,6 @@ from .bundles import Bundles
 from .caster import Caster, FacePlanes
 from .mesh import SceneMesh
 from .motion import MovingMesh, ScannedScene
-
-Float = NDArray[np.float64]
-Faces = NDArray[np.intp]
 
 CLEARANCE = np.array([2.5, 1.0, 3.0])
 """Room that a vehicle which carries the scanner takes around it: half its length and width, and its height, m."""
@@ -55,7 +51,7 @@ class FirstHits:
         along: n . d of the face's normal and the ray.
     """
 
-    face: Faces
+    face: Index
     distance: Float
     along: Float
 
@@ -95,7 +91,7 @@ class Target:
         self.caster = self._parts[0].caster
         self.bounds = static.vertex_bounds()
 
-    def face_values(self, name: str, faces: Faces) -> NDArray[Any]:
+    def face_values(self, name: str, faces: Index) -> AnyArray:
         """Return ``class_id``, ``instance_id`` or ``material`` of faces (H,); of -1 what stands for none."""
         values = getattr(self, name)
         if not len(faces) or faces.min() >= 0:
@@ -149,7 +145,7 @@ class Target:
         return FirstHits(*(getattr(nearest, name).reshape(shape[1:]) for name in ("face", "distance", "along")))
 
     def at_start(
-        self, faces: Faces, places: Float, times: Float, motions: list[Track], vectors: tuple[Float, ...] = ()
+        self, faces: Index, places: Float, times: Float, motions: list[Track], vectors: tuple[Float, ...] = ()
     ) -> tuple[Float, ...]:
         """Return places on faces, and directions there, as they are in the scene at the time 0.
 
@@ -173,7 +169,7 @@ class Target:
                 result[:, mine] = begin_rotation[0] @ _inverse(rotation, vector[:, mine])
         return results
 
-    def normals(self, faces: Faces, along: Float, times: Float, motions: list[Track]) -> Float:
+    def normals(self, faces: Index, along: Float, times: Float, motions: list[Track]) -> Float:
         """Return (3, H) unit normals, local, turned towards the rays that met the faces."""
         result = np.empty((3, len(faces)))
         for number, part in enumerate(self._parts):
@@ -188,7 +184,7 @@ class Target:
         return result
 
 
-def _join_arrays(arrays: list[NDArray[Any]]) -> NDArray[Any]:
+def _join_arrays(arrays: list[AnyArray]) -> AnyArray:
     return arrays[0] if len(arrays) == 1 else np.concatenate(arrays)
 
 
@@ -229,7 +225,7 @@ def _cast(part: _TargetPart, origins: Float, directions: Float, maximum_range: f
     return FirstHits(face, distance, along)
 
 
-def _rows(vectors: Float) -> NDArray[np.float32]:
+def _rows(vectors: Float) -> Float32:
     """Return vectors (3, ...) as casters take them, (..., 3)."""
     result = np.empty((*vectors.shape[1:], 3), dtype=np.float32)
     for i in range(3):
