@@ -37,16 +37,19 @@ from synthroads_addon.dataset.manifest import (
     Manifest,
     SceneEntry,
     append_record,
+    begin_removal,
     check_same_recipe,
     faults,
+    finish_removal,
     fold_records,
+    made_by,
     manifest_of,
     read_manifest,
+    remove,
     write_atomically,
     write_manifest,
 )
 from synthroads_addon.dataset.recipe import Recipe, SceneJob, scene_jobs
-from synthroads_addon.dataset.replacing import begin_removal, finish_removal, made_by, remove
 
 WORK = ".work"
 LOCK = ".lock"

@@ -13,8 +13,8 @@ from ..base.arrays import Float, Index
 from ..base.errors import InputError
 from ..base.noise import field
 from ..materials.reflectance import LUMINANCE, facet_terms
+from ..materials.surfaces import OCTAVES
 from ..materials.table import Material
-from ..materials.texture_spread import OCTAVES
 from .expected import Expectation, Receiver
 
 Function = Callable[[Float], Float]
@@ -41,7 +41,7 @@ class Fit:
 
     Attributes:
         level: factor on the material's linear intensities: the device's gain times the change of the brightness.
-        below, above: spreads, see `materials.texture_spread`.
+        below, above: spreads, see `materials.surfaces`.
     """
 
     level: float

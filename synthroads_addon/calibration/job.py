@@ -18,7 +18,7 @@ from ..materials.surfaces import Reflection
 from ..materials.table import Material, materials, read_material_table, write_material_table
 from ..scanning.devices.device import load_device
 from .classes import RealClass, RealCloud, class_by_label, read_real, seen_from
-from .expected import Expectation, Receiver, Views, chosen_views
+from .expected import Expectation, Receiver, Texture, Views, chosen_views, read_texture
 from .fit import (
     FITTED,
     SHOWN,
@@ -32,7 +32,6 @@ from .fit import (
     interquartile,
 )
 from .pavement import RoadClasses, road_classes
-from .texture import Texture, read_texture
 
 Part = Literal["spread", "wavelength", "slope"]
 PARTS: tuple[Part, ...] = ("spread", "wavelength", "slope")

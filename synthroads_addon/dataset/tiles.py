@@ -10,7 +10,7 @@ import numpy as np
 
 from ..base.arrays import Float
 from ..cloud.points import PointBlock
-from ..cloud.tools.tile_files import TileFiles
+from ..cloud.tools.subsample import TileFiles
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,7 @@ What only the scanner reads is assumed as follows; `docs/radiometry.md` has the 
   paint, steel); else they follow from the roughness.
 - **Retro-reflection** is the effective reflectance of the retro term alone, pi times the coefficient of
   retro-reflection (cd/lx/m2) at a right angle; a perfect diffuser has 1.
-- **Spread** says how the brightness differs from place to place of one material, see `materials.texture_spread`. The
+- **Spread** says how the brightness differs from place to place of one material, see `materials.surfaces`. The
   shipped table has none; `synthroads calibrate` fits it to real clouds.
 """
 

@@ -9,8 +9,7 @@ import numpy as np
 from ..base.arrays import Bool, Float, Index, Int
 from ..base.random_streams import stream
 from ..cloud.points import PointBlock, concatenate, make_block
-from ..materials.surfaces import brightness_of
-from ..materials.texture_spread import spread_factors
+from ..materials.surfaces import brightness_of, spread_factors
 from .beam import conical_directions, cylindrical_offsets
 from .colour.colour import SeenPoints
 from .devices.shots import shots
@@ -219,7 +218,7 @@ class BlockScan:
         return Marks(hits.distance, weight, received_intensity(brightness, hits.distance, self.plan.attenuation))
 
     def vary_brightness(self, traced: Traced, echoes: Echoes, motions: list[Track]) -> Echoes:
-        """Return the echoes as bright as the places are that gave most of them, see `materials.texture_spread`."""
+        """Return the echoes as bright as the places are that gave most of them, see `materials.surfaces`."""
         surfaces, target = self.plan.surfaces, self.plan.target
         material = traced.pick("material", echoes.hit)
         uneven = np.flatnonzero(np.take(surfaces.uneven, material, mode="clip"))

@@ -7,7 +7,7 @@ from typing import Any
 from pydantic import Field, model_validator
 
 from ..base.schema import ClosedModel, notes, optional, quantity
-from ..scanning.colour.settings import ColourMode, ColourSettings, ColourSource, Engine, Lighting
+from ..scanning.colour.colour import ColourMode, ColourSettings, ColourSource, Engine, Lighting
 
 USUAL_RANGE = 60.0
 """Range that the fidelities' spacings and pixels are meant for, m."""

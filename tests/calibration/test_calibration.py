@@ -14,7 +14,7 @@ from synthroads_addon.base.arrays import otsu
 from synthroads_addon.base.errors import InputError, OutputError
 from synthroads_addon.base.noise import field
 from synthroads_addon.calibration.classes import RealClass, class_by_label, read_real, seen_from
-from synthroads_addon.calibration.expected import Expectation, Receiver, Views, chosen_views
+from synthroads_addon.calibration.expected import Expectation, Receiver, Views, chosen_views, read_texture, texture_of
 from synthroads_addon.calibration.fit import (
     BRIGHTEST,
     brighten_material,
@@ -25,7 +25,6 @@ from synthroads_addon.calibration.fit import (
 from synthroads_addon.calibration.job import Calibration, CalibrationJob, MaterialTarget, calibrate, save_fitted, steps
 from synthroads_addon.calibration.pavement import RoadClasses, beside_axis, road_classes
 from synthroads_addon.calibration.plot import save_plot
-from synthroads_addon.calibration.texture import read_texture, texture_of
 from synthroads_addon.materials.reflectance import facet_terms
 from synthroads_addon.materials.table import Material, materials, read_material_table, write_material_table
 from synthroads_addon.scenario.scenario import Scenario

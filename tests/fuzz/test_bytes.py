@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from synthroads_addon.base.errors import InputError
-from synthroads_addon.calibration.texture import read_texture
+from synthroads_addon.calibration.expected import read_texture
 from synthroads_addon.cloud.formats.las import open_to_copy
 from synthroads_addon.cloud.formats.registry import open_cloud, open_writer
 from synthroads_addon.cloud.layers import DEFAULT_ATTRIBUTES

@@ -23,7 +23,7 @@ from headless.dataset_scene import DONE, FILES, published_folders
 from synthroads_addon.base.errors import InputError, OutputError
 from synthroads_addon.base.scratch import exclusive
 from synthroads_addon.base.scratch.owner import this_process
-from synthroads_addon.dataset import replacing
+from synthroads_addon.dataset import manifest as manifest_module
 from synthroads_addon.dataset.manifest import (
     RECORDS,
     Manifest,
@@ -209,7 +209,7 @@ CRASHES += [*(("write_manifest", after) for after in (0, 1, 2)), *(("append_reco
 def test_after_a_crash_no_scene_that_the_manifest_names_is_missing(
     old: Path, fresh: Path, place: str, after: int, goes_on: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    home = replacing if place == "remove" else dataset_run
+    home = manifest_module if place == "remove" else dataset_run
     before = content(old)
     with monkeypatch.context() as patched:
         patched.setattr(home, place, crashing(getattr(home, place), after))
@@ -219,7 +219,7 @@ def test_after_a_crash_no_scene_that_the_manifest_names_is_missing(
     manifest = read_manifest(old)
     assert not faults(old, manifest.scenes)
     if manifest.title == "Old":
-        assert {name: data for name, data in content(old).items() if name != replacing.REPLACED} == before
+        assert {name: data for name, data in content(old).items() if name != manifest_module.REPLACED} == before
         make(old, OLD, resume=True)
         assert content(old) == before
         goes_on = "overwrite"

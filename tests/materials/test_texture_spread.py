@@ -8,9 +8,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from synthroads_addon.base.noise import field
-from synthroads_addon.materials.surfaces import surfaces_of
+from synthroads_addon.materials import surfaces as module
+from synthroads_addon.materials.surfaces import OCTAVES, mean_over_median, spread_factors, surfaces_of
 from synthroads_addon.materials.table import Material, materials
-from synthroads_addon.materials.texture_spread import OCTAVES, factor, spread_factors
 from tests.helpers.scenes.scan_scenes import Standing, middle_pulses, plane, scan_of
 
 UNEVEN = materials()["asphalt"].model_copy(update={"spread_below": 0.4, "spread_above": 0.2, "spread_wavelength": 2.0})
@@ -26,14 +26,16 @@ def test_the_mean_is_one_whatever_the_spreads(below: float, above: float) -> Non
     # Gauss and Hermite's rule on either side: the kink at 0 is what makes this slow to converge, so many nodes.
     z = (np.arange(200_000) + 0.5) / 200_000 * 24.0 - 12.0
     weight = np.exp(-0.5 * z * z)
-    mean = (factor(z, below, above) * weight).sum() / weight.sum()
-    assert mean == pytest.approx(1.0, rel=1e-6)
+    mean = (np.exp(z * np.where(z < 0.0, below, above)) * weight).sum() / weight.sum()
+    assert mean == pytest.approx(float(mean_over_median(below, above)), rel=1e-6)
 
 
-def test_logarithms_are_normal_on_either_side() -> None:
+def test_logarithms_are_normal_on_either_side(monkeypatch: pytest.MonkeyPatch) -> None:
     z = np.array([-2.0, -1.0, 0.0, 1.0, 2.0])
-    logs = np.log(factor(z, 0.4, 0.1))
-    assert np.diff(logs) == pytest.approx([0.4, 0.4, 0.1, 0.1])
+    monkeypatch.setattr(module, "field", lambda *_: z)
+    factors = spread_factors(surfaces_of([UNEVEN]), np.zeros(len(z), dtype=np.intp), np.zeros((len(z), 3)), 1)
+    assert np.diff(np.log(factors)) == pytest.approx([0.4, 0.4, 0.2, 0.2])
+    assert factors[2] == pytest.approx(1.0 / float(mean_over_median(0.4, 0.2)))
 
 
 def test_the_field_of_three_octaves_is_nearly_normal() -> None:

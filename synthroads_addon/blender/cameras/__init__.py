@@ -8,10 +8,9 @@ from contextlib import ExitStack, contextmanager
 import bpy
 
 from ...base.errors import InputError
-from ...scanning.colour.colour import LayerSource, SurfaceConstants, needed_layers
+from ...scanning.colour.colour import ColourSettings, LayerSource, SurfaceConstants, needed_layers
 from ...scanning.colour.light import SunAndSky
 from ...scanning.colour.request import LayerRequest, material_layers
-from ...scanning.colour.settings import ColourSettings
 from ...scanning.colour.views import View, scene_sample, views_along
 from .images import RenderedLayers
 from .light import daylight

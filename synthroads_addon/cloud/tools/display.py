@@ -21,8 +21,7 @@ from ...base.errors import InputError
 from ...base.random_streams import stream
 from ..formats.base import CloudHeader
 from ..formats.registry import open_cloud
-from .picture import gray
-from .raster import Brightness
+from .picture import Brightness, gray
 
 ColourBy = Literal["class", "intensity", "rgb", "height"]
 COLOURINGS: tuple[ColourBy, ...] = get_args(ColourBy)

@@ -9,8 +9,7 @@ import numpy as np
 from ...base.arrays import AnyArray, Float
 from ...base.classes import ClassScheme, class_scheme
 from ..points import PointBlock
-from .picture import PAPER, Legend, add_frame, class_legend, gray, nice_step
-from .raster import Axes, Raster
+from .picture import PAPER, Axes, Legend, Raster, add_frame, class_legend, gray, nice_step
 
 WIDTH = 1800
 """Width of the pictures, pixels."""

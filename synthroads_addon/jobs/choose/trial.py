@@ -21,9 +21,8 @@ from ...blender.cameras import image_views, layer_source
 from ...blender.services import BlenderServices
 from ...cloud.points import PointBlock
 from ...scanning.beam import RINGS
-from ...scanning.colour.colour import LayerValues, SeenPoints, sample_points
+from ...scanning.colour.colour import ColourSettings, LayerValues, SeenPoints, sample_points
 from ...scanning.colour.request import LayerRequest
-from ...scanning.colour.settings import ColourSettings
 from ...scanning.colour.views import View
 from ...scanning.noise import Noise
 from ...scanning.plan import ScanPlan

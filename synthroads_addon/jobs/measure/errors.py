@@ -25,10 +25,9 @@ from ...blender.cameras import HAS_RETURN_CAMERA
 from ...cloud.points import PointBlock
 from ...road.geometry import RoadGeometry
 from ...scanning.beam import RINGS
-from ...scanning.colour.colour import FROM_MATERIAL, MATERIAL_LAYERS, NEARBY, LayerValues, source_name
+from ...scanning.colour.colour import FROM_MATERIAL, MATERIAL_LAYERS, NEARBY, ColourSettings, LayerValues, source_name
 from ...scanning.colour.difference import cie_lab, ciede2000
 from ...scanning.colour.request import LayerRequest
-from ...scanning.colour.settings import ColourSettings
 from ...scanning.relief import MicroRelief, shift_along_normals
 from ...scanning.scan import BlockResult
 from ...scanning.scene.mesh import SceneMesh

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any, Protocol
+from typing import Any, Literal, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +13,37 @@ from ...base.arrays import AnyArray, ArrayRows, Bool, Float, Float32, UInt8, UIn
 from ...cloud.points import NO_MATERIAL
 from ...materials.table import Material
 from .light import CloudShadows, SunAndSky
-from .settings import ColourMode
+
+ColourSource = Literal["auto", "images", "returns", "material"]
+Engine = Literal["cycles", "eevee"]
+ColourMode = Literal["lit", "unlit", "false_colour"]
+Lighting = Literal["direct", "path"]
+
+
+@dataclass(frozen=True)
+class ColourSettings:
+    """How colours and layers are rendered.
+
+    Attributes:
+        image_spacing: distance between two images along the path, m.
+        ground_sampling_distance: width of a pixel at the usual range, m.
+        samples: samples per pixel of the lit colours.
+        source: images, a pixel per return, or each material's mean; auto takes a pixel per return where that is there.
+        engine: renderer of the images.
+        mode: what RGB shows.
+        lighting: sun and open sky without noise, or whole light paths.
+        max_resolution: largest side of an image, px.
+    """
+
+    image_spacing: float
+    ground_sampling_distance: float
+    samples: int
+    source: ColourSource = "auto"
+    engine: Engine = "cycles"
+    mode: ColourMode = "lit"
+    lighting: Lighting = "direct"
+    max_resolution: int = 4096
+
 
 MATERIAL_LAYERS: dict[str, int] = {"base_color": 3, "roughness": 1, "metallic": 1, "specular": 1}
 """Layers of the surface itself, and their components."""

@@ -8,9 +8,8 @@ from dataclasses import dataclass
 from ...road.surroundings import Environment
 from ..platforms.path import Path
 from ..scene.mesh import SceneMesh
-from .colour import MaterialLayers, Shading, SurfaceConstants
+from .colour import ColourSettings, MaterialLayers, Shading, SurfaceConstants
 from .light import CloudShadows, SunAndSky
-from .settings import ColourSettings
 from .views import View
 
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from ...base.arrays import Float, Float32, UInt16
 from ..platforms.path import Path, Strip
 from ..scene.mesh import SceneMesh
-from .settings import ColourSettings
+from .colour import ColourSettings
 
 OVERLAP = 1.3
 """Length that an image covers as a multiple of the image spacing: what stands up is seen from aside."""

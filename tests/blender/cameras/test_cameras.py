@@ -12,9 +12,15 @@ from synthroads_addon.blender.cameras.images import aim
 from synthroads_addon.blender.cameras.light import daylight
 from synthroads_addon.blender.cameras.stage import Passes, stage
 from synthroads_addon.blender.materials import material as table_material
-from synthroads_addon.scanning.colour.colour import FROM_MATERIAL, FROM_RETURN, MATERIAL_LAYERS, NEARBY, SeenPoints
-from synthroads_addon.scanning.colour.nearby import REACH
-from synthroads_addon.scanning.colour.settings import ColourSettings
+from synthroads_addon.scanning.colour.colour import (
+    FROM_MATERIAL,
+    FROM_RETURN,
+    MATERIAL_LAYERS,
+    NEARBY,
+    ColourSettings,
+    SeenPoints,
+)
+from synthroads_addon.scanning.colour.images import REACH
 from synthroads_addon.scanning.colour.views import scene_sample, views_along
 from tests.helpers.scenes.coded_scene import (
     ENVIRONMENT,

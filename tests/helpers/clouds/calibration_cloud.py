@@ -5,9 +5,14 @@ from pathlib import Path
 import laspy
 import numpy as np
 
-from synthroads_addon.materials.texture_spread import factor
+from synthroads_addon.materials.surfaces import mean_over_median
 
 FULL = 65_535.0
+
+
+def brightness_factors(normal: np.ndarray, below: float, above: float) -> np.ndarray:
+    """Return the factors on a material's brightness of normal values (N,), with the spreads to either side."""
+    return np.exp(normal * np.where(normal < 0.0, below, above)) / mean_over_median(below, above)
 
 
 def write_las(path: Path, xyz: np.ndarray, intensity: np.ndarray, label: np.ndarray | None = None) -> Path:
@@ -35,7 +40,7 @@ def labelled(path: Path, decibels: float | None, gain: float, zeros: int = 50, s
     rng = np.random.default_rng(seed)
     kinds = [(40, 0.2, 0.3, 0.15, 30_000), (60, 0.5, 0.1, 0.2, 6_000)]
     label = np.repeat([kind[0] for kind in kinds], [kind[4] for kind in kinds])
-    linear = np.concatenate([r * factor(rng.standard_normal(n), low, high) for _, r, low, high, n in kinds])
+    linear = np.concatenate([r * brightness_factors(rng.standard_normal(n), low, high) for _, r, low, high, n in kinds])
     intensity = stored(linear, gain, decibels)
     intensity[:zeros] = 0.0
     xyz = np.column_stack([rng.random((len(label), 2)) * 100.0, np.zeros(len(label))])
@@ -52,6 +57,6 @@ def striped(path: Path, axis: Path, gain: float, shift: float = 0.25) -> tuple[P
     x, y = rng.random(120_000) * 300.0, rng.random(120_000) * 12.0 - 6.0
     line = 3.0 + np.where(x > 160.0, shift, 0.0)
     paint = (np.abs(y - line) <= 0.1) & (x % 12.0 < 6.0)
-    linear = np.where(paint, 0.35, 0.15) * factor(rng.standard_normal(len(x)), 0.3, 0.3)
+    linear = np.where(paint, 0.35, 0.15) * brightness_factors(rng.standard_normal(len(x)), 0.3, 0.3)
     axis.write_text("x,y,z\n" + "".join(f"{s},0,0\n" for s in range(301)), encoding="utf-8")
     return write_las(path, np.column_stack([x, y, np.zeros(len(x))]), stored(linear, gain, 30.0)), paint

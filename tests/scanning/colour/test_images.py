@@ -14,16 +14,15 @@ from synthroads_addon.scanning.colour.colour import (
     FROM_MATERIAL,
     MATERIAL_LAYERS,
     NEARBY,
+    ColourSettings,
     MaterialLayers,
     SeenPoints,
     Shading,
     encode_srgb,
     surface_constants,
 )
-from synthroads_addon.scanning.colour.images import ImageLayers, sample_image
+from synthroads_addon.scanning.colour.images import REACH, ImageLayers, sample_image
 from synthroads_addon.scanning.colour.light import SunAndSky
-from synthroads_addon.scanning.colour.nearby import REACH
-from synthroads_addon.scanning.colour.settings import ColourSettings
 from synthroads_addon.scanning.colour.views import RenderedImage, View, views_along
 
 DOWN = np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])

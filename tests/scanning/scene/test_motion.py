@@ -19,8 +19,7 @@ from synthroads_addon.road.section import Carriageway
 from synthroads_addon.road.surroundings import Vehicle
 from synthroads_addon.road.things.vehicles import CHASSIS, VEHICLE_GAP, VEHICLE_LANE_WIDTH, VEHICLE_TYPES
 from synthroads_addon.sampling.road import sample_road
-from synthroads_addon.scanning.scene.motion import LaneMotion, LinearMotion, lane_motions
-from synthroads_addon.scanning.scene.passes import OVERHANG, lane_passes
+from synthroads_addon.scanning.scene.motion import OVERHANG, LaneMotion, LinearMotion, lane_motions, lane_passes
 from synthroads_addon.scenario.road import RoadScenario
 
 Float = NDArray[np.float64]
