@@ -179,21 +179,6 @@ def encode_srgb(linear: NDArray[np.floating]) -> UInt16:
     return np.asarray(encoded * np.float32(65535.0) + np.float32(0.5), dtype=np.uint16)
 
 
-@dataclass(frozen=True)
-class Shading:
-    """How layers and light become RGB.
-
-    Attributes:
-        mode: what RGB shows.
-        light: sun and sky, exposed.
-        clouds: shadows that drift, or None.
-    """
-
-    mode: ColourMode = "lit"
-    light: SunAndSky = field(default_factory=SunAndSky)
-    clouds: CloudShadows | None = None
-
-
 def sample_points(source: LayerSource, points: SeenPoints, wanted: frozenset[str]) -> LayerValues:
     """Return the wanted layers of points; 0, as if of a material, for those in the air."""
     solid = np.flatnonzero(points.material != NO_MATERIAL)
@@ -211,19 +196,24 @@ def sample_points(source: LayerSource, points: SeenPoints, wanted: frozenset[str
     return LayerValues(arrays, spread(values.source, FROM_MATERIAL))
 
 
+@dataclass(frozen=True)
 class MaterialLayers:
-    """Each material's means, under sun and sky without shadows of objects. Can be used by many threads at once."""
+    """Each material's means, under sun and sky without shadows of objects. Can be used by many threads at once.
 
+    Attributes:
+        constants: of the scene's materials.
+        mode: what RGB shows.
+        light: sun and sky, exposed.
+        clouds: shadows that drift, or None.
+        report: empty, as nothing is rendered.
+    """
+
+    constants: SurfaceConstants
+    mode: ColourMode = "lit"
+    light: SunAndSky = field(default_factory=SunAndSky)
+    clouds: CloudShadows | None = None
+    report: dict[str, Any] = field(default_factory=dict)
     main_thread_only = False
-
-    def __init__(self, constants: SurfaceConstants, shading: Shading | None = None) -> None:
-        self.constants = constants
-        self.shading = shading or Shading()
-
-    @property
-    def report(self) -> dict[str, Any]:
-        """Return an empty report: nothing was rendered."""
-        return {}
 
     def sample(self, points: SeenPoints, wanted: frozenset[str]) -> LayerValues:
         """Return the wanted layers of N points; see `LayerSource.sample`."""
@@ -243,7 +233,7 @@ class MaterialLayers:
         """
         found = source != FROM_MATERIAL
         layers: dict[str, Float32] = {}
-        for name in sorted(needed_layers(wanted, self.shading.mode)):
+        for name in sorted(needed_layers(wanted, self.mode)):
             layers[name] = self.constants.values[name][points.material]
             if name in channels:
                 use = found & self.constants.varies[name][points.material]
@@ -254,16 +244,16 @@ class MaterialLayers:
         return LayerValues(arrays, source)
 
     def _rgb(self, points: SeenPoints, layers: dict[str, Float32], channels: dict[str, Float32], found: Bool) -> UInt16:
-        if self.shading.mode == "false_colour":
+        if self.mode == "false_colour":
             return encode_srgb(np.stack([layers[name] for name in _FALSE_COLOUR], axis=1))
         color = layers["base_color"]
-        if self.shading.mode == "unlit":
+        if self.mode == "unlit":
             return encode_srgb(color)
-        sun, sky = color * self.shading.light.sunlight(points.normal), color * self.shading.light.sky(points.normal)
+        sun, sky = color * self.light.sunlight(points.normal), color * self.light.sky(points.normal)
         if "sun" in channels:
             sun[found] = channels["sun"][found]
         if "sky" in channels:
             sky[found] = channels["sky"][found]
-        if self.shading.clouds is not None:
-            sun *= self.shading.clouds.transmission(points.position, points.time)[:, None]
+        if self.clouds is not None:
+            sun *= self.clouds.transmission(points.position, points.time)[:, None]
         return encode_srgb(sun + sky)

@@ -265,7 +265,7 @@ def light_nearby(fallback: MaterialLayers, points: SeenPoints, taken: Float32, c
     varies = fallback.constants.varies["base_color"][points.material][:, None]
     mean = fallback.constants.values["base_color"][points.material]
     color = np.where(varies, taken[:, channels["base_color"]], mean)
-    sun = fallback.shading.light.sun.astype(np.float32)
+    sun = fallback.light.sun.astype(np.float32)
     lit = taken[:, channels["sun"]].sum(axis=1) > _LIT * (color * sun).sum(axis=1)
-    result[:, channels["sun"]] = color * fallback.shading.light.sunlight(points.normal) * lit[:, None]
+    result[:, channels["sun"]] = color * fallback.light.sunlight(points.normal) * lit[:, None]
     return result

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from ...road.surroundings import Environment
 from ..platforms.path import Path
 from ..scene.mesh import SceneMesh
-from .colour import ColourSettings, MaterialLayers, Shading, SurfaceConstants
+from .colour import ColourSettings, MaterialLayers, SurfaceConstants
 from .light import CloudShadows, SunAndSky
 from .views import View
 
@@ -58,4 +58,4 @@ def material_layers(
     clouds = None
     if request.lit and request.environment.cloud_cover > 0.0:
         clouds = CloudShadows(request.environment, request.seed, request.frame)
-    return MaterialLayers(constants, Shading(request.settings.mode, light or SunAndSky(), clouds))
+    return MaterialLayers(constants, request.settings.mode, light or SunAndSky(), clouds)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -116,14 +116,15 @@ def views_along(path: Path, points: Float, settings: ColourSettings, field_of_vi
     """
     if not len(points):
         return []
-    views: list[View] = []
+    views: list[View | None] = []
     for strip in path.strips:
         times = _times(path, strip, settings.image_spacing)
         position, heading = _level(path, strip, times)
         for place, forward, time in zip(position, heading, times, strict=True):
             level = np.array([[*forward, 0.0], [-forward[1], forward[0], 0.0], [0.0, 0.0, 1.0]]).T
-            views += _at(place, level, float(time), points, path.typical_range, settings, field_of_view, largest)
-    return views
+            focal, limits, cameras = _cameras(points - place, level, path.typical_range, settings, field_of_view)
+            views += [_cut_view(place, level @ axes, focal, float(time), points, limits, largest) for axes in cameras]
+    return [view for view in views if view is not None]
 
 
 def scene_sample(mesh: SceneMesh) -> Float:
@@ -167,43 +168,37 @@ def _level(path: Path, strip: Strip, times: Float) -> tuple[Float, Float]:
     return position, np.where(length > 1e-9, travel / np.maximum(length, 1e-9), [1.0, 0.0])
 
 
-def _at(
-    place: Float,
-    level: Float,
-    time: float,
-    points: Float,
-    typical_range: float,
-    settings: ColourSettings,
-    field_of_view: float,
-    largest: int,
-) -> list[View]:
-    """Return the cameras at one place."""
-    near = points - place
-    ahead, height = near @ level[:, 0], -near[:, 2]
-    below = height[np.abs(ahead) < settings.image_spacing]
+def _cameras(
+    near: Float, level: Float, typical_range: float, settings: ColourSettings, field_of_view: float
+) -> tuple[float, tuple[float, float], Sequence[Float]]:
+    """Return focal length, limits (tangents aside and along) and axes of the cameras at one place.
+
+    Args:
+        near: (N, 3) places on the scene's surfaces from there, m.
+        level: (3, 3) axes of the level frame: forward, left and up.
+        typical_range: of the scanner, m.
+        settings: spacing and resolution of the images.
+        field_of_view: of the scanner, all of it, rad.
+    """
+    below = -near[np.abs(near @ level[:, 0]) < settings.image_spacing, 2]
     ground = float(np.median(below)) if len(below) else typical_range
     if ground < _HIGH:
-        focal = max(8.0, typical_range / settings.ground_sampling_distance)
-        around = (_cut_view(place, level @ axes, focal, time, points, (1.0, 1.0), largest) for axes in _AROUND)
-        return [view for view in around if view is not None]
-    focal = ground / settings.ground_sampling_distance
+        return max(8.0, typical_range / settings.ground_sampling_distance), (1.0, 1.0), _AROUND
     aside = min(_STEEPEST, np.tan(min(field_of_view / 2.0, 1.5)) * 1.05)
     along = min(_STEEPEST, OVERLAP * settings.image_spacing / 2.0 / ground)
-    view = _cut_view(place, level @ _NADIR, focal, time, points, (aside, along), largest)
-    return [] if view is None else [view]
+    return ground / settings.ground_sampling_distance, (aside, along), (_NADIR,)
 
 
-def _around() -> Iterable[Float]:
-    """Yield the axes of cameras that look ahead, left, back, right, up and down, in a level frame."""
+def _turned_ahead(cos: float, sin: float) -> Float:
+    """Return the axes of a camera that looks ahead, turned about the vertical, in a level frame."""
     ahead = np.array([[0.0, 0.0, -1.0], [-1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
-    for quarter in range(4):
-        cos, sin = ((1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0))[quarter]
-        yield np.array([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]]) @ ahead
-    yield np.array([[0.0, -1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, -1.0]])
-    yield _NADIR
+    return np.asarray(np.array([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]]) @ ahead)
 
 
-_AROUND: Sequence[Float] = tuple(_around())
+_UP = np.array([[0.0, -1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, -1.0]])
+_QUARTERS = ((1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0))
+_AROUND: Sequence[Float] = (*(_turned_ahead(*quarter) for quarter in _QUARTERS), _UP, _NADIR)
+"""Axes of cameras that look ahead, left, back, right, up and down, in a level frame."""
 
 
 def _cut_view(

@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
-from ...base.errors import InputError, nearest_name
-from ...base.files import PRESETS
-from ...base.schema import ClosedModel, Model, quantity, read_json
+from ...base.errors import InputError
+from ...base.files import PRESETS, preset_names, preset_path
+from ...base.schema import ClosedModel, Model, first_repeated, quantity, read_json
 from ..patterns.base import PulseTiming
 from ..patterns.registry import PatternModel
 
@@ -121,30 +119,26 @@ class Device(Model):
 
     @model_validator(mode="after")
     def _consistent(self) -> Device:
-        for fault in self._faults():
-            raise ValueError(fault)
-        return self
-
-    def _faults(self) -> Iterator[str]:
         slowest, fastest = self.lines_per_second
         if slowest > fastest:
-            yield f"lines_per_second must be slowest and fastest, in this order (not {slowest:g}, {fastest:g})"
+            raise ValueError(
+                f"lines_per_second must be slowest and fastest, in this order (not {slowest:g}, {fastest:g})"
+            )
         if self.channels > 256:
-            yield f"must have 256 beams at most, all heads together (not {self.channels})"
-        rates = [mode.pulse_rate_khz for mode in self.modes]
-        if len(set(rates)) < len(rates):
-            yield "modes must not have the same pulse_rate_khz twice"
+            raise ValueError(f"must have 256 beams at most, all heads together (not {self.channels})")
+        if first_repeated([mode.pulse_rate_khz for mode in self.modes]) is not None:
+            raise ValueError("modes must not have the same pulse_rate_khz twice")
         for number, mode in enumerate(self.modes):
             rate = mode.pulse_rate_khz * 1e3
-            fault = self.pattern.fault(mode.field_of_view_deg, rate)
-            if fault:
-                yield f"modes.{number}.field_of_view_deg {mode.field_of_view_deg:g} {fault}"
+            if fault := self.pattern.fault(mode.field_of_view_deg, rate):
+                raise ValueError(f"modes.{number}.field_of_view_deg {mode.field_of_view_deg:g} {fault}")
             reach = self.unambiguous_range(rate)
             if not self.minimum_range < mode.maximum_range <= reach:
-                yield (
+                raise ValueError(
                     f"modes.{number}.maximum_range {mode.maximum_range:g} must be more than the minimum range and "
                     f"at most {reach:.4g} m, unambiguous with {self.pulses_in_air} pulses in the air"
                 )
+        return self
 
 
 @dataclass(frozen=True)
@@ -210,17 +204,12 @@ class ScannerSetting:
 
 def device_names() -> list[str]:
     """Return the names of the device presets."""
-    return sorted(path.stem for path in DEVICES.glob("*.json"))
+    return preset_names(DEVICES)
 
 
 def load_device(name_or_file: str) -> Device:
     """Load a preset or a file; raise `InputError` if there is no such device or it is inconsistent."""
-    path = DEVICES / f"{name_or_file}.json" if name_or_file in device_names() else Path(name_or_file)
-    if path.suffix != ".json":
-        hint = nearest_name(name_or_file, device_names())
-        raise InputError(
-            "scan.device", name_or_file, f"must be a .json file or one of {', '.join(device_names())}{hint}"
-        )
+    path = preset_path(DEVICES, name_or_file, "scan.device")
     return Device.from_dict(read_json(path), source=str(name_or_file))
 
 

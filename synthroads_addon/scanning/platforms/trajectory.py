@@ -150,12 +150,10 @@ def read_trajectory(path: str | os.PathLike[str]) -> Trajectory:
         InputError: a column is missing or there twice, a value is no finite number, the time doesn't increase, or
             there are fewer than two rows.
     """
-    name = os.fspath(path)
-    lines = [
-        (number, line)
-        for number, line in enumerate(_text(name).splitlines(), 1)
-        if line.strip() and not line.lstrip().startswith("#")
-    ]
+    name, kind = os.fspath(path), f"this is no text: CSV with columns {', '.join(COLUMNS)} is needed"
+    text = read_text(name, kind, "a trajectory file is needed here", encoding="utf-8-sig")
+    numbered = enumerate(text.splitlines(), 1)
+    lines = [(number, line) for number, line in numbered if line.strip() and not line.lstrip().startswith("#")]
     if not lines:
         raise InputError(name, None, f"the file is empty: a header with {', '.join(COLUMNS)} is needed")
     separator = next((mark for mark in (";", ",", "\t") if mark in lines[0][1]), " ")
@@ -172,11 +170,6 @@ def read_trajectory(path: str | os.PathLike[str]) -> Trajectory:
         allowed = f"times must increase: more than {float(rows[before, 0])!r} s is needed"
         raise InputError(f"{name}:{numbers[row]} time", float(rows[row, 0]), allowed)
     return Trajectory(rows[:, 0], rows[:, 1:4], rows[:, 4], rows[:, 5], rows[:, 6], numbers)
-
-
-def _text(name: str) -> str:
-    kind = f"this is no text: CSV with columns {', '.join(COLUMNS)} is needed"
-    return read_text(name, kind, "a trajectory file is needed here", encoding="utf-8-sig")
 
 
 def _columns(place: str, head: list[str]) -> list[int]:

@@ -87,10 +87,6 @@ class Tripod(Platform):
         positions = np.column_stack([plan + offset[:, None] * left, ground + self.value("height")])
         return TripodPath(self, positions, heading)
 
-    def turn_rate(self) -> float:
-        """Return the rate at which the scanner is turned, counter-clockwise, rad/s."""
-        return math.radians(self.turn_deg) / self.turn_seconds
-
 
 class TripodPath:
     """One strip at each position; the scanner stands upright and turns counter-clockwise at an even rate.
@@ -110,7 +106,7 @@ class TripodPath:
     def __init__(self, platform: Tripod, positions: ArrayLike, headings: Float | None = None) -> None:
         self.positions = np.array(positions, dtype=np.float64).reshape(-1, 3)
         self._headings = np.zeros(len(self.positions)) if headings is None else headings
-        self._turning = platform.turn_rate()
+        self._turning = math.radians(platform.turn_deg) / platform.turn_seconds  # counter-clockwise
         self._mounting = platform.mounting()
         self.strips = strips_of([platform.turn_seconds] * len(self.positions))
         self.knot_spacing = knots_for(KNOT_RANGE * self._turning**2)

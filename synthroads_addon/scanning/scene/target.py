@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -41,8 +42,7 @@ class _TargetPart:
     radius: float
 
 
-@dataclass(frozen=True)
-class FirstHits:
+class FirstHits(NamedTuple):
     """First hits of rays; one value per ray, in the shape of the rays.
 
     Attributes:
@@ -137,12 +137,13 @@ class Target:
         shape = directions.shape
         flat_origins = np.broadcast_to(origins, shape).reshape(3, -1)
         flat_directions, flat_times = directions.reshape(3, -1), np.broadcast_to(times, shape[1:]).ravel()
-        nearest = FirstHits(*(getattr(met, name).ravel() for name in ("face", "distance", "along")))
+        nearest = FirstHits(met.face.ravel(), met.distance.ravel(), met.along.ravel())
         rays = Bundles.gather(flat_origins, flat_directions, flat_times, np.minimum(nearest.distance, maximum_range))
         for part, track in zip(self._parts[1:], motions, strict=True):
             if track.present.any():
                 _cast_moving(part, track, rays, maximum_range, nearest)
-        return FirstHits(*(getattr(nearest, name).reshape(shape[1:]) for name in ("face", "distance", "along")))
+        to = shape[1:]
+        return FirstHits(nearest.face.reshape(to), nearest.distance.reshape(to), nearest.along.reshape(to))
 
     def at_start(
         self, faces: Index, places: Float, times: Float, motions: list[Track], vectors: tuple[Float, ...] = ()
@@ -243,8 +244,8 @@ def _cast_moving(part: _TargetPart, track: Track, rays: Bundles, maximum_range: 
     begin, towards = rays.origins[:, near] - place, rays.directions[:, near]
     met = _cast(part, _inverse(rotation, begin), _inverse(rotation, towards), maximum_range)
     closer = np.flatnonzero(met.distance < nearest.distance[near])
-    for name in ("face", "distance", "along"):
-        getattr(nearest, name)[near[closer]] = getattr(met, name)[closer]
+    for values, closer_values in zip(nearest, met, strict=True):
+        values[near[closer]] = closer_values[closer]
 
 
 def _inverse(rotation: Float, vectors: Float) -> Float:

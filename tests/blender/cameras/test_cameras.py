@@ -182,7 +182,7 @@ def test_lit_colours_have_sun_sky_and_shadow(source: str, lighting: str, toleran
     sunny = points_on(mesh, 300, (-9.0, -10.0, 0.0), (9.0, -5.0, 0.0), "Matt")
     wanted = frozenset({"rgb"})
     with layer_source(job(mesh, {"rgb"}, source=source, lighting=lighting, **COARSE, **extra)) as layers:
-        day = layers.material.shading.light
+        day = layers.material.light
         in_shadow, in_sun = layers.sample(SeenPoints(**shadow), wanted), layers.sample(SeenPoints(**sunny), wanted)
     up = np.array([[0.0, 0.0, 1.0]])
     sky, sun = np.array(GREY) * day.sky(up), np.array(GREY) * day.sunlight(up)
@@ -313,7 +313,7 @@ def test_an_image_has_the_clouds_of_its_own_time() -> None:
     x = ground["position"][:, 0]
     with layer_source(job(mesh, {"rgb"}, cloudy, source="images", **COARSE)) as layers:
         red = _linear(layers.sample(SeenPoints(**ground), frozenset({"rgb"})).arrays["rgb"][:, 0])
-        shading = layers.material.shading
+        shading = layers.material
     up = np.array([[0.0, 0.0, 1.0]])
     share = (red - GREY[0] * shading.light.sky(up)[0, 0]) / (GREY[0] * shading.light.sunlight(up)[0, 0])
     # The images are taken at x = -5 and 5, after 1 and 3 seconds.

@@ -17,7 +17,6 @@ from synthroads_addon.scanning.colour.colour import (
     ColourSettings,
     MaterialLayers,
     SeenPoints,
-    Shading,
     encode_srgb,
     surface_constants,
 )
@@ -55,7 +54,7 @@ def _ground_image(view: View, slope: float = 0.0, time: float = 0.0) -> Rendered
 def _layers(images: list[RenderedImage], mode: str = "unlit") -> ImageLayers:
     varies = {name: np.zeros(len(ROWS), bool) for name in MATERIAL_LAYERS}
     varies["base_color"][0] = True
-    material = MaterialLayers(surface_constants(ROWS, varies), Shading(mode))  # type: ignore[arg-type]
+    material = MaterialLayers(surface_constants(ROWS, varies), mode)  # type: ignore[arg-type]
     return ImageLayers(images, {"base_color": 3}, material)
 
 
@@ -201,7 +200,7 @@ def test_light_from_close_by_is_that_of_the_points_own_slope(lit: bool) -> None:
     stack = np.concatenate([np.broadcast_to(part, (*image.depth.shape, 3)) for part in (color, sun)], axis=2)
     image = RenderedImage(image.view, stack.astype(np.float16), image.depth, image.material)
     constants = surface_constants(ROWS, varies)
-    layers = ImageLayers([image], {"base_color": 3, "sun": 3}, MaterialLayers(constants, Shading("lit", light)))
+    layers = ImageLayers([image], {"base_color": 3, "sun": 3}, MaterialLayers(constants, "lit", light))
     places, normal = np.array([[0.0, -0.15, 0.0]]), own[None]
     values = layers.sample(_seen(places, normal), frozenset({"rgb"}))
     assert values.source.tolist() == [NEARBY]

@@ -18,7 +18,6 @@ from synthroads_addon.scanning.colour.colour import (
     MATERIAL_LAYERS,
     MaterialLayers,
     SeenPoints,
-    Shading,
     encode_srgb,
     needed_layers,
     shares_by_source,
@@ -92,9 +91,9 @@ def test_a_mode_of_rgb_needs_its_layers(mode: str, needed: set[str]) -> None:
 
 def test_unlit_and_false_colours_are_layers() -> None:
     points, constants = _points(), surface_constants(ROWS)
-    unlit = MaterialLayers(constants, Shading("unlit")).sample(SeenPoints(**points), ALL).arrays
+    unlit = MaterialLayers(constants, "unlit").sample(SeenPoints(**points), ALL).arrays
     np.testing.assert_array_equal(unlit["rgb"], encode_srgb(unlit["base_color"]))
-    false = MaterialLayers(constants, Shading("false_colour")).sample(SeenPoints(**points), ALL).arrays
+    false = MaterialLayers(constants, "false_colour").sample(SeenPoints(**points), ALL).arrays
     np.testing.assert_array_equal(false["rgb"][:, 1], encode_srgb(false["metallic"]))
 
 
@@ -161,7 +160,7 @@ def test_shadows_drift_with_the_wind(x: float, y: float, seconds: float) -> None
 def test_the_drift_can_be_measured_in_the_colours() -> None:
     """Two passes over the same ground: the shift that fits their colours best is the wind's."""
     shadows = CloudShadows(CLOUDY.model_copy(update={"cloud_direction_deg": 90.0}), seed=5)
-    layers = MaterialLayers(surface_constants(ROWS), Shading(clouds=shadows))
+    layers = MaterialLayers(surface_constants(ROWS), clouds=shadows)
     x = np.arange(0.0, 2000.0, 2.0)
     line = {
         "position": np.stack([x, 0 * x, 0 * x], axis=1),
