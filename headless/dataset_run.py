@@ -27,7 +27,7 @@ from headless.messages import logger
 from synthroads_addon.base.errors import InputError, OutputError
 from synthroads_addon.base.machine import available_cores
 from synthroads_addon.base.progress import Progress, silent
-from synthroads_addon.base.scratch.exclusive import TakenError, exclusive
+from synthroads_addon.base.scratch.locks import TakenError, exclusive
 from synthroads_addon.base.version import generator
 from synthroads_addon.dataset.data_card import data_card
 from synthroads_addon.dataset.layouts import layout_descriptions

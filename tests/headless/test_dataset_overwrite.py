@@ -21,8 +21,8 @@ from headless.commands import command
 from headless.dataset_run import DatasetRun, Outcome
 from headless.dataset_scene import DONE, FILES, published_folders
 from synthroads_addon.base.errors import InputError, OutputError
-from synthroads_addon.base.scratch import exclusive
-from synthroads_addon.base.scratch.owner import this_process
+from synthroads_addon.base.scratch import locks
+from synthroads_addon.base.scratch.locks import this_process
 from synthroads_addon.dataset import manifest as manifest_module
 from synthroads_addon.dataset.manifest import (
     RECORDS,
@@ -332,7 +332,7 @@ def test_the_last_quarter_of_a_thousand_scenes_takes_no_longer_than_the_first(tm
 
 def test_a_disk_without_locks_still_keeps_another_run_out(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """As Lustre and some NFS mounts are: not every fault of a lock is another run."""
-    monkeypatch.setattr(exclusive, "try_lock", lambda descriptor: None)
+    monkeypatch.setattr(locks, "try_lock", lambda descriptor: None)
     folder = tmp_path / "set"
 
     def disturbed(folders: list[str]) -> Iterator[Outcome]:

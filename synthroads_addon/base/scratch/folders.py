@@ -16,8 +16,7 @@ from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 
 from ..errors import OutputError
-from .locks import try_lock
-from .owner import is_dead, read_owner, this_process
+from .locks import is_dead, read_owner, this_process, try_lock
 
 LOCK = ".owner.json"
 """File in each scratch folder that names the process which works in it, and is locked by it."""

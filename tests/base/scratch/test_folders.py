@@ -13,10 +13,9 @@ from pathlib import Path
 
 import pytest
 
-from synthroads_addon.base.scratch import folders, owner
+from synthroads_addon.base.scratch import folders, locks
 from synthroads_addon.base.scratch.folders import LOCK, remove_own, scratch_folder, temporary_files_in_scratch
-from synthroads_addon.base.scratch.locks import try_lock
-from synthroads_addon.base.scratch.owner import Owner, is_dead, read_owner, this_process
+from synthroads_addon.base.scratch.locks import Owner, is_dead, read_owner, this_process, try_lock
 
 linux = pytest.mark.skipif(sys.platform != "linux", reason="looks into /proc")
 ROOT = Path(__file__).resolve().parents[3]
@@ -194,8 +193,8 @@ def test_temporary_files_of_the_process_and_its_children_are_in_one_scratch_fold
 
 
 def test_a_system_without_boot_ids_still_knows_its_own(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(owner, "_boot_id", lambda: "")
-    monkeypatch.setattr(owner, "_start_of", lambda pid: 0 if pid == os.getpid() else None)
+    monkeypatch.setattr(locks, "_boot_id", lambda: "")
+    monkeypatch.setattr(locks, "_start_of", lambda pid: 0 if pid == os.getpid() else None)
     mine = this_process()
     assert not is_dead(mine, None)
     assert is_dead(replace(mine, pid=mine.pid + 1), None)
