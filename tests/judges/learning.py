@@ -68,12 +68,12 @@ def bring_openpoints() -> None:
 
 def openpoints_verdict(samples: Samples) -> list[str]:
     """Return in what the smallest network differs from the authors': parameters, outputs, gradients, statistics."""
-    from ml.networks.segmentation.pointnext import architecture
+    from ml.networks.segmentation.pointnext import PointNeXtOptions
     from tests.judges import pointnext_reference as reference
 
     with reference.openpoints_modules(openpoints_folder()) as modules:
-        plan = architecture("S", in_channels=reference.INPUTS, num_classes=reference.CLASSES)
-        count = sum(weight.numel() for weight in reference.Theirs(modules, plan).parameters())
+        theirs = reference.Theirs(modules, PointNeXtOptions(preset="S"))
+        count = sum(weight.numel() for weight in theirs.parameters())
         found = [] if count == reference.PUBLISHED["S"] else [f"{count} parameters"]
         differences = reference.compared(modules, reference.same_as_theirs("S"), 1100, training=True)
     return found + [f"{name}: {value:.1e}" for name, value in differences.items() if value > 1e-6]

@@ -17,8 +17,8 @@ import pytest
 import torch
 from torch import Tensor, nn
 
-from ml.networks.segmentation.neighbours import Neighbourhood, build_neighbours
-from ml.networks.segmentation.pointnext import Architecture, PointNeXt, architecture
+from ml.networks.segmentation.neighbours import _about_middle, build_neighbours, geometric_order
+from ml.networks.segmentation.pointnext import PointNeXt, PointNeXtOptions
 
 RADIUS, NEIGHBOURS, CLASSES, INPUTS = 0.3, 32, 13, 4
 PUBLISHED = {"S": 792_237, "B": 3_827_853, "L": 7_125_069, "XL": 41_576_461}
@@ -107,24 +107,24 @@ def _loaded(folder: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[types.Sim
 class Theirs(nn.Module):
     """Their network in the settings for S3DIS: batches (B, N, C) of clouds of one size."""
 
-    def __init__(self, modules: types.SimpleNamespace, plan: Architecture) -> None:
+    def __init__(self, modules: types.SimpleNamespace, options: PointNeXtOptions) -> None:
         super().__init__()
         common = {"norm_args": {"norm": "bn"}, "act_args": {"act": "relu"}, "conv_args": {"order": "conv-norm-act"}}
         self.encoder = modules.backbone.PointNextEncoder(
-            in_channels=plan.in_channels,
-            width=plan.width,
-            blocks=[1, *plan.blocks],
+            in_channels=INPUTS,
+            width=options.channels[0],
+            blocks=[1, *options.blocks],
             strides=[1, 4, 4, 4, 4],
             nsample=NEIGHBOURS,
             radius=RADIUS,
-            sa_layers=plan.layers,
-            sa_use_res=plan.residual,
+            sa_layers=2 if options.preset == "S" else 1,
+            sa_use_res=options.preset == "S",
             group_args=Attributes(NAME="ballquery", normalize_dp=True),
             **common,
         )
         self.decoder = modules.backbone.PointNextDecoder(self.encoder.channel_list)
         self.head = modules.segmentation.SegHead(
-            plan.num_classes, self.decoder.out_channels, norm_args={"norm": "bn"}, dropout=plan.dropout
+            CLASSES, self.decoder.out_channels, norm_args={"norm": "bn"}, dropout=options.dropout
         )
 
     def forward(self, coord: Tensor, feat: Tensor) -> Tensor:
@@ -158,10 +158,12 @@ def copy_weights(ours: PointNeXt, theirs: Theirs) -> None:
         mine.load_state_dict(state)
 
 
-def compared(modules: types.SimpleNamespace, plan: Architecture, points: int, *, training: bool) -> dict[str, float]:
+def compared(
+    modules: types.SimpleNamespace, options: PointNeXtOptions, points: int, *, training: bool
+) -> dict[str, float]:
     """Largest differences of outputs, gradients and running statistics, each relative."""
     torch.manual_seed(5)
-    its = Theirs(modules, plan).double()
+    its = Theirs(modules, options).double()
     for name, norm in its.named_modules():
         if isinstance(norm, (nn.BatchNorm1d, nn.BatchNorm2d)):  # as if trained: scales of either sign, any statistics
             norm.weight.data = torch.randn_like(norm.weight).sign() * (0.8 + 0.4 * torch.rand_like(norm.weight))
@@ -170,16 +172,17 @@ def compared(modules: types.SimpleNamespace, plan: Architecture, points: int, *,
             nn.init.normal_(norm.bias, 0.2, 0.2)
             nn.init.normal_(norm.running_mean, 0.0, 0.3)
             nn.init.uniform_(norm.running_var, 0.5, 2.0)
-    ours = PointNeXt(plan).double()
+    ours = PointNeXt(options, INPUTS, CLASSES).double()
     copy_weights(ours, its)
     ours.train(training)
     its.train(training)
     clouds = 2
     coord = torch.rand(clouds, points, 3, dtype=torch.float64) * torch.tensor([2.5, 2.5, 0.6])
-    feat = torch.randn(clouds, points, plan.in_channels, dtype=torch.float64)
-    target = torch.randn(clouds, points, plan.num_classes, dtype=torch.float64)
-    packed = build_neighbours(coord.reshape(-1, 3), torch.arange(1, clouds + 1) * points, plan.neighbourhood)
-    mine_in = feat.reshape(-1, plan.in_channels).requires_grad_()
+    coord = torch.stack([cloud[geometric_order(_about_middle(cloud.numpy()))] for cloud in coord])
+    feat = torch.randn(clouds, points, INPUTS, dtype=torch.float64)
+    target = torch.randn(clouds, points, CLASSES, dtype=torch.float64)
+    packed = build_neighbours(coord.reshape(-1, 3), torch.arange(1, clouds + 1) * points, options.neighbourhood)
+    mine_in = feat.reshape(-1, INPUTS).requires_grad_()
     its_in = feat.clone().requires_grad_()
     mine_out = ours(mine_in, packed)
     its_out = its(coord, its_in)
@@ -211,8 +214,6 @@ def differences(pairs: dict[str, tuple[Tensor | None, Tensor | None]], what: str
     }
 
 
-def same_as_theirs(name: str, **changes: object) -> Architecture:
-    """One of the sizes with the authors' sampling and order, and without dropout, which draws differently."""
-    plan = architecture(name, in_channels=INPUTS, num_classes=CLASSES)
-    fields = plan.neighbourhood.__dict__ | {"sampling": "farthest", "order": "given"}
-    return Architecture(**(plan.__dict__ | {"neighbourhood": Neighbourhood(**fields), "dropout": 0.0} | changes))
+def same_as_theirs(name: str) -> PointNeXtOptions:
+    """One of the sizes with the authors' sampling, and without dropout, which draws differently."""
+    return PointNeXtOptions(preset=name, sampling="farthest", dropout=0.0)

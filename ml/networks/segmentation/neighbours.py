@@ -7,16 +7,16 @@ Clouds of a batch are packed: their points lie one after the other in arrays (su
 cloud ends. No index ever leads from one cloud to another, so a batch gives what its clouds give one by one.
 
 Neighbourhoods hold a limited number of points. Out of a ball with more, the first in the cloud's order are taken, as
-PointNet++'s ball query does. With ``order="geometry"`` that order is a hash of the coordinates: a random subset of the
-ball, spread over all of it, that does not depend on the order in which the points came. (The nearest ones would shrink
-the ball.) Only points with the very same coordinates keep their given order among themselves.
+PointNet++'s ball query does. That order is a hash of the coordinates: a random subset of the ball, spread over all of
+it, that does not depend on the order in which the points came. (The nearest ones would shrink the ball.) Only points
+with the very same coordinates keep their given order among themselves.
 """
 
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 import torch
@@ -41,6 +41,16 @@ Neighbours = dict[str, torch.Tensor]
 - ``weight{s}`` (M_{s-1}, 3): their weights by inverse distance, of the sum 1
 """
 
+_POINTS_INTO = {
+    "sample": (-1, torch.int64),
+    "group": (-1, torch.int32),
+    "inner": (0, torch.int32),
+    "nearest": (0, torch.int32),
+}
+"""Arrays of indices: into which stage, counted from their own, and their dtype."""
+Sampling = Literal["grid", "farthest"]
+_STRIDE = 4
+"""One in so many points stays."""
 _CHUNK = 1 << 15
 """Queries whose pairs are held at once."""
 _TINY = 1e-8
@@ -54,35 +64,16 @@ class Neighbourhood:
     Attributes:
         radius: of the balls around the first stage's points, m; it doubles with each stage.
         neighbours: points of a ball; fewer are filled up with the first one again.
-        strides: of the stages: one in so many points stays.
-        inner: of the stages: whether its points also look at each other, within twice the stage's radius.
+        inner: of each stage: whether its points also look at each other, within twice the stage's radius.
         sampling: ``grid`` keeps of each cell the point nearest to its middle; cells of the first stage are two thirds
             of the radius wide, and double with each stage (a fourth of a surface's points then stays), and
-            ``farthest`` keeps exactly one in ``stride``, each the farthest from those already kept.
-        order: ``geometry``, a hash of the coordinates, or ``given``, the order of the points.
-
-    Raises:
-        InputError: a value is outside of what is possible.
+            ``farthest`` keeps exactly one in four, each the farthest from those already kept.
     """
 
     radius: float = 0.3
     neighbours: int = 32
-    strides: tuple[int, ...] = (4, 4, 4, 4)
     inner: tuple[bool, ...] = (True, True, True, True)
-    sampling: str = "grid"
-    order: str = "geometry"
-
-    def __post_init__(self) -> None:
-        """Check the values."""
-        if not 0 < self.radius < float("inf"):
-            raise InputError("neighbourhood.radius", self.radius, "must be above 0 m and finite")
-        if not 1 <= self.neighbours <= 255:
-            raise InputError("neighbourhood.neighbours", self.neighbours, "must be from 1 to 255")
-        if not self.strides or min(self.strides) < 2 or len(self.inner) != len(self.strides):
-            raise InputError("neighbourhood.strides", self.strides, "must be 2 or more, one for each of `inner`")
-        for field, allowed in (("sampling", ("grid", "farthest")), ("order", ("geometry", "given"))):
-            if getattr(self, field) not in allowed:
-                raise InputError(f"neighbourhood.{field}", getattr(self, field), f"must be {' or '.join(allowed)}")
+    sampling: Sampling = "grid"
 
     def stage_radius(self, stage: int) -> float:
         """Return the radius of ``group{stage}``, m; that of ``inner{stage}`` is twice as large."""
@@ -102,21 +93,19 @@ def build_neighbours(coord: torch.Tensor, offset: torch.Tensor, neighbourhood: N
             its thinnings than 2^62.
     """
     ends = _checked_ends(coord, offset)
-    stages = len(neighbourhood.strides)
-    clouds = [
-        _stages_of(coord[begin:end].numpy(), neighbourhood) for begin, end in itertools.pairwise([0, *ends.tolist()])
-    ]
-    sizes = np.array([[len(cloud[f"positions{s}"]) for s in range(stages + 1)] for cloud in clouds], dtype=np.int64)
-    sizes = sizes.reshape(len(clouds), stages + 1)
+    bounds = list(itertools.pairwise([0, *ends.tolist()])) or [(0, 0)]
+    clouds = [_stages_of(coord[begin:end].numpy(), neighbourhood) for begin, end in bounds]
+    stages = range(len(neighbourhood.inner) + 1)
+    sizes = np.array([[len(cloud[f"positions{stage}"]) for stage in stages] for cloud in clouds], dtype=np.int64)
     begins = np.cumsum(sizes, axis=0) - sizes
     packed: Neighbours = {}
-    for name, into, dtype in _names(neighbourhood):
-        shift = [0] * len(clouds) if into is None else begins[:, into].tolist()
+    for name in clouds[0]:
+        into, dtype = _POINTS_INTO.get(name[:-1], (None, coord.dtype))
+        shift = [0] * len(clouds) if into is None else begins[:, int(name[-1]) + into].tolist()
         parts = [cloud[name] + step if step else cloud[name] for cloud, step in zip(clouds, shift, strict=True)]
-        joined = np.concatenate(parts) if parts else _empty_part(name, neighbourhood)
-        packed[name] = torch.from_numpy(np.ascontiguousarray(joined)).to(dtype or coord.dtype)
-    for stage in range(stages + 1):
-        packed[f"offset{stage}"] = torch.from_numpy(np.cumsum(sizes[:, stage]))
+        packed[name] = torch.from_numpy(np.ascontiguousarray(np.concatenate(parts))).to(dtype)
+    for stage in stages:
+        packed[f"offset{stage}"] = torch.from_numpy(np.cumsum(sizes[:, stage])[: len(ends)])
     return packed
 
 
@@ -131,44 +120,23 @@ def _checked_ends(coord: torch.Tensor, offset: torch.Tensor) -> Indices:
     return ends
 
 
-def _names(neighbourhood: Neighbourhood) -> Iterator[tuple[str, int | None, torch.dtype | None]]:
-    """Yield the names of a cloud's arrays, the stage that they point into, and their dtype (None: the coordinates')."""
-    yield "positions0", None, None
-    for stage, inner in enumerate(neighbourhood.inner, start=1):
-        yield f"positions{stage}", None, None
-        yield f"sample{stage}", stage - 1, torch.int64
-        yield f"group{stage}", stage - 1, torch.int32
-        if inner:
-            yield f"inner{stage}", stage, torch.int32
-        yield f"nearest{stage}", stage, torch.int32
-        yield f"weight{stage}", None, None
-
-
-def _empty_part(name: str, neighbourhood: Neighbourhood) -> NDArray[np.float64]:
-    return np.zeros((0,) if name.startswith("sample") else (0, _columns(name, neighbourhood)))
-
-
-def _columns(name: str, neighbourhood: Neighbourhood) -> int:
-    return neighbourhood.neighbours if name.startswith(("group", "inner")) else 3
-
-
 def _stages_of(coord: NDArray[np.floating], neighbourhood: Neighbourhood) -> dict[str, NDArray[np.generic]]:
     """Return the arrays of one cloud, with indices that count from its own first point."""
     local = _about_middle(coord)
-    order = geometric_order(local) if neighbourhood.order == "geometry" else np.arange(len(local))
+    order = geometric_order(local)
     # What the network sees is rounded to the coordinates' dtype, so neighbours are those of the rounded positions.
     points = local[order].astype(np.float64)
     found: dict[str, NDArray[np.generic]] = {"positions0": local}
     tree = cKDTree(points) if len(points) else None
-    for stage, stride in enumerate(neighbourhood.strides, start=1):
+    for stage, inner in enumerate(neighbourhood.inner, start=1):
         radius = neighbourhood.stage_radius(stage)
-        sample = _sample(points, stride, radius, neighbourhood.sampling)
+        sample = _sample(points, radius, neighbourhood.sampling)
         kept = points[sample]
         kept_tree = cKDTree(kept) if len(kept) else None
         found[f"positions{stage}"] = kept.astype(local.dtype)
         found[f"sample{stage}"] = sample
         found[f"group{stage}"] = _first_in_ball(kept_tree, tree, radius, neighbourhood.neighbours)
-        if neighbourhood.inner[stage - 1]:
+        if inner:
             found[f"inner{stage}"] = _first_in_ball(kept_tree, kept_tree, 2 * radius, neighbourhood.neighbours)
         found[f"nearest{stage}"], found[f"weight{stage}"] = nearest_three(points, kept_tree)
         points, tree = kept, kept_tree
@@ -208,12 +176,12 @@ def _mix_bits(key: NDArray[np.uint64]) -> NDArray[np.uint64]:
     return key ^ (key >> np.uint64(31))
 
 
-def _sample(points: Floats, stride: int, radius: float, sampling: str) -> Indices:
+def _sample(points: Floats, radius: float, sampling: Sampling) -> Indices:
     if not len(points):
         return np.zeros(0, dtype=np.int64)
     if sampling == "grid":
         return thin(points - points.min(axis=0), radius * 2.0 / 3.0)
-    return farthest_sample(points, max(len(points) // stride, 1))
+    return farthest_sample(points, max(len(points) // _STRIDE, 1))
 
 
 def farthest_sample(points: Floats, count: int) -> Indices:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Iterator
-from dataclasses import replace
 
 import pytest
 import torch
@@ -13,11 +12,11 @@ from torch import Tensor, nn
 
 from ml.networks.segmentation.grouping import Norm
 from ml.networks.segmentation.neighbours import Neighbours, build_neighbours
-from ml.networks.segmentation.pointnext import PointNeXt, architecture
+from ml.networks.segmentation.pointnext import PointNeXtOptions
 from ml.segmentation.network import adapt_norms, laid_over
 from synthroads_addon.base.errors import InputError
 
-PLAN = replace(architecture("S", in_channels=2, num_classes=2, width=8), dropout=0.3)
+OPTIONS = PointNeXtOptions(preset="S", width=8, dropout=0.3)
 
 
 def draw(count: int, seed: int) -> Tensor:
@@ -107,7 +106,7 @@ def domain(seed: int, scale: float, shift: float) -> tuple[Tensor, Neighbours, T
     label = (torch.rand(300, generator=generator) < 0.5).long()
     intensity = label + 0.1 * torch.randn(300, generator=generator)
     feat = torch.stack([intensity * scale + shift, 0.05 * torch.randn(300, generator=generator)], dim=1)
-    return feat, build_neighbours(coord, torch.tensor([300]), PLAN.neighbourhood), label
+    return feat, build_neighbours(coord, torch.tensor([300]), OPTIONS.neighbourhood), label
 
 
 def accuracy(model: nn.Module, cloud: tuple[Tensor, Neighbours, Tensor]) -> float:
@@ -117,7 +116,7 @@ def accuracy(model: nn.Module, cloud: tuple[Tensor, Neighbours, Tensor]) -> floa
 
 def test_a_shifted_domain_is_recognised_again() -> None:
     torch.manual_seed(1)
-    model = PointNeXt(PLAN)
+    model = OPTIONS.build(2, 2)
     optimizer = torch.optim.AdamW(model.parameters(), lr=0.01)
     for step in range(50):
         feat, neighbours, label = domain(step, 1.0, 0.0)
@@ -150,7 +149,7 @@ def test_neighbours_are_found_across_what_was_laid_over() -> None:
     coord = torch.rand(40, 3) - 0.5
     batch = {"coord": coord, "offset": torch.tensor([20, 40])}
     mixed = laid_over(batch)
-    apart, together = (build_neighbours(each["coord"], each["offset"], PLAN.neighbourhood) for each in (batch, mixed))
+    apart, together = (OPTIONS.prepare(each) for each in (batch, mixed))
     first_own = apart["offset1"][0]
     assert bool((apart["group1"][:first_own] < 20).all())
     assert bool(((together["group1"] < 20).any(dim=1) & (together["group1"] >= 20).any(dim=1)).any())
@@ -160,4 +159,4 @@ def test_mixing_comes_before_neighbours() -> None:
     coord, offset = torch.rand(8, 3), torch.tensor([4, 8])
     batch = {"coord": coord, "offset": offset}
     with pytest.raises(InputError, match="before neighbours"):
-        laid_over(batch | build_neighbours(coord, offset, PLAN.neighbourhood))
+        laid_over(batch | build_neighbours(coord, offset, OPTIONS.neighbourhood))

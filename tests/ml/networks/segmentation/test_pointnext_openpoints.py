@@ -4,16 +4,14 @@ from __future__ import annotations
 
 import types
 from collections.abc import Iterator
-from dataclasses import replace
 
 import pytest
 
-from ml.networks.segmentation.pointnext import architecture
+from ml.networks.segmentation.pointnext import PointNeXtOptions
 from tests.judges import learning, require
 from tests.judges.pointnext_reference import (
-    CLASSES,
-    INPUTS,
     PUBLISHED,
+    RADIUS,
     Theirs,
     compared,
     openpoints_modules,
@@ -33,7 +31,7 @@ def theirs() -> Iterator[types.SimpleNamespace]:
 
 @pytest.mark.parametrize("name", PUBLISHED)
 def test_has_as_many_parameters(theirs: types.SimpleNamespace, name: str) -> None:
-    network = Theirs(theirs, architecture(name, in_channels=INPUTS, num_classes=CLASSES))
+    network = Theirs(theirs, PointNeXtOptions(preset=name))
     assert sum(weight.numel() for weight in network.parameters()) == PUBLISHED[name]
 
 
@@ -50,6 +48,5 @@ def test_gives_the_same_outputs_and_gradients(theirs: types.SimpleNamespace, nam
 
 
 def test_a_radius_that_is_another_is_seen(theirs: types.SimpleNamespace) -> None:
-    plan = same_as_theirs("S")
-    wider = replace(plan, neighbourhood=replace(plan.neighbourhood, radius=1.1 * plan.neighbourhood.radius))
+    wider = same_as_theirs("S").model_copy(update={"radius": 1.1 * RADIUS})
     assert max(compared(theirs, wider, 1100, training=False).values()) > 1e-3
