@@ -1,11 +1,15 @@
-"""Networks by task and name: each file in a task's folder of networks registers its own by the decorator `network`."""
+"""Networks and effects by task: each registers itself by a decorator, in a file that is found by its folder."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from importlib import import_module
 from pkgutil import iter_modules
 from typing import Any, TypeVar
+
+import numpy as np
+from pydantic import create_model
 
 from synthroads_addon.base.discovery import discriminated_union
 
@@ -15,7 +19,28 @@ P = TypeVar("P", bound=Part)
 
 FOLDERS = {"segmentation": "ml.networks.segmentation", "centerline": "ml.networks.centerline"}
 """Task -> package whose files are looked through for its networks."""
+EFFECTS = "ml.data.effects"
+"""Package whose files are looked through for effects of all tasks."""
 _NETWORKS: dict[str, dict[str, type[Part]]] = {task: {} for task in FOLDERS}
+_EFFECTS: dict[str, dict[str, Effect]] = {task: {} for task in FOLDERS}
+Change = Callable[[Any, Any, np.random.Generator], None]
+"""Changes a `Sample` in place: called with it, with the task's options of effects and with the sample's own stream."""
+F = TypeVar("F", bound=Change)
+
+
+@dataclass(frozen=True)
+class Effect:
+    """An effect on the samples of a training.
+
+    Attributes:
+        change: what it does.
+        order: effects of lower ones go first, those below 0 before a sample is thinned out.
+        fields: what it adds to the options.
+    """
+
+    change: Change
+    order: int
+    fields: Mapping[str, Any]
 
 
 def network(task: str) -> Callable[[type[P]], type[P]]:
@@ -29,10 +54,7 @@ def network(task: str) -> Callable[[type[P]], type[P]]:
     """
 
     def register(options: type[P]) -> type[P]:
-        name = options.model_fields["name"].default
-        known = _NETWORKS[task].setdefault(name, options)
-        if known is not options:
-            raise ValueError(f"{known.__module__} and {options.__module__} both have a network named {name!r}")
+        _register(_NETWORKS[task], options.model_fields["name"].default, options, options.__module__)
         return options
 
     return register
@@ -40,8 +62,7 @@ def network(task: str) -> Callable[[type[P]], type[P]]:
 
 def networks(task: str) -> dict[str, type[Part]]:
     """Return the options of all networks of a task by name, those of its folder's files included."""
-    for file in iter_modules(import_module(FOLDERS[task]).__path__):
-        import_module(f"{FOLDERS[task]}.{file.name}")
+    _import_files(FOLDERS[task])
     return dict(sorted(_NETWORKS[task].items()))
 
 
@@ -49,3 +70,53 @@ def network_union(task: str, usual: str) -> Any:
     """Return the type of a configuration's field ``network``: any of a task's; the usual one where it has no name."""
     models = networks(task)
     return discriminated_union({usual: models[usual], **models}, "name")
+
+
+def effect(*tasks: str, order: int = 100, **fields: Any) -> Callable[[F], F]:
+    """Register a function as an effect under its name.
+
+    Args:
+        tasks: on whose samples it acts, out of `FOLDERS`.
+        order: see `Effect`; those that come with the package are below 100.
+        fields: declared by `quantity`, with a default at which it neither does nor draws anything. A configuration's
+            ``effects`` have them.
+
+    Raises:
+        ValueError: another effect of a task has this name.
+    """
+
+    def register(change: F) -> F:
+        for task in tasks:
+            _register(_EFFECTS[task], change.__name__, Effect(change, order, fields), change.__module__)
+        return change
+
+    return register
+
+
+def effect_options(task: str, base: type[P]) -> type[P]:
+    """Return a class of options with the fields that the effects of a task add."""
+    _import_files(EFFECTS)
+    added = {name: field for one in _EFFECTS[task].values() for name, field in one.fields.items()}
+    fields: Any = {name: (type(field.default), field) for name, field in added.items()}
+    return create_model(base.__name__, __base__=base, __module__=EFFECTS, __doc__=base.__doc__, **fields)
+
+
+def apply_effects(
+    task: str, sample: Any, options: Part, random: np.random.Generator, *, before_thinning: bool = False
+) -> None:
+    """Apply the effects of a task to a sample, in place: those below order 0, or all others."""
+    for one in sorted(_EFFECTS[task].values(), key=lambda one: one.order):
+        if (one.order < 0) == before_thinning:
+            one.change(sample, options, random)
+
+
+def _register(known: dict[str, Any], name: str, thing: Any, module: str) -> None:
+    if known.setdefault(name, thing) is not thing:
+        first = getattr(known[name], "change", known[name]).__module__
+        kind = "effect" if isinstance(thing, Effect) else "network"
+        raise ValueError(f"{first} and {module} both have the {kind} {name!r}")
+
+
+def _import_files(package: str) -> None:
+    for file in iter_modules(import_module(package).__path__):
+        import_module(f"{package}.{file.name}")

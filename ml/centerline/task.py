@@ -18,7 +18,7 @@ from synthroads_addon.base.schema import canonical_json, read_json
 
 from ..configuration import Configuration
 from ..data.batches import Batches, BatchOptions, DataOptions, Roads, fixed_batches, quiet, read_roads
-from ..data.effects.slices import SequenceEffects
+from ..data.effects import SequenceEffects
 from ..data.slices import Batch, SliceSettings
 from ..networks.centerline.losses import LossOptions, centerline_loss
 from ..networks.centerline.models import TARGETS, CenterlineModel, ModelOptions

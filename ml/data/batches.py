@@ -18,7 +18,8 @@ from synthroads_addon.base.schema import quantity
 from ..configuration import Part
 from .axis import MeasuredAxis
 from .corridor import Truth, TruthKind
-from .effects.slices import SequenceCrop, SequenceEffects
+from .effects import SequenceEffects
+from .effects.slices import SequenceCrop
 from .roads import LearningRoad, read_measured, read_scene, scene_folders
 from .slices import Batch, Sample, SliceDataset, SliceSettings, collate, mirror_batch
 

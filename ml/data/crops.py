@@ -21,12 +21,20 @@ from torch.utils.data import Dataset, IterableDataset, get_worker_info
 from synthroads_addon.base.errors import InputError
 from synthroads_addon.base.random_streams import stream
 
-from .effects.crops import MISSING_SIGMA, NO_EFFECTS, Crop, Effects, FloatArray, crop_of
+from ..registry import apply_effects
+from .effects import CropEffects
+from .samples import Crop
 from .tiles import CloudTile, Scaling
 
 Feature = Literal["x", "y", "z", "red", "green", "blue", "intensity"]
 FEATURES: tuple[Feature, ...] = get_args(Feature)
 Item = dict[str, Tensor]
+NO_EFFECTS = CropEffects(
+    rotation=False, smallest_scale=1.0, largest_scale=1.0, jitter=0.0, jitter_limit=0.0, color_drop=0.0
+)
+"""For validation and prediction."""
+MISSING_SIGMA = 0.02
+"""Standard deviation of the noise that stands for a missing feature: nothing, but never exactly the same."""
 COORDINATE_SPAN = 10.0
 """Centred coordinates as features are in units of this, m, so that they are about as large as the others."""
 
@@ -101,7 +109,7 @@ class CropDataset(Dataset[Item]):
         plan: Sequence[Draw],
         seeds: Seeds,
         *,
-        effects: Effects = NO_EFFECTS,
+        effects: CropEffects = NO_EFFECTS,
         seed: int = 0,
         epoch: int = 0,
     ) -> None:
@@ -130,7 +138,7 @@ class CropStream(IterableDataset[Item]):
         scalings: dict[str, Scaling],
         settings: CropSettings,
         seeds: Seeds,
-        effects: Effects,
+        effects: CropEffects,
         seed: int,
     ) -> None:
         self.tiles, self.scalings, self.settings = tiles, scalings, settings
@@ -152,7 +160,13 @@ def cut_crop(tile: CloudTile, middle: NDArray[np.float32], points: int, scaling:
         away = ((tile.coord[:, :2] - middle[:2]) ** 2).sum(axis=1)
         keep = np.sort(np.argpartition(away, points - 1)[:points])
         tile = tile.select(keep)
-    return crop_of(tile, None if tile.strength is None else scaling.apply(tile.strength))
+    return crop_of(tile, scaling)
+
+
+def crop_of(tile: CloudTile, scaling: Scaling) -> Crop:
+    """Return a whole tile as a crop, with intensities as a feature."""
+    color = None if tile.color is None else (tile.color / np.float32(255.0)).astype(np.float32)
+    return Crop(tile.coord, None if tile.strength is None else scaling.apply(tile.strength), color, tile.segment)
 
 
 def item(crop: Crop, settings: CropSettings, random: np.random.Generator) -> Item:
@@ -163,7 +177,7 @@ def item(crop: Crop, settings: CropSettings, random: np.random.Generator) -> Ite
     Raises:
         InputError: the crop has no points.
     """
-    count = len(crop.coord)
+    count = len(crop)
     if count == 0:
         raise InputError("crop", 0, "has no points")
     middle = [*crop.coord[:, :2].mean(axis=0, dtype=np.float64), np.median(crop.coord[:, 2])]
@@ -190,7 +204,8 @@ def _draw_crop(crops: CropDataset | CropStream, place: int, random: np.random.Ge
     number, point = crops.seeds.draw(place, random)
     tile = crops.tiles[number]
     crop = cut_crop(tile, tile.coord[point], crops.settings.points, crops.scalings[tile.scene])
-    return item(crops.effects.apply(crop, random), crops.settings, random)
+    apply_effects("segmentation", crop, crops.effects, random)
+    return item(crop, crops.settings, random)
 
 
 def collate(items: Sequence[Item]) -> Item:
@@ -199,5 +214,5 @@ def collate(items: Sequence[Item]) -> Item:
     return batch | {"offset": torch.cumsum(batch["offset"], dim=0)}
 
 
-def _noise(random: np.random.Generator, shape: tuple[int, int]) -> FloatArray:
+def _noise(random: np.random.Generator, shape: tuple[int, int]) -> NDArray[np.float32]:
     return random.normal(0.0, MISSING_SIGMA, shape).astype(np.float32)

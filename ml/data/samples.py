@@ -1,8 +1,9 @@
-"""`Stretch`: a sequence of slices with its points and its truth, as effects change it and samples are made of it."""
+"""Points on their way into a network, as effects change them: `Crop` of a tile, `Stretch` of a road."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,16 +19,49 @@ _NO_SHOULDER = 1.2
 
 
 @dataclass
-class Stretch:
-    """A sequence of S slices with K points; effects change it in place.
+class Sample:
+    """N points. Effects put other arrays in place of these, which may be a tile's own.
 
     Attributes:
-        xyz: (K, 3) float64 in the slices' frames, m; z still that of the cloud.
-        number: (K,) slice of each point, ascending.
-        intensity: (K,) float64, 0 where there is none.
-        rgb: (K, 3) float64 from 0 to 1.
-        paved, marked: (K,) whether a point is known to lie on the pavement (markings included), or on a marking.
-        has_color: whether the colours mean something.
+        coord: (N, 3) m.
+        strength: (N,) intensities; None or all 0 where there are none.
+        color: (N, 3) from 0 to 1, or None.
+    """
+
+    coord: NDArray[Any]
+    strength: NDArray[Any] | None
+    color: NDArray[Any] | None
+    per_point: ClassVar[tuple[str, ...]] = ("coord", "strength", "color")
+
+    def __len__(self) -> int:
+        return len(self.coord)
+
+    def keep(self, points: NDArray[np.bool_] | NDArray[np.intp]) -> None:
+        """Leave out all points but those of a mask or of ascending indices."""
+        for name in self.per_point:
+            if (values := getattr(self, name)) is not None:
+                setattr(self, name, values[points])
+
+
+@dataclass
+class Crop(Sample):
+    """A piece of a tile; coordinates are relative to the tile, intensities scaled, all float32.
+
+    Attributes:
+        segment: (N,) int16 places of classes, or -1.
+    """
+
+    segment: NDArray[np.int16]
+    per_point: ClassVar[tuple[str, ...]] = (*Sample.per_point, "segment")
+
+
+@dataclass
+class Stretch(Sample):
+    """A sequence of S slices; coordinates are in the slices' frames but for z, still that of the cloud; all float64.
+
+    Attributes:
+        number: (N,) slice of each point, ascending.
+        paved, marked: (N,) whether a point is known to lie on the pavement (markings included), or on a marking.
         frames: the S frames.
         center: (S,) y of the true centreline, m, or NaN.
         corridor: (S, len(CORRIDOR)); height is above the cloud's zero.
@@ -35,32 +69,25 @@ class Stretch:
         carriageway: whether the truth is a carriageway's, beside which the other one must not be seen.
     """
 
-    xyz: Float
+    strength: Float
     number: NDArray[np.intp]
-    intensity: Float
-    rgb: Float
     paved: NDArray[np.bool_]
     marked: NDArray[np.bool_]
-    has_color: bool
     frames: Frames
     center: Float
     corridor: Float
     lines: Float
     room: Float
     carriageway: bool
-
-    def keep(self, points: NDArray[np.bool_] | NDArray[np.intp]) -> None:
-        """Leave out all points but those of a mask or of ascending indices."""
-        for name in ("xyz", "number", "intensity", "rgb", "paved", "marked"):
-            setattr(self, name, getattr(self, name)[points])
+    per_point: ClassVar[tuple[str, ...]] = (*Sample.per_point, "number", "paved", "marked")
 
     def along(self) -> Float:
         """Return how far along the path each slice lies from the first (S,), m."""
         return np.abs(self.frames.station - self.frames.station[0])
 
     def points_along(self) -> Float:
-        """Return how far along the path each point lies from the first slice (K,), m."""
-        return self.xyz[:, 0] + self.along()[self.number]
+        """Return how far along the path each point lies from the first slice (N,), m."""
+        return np.asarray(self.coord[:, 0] + self.along()[self.number])
 
     def paved_sides(self) -> Float:
         """Return how far the pavement reaches to the left and to the right of the centre (S, 2), m, or NaN."""

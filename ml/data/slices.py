@@ -29,9 +29,10 @@ from synthroads_addon.base.random_streams import stream
 from synthroads_addon.base.schema import quantity
 
 from ..configuration import Part
+from ..registry import apply_effects
 from . import intensity
 from .corridor import CORRIDOR, TruthKind
-from .effects.slices import SequenceEffects, leave_out, transform
+from .effects import SequenceEffects
 from .frames import SPACING, Frames, displace_frames, sequences
 from .points import ROAD_CLASSES
 from .roads import LearningRoad, cut_beside_median
@@ -143,9 +144,9 @@ class SliceDataset(Dataset[Sample]):
         path = displace_frames(exact, rng, settings.window, settings.direction_deg, settings.wander_length)
         cut = stretch(road, path, settings)
         if self.effects is not None:
-            leave_out(cut, self.effects, rng)
+            apply_effects("centerline", cut, self.effects, rng, before_thinning=True)
             thin(cut, settings.points_per_slice, rng)
-            transform(cut, self.effects, rng)
+            apply_effects("centerline", cut, self.effects, rng)
         return sample(cut, settings, rng, start.road, np.arange(settings.slices))
 
 
@@ -211,13 +212,12 @@ def stretch(road: LearningRoad, frames: Frames, settings: SliceSettings) -> Stre
         there = road.truth.at(frames.position, frames.direction, np.zeros(len(frames)))
         center, corridor, lines, room = there.center, there.corridor, there.lines, there.room
     cut = Stretch(
-        xyz=np.column_stack([found.xy, road.xyz[found.index, 2].astype(np.float64)]),
+        coord=np.column_stack([found.xy, road.xyz[found.index, 2].astype(np.float64)]),
+        strength=road.intensity[found.index].astype(np.float64),
+        color=road.rgb[found.index] / 255.0 if road.has_color else None,
         number=found.number,
-        intensity=road.intensity[found.index].astype(np.float64),
-        rgb=road.rgb[found.index] / 255.0,
         paved=paved,
         marked=marked,
-        has_color=road.has_color,
         frames=frames,
         center=center,
         corridor=corridor,
@@ -226,7 +226,7 @@ def stretch(road: LearningRoad, frames: Frames, settings: SliceSettings) -> Stre
         carriageway=settings.truth == "carriageway",
     )
     if np.isfinite(room).any():
-        y = cut.xyz[:, 1] - center[cut.number]
+        y = cut.coord[:, 1] - center[cut.number]
         cut.keep(~((y > room[cut.number, 0]) | (-y > room[cut.number, 1])))
     return cut
 
@@ -237,8 +237,8 @@ def sample(
     """Return a sequence as tensors, with at most ``points_per_slice`` points of each slice drawn at random."""
     thin(cut, settings.points_per_slice, rng)
     ends = np.searchsorted(cut.number, np.arange(len(cut.center)), side="right")
-    height = _medians(cut.xyz[:, 2], ends)
-    coord = cut.xyz - np.column_stack([np.zeros((len(cut.number), 2)), height[cut.number]])
+    height = _medians(cut.coord[:, 2], ends)
+    coord: Float = cut.coord - np.column_stack([np.zeros((len(cut.number), 2)), height[cut.number]])
     corridor = cut.corridor.copy()
     corridor[:, HEIGHT] -= height
     frame = np.column_stack([cut.frames.position, cut.frames.direction, height])
@@ -309,14 +309,14 @@ def _medians(z: Float, ends: NDArray[np.intp]) -> Float:
 def _features(cut: Stretch, rng: np.random.Generator) -> Float:
     """Return the features (K, 6), see the module's description."""
     count = len(cut.number)
-    if cut.intensity.any():
-        logs = intensity.logarithms(cut.intensity)
-        seen = np.column_stack([intensity.level(logs), intensity.contrast(logs, cut.xyz[:, 1])])
+    if cut.strength.any():
+        logs = intensity.logarithms(cut.strength)
+        seen = np.column_stack([intensity.level(logs), intensity.contrast(logs, cut.coord[:, 1])])
         brightness = np.clip(seen, -FEATURE_LIMIT, FEATURE_LIMIT)
     else:
         brightness = MISSING_NOISE * rng.standard_normal((count, 2))
-    colors = cut.rgb if cut.has_color else MISSING_NOISE * rng.standard_normal((count, 3))
-    return np.column_stack([brightness, colors, np.full(count, float(cut.has_color))])
+    colors = MISSING_NOISE * rng.standard_normal((count, 3)) if cut.color is None else cut.color
+    return np.column_stack([brightness, colors, np.full(count, float(cut.color is not None))])
 
 
 _OTHER_SIDE = {"left_edge": "right_edge", "right_edge": "left_edge"}

@@ -18,7 +18,7 @@ from synthroads_addon.cloud.tools.quantile_mapping import LEVELS, QuantileMap
 
 from ..configuration import Configuration, Part, Schedule
 from ..data.crops import FEATURES, CropSettings, Draw, Feature
-from ..data.effects.crops import Effects
+from ..data.effects import CropEffects
 from ..data.sources import FULL, Source
 from ..data.tiles import CloudTile
 from ..networks.base import SegmentationNetwork
@@ -74,7 +74,7 @@ class SegmentationConfiguration(Configuration):
         description="Synthetic share of the crops when mixed; as the tiles are if not given.",
     )
     balanced: bool = Field(False, description="Cut crops around points of each class as often.")
-    effects: Effects = Field(Effects(), description="What happens to crops.")
+    effects: CropEffects = Field(CropEffects(), description="What happens to crops.")
     adaptation: Adaptation = Field(Adaptation(), description="What brings domains nearer.")
     label_smoothing: float = quantity(0.2, ge=0, lt=1, unit="1", description="Share of the loss for all classes.")
     class_weights: bool = Field(True, description="Weigh classes by 1 / (f + 0.02), f their share of the points.")

@@ -18,8 +18,7 @@ from synthroads_addon.base.progress import Progress, silent
 from synthroads_addon.base.random_streams import stream
 
 from ..data.classes import IGNORED, class_names
-from ..data.crops import CropSettings, Item, item
-from ..data.effects.crops import crop_of
+from ..data.crops import CropSettings, Item, crop_of, item
 from ..data.points import thin
 from ..data.sources import Source, read_tiles
 from ..data.tiles import CloudTile, Scaling, scalings
@@ -112,11 +111,10 @@ def label_tile(
     keep = thin(tile.coord, settings.voxel)
     small = tile.select(keep)
     own = _needed_points(small.coord, tile.coord, core, settings.voxel)
-    strength = None if small.strength is None else scaling.apply(small.strength)
-    whole = replace(crop_of(small, strength), segment=np.full(len(small), IGNORED, dtype=np.int16))
+    small = replace(small, segment=np.full(len(small), IGNORED, dtype=np.int16))
     labels = np.zeros(len(small), dtype=np.int16)
     for number, (inside, seen) in enumerate(pieces(small.coord[:, :2], own)):
-        batch = item(whole.select(seen), settings, stream(seed, "missing features", number))
+        batch = item(crop_of(small.select(seen), scaling), settings, stream(seed, "missing features", number))
         best = classifier(batch).argmax(dim=1).cpu().numpy()
         labels[inside] = best[np.searchsorted(seen, inside)]
     return carry(small.coord[own], labels[own], tile.coord if core is None else tile.coord[core])

@@ -9,19 +9,28 @@ import sys
 from pathlib import Path
 from typing import Any, Literal
 
+import numpy as np
 import pytest
 import torch
 from pydantic import Field
 
+from ml import registry
 from ml.configuration import from_data
+from ml.data.crops import crop_of
+from ml.data.effects import CropEffects, SequenceEffects
+from ml.data.frames import along
+from ml.data.samples import Sample, Stretch
+from ml.data.slices import stretch
+from ml.data.tiles import Scaling
 from ml.networks.base import SegmentationNetwork
-from ml.registry import FOLDERS, network, networks
+from ml.registry import FOLDERS, Change, apply_effects, effect, effect_options, network, networks
 from ml.tasks import kinds
 from synthroads_addon.base.errors import InputError
-from synthroads_addon.base.schema import read_yaml
+from synthroads_addon.base.schema import quantity, read_yaml
 from tests.helpers.clouds.centerline_batches import SETTINGS
 from tests.helpers.clouds.centerline_batches import batch as slices
 from tests.helpers.clouds.segmentation_data import road_tile, toy, write_pointcept
+from tests.helpers.roads.analytic_roads import roads
 
 ROOT = Path(__file__).parents[2]
 PAGE = (ROOT / "docs/extend/network.md").read_text(encoding="utf-8")
@@ -60,7 +69,7 @@ def test_two_networks_of_one_name_are_refused() -> None:
         name: Literal["pointnext"] = Field("pointnext")
 
     with pytest.raises(
-        ValueError, match=r"ml\.networks\.segmentation\.pointnext and .*test_registry both have a network named 'pointn"
+        ValueError, match=r"ml\.networks\.segmentation\.pointnext and .*test_registry both have the network 'pointnext'"
     ):
         network("segmentation")(Other)
 
@@ -87,6 +96,55 @@ def test_a_centerlines_model_is_still_read_by_its_old_name() -> None:
 def code_of_page(file: str) -> str:
     """Return the code that the page says to save as a file."""
     return re.split(r"```\w+\n|```\n", PAGE[PAGE.index(f"`{file}`") :])[1]
+
+
+@pytest.fixture
+def fading(monkeypatch: pytest.MonkeyPatch) -> Change:
+    """An effect on the samples of both tasks, as a file of the folder would register it; gone after the test."""
+    monkeypatch.setattr(registry, "_EFFECTS", {task: dict(known) for task, known in registry._EFFECTS.items()})
+    strength = quantity(0.0, ge=0, le=1, unit="1", description="Share of the intensities that is lost.")
+
+    @effect("segmentation", "centerline", fade=strength)
+    def fading(sample: Sample, effects: Any, random: np.random.Generator) -> None:
+        if sample.strength is not None and effects.fade:
+            sample.strength = sample.strength * (1.0 - effects.fade * random.random())
+
+    return fading
+
+
+def test_an_effect_is_one_function_for_both_tasks(fading: Change) -> None:
+    for task, base in (("segmentation", CropEffects), ("centerline", SequenceEffects)):
+        options = effect_options(task, base)
+        assert options.from_dict({"fade": 0.5}).to_dict() == {**base().to_dict(), "fade": 0.5}
+        with pytest.raises(InputError, match="fade is 2"):
+            options.from_dict({"fade": 2})
+        samples = []
+        for fade in (0.0, 0.5):
+            one: Sample = crop_of(road_tile(50), Scaling()) if task == "segmentation" else cut()
+            apply_effects(task, one, options.from_dict({"fade": fade}), np.random.default_rng(1))
+            samples.append(one)
+        plain, faded = samples
+        assert plain.strength is not None
+        assert faded.strength is not None
+        np.testing.assert_array_equal(faded.coord, plain.coord)  # what is drawn for it comes last
+        ratio = faded.strength / plain.strength
+        assert ratio.min() == pytest.approx(ratio.max(), rel=1e-5)
+        assert 0.5 < ratio.min() < 1.0
+
+
+def test_two_effects_of_one_name_are_refused(fading: Change) -> None:
+    def other(sample: Sample, effects: Any, random: np.random.Generator) -> None: ...
+
+    other.__name__ = "fading"
+    with pytest.raises(ValueError, match=r"test_registry and .*test_registry both have the effect 'fading'"):
+        effect("centerline")(other)
+
+
+def cut() -> Stretch:
+    """Return some slices of a road."""
+    road = roads()[0]
+    assert road.truth is not None
+    return stretch(road, along(road.truth.axis).select(slice(40, 50)), SETTINGS)
 
 
 @pytest.mark.slow

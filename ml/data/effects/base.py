@@ -1,4 +1,4 @@
-"""Effects on training data that both tasks have: their fields, and what is drawn by them from a sample's own stream."""
+"""Fields that the effects of both tasks have, and what is alike of both."""
 
 from __future__ import annotations
 
@@ -11,24 +11,29 @@ from pydantic.fields import FieldInfo
 from synthroads_addon.base.schema import quantity
 
 from ...configuration import Part
+from ...registry import effect
+from ..samples import Sample
 
 
 class PointEffects(Part):
-    """Base of the tasks' effects."""
+    """Base of the tasks' options."""
 
     mirror: float = quantity(0.0, ge=0, le=1, unit="1", description="Probability of left and right being swapped.")
     dropout: float = quantity(0.0, ge=0, lt=1, unit="1", description="Largest share of the points that is left out.")
     color_drop: float = quantity(0.0, ge=0, le=1, unit="1", description="Probability of the colours being left out.")
 
-    def kept_points(self, count: int, rng: np.random.Generator) -> NDArray[np.bool_]:
+    def kept_points(self, count: int, random: np.random.Generator) -> NDArray[np.bool_]:
         """Return which points (count,) are not left out."""
-        return rng.random(count) >= self.dropout * rng.random()
-
-    def loses_colors(self, rng: np.random.Generator) -> bool:
-        """Return whether a sample's colours are left out."""
-        return bool(rng.random() < self.color_drop)
+        return random.random(count) >= self.dropout * random.random()
 
 
 def usually(name: str, value: float) -> Any:
     """Return a field of `PointEffects` with another default."""
     return FieldInfo.merge_field_infos(PointEffects.model_fields[name], default=value)
+
+
+@effect("segmentation", "centerline", order=50)
+def leave_out_colors(sample: Sample, effects: PointEffects, random: np.random.Generator) -> None:
+    """Leave out the colours."""
+    if random.random() < effects.color_drop:
+        sample.color = None

@@ -1,52 +1,22 @@
-"""Effects on a crop while training: cheap, on the fly, each drawn from the stream that is handed in."""
+"""Effects on crops of tiles."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field, field_validator, model_validator
 
 from synthroads_addon.base.schema import quantity
 
-from ..tiles import CloudTile
+from ...registry import effect
+from ..samples import Crop
 from .base import PointEffects, usually
 
-FloatArray = NDArray[np.float32]
-
-MISSING_SIGMA = 0.02
-"""Standard deviation of the noise that stands for a missing feature: nothing, but never exactly the same."""
+Generator = np.random.Generator
 
 
-@dataclass(frozen=True)
-class Crop:
-    """N points on their way into the network.
-
-    Attributes:
-        coord: (N, 3) m, relative to the tile.
-        color: (N, 3) from 0 to 1, or None.
-        strength: (N,) scaled intensity, or None.
-        segment: (N,) places of classes, or -1.
-    """
-
-    coord: FloatArray
-    color: FloatArray | None
-    strength: FloatArray | None
-    segment: NDArray[np.int16]
-
-    def select(self, keep: NDArray[np.bool_] | NDArray[np.intp]) -> Crop:
-        """Return the points chosen by a mask or indices."""
-        return Crop(
-            self.coord[keep],
-            None if self.color is None else self.color[keep],
-            None if self.strength is None else self.strength[keep],
-            self.segment[keep],
-        )
-
-
-class Effects(PointEffects):
+class CropEffects(PointEffects):
     """Effects on crops. All of it off leaves them as they are; the defaults are the recipe's."""
 
     rotation: bool = Field(True, description="Turn about the vertical by any angle.")
@@ -67,51 +37,47 @@ class Effects(PointEffects):
         return 0.5 * mirror if isinstance(mirror, bool) else mirror
 
     @model_validator(mode="after")
-    def _limit_is_no_less(self) -> Effects:
+    def _limit_is_no_less(self) -> CropEffects:
         if self.jitter_limit < self.jitter:
             raise ValueError(f"jitter_limit must not be less than jitter, {self.jitter:g}")
         return self
 
-    def apply(self, crop: Crop, random: np.random.Generator) -> Crop:
-        """Return a crop with all effects, in a fixed order."""
-        if self.dropout:
-            crop = crop.select(self.kept_points(len(crop.coord), random))
-        crop = replace(crop, coord=self._moved(crop.coord, random))
-        if crop.strength is not None and self.intensity_gain:
-            crop = replace(crop, strength=self._other_intensities(crop.strength, random))
-        if self.loses_colors(random):
-            crop = replace(crop, color=None)
-        if random.random() < self.intensity_drop:
-            crop = replace(crop, strength=None)
-        return crop
 
-    def _moved(self, coord: FloatArray, random: np.random.Generator) -> FloatArray:
-        angle = random.uniform(0.0, 2.0 * np.pi) if self.rotation else 0.0
-        scale = random.uniform(self.smallest_scale, self.largest_scale)
-        turn = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
-        if self.mirror and random.random() < self.mirror:
-            turn[:, 0] *= -1.0
-        middle = coord.mean(axis=0, dtype=np.float64)
-        moved = coord - middle
-        moved[:, :2] = moved[:, :2] @ turn
-        moved *= scale
-        if self.jitter:
-            noise = random.normal(0.0, self.jitter, coord.shape)
-            moved += np.clip(noise, -self.jitter_limit, self.jitter_limit)
-        return (moved + middle).astype(np.float32)
-
-    def _other_intensities(self, strength: FloatArray, random: np.random.Generator) -> FloatArray:
-        gain, exponent = np.exp(random.normal(0.0, self.intensity_gain, 2))
-        return (np.sign(strength) * np.abs(strength) ** exponent * gain).astype(np.float32)
+@effect("segmentation", order=10)
+def leave_out_points(crop: Crop, effects: CropEffects, random: Generator) -> None:
+    """Leave out single points."""
+    if effects.dropout:
+        crop.keep(effects.kept_points(len(crop), random))
 
 
-NO_EFFECTS = Effects(
-    rotation=False, smallest_scale=1.0, largest_scale=1.0, jitter=0.0, jitter_limit=0.0, color_drop=0.0
-)
-"""For validation and prediction."""
+@effect("segmentation", order=20)
+def move(crop: Crop, effects: CropEffects, random: Generator) -> None:
+    """Turn a crop about its middle, scale and mirror it, and add noise to its points."""
+    angle = random.uniform(0.0, 2.0 * np.pi) if effects.rotation else 0.0
+    scale = random.uniform(effects.smallest_scale, effects.largest_scale)
+    turn = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
+    if effects.mirror and random.random() < effects.mirror:
+        turn[:, 0] *= -1.0
+    middle = crop.coord.mean(axis=0, dtype=np.float64)
+    moved = crop.coord - middle
+    moved[:, :2] = moved[:, :2] @ turn
+    moved *= scale
+    if effects.jitter:
+        noise = random.normal(0.0, effects.jitter, moved.shape)
+        moved += np.clip(noise, -effects.jitter_limit, effects.jitter_limit)
+    crop.coord = (moved + middle).astype(np.float32)
 
 
-def crop_of(tile: CloudTile, strength: FloatArray | None) -> Crop:
-    """Return a whole tile as a crop; ``strength`` (N,) is its scaled intensity."""
-    color = None if tile.color is None else (tile.color / np.float32(255.0)).astype(np.float32)
-    return Crop(tile.coord, color, strength, tile.segment)
+@effect("segmentation", order=30)
+def change_intensities(crop: Crop, effects: CropEffects, random: Generator) -> None:
+    """Change intensities as a scanner with another gain and compression would have."""
+    if crop.strength is not None and effects.intensity_gain:
+        gain, exponent = np.exp(random.normal(0.0, effects.intensity_gain, 2))
+        crop.strength = (np.sign(crop.strength) * np.abs(crop.strength) ** exponent * gain).astype(np.float32)
+
+
+@effect("segmentation", order=60)
+def leave_out_intensities(crop: Crop, effects: CropEffects, random: Generator) -> None:
+    """Leave out the intensities."""
+    if random.random() < effects.intensity_drop:
+        crop.strength = None

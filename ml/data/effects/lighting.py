@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 from numpy.typing import NDArray
 
+from ...registry import effect
 from ..samples import Stretch
-
-if TYPE_CHECKING:
-    from .slices import SequenceEffects
+from .slices import SequenceEffects
 
 Float = NDArray[np.float64]
 Generator = np.random.Generator
@@ -30,32 +27,33 @@ _SCANNER_ASIDE = 15.0
 """Of the scanners from whose range intensities fall off: lowest and highest, and farthest from the path, m."""
 
 
-def relight(stretch: Stretch, effects: SequenceEffects, rng: Generator) -> None:
-    """Change intensities and colours as another scanner, other materials and another camera would have."""
-    if rng.random() >= effects.plain and stretch.intensity.any():
-        _relight_intensities(stretch, effects, rng)
-    if effects.loses_colors(rng):
-        stretch.has_color = False
-    elif stretch.has_color:
-        factors = np.exp(effects.tint * (rng.uniform(-1.0, 1.0) + rng.uniform(-1.0, 1.0, 3)))
-        stretch.rgb = np.clip(stretch.rgb * factors, 0.0, 1.0)
-
-
-def _relight_intensities(stretch: Stretch, effects: SequenceEffects, rng: Generator) -> None:
+@effect("centerline", order=40)
+def change_intensities(stretch: Stretch, effects: SequenceEffects, rng: Generator) -> None:
+    """Change intensities as another scanner and other materials would have."""
+    if rng.random() < effects.plain or not stretch.strength.any():
+        return
     share = rng.random(7)
-    value, marked = _repaint_lines(np.maximum(stretch.intensity, 0.0), stretch, effects.repaint, rng)
+    value, marked = _repaint_lines(np.maximum(stretch.strength, 0.0), stretch, effects.repaint, rng)
     value = _wear_markings(value, stretch.paved, marked, effects.paint * share[0])
     value, like_pavement = _verges(value, stretch, marked, effects.verge, rng)
     value = np.where(like_pavement, value, value * np.exp(effects.contrast * rng.uniform(-1.0, 1.0)))
     value = _blur_footprint(value, stretch, effects.footprint * share[5])
-    value *= _falloff(stretch.xyz[:, 1], effects.falloff * share[1], rng)
+    value *= _falloff(stretch.coord[:, 1], effects.falloff * share[1], rng)
     low, high = np.log(effects.gamma)
     log = np.exp(low + share[4] * (high - low)) * np.log(np.maximum(value / np.max(value), _DARKEST))
     # Noise by the spread, so that a scanner that compresses its intensities isn't drowned in it.
     spread = float(np.subtract(*np.percentile(log, (90.0, 10.0))))
     noise = effects.speckle * share[2] * rng.standard_normal(len(value))
     pattern = effects.patches * share[3] * _waves(stretch, rng) + effects.stripes * share[6] * _tracks(stretch, rng)
-    stretch.intensity = np.exp(log + spread * (noise + pattern))
+    stretch.strength = np.exp(log + spread * (noise + pattern))
+
+
+@effect("centerline", order=60)
+def tint(stretch: Stretch, effects: SequenceEffects, rng: Generator) -> None:
+    """Change colours as another camera would have."""
+    if stretch.color is not None:
+        factors = np.exp(effects.tint * (rng.uniform(-1.0, 1.0) + rng.uniform(-1.0, 1.0, 3)))
+        stretch.color = np.clip(stretch.color * factors, 0.0, 1.0)
 
 
 def _repaint_lines(
@@ -72,7 +70,7 @@ def _repaint_lines(
     if not stretch.without_shoulders() or not marked.any() or not bare.any():
         return value, marked
     paint, pavement = float(np.median(value[marked])), float(np.median(value[bare]))
-    y = stretch.xyz[:, 1] - stretch.center[stretch.number]
+    y = stretch.coord[:, 1] - stretch.center[stretch.number]
     edges = stretch.lines[stretch.number] * [1.0, -1.0]
     gone = np.zeros(len(value), dtype=bool)
     both, one = edge < probability, probability <= edge < 2.0 * probability
@@ -98,7 +96,7 @@ def _verges(
     bare = stretch.paved & ~marked
     if not stretch.without_shoulders() or not bare.any():
         return value, stretch.paved
-    y = stretch.xyz[:, 1] - stretch.center[stretch.number]
+    y = stretch.coord[:, 1] - stretch.center[stretch.number]
     beyond = np.column_stack([y, -y]) - stretch.paved_sides()[stretch.number]
     verge = ~stretch.paved & ((beyond > 0.0) & (beyond < widths)).any(axis=1)
     usual = float(np.median(value[verge])) if verge.any() else 0.0
@@ -123,7 +121,7 @@ def _blur_footprint(value: Float, stretch: Stretch, width: float) -> Float:
     """
     if not len(value) or width < _NARROWEST:
         return value
-    y = stretch.xyz[:, 1] - stretch.xyz[:, 1].min()
+    y = stretch.coord[:, 1] - stretch.coord[:, 1].min()
     # Slices far apart from each other on one axis, so that one search finds all windows.
     place = stretch.number * (2.0 * (float(y.max()) + width)) + y
     order = np.argsort(place)
@@ -155,7 +153,7 @@ def _tracks(stretch: Stretch, rng: Generator) -> Float:
     """Return a random function (K,) of about unit deviation that only changes across the road: waves of 1.5 to 6 m."""
     count = 5
     rate = 2.0 * np.pi / np.exp(rng.uniform(np.log(1.5), np.log(6.0), count))
-    y = stretch.xyz[:, 1] - np.nan_to_num(stretch.center)[stretch.number]
+    y = stretch.coord[:, 1] - np.nan_to_num(stretch.center)[stretch.number]
     angle = y[:, None] * rate + rng.uniform(0.0, 2.0 * np.pi, count)
     result: Float = np.cos(angle).sum(axis=1) * np.sqrt(2.0 / count)
     return result
@@ -166,7 +164,7 @@ def _waves(stretch: Stretch, rng: Generator) -> Float:
     count = 6
     rate = 2.0 * np.pi / np.exp(rng.uniform(np.log(2.0), np.log(20.0), count))
     way, phase = rng.uniform(0.0, 2.0 * np.pi, (2, count))
-    x, y = stretch.points_along(), stretch.xyz[:, 1]
+    x, y = stretch.points_along(), stretch.coord[:, 1]
     angle = x[:, None] * (rate * np.cos(way)) + y[:, None] * (rate * np.sin(way)) + phase
     result: Float = np.cos(angle).sum(axis=1) * np.sqrt(2.0 / count)
     return result

@@ -1,8 +1,4 @@
-"""Effects on sequences of slices, drawn while training: cheap, and carried along to the truth.
-
-Every effect takes its random numbers from the sample's own stream, so that a seed and a number give the same sample,
-whatever worker makes it.
-"""
+"""Effects on sequences of slices, carried along to the truth."""
 
 from __future__ import annotations
 
@@ -16,10 +12,10 @@ from pydantic import Field, model_validator
 from synthroads_addon.base.schema import quantity
 
 from ...configuration import Part
+from ...registry import effect
 from ..frames import Frames
 from ..samples import HEADING, HEIGHT, LEFT, RIGHT, Stretch
 from .base import PointEffects, usually
-from .lighting import relight
 
 Float = NDArray[np.float64]
 Generator = np.random.Generator
@@ -106,41 +102,21 @@ class SequenceEffects(PointEffects):
         return self
 
 
-def leave_out(stretch: Stretch, effects: SequenceEffects, rng: Generator) -> None:
-    """Draw the effects that leave points out, or put others in their place.
-
-    Args:
-        stretch: is changed in place.
-        effects: their strengths.
-        rng: the sample's own stream.
-    """
-    if rng.random() < effects.alone and stretch.without_shoulders():
-        stand_alone(stretch)
-    crop_sides(stretch, effects.crop, rng)
-    drop(stretch, effects, rng)
-
-
-def transform(stretch: Stretch, effects: SequenceEffects, rng: Generator) -> None:
-    """Draw the effects that change points. They cost the less the fewer points are left."""
-    for happens, turned in ((effects.mirror, mirror), (effects.turn_round, turn_round)):
-        if rng.random() < happens:
-            turned(stretch)
-    move(stretch, effects, rng)
-    relight(stretch, effects, rng)
-
-
-def stand_alone(stretch: Stretch) -> None:
+@effect("centerline", order=-30)
+def stand_alone(stretch: Stretch, effects: SequenceEffects, rng: Generator) -> None:
     """Put what lies beyond the pavement on the outer side of a carriageway on the median's side as well, mirrored.
 
     So a motorway's carriageway becomes a rural road. Heights go on from the pavement's own edge.
     """
+    if rng.random() >= effects.alone or not stretch.without_shoulders():
+        return
     edges = stretch.paved_sides()
     inwards, outwards = (0, 1) if np.isfinite(stretch.room[:, 0]).any() else (1, 0)
     sign = 1.0 if outwards == 0 else -1.0
     # How far beyond the pavement's outer and inner edge each point lies.
-    away = sign * (stretch.xyz[:, 1] - stretch.center[stretch.number])
+    away = sign * (stretch.coord[:, 1] - stretch.center[stretch.number])
     beyond_outer, beyond_inner = away - edges[stretch.number, outwards], -away - edges[stretch.number, inwards]
-    rise = stretch.xyz[:, 2] - stretch.corridor[stretch.number, HEIGHT]
+    rise = stretch.coord[:, 2] - stretch.corridor[stretch.number, HEIGHT]
     rims = [rise[(beyond <= 0.0) & (beyond >= -_RIM)] for beyond in (beyond_inner, beyond_outer)]
     if not len(rims[0]) or not len(rims[1]):
         return
@@ -148,20 +124,21 @@ def stand_alone(stretch: Stretch) -> None:
     kept = np.flatnonzero(~(beyond_inner > 0.0))
     number = stretch.number[copied]
     place = stretch.center[number] - sign * (edges[number, inwards] + beyond_outer[copied])
-    mirrored = stretch.xyz[copied].copy()
+    mirrored = stretch.coord[copied].copy()
     mirrored[:, 1] = place
     mirrored[:, 2] += float(np.median(rims[0]) - np.median(rims[1]))
     both = np.concatenate([kept, copied])
-    xyz = np.concatenate([stretch.xyz[kept], mirrored])
+    xyz = np.concatenate([stretch.coord[kept], mirrored])
     order = np.argsort(stretch.number[both], kind="stable")
     stretch.keep(both[order])
-    stretch.xyz = xyz[order]
+    stretch.coord = xyz[order]
     stretch.room = np.full_like(stretch.room, np.inf)
 
 
-def crop_sides(stretch: Stretch, crop: SequenceCrop, rng: Generator) -> None:
+@effect("centerline", order=-20)
+def crop_sides(stretch: Stretch, effects: SequenceEffects, rng: Generator) -> None:
     """Cut off both sides of every slice; slices without a known centre are cut as if it lay at the frame's origin."""
-    count = len(stretch.center)
+    count, crop = len(stretch.center), effects.crop
     center = np.nan_to_num(stretch.center)
     if rng.random() >= crop.probability:
         return
@@ -174,27 +151,31 @@ def crop_sides(stretch: Stretch, crop: SequenceCrop, rng: Generator) -> None:
         low, high = np.log(crop.reach)
         strip = np.tile(np.exp(rng.uniform(low, high, 2)), (count, 1))
     reach = strip * (1.0 - rng.uniform(0.0, crop.share, (1 if rng.random() < crop.steady else count, 2)))
-    y = stretch.xyz[:, 1] - center[stretch.number]
+    y = stretch.coord[:, 1] - center[stretch.number]
     stretch.keep((y <= reach[stretch.number, 0]) & (-y <= reach[stretch.number, 1]))
 
 
+@effect("centerline", order=-10)
 def drop(stretch: Stretch, effects: SequenceEffects, rng: Generator) -> None:
     """Leave out single points, whole slices, and a hole of some metres."""
-    slices, points = len(stretch.center), len(stretch.number)
+    slices, points = len(stretch.center), len(stretch)
     keep = effects.kept_points(points, rng)
     keep &= (rng.random(slices) >= effects.empty)[stretch.number]
     if rng.random() < effects.hidden and points:
         at, length, width = rng.integers(points), rng.uniform(2.0, 12.0), rng.uniform(1.5, 3.0)
-        x, y = stretch.points_along(), stretch.xyz[:, 1]
+        x, y = stretch.points_along(), stretch.coord[:, 1]
         keep &= ~((np.abs(x - x[at]) <= length / 2.0) & (np.abs(y - y[at]) <= width / 2.0))
     stretch.keep(keep)
 
 
-def mirror(stretch: Stretch) -> None:
+@effect("centerline", order=10)
+def mirror(stretch: Stretch, effects: SequenceEffects, rng: Generator) -> None:
     """Swap left and right. The frames are mirrored as well, so that a mirrored sample has no way back to the cloud."""
+    if rng.random() >= effects.mirror:
+        return
     frames = stretch.frames
     stretch.frames = Frames(frames.position * np.array([1.0, -1.0]), -frames.direction, frames.station)
-    stretch.xyz = stretch.xyz * np.array([1.0, -1.0, 1.0])
+    stretch.coord = stretch.coord * np.array([1.0, -1.0, 1.0])
     stretch.center = -stretch.center
     corridor = stretch.corridor.copy()
     corridor[:, LEFT], corridor[:, RIGHT] = -stretch.corridor[:, RIGHT], -stretch.corridor[:, LEFT]
@@ -203,13 +184,16 @@ def mirror(stretch: Stretch) -> None:
     stretch.lines, stretch.room = stretch.lines[:, ::-1], stretch.room[:, ::-1]
 
 
-def turn_round(stretch: Stretch) -> None:
+@effect("centerline", order=20)
+def turn_round(stretch: Stretch, effects: SequenceEffects, rng: Generator) -> None:
     """Run along the road in the other direction, the last slice first."""
+    if rng.random() >= effects.turn_round:
+        return
     last = len(stretch.center) - 1
     order = np.argsort(last - stretch.number, kind="stable")
     stretch.keep(order)
     stretch.number = last - stretch.number
-    stretch.xyz = stretch.xyz * np.array([-1.0, -1.0, 1.0])
+    stretch.coord = stretch.coord * np.array([-1.0, -1.0, 1.0])
     stretch.center = -stretch.center[::-1]
     corridor = stretch.corridor[::-1].copy()
     corridor[:, [LEFT, RIGHT]] = -corridor[:, [RIGHT, LEFT]]
@@ -218,14 +202,15 @@ def turn_round(stretch: Stretch) -> None:
     stretch.frames = stretch.frames.turned_round()
 
 
+@effect("centerline", order=30)
 def move(stretch: Stretch, effects: SequenceEffects, rng: Generator) -> None:
     """Tilt the ground and add noise to the points. Their slices stay what they are."""
     grade, cross = rng.uniform(-effects.tilt, effects.tilt, 2)
     along = stretch.along()
     middle = 0.5 * along[-1]
-    x, y = stretch.points_along() - middle, stretch.xyz[:, 1]
-    noise = rng.uniform(0.0, effects.jitter) * rng.standard_normal(stretch.xyz.shape)
-    stretch.xyz = stretch.xyz + noise
-    stretch.xyz[:, 2] += grade * x + cross * y
+    x, y = stretch.points_along() - middle, stretch.coord[:, 1]
+    noise = rng.uniform(0.0, effects.jitter) * rng.standard_normal(stretch.coord.shape)
+    stretch.coord = stretch.coord + noise
+    stretch.coord[:, 2] += grade * x + cross * y
     stretch.corridor = stretch.corridor.copy()
     stretch.corridor[:, HEIGHT] += grade * (along - middle) + cross * stretch.center

@@ -7,7 +7,7 @@ from typing import Any
 
 import torch
 
-from ml.data.effects.slices import SequenceEffects
+from ml.data.effects import SequenceEffects
 from ml.data.slices import Batch, SliceDataset, SliceSettings, collate
 from ml.networks.centerline.models import CenterlineModel
 from ml.registry import networks

@@ -15,7 +15,7 @@ import torch
 from ml.centerline import task
 from ml.configuration import from_data, load_configuration
 from ml.data.batches import Batches, BatchOptions, MeasuredRoad, Roads, read_roads
-from ml.data.effects.slices import SequenceEffects
+from ml.data.effects import SequenceEffects
 from ml.data.slices import mirror_batch
 from ml.runs import CALIBRATION, METRICS, Run
 from ml.tasks import Evaluation, Prediction

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from copy import copy
 from dataclasses import replace
 
 import numpy as np
@@ -13,16 +14,21 @@ from ml.data.classes import IGNORED
 from ml.data.crops import (
     COORDINATE_SPAN,
     FEATURES,
+    MISSING_SIGMA,
+    NO_EFFECTS,
     CropDataset,
     CropSettings,
     CropStream,
     Draw,
     Seeds,
     collate,
+    crop_of,
     cut_crop,
 )
-from ml.data.effects.crops import MISSING_SIGMA, NO_EFFECTS, Crop, Effects, crop_of
+from ml.data.effects import CropEffects
+from ml.data.samples import Crop
 from ml.data.tiles import CloudTile, Scaling, scalings
+from ml.registry import apply_effects
 from ml.segmentation.recipes import (
     SegmentationConfiguration,
     class_shares,
@@ -36,7 +42,7 @@ from tests.helpers.clouds.segmentation_data import road_tile
 SETTINGS = CropSettings(points=900)
 
 
-def dataset(tiles: list[CloudTile], effects: Effects = NO_EFFECTS, seed: int = 1, epoch: int = 0) -> CropDataset:
+def dataset(tiles: list[CloudTile], effects: CropEffects = NO_EFFECTS, seed: int = 1, epoch: int = 0) -> CropDataset:
     """Return two crops of each tile."""
     draws = [Draw(tile, number) for tile in range(len(tiles)) for number in range(2)]
     seeds = Seeds(tiles, 5, balanced=False)
@@ -76,14 +82,14 @@ def test_a_crop_is_the_nearest_points_as_columns() -> None:
 
 def test_items_depend_on_seed_epoch_and_place_alone() -> None:
     tiles = [road_tile(seed=1, scene="a"), road_tile(seed=2, scene="b")]
-    some = dataset(tiles, Effects())
-    again = dataset(tiles, Effects())
+    some = dataset(tiles, CropEffects())
+    again = dataset(tiles, CropEffects())
     for place in (3, 0, 2):  # in another order
         assert all(torch.equal(some[place][name], again[place][name]) for name in some[place])
     loader = DataLoader(again, batch_size=2, num_workers=2, collate_fn=collate)
     batch = next(iter(loader))
     assert torch.equal(batch["feat"], torch.cat([some[0]["feat"], some[1]["feat"]]))
-    for other in (dataset(tiles, Effects(), epoch=1), dataset(tiles, Effects(), seed=2)):
+    for other in (dataset(tiles, CropEffects(), epoch=1), dataset(tiles, CropEffects(), seed=2)):
         assert not torch.equal(some[0]["coord"], other[0]["coord"])
 
 
@@ -105,7 +111,7 @@ def test_missing_features_are_small_noise() -> None:
 
 def test_iterable_crops_are_endless_and_reproducible() -> None:
     tiles = [road_tile(seed=1), road_tile(seed=2)]
-    effects = Effects(dropout=0.5, intensity_gain=0.3)
+    effects = CropEffects(dropout=0.5, intensity_gain=0.3)
 
     def first(count: int, seed: int) -> list[torch.Tensor]:
         stream = CropStream(tiles, scalings(tiles, "share"), SETTINGS, Seeds(tiles, 5, False), effects, seed)
@@ -119,11 +125,14 @@ def test_iterable_crops_are_endless_and_reproducible() -> None:
 
 def effect(crop: Crop, seed: int = 1, **chosen: object) -> Crop:
     """Return a crop after the chosen effects alone."""
-    return NO_EFFECTS.model_copy(update=chosen).apply(crop, np.random.default_rng(seed))
+    changed = copy(crop)
+    options = NO_EFFECTS.model_copy(update=chosen)
+    apply_effects("segmentation", changed, options, np.random.default_rng(seed))
+    return changed
 
 
 def test_effects_off_change_nothing() -> None:
-    crop = crop_of(road_tile(), np.ones(6000, np.float32))
+    crop = crop_of(road_tile(), Scaling())
     same = effect(crop)
     np.testing.assert_allclose(same.coord, crop.coord, atol=1e-5)
     assert same.color is crop.color
@@ -131,7 +140,7 @@ def test_effects_off_change_nothing() -> None:
 
 
 def test_rotation_scale_mirror_and_jitter_do_what_they_say() -> None:
-    crop = crop_of(road_tile(), None)
+    crop = crop_of(replace(road_tile(), strength=None), Scaling())
     middle = crop.coord.mean(axis=0)
     before = np.linalg.norm(crop.coord - middle, axis=1)
     turned = effect(crop, rotation=True)
@@ -151,11 +160,12 @@ def test_rotation_scale_mirror_and_jitter_do_what_they_say() -> None:
 
 
 def test_colours_are_dropped_as_often_as_asked() -> None:
-    crop = crop_of(road_tile(50), np.ones(50, np.float32))
+    crop = crop_of(road_tile(50), Scaling())
     dropped = [effect(crop, seed, color_drop=0.2).color is None for seed in range(400)]
     assert 0.13 < np.mean(dropped) < 0.27
     assert effect(crop, intensity_drop=1.0).strength is None
-    other = effect(crop_of(road_tile(50), np.linspace(0.1, 1, 50, dtype=np.float32)), intensity_gain=0.4).strength
+    rising = replace(road_tile(50), strength=np.linspace(0.1, 1, 50, dtype=np.float32))
+    other = effect(crop_of(rising, Scaling()), intensity_gain=0.4).strength
     assert other is not None
     assert (np.diff(other) > 0).all()  # another scale, the same order
 

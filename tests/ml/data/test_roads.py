@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import torch
 
-from ml.data.effects.slices import SequenceEffects
+from ml.data.effects import SequenceEffects
 from ml.data.points import Points
 from ml.data.roads import crop_road, read_measured, read_scene, scene_folders
 from ml.data.slices import SliceDataset, SliceSettings, collate

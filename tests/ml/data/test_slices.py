@@ -13,10 +13,12 @@ from torch.utils.data import DataLoader
 
 from ml.data.axis import MeasuredAxis
 from ml.data.corridor import CORRIDOR, Truth
-from ml.data.effects.slices import SequenceEffects, Stretch, mirror, turn_round
+from ml.data.effects import SequenceEffects
+from ml.data.effects.slices import mirror, turn_round
 from ml.data.frames import Frames, along, displace_frames
 from ml.data.points import Points
 from ml.data.roads import LearningRoad
+from ml.data.samples import Stretch
 from ml.data.slices import (
     FEATURE_LIMIT,
     FEATURES,
@@ -181,7 +183,7 @@ def test_a_mirrored_cloud_gives_the_mirrored_sample(kind: str) -> None:
         frames = path_of(road).select(slice(40, 50))
         flipped = Frames(frames.position * [1.0, -1.0], -frames.direction, frames.station)
         cut = stretch(road, frames, ALL_POINTS)
-        mirror(cut)
+        mirror(cut, SequenceEffects(mirror=1.0), rng())
         other = stretch(mapped(road, turn, np.zeros(3)), flipped, ALL_POINTS)
         same(as_sample(cut), as_sample(other), atol=1e-3)
         np.testing.assert_allclose(cut.lines, other.lines, atol=1e-6)
@@ -192,7 +194,7 @@ def test_seeing_the_road_against_its_direction() -> None:
     road = roads("carriageway")[0]
     frames = path_of(road).select(slice(40, 50))
     cut = stretch(road, frames, ALL_POINTS)
-    turn_round(cut)
+    turn_round(cut, SequenceEffects(turn_round=1.0), rng())
     assert (np.diff(cut.number) >= 0).all()
     other = stretch(road, frames.turned_round(), ALL_POINTS)
     same(as_sample(cut), as_sample(other), atol=1e-4)
@@ -219,7 +221,7 @@ def test_a_slice_has_at_most_its_number_of_points_each_as_likely() -> None:
 def test_a_carriageway_shows_nothing_beyond_the_middle_of_the_median() -> None:
     for road in roads("carriageway"):
         cut = stretch(road, path_of(road).select(slice(40, 50)), ALL_POINTS)
-        y = cut.xyz[:, 1] - cut.center[cut.number]
+        y = cut.coord[:, 1] - cut.center[cut.number]
         inner = np.where(np.isfinite(cut.room[0]))[0][0]
         reach = (y if inner == 0 else -y).max()
         assert cut.room[0, inner] - 0.3 < reach <= cut.room[:, inner].max()

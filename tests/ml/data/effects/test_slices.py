@@ -10,25 +10,14 @@ import numpy as np
 import pytest
 
 from ml.data.corridor import CORRIDOR
-from ml.data.effects.lighting import _waves
-from ml.data.effects.slices import (
-    LEFT,
-    RIGHT,
-    SequenceCrop,
-    SequenceEffects,
-    Stretch,
-    crop_sides,
-    drop,
-    leave_out,
-    mirror,
-    move,
-    relight,
-    stand_alone,
-    transform,
-    turn_round,
-)
+from ml.data.effects import SequenceEffects
+from ml.data.effects.base import leave_out_colors
+from ml.data.effects.lighting import _waves, change_intensities, tint
+from ml.data.effects.slices import SequenceCrop, crop_sides, drop, mirror, move, stand_alone, turn_round
 from ml.data.frames import along, displace_frames
+from ml.data.samples import LEFT, RIGHT, Stretch
 from ml.data.slices import SliceSettings, stretch
+from ml.registry import apply_effects
 from synthroads_addon.base.errors import InputError
 from tests.helpers.roads.analytic_roads import roads
 
@@ -42,6 +31,18 @@ NONE = SequenceEffects(
     **dict.fromkeys(("falloff", "speckle", "patches", "stripes", "footprint", "color_drop", "tint"), 0.0),
 )
 SETTINGS = SliceSettings(points_per_slice=100_000, half_width=18.0)
+
+
+ALWAYS = SequenceEffects(mirror=1.0, turn_round=1.0, alone=1.0)
+
+
+def with_crop(crop: SequenceCrop) -> SequenceEffects:
+    return NONE.model_copy(update={"crop": crop})
+
+
+def relight(one: Stretch, effects: SequenceEffects, random: np.random.Generator) -> None:
+    for effect in (change_intensities, leave_out_colors, tint):
+        effect(one, effects, random)
 
 
 def rng(seed: int = 0) -> np.random.Generator:
@@ -63,7 +64,7 @@ def _cut(kind: str, which: int, seed: int, spacing: int) -> Stretch:
 
 
 def contents(one: Stretch) -> dict[str, np.ndarray]:
-    names = ("xyz", "number", "intensity", "rgb", "center", "corridor", "lines", "room")
+    names = ("coord", "number", "strength", "color", "center", "corridor", "lines", "room")
     return {name: getattr(one, name).copy() for name in names}
 
 
@@ -75,12 +76,12 @@ def same(one: dict[str, np.ndarray], other: dict[str, np.ndarray]) -> None:
 def test_effects_of_no_strength_change_nothing() -> None:
     one = cut()
     before = contents(one)
-    leave_out(one, NONE, rng())
-    transform(one, NONE, rng())
+    for before_thinning in (True, False):
+        apply_effects("centerline", one, NONE, rng(), before_thinning=before_thinning)
     # A power of 1 is left, and intensities as a share of the largest.
     after = contents(one)
-    np.testing.assert_allclose(after["intensity"] * np.max(before["intensity"]), before["intensity"], rtol=1e-9)
-    del before["intensity"], after["intensity"]
+    np.testing.assert_allclose(after["strength"] * np.max(before["strength"]), before["strength"], rtol=1e-9)
+    del before["strength"], after["strength"]
     same(before, after)
 
 
@@ -88,15 +89,15 @@ def test_effects_of_no_strength_change_nothing() -> None:
 def test_mirror_and_turn_are_their_own_inverse(effect: object) -> None:
     one = cut("carriageway")
     before, direction = contents(one), one.frames.direction.copy()
-    effect(one)  # type: ignore[operator]
+    effect(one, ALWAYS, rng())  # type: ignore[operator]
     assert not np.allclose(one.center, before["center"])
-    effect(one)  # type: ignore[operator]
+    effect(one, ALWAYS, rng())  # type: ignore[operator]
     after = contents(one)
     np.testing.assert_allclose(np.cos(one.frames.direction - direction), 1.0)
     for name in ("center", "corridor", "lines", "room"):
         np.testing.assert_allclose(after[name], before[name], atol=1e-9)
-    order = [np.lexsort((values["xyz"][:, 1], values["number"])) for values in (before, after)]
-    np.testing.assert_allclose(after["xyz"][order[1]], before["xyz"][order[0]], atol=1e-9)
+    order = [np.lexsort((values["coord"][:, 1], values["number"])) for values in (before, after)]
+    np.testing.assert_allclose(after["coord"][order[1]], before["coord"][order[0]], atol=1e-9)
 
 
 def test_edges_stay_left_and_right() -> None:
@@ -104,17 +105,17 @@ def test_edges_stay_left_and_right() -> None:
     for effect in (mirror, turn_round):
         one = cut()
         width = one.corridor[:, left] - one.corridor[:, right]
-        effect(one)
+        effect(one, ALWAYS, rng())
         turned = one.corridor[:, left] - one.corridor[:, right]
         np.testing.assert_allclose(np.sort(turned), np.sort(width), atol=1e-9)
-        paved = one.xyz[one.paved, 1]
+        paved = one.coord[one.paved, 1]
         number = one.number[one.paved]
         assert (paved <= one.corridor[number, left] + 0.15).all()
         assert (paved >= one.corridor[number, right] - 0.15).all()
 
 
 def extents(one: Stretch) -> tuple[np.ndarray, np.ndarray]:
-    y = one.xyz[:, 1] - one.center[one.number]
+    y = one.coord[:, 1] - one.center[one.number]
     left, right = np.zeros(10), np.zeros(10)
     np.maximum.at(left, one.number, y)
     np.maximum.at(right, one.number, -y)
@@ -126,7 +127,7 @@ def test_cropped_sides_lie_in_their_limits_about_the_truth() -> None:
     lefts, rights = [], []
     for seed in range(60):
         one = cut()
-        crop_sides(one, crop, rng(seed))
+        crop_sides(one, with_crop(crop), rng(seed))
         left, right = extents(one)
         assert max(left.max(), right.max()) <= 10.0
         assert min(left.min(), right.min()) > 0.5 * 6.0 - 0.6
@@ -141,7 +142,7 @@ def test_cropped_sides_lie_in_their_limits_about_the_truth() -> None:
 
 def test_steady_cuts_are_the_same_in_all_slices() -> None:
     one = cut()
-    crop_sides(one, SequenceCrop(probability=1.0, reach=(6.0, 10.0), share=0.5, steady=1.0), rng(1))
+    crop_sides(one, with_crop(SequenceCrop(probability=1.0, reach=(6.0, 10.0), share=0.5, steady=1.0)), rng(1))
     left, right = extents(one)
     assert np.ptp(left) < 0.8
     assert np.ptp(right) < 0.8
@@ -151,30 +152,30 @@ def test_a_carriageway_is_cut_outside_its_edge_lines() -> None:
     for share, least in ((0.0, 3.4), (0.75, 0.5)):
         one = cut("carriageway")
         assert np.isfinite(one.lines).all()
-        crop_sides(one, SequenceCrop(probability=1.0, beyond=(0.0, 3.0), share=share), rng(2))
+        crop_sides(one, with_crop(SequenceCrop(probability=1.0, beyond=(0.0, 3.0), share=share)), rng(2))
         for side, reach in enumerate(extents(one)):
             assert reach.max() <= min(one.lines[0, side] + 3.0, one.room[:, side].max()) + 1e-9
             assert reach.min() > least
     narrow = cut("carriageway")
     narrow.room[:] = 1.5
-    crop_sides(narrow, SequenceCrop(probability=1.0), rng(2))
+    crop_sides(narrow, with_crop(SequenceCrop(probability=1.0)), rng(2))
     assert max(reach.max() for reach in extents(narrow)) <= 1.5
     untouched = cut("carriageway")
-    crop_sides(untouched, SequenceCrop(probability=0.0), rng(2))
+    crop_sides(untouched, with_crop(SequenceCrop(probability=0.0)), rng(2))
     assert len(untouched.number) == len(cut("carriageway").number)
 
 
 @pytest.mark.parametrize("number", [0, 1])
 def test_a_carriageway_stands_alone(number: int) -> None:
     """Beside its inner edge lies what lies beside the outer one, and at the edges' height."""
-    one, plain = cut("carriageway", number), cut("carriageway", number)
-    stand_alone(one)
+    one, plain = (without_shoulders(cut("carriageway", number)) for _ in range(2))
+    stand_alone(one, ALWAYS, rng())
     edges = plain.paved_sides()
     inner = int(np.isfinite(plain.room).all(axis=0).argmax())
     sign = 1.0 if inner == 0 else -1.0
 
     def beyond(stretch: Stretch, side: float, column: int) -> np.ndarray:
-        y = stretch.xyz[:, 1] - stretch.center[stretch.number]
+        y = stretch.coord[:, 1] - stretch.center[stretch.number]
         return side * y - edges[stretch.number, column]
 
     assert (np.diff(one.number) >= 0).all()
@@ -186,7 +187,7 @@ def test_a_carriageway_stands_alone(number: int) -> None:
         np.sort(beyond(one, sign, inner)[beyond(one, sign, inner) > 0.0]), np.sort(outer[outer > 0.0]), atol=1e-9
     )
     near = [
-        one.xyz[(beyond(one, *side) > low) & (beyond(one, *side) <= low + 0.5), 2]
+        one.coord[(beyond(one, *side) > low) & (beyond(one, *side) <= low + 0.5), 2]
         for side, low in (((sign, inner), -0.5), ((sign, inner), 0.0))
     ]
     assert abs(np.median(near[0]) - np.median(near[1])) < 0.1
@@ -194,19 +195,19 @@ def test_a_carriageway_stands_alone(number: int) -> None:
 
 
 def test_where_the_inner_edge_is_unknown_no_points_are_put_nowhere() -> None:
-    one = cut("carriageway")
+    one = without_shoulders(cut("carriageway"))
     inner = int(np.isfinite(one.room).all(axis=0).argmax())
     one.corridor[3, (LEFT, RIGHT)[inner]] = np.nan
-    stand_alone(one)
-    assert np.isfinite(one.xyz).all()
+    stand_alone(one, ALWAYS, rng())
+    assert np.isfinite(one.coord).all()
     assert (one.number == 3).sum() > 20
 
 
 def test_a_slice_without_truth_is_cropped_all_the_same() -> None:
     one = cut()
     one.center[3] = np.nan
-    crop_sides(one, SequenceCrop(probability=1.0, reach=(5.0, 5.0), share=0.0), rng())
-    assert np.abs(one.xyz[one.number == 3, 1]).max() <= 5.0
+    crop_sides(one, with_crop(SequenceCrop(probability=1.0, reach=(5.0, 5.0), share=0.0)), rng())
+    assert np.abs(one.coord[one.number == 3, 1]).max() <= 5.0
     assert (one.number == 3).sum() > 20
 
 
@@ -233,11 +234,11 @@ def test_a_hole_is_as_long_as_a_vehicle(spacing: int) -> None:
     holes = []
     for seed in range(40):
         one = cut(spacing=spacing)
-        x = one.xyz[:, 0] + spacing * one.number
-        places = {tuple(place) for place in np.column_stack([x, one.xyz[:, 1]])}
+        x = one.coord[:, 0] + spacing * one.number
+        places = {tuple(place) for place in np.column_stack([x, one.coord[:, 1]])}
         drop(one, NONE.model_copy(update={"hidden": 1.0}), rng(seed))
-        x = one.xyz[:, 0] + spacing * one.number
-        gone = np.array(sorted(places - {tuple(place) for place in np.column_stack([x, one.xyz[:, 1]])}))
+        x = one.coord[:, 0] + spacing * one.number
+        gone = np.array(sorted(places - {tuple(place) for place in np.column_stack([x, one.coord[:, 1]])}))
         holes.append(np.ptp(gone, axis=0))
     along_road, across = np.max(holes, axis=0)
     assert 8.0 < along_road <= 12.0
@@ -248,7 +249,7 @@ def test_a_hole_is_as_long_as_a_vehicle(spacing: int) -> None:
 def test_patches_go_on_from_slice_to_slice(spacing: int) -> None:
     ahead, later = cut(spacing=spacing), cut(spacing=spacing)
     inside = later.number < 9
-    ahead.xyz[:, 0] += spacing
+    ahead.coord[:, 0] += spacing
     later.number = np.minimum(later.number + 1, 9)
     np.testing.assert_allclose(_waves(ahead, rng(5))[inside], _waves(later, rng(5))[inside], atol=1e-6)
 
@@ -258,12 +259,12 @@ def test_tilt_carries_the_height_along(spacing: int) -> None:
     one = cut(spacing=spacing)
     height = CORRIDOR.index("height")
     before = one.corridor[:, height].copy()
-    z = one.xyz[:, 2].copy()
+    z = one.coord[:, 2].copy()
     move(one, NONE.model_copy(update={"tilt": 0.1}), rng(1))
     # The plane that was added, found from the points, says what the centreline's height must be.
-    along_road = one.xyz[:, 0] + spacing * one.number
-    design = np.column_stack([along_road, one.xyz[:, 1], np.ones(len(z))])
-    grade, cross, zero = np.linalg.lstsq(design, one.xyz[:, 2] - z, rcond=None)[0]
+    along_road = one.coord[:, 0] + spacing * one.number
+    design = np.column_stack([along_road, one.coord[:, 1], np.ones(len(z))])
+    grade, cross, zero = np.linalg.lstsq(design, one.coord[:, 2] - z, rcond=None)[0]
     assert abs(grade) > 0.001
     assert abs(cross) > 0.001
     added = grade * spacing * np.arange(10) + cross * one.center + zero
@@ -272,26 +273,26 @@ def test_tilt_carries_the_height_along(spacing: int) -> None:
 
 def test_jitter() -> None:
     one = cut()
-    before = one.xyz.copy()
+    before = one.coord.copy()
     move(one, NONE.model_copy(update={"jitter": 0.05}), rng(1))
-    assert 0.001 < (one.xyz - before).std() < 0.05
+    assert 0.001 < (one.coord - before).std() < 0.05
 
 
 def relit(name: str, strength: object, seed: int) -> tuple[Stretch, np.ndarray]:
     """Return a sequence after one effect on its intensities, and the logarithm of the factors on them."""
     one = cut()
-    plain = one.intensity.copy()
+    plain = one.strength.copy()
     relight(one, NONE.model_copy(update={name: strength}), rng(seed))
-    assert (one.intensity > 0.0).all()
-    return one, np.log(one.intensity / plain)
+    assert (one.strength > 0.0).all()
+    return one, np.log(one.strength / plain)
 
 
 def test_a_power_keeps_the_order_of_intensities() -> None:
     spreads = []
     for seed in range(8):
         one, _ = relit("gamma", (0.2, 2.0), seed)
-        assert (np.diff(one.intensity[np.argsort(cut().intensity)]) >= -1e-12).all()
-        spreads.append(np.ptp(np.log(one.intensity)) / np.ptp(np.log(cut().intensity)))
+        assert (np.diff(one.strength[np.argsort(cut().strength)]) >= -1e-12).all()
+        spreads.append(np.ptp(np.log(one.strength)) / np.ptp(np.log(cut().strength)))
     assert min(spreads) < 0.7
     assert max(spreads) > 1.4
 
@@ -300,7 +301,7 @@ def test_intensities_fall_off_to_the_sides() -> None:
     falls = []
     for seed in range(8):
         one, logs = relit("falloff", 4.0, seed)
-        far, near = np.abs(one.xyz[:, 1]) > 14.0, np.abs(one.xyz[:, 1]) < 3.0
+        far, near = np.abs(one.coord[:, 1]) > 14.0, np.abs(one.coord[:, 1]) < 3.0
         falls.append(logs[far].mean() - logs[near].mean())
     # The scanner isn't always above the road: seen from beside it, one side may be as near as its middle.
     assert sum(fall < 0.0 for fall in falls) >= 6
@@ -312,7 +313,7 @@ def test_two_passes_beside_each_other_light_a_place_twice() -> None:
     scatter = []
     for seed in range(30):
         one, logs = relit("falloff", 4.0, seed)
-        near = np.abs(one.xyz[:, 1] - one.xyz[0, 1]) < 0.3
+        near = np.abs(one.coord[:, 1] - one.coord[0, 1]) < 0.3
         scatter.append(float(np.ptp(logs[near])))
     assert sorted(scatter)[10] < 0.3
     assert max(scatter) > 1.5
@@ -330,8 +331,8 @@ def test_a_wide_footprint_smears_lines() -> None:
         fainter = min(fainter, float(np.median(logs[plain.marked])))
         brighter = bare & (logs > 0.5)
         for number in range(10):
-            line = plain.xyz[(plain.marked | ~plain.paved) & (plain.number == number), 1]
-            beside = plain.xyz[brighter & (plain.number == number), 1]
+            line = plain.coord[(plain.marked | ~plain.paved) & (plain.number == number), 1]
+            beside = plain.coord[brighter & (plain.number == number), 1]
             apart = np.abs(beside[:, None] - line[None, :]).min(axis=1) if len(beside) and len(line) else np.zeros(1)
             widest = max(widest, float(apart.max()))
     assert 0.3 < widest <= 1.0
@@ -340,7 +341,7 @@ def test_a_wide_footprint_smears_lines() -> None:
 
 def test_tracks_run_along_the_road() -> None:
     one, logs = max((relit("stripes", 1.0, seed) for seed in range(8)), key=lambda found: found[1].std())
-    across = one.xyz[:, 1] - one.center[one.number]
+    across = one.coord[:, 1] - one.center[one.number]
     cell = np.round(across / 0.1).astype(int) - round(across.min() / 0.1)
     counts = np.bincount(cell)
     means = np.bincount(cell, logs) / np.maximum(counts, 1)
@@ -365,8 +366,8 @@ def test_worn_markings_are_darker_but_never_than_the_pavement() -> None:
     for seed in range(8):
         one, _ = relit("paint", 1.0, seed)
         assert one.marked.sum() > 20
-        bare = np.median(one.intensity[one.paved & ~one.marked])
-        ratios.append(np.median(one.intensity[one.marked]) / bare)
+        bare = np.median(one.strength[one.paved & ~one.marked])
+        ratios.append(np.median(one.strength[one.marked]) / bare)
     assert min(ratios) >= 1.0
     assert min(ratios) < 4.0
     assert max(ratios) > 7.0
@@ -387,10 +388,10 @@ def test_a_carriageways_lines_are_painted_otherwise() -> None:
     for seed in range(60):
         one, plain = without_shoulders(cut("carriageway")), cut("carriageway")
         relight(one, NONE.model_copy(update={"repaint": 0.4}), rng(seed))
-        assert (one.intensity > 0.0).all()
-        y = plain.xyz[:, 1] - plain.center[plain.number]
-        bare = np.median(one.intensity[plain.paved & ~plain.marked])
-        bright = one.intensity > 2.0 * bare
+        assert (one.strength > 0.0).all()
+        y = plain.coord[:, 1] - plain.center[plain.number]
+        bare = np.median(one.strength[plain.paved & ~plain.marked])
+        bright = one.strength > 2.0 * bare
         middle = plain.paved & (np.abs(y) < 0.06)
         solid.add(bool(bright[middle].all()))
         places = {"lane": 0.0 * y, "left": plain.lines[plain.number, 0], "right": -plain.lines[plain.number, 1]}
@@ -411,7 +412,7 @@ def test_a_carriageways_lines_are_painted_otherwise() -> None:
     assert np.ptp(logs) < 1e-9
     with_shoulders, plain = cut("carriageway"), cut("carriageway")
     relight(with_shoulders, NONE.model_copy(update={"repaint": 0.5}), rng(3))
-    ratio = with_shoulders.intensity / plain.intensity
+    ratio = with_shoulders.strength / plain.strength
     assert np.ptp(ratio) < 1e-9 * ratio.max()
 
 
@@ -419,17 +420,17 @@ def test_verges_of_rural_roads_look_like_asphalt() -> None:
     shares = []
     for seed in range(20):
         one = without_shoulders(cut("carriageway"))
-        y = one.xyz[:, 1] - one.center[one.number]
+        y = one.coord[:, 1] - one.center[one.number]
         one.paved &= (one.paved_sides()[one.number, 0] >= y) & (-y <= one.paved_sides()[one.number, 1])
-        one.intensity = np.where(one.paved, one.intensity, 0.12)
+        one.strength = np.where(one.paved, one.strength, 0.12)
         beyond = np.maximum(y - one.paved_sides()[one.number, 0], -y - one.paved_sides()[one.number, 1])
         near, far = ~one.paved & (beyond < 1.5), ~one.paved & (beyond > 2.0)
-        before = one.intensity.copy()
+        before = one.strength.copy()
         relight(one, NONE.model_copy(update={"verge": 2.0}), rng(seed))
-        bare = np.median(one.intensity[one.paved & ~one.marked])
+        bare = np.median(one.strength[one.paved & ~one.marked])
         scale = bare / np.median(before[one.paved & ~one.marked])
-        np.testing.assert_allclose(one.intensity[far], scale * before[far], rtol=1e-6)
-        shares.append(float(np.mean(one.intensity[near] < 2.0 * bare)))
+        np.testing.assert_allclose(one.strength[far], scale * before[far], rtol=1e-6)
+        shares.append(float(np.mean(one.strength[near] < 2.0 * bare)))
     assert min(shares) < 0.6
     assert max(shares) > 0.9
 
@@ -439,41 +440,40 @@ def test_patches_are_smooth_and_speckle_is_not(name: str) -> None:
     one, logs = max((relit(name, 0.5, seed) for seed in range(8)), key=lambda found: found[1].std())
     assert 0.1 < logs.std() < 0.8
     third = one.number == 3
-    steps = np.abs(np.diff(logs[third][np.argsort(one.xyz[third, 1])])).mean()
+    steps = np.abs(np.diff(logs[third][np.argsort(one.coord[third, 1])])).mean()
     assert steps < 0.7 * logs.std() if name == "patches" else steps > 0.9 * logs.std()
 
 
 def test_colours() -> None:
     one = cut()
     relight(one, NONE.model_copy(update={"color_drop": 1.0}), rng())
-    assert not one.has_color
+    assert one.color is None
     one = cut()
-    before = one.rgb.copy()
+    before = one.color.copy()
     relight(one, NONE.model_copy(update={"tint": 0.5}), rng(2))
-    assert one.has_color
-    assert one.rgb.min() >= 0.0
-    assert one.rgb.max() <= 1.0
-    factor = (one.rgb / before)[one.rgb.max(axis=1) < 1.0]
+    assert one.color.min() >= 0.0
+    assert one.color.max() <= 1.0
+    factor = (one.color / before)[one.color.max(axis=1) < 1.0]
     np.testing.assert_allclose(factor.std(axis=0), 0.0, atol=1e-9)
     assert factor.mean(axis=0).std() > 0.01
 
 
 def test_some_intensities_stay_as_they_are() -> None:
     """A noiseless simulation's clouds are among the training data."""
-    plain = cut().intensity
+    plain = cut().strength
     same_as_before = 0
     for seed in range(40):
         one = cut()
         relight(one, SequenceEffects(plain=0.5), rng(seed))
-        same_as_before += int(np.array_equal(one.intensity, plain))
+        same_as_before += int(np.array_equal(one.strength, plain))
     assert 10 < same_as_before < 30
 
 
 def test_points_without_intensity_stay_without() -> None:
     one = cut()
-    one.intensity[:] = 0.0
+    one.strength[:] = 0.0
     relight(one, SequenceEffects(), rng())
-    assert (one.intensity == 0.0).all()
+    assert (one.strength == 0.0).all()
 
 
 def test_a_sequence_without_points_passes_through() -> None:
@@ -481,9 +481,9 @@ def test_a_sequence_without_points_passes_through() -> None:
     one.keep(np.zeros(len(one.number), dtype=bool))
     for seed in range(5):
         copy = replace(one)
-        leave_out(copy, SequenceEffects(hidden=1.0), rng(seed))
-        transform(copy, SequenceEffects(), rng(seed))
-        assert len(copy.xyz) == 0
+        apply_effects("centerline", copy, SequenceEffects(hidden=1.0), rng(seed), before_thinning=True)
+        apply_effects("centerline", copy, SequenceEffects(), rng(seed))
+        assert len(copy.coord) == 0
 
 
 def test_wrong_limits_are_refused() -> None:
