@@ -30,10 +30,9 @@ def run(arguments: argparse.Namespace) -> Outcome:
 
     trained = Run.open(arguments.run, kinds())
     evaluation = Evaluation(arguments.data, arguments.split, arguments.output, arguments.mapping)
-    used = task(trained.configuration.task)
-    scores = used.evaluate(trained, evaluation, progress_bar(arguments))
+    scores, tables = task(trained.configuration.task).evaluate(trained, evaluation, progress_bar(arguments))
     written = f"written to {arguments.output}: {', '.join(scores['files'])}"
-    return 0, scores, f"{used.report(scores)}\n\n{written}"
+    return 0, scores, f"{tables}\n\n{written}"
 
 
 if __name__ == "__main__":

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
@@ -53,7 +53,7 @@ class Prediction:
 
 
 class Task(Protocol):
-    """A module of `TASKS`. All results are JSON data."""
+    """A module of `TASKS`. All results are JSON data, but for tables."""
 
     def configuration_kind(self) -> type[Configuration]:
         """Return the class of its configurations."""
@@ -61,11 +61,8 @@ class Task(Protocol):
     def train(self, run: Any, progress: Progress = silent) -> dict[str, Any]:
         """Train a `Run`, save it and return its metrics."""
 
-    def evaluate(self, run: Any, evaluation: Evaluation, progress: Progress = silent) -> dict[str, Any]:
-        """Measure a trained `Run`; ``files`` are the names of what was written to the output."""
-
-    def report(self, result: Mapping[str, Any]) -> str:
-        """Return what `evaluate` found as tables for people."""
+    def evaluate(self, run: Any, evaluation: Evaluation, progress: Progress = silent) -> tuple[dict[str, Any], str]:
+        """Measure a trained `Run`; ``files`` are the names of what was written to the output. And tables for people."""
 
     def predict(self, run: Any, prediction: Prediction, progress: Progress = silent) -> dict[str, Any]:
         """Use a trained `Run` on a cloud and write what it says."""

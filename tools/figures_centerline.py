@@ -21,8 +21,6 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any, TypeVar
 
-import numpy as np
-
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
 
@@ -35,7 +33,6 @@ from ml.data.slices import SliceSettings  # noqa: E402
 from ml.runs import Run  # noqa: E402
 from ml.scores import pictures, tables  # noqa: E402
 from ml.scores.baselines import SkeletonSettings  # noqa: E402
-from ml.scores.distances import over_seeds  # noqa: E402
 from ml.scores.evaluation import (  # noqa: E402
     HALF_WIDTH,
     Case,
@@ -49,8 +46,8 @@ from ml.scores.evaluation import (  # noqa: E402
     trivial_predictors,
     truth_of,
 )
+from ml.scores.metrics import Spread, over_seeds  # noqa: E402
 from ml.scores.paint import with_painted_line  # noqa: E402
-from ml.scores.tables import Spread  # noqa: E402
 from ml.tasks import kinds  # noqa: E402
 from synthroads_addon.base.errors import SynthRoadsError  # noqa: E402
 from synthroads_addon.base.files import write_file  # noqa: E402
@@ -282,9 +279,8 @@ def measure_corridor(
         for name, versions in learned.items():
             found = corridor_figures(versions[min(index, len(versions) - 1)], shown)
             for target, figures in found.items():
-                known = {figure: np.nan if value is None else value for figure, value in figures.items()}
-                known["mae"] *= tables.TARGETS_SHOWN[target][1]
-                rows.setdefault(f"{name}: {tables.TARGETS_SHOWN[target][0]}", []).append(known)
+                title = f"{name}: {tables.TARGETS_SHOWN[target][0]}"
+                rows.setdefault(title, []).append(tables.scaled(target, figures))
     return {name: {"all": over_seeds(values)} for name, values in rows.items()}
 
 

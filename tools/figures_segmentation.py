@@ -26,8 +26,9 @@ from ml.data.pack import CROP, summary  # noqa: E402
 from ml.data.packed import PackReader  # noqa: E402
 from ml.data.sources import Source  # noqa: E402
 from ml.runs import HISTORY, METRICS, PRETRAINING, Run  # noqa: E402
+from ml.scores.confusion import by_class, by_test  # noqa: E402
+from ml.scores.metrics import Spread, defined  # noqa: E402
 from ml.scores.pictures import comparison  # noqa: E402
-from ml.scores.tables import Spread, by_class, by_test, defined  # noqa: E402
 from ml.segmentation.experiment import RESULTS  # noqa: E402
 from ml.segmentation.recipes import SegmentationConfiguration  # noqa: E402
 from ml.segmentation.scoring import score, trained_model  # noqa: E402

@@ -19,8 +19,7 @@ from ..data.corridor import TruthKind
 from ..data.roads import LearningRoad, read_measured, read_scene, scene_folders
 from ..networks.centerline.models import TARGETS
 from ..scores.baselines import SkeletonSettings
-from ..scores.calibration import LEVELS
-from ..scores.distances import coverage
+from ..scores.distances import TARGET_METRICS, TargetErrors
 from ..scores.evaluation import (
     Case,
     Cropping,
@@ -31,8 +30,9 @@ from ..scores.evaluation import (
     trivial_predictors,
     truth_of,
 )
+from ..scores.metrics import figures, or_none
 from ..scores.pictures import PictureView, corridor_picture, lines_picture
-from ..scores.tables import as_data, write_tables
+from ..scores.tables import as_data, report, write_tables
 from ..tasks import Evaluation
 from .predictor import CenterlinePredictor, errors
 
@@ -54,7 +54,7 @@ def measure_run(
     predictor: CenterlinePredictor,
     evaluation: Evaluation,
     progress: Progress = silent,
-) -> dict[str, Any]:
+) -> tuple[dict[str, Any], str]:
     """Measure a trained model on data sets and on real clouds with an axis beside them; write tables and pictures.
 
     Synthetic roads are looked at along a path that strays from the axis, and whole. Real ones, whose strips were cut
@@ -62,7 +62,7 @@ def measure_run(
 
     Returns:
         the model's mean figures; ``tables`` has those of all predictors and roads, ``corridor`` its errors by target,
-        ``files`` the names of what was written.
+        ``files`` the names of what was written. And tables for people.
     """
     shown = read_cases(configuration, evaluation, progress)
     name = f"{configuration.network.name}, seed {configuration.seed}"
@@ -77,9 +77,9 @@ def measure_run(
     for number, one in enumerate(shown[:PICTURES]):
         progress("drawing", number / min(len(shown), PICTURES))
         files += _draw(evaluation.output, one, predictor, name)
-    rows = {figure: spread.mean for figure, spread in measured[name]["all"].items()}
-    plain = {figure: value if np.isfinite(value) else None for figure, value in rows.items()}
-    return {"roads": len(shown), **plain, "corridor": corridor, "tables": as_data(measured), "files": files}
+    found = {"corridor": corridor, "tables": as_data(measured), "files": files}
+    means = {figure: or_none(spread.mean) for figure, spread in measured[name]["all"].items()}
+    return {"roads": len(shown), **means, **found}, report(measured, corridor)
 
 
 def read_cases(
@@ -117,24 +117,13 @@ def corridor_figures(predictor: CenterlinePredictor, shown: Sequence[Case]) -> d
         error.append(errors(found, truth_of(one.road)))
         std.append(found.std)
         wide.append(predictor.widths(found))
-    return _figures(np.concatenate(error), np.concatenate(std), np.concatenate(wide))
-
-
-def _figures(error: Float, std: Float, wide: Float) -> dict[str, dict[str, float | None]]:
-    rows: dict[str, dict[str, float | None]] = {}
+    every, deviation, widths = np.concatenate(error), np.concatenate(std), np.concatenate(wide)
+    rows = {}
     for index, name in enumerate(TARGETS):
-        known = np.isfinite(error[:, index]) & np.isfinite(std[:, index])
-        size = np.abs(error[known, index])
-        row: dict[str, float | None] = {"slices": float(known.sum())}
-        row["mae"] = float(size.mean()) if len(size) else None
-        if name == "lanes":
-            row["right"] = float((np.rint(size) == 0).mean()) if len(size) else None
-        for place, level in enumerate(LEVELS):
-            gaussian = coverage(size, std[known, index], level)
-            row[f"coverage_{level:.0%}".rstrip("%")] = gaussian if len(size) else None
-            inside = size <= wide[known, index, place]
-            row[f"interval_{level:.0%}".rstrip("%")] = float(inside.mean()) if len(size) else None
-        rows[name] = row
+        known = np.isfinite(every[:, index]) & np.isfinite(deviation[:, index])
+        size = np.abs(every[known, index])
+        target = TargetErrors(size, deviation[known, index], widths[known, index], name == "lanes")
+        rows[name] = {figure: or_none(value) for figure, value in figures(TARGET_METRICS, target).items()}
     return rows
 
 

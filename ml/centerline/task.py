@@ -26,7 +26,6 @@ from ..networks.centerline.transformer import TransformerOptions
 from ..processes import helpers
 from ..registry import network_union
 from ..runs import CALIBRATION, Run, plain, stream_seed
-from ..scores import tables
 from ..scores.calibration import DEVIATIONS, IntervalCalibration
 from ..scores.evaluation import Cropping, case
 from ..tasks import Evaluation, Prediction
@@ -107,18 +106,15 @@ def train_network(run: Run[CenterlineConfiguration], progress: Progress = silent
     return model, roads
 
 
-def evaluate(run: Run[CenterlineConfiguration], evaluation: Evaluation, progress: Progress = silent) -> dict[str, Any]:
+def evaluate(
+    run: Run[CenterlineConfiguration], evaluation: Evaluation, progress: Progress = silent
+) -> tuple[dict[str, Any], str]:
     """Measure a trained model beside predictors that learn nothing; write tables and pictures.
 
     Raises:
         InputError: the run isn't finished, or the data hold no road with a known centreline.
     """
     return measure_run(run.configuration, predictor(run), evaluation, progress)
-
-
-def report(result: Mapping[str, Any]) -> str:
-    """Return what `evaluate` found as tables for people."""
-    return tables.report(result)
 
 
 def predict(run: Run[CenterlineConfiguration], prediction: Prediction, progress: Progress = silent) -> dict[str, Any]:

@@ -12,6 +12,7 @@ from synthroads_addon.base.errors import InputError
 from synthroads_addon.base.text_table import text_table
 
 from ..data.classes import IGNORED
+from .metrics import Metric, Spread, defined, markdown, or_none
 
 FloatArray = NDArray[np.float64]
 
@@ -55,25 +56,27 @@ class Confusion:
         self.counts += np.bincount(rows * count + columns, minlength=count * count).reshape(count, count)
 
     @property
+    def right(self) -> NDArray[np.int64]:
+        """Return the number of points rightly given to each class (C,)."""
+        return self.counts.diagonal()
+
+    @property
+    def found(self) -> NDArray[np.int64]:
+        """Return the number of points given to each class (C,)."""
+        return self.counts.sum(axis=0)
+
+    @property
     def support(self) -> NDArray[np.int64]:
         """Return the number of true points of each class (C,)."""
         return self.counts.sum(axis=1)
 
-    @property
-    def precision(self) -> FloatArray:
-        """Return the share of each class's predicted points that are right (C,)."""
-        return _ratio(self.counts.diagonal(), self.counts.sum(axis=0))
+    def values(self, metric: str) -> FloatArray:
+        """Return one of `METRICS` of each class (C,)."""
+        return np.asarray(METRICS[metric].value(self), dtype=np.float64)
 
-    @property
-    def recall(self) -> FloatArray:
-        """Return the share of each class's true points that are found (C,)."""
-        return _ratio(self.counts.diagonal(), self.support)
-
-    @property
-    def iou(self) -> FloatArray:
-        """Return intersection over union of each class (C,)."""
-        right = self.counts.diagonal()
-        return _ratio(right, self.support + self.counts.sum(axis=0) - right)
+    def mean(self, metric: str) -> float:
+        """Return the mean of one of `METRICS` over the classes for which it is defined; NaN if there is none."""
+        return Spread.over(defined(self.values(metric).tolist())).mean
 
     @property
     def accuracy(self) -> float:
@@ -82,40 +85,19 @@ class Confusion:
 
     def to_dict(self) -> dict[str, Any]:
         """Return everything as JSON data; NaN becomes None."""
-        columns = {"precision": self.precision, "recall": self.recall, "iou": self.iou}
+        columns = {metric: self.values(metric) for metric in METRICS}
         rows = {
-            name: {**{what: _or_none(values[place]) for what, values in columns.items()}, "support": int(support)}
+            name: {metric: or_none(values[place]) for metric, values in columns.items()} | {"support": int(support)}
             for place, (name, support) in enumerate(zip(self.names, self.support, strict=True))
         }
         return {
             "classes": rows,
-            "mean_precision": _or_none(mean(self.precision)),
-            "mean_recall": _or_none(mean(self.recall)),
-            "mean_iou": _or_none(mean(self.iou)),
-            "accuracy": _or_none(self.accuracy),
+            **{f"mean_{metric}": or_none(self.mean(metric)) for metric in METRICS},
+            "accuracy": or_none(self.accuracy),
             "points": int(self.counts.sum()),
             "ignored": self.ignored,
             "confusion": self.counts.tolist(),
         }
-
-
-def score_table(scores: Mapping[str, Any]) -> str:
-    """Return the scores that `Confusion.to_dict` has as a table for people, in percent."""
-    columns = ("precision", "recall", "iou")
-    rows = [
-        [name, *(_percent(row[column]) for column in columns), f"{row['support']:,}"]
-        for name, row in scores["classes"].items()
-    ]
-    rows.append(["mean", *(_percent(scores[f"mean_{column}"]) for column in columns), f"{scores['points']:,}"])
-    lines = text_table(["class", "precision", "recall", "IoU", "points"], rows)
-    unlabelled = f", {scores['ignored']:,} without a class left out" if scores["ignored"] else ""
-    return "\n".join([*lines, f"{_percent(scores['accuracy'])} % of the points are right{unlabelled}"])
-
-
-def mean(values: FloatArray) -> float:
-    """Return the mean of what is defined; NaN if nothing is."""
-    defined = values[np.isfinite(values)]
-    return float(defined.mean()) if len(defined) else float("nan")
 
 
 def _ratio(part: Any, whole: Any) -> Any:
@@ -123,9 +105,77 @@ def _ratio(part: Any, whole: Any) -> Any:
     return np.divide(part, whole, out=np.full_like(whole, np.nan), where=whole > 0)
 
 
-def _or_none(value: float) -> float | None:
-    return None if np.isnan(value) else float(value)
+METRICS = {
+    "precision": Metric(lambda of: _ratio(of.right, of.found), "precision", 100.0, 1),
+    "recall": Metric(lambda of: _ratio(of.right, of.support), "recall", 100.0, 1),
+    "iou": Metric(lambda of: _ratio(of.right, of.support + of.found - of.right), "IoU", 100.0, 1),
+}
+"""Metrics of each class (C,) of a `Confusion`; what is here is in its data and in all tables."""
+Scores = Mapping[str, Any]
+"""Result of `Confusion.to_dict`."""
+NOTE = "mean (standard deviation, ddof = 1) over seeds; - where undefined"
 
 
-def _percent(value: float | None) -> str:
-    return "-" if value is None else f"{100 * value:.1f}"
+def score_table(scores: Scores) -> str:
+    """Return scores as a table for people, in percent."""
+    rows = [
+        [label, *cells, f"{points:,}"] for label, points, cells in _class_rows([([scores], name) for name in METRICS])
+    ]
+    lines = text_table(["class", *(metric.title for metric in METRICS.values()), "points"], rows)
+    unlabelled = f", {scores['ignored']:,} without a class left out" if scores["ignored"] else ""
+    return "\n".join([*lines, f"{percent([scores['accuracy']])} % of the points are right{unlabelled}"])
+
+
+def by_test(results: Mapping[str, Mapping[str, Mapping[str, Scores]]], rows: Sequence[str] = ()) -> str:
+    """Return for each test of an experiment a table: the IoU of each class and variant in percent.
+
+    Args:
+        results: variant -> seed -> test -> scores; variants without a seed are left out.
+        rows: further rows, cells joined by ``|``, that the first test's table ends with.
+    """
+    done = {name: list(seeds.values()) for name, seeds in results.items() if seeds}
+    lines = [f"IoU in %, {NOTE}.", ""]
+    for place, test in enumerate(next(iter(done.values()))[0] if done else ()):
+        body = _class_rows([([run[test] for run in runs], "iou") for runs in done.values()])
+        lines += [f"**{test}**", "", *_class_table(list(done), body), *(rows if place == 0 else ()), ""]
+    counts = ", ".join(f"{name} {len(runs)}" for name, runs in done.items())
+    return "\n".join([*lines, f"Seeds: {counts}."])
+
+
+def by_class(runs: Sequence[Scores]) -> str:
+    """Return a table of precision, recall and IoU of each class that has points, in percent.
+
+    Means stand below them where every class has points: what is predicted without occurring would count as 0.
+
+    Args:
+        runs: scores of one test, a run per seed.
+    """
+    *classes, mean = _class_rows([(runs, name) for name in METRICS])
+    shown = [row for row in classes if row[1]]
+    body = [*shown, mean] if len(shown) == len(classes) else shown
+    return "\n".join(_class_table([metric.title for metric in METRICS.values()], body))
+
+
+_ClassRow = tuple[str, int, list[str]]
+"""A class, its points, and cells."""
+
+
+def _class_rows(columns: Sequence[tuple[Sequence[Scores], str]]) -> list[_ClassRow]:
+    """Return a row for each class and one for their mean; of each column the runs and the metric are given."""
+    first = columns[0][0][0]
+    rows = [
+        (label, row["support"], [percent([run["classes"][label][metric] for run in runs]) for runs, metric in columns])
+        for label, row in first["classes"].items()
+    ]
+    means = [percent([run[f"mean_{metric}"] for run in runs]) for runs, metric in columns]
+    return [*rows, ("mean", first["points"], means)]
+
+
+def _class_table(titles: Sequence[str], rows: Sequence[_ClassRow]) -> list[str]:
+    body = [[label, f"{points:,}", *cells] for label, points, cells in rows]
+    return markdown(["class", "points", *titles], body, ["---", "--:", *["--:"] * len(titles)]).splitlines()
+
+
+def percent(values: Sequence[float | None]) -> str:
+    """Return shares as ``mean (standard deviation)`` in percent; None is undefined and left out."""
+    return Spread.over([100.0 * value for value in defined(values)]).text(1, "-")

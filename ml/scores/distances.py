@@ -20,8 +20,9 @@ motorway.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,7 +30,7 @@ from scipy.spatial import cKDTree
 from scipy.special import ndtri
 
 from .calibration import LEVELS
-from .tables import Spread
+from .metrics import Metric
 
 Float = NDArray[np.float64]
 Index = NDArray[np.intp]
@@ -62,50 +63,127 @@ class Chamfer:
     windows: int
 
 
-def figures(
-    predicted: Float, true: Float, station: Float, std: Float | None = None, intervals: Float | None = None
-) -> dict[str, float]:
-    """Return all figures of one road by name, in metres unless said.
+@dataclass(frozen=True)
+class Comparison:
+    """Predicted and true centres of one road's M slices.
 
-    Args:
+    Attributes:
         predicted: (M, 2) predicted centres, NaN where there is none.
         true: (M, 2) true centres, one on each slice's orthogonal, NaN in the truth's gaps.
         station: (M,) of the slices along their path, m, growing.
         std: (M,) predicted standard deviation, m; None if there is none.
         intervals: (M, 2) half-widths of the intervals of `LEVELS`, m; None: a Gaussian's of the standard deviation.
-
-    Returns:
-        ``slices`` with a known truth, ``found`` (share of them with a prediction), ``mae`` (mean distance in the
-        plane), ``distance_95`` (its 95 % quantile), ``lateral`` (mean distance from the true line), ``bias`` (mean
-        offset from it, positive to the left), ``chamfer_full``, ``chamfer_common``, ``chamfer_compared`` (share),
-        ``chamfer_windows`` and, with ``std``, ``coverage_68``, ``coverage_95`` (shares) and ``std``, its mean.
     """
-    known = np.isfinite(true).all(axis=1)
-    both = known & np.isfinite(predicted).all(axis=1)
-    distance = np.hypot(*(predicted - true)[both].T)
-    offset = lateral_errors(predicted[both], true, station)
-    offset = offset[np.isfinite(offset)]
-    apart = chamfer(predicted, true, station)
-    result = {
-        "slices": float(known.sum()),
-        "found": float(both.sum() / known.sum()) if known.any() else np.nan,
-        "mae": _mean(distance),
-        "distance_95": float(np.quantile(distance, 0.95)) if len(distance) else np.nan,
-        "lateral": _mean(np.abs(offset)),
-        "bias": _mean(offset),
-        "chamfer_full": apart.full,
-        "chamfer_common": apart.common,
-        "chamfer_compared": apart.compared,
-        "chamfer_windows": float(apart.windows),
-    }
-    if std is not None:
-        for place, level in enumerate(LEVELS):
-            inside = coverage(distance, std[both], level)
-            if intervals is not None:
-                inside = _mean((distance <= intervals[both, place]).astype(np.float64))
-            result[f"coverage_{level:.0%}".rstrip("%")] = inside
-        result["std"] = _mean(std[both][np.isfinite(std[both])])
-    return result
+
+    predicted: Float
+    true: Float
+    station: Float
+    std: Float | None = None
+    intervals: Float | None = None
+
+    @cached_property
+    def known(self) -> NDArray[np.bool_]:
+        """Which slices (M,) have a truth."""
+        return np.isfinite(self.true).all(axis=1)
+
+    @cached_property
+    def both(self) -> NDArray[np.bool_]:
+        """Which slices (M,) have a truth and a prediction."""
+        return self.known & np.isfinite(self.predicted).all(axis=1)
+
+    @cached_property
+    def distance(self) -> Float:
+        """Distances in the plane (N,) of the centres that have both, m."""
+        return np.hypot(*(self.predicted - self.true)[self.both].T)
+
+    @cached_property
+    def offset(self) -> Float:
+        """Offsets (N,) from the true line, m, positive to the left; without those beside its gaps."""
+        offset = lateral_errors(self.predicted[self.both], self.true, self.station)
+        return offset[np.isfinite(offset)]
+
+    @cached_property
+    def chamfer(self) -> Chamfer:
+        """Chamfer distances."""
+        return chamfer(self.predicted, self.true, self.station)
+
+    def coverage(self, place: int) -> float | None:
+        """Return the share of distances within the interval of one of `LEVELS`; None without deviations."""
+        if self.std is None:
+            return None
+        if self.intervals is None:
+            return coverage(self.distance, self.std[self.both], LEVELS[place])
+        return _mean((self.distance <= self.intervals[self.both, place]).astype(np.float64))
+
+
+def _mean(values: Float) -> float:
+    return float(values.mean()) if len(values) else np.nan
+
+
+def _deviation(road: Comparison) -> float | None:
+    return None if road.std is None else _mean(road.std[road.both][np.isfinite(road.std[road.both])])
+
+
+METRICS = {
+    # Slices with a known truth, and the share of them with a prediction.
+    "slices": Metric(lambda road: road.known.sum(), summed=True),
+    "found": Metric(
+        lambda road: road.both.sum() / road.known.sum() if road.known.any() else np.nan, "found (%)", 100.0, 1, place=1
+    ),
+    "mae": Metric(lambda road: _mean(road.distance), "MAE (m)"),
+    "distance_95": Metric(
+        lambda road: np.quantile(road.distance, 0.95) if len(road.distance) else np.nan, "95 % (m)", decimals=2
+    ),
+    # Mean distance from the true line, and mean offset from it, positive to the left.
+    "lateral": Metric(lambda road: _mean(np.abs(road.offset)), "lateral (m)"),
+    "bias": Metric(lambda road: _mean(road.offset), "bias (m)"),
+    "chamfer_full": Metric(lambda road: road.chamfer.full, "Chamfer, full (m)"),
+    "chamfer_common": Metric(lambda road: road.chamfer.common, "Chamfer, common (m)"),
+    "chamfer_compared": Metric(lambda road: road.chamfer.compared),
+    "chamfer_windows": Metric(lambda road: road.chamfer.windows, summed=True),
+    "coverage_68": Metric(lambda road: road.coverage(0), "in 68 % (%)", 100.0, 1),
+    "coverage_95": Metric(lambda road: road.coverage(1), "in 95 % (%)", 100.0, 1),
+    "std": Metric(_deviation),
+}
+"""Metrics of a `Comparison`, m unless said; what is here is in a measurement's data and, with a title, in tables."""
+
+
+@dataclass(frozen=True)
+class TargetErrors:
+    """Predictions of one target of the corridor in N slices in which it is known.
+
+    Attributes:
+        size: (N,) of the errors, in the target's unit.
+        std: (N,) predicted standard deviations.
+        widths: (N, 2) half-widths of the intervals of `LEVELS`.
+        whole: whether the target is a whole number.
+    """
+
+    size: Float
+    std: Float
+    widths: Float
+    whole: bool
+
+    def inside(self, place: int) -> float:
+        """Return the share of errors within the predicted interval of one of `LEVELS`."""
+        return _mean((self.size <= self.widths[:, place]).astype(np.float64))
+
+
+TARGET_METRICS = {
+    "slices": Metric(lambda target: len(target.size)),
+    "mae": Metric(lambda target: _mean(target.size), "mean error"),
+    "right": Metric(
+        lambda target: _mean((np.rint(target.size) == 0).astype(np.float64)) if target.whole else None,
+        "right when rounded (%)",
+        100.0,
+        1,
+    ),
+    "coverage_68": Metric(lambda target: coverage(target.size, target.std, LEVELS[0])),
+    "interval_68": Metric(lambda target: target.inside(0), "in 68 % (%)", 100.0, 1),
+    "coverage_95": Metric(lambda target: coverage(target.size, target.std, LEVELS[1])),
+    "interval_95": Metric(lambda target: target.inside(1), "in 95 % (%)", 100.0, 1),
+}
+"""Metrics of `TargetErrors`."""
 
 
 def lateral_errors(points: Float, true: Float, station: Float) -> Float:
@@ -220,15 +298,6 @@ def _both_ways(one: Float, other: Float) -> float:
     return float(cKDTree(other).query(one)[0].mean() + cKDTree(one).query(other)[0].mean())
 
 
-def over_seeds(rows: Sequence[Mapping[str, float]]) -> dict[str, Spread]:
-    """Return mean and standard deviation (ddof 1) of each figure over runs with several seeds.
-
-    A figure that is NaN or missing in one of them has a NaN mean: nothing is left out silently.
-    """
-    names = list(dict.fromkeys(name for row in rows for name in row))
-    return {name: Spread.over([row.get(name, np.nan) for row in rows]) for name in names}
-
-
 def over_roads(rows: Iterable[Mapping[str, float]]) -> dict[str, float]:
     """Return the figures of several roads as one: means weighted by the number of slices; ``slices`` are summed.
 
@@ -236,18 +305,12 @@ def over_roads(rows: Iterable[Mapping[str, float]]) -> dict[str, float]:
     """
     rows = list(rows)
     slices = np.array([row["slices"] for row in rows])
-    names = list(dict.fromkeys(name for row in rows for name in row if name != "slices"))
-    table = {name: np.array([row.get(name, np.nan) for row in rows]) for name in names}
-    windows = table.get("chamfer_windows", np.zeros(len(rows)))
-    summed = {"slices": float(slices.sum())}
-    for name, values in table.items():
+    windows = np.array([row.get("chamfer_windows", np.nan) for row in rows])
+    result = {}
+    for name in ("slices", *dict.fromkeys(name for row in rows for name in row if name != "slices")):
+        values = np.array([row.get(name, np.nan) for row in rows])
         counted = windows > 0 if name.startswith("chamfer_") else np.ones(len(rows), dtype=bool)
         weight = slices[counted]
-        summed[name] = float((values[counted] * weight).sum() / weight.sum()) if weight.sum() else np.nan
-    if "chamfer_windows" in table:
-        summed["chamfer_windows"] = float(windows.sum())
-    return summed
-
-
-def _mean(values: Float) -> float:
-    return float(values.mean()) if len(values) else np.nan
+        mean = float((values[counted] * weight).sum() / weight.sum()) if weight.sum() else np.nan
+        result[name] = float(values.sum()) if METRICS[name].summed else mean
+    return result

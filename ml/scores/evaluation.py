@@ -35,8 +35,8 @@ from ..data.points import ROAD_CLASSES
 from ..data.roads import LearningRoad, Slices, crop_road, cut_beside_median
 from ..data.slices import SliceSettings
 from . import baselines
-from .distances import figures, over_roads, over_seeds
-from .tables import Spread
+from .distances import METRICS, Comparison, over_roads
+from .metrics import Spread, figures, over_seeds
 
 Float = NDArray[np.float64]
 Predictor = Callable[[LearningRoad, Frames], Float]
@@ -106,13 +106,14 @@ def truth_of(road: LearningRoad) -> Truth:
 
 
 def evaluate(predictor: Predictor, shown: Case) -> dict[str, float]:
-    """Return the figures of one predictor on one road, see `metrics.figures`."""
+    """Return the figures of one predictor on one road, see `distances.METRICS`."""
     frames = shown.frames
     predicted = predictor(shown.road, frames)
     true, _ = truth_of(shown.road).axis.crossing(frames.position, frames.direction)
     std = predicted[:, 1] if predicted.shape[1] > 1 else None
     intervals = predicted[:, -2:] if predicted.shape[1] == len(CORRIDOR_COLUMNS) else None
-    return figures(frames.at(predicted[:, 0]), frames.at(true), frames.station, std, intervals)
+    compared = Comparison(frames.at(predicted[:, 0]), frames.at(true), frames.station, std, intervals)
+    return figures(METRICS, compared)
 
 
 def measure(

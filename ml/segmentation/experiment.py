@@ -22,7 +22,7 @@ from synthroads_addon.scenario.scenario import apply_change, apply_values
 from ..configuration import EXPERIMENTS, experiment_names, load_configuration
 from ..data.sources import Source
 from ..runs import CHECKPOINT, CONFIGURATION, HISTORY, METRICS, PRETRAINING, Run, lasting
-from ..scores.tables import by_test
+from ..scores.confusion import by_test
 from ..training_loop import chosen_device
 from .recipes import Data, SegmentationConfiguration
 from .scoring import score_all, trained_model

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from functools import partial
@@ -27,7 +27,7 @@ from ..data.sources import Source
 from ..data.tiles import CloudTile, scalings
 from ..processes import helpers
 from ..runs import PRETRAINING, Run
-from ..scores.confusion import Confusion, mean, score_table
+from ..scores.confusion import Confusion, score_table
 from ..scores.pictures import comparison
 from ..tasks import Evaluation, Prediction
 from ..training_loop import Figures, chosen_device, fit
@@ -72,7 +72,7 @@ def train(run: SegmentationRun, progress: Progress = silent) -> dict[str, Any]:
     return metrics
 
 
-def evaluate(run: SegmentationRun, evaluation: Evaluation, progress: Progress = silent) -> dict[str, Any]:
+def evaluate(run: SegmentationRun, evaluation: Evaluation, progress: Progress = silent) -> tuple[dict[str, Any], str]:
     """Score a trained run on labelled data, each by itself; write tables and pictures.
 
     Raises:
@@ -83,13 +83,15 @@ def evaluate(run: SegmentationRun, evaluation: Evaluation, progress: Progress = 
     device = chosen_device(configuration)
     model = trained_model(run, device)
     results: dict[str, Any] = {}
+    tables: dict[str, str] = {}
     files: list[str] = []
     for path, name in zip(evaluation.data, _names(evaluation), strict=True):
         source = _test_source(path, evaluation)
         confusion, shown = score(model, configuration, [source], device, progress)
         results[name] = confusion.to_dict()
+        tables[name] = score_table(results[name]) + "\n"
         files.append(f"{name}.txt")
-        write_file(evaluation.output / files[-1], (score_table(results[name]) + "\n").encode(), overwrite=True)
+        write_file(evaluation.output / files[-1], tables[name].encode(), overwrite=True)
         if shown is not None:
             tile, labels = shown
             scheme = configuration.scheme()
@@ -97,12 +99,8 @@ def evaluate(run: SegmentationRun, evaluation: Evaluation, progress: Progress = 
             picture = comparison(tile, labels, source.targets(scheme), scheme)
             write_file(evaluation.output / files[-1], picture, overwrite=True)
     means = {f"{name}_mean_iou": result["mean_iou"] for name, result in results.items()}
-    return {**means, "tests": results, "files": files}
-
-
-def report(result: Mapping[str, Any]) -> str:
-    """Return what `evaluate` found as tables for people: scores by class of each test, in percent."""
-    return "\n\n".join(f"{name}:\n{score_table(scores)}" for name, scores in result["tests"].items())
+    text = "\n".join(f"{name}:\n{table}" for name, table in tables.items())
+    return {**means, "tests": results, "files": files}, text.rstrip("\n")
 
 
 def _names(evaluation: Evaluation) -> list[str]:
@@ -269,6 +267,6 @@ def _validation(
         for tile in tiles:
             labels = label_tile(tile, scaling[tile.scene], scores, configuration.crop_settings())
             confusion.add(tile.segment, labels)
-        return {"validation_mean_iou": mean(confusion.iou)}
+        return {"validation_mean_iou": confusion.mean("iou")}
 
     return validate

@@ -34,14 +34,14 @@ def scores_that_differ(confusion: object, truth: np.ndarray, predicted: np.ndarr
     precision, recall, _, support = metrics.precision_recall_fscore_support(
         truth, predicted, labels=labels, zero_division=np.nan
     )
-    defined = ~np.isnan(confusion.iou)  # scikit-learn's IoU has no NaN for classes that occur nowhere
+    defined = ~np.isnan(confusion.values("iou"))  # scikit-learn's IoU has no NaN for classes that occur nowhere
     iou = metrics.jaccard_score(truth, predicted, labels=labels, average=None, zero_division=0)
     pairs = {
         "counts": (confusion.counts, metrics.confusion_matrix(truth, predicted, labels=labels)),
-        "precision": (confusion.precision, precision),
-        "recall": (confusion.recall, recall),
+        "precision": (confusion.values("precision"), precision),
+        "recall": (confusion.values("recall"), recall),
         "support": (confusion.support, support),
-        "IoU": (confusion.iou[defined], iou[defined]),
+        "IoU": (confusion.values("iou")[defined], iou[defined]),
     }
     return [f"{name}: {a} and not {b}" for name, (a, b) in pairs.items() if not np.allclose(a, b, equal_nan=True)]
 

@@ -129,7 +129,7 @@ def test_what_a_run_writes(trained: Trained):
 
 def test_measuring_and_using_a_run(trained: Trained, data: Path, tmp_path: Path):
     run = trained()
-    figures = task.evaluate(run, Evaluation([data], "test", tmp_path / "measured"), silent)
+    figures, report = task.evaluate(run, Evaluation([data], "test", tmp_path / "measured"), silent)
     assert figures["roads"] == 1
     assert figures["mae"] > 0
     assert {"centroid", "skeleton", "the displaced path"} <= set(figures["tables"])
@@ -138,7 +138,7 @@ def test_measuring_and_using_a_run(trained: Trained, data: Path, tmp_path: Path)
     assert {"centerline.json", "centerline.md", "corridor.json", "a-03-lines.png", "a-03-corridor.png"} <= names
     json.dumps(figures, allow_nan=False)
     assert names == set(figures["files"])
-    rows = [re.split(r"\s{2,}", line.strip()) for line in task.report(figures).splitlines()]
+    rows = [re.split(r"\s{2,}", line.strip()) for line in report.splitlines()]
     assert rows[0] == ["1 road:"]
     assert rows[1][:2] == ["MAE (m)", "95 % (m)"]
     assert rows[1][-3:] == ["in 68 % (%)", "in 95 % (%)", "found (%)"]

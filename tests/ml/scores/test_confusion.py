@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from ml.data.classes import IGNORED
-from ml.scores.confusion import Confusion, mean, score_table
-from ml.scores.tables import Spread, by_class, by_test, defined
+from ml.scores.confusion import METRICS, Confusion, by_class, by_test, score_table
+from ml.scores.metrics import Metric, Spread, defined
 from synthroads_addon.base.errors import InputError
 from tests.judges import require
 from tests.judges.learning import scores_that_differ
@@ -43,7 +43,7 @@ def test_scores_are_those_of_counting(seed: int) -> None:
     for part in np.array_split(np.arange(len(truth)), 7):  # one matrix, summed over parts
         confusion.add(truth[part], predicted[part])
     want = np.array([counted(truth, predicted, label) for label in range(len(NAMES))])
-    found = np.stack([confusion.precision, confusion.recall, confusion.iou], axis=1)
+    found = np.stack([confusion.values(metric) for metric in ("precision", "recall", "iou")], axis=1)
     np.testing.assert_allclose(found, want, rtol=1e-12)
     assert confusion.support.tolist() == [int((truth == label).sum()) for label in range(len(NAMES))]
     assert confusion.ignored == int((truth == IGNORED).sum())
@@ -53,12 +53,13 @@ def test_undefined_scores_are_nan_and_left_out_of_means() -> None:
     truth, predicted = random_labels(4)
     confusion = Confusion(NAMES)
     confusion.add(truth, predicted)
-    assert np.isnan(confusion.precision).tolist() == [False, False, False, True, False, True]  # 3, 5 never predicted
-    assert np.isnan(confusion.recall).tolist() == [False, False, False, False, True, True]  # 4, 5 don't occur
-    assert np.isnan(confusion.iou).tolist() == [False, False, False, False, False, True]  # 5 neither
-    assert confusion.iou[3] == 0.0
-    assert confusion.iou[4] == 0.0
-    assert confusion.to_dict()["mean_iou"] == pytest.approx(np.mean(confusion.iou[:5]))
+    undefined = {metric: np.flatnonzero(np.isnan(confusion.values(metric))).tolist() for metric in METRICS}
+    assert undefined["precision"] == [3, 5]  # never predicted
+    assert undefined["recall"] == [4, 5]  # don't occur
+    assert undefined["iou"] == [5]  # neither
+    assert confusion.values("iou")[3] == 0.0
+    assert confusion.values("iou")[4] == 0.0
+    assert confusion.to_dict()["mean_iou"] == pytest.approx(np.mean(confusion.values("iou")[:5]))
     assert "-" in score_table(confusion.to_dict()).splitlines()[6]
 
 
@@ -100,7 +101,7 @@ def test_deviation_over_seeds_is_that_of_a_sample() -> None:
     found = Spread.over(defined([1.0, 2.0, float("nan"), None, 4.0]))
     assert (found.mean, found.std) == pytest.approx((7 / 3, np.std([1, 2, 4], ddof=1)))
     assert np.isnan(Spread.over([1.0]).std)
-    assert np.isnan(mean(np.array([np.nan])))
+    assert np.isnan(Spread.over([]).mean)
 
 
 @pytest.mark.parametrize("seed", [5, 6])
@@ -133,3 +134,15 @@ def test_further_rows_end_the_first_tests_table() -> None:
     assert lines.index(row) + 2 == lines.index("**unseen**")
     assert lines.count("| mean | 9 | 50.0 (0.0) | 50.0 |") == 2
     assert lines[-1] == "Seeds: tuned 2, adapted 1."
+
+
+def test_a_metric_is_one_entry_that_data_and_tables_have(monkeypatch: pytest.MonkeyPatch) -> None:
+    f1 = Metric(lambda of: 2.0 * of.right / (of.found + of.support), "F1", 100.0, 1)
+    monkeypatch.setitem(METRICS, "f1", f1)
+    confusion = Confusion(("a", "b"))
+    confusion.add(np.array([0, 0, 0, 1]), np.array([0, 0, 1, 1]))
+    scores = confusion.to_dict()
+    assert scores["classes"]["a"]["f1"] == pytest.approx(0.8)
+    assert scores["mean_f1"] == pytest.approx((0.8 + 2 / 3) / 2)
+    assert [line.split()[4] for line in score_table(scores).splitlines()[:3]] == ["F1", "80.0", "66.7"]
+    assert by_class([scores]).splitlines()[0] == "| class | points | precision | recall | IoU | F1 |"

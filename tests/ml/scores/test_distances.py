@@ -6,10 +6,16 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from ml.scores.distances import chamfer, coverage, figures, lateral_errors, over_roads, over_seeds, windows
+from ml.scores import metrics
+from ml.scores.distances import METRICS, Comparison, chamfer, coverage, lateral_errors, over_roads, windows
+from ml.scores.metrics import over_seeds
 from synthroads_addon.base.random_streams import stream
 
 Float = NDArray[np.float64]
+
+
+def figures(*given: Float) -> dict[str, float]:
+    return metrics.figures(METRICS, Comparison(*given))
 
 
 def arc(length: float, radius: float, offset: float = 0.0, heading: float = 0.7) -> tuple[Float, Float]:

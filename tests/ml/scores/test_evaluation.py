@@ -30,8 +30,9 @@ from ml.scores.evaluation import (
     trivial_predictors,
     truth_of,
 )
+from ml.scores.metrics import Spread
 from ml.scores.pictures import PictureView, corridor_picture, lines_picture
-from ml.scores.tables import COLUMNS, Spread, as_data, cell, report, road_table, table, write_tables
+from ml.scores.tables import COLUMNS, as_data, cell, report, road_table, table, write_tables
 from synthroads_addon.base.errors import InputError
 from tests.helpers.clouds.centerline_roads import REAL, strip_road
 from tests.helpers.roads import analytic_roads
@@ -189,7 +190,7 @@ def test_tables_say_mean_and_deviation(tmp_path: Path) -> None:
     assert text[0] == "|  | MAE (m) | found (%) |"
     assert text[2] == "| model | 0.123 (0.006) | 99.5 |"
     assert text[3] == "| baseline | 0.900 | – |"
-    assert cell(None, COLUMNS[0]) == "–"
+    assert cell(None, COLUMNS["mae"]) == "–"
     assert "| A: MAE (m) | A: Chamfer (m) |" in road_table(measured(), {"all": "A"})
     write_tables(tmp_path, "roads", measured())
     assert "## all" in (tmp_path / "roads.md").read_text()
@@ -208,7 +209,7 @@ def test_a_report_shows_every_road_and_the_corridor() -> None:
         "lanes": {"slices": 9.0, "mae": 0.5, "right": 0.75, "interval_68": 0.7},
         "heading": {"slices": 9.0, "mae": 0.004, "interval_68": None},
     }
-    text = report({"tables": as_data(rows), "corridor": corridor})
+    text = report(rows, corridor)
     assert [line.split("  ")[0].strip() for line in text.splitlines()] == [
         *("2 roads:", "", "model, seed 1", "skeleton", ""),
         *("model, seed 1, by road:", "", "a", "b", ""),

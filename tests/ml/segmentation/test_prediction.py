@@ -75,7 +75,7 @@ def test_a_tile_is_labelled_and_scored_on_all_its_points() -> None:
     confusion = Confusion(tuple("abcde"))
     confusion.add(tile.segment, labels)
     assert confusion.counts.sum() == 60_000
-    assert confusion.iou[1] > 0.8
+    assert confusion.values("iou")[1] > 0.8
     grouped = Confusion(tuple("abcde"))
     grouped.add(road_tile(100).segment, np.full(100, 3, dtype=np.int16))
     assert grouped.counts[:, 3].sum() == 100

@@ -318,7 +318,7 @@ def test_evaluation_with_a_mapping_scores_groups(trained: Trained, tmp_path: Pat
     las.intensity = np.rint(block.intensity * 65535)
     las.classification = np.array([2, 2, 2, 5, 1])[block.class_id]
     las.write(tmp_path / "street.laz")
-    found = task.evaluate(run, Evaluation([tmp_path / "street.laz"], "test", tmp_path / "out", mapping="ign"))
+    found, _ = task.evaluate(run, Evaluation([tmp_path / "street.laz"], "test", tmp_path / "out", mapping="ign"))
     classes = found["tests"]["street"]["classes"]
     assert list(classes) == ["ground", "vegetation", "other"]
     assert classes["other"]["support"] == 0
@@ -448,7 +448,7 @@ def test_clouds_of_one_name_have_results_of_their_own(trained: Trained, tmp_path
     for number, cloud in enumerate(clouds):
         cloud.parent.mkdir()
         write_cloud(cloud, road_block(500 + number, 4, 20.0))
-    found = task.evaluate(run, Evaluation(clouds, "test", tmp_path / "out"))
+    found, _ = task.evaluate(run, Evaluation(clouds, "test", tmp_path / "out"))
     assert list(found["tests"]) == ["one-cloud", "two-cloud"]
     assert {path.name for path in (tmp_path / "out").glob("*.txt")} == {"one-cloud.txt", "two-cloud.txt"}
     for name in ("set.v1", "set.v2"):

@@ -1,0 +1,104 @@
+"""Metrics: how a figure is made and shown, and its mean over several seeds."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class Metric:
+    """A figure of predictions.
+
+    Attributes:
+        value: makes it of what was compared; None: there is none.
+        title: of its column in tables, which have none without.
+        factor: on it in tables.
+        decimals: there.
+        place: of the column, behind those of lower ones.
+        summed: whether that of several roads is their sum, and not a mean.
+    """
+
+    value: Callable[[Any], Any]
+    title: str = ""
+    factor: float = 1.0
+    decimals: int = 3
+    place: int = 0
+    summed: bool = False
+
+
+def in_tables(metrics: Mapping[str, Metric]) -> dict[str, Metric]:
+    """Return the metrics that tables show, in the order of the columns."""
+    shown = {name: metric for name, metric in metrics.items() if metric.title}
+    return dict(sorted(shown.items(), key=lambda item: item[1].place))
+
+
+def figures(metrics: Mapping[str, Metric], compared: object) -> dict[str, float]:
+    """Return all metrics of what was compared by name, without those that there are none of."""
+    values = {name: metric.value(compared) for name, metric in metrics.items()}
+    return {name: float(value) for name, value in values.items() if value is not None}
+
+
+@dataclass(frozen=True)
+class Spread:
+    """A figure over several seeds: mean, standard deviation (ddof 1; NaN for one seed), number of seeds."""
+
+    mean: float
+    std: float
+    count: int
+
+    @classmethod
+    def over(cls, values: Iterable[float]) -> Spread:
+        """Return the spread of values; NaN without any, and where one of them is NaN."""
+        known = np.array([*values], dtype=np.float64)
+        std = float(known.std(ddof=1)) if len(known) > 1 else math.nan
+        return cls(float(known.mean()) if len(known) else math.nan, std, len(known))
+
+    def text(self, decimals: int, missing: str, factor: float = 1.0) -> str:
+        """Return ``mean (std)`` times a factor; the mean alone where there is no deviation, else what is missing."""
+        if math.isnan(self.mean):
+            return missing
+        mean = f"{factor * self.mean:,.{decimals}f}"
+        return mean if math.isnan(self.std) else f"{mean} ({factor * self.std:,.{decimals}f})"
+
+
+def defined(values: Sequence[float | None]) -> list[float]:
+    """Return those of some values that are finite numbers."""
+    return [float(value) for value in values if value is not None and math.isfinite(value)]
+
+
+def over_seeds(rows: Sequence[Mapping[str, float]]) -> dict[str, Spread]:
+    """Return mean and standard deviation (ddof 1) of each figure over runs with several seeds.
+
+    A figure that is NaN or missing in one of them has a NaN mean: nothing is left out silently.
+    """
+    names = dict.fromkeys(name for row in rows for name in row)
+    return {name: Spread.over(row.get(name, math.nan) for row in rows) for name in names}
+
+
+def or_none(value: float | None, digits: int | None = None) -> float | None:
+    """Return a number as JSON has it, perhaps rounded: None for NaN."""
+    if value is None or math.isnan(value):
+        return None
+    return float(value) if digits is None else round(value, digits)
+
+
+def markdown(head: Sequence[str], body: Iterable[Sequence[str]], rule: Sequence[str] | None = None) -> str:
+    """Return the lines of a Markdown table, each with its end.
+
+    Args:
+        head: titles of the columns.
+        body: rows of cells.
+        rule: what stands below the titles; three dashes each if not given.
+    """
+    dashes = " | ".join(["---"] * len(head)) if rule is None else None
+    second = f"| {dashes} |" if dashes else f"|{'|'.join(rule or ())}|"
+    return "".join(f"{line}\n" for line in (_row(head), second, *map(_row, body)))
+
+
+def _row(cells: Sequence[str]) -> str:
+    return f"| {' | '.join(cells)} |"
