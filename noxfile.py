@@ -144,11 +144,13 @@ def tests(session: nox.Session) -> None:
     # Without a limit on restarts a worker that crashes can leave the others waiting for ever.
     workers = ["-n", os.environ.get("TEST_WORKERS") or "2", "--dist", "loadfile", "--max-worker-restart", "0"]
     # The processes share the cores already; spinning threads of linear algebra would only slow each other down.
-    threads = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
+    environment: dict[str, str | None] = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
+    # Tests start hundreds of processes: where none kept its bytecode, each would compile all that it imports.
+    environment["PYTHONDONTWRITEBYTECODE"] = None
     start, codes = time.perf_counter(), []
     for arguments in pytest_runs(version, markers, session.posargs):
         try:  # the other part is run also after one has failed
-            session.run("python", "-m", "pytest", "-q", *workers, *arguments, env=threads, interrupt_timeout=10)
+            session.run("python", "-m", "pytest", "-q", *workers, *arguments, env=environment, interrupt_timeout=10)
             codes.append(0)
         except CommandFailed as failure:
             codes.append(failure.return_code or 1)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Iterator
 from operator import attrgetter
 from pathlib import Path
@@ -12,6 +13,7 @@ import numpy as np
 import pytest
 
 import synthroads_addon
+from synthroads_addon.ui.work.job import PanelJob
 
 SMALL = {
     "road.length": 120.0,
@@ -89,6 +91,12 @@ def choose(settings: Any, **values: Any) -> None:
     for path, value in values.items():
         head, _, name = path.rpartition(".")
         setattr(attrgetter(head)(settings) if head else settings, name, value)
+
+
+def wait_for_end(job: PanelJob[Any]) -> None:
+    """Let a job that has begun go on to its end, with pauses as between the window's ticks."""
+    while job.tick(0.0):
+        time.sleep(0.002)
 
 
 def fingerprint(item: bpy.types.Object) -> tuple:

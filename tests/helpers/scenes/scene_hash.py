@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Iterator
 from functools import cache
+from operator import attrgetter
 from typing import Any
 
 import bpy
@@ -26,6 +27,8 @@ _LEFT_OUT = {
     "pixels", "preview", "depsgraph",
 }  # fmt: skip
 
+_STRUCT, _ID, _ENDS_OF_LINKS = bpy.types.bpy_struct, bpy.types.ID, (bpy.types.Node, bpy.types.NodeSocket)
+
 
 def digest() -> str:
     """Return a digest of all data blocks of the open file: every property, array, node, link and custom property."""
@@ -40,8 +43,8 @@ def changes(before: list[str]) -> list[str]:
 
 
 def lines() -> list[str]:
-    """Return what the digest is made of, one text per value."""
-    _properties.cache_clear()  # an add-on may have come or gone since, and its properties with it
+    """Return what the digest is made of, texts of one or several values each."""
+    _kind.cache_clear()  # an add-on may have come or gone since, and its properties with it
     bpy.context.view_layer.update()
     found = [f"open scene {bpy.context.scene.name} {bpy.context.view_layer.name}\n"]
     for item in bpy.context.view_layer.objects:
@@ -54,46 +57,73 @@ def lines() -> list[str]:
     return found
 
 
-@cache
-def _properties(kind: type) -> tuple[frozenset[str], tuple[tuple[str, str], ...]]:
-    """Return the names of all properties of a kind of data, and (name, type) of those that are read."""
-    found = [(prop.identifier, prop.type) for prop in kind.bl_rna.properties]  # type: ignore[attr-defined]
-    same_for_all = {name for name, _ in found if name.startswith("bl_")} - {"bl_idname"}
-    return frozenset(name for name, _ in found), tuple(
-        pair for pair in found if pair[0] not in _LEFT_OUT | same_for_all
-    )
+class _Kind:
+    """How data of one kind is read: all properties that are single values at once, as there are very many of them."""
+
+    def __init__(self, kind: type) -> None:
+        properties = list(kind.bl_rna.properties)  # type: ignore[attr-defined]
+        self.names = {prop.identifier for prop in properties}
+        same_for_all = {name for name in self.names if name.startswith("bl_")} - {"bl_idname"}
+        read = [prop for prop in properties if prop.identifier not in _LEFT_OUT | same_for_all]
+        single = [prop.identifier for prop in read if _is_single(prop) and prop.identifier != "users"]
+        self.single = attrgetter(*single) if len(single) > 1 else None
+        self.others = [(p.identifier, p.type) for p in read if self.single is None or p.identifier not in single]
+        self.all = [(prop.identifier, prop.type) for prop in read]
+        self.has_keys = True
+
+
+_kind = cache(_Kind)
+
+
+def _is_single(prop: bpy.types.Property) -> bool:
+    is_list = getattr(prop, "is_array", False) or getattr(prop, "is_enum_flag", False)
+    return prop.type in ("BOOLEAN", "INT", "FLOAT", "STRING", "ENUM") and not is_list
 
 
 def _add_values(found: list[str], item: Any, path: str, seen: set[int]) -> None:
     if isinstance(item, bpy.types.Mesh):
         found.extend(_arrays(item, path))
-    names, properties = _properties(type(item))
-    if hasattr(item, "keys") and isinstance(item, bpy.types.bpy_struct):
+    kind = _kind(type(item))
+    if kind.has_keys:
+        _add_custom_properties(found, item, path, kind)
+    properties = kind.all
+    if kind.single is not None:
         try:
-            keys = sorted(set(item.keys()) - names)
-        except TypeError:  # this kind has no custom properties
-            keys = []
-        found.extend(f"{path}[{key!r}] = {_plain(item[key])}\n" for key in keys)
-    for name, kind in properties:
+            found.append(f"{path} = {kind.single(item)}\n")
+            properties = kind.others
+        except (AttributeError, RuntimeError, TypeError):
+            pass  # one of them can't be read here: each by itself
+    for name, type_ in properties:
         try:
             value = getattr(item, name)
         except (AttributeError, RuntimeError, TypeError):
             continue
-        if kind == "COLLECTION":
+        if type_ == "COLLECTION":
             for number, entry in enumerate(value):
                 _add_pointer(found, entry, f"{path}.{name}[{number}]", seen)
-        elif kind == "POINTER":
+        elif type_ == "POINTER":
             _add_pointer(found, value, f"{path}.{name}", seen)
         elif not callable(value):
             found.append(f"{path}.{name} = {_plain(value)}\n")
 
 
+def _add_custom_properties(found: list[str], item: Any, path: str, kind: _Kind) -> None:
+    if not (hasattr(item, "keys") and isinstance(item, bpy.types.bpy_struct)):
+        return
+    try:
+        keys = sorted(set(item.keys()) - kind.names)
+    except TypeError:  # this kind has no custom properties
+        kind.has_keys = False
+        return
+    found.extend(f"{path}[{key!r}] = {_plain(item[key])}\n" for key in keys)
+
+
 def _add_pointer(found: list[str], value: Any, path: str, seen: set[int]) -> None:
-    if value is None or not isinstance(value, bpy.types.bpy_struct):
+    if value is None or not isinstance(value, _STRUCT):
         found.append(f"{path} = {value}\n")
-    elif isinstance(value, bpy.types.ID) and not value.is_embedded_data:
+    elif isinstance(value, _ID) and not value.is_embedded_data:
         found.append(f"{path} -> {type(value).__name__} {value.name_full}\n")
-    elif isinstance(value, bpy.types.Node | bpy.types.NodeSocket) and ".links" in path:
+    elif isinstance(value, _ENDS_OF_LINKS) and ".links" in path:
         found.append(f"{path} -> {value.name}\n")
     elif (pointer := value.as_pointer()) not in seen:
         _add_values(found, value, path, seen | {pointer})

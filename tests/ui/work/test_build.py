@@ -21,7 +21,16 @@ from synthroads_addon.scenario.scenario import load_scenario
 from synthroads_addon.ui.work import build
 from synthroads_addon.ui.work.job import PanelJob, running_job
 from tests.helpers.scenes.kept_groups import KeptGroups
-from tests.helpers.scenes.panel_road import SAME, block_counts, cheap, choose, fingerprint, settings, users_own  # noqa: F401
+from tests.helpers.scenes.panel_road import (  # noqa: F401
+    SAME,
+    block_counts,
+    cheap,
+    choose,
+    fingerprint,
+    settings,
+    users_own,
+    wait_for_end,
+)
 from tests.helpers.scenes.scene_hash import changes, digest, lines
 
 
@@ -207,8 +216,7 @@ def test_the_operator_cancelled_at_any_tick_leaves_the_file(cheap: Any) -> None:
         for _ in range(ticks):
             job.tick(0.02)
         job.stop()
-        while job.tick():
-            pass
+        wait_for_end(job)
         assert running_job() is None
         assert block_counts() == counts
         assert changes(expected) == [], f"after {ticks} ticks"
@@ -250,8 +258,7 @@ def test_an_undo_step_of_a_half_built_road_holds_none_of_it(cheap: Any, users_ow
         job.tick()
     bpy.data.objects["Cube"].location.x += 1.0
     bpy.ops.ed.undo_push(message="moved meanwhile")
-    while job.tick():
-        pass
+    wait_for_end(job)
     assert job.error is None
     bpy.ops.ed.undo_push(message="Build Road")
     bpy.ops.ed.undo()
