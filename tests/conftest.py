@@ -104,7 +104,7 @@ def kept_groups() -> KeptGroups:
 
 @pytest.fixture(scope="module", autouse=True)
 def _empty_scene_for_module(request: pytest.FixtureRequest) -> Iterator[None]:
-    """Start each module of tests of Blender with an empty scene and its usual settings; leave none of its data behind."""
+    """Start each module of tests of Blender with factory settings and an empty scene; leave none of its data behind."""
     if not _needs_blender(request):
         yield
         return

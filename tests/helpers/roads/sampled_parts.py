@@ -17,7 +17,7 @@ from synthroads_addon.sampling.road import sample_road
 from synthroads_addon.scenario.road import RoadScenario
 
 PAIRS = [(name, section) for name, sections in SECTIONS_OF_CLASS.items() for section in sections]
-SEEDS = {1.0: 1, 5.0: 1, 50.0: 1, 600.0: 6, 3000.0: 2}
+SEEDS = {1.0: 1, 5.0: 1, 50.0: 1, 600.0: 3, 3000.0: 1}
 BLEND = 30.0
 """Behind a ramp's end the verge needs this length (m) to come back."""
 
@@ -38,14 +38,16 @@ def sampled_roads() -> list[RoadParameters]:
 
 
 @cache
-def full_roads() -> list[RoadParameters]:
-    """Roads of which each carriageway has an exit, an entry, an emergency bay, and a lane that begins or ends."""
+def full_road(design_class: str, section: str, seed: int) -> RoadParameters:
+    """A road of which each carriageway has an exit, an entry, an emergency bay, and a lane that begins or ends."""
     everything = {"turnouts": {"exits": 1, "entries": 1, "emergency_bays": 1}, "lane_changes": {"share": 1}}
-    return [
-        sample_road(scenario(design_class=design_class, cross_section=section, length=2000.0, **everything), seed)
-        for design_class, section in (("EKA1A", "RQ36"), ("EKA3", "RQ38.5"))
-        for seed in range(25)
-    ]
+    return sample_road(scenario(design_class=design_class, cross_section=section, length=2000.0, **everything), seed)
+
+
+def full_roads(seeds: range = range(16)) -> list[RoadParameters]:
+    """Such roads of two lanes and of four."""
+    pairs = (("EKA1A", "RQ36"), ("EKA3", "RQ38.5"))
+    return [full_road(design_class, section, seed) for design_class, section in pairs for seed in seeds]
 
 
 def sides(road: RoadParameters) -> list[tuple[str, Carriageway, list[tuple[str, Turnout]]]]:

@@ -86,14 +86,7 @@ def _add_values(found: list[str], item: Any, path: str, seen: set[int]) -> None:
     kind = _kind(type(item))
     if kind.has_keys:
         _add_custom_properties(found, item, path, kind)
-    properties = kind.all
-    if kind.single is not None:
-        try:
-            found.append(f"{path} = {kind.single(item)}\n")
-            properties = kind.others
-        except (AttributeError, RuntimeError, TypeError):
-            pass  # one of them can't be read here: each by itself
-    for name, type_ in properties:
+    for name, type_ in kind.others if _add_single(found, item, path, kind) else kind.all:
         try:
             value = getattr(item, name)
         except (AttributeError, RuntimeError, TypeError):
@@ -105,6 +98,17 @@ def _add_values(found: list[str], item: Any, path: str, seen: set[int]) -> None:
             _add_pointer(found, value, f"{path}.{name}", seen)
         elif not callable(value):
             found.append(f"{path}.{name} = {_plain(value)}\n")
+
+
+def _add_single(found: list[str], item: Any, path: str, kind: _Kind) -> bool:
+    """Add all single values at once; return whether that was possible: some can't be read everywhere."""
+    if kind.single is None:
+        return False
+    try:
+        found.append(f"{path} = {kind.single(item)}\n")
+    except (AttributeError, RuntimeError, TypeError):
+        return False
+    return True
 
 
 def _add_custom_properties(found: list[str], item: Any, path: str, kind: _Kind) -> None:
