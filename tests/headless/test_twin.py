@@ -14,7 +14,7 @@ from headless import cli
 from synthroads_addon.base.errors import InputError
 from synthroads_addon.scenario.scenario import Scenario, load_scenario
 from synthroads_addon.twin import formats as twin
-from tests.helpers.roads.twin_roads import many_roads
+from tests.helpers.roads.twin_roads import one_of_many
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -22,7 +22,7 @@ ROOT = Path(__file__).resolve().parents[2]
 @pytest.fixture
 def parameters(tmp_path: Path) -> Path:
     path = tmp_path / "parameters.json"
-    path.write_text(many_roads()[3].to_json(), encoding="utf-8")
+    path.write_text(one_of_many(3).to_json(), encoding="utf-8")
     return path
 
 

@@ -3,14 +3,21 @@
 from __future__ import annotations
 
 import ast
+import hashlib
+import marshal
+import os
+import sys
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from functools import cache
+from pathlib import Path
 from types import CodeType, SimpleNamespace
 from typing import Any
 from unittest import mock
 
 from tests.judges.samples import Samples
+
+CACHE = Path(__file__).parents[2] / ".pytest_cache" / "ifc-rules"
 
 
 def issues(file: Any, express_rules: bool = True) -> list[str]:
@@ -39,12 +46,23 @@ def _rules_compiled_once() -> Iterator[None]:
 
 @cache
 def _compiled(source: str, name: str, mode: str) -> CodeType:
-    """Return rules' code whose assertions say what they compared."""
+    """Return rules' code whose assertions say what they compared; it is kept among what pytest keeps of its own."""
+    import pytest
     from _pytest.assertion import rewrite
 
+    made_of = [source, name, mode, pytest.__version__, sys.version]
+    kept = CACHE / hashlib.sha256("\0".join(made_of).encode()).hexdigest()
+    with suppress(OSError, ValueError, EOFError, TypeError):
+        return marshal.loads(kept.read_bytes())
     tree = ast.parse(source)
     rewrite.AssertionRewriter(None, None, source.encode()).run(tree)
-    return compile(tree, name, mode)
+    code = compile(tree, name, mode)
+    with suppress(OSError):
+        CACHE.mkdir(parents=True, exist_ok=True)
+        part = kept.with_suffix(f".{os.getpid()}")
+        part.write_bytes(marshal.dumps(code))
+        part.replace(kept)
+    return code
 
 
 def verdict(samples: Samples) -> list[str]:

@@ -12,7 +12,7 @@ import pytest
 from synthroads_addon.road.objects import PointObject
 from synthroads_addon.twin.formats import FORMATS, TWIN_FORMATS, FormatEntry, missing_packages, write_twin
 from tests.helpers.page_modules import block_of_page, module_of_page
-from tests.helpers.roads.twin_roads import many_roads
+from tests.helpers.roads.twin_roads import one_of_many
 from tests.twin.test_geojson import features_of
 
 TWIN = Path(__file__).parents[2] / "synthroads_addon" / "twin"
@@ -25,7 +25,7 @@ PAGE = "extend/twin-format.md"
 def test_a_format_is_written_to_its_file_with_the_same_bytes_each_time(name: str, tmp_path: Path) -> None:
     if package := missing_packages(name):
         pytest.skip(f"needs {package}")
-    road, entry = many_roads()[2], FORMATS[name]
+    road, entry = one_of_many(3), FORMATS[name]
     for folder in ("one", "two"):
         (tmp_path / folder).mkdir()
         write_twin(road, tmp_path / folder, [name])
@@ -54,7 +54,7 @@ def _imports(path: Path) -> Iterator[tuple[str, str]]:
 def test_the_format_of_the_page_has_every_object_at_its_place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     entry = eval(f"{{{block_of_page(PAGE, 'text')}}}", {"FormatEntry": FormatEntry})["objects"]
     module = module_of_page(PAGE, f"synthroads_addon/twin{entry.module.replace('.', '/')}.py", monkeypatch)
-    road = many_roads()[2]
+    road = one_of_many(2)
     module.write_objects(road, tmp_path / entry.file, 0.005)
     with (tmp_path / entry.file).open(encoding="utf-8", newline="") as file:
         rows = {row["id"]: row for row in csv.DictReader(file)}

@@ -14,10 +14,11 @@ from synthroads_addon.road.parameters import RoadParameters
 from synthroads_addon.road.section import Carriageway, LineMarking, Turnout
 from synthroads_addon.road.things.gantry import Gantry
 from synthroads_addon.twin.geojson import write_geojson
-from tests.helpers.roads.twin_roads import full_road, many_roads
+from tests.helpers.roads.twin_roads import full_road, one_of_many
 from tests.twin.cityjson.test_cityjson import NOT_IN_TWIN
 
-ROADS = [full_road, lambda: many_roads()[2], lambda: many_roads()[3]]
+Features = list[list[dict[str, Any]]]
+ROADS = [full_road, lambda: one_of_many(2), lambda: one_of_many(3)]
 
 
 def features_of(road: RoadParameters, folder: Path) -> list[dict[str, Any]]:
@@ -26,6 +27,12 @@ def features_of(road: RoadParameters, folder: Path) -> list[dict[str, Any]]:
     assert data["type"] == "FeatureCollection"
     assert data["crs"]["properties"]["name"].endswith(f"::{road.metadata.epsg}")
     return data["features"]
+
+
+@pytest.fixture(scope="module")
+def features(tmp_path_factory: pytest.TempPathFactory) -> Features:
+    """The features of each of the roads."""
+    return [features_of(road(), tmp_path_factory.mktemp("geojson")) for road in ROADS]
 
 
 def lines_of(feature: dict[str, Any]) -> list[np.ndarray]:
@@ -37,18 +44,18 @@ def lines_of(feature: dict[str, Any]) -> list[np.ndarray]:
 
 
 @pytest.mark.parametrize("index", range(len(ROADS)))
-def test_every_object_is_there_with_its_instance(index: int, tmp_path: Path) -> None:
+def test_every_object_is_there_with_its_instance(index: int, features: Features) -> None:
     road = ROADS[index]()
-    found = {(f["properties"]["id"], f["properties"]["instance"]) for f in features_of(road, tmp_path)}
+    found = {(f["properties"]["id"], f["properties"]["instance"]) for f in features[index]}
     wanted = {(name, item.instance) for name, item in road.objects.items() if not isinstance(item, NOT_IN_TWIN)}
     assert found == wanted
 
 
 @pytest.mark.parametrize("index", range(len(ROADS)))
-def test_points_lie_on_the_analytic_road_within_a_millimetre(index: int, tmp_path: Path) -> None:
+def test_points_lie_on_the_analytic_road_within_a_millimetre(index: int, features: Features) -> None:
     road = ROADS[index]()
     geometry, origin = RoadGeometry(road), np.array(road.transform.translate)
-    for feature in features_of(road, tmp_path):
+    for feature in features[index]:
         about = feature["properties"]
         if about["feature"] == "furniture":
             continue
@@ -63,10 +70,10 @@ def test_points_lie_on_the_analytic_road_within_a_millimetre(index: int, tmp_pat
         assert np.linalg.norm(local - truth, axis=1).max() < 0.001, about["id"]
 
 
-def test_lanes_and_boundaries_are_those_of_the_cross_section(tmp_path: Path) -> None:
+def test_lanes_and_boundaries_are_those_of_the_cross_section(features: Features) -> None:
     road = full_road()
     geometry = RoadGeometry(road)
-    for feature in features_of(road, tmp_path):
+    for feature in features[0]:
         about = feature["properties"]
         item = road.objects[about["id"]]
         if about["feature"] not in ("lane", "lane_boundary", "paved_edge") or isinstance(item, Turnout):
@@ -89,9 +96,9 @@ def test_lanes_and_boundaries_are_those_of_the_cross_section(tmp_path: Path) -> 
             assert np.quantile(away, 0.95) < 3e-4
 
 
-def test_turnouts_have_the_lane_of_their_parameters(tmp_path: Path) -> None:
+def test_turnouts_have_the_lane_of_their_parameters(features: Features) -> None:
     road = full_road()
-    for feature in features_of(road, tmp_path):
+    for feature in features[0]:
         item = road.objects[feature["properties"]["id"]]
         if isinstance(item, Turnout) and item.ramp:
             about = feature["properties"]
@@ -100,11 +107,11 @@ def test_turnouts_have_the_lane_of_their_parameters(tmp_path: Path) -> None:
             assert max(about["widths"]) == pytest.approx(max(item.lane_width, item.ramp.lane_width), abs=1e-3)
 
 
-def test_dashes_are_those_of_the_marking(tmp_path: Path) -> None:
+def test_dashes_are_those_of_the_marking(features: Features) -> None:
     road = full_road()
     geometry = RoadGeometry(road)
     lines = 0
-    for feature in features_of(road, tmp_path):
+    for feature in features[0]:
         item = road.objects[feature["properties"]["id"]]
         if isinstance(item, LineMarking):
             lines += 1
@@ -115,10 +122,10 @@ def test_dashes_are_those_of_the_marking(tmp_path: Path) -> None:
     assert lines == len(road.of_type(LineMarking))
 
 
-def test_furniture_stands_where_the_parameters_say(tmp_path: Path) -> None:
+def test_furniture_stands_where_the_parameters_say(features: Features) -> None:
     road = full_road()
     geometry = RoadGeometry(road)
-    for feature in features_of(road, tmp_path):
+    for feature in features[0]:
         about = feature["properties"]
         if about["feature"] == "furniture" and feature["geometry"]["type"] == "Point":
             item = road.objects[about["id"]]

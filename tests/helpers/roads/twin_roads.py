@@ -29,14 +29,15 @@ def full_road() -> RoadParameters:
     return road(11, design_class="EKA1A", cross_section="RQ36", length=1100.0, **EVERYTHING)
 
 
+NUMBER = 50
+"""Of the roads that `one_of_many` makes."""
+
+
 @cache
-def many_roads() -> list[RoadParameters]:
-    """Fifty roads: every design class with its cross-sections, full ones, construction zones, short and plain ones."""
-    made = []
-    for number in range(50):
-        design_class, section = PAIRS[number % len(PAIRS)]
-        kind = number % 4
-        length = (200.0, 1100.0, 600.0, 40.0)[kind]
-        limits = ({}, EVERYTHING, WORKS, {})[kind]
-        made.append(road(number, design_class=design_class, cross_section=section, length=length, **limits))
-    return made
+def one_of_many(number: int) -> RoadParameters:
+    """One of fifty roads: every design class with its cross-sections; plain, full, with a construction zone, short."""
+    design_class, section = PAIRS[number % len(PAIRS)]
+    kind = number % 4
+    length = (200.0, 1100.0, 600.0, 40.0)[kind]
+    limits = ({}, EVERYTHING, WORKS, {})[kind]
+    return road(number, design_class=design_class, cross_section=section, length=length, **limits)

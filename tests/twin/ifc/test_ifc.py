@@ -259,11 +259,11 @@ FLAT = [
 ]
 
 
-@pytest.mark.parametrize("sign", [1.0, -1.0])
-def test_clothoids_between_nearly_equal_radii(sign: float, tmp_path) -> None:
-    # All in one file: what an IFC clothoid is worst at.
+def test_clothoids_between_nearly_equal_radii(tmp_path) -> None:
+    # All in one file, to the left and the right in turn: what an IFC clothoid is worst at.
     elements = []
-    for radius, length, change in FLAT:
+    for number, (radius, length, change) in enumerate(FLAT):
+        sign = 1.0 - 2.0 * (number % 2)
         first, last = sign / radius, sign / radius + sign * change / length
         elements += [(length, first, last), (length, last, first), (50.0, 0.0, 0.0), (length, 0.0, last)]
         elements += [(length, last, -first), (30.0, 0.0, 1e-9)]
@@ -832,7 +832,7 @@ def test_only_with_ifcopenshell(monkeypatch, tmp_path) -> None:
 def test_whatever_is_a_road_can_be_written(tmp_path_factory: pytest.TempPathFactory) -> None:
     written_roads = 0
 
-    @settings(max_examples=8, phases=[Phase.generate], deadline=None, suppress_health_check=list(HealthCheck))
+    @settings(max_examples=6, phases=[Phase.generate], deadline=None, suppress_health_check=list(HealthCheck))
     @given(data=road_data(*OBJECTS))
     def check(data: dict[str, Any]) -> None:
         nonlocal written_roads
@@ -852,7 +852,7 @@ def test_whatever_is_a_road_can_be_written(tmp_path_factory: pytest.TempPathFact
         assert issues(file) == []
 
     check()
-    assert written_roads >= 4
+    assert written_roads >= 3
 
 
 def test_a_post_that_begins_above_its_beam_has_no_body(tmp_path) -> None:
